@@ -1,0 +1,20 @@
+"""`python -m shutter_addon render …` with the bpy wheel; see blender/commands.py."""
+
+import sys
+
+
+def main() -> int:
+    try:
+        import bpy  # noqa: F401
+    except ImportError:
+        print("shutter: Blender as a library is needed: pip install bpy (Python 3.13), or scripts/setup", file=sys.stderr)
+        return 2
+    from . import blender
+    from .blender.commands import main as command
+
+    blender.register()
+    return command(sys.argv[1:])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,30 @@
+"""Everything that touches bpy: properties, engine, strips, commands."""
+
+from . import engine, handlers, properties
+
+_modules = (properties, engine, handlers)
+_commands = []
+
+
+def register():
+    """Registers everything with Blender, the command included."""
+    import bpy
+
+    for module in _modules:
+        module.register()
+    _commands.append(bpy.utils.register_cli_command("shutter", _run))
+
+
+def unregister():
+    """Leaves nothing behind."""
+    import bpy
+
+    bpy.utils.unregister_cli_command(_commands.pop())
+    for module in reversed(_modules):
+        module.unregister()
+
+
+def _run(argv):
+    from .commands import main
+
+    return main(argv)

@@ -1,0 +1,100 @@
+"""F-curves of the edit's Scene: values at any frame, whatever frame Blender itself is at.
+
+The engine is called with the effect scene's depsgraph, which knows nothing of the edit's animation.
+"""
+
+from itertools import pairwise
+
+import bpy
+from bpy_extras import anim_utils
+
+from ..core import keyframes
+
+
+class Curves:
+    """The F-curves of a scene, found by path."""
+
+    def __init__(self, scene):
+        animation = scene.animation_data
+        bag = None
+        if animation and animation.action and animation.action_slot:
+            bag = anim_utils.action_get_channelbag_for_slot(animation.action, animation.action_slot)
+        self._curves = {(c.data_path, c.array_index): c for c in bag.fcurves if not c.mute} if bag else {}
+
+    def find(self, path: str, index: int = 0):
+        """The F-curve of a property, or None; muted ones do not count."""
+        return self._curves.get((path, index))
+
+    def under(self, path: str) -> list:
+        """The F-curves whose path starts with `path`."""
+        return [curve for (data_path, _), curve in self._curves.items() if data_path.startswith(path)]
+
+    def value(self, owner, path: str, name: str, frame: float):
+        """A float property, or a float vector as a list, at a frame; path: the owner's, from the scene."""
+        value = getattr(owner, name)
+        if isinstance(value, float):
+            return self._component(f"{path}.{name}", 0, frame, value)
+        return [self._component(f"{path}.{name}", i, frame, v) for i, v in enumerate(value)]
+
+    def _component(self, path, index, frame, value):
+        curve = self._curves.get((path, index))
+        return curve.evaluate(frame) if curve and not curve.is_empty else value
+
+
+def key_frames(curves) -> list[float]:
+    """Frames with a key on any of the curves, ascending."""
+    return sorted({key.co[0] for curve in curves for key in curve.keyframe_points})
+
+
+def progress(curves, start: float, end: float, frame: float) -> float:
+    """Share 0 to 1 of the way between two keys at a frame, with the easing of the curve that changes most."""
+    curve = max(curves, key=lambda c: abs(c.evaluate(end) - c.evaluate(start)))
+    change = curve.evaluate(end) - curve.evaluate(start)
+    if abs(change) < 1e-9:
+        return 0.0
+    return min(max((curve.evaluate(frame) - curve.evaluate(start)) / change, 0.0), 1.0)
+
+
+def ease_at(curve, frame: float) -> str:
+    """The recipe's word for the ease of the span that starts at a frame; linear where there is no key."""
+    for key in curve.keyframe_points if curve else ():
+        if key.co[0] == frame:
+            word = key.interpolation.lower()
+            return word if word in keyframes.EASES else "bezier"
+    return "linear"
+
+
+def set_keys(scene, path: str, index: int, keys) -> None:
+    """Replaces a property's F-curve by keys (frame, value, ease of the span that follows)."""
+    bag = _channelbag(scene)
+    if (old := bag.fcurves.find(path, index=index)) is not None:
+        bag.fcurves.remove(old)
+    curve = bag.fcurves.new(path, index=index)
+    points = curve.keyframe_points
+    points.add(len(keys))
+    points.foreach_set("co", [number for frame, value, _ in keys for number in (frame, value)])
+    for point, (_, _, ease) in zip(points, keys, strict=True):
+        point.interpolation = ease.upper()
+        point.handle_left_type = point.handle_right_type = "FREE"
+    # Flat handles of a third of the span: eased is u²(3 − 2u), as in core.keyframes, whatever lies beside it.
+    reach = [(b[0] - a[0]) / 3 for a, b in pairwise(keys)]
+    for point, before, after in zip(points, [1.0, *reach], [*reach, 1.0], strict=True):
+        point.handle_left = point.co[0] - before, point.co[1]
+        point.handle_right = point.co[0] + after, point.co[1]
+
+
+def _channelbag(scene):
+    animation = scene.animation_data_create()
+    if animation.action is None:
+        animation.action = bpy.data.actions.new(f"{scene.name}Action")
+    if animation.action_slot is None:
+        animation.action_slot = animation.action.slots.new("SCENE", scene.name)
+    return anim_utils.action_ensure_channelbag_for_slot(animation.action, animation.action_slot)
+
+
+def remove_curves(scene, path: str) -> None:
+    """Removes the scene's F-curves whose path starts with `path`."""
+    if scene.animation_data and scene.animation_data.action:
+        bag = _channelbag(scene)
+        for curve in [c for c in bag.fcurves if c.data_path.startswith(path)]:
+            bag.fcurves.remove(curve)

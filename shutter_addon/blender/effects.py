@@ -1,0 +1,179 @@
+"""The effect at a frame, from Blender's data to core's; and recipes into Blender's data."""
+
+import numpy as np
+
+from ..core import keyframes, recipe, scribbles, shutters
+from . import animation, geometry
+
+OPTIONS = ("position", "interpolation", "light", "exposure", "edges")
+
+
+class EffectError(RuntimeError):
+    """The effect cannot be rendered as it stands; the message is one sentence for the user."""
+
+
+def instant(edit, effect, strip, frame: float) -> recipe.Instant:
+    """The effect at a timeline frame of its edit; strip: the effect strip that shows it. EffectError: no shutter
+    at all, or one that never opens."""
+    if not effect.shutters:
+        raise EffectError(f'"{effect.name}" has no shutter')
+    curves, path = animation.Curves(edit), effect.path_from_id()
+    bars = [
+        _bars_at(curves, f"{path}.shutters[{i}]", shutter, effect.window, frame)
+        for i, shutter in enumerate(effect.shutters)
+    ]
+    for shutter, values in zip(effect.shutters, bars, strict=True):
+        try:
+            shutters.check_bars(values)
+        except shutters.ShutterError as error:
+            raise EffectError(f'shutter "{shutter.name}" at frame {frame:g}: {error}') from None
+    return recipe.Instant(options(effect), np.stack(bars), tuple(_shapes_at(edit, effect, strip, curves, frame)))
+
+
+def options(effect) -> recipe.Options:
+    """The effect's options in the recipe's words."""
+    words = {name: getattr(effect, name).lower() for name in OPTIONS}
+    return recipe.Options(effect.window, **words, aggregate=int(effect.aggregate), border=effect.border)
+
+
+def _bars_at(curves, path: str, shutter, window: int, frame: float) -> np.ndarray:
+    """Bars at a frame; between keys by displacement, with the ease of the F-curves."""
+    stored = np.zeros(window)
+    weights = [bar.weight for bar in shutter.bars][:window]
+    stored[: len(weights)] = weights
+    keyed = {i: curve for i in range(window) if (curve := curves.find(f"{path}.bars[{i}].weight"))}
+    if not keyed:
+        return stored
+
+    def at(time):
+        bars = stored.copy()
+        bars[list(keyed)] = [max(curve.evaluate(time), 0.0) for curve in keyed.values()]
+        return bars
+
+    frames = animation.key_frames(keyed.values())
+    before, after, _ = keyframes.span(frames, frame)
+    if before == after:
+        return at(frames[before])
+    first, second = at(frames[before]), at(frames[after])
+    if not (first.any() and second.any()):  # the way to a closed shutter is no displacement
+        return at(frame)
+    return keyframes.between_bars(
+        first, second, animation.progress(keyed.values(), frames[before], frames[after], frame)
+    )
+
+
+def _shapes_at(edit, effect, strip, curves, frame: float):
+    names = [shutter.name for shutter in effect.shutters]
+    size = effect.scene.render.resolution_x, effect.scene.render.resolution_y
+    to_picture = np.linalg.inv(geometry.picture_to_image(strip, size))
+    for i, region in enumerate(effect.regions):
+        path = f"{effect.path_from_id()}.regions[{i}]"
+        if region.shutter not in names:
+            continue
+        strokes = _strokes_at(effect, region, curves.find(f"{path}.location"), frame)
+        location = curves.value(region, path, "location", frame)
+        rotation = np.degrees(curves.value(region, path, "rotation", frame))
+        scale = curves.value(region, path, "scale", frame)
+        strokes = [geometry.mapped(to_picture, stroke) for stroke in strokes]
+        yield scribbles.Shape(
+            names.index(region.shutter),
+            region.kind.lower(),
+            curves.value(region, path, "width", frame),
+            scribbles.transform(strokes, location, rotation, scale, size[0] / size[1]),
+        )
+
+
+def _strokes_at(effect, region, timing, frame: float) -> list[np.ndarray]:
+    """A region's strokes (n, 2) in image space at a frame, between two drawings with the ease of `timing`'s keys."""
+    layer = effect.annotation.layers.get(region.layer) if effect.annotation else None
+    if layer is None or not layer.frames:
+        return []
+    drawings = sorted(layer.frames, key=lambda drawing: drawing.frame_number)
+    numbers = [drawing.frame_number for drawing in drawings]
+    before, after, u = keyframes.span(numbers, frame)
+    u = keyframes.eased(u, animation.ease_at(timing, numbers[before]))
+    return scribbles.between_strokes(_points(drawings[before]), _points(drawings[after]), u)
+
+
+def _points(drawing) -> list[np.ndarray]:
+    result = []
+    for stroke in drawing.strokes:
+        flat = np.empty(len(stroke.points) * 3, dtype=np.float32)
+        stroke.points.foreach_get("co", flat)
+        result.append(flat.reshape(-1, 3)[:, :2].astype(np.float64))
+    return [points for points in result if len(points)]
+
+
+def apply(edit, effect, strip, source: recipe.Recipe) -> None:
+    """Replaces the effect's data and keys by a recipe, whose frame 1 is the strip's first."""
+    clear(edit, effect)
+    first = strip.left_handle - 1
+    effect.window = source.window
+    for name in OPTIONS:
+        setattr(effect, name, getattr(source, name).upper())
+    effect.aggregate, effect.border = str(source.aggregate), source.border
+    path = effect.path_from_id()
+    for i, shutter in enumerate(source.shutters):
+        _add_shutter(edit, effect, f"{path}.shutters[{i}]", shutter, first)
+    for i, region in enumerate(source.regions):
+        _add_region(edit, effect, strip, f"{path}.regions[{i}]", region, first)
+
+
+def clear(edit, effect) -> None:
+    """Removes the effect's shutters, regions, scribbles and keys."""
+    animation.remove_curves(edit, effect.path_from_id() + ".")
+    effect.shutters.clear()
+    effect.regions.clear()
+    if effect.annotation is not None:
+        for layer in list(effect.annotation.layers):
+            effect.annotation.layers.remove(layer)
+
+
+def _add_shutter(edit, effect, path: str, source: recipe.Shutter, first: float) -> None:
+    shutter = effect.shutters.add()
+    shutter.name, shutter.color = source.name, source.color
+    for weight in source.bars if source.bars is not None else source.keys[0].bars:
+        shutter.bars.add().weight = weight
+    if source.keys:
+        for k in range(len(shutter.bars)):
+            keys = [(key.frame + first, key.bars[k], key.ease) for key in source.keys]
+            animation.set_keys(edit, f"{path}.bars[{k}].weight", 0, keys)
+
+
+def _add_region(edit, effect, strip, path: str, source: recipe.Region, first: float) -> None:
+    region = effect.regions.add()
+    region.name, region.shutter, region.width = source.name, source.shutter, source.width
+    region.kind = source.kind.upper()
+    color = next(shutter.color for shutter in effect.shutters if shutter.name == source.shutter)
+    region.layer = _draw(effect, strip, source, color, first)
+    if not source.keys:
+        return
+    start = source.keys[0]
+    region.location, region.rotation, region.scale = start.location, np.radians(start.rotation), start.scale
+    channels = {
+        ("location", 0): lambda key: key.location[0],
+        ("location", 1): lambda key: key.location[1],
+        ("rotation", 0): lambda key: np.radians(key.rotation),
+        ("scale", 0): lambda key: key.scale,
+    }
+    for (name, index), value in channels.items():
+        keys = [(key.frame + first, value(key), key.ease) for key in source.keys]
+        animation.set_keys(edit, f"{path}.{name}", index, keys)
+
+
+def _draw(effect, strip, source: recipe.Region, color, first: float) -> str:
+    """Draws a region's strokes on an annotation layer of its own, a frame per drawing; the layer's name."""
+    layer = effect.annotation.layers.new(source.name or "Region", set_active=False)
+    layer.color = color
+    size = effect.scene.render.resolution_x, effect.scene.render.resolution_y
+    to_image = geometry.picture_to_image(strip, size)
+    for key, strokes in source.drawings():
+        drawing = layer.frames.new(int((key.frame if key else 1) + first))
+        for points in strokes:
+            stroke = drawing.strokes.new()
+            stroke.display_mode = "2DSPACE"
+            stroke.points.add(len(points))
+            image = np.zeros((len(points), 3), dtype=np.float32)
+            image[:, :2] = geometry.mapped(to_image, np.asarray(points))
+            stroke.points.foreach_set("co", image.ravel())
+    return layer.info

@@ -1,0 +1,25 @@
+"""Where a strip's picture lies on the sequencer's image, and which source frame it shows when."""
+
+import numpy as np
+
+
+def picture_to_image(strip, size) -> np.ndarray:
+    """Matrix (3, 3) from fractions of the strip's picture to the sequencer's image space.
+
+    Image space, as annotations have it: pixels, origin at the image's centre, y up. size: the picture's, in pixels.
+    Blender scales and turns a strip about its transform's origin.
+    """
+    width, height = size
+    t = strip.transform
+    cos, sin = np.cos(t.rotation), np.sin(t.rotation)
+    pivot = (np.array(t.origin) - 0.5) * (width, height)
+    linear = np.array([[cos, -sin], [sin, cos]]) * (t.scale_x, t.scale_y)
+    offset = np.array([t.offset_x, t.offset_y]) + pivot - linear @ (pivot + (width / 2, height / 2))
+    matrix = np.eye(3)
+    matrix[:2, :2], matrix[:2, 2] = linear * (width, height), offset
+    return matrix
+
+
+def mapped(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Points (n, 2) through a matrix (3, 3)."""
+    return points @ matrix[:2, :2].T + matrix[:2, 2]

@@ -1,0 +1,83 @@
+"""Pictures of effect scenes: one renderer each, all on one device, kept from frame to frame."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..compute.renderer import Renderer, open_compositor
+from ..media import MediaError
+from ..media.exr import write_exr
+from . import effects, sources, strips, timing
+
+FAULTS = (effects.EffectError, MediaError, MemoryError)
+
+device = "auto"
+weights_folder: Path | None = None
+
+_compositor = None
+_renderers: dict = {}
+
+
+def picture(scene, scene_frame: float, say=print) -> np.ndarray:
+    """The picture (H, W, 4) float32 of an effect scene at one of its frames: scene-linear, premultiplied, top row
+    first. One of FAULTS: there is none, in one sentence. say: called with a sentence when the device is a lesser one.
+    """
+    edit, effect, strip = strips.find_edit(scene)
+    frame = strips.timeline_frame(strip, scene_frame)
+    source = strips.source_of(edit, effect, strip)
+    renderer = _renderer(scene, source, say)
+    fps = edit.render.fps / edit.render.fps_base
+    moment = effects.instant(edit, effect, strip, frame)
+    if weights_folder is not None:
+        _write_weights(renderer.coefficients(moment), [s.name for s in effect.shutters], frame - strip.left_handle + 1)
+    index = timing.source_frame(source, frame, renderer.source.count, fps)
+    return renderer.picture(index, moment, backward=source.use_reverse_frames)
+
+
+def _renderer(scene, source_strip, say) -> Renderer:
+    global _compositor
+    if _compositor is None:
+        _compositor, message = open_compositor(device)
+        if message:
+            say(message)
+    key = sources.media_key(source_strip)
+    old_key, renderer = _renderers.get(scene.session_uid, (None, None))
+    if old_key != key:
+        if renderer is not None:
+            _close(renderer)
+        renderer = Renderer(_compositor, sources.open_media(source_strip))
+        _renderers[scene.session_uid] = key, renderer
+    return renderer
+
+
+def _close(renderer) -> None:
+    with renderer.compositor.current():
+        renderer.release_window()
+    renderer.source.close()
+
+
+def forget(*_) -> None:
+    """Closes all sources and frees the device: when a file is loaded, and when the extension goes."""
+    global _compositor
+    for _key, renderer in _renderers.values():
+        _close(renderer)
+    _renderers.clear()
+    if _compositor is not None:
+        with _compositor.current():
+            _compositor.release()
+        _compositor = None
+
+
+def resized(picture: np.ndarray, width: int, height: int) -> np.ndarray:
+    """The picture at the size the sequencer asks for (it renders previews smaller)."""
+    if picture.shape[:2] == (height, width):
+        return picture
+    import OpenImageIO as oiio
+
+    small = oiio.ImageBufAlgo.resize(oiio.ImageBuf(np.ascontiguousarray(picture)), roi=oiio.ROI(0, width, 0, height))
+    return small.get_pixels(oiio.FLOAT).reshape(height, width, 4)
+
+
+def _write_weights(coefficients: np.ndarray, names: list[str], frame: float) -> None:
+    """Coefficients (N, h, w) as a float EXR, a channel per shutter."""
+    write_exr(weights_folder / f"{round(frame):04d}.exr", np.moveaxis(coefficients, 0, -1), names)

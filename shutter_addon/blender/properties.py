@@ -1,0 +1,124 @@
+"""The effect's data: on the edit's Scene, where it can be keyed (properties nested on a strip cannot).
+
+`scene.virtual_shutter.effects[i]` belongs to the effect scene it points to; the Scene strips that show that scene
+are the effect's strips. Frames are timeline frames of the edit, as everywhere in Blender.
+"""
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+from bpy.types import PropertyGroup
+
+from ..core.shutters import MAX_WINDOW
+
+# Enum identifiers are the recipe's words in capitals.
+POSITIONS = (
+    ("START", "Start", "The window begins at the frame"),
+    ("CENTER", "Center", "The frame lies in the middle of the window"),
+    ("END", "End", "The window ends at the frame"),
+)
+INTERPOLATIONS = (
+    ("DISPLACEMENT", "Displacement", "Between shutters, times move"),
+    ("VALUE", "Value", "Between shutters, pictures cross-fade"),
+)
+LIGHTS = (
+    ("LINEAR", "Linear", "Sum light, as a camera does: bright streaks stay bright"),
+    ("ENCODED", "Encoded", "Sum code values"),
+)
+EXPOSURES = (
+    ("NORMALIZED", "Normalized", "Every shutter gives full brightness"),
+    ("WEIGHTED", "Weighted", "A shutter that is open for less time than the default is darker"),
+)
+EDGES = (
+    ("HOLD", "Hold", "Beyond the clip's ends, repeat its first or last frame"),
+    ("MIRROR", "Mirror", "Beyond the clip's ends, play back from there"),
+    ("SHORTEN", "Shorten", "Leave out what lies beyond the clip's ends"),
+)
+AGGREGATES = (
+    ("1", "1×1", "Every pixel has its own shutter"),
+    ("2", "2×2", "Blocks of 2×2 pixels share a shutter"),
+    ("4", "4×4", "Blocks of 4×4 pixels share a shutter"),
+)
+KINDS = (
+    ("LINE", "Line", "The strokes, as wide as the region's width"),
+    ("LASSO", "Lasso", "What the strokes enclose"),
+)
+
+
+class ShutterBar(PropertyGroup):
+    weight: FloatProperty(
+        name="Weight", description="How much this frame contributes", default=1.0, min=0.0, soft_max=1.0
+    )
+
+
+class Shutter(PropertyGroup):
+    name: StringProperty(name="Name", default="Shutter")
+    color: FloatVectorProperty(name="Color", subtype="COLOR_GAMMA", size=3, min=0.0, max=1.0, default=(0.8, 0.8, 0.8))
+    bars: CollectionProperty(type=ShutterBar)
+
+
+class ShutterRegion(PropertyGroup):
+    name: StringProperty(name="Name", default="Region")
+    shutter: StringProperty(name="Shutter", description="Name of the shutter that holds here")
+    layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes")
+    kind: EnumProperty(name="Kind", items=KINDS)
+    width: FloatProperty(
+        name="Width",
+        description="Width of lines, as a part of the picture's height",
+        default=0.02,
+        min=0.0,
+        soft_max=0.5,
+    )
+    location: FloatVectorProperty(name="Location", description="In parts of the picture", size=2)
+    rotation: FloatProperty(name="Rotation", description="About the shape's center", subtype="ANGLE")
+    scale: FloatProperty(name="Scale", description="About the shape's center", default=1.0)
+
+
+class ShutterEffect(PropertyGroup):
+    name: StringProperty(name="Name", default="Shutter")
+    scene: PointerProperty(name="Scene", description="Scene that the effect's strips show", type=bpy.types.Scene)
+    source: StringProperty(name="Source", description="Identity of the source strip")
+    start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts")
+    annotation: PointerProperty(name="Scribbles", type=bpy.types.Annotation)
+    window: IntProperty(
+        name="Window", description="Source frames that a shutter can expose", default=8, min=1, max=MAX_WINDOW
+    )
+    position: EnumProperty(name="Position", items=POSITIONS)
+    interpolation: EnumProperty(name="Interpolation", items=INTERPOLATIONS)
+    light: EnumProperty(name="Light", items=LIGHTS)
+    exposure: EnumProperty(name="Exposure", items=EXPOSURES)
+    edges: EnumProperty(name="Edges", items=EDGES)
+    aggregate: EnumProperty(name="Aggregate", items=AGGREGATES)
+    border: BoolProperty(name="Border", description="The frame's edge is a scribble of the default shutter")
+    shutters: CollectionProperty(type=Shutter)
+    regions: CollectionProperty(type=ShutterRegion)
+
+
+class ShutterEdit(PropertyGroup):
+    effects: CollectionProperty(type=ShutterEffect)
+
+
+classes = (ShutterBar, Shutter, ShutterRegion, ShutterEffect, ShutterEdit)
+
+
+def register():
+    for cls in classes:
+        bpy.utils.register_class(cls)
+    bpy.types.Scene.virtual_shutter = PointerProperty(type=ShutterEdit)
+    # A strip cannot be pointed to and may be renamed: the source strip carries the identity that effects look for.
+    bpy.types.Strip.virtual_shutter_source = StringProperty(options={"HIDDEN"})
+
+
+def unregister():
+    del bpy.types.Strip.virtual_shutter_source
+    del bpy.types.Scene.virtual_shutter
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,116 @@
+"""Effect strips: a Scene strip above its source, and the scene, data and source that belong to it."""
+
+import uuid
+
+import bpy
+
+from . import effects, sources
+
+ENGINE = "VIRTUAL_SHUTTER"
+SOURCES = ("MOVIE", "IMAGE")
+_LOOK = ("use_flip_x", "use_flip_y", "color_multiply", "color_saturation", "multiply_alpha")
+
+
+def effect_strips(edit) -> list:
+    """The edit's effect strips, those inside meta strips too."""
+    if edit.sequence_editor is None:
+        return []
+    return [
+        strip
+        for strip in edit.sequence_editor.strips_all
+        if strip.type == "SCENE" and strip.scene and strip.scene.render.engine == ENGINE
+    ]
+
+
+def effect_of(edit, scene):
+    """The edit's effect that an effect scene shows, or None."""
+    return next((effect for effect in edit.virtual_shutter.effects if effect.scene == scene), None)
+
+
+def find_edit(scene):
+    """Edit, effect and one of its strips for an effect scene. EffectError: nothing uses it any more."""
+    for edit in bpy.data.scenes:
+        if (effect := effect_of(edit, scene)) is not None:
+            for strip in effect_strips(edit):
+                if strip.scene == scene:
+                    return edit, effect, strip
+    raise effects.EffectError(f'scene "{scene.name}" belongs to no Shutter strip')
+
+
+def origin(strip) -> float:
+    """Timeline frame at which the strip's untrimmed content would start: the same for all parts of a cut strip."""
+    return strip.content_start - strip.content_trim_start
+
+
+def timeline_frame(strip, scene_frame: float) -> float:
+    """The timeline frame at which an effect strip shows a frame of its scene."""
+    return origin(strip) + scene_frame - strip.scene.frame_start
+
+
+def source_of(edit, effect, strip):
+    """The effect's source strip: of those with its identity (parts of a cut strip, copies) the nearest in time, then
+    the nearest below. EffectError: there is none any more."""
+    candidates = [s for s in edit.sequence_editor.strips_all if s.virtual_shutter_source == effect.source]
+    if not candidates:
+        raise effects.EffectError(f'the source strip of "{strip.name}" was deleted')
+
+    def distance(other):
+        apart = max(other.left_handle - strip.right_handle + 1, strip.left_handle - other.right_handle + 1, 0)
+        return apart, other.channel > strip.channel, abs(strip.channel - other.channel)
+
+    return min(candidates, key=distance)
+
+
+def add_effect(edit, source):
+    """Puts a new effect on a movie or image strip: its strip above the source, same range, transform and crop.
+
+    Returns strip and effect; the effect has no shutter yet. MediaError: the source cannot be read."""
+    medium = sources.open_media(source)
+    medium.close()
+    if not source.virtual_shutter_source:
+        source.virtual_shutter_source = uuid.uuid4().hex
+    scene = _new_scene(edit, f"Shutter {source.name}", (medium.width, medium.height), source)
+    above = max(s.channel for s in edit.sequence_editor.strips_all if _overlap(s, source)) + 1
+    strip = edit.sequence_editor.strips.new_scene("Shutter", scene, above, int(source.content_start))
+    strip.left_handle, strip.right_handle = source.left_handle, source.right_handle
+    strip.blend_type = source.blend_type
+    copy_look(source, strip)
+    effect = edit.virtual_shutter.effects.add()
+    effect.name, effect.scene, effect.source, effect.start = (
+        strip.name,
+        scene,
+        source.virtual_shutter_source,
+        origin(strip),
+    )
+    effect.annotation = bpy.data.annotations.new(f"Scribbles {source.name}")
+    return strip, effect
+
+
+def _overlap(a, b) -> bool:
+    return a.left_handle < b.right_handle and b.left_handle < a.right_handle
+
+
+def copy_look(source, strip) -> None:
+    """Transform, crop, flip and colour of the source strip."""
+    for group in ("transform", "crop"):
+        old, new = getattr(source, group), getattr(strip, group)
+        for prop in old.bl_rna.properties:
+            if not prop.is_readonly:
+                setattr(new, prop.identifier, getattr(old, prop.identifier))
+    for name in _LOOK:
+        setattr(strip, name, getattr(source, name))
+
+
+def _new_scene(edit, name: str, size, source):
+    scene = bpy.data.scenes.new(name)
+    scene.render.engine = ENGINE
+    scene.render.resolution_x, scene.render.resolution_y = size
+    scene.render.resolution_percentage = 100
+    scene.frame_start, scene.frame_end = 1, max(1, int(source.content_end - source.content_start))
+    # A Scene strip plays at its scene's rate; at the edit's it shows one frame per timeline frame.
+    scene.render.fps, scene.render.fps_base = edit.render.fps, edit.render.fps_base
+    # Without a camera, Blender renders a Scene strip empty and never asks the engine.
+    camera = bpy.data.objects.new(f"{name} Camera", bpy.data.cameras.new(f"{name} Camera"))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    return scene

@@ -1,0 +1,91 @@
+"""Which source frame a strip shows at a timeline frame: Blender's own answer, which its Python API does not give."""
+
+import ctypes
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+# eSeqRetimingKeyFlag: the key starts a smooth transition between two speeds.
+_TRANSITION_IN = 1 << 0
+
+
+@dataclass(frozen=True)
+class RetimingKey:
+    """index: position in frames of the content, before retiming; factor: what it shows, 0 to 1 of the content."""
+
+    index: float
+    flag: int
+    factor: float
+
+
+def source_frame(strip, frame: float, count: int, scene_fps: float) -> int:
+    """Source frame that a movie or image strip shows at a timeline frame; count: frames of its medium.
+
+    Trims, cuts, playback rate, retiming keys, reversed frames and strobe as Blender's sequencer applies them.
+    """
+    length = max(1, count - strip.content_trim_start - strip.content_trim_end)
+    end = strip.content_end - 1
+    position = max(end - frame if strip.use_reverse_frames else frame - strip.content_start, 0.0)
+    keys = _retiming_keys(strip)
+    position *= _playback_rate(strip, keys, length, scene_fps)
+    if len(keys) > 1:
+        position = retimed(keys, position) * length
+    position = min(max(position, 0.0), length - 1)
+    if strip.strobe > 1:
+        position -= math.fmod(position, strip.strobe)
+    # Movies show the nearest frame, image strips the one begun.
+    index = math.floor(position + 0.5) if strip.type == "MOVIE" else int(position)
+    return index + strip.content_trim_start
+
+
+def _playback_rate(strip, keys, length: int, scene_fps: float) -> float:
+    """Source frames per timeline frame: 1, or the movie's rate over the scene's if the strip was added to keep its
+    speed. Blender does not tell which; the strip's length does."""
+    fps = getattr(strip, "fps", 0.0)
+    if fps <= 0:
+        return 1.0
+    rate = fps / scene_fps
+    shown = strip.content_end - strip.content_start
+    natural = keys[-1].index if len(keys) > 1 else length
+    return rate if abs(natural / rate - shown) < abs(natural - shown) or int(natural / rate) == shown else 1.0
+
+
+def _retiming_keys(strip) -> list[RetimingKey]:
+    """The strip's retiming keys from Blender's memory: Python gets their timeline frames, but not what they show.
+
+    SeqRetimingKey begins with double strip_frame_index, int flag, float retiming_factor.
+    """
+
+    class Raw(ctypes.Structure):
+        _fields_ = (("index", ctypes.c_double), ("flag", ctypes.c_int), ("factor", ctypes.c_float))
+
+    raw = [Raw.from_address(key.as_pointer()) for key in strip.retiming_keys]
+    return [RetimingKey(key.index, key.flag, key.factor) for key in raw]
+
+
+def retimed(keys: list[RetimingKey], position: float) -> float:
+    """What the keys make of a position in the content, 0 to 1: lines between them, arcs through transitions."""
+    k = max((i for i, key in enumerate(keys[:-1]) if key.index <= position), default=0)
+    first, second = keys[k], keys[k + 1]
+    if first.flag & _TRANSITION_IN and 0 < k < len(keys) - 2:
+        speed_in, speed_out = _speed(keys[k - 1], first), _speed(second, keys[k + 2])
+        if abs(speed_in - speed_out) * keys[-1].index >= 0.01:
+            return min(1.0, _arc(first, speed_in, second, speed_out, position))
+        return min(1.0, first.factor + speed_in * (position - first.index))
+    return min(1.0, first.factor + _speed(first, second) * (position - first.index))
+
+
+def _speed(first: RetimingKey, second: RetimingKey) -> float:
+    return (second.factor - first.factor) / max(second.index - first.index, 1e-9)
+
+
+def _arc(first: RetimingKey, speed_in: float, second: RetimingKey, speed_out: float, position: float) -> float:
+    """The circle that leaves the first key with one slope and reaches the second with the other."""
+    # Its centre lies on both normals: x + slope·y is the same there as at the key.
+    lines = np.array([[1.0, speed_in], [1.0, speed_out]])
+    sums = [first.index + speed_in * first.factor, second.index + speed_out * second.factor]
+    x, y = np.linalg.solve(lines, sums)
+    radius = math.hypot(first.index - x, first.factor - y)
+    side = -1 if y > first.factor else 1
+    return y + side * math.sqrt(max(radius**2 - (position - x) ** 2, 0.0))

@@ -1,0 +1,1 @@
+"""Passes over a device: diffuse, compose. No bpy."""

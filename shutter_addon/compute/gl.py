@@ -1,0 +1,88 @@
+"""The GL device: a moderngl context of its own, with a window or without one (EGL, WGL)."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import contextmanager
+
+import moderngl
+import numpy as np
+
+from .passes import LOCAL_SIZE, Pass, source
+
+# Format (as in GLSL): components, moderngl's type, NumPy's type of what is written and read.
+FORMATS = {
+    "rgba8": (4, "f1", np.uint8),
+    "rgba16": (4, "nu2", np.uint16),
+    "rgba16f": (4, "f2", np.float16),
+    "rgba32f": (4, "f4", np.float32),
+    "r32f": (1, "f4", np.float32),
+    "r16ui": (1, "u2", np.uint16),
+}
+
+
+class NoGLError(RuntimeError):
+    """There is no GL 4.3 here; the message is one sentence for the user."""
+
+
+class GLDevice:
+    """Textures and compute passes. Calls belong inside `with device.current():`, on whatever thread renders."""
+
+    def __init__(self):
+        backend = {"backend": "egl"} if sys.platform == "linux" else {}
+        try:
+            self._context = moderngl.create_context(standalone=True, require=430, **backend)
+        except Exception as error:  # moderngl raises whatever its platform raises
+            raise NoGLError(f"no OpenGL 4.3: {error}") from None
+        self._programs = {}
+        self.name = self._context.info["GL_RENDERER"]
+        self.max_layers = self._context.info["GL_MAX_ARRAY_TEXTURE_LAYERS"]
+        self.max_size = self._context.info["GL_MAX_TEXTURE_SIZE"]
+
+    @contextmanager
+    def current(self):
+        """Makes the context current on this thread, and the previous one afterwards (Blender's, in a window)."""
+        with self._context:
+            yield self
+
+    def texture(self, width: int, height: int, layers: int, kind: str) -> moderngl.TextureArray:
+        """A texture array of `kind` in FORMATS, without filtering. NoGLError: the device has no room for it."""
+        components, dtype, _ = FORMATS[kind]
+        try:
+            texture = self._context.texture_array((width, height, layers), components, dtype=dtype)
+        except moderngl.Error as error:
+            raise NoGLError(f"{self.name} has no room for {layers} layers of {width}×{height}: {error}") from None
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        texture.extra = kind
+        return texture
+
+    def write(self, texture, array: np.ndarray, layer: int = 0) -> None:
+        """Fills a layer from a C-contiguous array (height, width[, 4]) of the format's type."""
+        width, height, _ = texture.size
+        texture.write(array, viewport=(0, 0, layer, width, height, 1), alignment=1)
+
+    def read(self, texture) -> np.ndarray:
+        """The texture as an array (layers, height, width, components)."""
+        components, _, dtype = FORMATS[texture.extra]
+        width, height, layers = texture.size
+        array = np.empty((layers, height, width, components), dtype=dtype)
+        texture.read_into(array, alignment=1)
+        return array
+
+    def run(self, program: Pass, size: tuple[int, ...], *, textures=None, images=None, **constants) -> None:
+        """Runs a pass over `size` invocations (x, y[, z]); textures and images by name, constants by keyword."""
+        if program not in self._programs:
+            self._programs[program] = self._context.compute_shader(source(program))
+        shader = self._programs[program]
+        for unit, name in enumerate(program.samplers):
+            textures[name].use(unit)
+        for unit, (name, image) in enumerate(program.images.items()):
+            images[name].bind_to_image(unit, read=image.reads, write=True)
+        for name, value in constants.items():
+            if name in shader:  # the compiler drops what a source does not use
+                shader[name] = value
+        shader.run(*(-(-n // local) for n, local in zip((*size, 1)[:3], LOCAL_SIZE, strict=True)))
+        self._context.memory_barrier()
+
+    def release(self) -> None:
+        self._context.release()

@@ -1,0 +1,43 @@
+"""What a composition needs to know of its shutters, once per frame: gains, knots or bars, as float32 tables."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core import shutters
+from ..core.recipe import Instant
+
+
+def padded(values: np.ndarray) -> np.ndarray:
+    """(…, N) as (…, G, 4): four shutters to a texel, zeros behind the last."""
+    groups = -(-values.shape[-1] // 4)
+    result = np.zeros((*values.shape[:-1], groups * 4))
+    result[..., : values.shape[-1]] = values
+    return result.reshape(*values.shape[:-1], groups, 4)
+
+
+def table(instant: Instant) -> np.ndarray:
+    """The table (1 + rows, columns, 4) float32 that shaders/include/compose.glsl describes.
+
+    Row 0: the gains. Displacement: a row per piece of the quantiles, start and end of each group of four shutters
+    side by side, dz in the last column. Value: a row per frame of the window, its normalised bars.
+    """
+    rows = _pieces(instant.bars) if instant.options.interpolation == "displacement" else _bars(instant.bars)
+    result = np.zeros((1 + len(rows), rows.shape[1], 4), dtype=np.float32)
+    gains = padded(instant.gains)
+    result[0, : len(gains)] = gains
+    result[1:] = rows
+    return result
+
+
+def _pieces(bars) -> np.ndarray:
+    knots = shutters.knots(bars)
+    start, end = padded(knots.start), padded(knots.end)
+    rows = np.zeros((len(start), 2 * start.shape[1] + 1, 4))
+    rows[:, 0:-1:2], rows[:, 1:-1:2] = start, end
+    rows[:, -1, 0] = np.diff(knots.z)
+    return rows
+
+
+def _bars(bars) -> np.ndarray:
+    return padded((bars / bars.sum(axis=1, keepdims=True)).T)

@@ -1,0 +1,62 @@
+"""The reference compositor: every pixel's own shutter, exact, in float64, one frame after the other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import light, shutters
+from .recipe import Instant
+
+
+def window_indices(instant: Instant, index: int, count: int) -> np.ndarray:
+    """Source frames (L,) of the window around source frame `index` of a clip of `count` frames; −1: left out.
+
+    Past the clip's ends "hold" repeats the last frame, "mirror" plays back from it without showing it twice.
+    "shorten" leaves frames out, but keeps the window's own ends when it lies outside altogether.
+    """
+    wanted = index - instant.options.before + np.arange(instant.options.window)
+    held = np.clip(wanted, 0, count - 1)
+    if instant.options.edges == "mirror" and count > 1:
+        folded = np.mod(wanted, 2 * (count - 1))
+        return np.where(folded < count, folded, 2 * (count - 1) - folded)
+    if instant.options.edges == "shorten" and (wanted == held).any():
+        return np.where(wanted == held, held, -1)
+    return held
+
+
+def compose(instant: Instant, frames, present, coefficients) -> np.ndarray:
+    """The picture (H, W, 4) float64, scene-linear and premultiplied: F = e(q) · ∫ V(t + ⌊Q⁻¹(z)⌋) dz (§3.1, §3.4.1).
+
+    frames: L pictures (H, W, 4), scene-linear, premultiplied; present: (L,) bool, False for frames left out, whose
+    share goes to the others (if none has a share: to the nearest present frame). coefficients: (N, H, W), Σ = 1.
+    """
+    between = shutters.INTERPOLATIONS[instant.options.interpolation]
+    normalised = instant.bars / instant.bars.sum(axis=1, keepdims=True)
+    q = between(normalised, np.moveaxis(np.asarray(coefficients, dtype=np.float64), 0, -1))
+    q = _without_absent(q, np.asarray(present))
+    encoded = instant.options.light == "encoded"
+    total = sum(q[..., k, None] * (_encode(frame) if encoded else frame) for k, frame in enumerate(frames))
+    gain = np.einsum("n,nhw->hw", instant.gains, coefficients)
+    return (_decode(total) if encoded else total) * np.concatenate(
+        [np.repeat(gain[..., None], 3, axis=-1), np.ones_like(gain)[..., None]], axis=-1
+    )
+
+
+def _without_absent(q: np.ndarray, present: np.ndarray) -> np.ndarray:
+    if present.all():
+        return q
+    kept = q * present
+    share = kept.sum(axis=-1, keepdims=True)
+    centre = (q * (np.arange(len(present)) + 0.5)).sum(axis=-1)
+    places = np.flatnonzero(present)
+    nearest = places[np.abs(centre[..., None] - (places + 0.5)).argmin(axis=-1)]
+    alone = np.arange(len(present)) == nearest[..., None]
+    return np.where(share > 1e-6, kept / np.maximum(share, 1e-6), alone)
+
+
+def _encode(frame: np.ndarray) -> np.ndarray:
+    return light.premultiplied(light.straight(frame), light.to_encoded)
+
+
+def _decode(total: np.ndarray) -> np.ndarray:
+    return light.premultiplied(light.straight(total), light.to_linear)

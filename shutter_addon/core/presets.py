@@ -1,0 +1,98 @@
+"""Shutters by name: each preset makes L bars in [0, 1] from a window length and a few parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def still(window: int, frame: int = 0) -> np.ndarray:
+    """One sharp frame, a delta at `frame` (0 to L − 1; beyond the window: the last)."""
+    bars = np.zeros(window)
+    bars[min(max(frame, 0), window - 1)] = 1
+    return bars
+
+
+def angle(window: int, degrees: float = 180.0) -> np.ndarray:
+    """A rotary disc: open for `degrees` of 360 of the window; the last bar may be a part."""
+    return np.clip(window * degrees / 360.0 - np.arange(window), 0, 1)
+
+
+def cuts(window: int, count: int = 2, width: int = 1) -> np.ndarray:
+    """A disc with `count` even cuts, each `width` frames wide: that many pictures on top of each other."""
+    bars = np.zeros(window)
+    for start in np.floor(np.arange(count) * window / count).astype(int):
+        bars[start : start + width] = 1
+    return bars
+
+
+def ramp_up(window: int) -> np.ndarray:
+    """From almost closed to open: a trail that ends sharp."""
+    return np.arange(1, window + 1) / window
+
+
+def ramp_down(window: int) -> np.ndarray:
+    """From open to almost closed."""
+    return ramp_up(window)[::-1].copy()
+
+
+def triangle(window: int) -> np.ndarray:
+    """Rises to the middle of the window and falls again."""
+    bars = 1 - np.abs(2 * (np.arange(window) + 0.5) / window - 1)
+    return bars / bars.max()
+
+
+def gaussian(window: int, sigma: float = 0.2) -> np.ndarray:
+    """A bell around the middle; `sigma` in windows."""
+    return np.exp(-0.5 * (((np.arange(window) + 0.5) / window - 0.5) / sigma) ** 2)
+
+
+def trail(window: int, decay: float = 0.25) -> np.ndarray:
+    """An exponential trail: a bar falls to 1/e of the first after `decay` windows."""
+    return np.exp(-np.arange(window) / (decay * window))
+
+
+def stutter(window: int, every: int = 4) -> np.ndarray:
+    """Every n-th frame, as a strobe lights them."""
+    return (np.arange(window) % every == 0).astype(float)
+
+
+def first(window: int) -> np.ndarray:
+    """The first frame: with `last` along two edges, a rolling shutter (paper Figure 11)."""
+    return still(window, 0)
+
+
+def last(window: int) -> np.ndarray:
+    """The last frame of the window."""
+    return still(window, window - 1)
+
+
+def rolling_pair(window: int) -> np.ndarray:
+    """First and last frame as two shutters (2, L)."""
+    return np.stack([first(window), last(window)])
+
+
+# name: (label, function, parameters). "Custom" is no preset: it is whatever the bars are.
+PRESETS = {
+    "STILL": ("Still Frame", still, {}),
+    "ANGLE_45": ("45°", angle, {"degrees": 45.0}),
+    "ANGLE_90": ("90°", angle, {"degrees": 90.0}),
+    "ANGLE_180": ("180°", angle, {"degrees": 180.0}),
+    "ANGLE_270": ("270°", angle, {"degrees": 270.0}),
+    "ANGLE_360": ("360°", angle, {"degrees": 360.0}),
+    "TWO_CUTS": ("Two Cuts", cuts, {"count": 2}),
+    "CUTS": ("Cuts", cuts, {"count": 4}),
+    "RAMP_UP": ("Ramp Up", ramp_up, {}),
+    "RAMP_DOWN": ("Ramp Down", ramp_down, {}),
+    "TRIANGLE": ("Triangle", triangle, {}),
+    "GAUSSIAN": ("Gaussian", gaussian, {}),
+    "TRAIL": ("Exponential Trail", trail, {}),
+    "STUTTER": ("Stutter", stutter, {"every": 4}),
+    "FIRST": ("First Frame", first, {}),
+    "LAST": ("Last Frame", last, {}),
+}
+
+
+def bars(name: str, window: int, **parameters) -> np.ndarray:
+    """Bars (L,) of the preset `name`, its own parameters overridden by `parameters`. KeyError: no such preset."""
+    _label, make, defaults = PRESETS[name]
+    return make(window, **(defaults | parameters))

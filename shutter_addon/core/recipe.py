@@ -1,0 +1,390 @@
+"""Recipes: the whole effect but the footage, as a JSON file, version 1; and the effect as it stands at a frame.
+
+Frames are timeline frames, 1 = the strip's first. Points are fractions of the picture, y up.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import dataclass, field, is_dataclass
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal, get_args, get_origin
+
+import cattrs
+import numpy as np
+from cattrs.cols import list_structure_factory
+from cattrs.errors import ForbiddenExtraKeysError
+from cattrs.gen import make_dict_structure_fn
+
+from . import keyframes, scribbles, shutters
+
+Point = tuple[float, float]
+Stroke = list[Point]
+Ease = Literal["linear", "bezier", "constant"]
+Interpolation = Literal["displacement", "value"]
+Light = Literal["linear", "encoded"]
+Exposure = Literal["normalized", "weighted"]
+Edges = Literal["hold", "mirror", "shorten"]
+Position = Literal["start", "center", "end"]
+
+
+class RecipeError(ValueError):
+    """A recipe that breaks the format; the message is one sentence that names the place."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a window of L frames becomes a picture; the recipe's fields of the same names."""
+
+    window: int
+    position: Position = "start"
+    interpolation: Interpolation = "displacement"
+    light: Light = "linear"
+    exposure: Exposure = "normalized"
+    edges: Edges = "hold"
+    aggregate: Literal[1, 2, 4] = 1
+    border: bool = False
+
+    @property
+    def before(self) -> int:
+        """How many frames of the window lie before the frame itself."""
+        return {"start": 0, "center": (self.window - 1) // 2, "end": self.window - 1}[self.position]
+
+
+@dataclass(frozen=True)
+class Instant:
+    """The effect at one frame: bars (N, L) float64, the first shutter is the default; moved shapes in order.
+
+    reference: the exposure that counts as full brightness where exposure is "weighted"; the default shutter's.
+    """
+
+    options: Options
+    bars: np.ndarray
+    shapes: tuple[scribbles.Shape, ...] = ()
+    reference: float | None = None
+
+    @property
+    def gains(self) -> np.ndarray:
+        """Brightness (N,) of each shutter: all 1, or its exposure over the reference ("weighted")."""
+        exposures = self.bars.sum(axis=1)
+        if self.options.exposure == "normalized":
+            return np.ones_like(exposures)
+        return exposures / (self.reference or exposures[0])
+
+    def alone(self, chosen: int) -> Instant:
+        """The same where one shutter alone holds for the whole picture."""
+        return Instant(self.options, self.bars[chosen, None], (), self.reference or float(self.bars[0].sum()))
+
+
+@dataclass(frozen=True)
+class ShutterKey:
+    frame: float
+    bars: list[float]
+    ease: Ease = "linear"
+
+
+@dataclass(frozen=True)
+class Shutter:
+    """Bars, or keys of bars."""
+
+    name: str
+    color: tuple[float, float, float] = (0.8, 0.8, 0.8)
+    bars: list[float] | None = None
+    keys: list[ShutterKey] = field(default_factory=list)
+
+    def at(self, frame: float) -> np.ndarray:
+        """Bars (L,) at a frame; between keys by displacement."""
+        if not self.keys:
+            return np.asarray(self.bars, dtype=np.float64)
+        a, b, u = keyframes.span([key.frame for key in self.keys], frame)
+        return keyframes.between_bars(self.keys[a].bars, self.keys[b].bars, keyframes.eased(u, self.keys[a].ease))
+
+
+@dataclass(frozen=True)
+class RegionKey:
+    """Location in fractions of the picture, rotation in degrees counter-clockwise, perhaps a redrawn shape."""
+
+    frame: float
+    location: Point = (0.0, 0.0)
+    rotation: float = 0.0
+    scale: float = 1.0
+    strokes: list[Stroke] | None = None
+    ease: Ease = "linear"
+
+
+@dataclass(frozen=True)
+class Region:
+    """A scribble of a shutter. Redrawn shapes follow one another between the keys that carry strokes; a first key
+    without any carries the region's own."""
+
+    shutter: str
+    name: str = ""
+    kind: Literal["line", "lasso"] = "line"
+    width: float = 0.02
+    strokes: list[Stroke] = field(default_factory=list)
+    keys: list[RegionKey] = field(default_factory=list)
+
+    def drawings(self) -> list[tuple[RegionKey | None, list[Stroke]]]:
+        """The key that starts each drawing, and its strokes, in time."""
+        drawn = [(key, key.strokes) for key in self.keys if key.strokes is not None]
+        if not drawn or self.keys[0].strokes is None:
+            drawn.insert(0, (self.keys[0] if self.keys else None, self.strokes))
+        return drawn
+
+    def at(self, frame: float, aspect: float) -> tuple[np.ndarray, ...]:
+        """Moved strokes (n, 2) at a frame, for a picture of width / height = aspect."""
+        if not self.keys:
+            return scribbles.transform(self.strokes, (0, 0), 0, 1, aspect)
+        drawn = self.drawings()
+        a, b, u = keyframes.span([key.frame for key, _ in drawn], frame)
+        strokes = scribbles.between_strokes(drawn[a][1], drawn[b][1], keyframes.eased(u, drawn[a][0].ease))
+        a, b, u = keyframes.span([key.frame for key in self.keys], frame)
+        first, second, u = self.keys[a], self.keys[b], keyframes.eased(u, self.keys[a].ease)
+        location, rotation, scale = (
+            (1 - u) * np.asarray(getattr(first, name)) + u * np.asarray(getattr(second, name))
+            for name in ("location", "rotation", "scale")
+        )
+        return scribbles.transform(strokes, location, rotation, scale, aspect)
+
+
+@dataclass(frozen=True)
+class Recipe:
+    version: Literal[1]
+    window: int
+    shutters: list[Shutter]
+    regions: list[Region] = field(default_factory=list)
+    position: Position = "start"
+    interpolation: Interpolation = "displacement"
+    light: Light = "linear"
+    exposure: Exposure = "normalized"
+    edges: Edges = "hold"
+    aggregate: Literal[1, 2, 4] = 1
+    border: bool = False
+
+    @property
+    def options(self) -> Options:
+        return Options(**{name: getattr(self, name) for name in Options.__dataclass_fields__})
+
+    def at(self, frame: float, aspect: float) -> Instant:
+        """The effect at a timeline frame (1 = the strip's first), for a picture of width / height = aspect."""
+        order = [shutter.name for shutter in self.shutters]
+        return Instant(
+            self.options,
+            np.stack([shutter.at(frame) for shutter in self.shutters]),
+            tuple(
+                scribbles.Shape(order.index(region.shutter), region.kind, region.width, region.at(frame, aspect))
+                for region in self.regions
+            ),
+        )
+
+
+def load(path: str | Path) -> Recipe:
+    """The recipe in a JSON file. RecipeError: it cannot be read, or breaks the format."""
+    try:
+        return parse(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RecipeError(f"{path}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise RecipeError(f"{path}: not a text file") from None
+    except RecipeError as error:
+        raise RecipeError(f"{path}: {error}") from None
+
+
+def parse(text: str) -> Recipe:
+    """The recipe in a JSON text. RecipeError: one sentence that names the place, as `shutters[1].bars: …`."""
+    try:
+        data = json.loads(text)
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise RecipeError(f"not JSON: {error}") from None
+    try:
+        recipe = _converter.structure(data, Recipe)
+    except Exception as error:
+        raise RecipeError(_first_fault(error)) from None
+    _check(recipe)
+    return recipe
+
+
+def dump(recipe: Recipe) -> str:
+    """The recipe as JSON text; `parse(dump(r)) == r`. Fields that carry nothing are left out."""
+    text = json.dumps(_compact(_converter.unstructure(recipe)), indent=1, ensure_ascii=False)
+    # People read and edit these files: a list of numbers stays on one line.
+    return (
+        re.sub(
+            r"\[[-+.\de,\s]+\]",
+            lambda numbers: " ".join(numbers[0].split()).replace("[ ", "[").replace(" ]", "]"),
+            text,
+        )
+        + "\n"
+    )
+
+
+def save(recipe: Recipe, path: str | Path) -> None:
+    """Writes a recipe whole or not at all. OSError: it cannot be written."""
+    path = Path(path)
+    part = path.with_name(path.name + ".part")
+    try:
+        part.write_text(dump(recipe), encoding="utf-8")
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _compact(value):
+    if isinstance(value, dict):
+        return {k: _compact(v) for k, v in value.items() if v is not None and not (k == "keys" and not v)}
+    return [_compact(v) for v in value] if isinstance(value, (list, tuple)) else value
+
+
+# Reading: the converter checks the structure, _check what no type can say.
+
+
+def _number(value, _kind) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{_shown(value)} is not a number")
+    if not math.isfinite(value):
+        raise ValueError(f"{value} is not a finite number")
+    return float(value)
+
+
+def _exactly(wanted: type, name: str):
+    def structure(value, _kind):
+        if type(value) is not wanted:
+            raise ValueError(f"{_shown(value)} is not {name}")
+        return value
+
+    return structure
+
+
+def _choice(value, kind):
+    allowed = get_args(kind)
+    if not any(type(value) is type(option) and value == option for option in allowed):
+        raise ValueError(f"{_shown(value)} is none of {', '.join(map(str, allowed))}")
+    return value
+
+
+def _tuple(kind, converter):
+    inner = get_args(kind)
+
+    def structure(value, _kind):
+        if not isinstance(value, list):
+            raise ValueError(f"{_shown(value)} is not a list")
+        if len(value) != len(inner):
+            raise ValueError(f"{len(value)} values, not {len(inner)}")
+        return tuple(converter.structure(v, t) for v, t in zip(value, inner, strict=True))
+
+    return structure
+
+
+def _after_check(factory, wanted: type, name: str):
+    """A hook factory whose hooks take JSON's `wanted` only: Python walks through texts and objects as well."""
+
+    def make(kind, converter):
+        structure = factory(kind, converter)
+
+        def checked(value, kind):
+            if not isinstance(value, wanted):
+                raise ValueError(f"{_shown(value)} is not {name}")
+            return structure(value, kind)
+
+        return checked
+
+    return make
+
+
+def _make_converter() -> cattrs.Converter:
+    converter = cattrs.Converter()
+    converter.register_structure_hook(float, _number)
+    converter.register_structure_hook(int, _exactly(int, "a whole number"))
+    converter.register_structure_hook(str, _exactly(str, "a text"))
+    converter.register_structure_hook(bool, _exactly(bool, "true or false"))
+    converter.register_structure_hook_func(lambda kind: get_origin(kind) is Literal, _choice)
+    converter.register_structure_hook_factory(lambda kind: get_origin(kind) is tuple, _tuple)
+    converter.register_structure_hook_factory(
+        lambda kind: get_origin(kind) is list, _after_check(list_structure_factory, list, "a list")
+    )
+    strict = partial(make_dict_structure_fn, _cattrs_forbid_extra_keys=True)
+    converter.register_structure_hook_factory(is_dataclass, _after_check(strict, dict, "an object"))
+    return converter
+
+
+_converter = _make_converter()
+
+
+def _shown(value) -> str:
+    text = json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= 40 else text[:37] + "…"
+
+
+def _first_fault(error: Exception) -> str:
+    """`place: what is wrong`, of the first fault."""
+
+    def sentence(error, kind):
+        if isinstance(error, KeyError):
+            return "missing"
+        if isinstance(error, ForbiddenExtraKeysError):
+            return f"unknown field {', '.join(sorted(error.extra_fields))}"
+        return str(error)
+
+    message, _, place = cattrs.transform_error(error, "$", sentence)[0].rpartition(" @ $")
+    return f"{place.lstrip('.') or 'recipe'}: {message}"
+
+
+def _check(recipe: Recipe) -> None:
+    def require(condition, place, message):
+        if not condition:
+            raise RecipeError(f"{place}: {message}")
+
+    require(
+        1 <= recipe.window <= shutters.MAX_WINDOW,
+        "window",
+        f"{recipe.window} is not 1 to {shutters.MAX_WINDOW}",
+    )
+    require(recipe.shutters, "shutters", "there is none; the first is the default")
+    names = [shutter.name for shutter in recipe.shutters]
+    for i, shutter in enumerate(recipe.shutters):
+        place = f"shutters[{i}]"
+        require(
+            names.index(shutter.name) == i,
+            f"{place}.name",
+            f'"{shutter.name}" is taken by shutters[{names.index(shutter.name)}]',
+        )
+        require((shutter.bars is None) != (not shutter.keys), place, "either bars or keys, one of the two")
+        require(all(0 <= c <= 1 for c in shutter.color), f"{place}.color", "not three numbers from 0 to 1")
+        _check_frames(shutter.keys, place, require)
+        for where, bars in (
+            [(f"{place}.bars", shutter.bars)]
+            if shutter.bars is not None
+            else [(f"{place}.keys[{k}].bars", key.bars) for k, key in enumerate(shutter.keys)]
+        ):
+            require(len(bars) == recipe.window, where, f"{len(bars)} values, window is {recipe.window}")
+            try:
+                shutters.check_bars(bars)
+            except shutters.ShutterError as error:
+                raise RecipeError(f"{where}: {error}") from None
+    for i, region in enumerate(recipe.regions):
+        place = f"regions[{i}]"
+        require(region.shutter in names, f"{place}.shutter", f'there is no shutter "{region.shutter}"')
+        require(region.width >= 0, f"{place}.width", f"{region.width} is negative")
+        require(region.drawings()[0][1], f"{place}.strokes", "empty: nothing is drawn")
+        _check_frames(region.keys, place, require)
+        for k, key in enumerate(region.keys):
+            whole = key.strokes is None or key.frame == int(key.frame)
+            require(whole, f"{place}.keys[{k}].frame", f"{key.frame:g} is no whole frame, but redrawn")
+        for where, strokes in [(place, region.strokes)] + [
+            (f"{place}.keys[{k}]", key.strokes) for k, key in enumerate(region.keys) if key.strokes is not None
+        ]:
+            for j, stroke in enumerate(strokes):
+                require(stroke, f"{where}.strokes[{j}]", "empty: a stroke has at least one point")
+
+
+def _check_frames(keys, place, require) -> None:
+    for k, (first, second) in enumerate(pairwise(keys)):
+        require(
+            first.frame < second.frame,
+            f"{place}.keys[{k + 1}].frame",
+            f"{second.frame:g} does not follow {first.frame:g}",
+        )

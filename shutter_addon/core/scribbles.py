@@ -1,0 +1,151 @@
+"""Scribbles: strokes that move, and the label image they leave (paper §3.3).
+
+Points are fractions of the picture, x to the right and y up from the lower left corner; widths are fractions
+of its height. Pictures here have their top row first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+# A line never gets thinner than this radius in pixels: a 5-point diffusion would leak through it.
+_MIN_RADIUS = 0.7072
+# Long segments are cut to this many pixels, so that the box around each stays small.
+_MAX_SEGMENT = 128.0
+FREE = 0
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A region as it stands at one frame: strokes (n, 2) already moved, and the index of its shutter."""
+
+    shutter: int
+    kind: str  # line | lasso
+    width: float
+    strokes: tuple[np.ndarray, ...]
+
+
+def resample(stroke, count: int) -> np.ndarray:
+    """`count` points (count, 2) at equal arc lengths along a stroke (n, 2), its ends kept."""
+    stroke = np.asarray(stroke, dtype=np.float64)
+    steps = np.hypot(*np.diff(stroke, axis=0).T) if len(stroke) > 1 else np.zeros(0)
+    length = np.concatenate([[0.0], np.cumsum(steps)])
+    if length[-1] == 0:
+        return np.repeat(stroke[:1], count, axis=0)
+    at = np.linspace(0, length[-1], count)
+    return np.stack([np.interp(at, length, stroke[:, axis]) for axis in (0, 1)], axis=1)
+
+
+def between_strokes(first, second, u: float) -> list[np.ndarray]:
+    """Strokes a share u of the way from one drawing to the next, paired in order.
+
+    Strokes of the same number of points move point by point, others by arc length. A stroke without a partner
+    stays as it is until the next drawing.
+    """
+    if u <= 0:
+        return [np.asarray(s, dtype=np.float64) for s in first]
+    if u >= 1:
+        return [np.asarray(s, dtype=np.float64) for s in second]
+    result = []
+    for index, a in enumerate(first):
+        a = np.asarray(a, dtype=np.float64)
+        if index < len(second):
+            b = np.asarray(second[index], dtype=np.float64)
+            if len(a) != len(b):
+                a, b = (resample(s, max(len(a), len(b))) for s in (a, b))
+            a = (1 - u) * a + u * b
+        result.append(a)
+    return result
+
+
+def transform(strokes, location, rotation: float, scale: float, aspect: float) -> tuple[np.ndarray, ...]:
+    """Strokes scaled, turned by `rotation` degrees counter-clockwise about the centre of their common bounding
+    box, and moved by `location` (fractions). `aspect` is the picture's width over its height: circles stay round.
+    """
+    strokes = [np.asarray(s, dtype=np.float64) for s in strokes]
+    if not strokes:
+        return ()
+    points = np.concatenate(strokes)
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    sin, cos = np.sin(np.radians(rotation)) * scale, np.cos(np.radians(rotation)) * scale
+    turn = np.array([[cos, -sin / aspect], [sin * aspect, cos]])
+    return tuple((s - centre) @ turn.T + centre + np.asarray(location, dtype=np.float64) for s in strokes)
+
+
+def rasterise(shapes, width: int, height: int, *, border: bool = False) -> np.ndarray:
+    """Labels (height, width) uint16: 0 where free, 1 + shutter where a shape covers the pixel's centre.
+
+    Later shapes win. `border` fixes the frame's edge to the first shutter, under every shape.
+    """
+    labels = np.zeros((height, width), dtype=np.uint16)
+    if border:
+        labels[[0, -1], :] = labels[:, [0, -1]] = 1
+    size = np.array([width, height], dtype=np.float64)
+    for shape in shapes:
+        for stroke in shape.strokes:
+            if len(stroke) == 0:
+                continue
+            pixels = np.asarray(stroke, dtype=np.float64) * size
+            pixels[:, 1] = height - pixels[:, 1]
+            filled = shape.kind == "lasso" and _fill(labels, pixels, shape.shutter + 1)
+            if not filled:
+                _draw(labels, pixels, shape.width * height / 2 if shape.kind == "line" else 0, shape.shutter + 1)
+    return labels
+
+
+def constraints(labels: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Mask (H, W) bool of the fixed pixels, and their values (count, H, W) float32: 1 for the own shutter."""
+    values = (labels[None] == np.arange(1, count + 1, dtype=labels.dtype)[:, None, None]).astype(np.float32)
+    return labels != FREE, values
+
+
+def _draw(labels: np.ndarray, points: np.ndarray, radius: float, label: int) -> None:
+    """Labels the pixels within `radius` of a polyline in pixels, y down."""
+    radius = max(radius, _MIN_RADIUS)
+    if len(points) == 1:
+        points = np.repeat(points, 2, axis=0)
+    for a, b in pairwise(points):
+        pieces = max(1, int(np.ceil(np.hypot(*(b - a)) / max(_MAX_SEGMENT, 4 * radius))))
+        ends = a + (b - a) * np.linspace(0, 1, pieces + 1)[:, None]
+        for p, q in pairwise(ends):
+            _draw_segment(labels, p, q, radius, label)
+
+
+def _draw_segment(labels, a, b, radius, label) -> None:
+    height, width = labels.shape
+    limit = np.array([width, height])
+    low = np.clip(np.floor(np.minimum(a, b) - radius), 0, limit).astype(int)
+    high = np.clip(np.ceil(np.maximum(a, b) + radius), 0, limit).astype(int)
+    if (low >= high).any():
+        return
+    x = np.arange(low[0], high[0]) + 0.5 - a[0]
+    y = (np.arange(low[1], high[1]) + 0.5 - a[1])[:, None]
+    d = b - a
+    along = np.clip((x * d[0] + y * d[1]) / max(d @ d, 1e-12), 0, 1)
+    near = (x - along * d[0]) ** 2 + (y - along * d[1]) ** 2 <= radius * radius
+    labels[low[1] : high[1], low[0] : high[0]][near] = label
+
+
+def _fill(labels: np.ndarray, points: np.ndarray, label: int) -> bool:
+    """Labels the pixel centres that a closed polygon winds around (nonzero); whether there were any.
+
+    A hand-drawn lasso crosses itself: even-odd would leave holes in it.
+    """
+    height, width = labels.shape
+    first = int(np.clip(np.ceil(points[:, 1].min() - 0.5), 0, height))
+    last = int(np.clip(np.ceil(points[:, 1].max() - 0.5), first, height))
+    # Differences along x of the winding number: each edge adds its direction right of where it crosses a row.
+    winding = np.zeros((last - first, width + 1), dtype=np.int32)
+    for a, b in zip(points, np.roll(points, -1, axis=0), strict=True):
+        direction = 1 if a[1] < b[1] else -1
+        top, bottom = (a, b) if direction == 1 else (b, a)
+        rows = np.arange(max(0, int(np.ceil(top[1] - 0.5))), min(height, int(np.ceil(bottom[1] - 0.5))))
+        if len(rows):
+            x = top[0] + (rows + 0.5 - top[1]) * (bottom[0] - top[0]) / (bottom[1] - top[1])
+            winding[rows - first, np.clip(np.ceil(x - 0.5), 0, width).astype(int)] += direction
+    inside = np.cumsum(winding[:, :-1], axis=1) != 0
+    labels[first:last][inside] = label
+    return bool(inside.any())

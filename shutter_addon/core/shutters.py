@@ -1,0 +1,150 @@
+"""Shutters: bars, exposure, accumulation, quantile, and their interpolation (paper §3.1, §3.2, §3.4.1).
+
+A shutter is an array of L bars ≥ 0, one per source frame of the window. Its exposure is e = Σ bars, its
+normalised accumulation S is piecewise linear on [0, L] and rises from 0 to 1, its quantile S⁻¹ maps z in
+[0, 1] to a time in [0, L]. Everything here is exact, in float64: the reference of every device.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+MAX_WINDOW = 256
+
+# Levels of z closer than this are one: float rounding of equal sums, far below any visible weight.
+_SAME = 1e-12
+
+
+class ShutterError(ValueError):
+    """Bars that are no shutter; the message is one sentence for the user."""
+
+
+def check_bars(bars) -> np.ndarray:
+    """Bars as a float64 array (L,), or ShutterError: 1 to 256 finite numbers ≥ 0, not all of them 0."""
+    bars = np.asarray(bars, dtype=np.float64)
+    if bars.ndim != 1 or not 1 <= len(bars) <= MAX_WINDOW:
+        raise ShutterError(f"a shutter has 1 to {MAX_WINDOW} bars, not {bars.size}")
+    if not np.isfinite(bars).all():
+        raise ShutterError("a bar is not a finite number")
+    if (bars < 0).any():
+        raise ShutterError("a bar is negative")
+    if not bars.any():
+        raise ShutterError("all bars are zero: the shutter never opens")
+    return bars
+
+
+def exposure(bars) -> float:
+    """e(s) = Σ bars: the open time in frames."""
+    return float(np.sum(bars))
+
+
+def accumulation(bars) -> np.ndarray:
+    """S at the L + 1 frame boundaries, float64, from 0 to exactly 1. Bars as in `check_bars`."""
+    sums = np.concatenate([[0.0], np.cumsum(np.asarray(bars, dtype=np.float64))])
+    return sums / sums[-1]
+
+
+@dataclass(frozen=True)
+class Quantile:
+    """S⁻¹ as linear pieces between the levels z (K + 1,), 0 to 1.
+
+    Piece k runs from time start[k] at z[k] to end[k] at z[k + 1]; where end[k] < start[k + 1] the shutter is
+    closed in between and S⁻¹ jumps. start and end have shape (K,), or (K, N) for N shutters on common levels.
+    """
+
+    z: np.ndarray
+    start: np.ndarray
+    end: np.ndarray
+
+
+def quantile(bars) -> Quantile:
+    """The quantile of one shutter: a piece per open bar."""
+    total = accumulation(bars)
+    is_open = np.diff(total) > 0
+    frames = np.flatnonzero(is_open).astype(np.float64)
+    z = np.concatenate([[0.0], total[1:][is_open]])
+    return Quantile(z, frames, frames + 1.0)
+
+
+def knots(shutters) -> Quantile:
+    """The quantiles of N shutters (N, L) on the union of their levels; start and end have shape (K, N).
+
+    The levels do not depend on the coefficients c: a pixel's quantile on piece k runs from c·start[k] to
+    c·end[k]. Levels at which no shutter jumps or bends are left out (a box has one piece, whatever its length).
+    """
+    parts = [quantile(bars) for bars in np.atleast_2d(shutters)]
+    levels = np.unique(np.concatenate([part.z for part in parts]))
+    levels = levels[np.concatenate([[True], np.diff(levels) > _SAME])]
+    levels[-1] = 1.0
+    start, end = (np.stack(side, axis=1) for side in zip(*(_on_levels(p, levels) for p in parts), strict=True))
+    keep = _bends(levels, start, end)
+    return Quantile(
+        np.concatenate([[0.0], levels[1:-1][keep], [1.0]]),
+        start[np.concatenate([[True], keep])],
+        end[np.concatenate([keep, [True]])],
+    )
+
+
+def _on_levels(part: Quantile, levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Start and end times of one quantile between common levels, which contain its own within rounding."""
+    middle = (levels[:-1] + levels[1:]) / 2
+    piece = np.clip(np.searchsorted(part.z, middle) - 1, 0, len(part.start) - 1)
+    z0, z1 = part.z[piece], part.z[piece + 1]
+    slope = (part.end[piece] - part.start[piece]) / (z1 - z0)
+    start = part.start[piece] + (levels[:-1] - z0) * slope
+    end = part.end[piece] - (z1 - levels[1:]) * slope
+    return np.clip(start, part.start[piece], part.end[piece]), np.clip(end, part.start[piece], part.end[piece])
+
+
+def _bends(levels, start, end) -> np.ndarray:
+    """Which inner levels are a jump or a change of slope of any shutter; shape (K - 1,)."""
+    slope = (end - start) / np.diff(levels)[:, None]
+    jumps = np.abs(start[1:] - end[:-1]) > 1e-9
+    turns = np.abs(np.diff(slope, axis=0)) > 1e-9 * (slope[1:] + slope[:-1])
+    return (jumps | turns).any(axis=1)
+
+
+def weights(start, end, dz, window: int) -> np.ndarray:
+    """Normalised weights (…, L) of the frames from a quantile's pieces; start, end (…, K) and dz (K,).
+
+    q(τ) = Q(τ + 1) − Q(τ): each piece spreads dz evenly over the time between its start and its end.
+    """
+    frames = np.arange(window, dtype=np.float64)
+    x0, x1 = np.asarray(start)[..., None], np.asarray(end)[..., None]
+    # A time never passes slower than its level (slope ≥ 1), so x1 − x0 ≥ dz > 0.
+    share = (np.clip(x1, frames, frames + 1) - np.clip(x0, frames, frames + 1)) / (x1 - x0)
+    return np.einsum("...kl,k->...l", share, dz)
+
+
+def mix_exposure(shutters, coefficients) -> np.ndarray:
+    """e(q) = Σ cᵢ eᵢ for coefficients (…, N): the exposure of the interpolated shutter, shape (…)."""
+    return np.asarray(coefficients) @ np.sum(shutters, axis=1)
+
+
+def displace(shutters, coefficients) -> np.ndarray:
+    """Displacement interpolation: bars (…, L) of the shutter between shutters (N, L), for coefficients (…, N)
+    with Σc = 1, c ≥ 0 (paper §3.2, §3.4.1; exact). Σ of the result is e(q)."""
+    shutters = np.atleast_2d(np.asarray(shutters, dtype=np.float64))
+    coefficients = np.asarray(coefficients, dtype=np.float64)
+    table = knots(shutters)
+    q = weights(coefficients @ table.start.T, coefficients @ table.end.T, np.diff(table.z), shutters.shape[1])
+    return q * mix_exposure(shutters, coefficients)[..., None]
+
+
+def mix(shutters, coefficients) -> np.ndarray:
+    """Value interpolation: bars (…, L) of Σ cᵢ sᵢ/eᵢ, scaled to e(q). Arguments as for `displace`."""
+    shutters = np.atleast_2d(np.asarray(shutters, dtype=np.float64))
+    coefficients = np.asarray(coefficients, dtype=np.float64)
+    q = coefficients @ (shutters / shutters.sum(axis=1, keepdims=True))
+    return q * mix_exposure(shutters, coefficients)[..., None]
+
+
+INTERPOLATIONS = {"displacement": displace, "value": mix}
+
+
+def open_span(shutters) -> tuple[int, int]:
+    """First and one past the last frame of the window that any mix of these shutters (N, L) can expose."""
+    used = np.flatnonzero(np.any(np.atleast_2d(shutters) > 0, axis=0))
+    return int(used[0]), int(used[-1]) + 1

@@ -1,0 +1,244 @@
+"""Both devices against the float64 reference: random footage, random shutters, every option."""
+
+import numpy as np
+import pytest
+
+from shutter_addon.compute.cpu import CPUCompositor
+from shutter_addon.compute.renderer import Renderer, open_compositor
+from shutter_addon.core import compositor, light
+from shutter_addon.core.recipe import Instant, Options
+from shutter_addon.core.scribbles import Shape
+
+LEVEL = 1 / 255
+
+
+class Footage:
+    """Frames in memory, as a source of shutter_addon.media."""
+
+    def __init__(self, frames, transfer="srgb", alpha="opaque"):
+        self.frames, self.transfer, self.alpha = frames, transfer, alpha
+        self.count, self.height, self.width = frames.shape[:3]
+        self.dtype = frames.dtype
+        self.reads = []
+
+    def read(self, index):
+        self.reads.append(index)
+        return self.frames[index]
+
+    def linear(self):
+        """All frames in float64, scene-linear, premultiplied."""
+        values = self.frames.astype(np.float64)
+        if self.dtype.kind == "u":
+            values /= np.iinfo(self.dtype).max
+        convert = light.to_linear if self.transfer == "srgb" else None
+        if self.alpha == "premultiplied":
+            return light.premultiplied(light.straight(values), convert)
+        return light.premultiplied(values, convert)
+
+
+def footage(rng, count=20, size=(37, 23), dtype=np.uint8, **kind):
+    shape = (count, size[1], size[0], 4)
+    if np.dtype(dtype).kind == "u":
+        frames = rng.integers(0, np.iinfo(dtype).max + 1, shape).astype(dtype)
+    else:
+        frames = (rng.random(shape) ** 3 * 4).astype(dtype)
+    if kind.get("alpha", "opaque") == "opaque":
+        frames[..., 3] = np.iinfo(dtype).max if np.dtype(dtype).kind == "u" else 1
+    elif np.dtype(dtype).kind == "f":
+        frames[..., 3] = rng.random(shape[:3])
+    return Footage(frames, **kind)
+
+
+SHAPES = (
+    Shape(1, "line", 0.1, (np.array([[0.1, 0.2], [0.7, 0.3]]),)),
+    Shape(2, "lasso", 0.0, (np.array([[0.6, 0.6], [0.9, 0.6], [0.8, 0.9]]),)),
+    Shape(0, "line", 0.05, (np.array([[0.1, 0.9], [0.3, 0.5]]),)),
+)
+
+
+def instant(rng, window=16, shapes=SHAPES, count=3, **options):
+    bars = rng.random((count, window)) * (rng.random((count, window)) > 0.3)
+    bars[:, 0] += 0.01
+    return Instant(Options(window, **options), bars, shapes)
+
+
+@pytest.fixture(params=["gpu", "cpu"], scope="module")
+def device(request):
+    return open_compositor(request.param)[0]
+
+
+def check(device, source, moment, index, tolerance=LEVEL):
+    renderer = Renderer(device, source)
+    picture = renderer.picture(index, moment)
+    c = renderer.coefficients(moment)
+    block = moment.options.aggregate
+    c = c.repeat(block, 1).repeat(block, 2)[:, : source.height, : source.width].astype(np.float64)
+    c /= c.sum(axis=0)
+    indices = compositor.window_indices(moment, index, source.count)
+    expected = compositor.compose(moment, source.linear()[np.maximum(indices, 0)], indices >= 0, c)
+    assert picture.shape == expected.shape
+    # Light above white differs in proportion: compare it relatively.
+    difference = np.abs(light.to_encoded(picture.astype(np.float64)) - light.to_encoded(expected))
+    assert (difference / np.maximum(1, np.abs(expected))).max() <= tolerance
+    renderer.release_window()
+    return picture, expected
+
+
+@pytest.mark.parametrize("interpolation", ["displacement", "value"])
+@pytest.mark.parametrize("light_", ["linear", "encoded"])
+@pytest.mark.parametrize("exposure", ["normalized", "weighted"])
+def test_random_bars(device, interpolation, light_, exposure):
+    rng = np.random.default_rng(1)
+    check(device, footage(rng), instant(rng, interpolation=interpolation, light=light_, exposure=exposure), 2)
+
+
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+@pytest.mark.parametrize("index", [0, 7, 19])
+def test_edges(device, edges, position, index):
+    rng = np.random.default_rng(2)
+    check(device, footage(rng), instant(rng, edges=edges, position=position), index)
+
+
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+def test_window_longer_than_clip(device, edges):
+    rng = np.random.default_rng(3)
+    check(device, footage(rng, count=3), instant(rng, window=50, edges=edges, position="center"), 1)
+
+
+def test_shortened_to_nothing_shows_the_nearest_frame(device):
+    rng = np.random.default_rng(4)
+    bars = np.zeros((2, 8))
+    bars[0, 0] = bars[1, 7] = 1
+    moment = Instant(Options(8, edges="shorten"), bars, SHAPES[:1] + SHAPES[2:])
+    check(device, footage(rng), moment, 19)
+    late = Instant(Options(8, edges="shorten"), bars[1:])
+    picture, _ = check(device, source := footage(rng), late, 19)
+    assert np.abs(picture - source.linear()[19]).max() < 1e-5
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16, np.float32])
+@pytest.mark.parametrize("alpha", ["opaque", "straight", "premultiplied"])
+@pytest.mark.parametrize("transfer", ["srgb", "linear"])
+def test_stored_types(device, dtype, alpha, transfer):
+    rng = np.random.default_rng(5)
+    source = footage(rng, dtype=dtype, alpha=alpha, transfer=transfer)
+    if alpha == "premultiplied":
+        top = source.frames[..., 3:]
+        source.frames[..., :3] = np.minimum(source.frames[..., :3], top)
+    for light_ in ("linear", "encoded"):
+        check(device, source, instant(rng, light=light_), 1)
+
+
+@pytest.mark.parametrize("block", [2, 4])
+def test_aggregation(device, block):
+    rng = np.random.default_rng(6)
+    check(device, footage(rng), instant(rng, aggregate=block), 0)
+
+
+@pytest.mark.parametrize("count", [1, 2, 4, 5, 8, 9])
+def test_number_of_shutters(device, count):
+    rng = np.random.default_rng(7)
+    shapes = tuple(Shape(i, "line", 0.05, (np.array([[i / count, 0.1], [i / count, 0.8]]),)) for i in range(count))
+    check(device, footage(rng, size=(64, 40)), instant(rng, count=count, shapes=shapes), 0)
+
+
+@pytest.mark.parametrize("window", [1, 2, 64, 256])
+def test_window_lengths(device, window):
+    rng = np.random.default_rng(8)
+    check(device, footage(rng, count=40), instant(rng, window=window), 3)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (33, 17), (2, 100)])
+def test_odd_sizes(device, size):
+    rng = np.random.default_rng(9)
+    check(device, footage(rng, size=size), instant(rng), 3)
+
+
+def test_still_frame_is_exact_to_the_bit_at_8_bits(device):
+    rng = np.random.default_rng(10)
+    source = footage(rng)
+    bars = np.zeros((1, 8))
+    bars[0, 2] = 0.3
+    for index in (5, 0, 19):
+        picture = Renderer(device, source).picture(index, Instant(Options(8), bars))
+        codes = np.rint(light.to_encoded(picture[..., :3].astype(np.float64)) * 255)
+        assert np.array_equal(codes, source.frames[min(index + 2, 19), ..., :3])
+
+
+def test_a_window_that_slides_reads_one_frame(device):
+    rng = np.random.default_rng(11)
+    source = footage(rng)
+    renderer = Renderer(device, source)
+    moment = instant(rng)
+    moment.bars[:, -1] = 1
+    renderer.picture(0, moment)
+    assert source.reads == list(range(16))
+    renderer.picture(1, moment)
+    renderer.picture(1, moment)
+    assert source.reads == list(range(17))
+
+
+def test_frames_that_no_shutter_exposes_are_not_read(device):
+    rng = np.random.default_rng(12)
+    source = footage(rng)
+    bars = np.zeros((1, 16))
+    bars[0, 5:7] = 1
+    Renderer(device, source).picture(3, Instant(Options(16), bars))
+    assert source.reads == [8, 9]
+
+
+def test_no_new_solve_when_nothing_moved(device, monkeypatch):
+    rng = np.random.default_rng(13)
+    solves = []
+    solve = type(device).diffuse
+    monkeypatch.setattr(type(device), "diffuse", lambda self, *a: solves.append(1) or solve(self, *a))
+    renderer, moment = Renderer(device, footage(rng)), instant(rng)
+    first = renderer.picture(0, moment)
+    assert np.array_equal(first, renderer.picture(0, moment))
+    renderer.picture(1, moment)
+    assert len(solves) == 1
+    moved = instant(rng, shapes=SHAPES[1:])
+    renderer.picture(0, moved)
+    assert len(solves) == 2
+
+
+@pytest.mark.parametrize("resident", [True, False])
+def test_bands_and_streaming_change_nothing(monkeypatch, resident):
+    from shutter_addon.compute import gpu
+
+    rng = np.random.default_rng(14)
+    source, moment = footage(rng), instant(rng)
+    device = open_compositor("gpu")[0]
+    whole = Renderer(device, source).picture(0, moment)
+    monkeypatch.setattr(gpu, "BAND_BYTES", source.width * 4 * 16 * 5)
+    if not resident:
+        monkeypatch.setattr(gpu, "RESIDENT_BYTES", 0)
+    renderer = Renderer(device, source)
+    for index in (3, 0):
+        picture = renderer.picture(index, moment)
+    assert np.array_equal(picture, whole)
+
+
+def test_history_leaves_no_trace(device):
+    rng = np.random.default_rng(15)
+    source, moment = footage(rng), instant(rng)
+    renderer = Renderer(device, source)
+    in_order = [renderer.picture(index, moment) for index in range(6)]
+    for index in (4, 1, 5, 0, 3, 2):
+        assert np.array_equal(renderer.picture(index, moment), in_order[index])
+        assert np.array_equal(Renderer(device, source).picture(index, moment), in_order[index])
+
+
+def test_no_gl_says_so(monkeypatch):
+    from shutter_addon.compute import gl
+
+    def fail(self):
+        raise gl.NoGLError("no OpenGL 4.3: none here")
+
+    monkeypatch.setattr(gl.GLDevice, "__init__", fail)
+    device, message = open_compositor("auto")
+    assert isinstance(device, CPUCompositor)
+    assert message == "no OpenGL 4.3: none here; composing with NumPy, which is slow"
+    with pytest.raises(RuntimeError, match="no OpenGL"):
+        open_compositor("gpu")

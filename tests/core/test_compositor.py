@@ -1,0 +1,106 @@
+"""The reference compositor against sums written out by hand."""
+
+import numpy as np
+import pytest
+
+from shutter_addon.core import compositor, light, shutters
+from shutter_addon.core.recipe import Instant, Options
+
+
+def instant(bars, **options):
+    bars = np.asarray(bars, dtype=np.float64)
+    return Instant(Options(bars.shape[1], **options), bars)
+
+
+def frames(count, seed=0, size=(3, 4)):
+    pictures = np.random.default_rng(seed).random((count, *size, 4))
+    pictures[..., 3] = 1
+    return pictures
+
+
+def everywhere(c, size=(3, 4)):
+    return np.broadcast_to(np.asarray(c, dtype=float)[:, None, None], (len(c), *size))
+
+
+@pytest.mark.parametrize(
+    ("edges", "index", "expected"),
+    [
+        ("hold", 8, [8, 9, 9, 9, 9]),
+        ("hold", -3, [0, 0, 0, 0, 1]),
+        ("mirror", 8, [8, 9, 8, 7, 6]),
+        ("mirror", -2, [2, 1, 0, 1, 2]),
+        ("shorten", 8, [8, 9, -1, -1, -1]),
+        ("shorten", -3, [-1, -1, -1, 0, 1]),
+        ("shorten", 20, [9, 9, 9, 9, 9]),
+    ],
+)
+def test_edges(edges, index, expected):
+    assert compositor.window_indices(instant(np.ones((1, 5)), edges=edges), index, 10).tolist() == expected
+
+
+def test_positions():
+    for position, expected in [("start", [5, 6, 7, 8]), ("center", [4, 5, 6, 7]), ("end", [2, 3, 4, 5])]:
+        assert compositor.window_indices(instant(np.ones((1, 4)), position=position), 5, 10).tolist() == expected
+
+
+def test_a_clip_of_one_frame():
+    for edges in ("hold", "mirror", "shorten"):
+        indices = compositor.window_indices(instant(np.ones((1, 3)), edges=edges), 0, 1)
+        assert set(indices.tolist()) <= {0, -1}
+
+
+def test_equal_bars_are_the_mean_of_light():
+    pictures = frames(8)
+    result = compositor.compose(instant(np.ones((1, 8))), pictures, np.ones(8, bool), everywhere([1]))
+    assert result == pytest.approx(pictures.mean(axis=0))
+
+
+def test_encoded_is_the_mean_of_code_values():
+    pictures = frames(8)
+    moment = instant(np.ones((1, 8)), light="encoded")
+    result = compositor.compose(moment, pictures, np.ones(8, bool), everywhere([1]))
+    assert light.to_encoded(result[..., :3]) == pytest.approx(light.to_encoded(pictures[..., :3]).mean(axis=0))
+
+
+def test_each_pixel_has_its_own_shutter():
+    rng = np.random.default_rng(1)
+    pictures, bars = frames(6), rng.random((3, 6))
+    c = rng.dirichlet(np.ones(3), (3, 4))
+    for interpolation, between in shutters.INTERPOLATIONS.items():
+        moment = instant(bars / bars.sum(axis=1, keepdims=True), interpolation=interpolation)
+        result = compositor.compose(moment, pictures, np.ones(6, bool), np.moveaxis(c, -1, 0))
+        q = between(moment.bars, c[1, 2])
+        assert result[1, 2] == pytest.approx(sum(w * p[1, 2] for w, p in zip(q, pictures, strict=True)))
+
+
+def test_weighted_exposure_is_relative_to_the_default_shutter():
+    pictures, bars = frames(4), np.array([[1.0, 1, 1, 1], [1, 0, 0, 0]])
+    moment = instant(bars, exposure="weighted")
+    result = compositor.compose(moment, pictures, np.ones(4, bool), everywhere([0, 1]))
+    assert result[..., :3] == pytest.approx(pictures[0][..., :3] / 4)
+    assert result[..., 3] == pytest.approx(1)
+    alone = moment.alone(1)
+    assert compositor.compose(alone, pictures, np.ones(4, bool), everywhere([1])) == pytest.approx(result)
+
+
+def test_alpha_is_premultiplied():
+    clear, solid = np.zeros((1, 1, 4)), np.array([[[0.8, 0.2, 0.1, 1.0]]])
+    moment = instant([[1, 1]])
+    result = compositor.compose(moment, [clear, solid], np.ones(2, bool), np.ones((1, 1, 1)))
+    assert result[0, 0] == pytest.approx([0.4, 0.1, 0.05, 0.5])
+
+
+def test_what_is_left_out_goes_to_the_others():
+    pictures = frames(4)
+    present = np.array([True, True, False, False])
+    moment = instant([[1, 3, 2, 2]], edges="shorten")
+    result = compositor.compose(moment, pictures, present, everywhere([1]))
+    assert result == pytest.approx((pictures[0] + 3 * pictures[1]) / 4)
+    late = instant([[0, 0, 0, 1]], edges="shorten")
+    assert compositor.compose(late, pictures, present, everywhere([1])) == pytest.approx(pictures[1])
+
+
+def test_light_round_trip():
+    codes = np.linspace(-0.5, 3, 1000)
+    assert light.to_encoded(light.to_linear(codes)) == pytest.approx(codes, abs=1e-7)
+    assert light.to_linear(np.float64(0.5)) == pytest.approx(0.21404114, abs=1e-7)

@@ -1,0 +1,44 @@
+import numpy as np
+import pytest
+
+from shutter_addon.core import presets, shutters
+
+
+@pytest.mark.parametrize("name", presets.PRESETS)
+@pytest.mark.parametrize("window", [1, 2, 3, 8, 64, 256])
+def test_every_preset_is_a_shutter(name, window):
+    bars = shutters.check_bars(presets.bars(name, window))
+    assert len(bars) == window
+    assert bars.max() <= 1
+
+
+def test_shapes():
+    assert presets.still(4, 2).tolist() == [0, 0, 1, 0]
+    assert presets.still(4, 9).tolist() == [0, 0, 0, 1]
+    assert presets.angle(8, 180).tolist() == [1, 1, 1, 1, 0, 0, 0, 0]
+    assert presets.angle(8, 45).tolist() == [1, 0, 0, 0, 0, 0, 0, 0]
+    assert presets.angle(6, 45).tolist() == [0.75, 0, 0, 0, 0, 0]
+    assert presets.angle(8, 360).tolist() == [1] * 8
+    assert presets.cuts(8, 2).tolist() == [1, 0, 0, 0, 1, 0, 0, 0]
+    assert presets.cuts(9, 3, 2).tolist() == [1, 1, 0, 1, 1, 0, 1, 1, 0]
+    assert presets.ramp_up(4).tolist() == [0.25, 0.5, 0.75, 1]
+    assert presets.ramp_down(4).tolist() == [1, 0.75, 0.5, 0.25]
+    assert presets.triangle(5) == pytest.approx([0.2, 0.6, 1, 0.6, 0.2])
+    assert presets.stutter(8, 3).tolist() == [1, 0, 0, 1, 0, 0, 1, 0]
+    assert presets.rolling_pair(3).tolist() == [[1, 0, 0], [0, 0, 1]]
+
+
+def test_gaussian_and_trail_by_their_definitions():
+    g = presets.gaussian(101, 0.1)
+    assert g.argmax() == 50
+    assert g[60] / g[50] == pytest.approx(np.exp(-0.5 * (10 / 10.1) ** 2))
+    t = presets.trail(100, 0.25)
+    assert t[0] == 1
+    assert t[25] == pytest.approx(np.exp(-1))
+
+
+def test_parameters_override_the_presets_own():
+    assert presets.bars("STUTTER", 6).tolist() == [1, 0, 0, 0, 1, 0]
+    assert presets.bars("STUTTER", 6, every=2).tolist() == [1, 0, 1, 0, 1, 0]
+    with pytest.raises(KeyError):
+        presets.bars("NOPE", 6)

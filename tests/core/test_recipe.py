@@ -1,0 +1,182 @@
+import copy
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shutter_addon.core import recipe
+
+EXAMPLE = {
+    "version": 1,
+    "window": 8,
+    "position": "start",
+    "interpolation": "displacement",
+    "light": "linear",
+    "exposure": "normalized",
+    "edges": "hold",
+    "aggregate": 1,
+    "border": False,
+    "shutters": [
+        {"name": "Long", "color": [0.2, 0.5, 1.0], "bars": [1, 1, 1, 1, 1, 1, 1, 1]},
+        {
+            "name": "Sharp",
+            "color": [1.0, 0.3, 0.2],
+            "keys": [
+                {"frame": 1, "bars": [1, 0, 0, 0, 0, 0, 0, 0]},
+                {"frame": 40, "bars": [0, 0, 0, 0, 0, 0, 0, 1], "ease": "linear"},
+            ],
+        },
+    ],
+    "regions": [
+        {
+            "name": "pendulum",
+            "shutter": "Sharp",
+            "kind": "line",
+            "width": 0.02,
+            "strokes": [[[0.1, 0.5], [0.4, 0.6]]],
+            "keys": [
+                {"frame": 1, "location": [0, 0], "rotation": 0, "scale": 1},
+                {"frame": 40, "location": [0.2, 0], "rotation": 30, "scale": 1.5},
+            ],
+        }
+    ],
+}
+
+
+def test_the_contracts_example():
+    parsed = recipe.parse(json.dumps(EXAMPLE))
+    assert recipe.parse(recipe.dump(parsed)) == parsed
+    moment = parsed.at(1, 16 / 9)
+    assert moment.bars.tolist() == [[1] * 8, [1, 0, 0, 0, 0, 0, 0, 0]]
+    assert moment.shapes[0].shutter == 1
+    assert moment.shapes[0].strokes[0] == pytest.approx(np.array([[0.1, 0.5], [0.4, 0.6]]))
+    later = parsed.at(20.5, 16 / 9)
+    assert later.bars[1] == pytest.approx([0, 0, 0, 0.5, 0.5, 0, 0, 0])
+    assert parsed.at(99, 1).bars[1].tolist() == [0, 0, 0, 0, 0, 0, 0, 1]
+
+
+def test_defaults():
+    small = recipe.parse('{"version": 1, "window": 2, "shutters": [{"name": "A", "bars": [1, 1]}]}')
+    assert small.options == recipe.Options(2)
+    assert small.options.aggregate == 1
+    assert small.regions == []
+
+
+def broken(change):
+    data = copy.deepcopy(EXAMPLE)
+    change(data)
+    return json.dumps(data)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda d: d.pop("window"), "window: missing"),
+        (lambda d: d.update(foo=1), "recipe: unknown field foo"),
+        (lambda d: d["regions"][0].update(bar=1), r"regions[0]: unknown field bar"),
+        (lambda d: d.update(version=2), "version: 2 is none of 1"),
+        (lambda d: d.update(version=True), "version: true is none of 1"),
+        (lambda d: d.update(window=0), "window: 0 is not 1 to 256"),
+        (lambda d: d.update(window=257), "window: 257 is not 1 to 256"),
+        (lambda d: d.update(window=8.0), "window: 8.0 is not a whole number"),
+        (lambda d: d.update(light="bright"), 'light: "bright" is none of linear, encoded'),
+        (lambda d: d.update(aggregate=3), "aggregate: 3 is none of 1, 2, 4"),
+        (lambda d: d.update(border=1), "border: 1 is not true or false"),
+        (lambda d: d.update(shutters=[]), "shutters: there is none"),
+        (lambda d: d.update(shutters="Long"), 'shutters: "Long" is not a list'),
+        (lambda d: d.update(regions={"a": 1}), "regions: {"),
+        (lambda d: d["shutters"].append(7), "shutters[2]: 7 is not an object"),
+        (lambda d: d["shutters"][0].update(bars=[1] * 7), "shutters[0].bars: 7 values, window is 8"),
+        (lambda d: d["shutters"][0].update(bars=[0] * 8), "shutters[0].bars: all bars are zero"),
+        (lambda d: d["shutters"][0]["bars"].__setitem__(3, float("nan")), "shutters[0].bars[3]: nan is not"),
+        (lambda d: d["shutters"][0]["bars"].__setitem__(3, float("inf")), "shutters[0].bars[3]: inf is not"),
+        (lambda d: d["shutters"][0]["bars"].__setitem__(3, -1), "shutters[0].bars: a bar is negative"),
+        (lambda d: d["shutters"][0]["bars"].__setitem__(3, "1"), 'shutters[0].bars[3]: "1" is not a number'),
+        (lambda d: d["shutters"][0]["bars"].__setitem__(3, True), "shutters[0].bars[3]: true is not a number"),
+        (lambda d: d["shutters"][0].update(name="Sharp"), 'shutters[1].name: "Sharp" is taken by shutters[0]'),
+        (lambda d: d["shutters"][0].update(color=[1, 2, 3]), "shutters[0].color: not three numbers"),
+        (lambda d: d["shutters"][0].update(color=[1, 1]), "shutters[0].color: 2 values, not 3"),
+        (lambda d: d["shutters"][0].pop("bars"), "shutters[0]: either bars or keys"),
+        (lambda d: d["shutters"][1].update(bars=[1] * 8), "shutters[1]: either bars or keys"),
+        (lambda d: d["shutters"][1]["keys"][1].update(frame=1), "shutters[1].keys[1].frame: 1 does not follow 1"),
+        (lambda d: d["shutters"][1]["keys"][0].update(bars=[1]), "shutters[1].keys[0].bars: 1 values"),
+        (lambda d: d["shutters"][1]["keys"][0].update(ease="in"), 'shutters[1].keys[0].ease: "in" is none of'),
+        (lambda d: d["regions"][0].update(shutter="X"), 'regions[0].shutter: there is no shutter "X"'),
+        (lambda d: d["regions"][0].update(width=-1), "regions[0].width: -1.0 is negative"),
+        (lambda d: d["regions"][0].update(kind="blob"), 'regions[0].kind: "blob" is none of line, lasso'),
+        (lambda d: d["regions"][0].update(strokes=[]), "regions[0].strokes: empty"),
+        (lambda d: d["regions"][0].update(strokes=[[]]), "regions[0].strokes[0]: empty"),
+        (lambda d: d["regions"][0].update(strokes=[[[1, 2, 3]]]), "regions[0].strokes[0][0]: 3 values, not 2"),
+        (lambda d: d["regions"][0]["keys"][0].update(strokes=[[]]), "regions[0].keys[0].strokes[0]: empty"),
+        (lambda d: d["regions"][0]["keys"].reverse(), "regions[0].keys[1].frame: 1 does not follow 40"),
+        (
+            lambda d: d["regions"][0]["keys"][1].update(frame=2.5, strokes=[[[0, 0]]]),
+            "regions[0].keys[1].frame: 2.5 is no whole frame",
+        ),
+    ],
+)
+def test_one_sentence_that_names_the_place(change, sentence):
+    with pytest.raises(recipe.RecipeError) as fault:
+        recipe.parse(broken(change))
+    assert str(fault.value).startswith(sentence)
+    assert "\n" not in str(fault.value)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "null", "3", '"a"', "[" * 100_000])
+def test_no_recipe_at_all(text):
+    with pytest.raises(recipe.RecipeError):
+        recipe.parse(text)
+
+
+def test_files(tmp_path):
+    parsed = recipe.parse(json.dumps(EXAMPLE))
+    recipe.save(parsed, tmp_path / "r.json")
+    assert recipe.load(tmp_path / "r.json") == parsed
+    assert [p.name for p in tmp_path.iterdir()] == ["r.json"]
+    for path, sentence in [
+        (tmp_path / "none.json", "No such file"),
+        (tmp_path, "directory"),
+        (tmp_path / "b.json", "not a text file"),
+    ]:
+        (tmp_path / "b.json").write_bytes(b"\xff\xfe\x00\x80")
+        with pytest.raises(recipe.RecipeError, match=sentence):
+            recipe.load(path)
+
+
+def region(**fields):
+    return recipe.Region("A", strokes=[[(0.0, 0.0), (0.2, 0.0)]], **fields)
+
+
+def test_a_region_moves_with_the_ease_of_its_key():
+    keys = [recipe.RegionKey(1, ease="bezier"), recipe.RegionKey(5, location=(0.4, 0.0), ease="constant")]
+    keys.append(recipe.RegionKey(9, location=(0.0, 0.0)))
+    moving = region(keys=keys)
+    assert moving.at(2, 1)[0][0] == pytest.approx([0.4 * 0.15625, 0])
+    assert moving.at(8.9, 1)[0][0] == pytest.approx([0.4, 0])
+    assert moving.at(9, 1)[0][0] == pytest.approx([0, 0])
+
+
+def test_redrawn_strokes_follow_one_another():
+    keys = [
+        recipe.RegionKey(1),
+        recipe.RegionKey(3, location=(0.0, 0.1)),
+        recipe.RegionKey(5, strokes=[[(0.0, 1.0), (0.1, 1.0), (0.2, 1.0)]]),
+    ]
+    drawn = region(keys=keys)
+    assert drawn.at(1, 1)[0] == pytest.approx(np.array([[0, 0], [0.2, 0]]))
+    assert drawn.at(3, 1)[0] == pytest.approx(np.array([[0, 0.6], [0.1, 0.6], [0.2, 0.6]]))
+    assert drawn.at(5, 1)[0] == pytest.approx(np.array([[0, 1], [0.1, 1], [0.2, 1]]))
+
+
+@given(st.floats(-5, 100))
+def test_any_frame_gives_an_instant(frame):
+    moment = recipe.parse(json.dumps(EXAMPLE)).at(frame, 1.5)
+    assert np.isfinite(moment.bars).all()
+    assert np.isfinite(moment.shapes[0].strokes[0]).all()
+
+
+def test_position():
+    assert [recipe.Options(8, position=p).before for p in ("start", "center", "end")] == [0, 3, 7]
+    assert [recipe.Options(5, position=p).before for p in ("start", "center", "end")] == [0, 2, 4]

@@ -1,0 +1,141 @@
+"""Scribbles against pixels found one by one."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shutter_addon.core import scribbles
+from shutter_addon.core.scribbles import Shape
+
+coordinate = st.floats(-0.3, 1.3)
+strokes = st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=6).map(np.array)
+sizes = st.tuples(st.integers(1, 40), st.integers(1, 30))
+
+
+def centres(width, height):
+    """Pixel centres (H, W, 2) in pixels, y up."""
+    x, y = np.meshgrid(np.arange(width) + 0.5, height - 0.5 - np.arange(height))
+    return np.stack([x, y], axis=-1)
+
+
+def distance(point, a, b):
+    d = b - a
+    t = np.clip((point - a) @ d / max(d @ d, 1e-12), 0, 1)
+    return np.linalg.norm(point - (a + t[..., None] * d), axis=-1)
+
+
+@settings(deadline=None)
+@given(strokes, sizes, st.floats(0.0, 0.4))
+def test_a_line_covers_what_lies_within_half_its_width(stroke, size, line_width):
+    width, height = size
+    labels = scribbles.rasterise([Shape(4, "line", line_width, (stroke,))], width, height)
+    pixels = stroke * size
+    points = centres(width, height)
+    segments = list(zip(pixels[:-1], pixels[1:], strict=True)) or [(pixels[0], pixels[0])]
+    nearest = np.min([distance(points, a, b) for a, b in segments], axis=0)
+    radius = max(line_width * height / 2, 0.7072)
+    assert set(np.unique(labels)) <= {0, 5}
+    sure = np.abs(nearest - radius) > 1e-6
+    assert np.array_equal((labels == 5)[sure], (nearest < radius)[sure])
+
+
+@settings(deadline=None)
+@given(strokes, sizes)
+def test_a_lasso_covers_what_it_winds_around(stroke, size):
+    width, height = size
+    labels = scribbles.rasterise([Shape(0, "lasso", 0, (stroke,))], width, height)
+    points, pixels = centres(width, height), stroke * size
+    a, b = pixels, np.roll(pixels, -1, axis=0)
+    start, end = a - points[..., None, :], b - points[..., None, :]
+    cross = start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0]
+    turn = np.arctan2(cross, (start * end).sum(axis=-1)).sum(axis=-1)
+    inside = np.abs(turn) > np.pi
+    on_edge = np.min([distance(points, p, q) for p, q in zip(a, b, strict=True)], axis=0) < 1e-6
+    if (inside & ~on_edge).any():
+        assert np.array_equal((labels == 1)[~on_edge], inside[~on_edge])
+
+
+def test_a_lasso_that_holds_no_pixel_centre_still_marks_its_place():
+    thin = np.array([[0.1, 0.5], [0.9, 0.501], [0.5, 0.5005]])
+    assert (scribbles.rasterise([Shape(0, "lasso", 0, (thin,))], 20, 20) == 1).any()
+
+
+def test_a_lasso_that_crosses_itself_has_no_hole():
+    turns = np.linspace(0, 4 * np.pi, 60)
+    spiral = np.stack([0.5 + 0.3 * np.cos(turns), 0.5 + 0.3 * np.sin(turns)], axis=1)
+    assert scribbles.rasterise([Shape(0, "lasso", 0, (spiral,))], 50, 50)[25, 25] == 1
+
+
+def test_later_shapes_win_and_the_border_lies_below():
+    low = Shape(1, "lasso", 0, (np.array([[0, 0], [0.6, 0], [0.6, 0.6], [0, 0.6]]),))
+    high = Shape(2, "lasso", 0, (np.array([[0.4, 0.4], [1, 0.4], [1, 1], [0.4, 1]]),))
+    labels = scribbles.rasterise([low, high], 10, 10, border=True)
+    assert labels[4, 5] == 3
+    assert labels[9, 0] == 2
+    assert labels[0, 0] == 1
+    assert labels[0, 9] == 3
+    assert scribbles.rasterise([high, low], 10, 10)[4, 5] == 2
+
+
+def test_the_thinnest_line_is_tight_for_a_diffusion():
+    """No path of side-by-side pixels crosses it."""
+    line = np.array([[-0.1, 0.13], [1.1, 0.92]])
+    free = scribbles.rasterise([Shape(0, "line", 0, (line,))], 97, 61) == 0
+    reached = np.zeros_like(free)
+    reached[0] = free[0]
+    for _ in range(400):
+        spread = reached.copy()
+        spread[1:] |= reached[:-1]
+        spread[:-1] |= reached[1:]
+        spread[:, 1:] |= reached[:, :-1]
+        spread[:, :-1] |= reached[:, 1:]
+        reached = spread & free
+    assert reached[0].sum() > 0
+    assert not reached[-1, -30:].any()
+
+
+def test_a_turn_keeps_circles_round():
+    angles = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    circle = np.stack([0.5 + 0.1 * np.cos(angles), 0.5 + 0.2 * np.sin(angles)], axis=1)  # round at 2:1
+    (turned,) = scribbles.transform([circle], (0, 0), 33, 1, 2.0)
+    radii = np.hypot((turned[:, 0] - 0.5) * 2, turned[:, 1] - 0.5)
+    assert radii == pytest.approx(np.full(40, 0.2))
+
+
+def test_transform_turns_counter_clockwise_about_the_common_centre():
+    a, b = np.array([[0.2, 0.5], [0.4, 0.5]]), np.array([[0.8, 0.5]])
+    first, second = scribbles.transform([a, b], (0.1, -0.2), 90, 0.5, 1.0)
+    assert first == pytest.approx(np.array([[0.6, 0.15], [0.6, 0.25]]))
+    assert second == pytest.approx(np.array([[0.6, 0.45]]))
+
+
+@given(strokes, st.integers(2, 20))
+def test_resampling_keeps_the_ends_and_the_spacing(stroke, count):
+    points = scribbles.resample(stroke, count)
+    assert points.shape == (count, 2)
+    assert np.allclose(points[0], stroke[0])
+    if len(stroke) > 1 and not np.allclose(stroke, stroke[0]):
+        assert np.allclose(points[-1], stroke[-1])
+
+
+def test_resampling_goes_by_length_not_by_points():
+    stroke = np.array([[0, 0], [0.01, 0], [0.02, 0], [1.0, 0]])
+    assert scribbles.resample(stroke, 5)[:, 0] == pytest.approx([0, 0.25, 0.5, 0.75, 1])
+
+
+def test_between_drawings_of_other_point_counts():
+    (half,) = scribbles.between_strokes([[[0, 0], [1, 0]]], [[[0, 1], [0.5, 1], [1, 1]]], 0.5)
+    assert half == pytest.approx(np.array([[0, 0.5], [0.5, 0.5], [1, 0.5]]))
+    (same,) = scribbles.between_strokes([[[0, 0], [0.1, 0], [1, 0]]], [[[0, 1], [0.1, 1], [1, 1]]], 0.5)
+    assert same[1] == pytest.approx([0.1, 0.5])
+    first, alone = scribbles.between_strokes([[[0, 0]], [[0.3, 0.3]]], [[[1, 1]]], 0.25)
+    assert first[0] == pytest.approx([0.25, 0.25])
+    assert alone[0] == pytest.approx([0.3, 0.3])
+
+
+def test_constraints():
+    mask, values = scribbles.constraints(np.array([[0, 1], [3, 0]], dtype=np.uint16), 3)
+    assert mask.tolist() == [[False, True], [True, False]]
+    assert values[:, 0, 1].tolist() == [1, 0, 0]
+    assert values[:, 1, 0].tolist() == [0, 0, 1]

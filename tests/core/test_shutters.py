@@ -1,0 +1,161 @@
+"""The mathematics of shutters, as properties of random bars."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from shutter_addon.core import shutters
+
+BAR = st.one_of(st.just(0.0), st.floats(1e-3, 1.0))
+
+
+@st.composite
+def bars_lists(draw, count=st.integers(1, 4), window=st.integers(1, 40)):
+    n, length = draw(count), draw(window)
+    bars = draw(arrays(np.float64, (n, length), elements=BAR))
+    assume((bars.sum(axis=1) > 0).all())
+    return bars
+
+
+@st.composite
+def mixes(draw):
+    bars = draw(bars_lists())
+    c = draw(arrays(np.float64, len(bars), elements=st.floats(0, 1)))
+    assume(c.sum() > 0.1)
+    return bars, c / c.sum()
+
+
+def brute_quantile(bars, z):
+    """S⁻¹(z), right limit, by walking the accumulation."""
+    total = shutters.accumulation(bars)
+    for k in range(len(bars)):
+        if total[k + 1] > z:
+            return k + (z - total[k]) / (total[k + 1] - total[k])
+    return float(np.flatnonzero(bars)[-1] + 1)
+
+
+def brute_displace(bars, c, samples=200_000):
+    """The interpolated shutter from many samples of the mixed quantile."""
+    z = (np.arange(samples) + 0.5) / samples
+    times = np.zeros(samples)
+    for weight, shutter in zip(c, bars, strict=True):
+        total = shutters.accumulation(shutter)
+        k = np.searchsorted(total, z, side="right") - 1
+        times += weight * (k + (z - total[k]) / (total[k + 1] - total[k]))
+    counts = np.bincount(np.minimum(times.astype(int), bars.shape[1] - 1), minlength=bars.shape[1])
+    return counts / samples
+
+
+@given(bars_lists(count=st.just(1)))
+def test_accumulation_rises_from_0_to_1(bars):
+    total = shutters.accumulation(bars[0])
+    assert len(total) == bars.shape[1] + 1
+    assert total[0] == 0
+    assert total[-1] == 1
+    assert (np.diff(total) >= 0).all()
+    assert np.allclose(np.diff(total) * shutters.exposure(bars[0]), bars[0], atol=1e-12)
+
+
+@given(bars_lists(count=st.just(1)), st.floats(0, 1))
+def test_quantile_inverts_the_accumulation(bars, z):
+    q = shutters.quantile(bars[0])
+    piece = min(np.searchsorted(q.z, z, side="right") - 1, len(q.start) - 1)
+    time = q.start[piece] + (z - q.z[piece]) / (q.z[piece + 1] - q.z[piece]) * (q.end[piece] - q.start[piece])
+    back = np.interp(time, np.arange(bars.shape[1] + 1), shutters.accumulation(bars[0]))
+    assert abs(back - z) < 1e-9
+    if z < 1:
+        assert time == pytest.approx(brute_quantile(bars[0], z), abs=1e-6)
+
+
+@given(bars_lists(), st.floats(0, 0.999))
+def test_knots_hold_every_quantile(bars, z):
+    knots = shutters.knots(bars)
+    piece = min(np.searchsorted(knots.z, z, side="right") - 1, len(knots.start) - 1)
+    u = (z - knots.z[piece]) / (knots.z[piece + 1] - knots.z[piece])
+    times = knots.start[piece] + u * (knots.end[piece] - knots.start[piece])
+    assume(np.abs(knots.z - z).min() > 1e-9)  # at a jump both limits are right
+    assert times == pytest.approx([brute_quantile(b, z) for b in bars], abs=1e-6)
+
+
+def test_a_box_has_two_knots_whatever_its_length():
+    assert len(shutters.knots(np.ones((1, 200))).z) == 2
+    assert len(shutters.knots(np.ones((3, 64))).z) == 2
+
+
+@given(mixes())
+def test_displacement_keeps_exposure_and_is_a_shutter(mix):
+    bars, c = mix
+    q = shutters.displace(bars, c)
+    assert (q >= 0).all()
+    assert q.sum() == pytest.approx(c @ bars.sum(axis=1))
+    assert shutters.mix_exposure(bars, c) == pytest.approx(q.sum())
+
+
+@given(mixes())
+def test_displacement_moves_the_centre_in_proportion(mix):
+    """∫ Q⁻¹ is linear in c: the mean time of the mix is the mix of the mean times, frames taken as spans of time."""
+    bars, c = mix
+    knots = shutters.knots(bars)
+    mean = ((knots.start + knots.end) / 2 * np.diff(knots.z)[:, None]).sum(axis=0)
+    own = [(b / b.sum()) @ (np.arange(len(b)) + 0.5) for b in bars]
+    assert mean == pytest.approx(own, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_displacement_equals_brute_force(seed):
+    rng = np.random.default_rng(seed)
+    bars = rng.random((3, 24)) * (rng.random((3, 24)) > 0.4) + np.eye(3, 24) * 0.01
+    c = rng.dirichlet(np.ones(3))
+    q = shutters.displace(bars, c)
+    assert q / q.sum() == pytest.approx(brute_displace(bars, c), abs=1e-4)
+
+
+@given(bars_lists())
+def test_a_pure_coefficient_gives_that_shutter(bars):
+    for i, c in enumerate(np.eye(len(bars))):
+        assert shutters.displace(bars, c) == pytest.approx(bars[i], abs=1e-9)
+        assert shutters.mix(bars, c) == pytest.approx(bars[i], abs=1e-9)
+
+
+@given(st.integers(2, 200), st.floats(0, 1))
+def test_between_two_deltas_lies_a_delta_of_width_one(window, u):
+    bars = np.zeros((2, window))
+    bars[0, 0] = bars[1, -1] = 1
+    q = shutters.displace(bars, [1 - u, u])
+    time = u * (window - 1)
+    expected = np.maximum(0, 1 - np.abs(np.arange(window) - time))
+    assert q == pytest.approx(expected, abs=1e-9)
+    assert shutters.mix(bars, [1 - u, u]) == pytest.approx([1 - u, *np.zeros(window - 2), u])
+
+
+def test_many_coefficients_at_once():
+    rng = np.random.default_rng(0)
+    bars, c = rng.random((3, 10)), rng.dirichlet(np.ones(3), (4, 5))
+    for function in (shutters.displace, shutters.mix):
+        q = function(bars, c)
+        assert q.shape == (4, 5, 10)
+        assert q[2, 3] == pytest.approx(function(bars, c[2, 3]))
+
+
+@pytest.mark.parametrize(
+    ("bars", "sentence"),
+    [
+        ([], "1 to 256"),
+        ([1.0] * 257, "1 to 256"),
+        ([[1.0]], "1 to 256"),
+        ([0.0, 0.0], "never opens"),
+        ([1.0, -0.1], "negative"),
+        ([1.0, float("nan")], "finite"),
+        ([1.0, float("inf")], "finite"),
+    ],
+)
+def test_no_shutter(bars, sentence):
+    with pytest.raises(shutters.ShutterError, match=sentence):
+        shutters.check_bars(bars)
+
+
+def test_open_span():
+    assert shutters.open_span([[0, 0, 1, 0], [0, 1, 0, 0]]) == (1, 3)
+    assert shutters.open_span(np.ones((1, 1))) == (0, 1)

@@ -1,0 +1,58 @@
+"""The layers: core, media and compute never import bpy, and core needs no GL and no media libraries."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "shutter_addon"
+
+
+def imported(path):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (name.name.split(".")[0] for name in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            dots = "." * node.level
+            yield from ([dots + (node.module or "")] if node.module else [dots + n.name for n in node.names])
+
+
+BLENDER = {"bpy", "bpy_extras", "gpu", "mathutils", "bl_ui", "addon_utils"}
+FORBIDDEN = {
+    "core": BLENDER | {"moderngl", "av", "OpenImageIO", "..media", "..compute", "..blender"},
+    "media": BLENDER | {"moderngl", "..compute", "..blender"},
+    "compute": BLENDER | {"av", "OpenImageIO", "..media", "..blender"},
+}
+
+
+@pytest.mark.parametrize("layer", FORBIDDEN)
+def test_no_leak(layer):
+    files = list((PACKAGE / layer).rglob("*.py"))
+    assert files
+    for path in files:
+        for name in imported(path):
+            assert name not in FORBIDDEN[layer], f"{path.name} imports {name}"
+            assert not any(name.startswith(f"{f}.") for f in FORBIDDEN[layer] if f.startswith("."))
+
+
+def test_no_absolute_import_of_the_package():
+    """An installed extension has another name."""
+    for path in PACKAGE.rglob("*.py"):
+        assert "shutter_addon" not in set(imported(path)), path
+
+
+def test_they_run_without_bpy():
+    code = """
+import sys
+sys.modules["bpy"] = sys.modules["gpu"] = None
+import shutter_addon.core.recipe, shutter_addon.core.compositor, shutter_addon.core.presets
+import shutter_addon.media, shutter_addon.compute.renderer, shutter_addon.compute.gpu
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=PACKAGE.parent)
+
+
+def test_the_extensions_root_imports_lazily():
+    root = ast.parse((PACKAGE.parent / "__init__.py").read_text(encoding="utf-8"))
+    assert not any(isinstance(node, ast.Import | ast.ImportFrom) for node in root.body)
