@@ -7,7 +7,10 @@ def main() -> int:
     try:
         import bpy  # noqa: F401
     except ImportError:
-        print("shutter: Blender as a library is needed: pip install bpy (Python 3.13), or scripts/setup", file=sys.stderr)
+        print(
+            "Virtual Shutter: Blender as a library is needed (Python 3.13: pip install bpy); or run scripts/setup",
+            file=sys.stderr,
+        )
         return 2
     from . import blender
     from .blender.commands import main as command

@@ -25,10 +25,6 @@ class Curves:
         """The F-curve of a property, or None; muted ones do not count."""
         return self._curves.get((path, index))
 
-    def under(self, path: str) -> list:
-        """The F-curves whose path starts with `path`."""
-        return [curve for (data_path, _), curve in self._curves.items() if data_path.startswith(path)]
-
     def value(self, owner, path: str, name: str, frame: float):
         """A float property, or a float vector as a list, at a frame; path: the owner's, from the scene."""
         value = getattr(owner, name)
@@ -94,7 +90,30 @@ def _channelbag(scene):
 
 def remove_curves(scene, path: str) -> None:
     """Removes the scene's F-curves whose path starts with `path`."""
-    if scene.animation_data and scene.animation_data.action:
-        bag = _channelbag(scene)
-        for curve in [c for c in bag.fcurves if c.data_path.startswith(path)]:
-            bag.fcurves.remove(curve)
+    for curve in _curves_under(scene, path):
+        _channelbag(scene).fcurves.remove(curve)
+
+
+def move_curves(scene, path: str, frames: float) -> None:
+    """Moves the keys of the F-curves whose path starts with `path` in time."""
+    for curve in _curves_under(scene, path):
+        for point in curve.keyframe_points:
+            point.co[0] += frames
+            point.handle_left[0] += frames
+            point.handle_right[0] += frames
+        curve.update()
+
+
+def copy_curves(scene, path: str, new_scene, new_path: str) -> None:
+    """Copies the F-curves whose path starts with `path` to the same properties under `new_path` of a scene."""
+    for curve in _curves_under(scene, path):
+        copy = _channelbag(new_scene).fcurves.new_from_fcurve(
+            curve, data_path=new_path + curve.data_path.removeprefix(path)
+        )
+        copy.array_index = curve.array_index
+
+
+def _curves_under(scene, path: str) -> list:
+    if not (scene.animation_data and scene.animation_data.action):
+        return []
+    return [curve for curve in _channelbag(scene).fcurves if curve.data_path.startswith(path)]

@@ -85,7 +85,7 @@ def _shapes_at(edit, effect, strip, curves, frame: float):
 
 def _strokes_at(effect, region, timing, frame: float) -> list[np.ndarray]:
     """A region's strokes (n, 2) in image space at a frame, between two drawings with the ease of `timing`'s keys."""
-    layer = effect.annotation.layers.get(region.layer) if effect.annotation else None
+    layer = effect.scene.annotation.layers.get(region.layer) if effect.scene.annotation else None
     if layer is None or not layer.frames:
         return []
     drawings = sorted(layer.frames, key=lambda drawing: drawing.frame_number)
@@ -124,9 +124,9 @@ def clear(edit, effect) -> None:
     animation.remove_curves(edit, effect.path_from_id() + ".")
     effect.shutters.clear()
     effect.regions.clear()
-    if effect.annotation is not None:
-        for layer in list(effect.annotation.layers):
-            effect.annotation.layers.remove(layer)
+    if effect.scene.annotation is not None:
+        for layer in list(effect.scene.annotation.layers):
+            effect.scene.annotation.layers.remove(layer)
 
 
 def _add_shutter(edit, effect, path: str, source: recipe.Shutter, first: float) -> None:
@@ -163,7 +163,7 @@ def _add_region(edit, effect, strip, path: str, source: recipe.Region, first: fl
 
 def _draw(effect, strip, source: recipe.Region, color, first: float) -> str:
     """Draws a region's strokes on an annotation layer of its own, a frame per drawing; the layer's name."""
-    layer = effect.annotation.layers.new(source.name or "Region", set_active=False)
+    layer = effect.scene.annotation.layers.new(source.name or "Region", set_active=False)
     layer.color = color
     size = effect.scene.render.resolution_x, effect.scene.render.resolution_y
     to_image = geometry.picture_to_image(strip, size)

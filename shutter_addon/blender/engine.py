@@ -2,6 +2,7 @@
 
 import os
 import sys
+import traceback
 
 import bpy
 import numpy as np
@@ -21,6 +22,10 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         except pictures.FAULTS as error:
             fail(self, str(error))
             return
+        except Exception as error:  # Blender would print it, and render the frame without the effect
+            traceback.print_exc()
+            fail(self, f"internal error: {error!r}")
+            return
         picture = pictures.resized(picture, self.resolution_x, self.resolution_y)
         result = self.begin_result(0, 0, self.resolution_x, self.resolution_y)
         # Blender's rows go up; composed pictures lie so in memory, and this copies nothing.
@@ -28,26 +33,33 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         self.end_result(result)
 
     def _say(self, message: str) -> None:
-        self.report({"INFO"}, f"Virtual Shutter: {message}")
+        if bpy.app.background:
+            print(f"Virtual Shutter: {message}", file=sys.stderr, flush=True)
+        else:
+            self.report({"WARNING"}, f"Virtual Shutter: {message}")
 
 
 def fail(engine, sentence: str) -> None:
-    """Says why there is no picture: a report in the window; without one, the process ends with exit code 2.
+    """Says why there is no picture: a report in the window; without one, the process ends.
 
     Blender goes on after an engine's error and writes the frame without it: a farm would deliver a plain film.
     """
-    if not bpy.app.background:
-        engine.report({"ERROR"}, f"Virtual Shutter: {sentence}")
-        return
-    sys.stdout.flush()
-    print(f"virtual shutter: {sentence}", file=sys.stderr, flush=True)
+    if bpy.app.background:
+        refuse(sentence)
+    engine.report({"ERROR"}, f"Virtual Shutter: {sentence}")
+
+
+def refuse(sentence: str) -> None:
+    """Ends the process from inside a render: the sentence on stderr, exit code 2."""
+    print(f"Virtual Shutter: {sentence}", file=sys.stderr, flush=True)
     leave(2)
 
 
 def leave(code: int) -> None:
-    """Ends the process from inside a render; sys.exit would leave Blender complaining about its memory."""
+    """Ends the process from inside a render; after sys.exit Blender would complain about its memory."""
     for clean_up in before_leaving:
         clean_up()
+    sys.stdout.flush()
     os._exit(code)
 
 

@@ -1,4 +1,4 @@
-"""Where a strip's picture lies on the sequencer's image, and which source frame it shows when."""
+"""Where a strip's picture lies on the sequencer's image."""
 
 import numpy as np
 
@@ -14,7 +14,8 @@ def picture_to_image(strip, size) -> np.ndarray:
     cos, sin = np.cos(t.rotation), np.sin(t.rotation)
     pivot = (np.array(t.origin) - 0.5) * (width, height)
     linear = np.array([[cos, -sin], [sin, cos]]) * (t.scale_x, t.scale_y)
-    offset = np.array([t.offset_x, t.offset_y]) + pivot - linear @ (pivot + (width / 2, height / 2))
+    corner = -(pivot + np.array([width, height]) / 2)
+    offset = np.array([t.offset_x, t.offset_y]) + pivot + linear @ corner
     matrix = np.eye(3)
     matrix[:2, :2], matrix[:2, 2] = linear * (width, height), offset
     return matrix

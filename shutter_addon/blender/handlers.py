@@ -3,15 +3,32 @@
 import bpy
 from bpy.app.handlers import persistent
 
-from . import pictures
+from . import copies, pictures, strips
 
 
 @persistent
-def _loaded(*_):
+def _before_load(*_):
     pictures.forget()
 
 
-HANDLERS = {"load_pre": _loaded}
+@persistent
+def _adopt_copies(*_):
+    copies.adopt()
+
+
+@persistent
+def _before_render(scene, *_):
+    # In a window the render has a thread of its own, and the last update has seen to copies.
+    if bpy.app.background and scene.render.engine != strips.ENGINE:
+        copies.adopt()
+
+
+HANDLERS = {
+    "load_pre": _before_load,
+    "load_post": _adopt_copies,
+    "depsgraph_update_post": _adopt_copies,
+    "render_init": _before_render,
+}
 
 
 def register():

@@ -3,13 +3,14 @@
 from pathlib import Path
 
 import numpy as np
+import OpenImageIO
 
-from ..compute.renderer import Renderer, open_compositor
+from ..compute.renderer import NoDeviceError, Renderer, open_compositor
 from ..media import MediaError
 from ..media.exr import write_exr
 from . import effects, sources, strips, timing
 
-FAULTS = (effects.EffectError, MediaError, MemoryError)
+FAULTS = (effects.EffectError, MediaError, NoDeviceError, MemoryError)
 
 device = "auto"
 weights_folder: Path | None = None
@@ -44,27 +45,20 @@ def _renderer(scene, source_strip, say) -> Renderer:
     old_key, renderer = _renderers.get(scene.session_uid, (None, None))
     if old_key != key:
         if renderer is not None:
-            _close(renderer)
+            renderer.close()
         renderer = Renderer(_compositor, sources.open_media(source_strip))
         _renderers[scene.session_uid] = key, renderer
     return renderer
-
-
-def _close(renderer) -> None:
-    with renderer.compositor.current():
-        renderer.release_window()
-    renderer.source.close()
 
 
 def forget(*_) -> None:
     """Closes all sources and frees the device: when a file is loaded, and when the extension goes."""
     global _compositor
     for _key, renderer in _renderers.values():
-        _close(renderer)
+        renderer.close()
     _renderers.clear()
     if _compositor is not None:
-        with _compositor.current():
-            _compositor.release()
+        _compositor.release()
         _compositor = None
 
 
@@ -72,10 +66,10 @@ def resized(picture: np.ndarray, width: int, height: int) -> np.ndarray:
     """The picture at the size the sequencer asks for (it renders previews smaller)."""
     if picture.shape[:2] == (height, width):
         return picture
-    import OpenImageIO as oiio
-
-    small = oiio.ImageBufAlgo.resize(oiio.ImageBuf(np.ascontiguousarray(picture)), roi=oiio.ROI(0, width, 0, height))
-    return small.get_pixels(oiio.FLOAT).reshape(height, width, 4)
+    small = OpenImageIO.ImageBufAlgo.resize(
+        OpenImageIO.ImageBuf(np.ascontiguousarray(picture)), roi=OpenImageIO.ROI(0, width, 0, height)
+    )
+    return small.get_pixels(OpenImageIO.FLOAT).reshape(height, width, 4)
 
 
 def _write_weights(coefficients: np.ndarray, names: list[str], frame: float) -> None:

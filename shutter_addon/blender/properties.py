@@ -18,6 +18,7 @@ from bpy.props import (
 from bpy.types import PropertyGroup
 
 from ..core.shutters import MAX_WINDOW
+from .strips import effect_strips
 
 # Enum identifiers are the recipe's words in capitals.
 POSITIONS = (
@@ -53,9 +54,20 @@ KINDS = (
 )
 
 
+def _changed(group, _context):
+    """The sequencer keeps finished frames, and knows nothing of what the effect's strips depend on."""
+    for strip in effect_strips(group.id_data):
+        strip.invalidate_cache("RAW")
+
+
 class ShutterBar(PropertyGroup):
     weight: FloatProperty(
-        name="Weight", description="How much this frame contributes", default=1.0, min=0.0, soft_max=1.0
+        name="Weight",
+        description="How much this frame contributes",
+        default=1.0,
+        min=0.0,
+        soft_max=1.0,
+        update=_changed,
     )
 
 
@@ -67,19 +79,20 @@ class Shutter(PropertyGroup):
 
 class ShutterRegion(PropertyGroup):
     name: StringProperty(name="Name", default="Region")
-    shutter: StringProperty(name="Shutter", description="Name of the shutter that holds here")
-    layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes")
-    kind: EnumProperty(name="Kind", items=KINDS)
+    shutter: StringProperty(name="Shutter", description="Name of the shutter that holds here", update=_changed)
+    layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=_changed)
+    kind: EnumProperty(name="Kind", items=KINDS, update=_changed)
     width: FloatProperty(
         name="Width",
         description="Width of lines, as a part of the picture's height",
         default=0.02,
         min=0.0,
         soft_max=0.5,
+        update=_changed,
     )
-    location: FloatVectorProperty(name="Location", description="In parts of the picture", size=2)
-    rotation: FloatProperty(name="Rotation", description="About the shape's center", subtype="ANGLE")
-    scale: FloatProperty(name="Scale", description="About the shape's center", default=1.0)
+    location: FloatVectorProperty(name="Location", description="In parts of the picture", size=2, update=_changed)
+    rotation: FloatProperty(name="Rotation", description="About the shape's center", subtype="ANGLE", update=_changed)
+    scale: FloatProperty(name="Scale", description="About the shape's center", default=1.0, update=_changed)
 
 
 class ShutterEffect(PropertyGroup):
@@ -87,32 +100,41 @@ class ShutterEffect(PropertyGroup):
     scene: PointerProperty(name="Scene", description="Scene that the effect's strips show", type=bpy.types.Scene)
     source: StringProperty(name="Source", description="Identity of the source strip")
     start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts")
-    annotation: PointerProperty(name="Scribbles", type=bpy.types.Annotation)
     window: IntProperty(
-        name="Window", description="Source frames that a shutter can expose", default=8, min=1, max=MAX_WINDOW
+        name="Window",
+        description="Source frames that a shutter can expose",
+        default=8,
+        min=1,
+        max=MAX_WINDOW,
+        update=_changed,
     )
-    position: EnumProperty(name="Position", items=POSITIONS)
-    interpolation: EnumProperty(name="Interpolation", items=INTERPOLATIONS)
-    light: EnumProperty(name="Light", items=LIGHTS)
-    exposure: EnumProperty(name="Exposure", items=EXPOSURES)
-    edges: EnumProperty(name="Edges", items=EDGES)
-    aggregate: EnumProperty(name="Aggregate", items=AGGREGATES)
-    border: BoolProperty(name="Border", description="The frame's edge is a scribble of the default shutter")
+    position: EnumProperty(name="Position", items=POSITIONS, update=_changed)
+    interpolation: EnumProperty(name="Interpolation", items=INTERPOLATIONS, update=_changed)
+    light: EnumProperty(name="Light", items=LIGHTS, update=_changed)
+    exposure: EnumProperty(name="Exposure", items=EXPOSURES, update=_changed)
+    edges: EnumProperty(name="Edges", items=EDGES, update=_changed)
+    aggregate: EnumProperty(name="Aggregate", items=AGGREGATES, update=_changed)
+    border: BoolProperty(
+        name="Border", description="The frame's edge is a scribble of the default shutter", update=_changed
+    )
     shutters: CollectionProperty(type=Shutter)
     regions: CollectionProperty(type=ShutterRegion)
 
 
-class ShutterEdit(PropertyGroup):
+class ShutterScene(PropertyGroup):
+    """Of an edit: its effects. Of an effect's scene: an identity, by which a copy is known."""
+
     effects: CollectionProperty(type=ShutterEffect)
+    identity: StringProperty()
 
 
-classes = (ShutterBar, Shutter, ShutterRegion, ShutterEffect, ShutterEdit)
+classes = (ShutterBar, Shutter, ShutterRegion, ShutterEffect, ShutterScene)
 
 
 def register():
     for cls in classes:
         bpy.utils.register_class(cls)
-    bpy.types.Scene.virtual_shutter = PointerProperty(type=ShutterEdit)
+    bpy.types.Scene.virtual_shutter = PointerProperty(type=ShutterScene)
     # A strip cannot be pointed to and may be renamed: the source strip carries the identity that effects look for.
     bpy.types.Strip.virtual_shutter_source = StringProperty(options={"HIDDEN"})
 

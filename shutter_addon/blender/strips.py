@@ -70,11 +70,14 @@ def add_effect(edit, source):
     if not source.virtual_shutter_source:
         source.virtual_shutter_source = uuid.uuid4().hex
     scene = _new_scene(edit, f"Shutter {source.name}", (medium.width, medium.height), source)
-    above = max(s.channel for s in edit.sequence_editor.strips_all if _overlap(s, source)) + 1
-    strip = edit.sequence_editor.strips.new_scene("Shutter", scene, above, int(source.content_start))
+    taken = {s.channel for s in edit.sequence_editor.strips_all if _overlap(s, source)}
+    channel = next(c for c in range(source.channel + 1, source.channel + len(taken) + 2) if c not in taken)
+    strip = edit.sequence_editor.strips.new_scene("Shutter", scene, channel, int(source.content_start))
     strip.left_handle, strip.right_handle = source.left_handle, source.right_handle
     strip.blend_type = source.blend_type
     copy_look(source, strip)
+    # Through a transparent picture the plain source would show. An opaque one stays: mute the effect to see it.
+    source.mute = medium.alpha != "opaque"
     effect = edit.virtual_shutter.effects.add()
     effect.name, effect.scene, effect.source, effect.start = (
         strip.name,
@@ -82,7 +85,7 @@ def add_effect(edit, source):
         source.virtual_shutter_source,
         origin(strip),
     )
-    effect.annotation = bpy.data.annotations.new(f"Scribbles {source.name}")
+    scene.annotation = bpy.data.annotations.new(f"Scribbles {source.name}")
     return strip, effect
 
 
@@ -104,6 +107,7 @@ def copy_look(source, strip) -> None:
 def _new_scene(edit, name: str, size, source):
     scene = bpy.data.scenes.new(name)
     scene.render.engine = ENGINE
+    scene.virtual_shutter.identity = uuid.uuid4().hex
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
     scene.frame_start, scene.frame_end = 1, max(1, int(source.content_end - source.content_start))

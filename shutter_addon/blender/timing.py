@@ -25,18 +25,32 @@ def source_frame(strip, frame: float, count: int, scene_fps: float) -> int:
     Trims, cuts, playback rate, retiming keys, reversed frames and strobe as Blender's sequencer applies them.
     """
     length = max(1, count - strip.content_trim_start - strip.content_trim_end)
-    end = strip.content_end - 1
-    position = max(end - frame if strip.use_reverse_frames else frame - strip.content_start, 0.0)
     keys = _retiming_keys(strip)
-    position *= _playback_rate(strip, keys, length, scene_fps)
+    rate = _playback_rate(strip, keys, length, scene_fps)
+
+    def position(time):
+        return _position(strip, keys, rate, length, time)
+
+    # Blender decodes the nearest frame, but keeps it for every position with the same whole part: of a slow strip that
+    # plays forward, the first of those positions decides.
+    whole = int(position(frame))
+    while frame - 1 >= strip.left_handle and int(position(frame - 1)) == whole:
+        frame -= 1
+    index = math.floor(position(frame) + np.float32(0.5))
+    return min(index, length - 1) + strip.content_trim_start
+
+
+def _position(strip, keys, rate: float, length: int, frame: float) -> np.float32:
+    """Where in the strip's content a timeline frame lies, in frames; in float32 as Blender reckons, ties included."""
+    end = strip.content_end - 1
+    position = np.float32(max(end - frame if strip.use_reverse_frames else frame - strip.content_start, 0.0))
+    position *= np.float32(rate)
     if len(keys) > 1:
-        position = retimed(keys, position) * length
-    position = min(max(position, 0.0), length - 1)
+        position = retimed(keys, position) * np.float32(length)
+    position = min(max(position, np.float32(0)), np.float32(length - 1))
     if strip.strobe > 1:
-        position -= math.fmod(position, strip.strobe)
-    # Movies show the nearest frame, image strips the one begun.
-    index = math.floor(position + 0.5) if strip.type == "MOVIE" else int(position)
-    return index + strip.content_trim_start
+        position -= np.float32(math.fmod(position, strip.strobe))
+    return position
 
 
 def _playback_rate(strip, keys, length: int, scene_fps: float) -> float:
@@ -64,28 +78,29 @@ def _retiming_keys(strip) -> list[RetimingKey]:
     return [RetimingKey(key.index, key.flag, key.factor) for key in raw]
 
 
-def retimed(keys: list[RetimingKey], position: float) -> float:
+def retimed(keys: list[RetimingKey], position: float) -> np.float32:
     """What the keys make of a position in the content, 0 to 1: lines between them, arcs through transitions."""
     k = max((i for i, key in enumerate(keys[:-1]) if key.index <= position), default=0)
     first, second = keys[k], keys[k + 1]
+    speed = _speed(first, second)
     if first.flag & _TRANSITION_IN and 0 < k < len(keys) - 2:
-        speed_in, speed_out = _speed(keys[k - 1], first), _speed(second, keys[k + 2])
-        if abs(speed_in - speed_out) * keys[-1].index >= 0.01:
-            return min(1.0, _arc(first, speed_in, second, speed_out, position))
-        return min(1.0, first.factor + speed_in * (position - first.index))
-    return min(1.0, first.factor + _speed(first, second) * (position - first.index))
+        speed, speed_out = _speed(keys[k - 1], first), _speed(second, keys[k + 2])
+        if abs(speed - speed_out) * np.float32(keys[-1].index) >= 0.01:
+            return min(np.float32(1), _arc(first, speed, second, speed_out, position))
+    along = np.float32(position - first.index)
+    return min(np.float32(1), np.float32(first.factor) + speed * along)
 
 
-def _speed(first: RetimingKey, second: RetimingKey) -> float:
-    return (second.factor - first.factor) / max(second.index - first.index, 1e-9)
+def _speed(first: RetimingKey, second: RetimingKey) -> np.float32:
+    return np.float32(second.factor - first.factor) / np.float32(max(second.index - first.index, 1e-9))
 
 
-def _arc(first: RetimingKey, speed_in: float, second: RetimingKey, speed_out: float, position: float) -> float:
+def _arc(first: RetimingKey, speed_in: float, second: RetimingKey, speed_out: float, position: float) -> np.float32:
     """The circle that leaves the first key with one slope and reaches the second with the other."""
     # Its centre lies on both normals: x + slope·y is the same there as at the key.
-    lines = np.array([[1.0, speed_in], [1.0, speed_out]])
+    slopes = np.array([[1.0, speed_in], [1.0, speed_out]])
     sums = [first.index + speed_in * first.factor, second.index + speed_out * second.factor]
-    x, y = np.linalg.solve(lines, sums)
+    x, y = np.linalg.solve(slopes, sums)
     radius = math.hypot(first.index - x, first.factor - y)
     side = -1 if y > first.factor else 1
-    return y + side * math.sqrt(max(radius**2 - (position - x) ** 2, 0.0))
+    return np.float32(y + side * math.sqrt(max(radius**2 - (position - x) ** 2, 0.0)))

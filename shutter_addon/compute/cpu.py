@@ -32,6 +32,16 @@ class Window:
         self.frames = {}
 
 
+class Solver:
+    """compute.diffusion on NumPy, as its class Diffusion."""
+
+    def solve(self, labels: np.ndarray, count: int) -> np.ndarray:
+        return diffuse(labels, count)
+
+    def release(self) -> None:
+        pass
+
+
 class CPUCompositor:
     """Composes with NumPy; the same methods as GPUCompositor."""
 
@@ -43,8 +53,8 @@ class CPUCompositor:
     def window(self, source, capacity: int) -> Window:
         return Window(source, capacity)
 
-    def diffuse(self, labels: np.ndarray, count: int) -> np.ndarray:
-        return diffuse(labels, count)
+    def solver(self) -> Solver:
+        return Solver()
 
     def constant(self, values: np.ndarray) -> np.ndarray:
         return np.asarray(values, dtype=np.float32)[:, None, None]

@@ -57,8 +57,8 @@ class GLDevice:
         return texture
 
     def write(self, texture, array: np.ndarray, layer: int = 0) -> None:
-        """Fills a layer from a C-contiguous array (height, width[, 4]) of the format's type."""
-        width, height, _ = texture.size
+        """Fills a layer, or its first rows, from a C-contiguous array (rows, width[, 4]) of the format's type."""
+        height, width = array.shape[:2]
         texture.write(array, viewport=(0, 0, layer, width, height, 1), alignment=1)
 
     def read(self, texture) -> np.ndarray:
@@ -69,8 +69,8 @@ class GLDevice:
         texture.read_into(array, alignment=1)
         return array
 
-    def run(self, program: Pass, size: tuple[int, ...], *, textures=None, images=None, **constants) -> None:
-        """Runs a pass over `size` invocations (x, y[, z]); textures and images by name, constants by keyword."""
+    def run(self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, **constants) -> None:
+        """Runs a pass over `extent` invocations (x, y[, z]); textures and images by name, constants by keyword."""
         if program not in self._programs:
             self._programs[program] = self._context.compute_shader(source(program))
         shader = self._programs[program]
@@ -81,7 +81,7 @@ class GLDevice:
         for name, value in constants.items():
             if name in shader:  # the compiler drops what a source does not use
                 shader[name] = value
-        shader.run(*(-(-n // local) for n, local in zip((*size, 1)[:3], LOCAL_SIZE, strict=True)))
+        shader.run(*(-(-n // local) for n, local in zip((*extent, 1)[:3], LOCAL_SIZE, strict=True)))
         self._context.memory_barrier()
 
     def release(self) -> None:

@@ -124,7 +124,6 @@ class GPUCompositor:
     def __init__(self, device):
         self.name = device.name
         self._device = device
-        self._diffusion = Diffusion(device)
         self._textures: dict[str, object] = {}
 
     def current(self):
@@ -134,16 +133,16 @@ class GPUCompositor:
     def window(self, source, capacity: int) -> Window:
         return Window(self._device, source, capacity)
 
-    def diffuse(self, labels: np.ndarray, count: int):
-        """Coefficients on the device; see compute.diffusion. Valid until the next call."""
-        return self._diffusion.solve(labels, count)
+    def solver(self) -> Diffusion:
+        """A diffusion whose solution stays valid until it solves again."""
+        return Diffusion(self._device)
 
     def constant(self, values: np.ndarray):
         """The same coefficients (N,) everywhere, on the device."""
         return self._filled("constant", padded(values).astype(np.float32)[:, None, None, :], "rgba32f")
 
     def coefficients(self, handle, count: int) -> np.ndarray:
-        """Coefficients (N, h, w) float32 of what `diffuse` or `constant` gave."""
+        """Coefficients (N, h, w) float32 of what a solver or `constant` gave."""
         values = self._device.read(handle)
         return np.moveaxis(values, -1, 1).reshape(-1, *values.shape[1:3])[:count]
 
@@ -196,7 +195,7 @@ class GPUCompositor:
         return texture
 
     def release(self) -> None:
-        for texture in self._textures.values():
-            texture.release()
-        self._diffusion.release()
+        with self._device.current():
+            for texture in self._textures.values():
+                texture.release()
         self._device.release()

@@ -35,6 +35,7 @@ class Renderer:
 
     def __init__(self, compositor, source):
         self.compositor, self.source = compositor, source
+        self._solver = compositor.solver()
         self._window = None
         self._solved = None
 
@@ -82,7 +83,7 @@ class Renderer:
     def _diffused(self, labels: np.ndarray, count: int):
         """Solves anew only when a scribble moved."""
         if self._solved is None or self._solved[0] != count or not np.array_equal(self._solved[1], labels):
-            self._solved = count, labels, self.compositor.diffuse(labels, count)
+            self._solved = count, labels, self._solver.solve(labels, count)
         return self._solved[2]
 
     def _needed(self, index: int, instant: Instant, backward: bool) -> np.ndarray:
@@ -103,9 +104,17 @@ class Renderer:
         return self._window
 
     def release_window(self) -> None:
+        """Frees the frames; the next picture reads them again."""
         if self._window is not None:
             self._window.release()
             self._window = None
+
+    def close(self) -> None:
+        """Frees everything on the device and closes the source."""
+        with self.compositor.current():
+            self.release_window()
+            self._solver.release()
+        self.source.close()
 
 
 def _uniform(labels: np.ndarray, count: int) -> np.ndarray | None:

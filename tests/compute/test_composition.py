@@ -191,8 +191,9 @@ def test_frames_that_no_shutter_exposes_are_not_read(device):
 def test_no_new_solve_when_nothing_moved(device, monkeypatch):
     rng = np.random.default_rng(13)
     solves = []
-    solve = type(device).diffuse
-    monkeypatch.setattr(type(device), "diffuse", lambda self, *a: solves.append(1) or solve(self, *a))
+    solver = type(device.solver())
+    solve = solver.solve
+    monkeypatch.setattr(solver, "solve", lambda self, *a: solves.append(1) or solve(self, *a))
     renderer, moment = Renderer(device, footage(rng)), instant(rng)
     first = renderer.picture(0, moment)
     assert np.array_equal(first, renderer.picture(0, moment))
@@ -228,6 +229,15 @@ def test_history_leaves_no_trace(device):
     for index in (4, 1, 5, 0, 3, 2):
         assert np.array_equal(renderer.picture(index, moment), in_order[index])
         assert np.array_equal(Renderer(device, source).picture(index, moment), in_order[index])
+
+
+def test_two_effects_share_a_device(device):
+    rng = np.random.default_rng(16)
+    source, first, second = footage(rng), instant(rng), instant(rng, shapes=SHAPES[:2])
+    one, other = Renderer(device, source), Renderer(device, source)
+    expected = one.picture(0, first), other.picture(0, second)
+    assert np.array_equal(one.picture(0, first), expected[0])
+    assert np.array_equal(other.picture(0, second), expected[1])
 
 
 def test_no_gl_says_so(monkeypatch):

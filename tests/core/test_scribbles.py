@@ -1,5 +1,7 @@
 """Scribbles against pixels found one by one."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -32,7 +34,7 @@ def test_a_line_covers_what_lies_within_half_its_width(stroke, size, line_width)
     labels = scribbles.rasterise([Shape(4, "line", line_width, (stroke,))], width, height)
     pixels = stroke * size
     points = centres(width, height)
-    segments = list(zip(pixels[:-1], pixels[1:], strict=True)) or [(pixels[0], pixels[0])]
+    segments = list(pairwise(pixels)) or [(pixels[0], pixels[0])]
     nearest = np.min([distance(points, a, b) for a, b in segments], axis=0)
     radius = max(line_width * height / 2, 0.7072)
     assert set(np.unique(labels)) <= {0, 5}

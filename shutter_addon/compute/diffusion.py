@@ -1,0 +1,303 @@
+"""Diffusion: coefficients for every pixel from the scribbles (paper §3.4.2).
+
+The harmonic function with the scribbles as fixed values and free (Neumann) edges, by multigrid V-cycles on the
+5-point Laplacian. Coarse cells lie on the even cells of the finer grid, and coarse operators are Galerkin products
+PᵀAP (nine points). P is the bilinear prolongation, each cell's row scaled by t = 1 − HOLD · (row sum) / (diagonal),
+and by 0 on fixed cells: the less a cell can move, the less it follows. So a coarse grid knows of scribbles far
+thinner than its cells, without influence blocks and without a rule for coarsening constraints.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from .passes import Image, Pass
+
+# Largest error × 255 over 67 scenes after 2, 3, 4, 5 cycles: 6.8, 1.1, 0.17, 0.03 (median 0.18, 0.014, 0.003, 0.0006).
+CYCLES = 4
+SWEEPS = 2
+# Lower is faster at walls (two lines side by side), higher at dots and at holes in walls: 0.8 balances the two.
+HOLD = 0.8
+# Coefficients below this are none: regions that one shutter encloses get exactly that one.
+NOTHING = 1 / 4096
+_COLOURS = ((0, 0), (1, 1), (0, 1), (1, 0))
+_OFFSETS = tuple((y, x) for y in (-1, 0, 1) for x in (-1, 0, 1))
+
+
+def diffuse(labels: np.ndarray, count: int) -> np.ndarray:
+    """Coefficients (count, H, W) float32, ≥ 0 and of sum 1, from labels (H, W): 0 free, 1 + shutter fixed.
+
+    Labels without any scribble give the first shutter everywhere.
+    """
+    levels = [_finest(labels)]
+    while levels[-1].shape != (1, 1):
+        levels.append(_coarser(levels[-1]))
+    solution = _padded(labels == np.arange(1, count + 1)[:, None, None])
+    for cycle in range(CYCLES):
+        _cycle(levels, solution, 0.0, SWEEPS if cycle else 0)
+    return _finish(_inner(solution))
+
+
+class _Level:
+    """A grid's operator: `weights` {offset: what a cell gives its neighbour, a number or (H, W)}, and its diagonal."""
+
+    def __init__(self, weights, diagonal, live, row_sum):
+        self.shape = diagonal.shape
+        self.weights = weights
+        self.diagonal = diagonal
+        self.inverse = np.divide(live, diagonal, where=live, out=np.zeros(self.shape, np.float32))
+        self.live = live
+        self.scale = live * np.maximum(0, 1 - HOLD * row_sum * self.inverse)
+
+
+def _finest(labels: np.ndarray) -> _Level:
+    """The 5-point Laplacian; solutions hold the fixed values, so every neighbour counts."""
+    ones, fixed = _padded(np.ones((1, *labels.shape))), _padded(labels[None] != 0)
+    cross = {offset: 1 for offset in _OFFSETS if 0 in offset and any(offset)}
+    neighbours, held = (sum(_part(a, offset)[0] for offset in cross) for a in (ones, fixed))
+    return _Level(cross, np.maximum(neighbours, 1), labels == 0, held)
+
+
+def _coarser(fine: _Level) -> _Level:
+    """PᵀAP by probing: coarse cells three apart do not meet in a row, so nine vectors tell all rows."""
+    height, width = ((n + 1) // 2 for n in fine.shape)
+    rows, columns = np.arange(height) % 3, np.arange(width) % 3
+    probes = np.stack([np.outer(rows == y, columns == x) for y in range(3) for x in range(3)]).astype(np.float32)
+    answers = -_restrict(fine, _residual(fine, _padded(_prolong(fine, probes)), 0.0))
+    entries = {}
+    for y, x in _OFFSETS:
+        near = (rows[:, None] + y) % 3 * 3 + (columns + x) % 3
+        entries[y, x] = np.take_along_axis(answers, near[None], axis=0)[0]
+        # Grids of one or two cells: beyond the edge there is nothing.
+        entries[y, x][_beyond(height, y)] = 0
+        entries[y, x][:, _beyond(width, x)] = 0
+    diagonal = entries.pop((0, 0))
+    return _Level({o: -a for o, a in entries.items()}, diagonal, diagonal > 0, diagonal + sum(entries.values()))
+
+
+def _beyond(size: int, offset: int) -> np.ndarray:
+    neighbours = np.arange(size) + offset
+    return (neighbours < 0) | (neighbours >= size)
+
+
+def _cycle(levels, solution, right, sweeps) -> None:
+    """One V-cycle on the padded solution (N, H + 2, W + 2), in place."""
+    level, *below = levels
+    for _ in range(sweeps):
+        _smooth(level, solution, right)
+    if below:
+        residual = _restrict(level, _residual(level, solution, right))
+        correction = _padded(np.zeros_like(residual))
+        _cycle(below, correction, residual, SWEEPS)
+        _inner(solution)[:] += _prolong(level, _inner(correction))
+    for _ in range(SWEEPS):
+        _smooth(level, solution, right)
+
+
+def _smooth(level: _Level, solution, right) -> None:
+    """A Gauss-Seidel sweep in four colours, which are red-black where only four neighbours count."""
+    height, width = level.shape
+    for y, x in _COLOURS:
+        cells = np.s_[y::2, x::2]
+        total = right[:, *cells] if np.ndim(right) else 0.0
+        for (dy, dx), weight in level.weights.items():
+            near = solution[:, y + 1 + dy : height + 1 + dy : 2, x + 1 + dx : width + 1 + dx : 2]
+            total = total + (near * weight[cells] if np.ndim(weight) else near)
+        own = _inner(solution)[:, *cells]
+        np.copyto(own, total * level.inverse[cells], where=level.live[cells])
+
+
+def _residual(level: _Level, solution, right) -> np.ndarray:
+    """What the equations of the live cells still miss, (N, H, W)."""
+    total = right - level.diagonal * _inner(solution)
+    for offset, weight in level.weights.items():
+        total += weight * _part(solution, offset)
+    return total * level.live
+
+
+def _prolong(fine: _Level, coarse: np.ndarray) -> np.ndarray:
+    height, width = fine.shape
+    return _spread(_spread(coarse, height, 1), width, 2) * fine.scale
+
+
+def _restrict(fine: _Level, residual: np.ndarray) -> np.ndarray:
+    """The transpose of _prolong."""
+    return _gather(_gather(residual * fine.scale, 1), 2)
+
+
+def _spread(coarse: np.ndarray, size: int, axis: int) -> np.ndarray:
+    """Linear interpolation to `size` cells along an axis; coarse cells lie on the even ones."""
+    cells = np.arange(size)
+    after = np.minimum((cells + 1) // 2, coarse.shape[axis] - 1)
+    return (coarse.take(cells // 2, axis) + coarse.take(after, axis)) * np.float32(0.5)
+
+
+def _gather(fine: np.ndarray, axis: int) -> np.ndarray:
+    """The transpose of _spread."""
+    fine = np.moveaxis(fine, axis, 0)
+    odd = fine[1::2] * np.float32(0.5)
+    coarse = fine[0::2].copy()
+    coarse[: len(odd)] += odd
+    coarse[1:] += odd[: len(coarse) - 1]
+    if len(odd) == len(coarse):
+        coarse[-1] += odd[-1]
+    return np.moveaxis(coarse, 0, axis)
+
+
+def _finish(solution: np.ndarray) -> np.ndarray:
+    coefficients = np.where(solution < NOTHING, np.float32(0), solution)
+    total = coefficients.sum(axis=0)
+    coefficients[0][total == 0] = 1
+    return coefficients / np.where(total == 0, 1, total)
+
+
+def _padded(array: np.ndarray) -> np.ndarray:
+    """(N, H, W) with a frame of zeros around, float32."""
+    return np.pad(array.astype(np.float32), ((0, 0), (1, 1), (1, 1)))
+
+
+def _inner(padded: np.ndarray) -> np.ndarray:
+    return padded[:, 1:-1, 1:-1]
+
+
+def _part(padded: np.ndarray, offset) -> np.ndarray:
+    """The neighbours at an offset (dy, dx) of all cells."""
+    dy, dx = offset
+    return padded[:, 1 + dy : padded.shape[1] - 1 + dy, 1 + dx : padded.shape[2] - 1 + dx]
+
+
+_SAMPLER = "sampler2DArray"
+_STORED = Image("rgba32f")
+_SOLUTION = {"solution": Image("rgba32f", reads=True)}
+_FINEST = {"following": _SAMPLER}
+_STENCIL = {"stencil": _SAMPLER}
+_GRID = {"size": "ivec2"}
+_GRIDS = {"size": "ivec2", "coarse": "ivec2"}
+
+_START = Pass(
+    "diffuse_start",
+    {"labels": "usampler2DArray"},
+    {"solution": _STORED, "following": Image("r32f")},
+    {**_GRID, "hold": "float"},
+)
+_FINISH = Pass("diffuse_finish", {}, _SOLUTION, {**_GRID, "layers": "int", "nothing": "float"})
+_COARSEN_FINEST = Pass("diffuse_coarsen_finest", _FINEST, {"next": _STORED}, {**_GRIDS, "hold": "float"})
+_COARSEN = Pass("diffuse_coarsen", _STENCIL, {"next": _STORED}, {**_GRIDS, "hold": "float"})
+_SMOOTH_FINEST = Pass("diffuse_smooth_finest", _FINEST, _SOLUTION, {**_GRID, "colour": "int"})
+_SMOOTH = Pass("diffuse_smooth", {**_STENCIL, "right": _SAMPLER}, _SOLUTION, {**_GRID, "colour": "ivec2"})
+_RESIDUAL_FINEST = Pass("diffuse_residual_finest", {**_FINEST, "solution": _SAMPLER}, {"residual": _STORED}, _GRID)
+_RESIDUAL = Pass(
+    "diffuse_residual", {**_STENCIL, "right": _SAMPLER, "solution": _SAMPLER}, {"residual": _STORED}, _GRID
+)
+_RESTRICT = Pass(
+    "diffuse_restrict", {"residual": _SAMPLER}, {"right": _STORED, "correction": _STORED}, {**_GRIDS, "step": "int"}
+)
+_PROLONG_FINEST = Pass("diffuse_prolong_finest", {**_FINEST, "correction": _SAMPLER}, _SOLUTION, _GRIDS)
+_PROLONG = Pass("diffuse_prolong", {**_STENCIL, "correction": _SAMPLER}, _SOLUTION, _GRIDS)
+
+
+class _Grid:
+    """A grid's textures: layers of four shutters each, and the operator, which the finest reads from its labels."""
+
+    def __init__(self, device, width: int, height: int, layers: int, finest: bool):
+        self.size = width, height
+        self.layers = layers
+        self.finest = finest
+        self.textures = {name: device.texture(width, height, layers, "rgba32f") for name in ("solution", "residual")}
+        if finest:
+            self.textures["labels"] = device.texture(width, height, 1, "r16ui")
+            self.textures["following"] = device.texture(width, height, 1, "r32f")
+        else:
+            self.textures["right"] = device.texture(width, height, layers, "rgba32f")
+            self.textures["stencil"] = device.texture(width, height, 3, "rgba32f")
+
+
+class Diffusion:
+    """diffuse() on a device. Textures stay until the size or the number of shutters changes."""
+
+    def __init__(self, device):
+        self._device = device
+        self._grids = []
+        self._made_for = None
+
+    def solve(self, labels: np.ndarray, count: int):
+        """A texture array rgba32f, shutter i in layer i // 4 and channel i % 4, from labels (H, W) uint16.
+
+        The next call overwrites it. Nothing is read back, and nothing of earlier calls is used.
+        """
+        self._prepare(labels.shape, count)
+        finest = self._grids[0]
+        self._device.write(finest.textures["labels"], np.ascontiguousarray(labels, dtype=np.uint16))
+        self._run(_START, (*finest.size, finest.layers), finest)
+        for grid, coarse in pairwise(self._grids):
+            coarsen = _COARSEN_FINEST if grid.finest else _COARSEN
+            self._run(coarsen, coarse.size, grid, coarse, next=coarse.textures["stencil"])
+        for cycle in range(CYCLES):
+            self._cycle(0, SWEEPS if cycle else 0)
+        self._run(_FINISH, finest.size, finest, layers=finest.layers, nothing=NOTHING)
+        return finest.textures["solution"]
+
+    def release(self) -> None:
+        for grid in self._grids:
+            for texture in grid.textures.values():
+                texture.release()
+        self._grids, self._made_for = [], None
+
+    def _prepare(self, shape, count) -> None:
+        height, width = shape
+        layers = -(-count // 4)
+        if self._made_for == (width, height, layers):
+            return
+        self.release()
+        self._grids.append(_Grid(self._device, width, height, layers, True))
+        while (width, height) != (1, 1):
+            width, height = (width + 1) // 2, (height + 1) // 2
+            self._grids.append(_Grid(self._device, width, height, layers, False))
+        self._made_for = *shape[::-1], layers
+
+    def _cycle(self, index: int, sweeps: int) -> None:
+        grid, *below = self._grids[index : index + 2]
+        for _ in range(sweeps):
+            self._smooth(grid)
+        if grid.finest and not sweeps:
+            # The coarser grid hears of the red pixels' residuals alone: make sure that the black ones have none.
+            self._smooth(grid, colours=(1,))
+        if below:
+            self._correct(grid, below[0], index)
+        for _ in range(SWEEPS):
+            self._smooth(grid)
+
+    def _correct(self, grid: _Grid, coarse: _Grid, index: int) -> None:
+        """Adds the solution of the coarser grid for the residual."""
+        width, height = grid.size
+        area = ((width + 1) // 2 if grid.finest else width, height, grid.layers)
+        self._run(_RESIDUAL_FINEST if grid.finest else _RESIDUAL, area, grid)
+        below = {"right": coarse.textures["right"], "correction": coarse.textures["solution"]}
+        self._run(_RESTRICT, (*coarse.size, grid.layers), grid, coarse, **below, step=2 if grid.finest else 1)
+        self._cycle(index + 1, SWEEPS)
+        self._run(_PROLONG_FINEST if grid.finest else _PROLONG, area, grid, coarse, **below)
+
+    def _smooth(self, grid: _Grid, colours=(0, 1)) -> None:
+        width, height = grid.size
+        if grid.finest:
+            for colour in colours:
+                self._run(_SMOOTH_FINEST, ((width + 1) // 2, height, grid.layers), grid, colour=colour)
+        else:
+            for y, x in _COLOURS:
+                if y < height and x < width:
+                    self._run(_SMOOTH, ((width + 1 - x) // 2, (height + 1 - y) // 2, grid.layers), grid, colour=(x, y))
+
+    def _run(self, program: Pass, size, grid: _Grid, coarse: _Grid | None = None, **extra) -> None:
+        """Runs a pass on a grid; `extra` names textures and constants besides the grid's own."""
+        given = {"size": grid.size, "hold": HOLD, **grid.textures, **extra}
+        if coarse:
+            given["coarse"] = coarse.size
+        self._device.run(
+            program,
+            size,
+            textures={name: given[name] for name in program.samplers},
+            images={name: given[name] for name in program.images},
+            **{name: given[name] for name in program.constants},
+        )

@@ -1,0 +1,50 @@
+"""A source in any colour space that Blender knows."""
+
+import numpy as np
+from OpenImageIO import FLOAT, ColorConfig, ImageBuf, ImageBufAlgo
+
+from .errors import MediaError
+
+SCENE_LINEAR = "Linear Rec.709"  # of Blender's own configuration
+TRANSFERS = {"sRGB": "srgb", SCENE_LINEAR: "linear", "Non-Color": "linear"}
+
+
+def in_colorspace(source, name, config):
+    """The source with its samples taken to be in the colour space of that name (as a strip's colour space says).
+
+    config: path of the OpenColorIO configuration that has it, not needed for sRGB and scene linear."""
+    if name in TRANSFERS:
+        source.transfer = TRANSFERS[name]
+        return source
+    return ColorSource(source, name, config)
+
+
+class ColorSource:
+    """Another source's frames, converted to scene linear float32."""
+
+    transfer, dtype = "linear", np.dtype(np.float32)
+
+    def __init__(self, source, name, config):
+        if config is None or name not in ColorConfig(str(config)).getColorSpaceNames():
+            raise MediaError(f"{source.path.name}: unknown colour space {name}")
+        self._source, self._name, self._config = source, name, str(config)
+
+    def __getattr__(self, name):
+        return getattr(self._source, name)
+
+    def read(self, index):
+        """The frame as the source has it, but scene linear."""
+        samples = self._source.read(index)
+        scale = np.iinfo(samples.dtype).max if samples.dtype.kind == "u" else 1
+        picture = ImageBuf(samples.astype(np.float32) / np.float32(scale))
+        associated = self._source.alpha == "premultiplied"
+        linear = ImageBufAlgo.colorconvert(picture, self._name, SCENE_LINEAR, associated, colorconfig=self._config)
+        if linear.has_error:
+            raise MediaError(f"{self._source.path.name}: no conversion from {self._name} ({linear.geterror()})")
+        return linear.get_pixels(FLOAT)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._source.close()

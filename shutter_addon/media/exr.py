@@ -1,0 +1,25 @@
+"""Float EXR files with channels of any name."""
+
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO
+
+from .errors import MediaError
+
+
+def write_exr(path: Path, values: np.ndarray, names: list[str]) -> None:
+    """Writes values (height, width, channels) float32 with these channel names, whole or not at all.
+
+    MediaError: it cannot be written."""
+    height, width, channels = values.shape
+    spec = OpenImageIO.ImageSpec(width, height, channels, OpenImageIO.FLOAT)
+    spec.channelnames = tuple(names)
+    spec["compression"] = "zip"
+    part = path.with_name(f".{path.stem}.part.exr")
+    output = OpenImageIO.ImageOutput.create(str(part))
+    written = output.open(str(part), spec) and output.write_image(np.ascontiguousarray(values, dtype=np.float32))
+    if not (output.close() and written):
+        part.unlink(missing_ok=True)
+        raise MediaError(f"{path}: {output.geterror() or 'cannot be written'}")
+    part.replace(path)

@@ -1,0 +1,125 @@
+"""Frames of a movie: those that Blender's movie strip shows, converted to RGB as Blender converts them."""
+
+import math
+from fractions import Fraction
+
+import av
+import numpy as np
+
+from .decode import FrameReader, fraction, reason
+from .deinterlace import blur_rows, has_fields, interpolate_fields
+from .errors import MediaError
+from .files import check_file, check_index
+
+# Blender's choice for YUV to RGB; libswscale's defaults are a level too dark and smear colours.
+SCALER = "neighbor+accurate_rnd+full_chroma_int"
+
+
+class MovieSource:
+    """A movie's frames.
+
+    Frame i is the one on screen at the stream's start + i / fps: the last whose time stamp is not later, or the first
+    frame. So frames repeat or drop out where the rate varies, and the last one holds while sound goes on beyond it.
+    8-bit movies give uint8, deeper ones uint16 (libswscale keeps 16 bits even of floats), always display values.
+    """
+
+    transfer = "srgb"
+
+    def __init__(self, path, *, stream=0, deinterlace=False):
+        self.path = check_file(path)
+        self._deinterlace = deinterlace
+        self._graph = self._graph_key = None
+        self._reader = FrameReader(self.path, stream)
+        try:
+            self._probe()
+        except BaseException:
+            self.close()
+            raise
+
+    def _probe(self):
+        reader, first = self._reader, self._reader.shown
+        self.fps = fraction(reader.stream.guessed_rate)
+        self.count = _count(reader.container, reader.stream, self.fps)
+        if self.count < 1:
+            raise MediaError(f"{self.path.name}: its length is unknown; put it into an MP4 or MKV file first")
+        self.has_audio = bool(reader.container.streams.audio)
+        self._step = float(1 / (self.fps * reader.time_base))
+        self._size = first.width, first.height
+        self._turns = -round(first.rotation / 90) % 4
+        self.width, self.height = self._size[::-1] if self._turns % 2 else self._size
+        deep = max(component.bits for component in first.format.components) > 8
+        self._format, self.dtype = ("rgba64le", np.dtype(np.uint16)) if deep else ("rgba", np.dtype(np.uint8))
+        # Blender takes 8-bit colours for straight, but those of deeper movies, its floats, for premultiplied.
+        has_alpha = any(component.is_alpha for component in first.format.components)
+        self.alpha = "opaque" if not has_alpha else "premultiplied" if deep else "straight"
+
+    def read(self, index):
+        """The frame as a new array (height, width, 4), RGBA, top row first.
+
+        Raises MediaError for a frame that is damaged or cut off, IndexError outside 0 … count-1."""
+        check_index(self, index)
+        time = self._reader.start + _round(index * self._step)
+        try:
+            return self._pixels(self._reader.frame_at(time, self._step))
+        except av.error.FFmpegError as error:
+            raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {reason(error)}") from error
+        except MediaError as error:
+            raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {error}") from error
+
+    def _pixels(self, frame):
+        by_fields = self._deinterlace and has_fields(frame)
+        frame = interpolate_fields(frame) if by_fields else frame
+        graph = self._graph_for(frame)
+        graph.vpush(frame)
+        picture = graph.vpull().to_ndarray()
+        if self._deinterlace and not by_fields:
+            picture = blur_rows(picture, opaque=self.alpha == "opaque")
+        return np.require(np.rot90(picture, -self._turns), requirements=["C", "W"])
+
+    def _graph_for(self, frame):
+        key = (frame.format.name, frame.width, frame.height, frame.colorspace, frame.color_range)
+        if key != self._graph_key:
+            graph = av.filter.Graph()
+            size = "{}:{}".format(*self._size)
+            nodes = [
+                graph.add_buffer(width=key[1], height=key[2], format=frame.format, time_base=Fraction(1)),
+                graph.add("scale", f"{size}:flags={SCALER}"),
+                graph.add("format", self._format),
+                graph.add("buffersink"),
+            ]
+            graph.link_nodes(*nodes).configure()
+            self._graph, self._graph_key = graph, key
+        return self._graph
+
+    def close(self):
+        """Closes the file; a later read opens it again."""
+        self._reader.close()
+        self._graph = self._graph_key = None
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+
+def _round(x):
+    return math.floor(x + 0.5)  # as in C; Python rounds halves to even
+
+
+def _count(container, stream, fps):
+    """The movie's length as Blender takes it from what the container says, without decoding; 0: unknown."""
+    if not fps:
+        return 0
+    time_base = fraction(stream.time_base)
+    if stream.duration is not None:
+        return _round(float(stream.duration * time_base) * float(fps))
+    if container.duration is None:
+        return stream.frames
+    sound = container.streams.audio[:1]
+    late = _start(stream) - (_start(sound[0]) if sound else 0.0)
+    return _round((container.duration / av.time_base - max(late, 0.0)) * float(fps))
+
+
+def _start(stream):
+    return float((stream.start_time or 0) * fraction(stream.time_base))

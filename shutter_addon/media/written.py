@@ -1,0 +1,32 @@
+"""Checks of written files: a full disk leaves them short, and Blender does not always say so."""
+
+from pathlib import Path
+
+import av
+import OpenImageIO
+
+_PNG_END = b"IEND\xaeB`\x82"
+
+
+def is_whole_picture(path: Path) -> bool:
+    """Whether a PNG or EXR file is complete, by its end alone."""
+    if path.suffix.lower() == ".png":
+        with path.open("rb") as file:
+            file.seek(max(0, path.stat().st_size - len(_PNG_END)))
+            return file.read() == _PNG_END
+    image = OpenImageIO.ImageInput.open(str(path))
+    if image is None:
+        return False
+    spec = image.spec()
+    last = image.read_scanline(spec.y + spec.height - 1, 0, "half")
+    image.close()
+    return last is not None
+
+
+def frames_in_movie(path: Path) -> int:
+    """How many pictures a movie holds, without decoding them; 0 if it cannot be read at all."""
+    try:
+        with av.open(str(path)) as container:
+            return sum(packet.size > 0 for packet in container.demux(video=0))
+    except (av.error.FFmpegError, IndexError):
+        return 0

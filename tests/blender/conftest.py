@@ -1,0 +1,85 @@
+"""Blender as a library: one process, the modules registered once, a new file for each test."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from support import read_picture
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="session")
+def bpy():
+    import bpy
+
+    from shutter_addon import blender
+
+    blender.register()
+    yield bpy
+    blender.unregister()
+
+
+@pytest.fixture
+def edit(bpy):
+    """An empty edit, set up to show code values as the source has them."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    scene.sequence_editor_create()
+    scene.render.resolution_percentage = 100
+    scene.render.dither_intensity = 0
+    scene.view_settings.view_transform = "Standard"
+    return scene
+
+
+@pytest.fixture
+def render(bpy, tmp_path, monkeypatch):
+    """Renders frames of a scene through the sequencer: {frame: (H, W, 4) in 8-bit levels}, from 8 or 16 bits."""
+    from shutter_addon.blender import engine
+
+    faults = []
+    monkeypatch.setattr(engine, "fail", lambda _engine, sentence: faults.append(sentence))
+
+    def rendered(scene, frames, depth="8"):
+        scene.render.image_settings.file_format = "PNG"
+        scene.render.image_settings.color_depth = depth
+        scene.render.image_settings.color_mode = "RGBA"
+        pictures = {}
+        for frame in frames:
+            scene.frame_set(frame)
+            scene.render.filepath = str(tmp_path / f"r{frame}.png")
+            bpy.ops.render.render(write_still=True, scene=scene.name)
+            assert not faults
+            pictures[frame] = read_picture(tmp_path / f"r{frame}.png")
+        return pictures
+
+    return rendered
+
+
+@pytest.fixture
+def command(tmp_path):
+    """Runs `python -m shutter_addon` in a process of its own; a recipe may be given as a dictionary."""
+
+    def run(*arguments, recipe=None, check=True, env=None, **options):
+        arguments = [str(a) for a in arguments]
+        if recipe is not None:
+            path = tmp_path / "recipe.json"
+            path.write_text(json.dumps(recipe))
+            arguments += ["--recipe", str(path)]
+        done = subprocess.run(
+            [sys.executable, "-m", "shutter_addon", "render", *arguments],
+            cwd=ROOT,
+            env=os.environ | (env or {}),
+            capture_output=True,
+            text=True,
+            check=False,
+            **options,
+        )
+        if check:
+            assert done.returncode == 0, done.stderr
+        return done
+
+    return run

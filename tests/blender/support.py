@@ -1,0 +1,43 @@
+"""Pictures and recipes for the tests of the Blender layer."""
+
+import numpy as np
+import OpenImageIO
+
+
+def read_picture(path):
+    """A picture file's samples as float64; whole-number formats in 8-bit levels, straight alpha."""
+    wishes = OpenImageIO.ImageSpec()
+    wishes.attribute("oiio:UnassociatedAlpha", 1)
+    image = OpenImageIO.ImageInput.open(str(path), wishes)
+    spec = image.spec()
+    kind = str(spec.format)
+    pixels = image.read_image(kind).astype(np.float64)
+    image.close()
+    return pixels.reshape(spec.height, spec.width, -1) * {"uint8": 1, "uint16": 255 / 65535}.get(kind, 1)
+
+
+def write_frames(folder, frames, name="f"):
+    """Frames (n, H, W, C) uint8 or uint16 as PNG files; the first one's path."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for i, frame in enumerate(frames, start=1):
+        height, width, channels = frame.shape
+        spec = OpenImageIO.ImageSpec(width, height, channels, str(frame.dtype))
+        spec.attribute("oiio:UnassociatedAlpha", 1)
+        output = OpenImageIO.ImageOutput.create("png")
+        output.open(str(folder / f"{name}{i:04d}.png"), spec)
+        output.write_image(np.ascontiguousarray(frame))
+        output.close()
+    return folder / f"{name}0001.png"
+
+
+def recipe(window, *shutters, regions=(), **options):
+    """A recipe as a dictionary; shutters: bars, or a list of (frame, bars) keys."""
+    entries = []
+    for i, bars in enumerate(shutters):
+        entry = {"name": f"S{i}"}
+        if isinstance(bars, dict):
+            entry["keys"] = [{"frame": frame, "bars": list(b)} for frame, b in bars.items()]
+        else:
+            entry["bars"] = [float(b) for b in bars]
+        entries.append(entry)
+    return {"version": 1, "window": window, "shutters": entries, "regions": list(regions), **options}

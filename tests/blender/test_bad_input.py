@@ -1,0 +1,236 @@
+"""Bad input: one sentence on stderr, exit code 2, and nothing half-written."""
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from support import read_picture, recipe, write_frames
+
+from shutter_addon.media import open_source
+
+STILL = recipe(4, [1, 0, 0, 0])
+
+
+@pytest.fixture(scope="module")
+def frames(tmp_path_factory):
+    pictures = np.random.default_rng(0).integers(0, 256, (6, 16, 20, 3), dtype=np.uint8)
+    return write_frames(tmp_path_factory.mktemp("frames"), pictures)
+
+
+def refused(done, *words):
+    """Exit code 2 and one sentence with these words."""
+    assert done.returncode == 2, (done.returncode, done.stderr)
+    lines = [line for line in done.stderr.strip().splitlines() if not line.startswith("libpng error")]
+    assert len(lines) == 1, done.stderr
+    for word in ("Virtual Shutter: ", *words):
+        assert word in lines[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("missing.mp4", None, ["missing.mp4", "no such file"]),
+        ("empty.mp4", b"", ["empty.mp4", "empty"]),
+        ("noise.mp4", b"no movie at all" * 100, ["noise.mp4"]),
+        ("empty.png", b"", ["empty.png", "empty"]),
+        ("noise.png", b"\\x89PNG\\r\\n\\x1a\\n" + b"x" * 100, ["noise.png"]),
+        ("folder", "folder", ["folder"]),
+    ],
+)
+def test_no_medium(command, tmp_path, name, content, words):
+    path = tmp_path / name
+    if content == "folder":
+        path.mkdir()
+    elif content is not None:
+        path.write_bytes(content)
+    refused(command(path, "--output", tmp_path / "out", recipe=STILL, check=False), *words)
+    assert not (tmp_path / "out").exists()
+
+
+def test_audio_only(command, tmp_path):
+    import av
+
+    with av.open(str(tmp_path / "sound.mp4"), "w") as container:
+        stream = container.add_stream("aac", rate=48000)
+        sound = av.AudioFrame.from_ndarray(np.zeros((1, 1024), dtype=np.float32), format="fltp", layout="mono")
+        sound.sample_rate = 48000
+        container.mux(stream.encode(sound))
+        container.mux(stream.encode())
+    done = command(tmp_path / "sound.mp4", "--output", tmp_path / "out", recipe=STILL, check=False)
+    refused(done, "sound.mp4", "no video")
+    assert not (tmp_path / "out").exists()
+
+
+def test_truncated_movie(command, bunny, tmp_path):
+    """The header is lost: nothing. The frames are: those before the damage are there, whole; none after it."""
+    data = bunny.read_bytes()
+    (tmp_path / "header.mp4").write_bytes(data[: len(data) // 2])
+    with open_source(bunny) as source:
+        moov_first = data.find(b"moov") < data.find(b"mdat")
+        assert source.count == 132
+    done = command(tmp_path / "header.mp4", "--output", tmp_path / "out", "--frames", "1", recipe=STILL, check=False)
+    assert (done.returncode == 0) == moov_first
+
+
+def test_damaged_in_the_middle(command, frames, tmp_path):
+    broken = tmp_path / "in"
+    broken.mkdir()
+    for file in frames.parent.iterdir():
+        (broken / file.name).write_bytes(file.read_bytes())
+    file = broken / "f0004.png"
+    file.write_bytes(file.read_bytes()[:200])
+    done = command(broken / "f0001.png", "--output", tmp_path / "out", recipe=recipe(1, [1]), check=False)
+    refused(done, "f0004.png")
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["0001.png", "0002.png", "0003.png"]
+    for path in (tmp_path / "out").iterdir():
+        assert np.array_equal(np.rint(read_picture(path)), read_picture(frames.parent / f"f{path.name}"))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"shutters": [{"name": "A", "bars": [0, 0, 0, 0]}]}, ["shutters[0].bars", "all bars are zero"]),
+        ({"shutters": [{"name": "A", "bars": [1, float("nan"), 0, 0]}]}, ["shutters[0].bars[1]", "nan"]),
+        ({"shutters": [{"name": "A", "bars": [1, 1, 1]}]}, ["shutters[0].bars: 3 values, window is 4"]),
+        ({"surprise": 1}, ["unknown field surprise"]),
+        ({"regions": [{"shutter": "A", "strokes": [[]]}]}, ["regions[0]"]),
+    ],
+)
+def test_wrong_recipe(command, frames, tmp_path, change, words):
+    done = command(frames, "--output", tmp_path / "out", recipe=STILL | change, check=False)
+    refused(done, "recipe.json", *words)
+    assert not (tmp_path / "out").exists()
+
+
+def test_no_recipe(command, frames, tmp_path):
+    (tmp_path / "r.json").write_text("{")
+    for path in (tmp_path / "r.json", tmp_path / "none.json"):
+        refused(command(frames, "--recipe", path, "--output", tmp_path / "out", check=False), path.name)
+
+
+@pytest.mark.parametrize("text", ["0:3", "3:2", "1:7", "a:b", "7", "-1:2"])
+def test_frames_outside_the_clip(command, frames, tmp_path, text):
+    refused(
+        command(frames, "--output", tmp_path / "out", f"--frames={text}", recipe=STILL, check=False), "--frames", text
+    )
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_window_longer_than_the_clip(command, frames, tmp_path):
+    for edges in ("hold", "mirror", "shorten"):
+        data = recipe(200, np.ones(200), edges=edges)
+        command(frames, "--output", tmp_path / edges, recipe=data)
+        assert len(list((tmp_path / edges).iterdir())) == 6
+
+
+@pytest.mark.parametrize(("width", "height"), [(33, 17), (5, 4), (4, 129)])
+def test_odd_sizes(command, tmp_path, width, height):
+    pictures = np.random.default_rng(0).integers(0, 256, (2, height, width, 3), dtype=np.uint8)
+    first = write_frames(tmp_path / "in", pictures)
+    data = recipe(
+        2, [1, 0], [1, 1], regions=[{"shutter": "S1", "kind": "lasso", "strokes": [[[0, 0], [1, 0], [1, 1]]]}]
+    )
+    command(first, "--output", tmp_path / "out", recipe=data)
+    done = command(first, "--output", tmp_path / "plain", recipe=recipe(1, [1]))
+    assert np.array_equal(np.rint(read_picture(tmp_path / "plain" / "0002.png")), pictures[1])
+    if width % 2:
+        done = command(first, "--output", tmp_path / "film.mp4", recipe=data, check=False)
+        refused(done, "film.mp4", "even sizes")
+
+
+def test_a_picture_smaller_than_blender_renders(command, tmp_path):
+    first = write_frames(tmp_path / "in", np.zeros((1, 1, 1, 3), dtype=np.uint8))
+    refused(command(first, "--output", tmp_path / "out", recipe=STILL, check=False), "1×1", "4×4")
+
+
+def test_outputs_that_cannot_be(command, frames, tmp_path):
+    (tmp_path / "file").write_text("mine")
+    for output, words in [
+        (tmp_path / "file" / "out", ["file"]),
+        (tmp_path / "file", ["file"]),
+        (tmp_path / "film.gif", ["film.gif", ".mp4"]),
+        ("/proc/out", ["/proc"]),
+        ("/proc/film.mp4", ["/proc"]),
+    ]:
+        refused(command(frames, "--output", output, recipe=STILL, check=False), *words)
+    assert (tmp_path / "file").read_text() == "mine"
+    done = command(frames, "--output", tmp_path / "a.mp4", "--format", "exr", recipe=STILL, check=False)
+    refused(done, "--format")
+    refused(command(frames, recipe=STILL, check=False), "--output")
+    refused(command(frames, "--save", "/proc/x.blend", recipe=STILL, check=False), "/proc")
+
+
+@pytest.mark.parametrize("output", ["out", "film.mp4", "save"])
+def test_a_full_disk(command, frames, tmp_path, output):
+    """No file may grow beyond 400 bytes: what Blender gets when the disk is full."""
+
+    def limit():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (400, 400))
+
+    option = ["--save", tmp_path / "save.blend"] if output == "save" else ["--output", tmp_path / output]
+    env = {"PYTHONDONTWRITEBYTECODE": "1"}
+    # The recipe is written before the limit holds.
+    done = command(frames, *option, recipe=STILL, check=False, preexec_fn=limit, env=env)
+    assert done.returncode == 2, done.stderr
+    assert str(option[1]) in done.stderr
+    left = [p for p in tmp_path.rglob("*") if p.is_file() and p.name != "recipe.json"]
+    assert not left
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("output", ["out", "film.mp4"])
+def test_stopped_halfway(bunny, tmp_path, number, output):
+    """Finished frames stay, whole; nothing else does."""
+    (tmp_path / "r.json").write_text(json.dumps(recipe(8, np.ones(8))))
+    options = ["--recipe", tmp_path / "r.json", "--output", tmp_path / output]
+    arguments = [sys.executable, "-m", "shutter_addon", "render", bunny, *options]
+    with subprocess.Popen(list(map(str, arguments)), cwd=bunny.parents[1], stderr=subprocess.PIPE) as process:
+        part = wait_for(lambda: next(tmp_path.rglob(".part-*"), None), process)
+        if output == "out":
+            wait_for(lambda: len(list(part.parent.glob("*.png"))) >= 3, process)
+        else:
+            wait_for(lambda: any(p.stat().st_size for p in part.iterdir()), process)
+        os.kill(process.pid, number)
+        process.wait(timeout=60)
+    assert process.returncode == 130
+    left = sorted(p for p in tmp_path.rglob("*") if p.is_file() and p.name != "r.json")
+    assert not list(tmp_path.rglob(".part-*"))
+    if output == "film.mp4":
+        assert left == []
+    else:
+        assert 3 <= len(left) < 132
+        for path in left:
+            assert read_picture(path).shape == (720, 1280, 3)
+
+
+def wait_for(condition, process, seconds=60):
+    """The first true value of a condition; fails when the process ends before."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if value := condition():
+            return value
+        assert process.poll() is None, process.stderr.read()
+        time.sleep(0.02)
+    raise AssertionError("nothing happened")
+
+
+def test_no_gl(command, frames, tmp_path):
+    """Without GL, NumPy composes and says so; a GPU that was asked for is refused."""
+    env = {
+        "__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent",
+        "LIBGL_DRIVERS_PATH": "/nonexistent",
+        "EGL_PLATFORM": "none",
+    }
+    done = command(frames, "--output", tmp_path / "out", recipe=STILL, env=env)
+    assert "composing with NumPy" in done.stderr
+    assert len(list((tmp_path / "out").iterdir())) == 6
+    refused(
+        command(frames, "--output", tmp_path / "no", "--device", "gpu", recipe=STILL, env=env, check=False), "OpenGL"
+    )

@@ -1,0 +1,181 @@
+"""The command, end to end: from footage and a recipe to files, through Blender's sequencer."""
+
+import numpy as np
+import OpenImageIO
+import pytest
+from support import read_picture, recipe, write_frames
+
+from shutter_addon.core import light
+from shutter_addon.media import open_source
+
+
+def still(window, k=0):
+    return [float(i == k) for i in range(window)]
+
+
+def line(shutter, *points, **fields):
+    return {"shutter": shutter, "strokes": [[list(p) for p in points]], **fields}
+
+
+TOP = line("S0", (-0.1, 1.0), (1.1, 1.0), width=0.0)
+BOTTOM = line("S1", (-0.1, 0.0), (1.1, 0.0), width=0.0)
+
+
+@pytest.fixture(scope="module")
+def noise(tmp_path_factory):
+    """Twelve frames of random pixels: folder's first file, frames (12, 48, 64, 3) uint8."""
+    frames = np.random.default_rng(0).integers(0, 256, (12, 48, 64, 3), dtype=np.uint8)
+    return write_frames(tmp_path_factory.mktemp("noise"), frames), frames
+
+
+def linear(frames):
+    return light.to_linear(np.asarray(frames, dtype=np.float64) / 255)
+
+
+def levels(values):
+    return light.to_encoded(values) * 255
+
+
+def test_a_still_frame_gives_the_sequence_back(command, noise, tmp_path, same_pixels):
+    first, frames = noise
+    command(first, "--output", tmp_path / "out", recipe=recipe(8, still(8)))
+    names = sorted(p.name for p in (tmp_path / "out").iterdir())
+    assert names == [f"{i:04d}.png" for i in range(1, 13)]
+    for i, name in enumerate(names):
+        same_pixels(read_picture(tmp_path / "out" / name), frames[i], 1)
+
+
+@pytest.mark.parametrize("light_", ["linear", "encoded"])
+def test_equal_bars_are_the_mean(command, noise, tmp_path, same_pixels, light_):
+    first, frames = noise
+    command(first, "--output", tmp_path / "out", "--frames", "2:3", recipe=recipe(8, np.ones(8), light=light_))
+    for frame in (2, 3):
+        window = frames[frame - 1 : frame + 7]
+        expected = levels(linear(window).mean(axis=0)) if light_ == "linear" else window.mean(axis=0)
+        same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), expected, 1)
+
+
+def test_two_edges_are_a_slit_scan(command, bunny, tmp_path):
+    window = 16
+    data = recipe(window, still(window), still(window, window - 1), regions=[TOP, BOTTOM])
+    command(bunny, "--output", tmp_path / "out", "--frames", "40", recipe=data)
+    with open_source(bunny) as source:
+        frames = linear(np.stack([source.read(39 + k)[..., :3] for k in range(window)]))
+    height = frames.shape[1]
+    times = np.clip((np.arange(height) - 0.5) / (height - 2), 0, 1) * (window - 1)
+    rows = np.arange(height)
+    low = np.minimum(times.astype(int), window - 2)
+    part = (times - low)[:, None, None]
+    expected = levels((1 - part) * frames[low, rows] + part * frames[low + 1, rows])
+    difference = np.abs(read_picture(tmp_path / "out" / "0040.png") - expected)
+    assert difference.mean() <= 1
+    assert difference.max() <= 8
+
+
+def test_a_keyed_delta_stays_one_sharp_frame(command, noise, tmp_path, same_pixels):
+    first, frames = noise
+    data = recipe(9, {1: still(9), 9: still(9, 8)})
+    command(first, "--output", tmp_path / "out", "--frames", "1:5", recipe=data | {"edges": "hold"})
+    for frame in range(1, 6):
+        source = min(2 * (frame - 1), 11)
+        same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), frames[source], 1)
+
+
+@pytest.mark.parametrize("interpolation", ["displacement", "value"])
+def test_random_bars_equal_the_reference(command, noise, tmp_path, same_pixels, interpolation):
+    from shutter_addon.core import compositor
+    from shutter_addon.core import recipe as recipes
+
+    rng = np.random.default_rng(1)
+    data = recipe(
+        8,
+        *rng.random((3, 8)),
+        interpolation=interpolation,
+        regions=[
+            line("S0", (0.1, 0.1), (0.2, 0.8), width=0.1),
+            line("S1", (0.5, 0.9), (0.9, 0.7), (0.8, 0.2), width=0.05),
+            line("S2", (0.4, 0.3), (0.6, 0.3), (0.5, 0.6), kind="lasso"),
+        ],
+    )
+    first, frames = noise
+    command(first, "--output", tmp_path / "out", "--weights", tmp_path / "w", "--frames", "2", recipe=data)
+    coefficients = read_picture(tmp_path / "w" / "0002.exr")
+    assert coefficients.shape == (48, 64, 3)
+    assert np.abs(coefficients.sum(axis=-1) - 1).max() < 1e-5
+    image = OpenImageIO.ImageInput.open(str(tmp_path / "w" / "0002.exr"))
+    assert image.spec().channelnames == ("S0", "S1", "S2")
+    image.close()
+    moment = recipes.parse((tmp_path / "recipe.json").read_text()).at(2, 64 / 48)
+    window = np.dstack([linear(frames[1:9]).transpose(1, 2, 3, 0)]).transpose(3, 0, 1, 2)
+    opaque = np.concatenate([window, np.ones((*window.shape[:3], 1))], axis=-1)
+    expected = compositor.compose(moment, opaque, np.ones(8, bool), np.moveaxis(coefficients, -1, 0))
+    same_pixels(read_picture(tmp_path / "out" / "0002.png"), levels(expected[..., :3]), 1)
+
+
+def test_chunks_and_order_change_no_bit(command, noise, tmp_path):
+    first, _ = noise
+    rng = np.random.default_rng(2)
+    moving = line("S1", (0.2, 0.2), (0.4, 0.6), width=0.1)
+    moving["keys"] = [{"frame": 1}, {"frame": 12, "location": [0.4, 0.1], "rotation": 40}]
+    data = recipe(6, *rng.random((2, 6)), regions=[line("S0", (0.9, 0.1), (0.9, 0.9)), moving])
+    command(first, "--output", tmp_path / "whole", recipe=data)
+    for chunk in ("9:12", "5:8", "3", "1:2", "4"):
+        command(first, "--output", tmp_path / "parts", "--frames", chunk, recipe=data)
+    for frame in range(1, 13):
+        whole, part = (tmp_path / f / f"{frame:04d}.png" for f in ("whole", "parts"))
+        assert np.array_equal(read_picture(whole), read_picture(part))
+
+
+def test_both_devices_agree(command, noise, tmp_path, same_pixels):
+    first, _ = noise
+    rng = np.random.default_rng(3)
+    data = recipe(
+        8, *rng.random((2, 8)), regions=[line("S0", (0.1, 0.1), (0.9, 0.2)), line("S1", (0.5, 0.7), (0.6, 0.9))]
+    )
+    for device in ("gpu", "cpu"):
+        command(first, "--output", tmp_path / device, "--frames", "3", "--device", device, recipe=data)
+    same_pixels(read_picture(tmp_path / "cpu" / "0003.png"), read_picture(tmp_path / "gpu" / "0003.png"), 1)
+
+
+def test_exr_is_scene_linear(command, noise, tmp_path):
+    first, frames = noise
+    command(first, "--output", tmp_path / "out", "--format", "exr", "--frames", "1", recipe=recipe(4, np.ones(4)))
+    picture = read_picture(tmp_path / "out" / "0001.exr")
+    assert np.abs(picture - linear(frames[:4]).mean(axis=0)).max() < 1e-3
+
+
+@pytest.mark.parametrize("ending", [".mp4", ".mov", ".mkv", ".webm", ".avi"])
+def test_movies(command, bunny, tmp_path, ending):
+    output = tmp_path / f"film{ending}"
+    command(bunny, "--output", output, "--frames", "11:20", recipe=recipe(4, still(4)))
+    assert [p.name for p in tmp_path.iterdir() if p.name.startswith((".", "film"))] == [output.name]
+    with open_source(output) as film, open_source(bunny) as source:
+        assert (film.width, film.height, film.count, film.fps) == (1280, 720, 10, 25)
+        assert film.has_audio
+        difference = np.abs(film.read(3).astype(float) - source.read(13)).mean()
+        assert difference < 6
+
+
+def test_alpha_is_carried(command, tmp_path, same_pixels):
+    frames = np.random.default_rng(4).integers(0, 256, (4, 16, 20, 4), dtype=np.uint8)
+    frames[:, :8, :, 3] = 255
+    frames[:, 12:, :, 3] = 0
+    first = write_frames(tmp_path / "in", frames)
+    command(first, "--output", tmp_path / "out", "--frames", "1", recipe=recipe(2, [1, 1]))
+    picture = read_picture(tmp_path / "out" / "0001.png")
+    alpha = frames[:2, ..., 3:].astype(float) / 255
+    total = (linear(frames[:2, ..., :3]) * alpha).mean(axis=0)
+    mean = alpha.mean(axis=0)
+    same_pixels(picture[..., 3:], mean * 255, 1)
+    expected = levels(total / np.maximum(mean, 1e-6))
+    solid = mean[..., 0] > 0.1
+    assert np.abs(picture[..., :3] - expected)[solid].max() <= 1.5
+
+
+def test_a_gap_in_the_numbering_holds(command, noise, tmp_path, same_pixels):
+    _, frames = noise
+    first = write_frames(tmp_path / "in", frames[:6])
+    (tmp_path / "in" / "f0003.png").unlink()
+    command(first, "--output", tmp_path / "out", recipe=recipe(1, [1]))
+    for frame, source in zip(range(1, 7), (0, 1, 1, 3, 4, 5), strict=True):
+        same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), frames[source], 1)

@@ -1,0 +1,345 @@
+"""Which source frame an effect shows: what Blender itself shows for the plain strip, whatever was done to it."""
+
+from contextlib import contextmanager
+
+import av
+import numpy as np
+import pytest
+from support import recipe, write_frames
+
+LEVELS = 1
+
+
+@pytest.fixture(scope="module")
+def movie(tmp_path_factory):
+    """A movie of 60 frames, 32×32, 24 fps; frame i is a grey of its own."""
+    return make_movie(tmp_path_factory.mktemp("movie") / "grey.mkv", 24)
+
+
+@pytest.fixture(scope="module")
+def fast_movie(tmp_path_factory):
+    """The same at 240 fps."""
+    return make_movie(tmp_path_factory.mktemp("movie") / "fast.mkv", 240)
+
+
+def make_movie(path, rate, count=60):
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("ffv1", rate=rate)
+        stream.width = stream.height = 32
+        stream.pix_fmt = "bgr0"
+        for i in range(count):
+            picture = np.full((32, 32, 3), 4 * i + 5, dtype=np.uint8)
+            picture[:16, :, 0] = 255 - 4 * i
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        container.mux(stream.encode())
+    return path
+
+
+@pytest.fixture(scope="module")
+def images(tmp_path_factory):
+    frames = np.zeros((20, 32, 32, 3), dtype=np.uint8)
+    for i in range(20):
+        frames[i] = 12 * i + 5
+    return write_frames(tmp_path_factory.mktemp("images"), frames)
+
+
+@pytest.fixture
+def effect_on(bpy, edit):
+    """Puts an effect on a strip: still frames by default; gives strip and effect."""
+    from shutter_addon.blender import effects, strips
+    from shutter_addon.core import recipe as recipes
+
+    edit.render.resolution_x = edit.render.resolution_y = 32
+    edit.frame_start, edit.frame_end = -100, 300
+
+    def add(source, data=None):
+        import json
+
+        strip, effect = strips.add_effect(edit, source)
+        effects.apply(edit, effect, strip, recipes.parse(json.dumps(data or recipe(4, [1, 0, 0, 0]))))
+        return strip, effect
+
+    return add
+
+
+def new_movie(edit, path, start=1, channel=1):
+    return edit.sequence_editor.strips.new_movie("movie", str(path), channel, start)
+
+
+def new_images(edit, first, start=1, channel=1):
+    strip = edit.sequence_editor.strips.new_image("images", str(first), channel, start)
+    for file in sorted(first.parent.iterdir())[1:]:
+        strip.elements.append(file.name)
+    return strip
+
+
+def check(edit, render, effect_strips, frames):
+    """The picture with the effect, at frames asked for out of order, equals the picture without."""
+    for strip in effect_strips:
+        strip.mute = True
+    # In order: what Blender shows of a slowed strip depends on what it has shown before (see timing.source_frame).
+    plain = render(edit, frames)
+    for strip in effect_strips:
+        strip.mute = False
+    shown = render(edit, [int(frame) for frame in np.random.default_rng(0).permutation(list(frames))])
+    for frame in frames:
+        assert np.abs(shown[frame] - plain[frame]).max() <= LEVELS, f"at frame {frame}"
+    assert len({p[0, 0, 0] for p in plain.values()}) > len(frames) / 20, "the plain strip shows several frames"
+
+
+def test_plain(edit, render, effect_on, movie):
+    strip, _ = effect_on(new_movie(edit, movie))
+    assert (strip.left_handle, strip.right_handle) == (1, 61)
+    check(edit, render, [strip], range(1, 61, 3))
+
+
+def test_before_frame_one(edit, render, effect_on, movie):
+    strip, _ = effect_on(new_movie(edit, movie, start=-20))
+    check(edit, render, [strip], range(-20, 40, 5))
+
+
+def test_trims_on_both_sides(edit, render, effect_on, movie):
+    source = new_movie(edit, movie, start=10)
+    source.left_handle, source.right_handle = 25, 50
+    strip, _ = effect_on(source)
+    assert (strip.left_handle, strip.right_handle) == (25, 50)
+    check(edit, render, [strip], range(25, 50, 3))
+
+
+def test_trimmed_after_the_effect_was_made(edit, render, effect_on, movie):
+    source = new_movie(edit, movie, start=10)
+    strip, _ = effect_on(source)
+    source.left_handle, source.right_handle = 25, 50
+    strip.left_handle, strip.right_handle = 20, 55
+    check(edit, render, [strip], range(25, 50, 3))
+
+
+def test_still_frames_beyond_the_content(edit, render, effect_on, movie):
+    source = new_movie(edit, movie, start=10)
+    source.left_handle, source.right_handle = 1, 90
+    strip, _ = effect_on(source)
+    check(edit, render, [strip], [1, 5, 9, 10, 11, 40, 69, 70, 71, 89])
+
+
+def test_hard_cut_source(edit, render, effect_on, movie):
+    source = new_movie(edit, movie, start=10)
+    right = source.split(30, "HARD")
+    strip, _ = effect_on(right)
+    check(edit, render, [strip], range(30, 70, 3))
+
+
+def test_reversed(edit, render, effect_on, movie):
+    source = new_movie(edit, movie)
+    source.use_reverse_frames = True
+    strip, _ = effect_on(source)
+    check(edit, render, [strip], range(1, 61, 3))
+
+
+def test_strobe(edit, render, effect_on, movie):
+    source = new_movie(edit, movie)
+    source.strobe = 4
+    strip, _ = effect_on(source)
+    check(edit, render, [strip], range(1, 61, 3))
+
+
+@pytest.mark.parametrize("last", [31, 121, 97])
+def test_speed(edit, render, effect_on, movie, last):
+    source = new_movie(edit, movie)
+    source.retiming_keys.add(timeline_frame=1)
+    source.retiming_keys[-1].timeline_frame = last
+    strip, _ = effect_on(source)
+    check(edit, render, [strip], range(1, last))
+
+
+def test_retiming_keys(edit, render, effect_on, movie):
+    source = new_movie(edit, movie)
+    keys = source.retiming_keys
+    keys.add(timeline_frame=20)
+    keys.add(timeline_frame=40)
+    keys[-1].timeline_frame = 150
+    keys[2].timeline_frame = 100
+    keys[1].timeline_frame = 90
+    assert len(keys) == 4
+    strip, _ = effect_on(source)
+    check(edit, render, [strip], range(1, 150))
+
+
+def test_images(edit, render, effect_on, images):
+    strip, _ = effect_on(new_images(edit, images, start=5))
+    check(edit, render, [strip], range(5, 25))
+
+
+def test_images_retimed_and_reversed(edit, render, effect_on, images):
+    source = new_images(edit, images, start=5)
+    source.use_reverse_frames = True
+    source.retiming_keys.add(timeline_frame=5)
+    source.retiming_keys[-1].timeline_frame = 52
+    strip, _ = effect_on(source)
+    check(edit, render, [strip], range(5, 52))
+
+
+@pytest.mark.parametrize("fps", [24, 25, 30])
+def test_a_movie_of_240_fps_that_keeps_its_speed(bpy, edit, render, effect_on, fast_movie, fps):
+    edit.render.fps = fps
+    source = add_by_operator(bpy, edit, fast_movie)
+    assert source.right_handle - source.left_handle < 10
+    strip, _ = effect_on(source)
+    check(edit, render, [strip], range(source.left_handle, source.right_handle))
+
+
+@contextmanager
+def sequencer(bpy):
+    """The context of a sequencer: the operators of its menus ask for one. Gives its area."""
+    window = bpy.data.window_managers[0].windows[0]
+    window.workspace.sequencer_scene = bpy.context.scene
+    area = window.screen.areas[0]
+    area.type = "SEQUENCE_EDITOR"
+    with bpy.context.temp_override(window=window, area=area):
+        yield area
+
+
+def add_by_operator(bpy, edit, path):
+    """As the Add menu does, with "Adjust Playback Rate"."""
+    with sequencer(bpy):
+        bpy.ops.sequencer.movie_strip_add(
+            filepath=str(path), frame_start=1, channel=1, sound=False, adjust_playback_rate=True, use_framerate=False
+        )
+    return next(s for s in edit.sequence_editor.strips if s.type == "MOVIE")
+
+
+def test_the_window_counts_source_frames_in_playing_order(edit, render, effect_on, images):
+    """Two frames on, at a still frame: of a reversed strip, the frame two before."""
+    source = new_images(edit, images)
+    source.use_reverse_frames = True
+    effect_on(source, recipe(4, [0, 0, 1, 0]))
+    shown = render(edit, [1, 10, 19])
+    assert [shown[f][0, 0, 0] for f in (1, 10, 19)] == pytest.approx([12 * 17 + 5, 12 * 8 + 5, 5], abs=1)
+
+
+def test_the_window_reaches_past_a_trim(edit, render, effect_on, images):
+    source = new_images(edit, images)
+    source.right_handle = 6
+    effect_on(source, recipe(8, [0, 0, 0, 0, 0, 0, 0, 1]))
+    assert render(edit, [5])[5][0, 0, 0] == pytest.approx(12 * 11 + 5, abs=1)
+
+
+def test_cut_effect_and_source(edit, render, effect_on, movie):
+    source = new_movie(edit, movie)
+    data = recipe(4, {1: [1, 0, 0, 0], 31: [0, 0, 0, 1]})
+    strip, _ = effect_on(source, data)
+    frames = [1, 9, 19, 20, 21, 22, 30, 50]
+    whole = render(edit, frames)
+    parts = [strip, strip.split(20, "SOFT")]
+    parts.append(parts[1].split(30, "HARD"))
+    source.split(22, "SOFT")
+    assert len({part.scene for part in parts}) == 1
+    for frame, picture in render(edit, frames).items():
+        assert np.array_equal(picture, whole[frame]), frame
+
+
+def test_a_duplicate_keeps_the_look_and_gets_data_of_its_own(bpy, edit, render, effect_on, movie):
+    source = new_movie(edit, movie)
+    strip, _ = effect_on(source, recipe(4, {1: [1, 0, 0, 0], 31: [0, 0, 0, 1]}, regions=[]))
+    before = render(edit, [1, 11, 31])
+    for s in edit.sequence_editor.strips:
+        s.select = True
+    # Without a screen, Blender crashes when this operator has no region, and others when they have one.
+    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+        bpy.ops.sequencer.duplicate()
+    copy_strip = next(s for s in edit.sequence_editor.strips if s.type == "SCENE" and s != strip)
+    copy_source = next(s for s in edit.sequence_editor.strips if s.type == "MOVIE" and s != source)
+    for s in (copy_strip, copy_source):
+        s.content_start += 100
+    shown = render(edit, [101, 111, 131, 1, 11, 31])
+    assert copy_strip.scene != strip.scene
+    effects = edit.virtual_shutter.effects
+    assert [effect.start for effect in effects] == [1, 101]
+    for frame in (1, 11, 31):
+        assert np.array_equal(shown[frame], before[frame])
+        assert np.array_equal(shown[frame + 100], before[frame])
+    effects[1].shutters[0].name = "Other"
+    assert effects[0].shutters[0].name == "S0"
+
+
+def test_an_effect_moved_with_its_source_takes_its_keys_along(edit, render, effect_on, movie):
+    source = new_movie(edit, movie)
+    strip, _ = effect_on(source, recipe(4, {1: [1, 0, 0, 0], 31: [0, 0, 0, 1]}))
+    before = render(edit, [1, 11, 31])
+    for s in (strip, source):
+        s.content_start += 40
+    after = render(edit, [41, 51, 71])
+    for frame in (1, 11, 31):
+        assert np.array_equal(after[frame + 40], before[frame])
+
+
+def test_two_effects_on_two_strips_of_one_movie(edit, render, effect_on, movie):
+    first, second = new_movie(edit, movie, 1, 1), new_movie(edit, movie, 81, 1)
+    effect_on(first, recipe(4, [1, 0, 0, 0]))
+    effect_on(second, recipe(4, [0, 0, 0, 1]))
+    shown = render(edit, [5, 85, 15, 95])
+    assert shown[5][20, 0, 0] == pytest.approx(4 * 4 + 5, abs=1)
+    assert shown[85][20, 0, 0] == pytest.approx(4 * 7 + 5, abs=1)
+    assert shown[95][20, 0, 0] == pytest.approx(4 * 17 + 5, abs=1)
+
+
+@pytest.mark.parametrize("full", [True, False])
+def test_a_copied_edit_has_effects_of_its_own(bpy, edit, render, effect_on, movie, full):
+    source = new_movie(edit, movie)
+    _, effect = effect_on(source, recipe(4, [0, 0, 1, 0], regions=[]))
+    before = render(edit, [5])[5]
+    if full:
+        with bpy.context.temp_override(scene=edit):
+            bpy.ops.scene.new(type="FULL_COPY")
+        copy = next(s for s in bpy.data.scenes if s != edit and s.virtual_shutter.effects)
+    else:
+        copy = edit.copy()
+    assert np.array_equal(render(copy, [5])[5], before)
+    own = copy.virtual_shutter.effects[0]
+    assert own.scene != effect.scene
+    own.shutters[0].bars[2].weight, own.shutters[0].bars[0].weight = 0, 1
+    assert render(copy, [5])[5][20, 0, 0] == pytest.approx(4 * 4 + 5, abs=1)
+    assert np.array_equal(render(edit, [5])[5], before)
+
+
+def test_transform_and_crop_follow_the_source(edit, render, effect_on, movie):
+    source = new_movie(edit, movie)
+    source.transform.scale_x = source.transform.scale_y = 0.5
+    source.transform.offset_x, source.transform.rotation = 5, 0.4
+    source.crop.min_x = 6
+    source.use_flip_x = True
+    strip, _ = effect_on(source)
+    shown = render(edit, [7])[7]
+    strip.mute = True
+    plain = render(edit, [7])[7]
+    assert plain[..., 0].min() == 0
+    # Where an edge is half covered, the source shines through a second time.
+    assert (np.abs(shown - plain).max(axis=-1) > LEVELS).mean() < 0.1
+    assert np.abs(shown - plain).mean() < 3
+
+
+def test_half_resolution(edit, render, effect_on, movie):
+    strip, _ = effect_on(new_movie(edit, movie))
+    edit.render.resolution_percentage = 50
+    check(edit, render, [strip], [1, 20, 40, 60])
+
+
+def test_a_deleted_source_is_said(bpy, edit, effect_on, movie):
+    from shutter_addon.blender import pictures
+
+    source = new_movie(edit, movie)
+    _, effect = effect_on(source)
+    edit.sequence_editor.strips.remove(source)
+    with pytest.raises(pictures.FAULTS, match='the source strip of "Shutter" was deleted'):
+        pictures.picture(effect.scene, 5)
+
+
+def test_no_shutters_and_a_closed_shutter_are_said(bpy, edit, effect_on, movie):
+    from shutter_addon.blender import pictures
+
+    _, effect = effect_on(new_movie(edit, movie))
+    effect.shutters[0].bars[0].weight = 0
+    with pytest.raises(pictures.FAULTS, match='shutter "S0" at frame 5: all bars are zero'):
+        pictures.picture(effect.scene, 5)
+    effect.shutters.clear()
+    with pytest.raises(pictures.FAULTS, match='"Shutter" has no shutter'):
+        pictures.picture(effect.scene, 5)

@@ -1,0 +1,340 @@
+"""Diffusion against the exact solution: a sparse direct solve of the 5-point Laplacian with Neumann edges."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.sparse import coo_matrix, diags
+from scipy.sparse.linalg import splu
+
+from shutter_addon.compute import diffusion
+from shutter_addon.compute.diffusion import Diffusion, diffuse
+from shutter_addon.core.scribbles import Shape, rasterise
+
+LEVEL = 1 / 255
+
+
+def exact(labels, count):
+    """Coefficients (count, H, W) float64; every connected free region must touch a scribble."""
+    free = (labels == 0).ravel()
+    values = (labels.ravel()[:, None] == np.arange(1, count + 1)).astype(float)
+    if free.any():
+        cells = np.arange(labels.size).reshape(labels.shape)
+        a = np.concatenate([cells[1:].ravel(), cells[:, 1:].ravel()])
+        b = np.concatenate([cells[:-1].ravel(), cells[:, :-1].ravel()])
+        links = coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), shape=(labels.size,) * 2).tocsr()
+        laplacian = (diags(np.asarray(links.sum(axis=1)).ravel()) - links).tocsr()[free]
+        right = -laplacian[:, ~free] @ values[~free]
+        values[free] = splu(laplacian[:, free].tocsc(), permc_spec="MMD_AT_PLUS_A").solve(right)
+    return values.T.reshape(count, *labels.shape)
+
+
+def line(shutter, *points, width=0.0):
+    return Shape(shutter, "line", width, (np.array(points, float),))
+
+
+def circle(shutter, x, y, radius, width=0.0):
+    turn = np.linspace(0, 2 * np.pi, 65)
+    return line(shutter, *zip(x + radius * np.cos(turn) * 9 / 16, y + radius * np.sin(turn), strict=True), width=width)
+
+
+def blank(width, height):
+    return np.zeros((height, width), np.uint16)
+
+
+def four_lines_and_a_ring(width=480, height=270):
+    shapes = [
+        line(0, (0.1, 0.1), (0.3, 0.8), width=0.02),
+        line(1, (0.5, 0.2), (0.6, 0.9), width=0.02),
+        line(2, (0.8, 0.1), (0.9, 0.5), width=0.01),
+        line(3, (0.35, 0.5), (0.45, 0.3), width=0.03),
+        circle(1, 0.7, 0.6, 0.12, width=0.02),
+    ]
+    return rasterise(shapes, width, height), 4
+
+
+def edge_lines(width=300, height=200):
+    labels = blank(width, height)
+    labels[0], labels[-1] = 1, 2
+    return labels, 2
+
+
+def rings_within_rings():
+    return rasterise([circle(i % 4, 0.5, 0.5, 0.45 - 0.07 * i) for i in range(6)], 320, 180), 4
+
+
+def touching_lines():
+    """Pairs of 1-px lines side by side, of different shutters, with loose ends."""
+    labels = blank(320, 180)
+    labels[20:160, 100], labels[20:160, 101] = 1, 2
+    labels[90, 102:300], labels[91, 102:300] = 3, 1
+    return labels, 3
+
+
+def wall(width=640, height=90, x=255):
+    """Two lines side by side across the picture: the slowest of all known scenes, the more so the larger it is."""
+    labels = blank(width, height)
+    labels[:, x : x + 2] = 1, 2
+    return labels, 2
+
+
+def diagonals():
+    labels = blank(320, 180)
+    k = np.arange(150)
+    labels[15 + k, 20 + k], labels[15 + k, 21 + k], labels[15 + k, 120 + k] = 1, 3, 2
+    return labels, 3
+
+
+def dots(count=12, shutters=5, seed=0):
+    labels, rng = blank(320, 180), np.random.default_rng(seed)
+    labels[rng.integers(0, 180, count), rng.integers(0, 320, count)] = 1 + np.arange(count) % shutters
+    return labels, shutters
+
+
+def corners(width=257, height=129):
+    labels = blank(width, height)
+    labels[0, 0], labels[-1, -1] = 1, 2
+    return labels, 2
+
+
+def neighbours():
+    labels = blank(320, 180)
+    labels[90, 160:162] = 1, 2
+    return labels, 2
+
+
+def hole_in_a_wall():
+    labels = blank(320, 180)
+    labels[:, 160], labels[:, 0], labels[:, -1], labels[40:140, 80] = 1, 2, 3, 1
+    labels[90, 160] = labels[60, 80] = 0
+    return labels, 3
+
+
+def dashes(off):
+    labels = blank(320, 180)
+    labels[np.arange(180) % (off + 1) == 0, 160] = 1
+    labels[:, 5], labels[::7, 250] = 2, 3
+    return labels, 3
+
+
+def spiral(gap):
+    labels = blank(256, 256)
+    a, b = 0, 255
+    while b - a > 2 * gap:
+        labels[a, a : b + 1], labels[a : b + 1, b] = 1, 2
+        labels[b, a + gap : b + 1], labels[a + gap : b + 1, a + gap] = 1, 2
+        a, b = a + gap, b - gap
+    return labels, 2
+
+
+def maze(gap):
+    """Long corridors between walls of two shutters, and a pixel of a third where they start."""
+    labels = blank(256, 256)
+    for k, y in enumerate(range(gap, 256, gap)):
+        labels[y, slice(0, -gap) if k % 2 else slice(gap, None)] = 1 + (k % 3 == 0)
+    labels[0, 0] = 3
+    return labels, 3
+
+
+def random_shapes(seed, shutters=6, width=333, height=187, count=14):
+    rng = np.random.default_rng(seed)
+    shapes = []
+    for i in range(count):
+        points = rng.random((rng.integers(2, 6), 2)) * rng.choice([0.3, 1.0])
+        shapes.append(Shape(i % shutters, rng.choice(["line", "lasso"]), rng.choice([0.0, 0.01, 0.05]), (points,)))
+    return rasterise(shapes, width, height), shutters
+
+
+def scattered(width, height, share, shutters=3, seed=1):
+    rng = np.random.default_rng(seed)
+    labels = rng.integers(1, shutters + 1, (height, width)) * (rng.random((height, width)) < share)
+    labels[height // 2, width // 2] = 1
+    return labels.astype(np.uint16), shutters
+
+
+def enclosed():
+    """A 1-px ring of shutter 1 right inside one of shutter 2, and shutter 0 outside both."""
+    shapes = [line(0, (0.02, 0.1), (0.05, 0.9), width=0.02), circle(1, 0.5, 0.5, 0.3), circle(2, 0.5, 0.5, 0.315)]
+    return rasterise(shapes, 320, 180), 3
+
+
+SCENES = {
+    "four lines and a ring": four_lines_and_a_ring(),
+    "odd size": four_lines_and_a_ring(497, 283),
+    "edge lines": edge_lines(),
+    "rings": rings_within_rings(),
+    "touching": touching_lines(),
+    "wall": wall(),
+    "diagonals": diagonals(),
+    "dots": dots(),
+    "three dots": dots(3, 3, seed=5),
+    "corners": corners(),
+    "corners of a band": corners(513, 3),
+    "neighbours": neighbours(),
+    "hole": hole_in_a_wall(),
+    "dashes": dashes(3),
+    "wide dashes": dashes(7),
+    "spiral": spiral(3),
+    "wide spiral": spiral(7),
+    "maze": maze(5),
+    "wide maze": maze(20),
+    "random, 6": random_shapes(4),
+    "random, 9": random_shapes(3, shutters=9, count=20),
+    "random, 17": random_shapes(8, shutters=17, width=200, height=121, count=30),
+    "dust": scattered(160, 120, 0.003),
+    "noise": scattered(161, 120, 0.2),
+    "enclosed": enclosed(),
+    "1×1": scattered(1, 1, 0),
+    "1×97": scattered(1, 97, 0.03),
+    "97×1": scattered(97, 1, 0.03),
+    "2×3": scattered(2, 3, 0.2),
+    "33×17": scattered(33, 17, 0.02),
+}
+
+
+@pytest.fixture(scope="module")
+def device():
+    gl = pytest.importorskip("shutter_addon.compute.gl")
+    try:
+        device = gl.GLDevice()
+    except gl.NoGLError as error:
+        pytest.skip(str(error))
+    with device.current():
+        yield device
+    device.release()
+
+
+@pytest.fixture(scope="module")
+def on_device(device):
+    solver = Diffusion(device)
+
+    def solve(labels, count):
+        layers = device.read(solver.solve(labels, count))
+        return np.moveaxis(layers, 3, 1).reshape(-1, *labels.shape)[:count]
+
+    yield solve
+    solver.release()
+
+
+@pytest.fixture(scope="module", params=["numpy", "device"])
+def solve(request):
+    return diffuse if request.param == "numpy" else request.getfixturevalue("on_device")
+
+
+def assert_coefficients(got, count, shape):
+    assert got.shape == (count, *shape)
+    assert got.dtype == np.float32
+    assert got.min() >= 0
+    np.testing.assert_allclose(got.sum(axis=0), 1, atol=1e-6)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_is_the_exact_solution_on_both(scene, on_device):
+    labels, count = SCENES[scene]
+    want = exact(labels, count)
+    both = [solve(labels, count) for solve in (diffuse, on_device)]
+    for got in both:
+        assert_coefficients(got, count, labels.shape)
+        np.testing.assert_array_equal(got[:, labels > 0], want[:, labels > 0])
+        np.testing.assert_allclose(got, want, rtol=0, atol=LEVEL / 4)
+    np.testing.assert_allclose(*both, rtol=0, atol=LEVEL / 4)
+
+
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    width=st.integers(1, 70),
+    height=st.integers(1, 70),
+    shutters=st.integers(1, 10),
+    share=st.sampled_from([0.0, 0.002, 0.02, 0.1, 0.5, 1.0]),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_any_pixels_may_be_fixed(on_device, width, height, shutters, share, seed):
+    labels, count = scattered(width, height, share, shutters, seed)
+    want = exact(labels, count)
+    for solve in (diffuse, on_device):
+        np.testing.assert_allclose(solve(labels, count), want, rtol=0, atol=LEVEL / 4)
+
+
+@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(seed=st.integers(0, 2**32 - 1), shutters=st.integers(2, 9), size=st.integers(60, 260), count=st.integers(2, 40))
+def test_any_shapes(on_device, seed, shutters, size, count):
+    labels, shutters = random_shapes(seed, shutters, size, size * 9 // 16 + 1, count)
+    if not labels.any():
+        return
+    want = exact(labels, shutters)
+    for solve in (diffuse, on_device):
+        np.testing.assert_allclose(solve(labels, shutters), want, rtol=0, atol=LEVEL / 4)
+
+
+def test_edge_lines_are_linear_in_y(solve):
+    labels, count = edge_lines(480, 270)
+    want = np.broadcast_to(np.linspace(0, 1, 270)[:, None], (270, 480))
+    np.testing.assert_allclose(solve(labels, count), np.stack([1 - want, want]), rtol=0, atol=LEVEL / 4)
+
+
+def test_enclosed_regions_have_one_shutter_alone(solve):
+    labels, count = enclosed()
+    inside = exact(labels, count)[1] > 1 - 1e-9
+    assert inside.sum() > 5000
+    got = solve(labels, count)
+    np.testing.assert_array_equal(got[1][inside], 1)
+    np.testing.assert_array_equal(got[[0, 2]][:, inside], 0)
+
+
+def test_a_scribble_around_everything(solve):
+    labels = blank(200, 120)
+    labels[[0, -1]] = labels[:, [0, -1]] = 3
+    got = solve(labels, 5)
+    np.testing.assert_array_equal(got, np.broadcast_to(np.eye(5)[2][:, None, None], got.shape))
+
+
+def test_touching_scribbles_do_not_bleed(solve):
+    labels = blank(200, 120)
+    labels[:, 127], labels[:, 128] = 1, 2
+    want = np.broadcast_to(np.arange(200) < 128, (2, *labels.shape)) ^ np.array([False, True])[:, None, None]
+    np.testing.assert_allclose(solve(labels, 2), want, rtol=0, atol=LEVEL / 4)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (64, 48), (37, 5)])
+def test_without_scribbles_the_first_shutter_is_everywhere(solve, size):
+    got = solve(blank(*size), 6)
+    np.testing.assert_array_equal(got, np.broadcast_to(np.eye(6)[0][:, None, None], got.shape))
+
+
+def test_one_shutter_alone_is_everywhere(solve):
+    labels, _ = dots(3, 1)
+    got = solve(labels * 2, 3)
+    np.testing.assert_array_equal(got, np.broadcast_to(np.eye(3)[1][:, None, None], got.shape))
+
+
+def test_the_device_forgets_earlier_frames(device, on_device):
+    labels, count = SCENES["random, 9"]
+    fresh = Diffusion(device)
+    want = device.read(fresh.solve(labels, count))
+    for other in (labels[::-1], blank(*labels.shape[::-1]), *(scene for scene, _ in list(SCENES.values())[:3])):
+        fresh.solve(other, count)
+        np.testing.assert_array_equal(device.read(fresh.solve(labels, count)), want)
+    fresh.release()
+
+
+def test_textures_stay_while_size_and_shutters_do(device):
+    solver = Diffusion(device)
+    labels, count = dots()
+    texture = solver.solve(labels, count)
+    assert solver.solve(labels[::-1], count) is texture
+    assert solver.solve(labels[:90], count) is not texture
+    assert texture.size[2] == 2
+    solver.release()
+
+
+def test_more_cycles_come_closer(monkeypatch, solve):
+    labels, count = touching_lines()
+    monkeypatch.setattr(diffusion, "NOTHING", 0.0)
+    want = exact(labels, count)
+    errors = []
+    for cycles in (1, 2, 3, 4):
+        monkeypatch.setattr(diffusion, "CYCLES", cycles)
+        errors.append(abs(solve(labels, count) - want).max())
+    assert all(after < before / 4 for before, after in pairwise(errors)), errors

@@ -1,0 +1,34 @@
+"""What tests of all layers share."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="session")
+def bunny():
+    """Big Buck Bunny: 132 frames, 1280×720, 25 fps, H.264, with sound."""
+    return ROOT / "assets" / "bigbuckbunny.mp4"
+
+
+@pytest.fixture
+def same_pixels(tmp_path):
+    """Compares two pictures (H, W, C) in 8-bit levels; on failure both and their amplified difference are kept."""
+
+    def compare(picture, expected, levels, name="picture"):
+        assert picture.shape == expected.shape
+        difference = np.abs(picture.astype(np.float64) - expected.astype(np.float64))
+        if difference.max() <= levels:
+            return
+        import OpenImageIO
+
+        for kind, values in [("is", picture), ("expected", expected), ("difference", difference * 16)]:
+            pixels = np.ascontiguousarray(np.clip(values, 0, 255).astype(np.uint8))
+            OpenImageIO.ImageBuf(pixels).write(str(tmp_path / f"{name}-{kind}.png"))
+        place = np.unravel_index(difference.argmax(), difference.shape)
+        pytest.fail(f"{difference.max():.3f} levels apart at {place}, {levels} allowed; pictures in {tmp_path}")
+
+    return compare

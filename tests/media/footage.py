@@ -1,0 +1,186 @@
+"""Ugly media files, made at test time. Every picture carries its number as eight black or white blocks."""
+
+import struct
+from fractions import Fraction
+
+import av
+import numpy as np
+from OpenImageIO import ImageOutput, ImageSpec
+
+WIDTH, HEIGHT, BLOCK = 128, 64, 16
+COUNT = 36
+VARIABLE = [n * n // 8 + n for n in range(24)]  # when a frame begins, in 25ths of a second
+
+
+def picture(number, width=WIDTH, height=HEIGHT):
+    """The uint8 RGB picture of that number: its bits in the upper rows, a moving coloured ramp below."""
+    y, x = np.mgrid[:height, :width]
+    ramp = np.stack([x * 2 + number, y * 4 + number * 3, 255 - x - y], -1) % 256
+    bits = (number >> np.minimum(x // BLOCK, 7)) & 1
+    return np.where((y < BLOCK)[..., None], (bits * 255)[..., None], ramp).astype(np.uint8)
+
+
+def see_through(number):
+    """The picture of that number as RGBA, clear at the left and opaque at the right."""
+    alpha = np.broadcast_to(np.linspace(0, 255, WIDTH).astype(np.uint8), (HEIGHT, WIDTH))
+    return np.dstack([picture(number), alpha])
+
+
+def number(pixels):
+    """The number that a picture shows, whatever its sample type."""
+    levels = pixels[BLOCK // 2, BLOCK // 2 : 8 * BLOCK : BLOCK, 0].astype(float)
+    top = np.iinfo(pixels.dtype).max if pixels.dtype.kind == "u" else 1.0
+    return sum(1 << bit for bit, level in enumerate(levels) if level > top / 2)
+
+
+def make_movie(
+    path,
+    codec,
+    count=COUNT,
+    *,
+    pix_fmt="yuv420p",
+    rate=25,
+    times=None,
+    options=None,
+    mux=None,
+    size=None,
+    **more,
+):
+    """Encodes pictures 0 … count-1 at `times`, in frames of the rate. options, mux: the encoder's and the muxer's.
+
+    more: format (the container's), pictures and array_format (arrays to encode in place of the numbered ones),
+    tags (colorspace, color_range, color_trc, color_primaries), seconds (of silence beside the pictures)."""
+    size = size or (WIDTH, HEIGHT)
+    arrays = more.get("pictures") or [picture(n, *size) for n in range(count)]
+    with av.open(str(path), "w", format=more.get("format"), options=mux or {}) as out:
+        stream = out.add_stream(codec, rate=rate, options=options or {})
+        stream.width, stream.height, stream.pix_fmt = *size, pix_fmt
+        stream.time_base = stream.codec_context.time_base = 1 / Fraction(rate)
+        for name, value in more.get("tags", {}).items():
+            setattr(stream.codec_context, name, value)
+        _write_silence(out, more.get("seconds", 0))
+        for array, time in zip(arrays, times or range(len(arrays)), strict=True):
+            frame = av.VideoFrame.from_ndarray(array, format=more.get("array_format", "rgb24"))
+            frame.pts, frame.time_base = time, 1 / Fraction(rate)
+            # one thread: with more, the way from RGB to deep YUV spoils some pixels now and then
+            out.mux(stream.encode(frame.reformat(format=pix_fmt, threads=1)))
+        out.mux(stream.encode())
+    return path
+
+
+def _write_silence(out, seconds):
+    if not seconds:
+        return
+    sound = out.add_stream("pcm_s16le", rate=8000, layout="mono")
+    for second in range(seconds):
+        frame = av.AudioFrame.from_ndarray(np.zeros((1, 8000), np.int16), format="s16", layout="mono")
+        frame.sample_rate, frame.pts = 8000, second * 8000
+        out.mux(sound.encode(frame))
+
+
+def copy_movie(source, path, *, later=0, drop=0):
+    """Copies the packets but the first `drop`, `later` frames (of the 25ths) later; earlier ones make an edit list."""
+    with (
+        av.open(str(source)) as movie,
+        av.open(str(path), "w", options={"avoid_negative_ts": "disabled"}) as out,
+    ):
+        stream = out.add_stream_from_template(movie.streams.video[0])
+        shift = round(later / 25 / movie.streams.video[0].time_base)
+        for position, packet in enumerate(movie.demux(video=0)):
+            if packet.size and position >= drop:
+                packet.pts, packet.dts, packet.stream = packet.pts + shift, packet.dts + shift, stream
+                out.mux(packet)
+    return path
+
+
+def rotate_movie(source, path, degrees):
+    """Copies an MP4 file and writes into its track header that it is to be turned clockwise."""
+    data = bytearray(source.read_bytes())
+    cos, sin = {90: (0, 1), 180: (-1, 0), 270: (0, -1)}[degrees]
+    matrix = cos << 16, sin << 16, 0, -sin << 16, cos << 16, 0, 0, 0, 1 << 30
+    start = data.index(b"tkhd") + 44
+    data[start : start + 36] = struct.pack(">9i", *matrix)
+    path.write_bytes(data)
+    return path
+
+
+def cut_file(source, path, end):
+    """Copies the file up to that fraction of its length, or up to the last place of those bytes."""
+    data = source.read_bytes()
+    path.write_bytes(data[: data.rindex(end) if isinstance(end, bytes) else round(len(data) * end)])
+    return path
+
+
+def damage_frame(source, path, index):
+    """Copies the movie and overwrites the frame's packet (in decoding order) with noise, but its first bytes."""
+    with av.open(str(source)) as movie:
+        packet = [p for p in movie.demux(video=0) if p.size][index]
+        position, size = packet.pos, packet.size
+    data = bytearray(source.read_bytes())
+    data[position + 4 : position + size] = b"\xff" * (size - 4)
+    path.write_bytes(data)
+    return path
+
+
+def save_image(path, array, samples="uint8", **attributes):
+    """Writes an array (height, width, channels) of 0 … 1 or of whole samples; attributes' __ stands for a colon.
+
+    names: the channels' names; data, display: windows (x, y, width, height)."""
+    height, width, channels = array.shape
+    spec = ImageSpec(width, height, channels, samples)
+    if "names" in attributes:
+        spec.channelnames = attributes.pop("names")
+    spec.x, spec.y = attributes.pop("at", (0, 0))
+    x, y, w, h = attributes.pop("display", (0, 0, width, height))
+    spec.full_x, spec.full_y, spec.full_width, spec.full_height = x, y, w, h
+    for name, value in attributes.items():
+        spec.attribute(name.replace("__", ":"), value)
+    out = ImageOutput.create(str(path))
+    assert out.open(str(path), spec), out.geterror()
+    assert out.write_image(np.ascontiguousarray(array)), out.geterror()
+    out.close()
+    return path
+
+
+def ugly_movies(folder):
+    """{name: (path, the number that each frame shall show, or None where only Blender knows)}."""
+    h264 = {"bf": "3", "g": "12"}
+    open_group = {"x264-params": "open-gop=1:keyint=12:bframes=3:scenecut=0"}
+    files, plain = {}, list(range(COUNT))
+
+    def encode(name, codec, numbers=plain, **more):
+        files[name] = make_movie(folder / name, codec, **more), numbers
+
+    encode("b_frames.mp4", "libx264", options=h264)
+    encode("open.mkv", "libx264", options=open_group)
+    encode("open.mp4", "libx264", options=open_group)
+    encode("open.ts", "libx264", options=open_group)
+    encode(
+        "hevc.mp4",
+        "libx265",
+        options={"x265-params": "open-gop=1:keyint=12:bframes=3:pools=none:frame-threads=1:log-level=none"},
+    )
+    encode("refresh.mp4", "libx264", options={"x264-params": "intra-refresh=1:keyint=12:bframes=0"})
+    encode("mpeg4.avi", "mpeg4", [0, *plain[:-1]], options={"bf": "2", "g": "12"})  # time stamps from 1 on, start 0
+    encode("mpeg4.mp4", "mpeg4", options={"bf": "2", "g": "12"})
+    encode("mpeg2.mpg", "mpeg2video", None, count=100, options={"bf": "2", "g": "12"})  # many frames to a time stamp
+    encode("mpeg2.ts", "mpeg2video", options={"bf": "2", "g": "12"})
+    encode(
+        "vp9.webm",
+        "libvpx-vp9",
+        options={"g": "20", "auto-alt-ref": "1", "lag-in-frames": "16", "cpu-used": "8"},
+    )
+    encode("ntsc.mov", "libx264", rate=Fraction(30000, 1001), options=h264)
+    encode("film.mp4", "mpeg4", rate=Fraction(24000, 1001))
+    shown = [max(n for n, time in enumerate(VARIABLE) if time <= i) for i in range(VARIABLE[-1] + 1)]
+    encode("variable.mkv", "libx264", shown, count=24, times=VARIABLE, options=h264)
+    encode("variable.mp4", "libx264", None, count=24, times=VARIABLE, options=h264)
+    encode("sound.mkv", "libx264", plain + [COUNT - 1] * (50 - COUNT), seconds=2)
+    encode("animation.gif", "gif", plain[:10], count=10, pix_fmt="rgb8")
+    b_frames, open_mp4, mpeg4 = (folder / name for name in ("b_frames.mp4", "open.mp4", "mpeg4.avi"))
+    files["edit_list.mp4"] = copy_movie(b_frames, folder / "edit_list.mp4", later=-7), plain[7:]
+    files["late.mp4"] = copy_movie(open_mp4, folder / "late.mp4", later=20), plain
+    files["late.mkv"] = copy_movie(open_mp4, folder / "late.mkv", later=20), None
+    files["no_key_first.ts"] = copy_movie(folder / "open.ts", folder / "no_key_first.ts", drop=7), None
+    files["no_index.avi"] = cut_file(mpeg4, folder / "no_index.avi", b"idx1"), None
+    return files

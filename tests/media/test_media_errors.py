@@ -1,0 +1,201 @@
+"""Bad input: one clear sentence that names the file, and whatever is sound can still be read."""
+
+import contextlib
+import re
+
+import av
+import numpy as np
+import pytest
+from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, save_image
+
+from shutter_addon.media import MediaError, open_source
+
+
+def sentence(path, **options):
+    with pytest.raises(MediaError) as caught:
+        open_source(path, **options)
+    text = str(caught.value)
+    assert "\n" not in text
+    assert len(text) < 150
+    return text
+
+
+def readable(source):
+    """{index: number shown} of the frames that can be read, and {index: sentence} of the others."""
+    good, bad = {}, {}
+    for index in range(source.count):
+        try:
+            good[index] = number(source.read(index))
+        except MediaError as error:
+            bad[index] = str(error)
+    return good, bad
+
+
+def sound_frames(path):
+    """What a decoder without threads gives of a file, all errors passed over."""
+    frames, error = [], contextlib.suppress(av.error.FFmpegError)
+    with av.open(str(path)) as movie:
+        decoder = movie.streams.video[0].codec_context
+        decoder.thread_type = "NONE"
+        with error:
+            for packet in movie.demux(video=0):
+                with error:
+                    frames += decoder.decode(packet) if packet.size else []
+        with error:
+            frames += decoder.decode(None)
+    return [frame for frame in frames if not frame.is_corrupt]
+
+
+@pytest.mark.parametrize("name", ["clip.mp4", "frame_01.png"])
+def test_missing(tmp_path, name):
+    assert sentence(tmp_path / name) == f"{name}: no such file in {tmp_path}"
+
+
+@pytest.mark.parametrize("name", ["clip.mp4", "frame_01.png"])
+def test_empty(tmp_path, name):
+    (tmp_path / name).touch()
+    assert sentence(tmp_path / name) == f"{name}: file is empty"
+
+
+def test_folder(tmp_path):
+    (tmp_path / "clip.mp4").mkdir()
+    assert sentence(tmp_path / "clip.mp4") == "clip.mp4: is a folder, not a file"
+
+
+@pytest.mark.parametrize("name", ["clip.mp4", "frame.png", "notes.txt"])
+def test_not_media(tmp_path, name):
+    (tmp_path / name).write_text("This is a text, not a picture. " * 40)
+    pattern = rf"{name}: (no video stream|cannot be read as (a movie|an image) \(.+\))$"
+    assert re.match(pattern, sentence(tmp_path / name))
+
+
+def test_sound_only(tmp_path):
+    with av.open(str(tmp_path / "song.wav"), "w") as out:
+        stream = out.add_stream("pcm_s16le", rate=8000, layout="mono")
+        frame = av.AudioFrame.from_ndarray(np.zeros((1, 8000), np.int16), format="s16", layout="mono")
+        frame.sample_rate = 8000
+        out.mux(stream.encode(frame))
+    assert sentence(tmp_path / "song.wav") == "song.wav: no video stream"
+
+
+def test_stream_that_is_not_there(movies):
+    assert sentence(movies["open.mp4"][0], stream=1) == "open.mp4: no video stream 1, it has 1"
+
+
+def test_raw_stream_without_length(tmp_path):
+    path = make_movie(tmp_path / "raw.h264", "libx264", format="h264")
+    assert sentence(path) == "raw.h264: its length is unknown; put it into an MP4 or MKV file first"
+
+
+def test_header_only(tmp_path, movies):
+    path = cut_file(movies["open.mkv"][0], tmp_path / "head.mkv", 0.12)
+    with av.open(str(path)) as movie:
+        assert [p.size for p in movie.demux(video=0) if p.size and not p.is_corrupt] == []
+    assert sentence(path) == "head.mkv: no frame of it can be decoded"
+
+
+def test_index_outside(movies):
+    with open_source(movies["open.mp4"][0]) as source:
+        for index in (-1, COUNT):
+            with pytest.raises(IndexError, match=rf"frame {index} of open\.mp4: it has frames 0 to {COUNT - 1}"):
+                source.read(index)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "codec", "options"),
+    [
+        ("mp4", "libx264", {"mux": {"movflags": "faststart"}, "options": {"bf": "3", "g": "12"}}),
+        ("mkv", "libx264", {"options": {"bf": "3", "g": "12"}}),
+        ("avi", "mpeg4", {"options": {"bf": "2", "g": "12"}}),
+        ("mov", "qtrle", {"pix_fmt": "rgb24", "mux": {"movflags": "faststart"}}),
+    ],
+)
+def test_cut_off_movie_keeps_what_it_has(tmp_path, suffix, codec, options):
+    whole = make_movie(tmp_path / f"whole.{suffix}", codec, 100, **options)
+    with open_source(whole) as source:
+        expected, none = readable(source)
+    assert none == {}
+    path = cut_file(whole, tmp_path / f"cut.{suffix}", 0.6)
+    with open_source(path) as source:
+        good, bad = readable(source)
+        again, _ = readable(source)
+    assert good == again
+    assert len(good) >= len(sound_frames(path)) > 10
+    assert all(expected[index] == shown for index, shown in good.items())
+    assert bad
+    for index, text in bad.items():
+        assert re.match(rf"frame {index} of cut\.{suffix} cannot be decoded: (the file is cut off|its data are)", text)
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "pix_fmt", "options"),
+    [
+        ("a.mov", "png", "rgb24", {}),
+        ("a.avi", "mjpeg", "yuvj420p", {}),
+        ("a.mp4", "libx264", "yuv420p", {"g": "1", "preset": "ultrafast"}),
+        ("a.mkv", "ffv1", "yuv420p", {"g": "1", "slicecrc": "1"}),
+    ],
+)
+def test_damaged_frame_in_the_middle(tmp_path, name, codec, pix_fmt, options):
+    whole = make_movie(tmp_path / f"whole_{name}", codec, 30, pix_fmt=pix_fmt, options=options)
+    with open_source(damage_frame(whole, tmp_path / name, 17)) as source:
+        good, bad = readable(source)
+    assert list(bad) == [17]
+    assert re.match(rf"frame 17 of {name} cannot be decoded: its data are damaged", bad[17])
+    assert good == {n: n for n in range(30) if n != 17}
+
+
+def test_damaged_frame_leaves_other_groups_alone(tmp_path, movies):
+    """A damaged P frame of H.264 spoils its group at most; the groups before and after are as they were."""
+    path = damage_frame(movies["b_frames.mp4"][0], tmp_path / "a.mp4", 13)
+    with open_source(movies["b_frames.mp4"][0]) as sound, open_source(path) as source:
+        for index in [*range(12), *range(24, COUNT)]:
+            assert np.array_equal(source.read(index), sound.read(index)), index
+
+
+def test_unlike_frames_of_a_sequence(tmp_path):
+    for n in range(5):
+        save_image(tmp_path / f"a_{n}.png", picture(n))
+    save_image(tmp_path / "a_1.png", picture(1, 64, 64))
+    save_image(tmp_path / "a_2.png", picture(2) / 255, "uint16")
+    cut_file(tmp_path / "a_3.png", tmp_path / "a_3.png", 0.5)
+    with open_source(tmp_path / "a_0.png") as source:
+        (tmp_path / "a_4.png").unlink()
+        good, bad = readable(source)
+    assert good == {0: 0}
+    assert bad[1] == "a_1.png: is 64×64, but a_0.png is 128×64"
+    assert bad[2] == "a_2.png: has uint16 samples, but a_0.png has uint8"
+    assert re.match(r"a_3\.png: cannot be (decoded|read as an image) \(.+\)$", bad[3])
+    assert bad[4] == f"a_4.png: no such file in {tmp_path}"
+
+
+@pytest.mark.parametrize("suffix", ["jpg", "tif", "exr", "dpx"])
+def test_cut_off_image(tmp_path, suffix):
+    path = save_image(tmp_path / f"a.{suffix}", picture(5))
+    cut_file(path, path, 0.6)
+    with pytest.raises(MediaError, match=rf"^a\.{suffix}: cannot be (decoded|read as an image) \(.+\)$"):
+        open_source(path).read(0)
+
+
+def test_image_without_colours(tmp_path):
+    path = save_image(tmp_path / "z.exr", np.ones((4, 4, 2), np.float32), "half", names=["Z", "depth.V"])
+    assert re.match(r"z\.exr: no colour channels, only (Z, depth\.V|depth\.V, Z)$", sentence(path))
+
+
+def test_sequence_without_files(tmp_path):
+    assert sentence(tmp_path, files=[]) == f"{tmp_path.name}: an image sequence without files"
+
+
+@pytest.mark.parametrize("name", ["open.mp4", "open.ts"])
+def test_file_that_vanishes_and_comes_back(tmp_path, movies, name):
+    path = tmp_path / name
+    path.write_bytes(movies[name][0].read_bytes())
+    with open_source(path) as source:
+        expected = source.read(30)
+        source.close()
+        path.rename(tmp_path / "elsewhere")
+        for index in (3, 30):
+            with pytest.raises(MediaError, match=rf"frame {index} of {name} cannot be decoded: no such file"):
+                source.read(index)
+        (tmp_path / "elsewhere").rename(path)
+        assert np.array_equal(source.read(30), expected)

@@ -1,0 +1,229 @@
+"""Image sequences: which file an index means, and the samples as the files hold them."""
+
+import struct
+import zlib
+
+import numpy as np
+import pytest
+from footage import HEIGHT, WIDTH, number, picture, save_image, see_through
+from OpenImageIO import ImageOutput, ImageSpec
+
+from shutter_addon.media import MediaError, open_source
+
+STRAIGHT = {"oiio__UnassociatedAlpha": 1}
+
+
+def numbered(folder, names):
+    """Saves a picture per name, numbered by its place in the list."""
+    for n, name in enumerate(names):
+        save_image(folder / name, picture(n))
+    return folder / names[0]
+
+
+def shown(source):
+    return [number(source.read(index)) for index in range(source.count)]
+
+
+@pytest.mark.parametrize(
+    ("names", "numbers"),
+    [
+        (["a_001.png", "a_002.png", "a_003.png"], [0, 1, 2]),
+        (["7.png", "8.png", "9.png", "10.png"], [0, 1, 2, 3]),
+        (["s2_t3_09v.tif", "s2_t3_10v.tif", "s2_t4_10v.tif", "s3_t3_10v.tif"], [0, 1]),
+        (["x-0998.png", "x-0999.png", "x-1000.png"], [0, 1, 2]),
+        (["a.1.png", "b.2.png", "a.2.jpg", "a.2.png"], [0, 3]),
+        (["still.png", "still1.png"], [0]),
+    ],
+)
+def test_files_are_found_by_number(tmp_path, names, numbers):
+    with open_source(numbered(tmp_path, names)) as source:
+        assert shown(source) == numbers
+        assert source.count == len(numbers)
+        assert source.fps is None
+
+
+def test_gap_holds_the_file_before(tmp_path):
+    first = numbered(tmp_path, ["a_03.png", "a_04.png", "a_07.png", "a_09.png"])
+    with open_source(first, fps=24) as source:
+        assert shown(source) == [0, 1, 1, 1, 2, 2, 3]
+        assert source.fps == 24
+
+
+def test_sequence_starts_with_the_file_given(tmp_path):
+    numbered(tmp_path, ["a_03.png", "a_04.png", "a_05.png"])
+    with open_source(tmp_path / "a_04.png") as source:
+        assert shown(source) == [1, 2]
+
+
+def test_listed_files_are_frames_by_place(tmp_path):
+    numbered(tmp_path, ["a_03.png", "a_04.png", "b.png"])
+    files = ["b.png", "a_03.png", "a_03.png", tmp_path / "a_04.png"]
+    for path in (tmp_path, tmp_path / "b.png"):
+        with open_source(path, files=files) as source:
+            assert shown(source) == [2, 0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("name", "samples", "dtype", "transfer", "tolerance"),
+    [
+        ("a.png", "uint8", np.uint8, "srgb", 0),
+        ("a.png", "uint16", np.uint16, "srgb", 0),
+        ("a.tif", "uint8", np.uint8, "srgb", 0),
+        ("a.tif", "uint16", np.uint16, "srgb", 0),
+        ("a.tif", "float", np.float32, "srgb", 0),
+        ("a.exr", "half", np.float16, "linear", 0),
+        ("a.exr", "float", np.float32, "linear", 0),
+        ("a.dpx", "uint16", np.uint16, "linear", 0),
+        ("a.hdr", "float", np.float32, "linear", 0.01),
+        ("a.bmp", "uint8", np.uint8, "srgb", 0),
+    ],
+)
+def test_samples_are_as_stored(tmp_path, name, samples, dtype, transfer, tolerance):
+    stored = picture(5).astype(np.float64) / 255
+    stored = stored.astype(dtype) if np.dtype(dtype).kind == "f" else (stored * np.iinfo(dtype).max).astype(dtype)
+    with open_source(save_image(tmp_path / name, stored, samples)) as source:
+        frame = source.read(0)
+        assert (source.dtype, source.transfer, source.alpha) == (dtype, transfer, "opaque")
+    assert frame.dtype == dtype
+    assert frame.flags.c_contiguous
+    assert np.abs(frame[..., :3].astype(float) - stored.astype(float)).max() <= tolerance
+    assert (frame[..., 3] == (1 if frame.dtype.kind == "f" else np.iinfo(dtype).max)).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "samples", "alpha"),
+    [
+        ("a.png", "uint8", "straight"),
+        ("a.png", "uint16", "straight"),
+        ("a.tif", "uint8", "straight"),
+        ("a.tif", "uint16", "premultiplied"),
+        ("a.exr", "half", "premultiplied"),
+    ],
+)
+def test_colours_are_not_multiplied_by_alpha(tmp_path, name, samples, alpha):
+    stored = see_through(5) / np.float32(255)
+    path = save_image(tmp_path / name, stored, samples, **STRAIGHT)
+    with open_source(path) as source:
+        frame = source.read(0)
+        assert source.alpha == alpha
+    with open_source(path, alpha="straight") as source:
+        assert source.alpha == "straight"
+        assert np.array_equal(source.read(0), frame)
+    scale = 1 if frame.dtype.kind == "f" else np.iinfo(frame.dtype).max
+    assert np.abs(frame.astype(float) / scale - stored).max() < 0.0005
+
+
+@pytest.mark.parametrize("channels", [1, 2, 3, 4])
+def test_any_channels_become_rgba(tmp_path, channels):
+    rgba = see_through(5)
+    array = rgba[..., [[0], [0, 3], [0, 1, 2], [0, 1, 2, 3]][channels - 1]]
+    with open_source(save_image(tmp_path / "a.png", array, **STRAIGHT)) as source:
+        frame = source.read(0)
+        assert source.alpha == ("straight" if channels in (2, 4) else "opaque")
+    expected = rgba.copy() if channels > 2 else rgba[..., [0, 0, 0, 3]]
+    if channels in (1, 3):
+        expected[..., 3] = 255
+    assert np.array_equal(frame, expected)
+
+
+@pytest.mark.parametrize(
+    ("at", "display"),
+    [
+        ((0, 0), (-10, -6, 160, 90)),
+        ((0, 0), (10, 6, 64, 32)),
+        ((5, 7), (0, 0, 100, 100)),
+        ((300, 0), (0, 0, 20, 20)),
+        ((-90, -20), (-30, -10, 150, 40)),
+    ],
+)
+def test_data_window_lies_in_display_window(tmp_path, at, display):
+    stored = (see_through(5) / np.float32(255)).astype(np.float16)
+    path = save_image(tmp_path / "a.exr", stored, "half", at=at, display=display)
+    with open_source(path) as source:
+        frame = source.read(0)
+    left, top, width, height = display
+    assert frame.shape == (height, width, 4)
+    for y in range(0, height, 3):
+        for x in range(0, width, 3):
+            column, row = x + left - at[0], y + top - at[1]
+            inside = 0 <= column < WIDTH and 0 <= row < HEIGHT
+            assert np.array_equal(frame[y, x], stored[row, column] if inside else np.zeros(4)), (x, y)
+
+
+@pytest.mark.parametrize(
+    ("names", "wanted"),
+    [
+        (["R", "G", "B", "A", "Z"], [0, 1, 2, 3]),
+        (["fog.R", "fog.G", "fog.B", "R", "G", "B"], [3, 4, 5]),
+        (
+            [
+                "V.Normal.X",
+                "V.Glow.R",
+                "V.Glow.G",
+                "V.Glow.B",
+                "V.Combined.R",
+                "V.Combined.G",
+                "V.Combined.B",
+            ],
+            [4, 5, 6],
+        ),
+        (["Z", "mask.Y"], [1]),
+    ],
+)
+def test_layers_with_colours_are_chosen(tmp_path, names, wanted):
+    stored = np.linspace(0, 1, len(names)).astype(np.float16) * np.ones((4, 6, 1), np.float16)
+    with open_source(save_image(tmp_path / "a.exr", stored, "half", names=names)) as source:
+        pixel = source.read(0)[2, 3]
+    expected = [stored[0, 0, i] for i in wanted]
+    assert list(pixel[:3]) == (expected * 3 if len(wanted) == 1 else expected[:3])
+    assert pixel[3] == (expected[3] if len(wanted) == 4 else 1)
+
+
+def test_parts_are_searched_for_colours(tmp_path):
+    depth, colour = (ImageSpec(8, 8, n, "half") for n in (1, 3))
+    depth.channelnames, colour.channelnames = ["Z"], ["R", "G", "B"]
+    for name, spec in (("depth", depth), ("colour", colour)):
+        spec.attribute("oiio:subimagename", name)
+    out = ImageOutput.create(str(tmp_path / "a.exr"))
+    assert out.open(str(tmp_path / "a.exr"), (depth, colour))
+    out.write_image(np.full((8, 8, 1), 9, np.float32))
+    out.open(str(tmp_path / "a.exr"), colour, "AppendSubimage")
+    out.write_image(np.full((8, 8, 3), 0.25, np.float32))
+    out.close()
+    with open_source(tmp_path / "a.exr") as source:
+        assert list(source.read(0)[4, 4]) == [0.25, 0.25, 0.25, 1]
+
+
+def test_palette_becomes_rgba(tmp_path):
+    def chunk(name, data):
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+
+    header = struct.pack(">2I5B", 2, 1, 8, 3, 0, 0, 0)  # 2 × 1 pixels with a palette of red and half clear green
+    chunks = {
+        b"IHDR": header,
+        b"PLTE": b"\xff\0\0\0\xff\0",
+        b"tRNS": b"\xff\x80",
+        b"IDAT": zlib.compress(b"\0\0\1"),
+    }
+    data = b"".join(chunk(name, data) for name, data in {**chunks, b"IEND": b""}.items())
+    (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + data)
+    with open_source(tmp_path / "a.png") as source:
+        assert source.read(0).tolist() == [[[255, 0, 0, 255], [0, 255, 0, 128]]]
+
+
+def test_colour_spaces_that_are_only_names(tmp_path):
+    path = save_image(tmp_path / "a.png", picture(5))
+    for name, transfer in (("sRGB", "srgb"), ("Linear Rec.709", "linear"), ("Non-Color", "linear")):
+        with open_source(path, colorspace=name) as source:
+            assert source.transfer == transfer
+            assert np.array_equal(source.read(0)[..., :3], picture(5))
+
+
+def test_other_colour_spaces_become_scene_linear(tmp_path, blender_config):
+    levels = np.linspace(0, 1, WIDTH, dtype=np.float32) * np.ones((HEIGHT, 1), np.float32)
+    path = save_image(tmp_path / "a.png", np.repeat(levels[..., None], 3, axis=2), "uint16")
+    with open_source(path, colorspace="Linear Rec.2020", config=blender_config) as source:
+        assert (source.dtype, source.transfer, source.width) == (np.float32, "linear", WIDTH)
+        assert np.abs(source.read(0)[..., :3] - levels[..., None]).max() < 1e-4  # grey stays grey
+    with pytest.raises(MediaError, match=r"^a.png: unknown colour space Nonsense$"):
+        open_source(path, colorspace="Nonsense", config=blender_config)
