@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
-from tqdm import tqdm
 
 from ..media.written import frames_in_movie, is_whole_picture
 from . import engine
@@ -106,10 +105,10 @@ def message(error: RuntimeError) -> str:
 @contextmanager
 def _frames_moved(part: Path, folder: Path, count: int):
     """Moves each finished picture from `part` to `folder`, and a progress bar on."""
-    with tqdm(total=count, unit="frame", disable=None) as bar:
+    with _progress(count) as update:
 
         def moved(*_):
-            bar.update()
+            update()
             for path in part.iterdir():
                 if is_movie(path):
                     continue
@@ -122,6 +121,18 @@ def _frames_moved(part: Path, folder: Path, count: int):
             yield
         finally:
             bpy.app.handlers.render_write.remove(moved)
+
+
+@contextmanager
+def _progress(count: int):
+    """A progress bar on a terminal; gives what moves it on by a frame."""
+    try:
+        from tqdm import tqdm
+    except ImportError:  # a Blender that the extension was copied into without its wheels
+        yield lambda: None
+        return
+    with tqdm(total=count, unit="frame", disable=None) as bar:
+        yield bar.update
 
 
 @contextmanager
@@ -138,7 +149,7 @@ def _leaving(clean_up):
     finally:
         engine.before_leaving.remove(clean_up)
         for number, before in stops.items():
-            signal.signal(number, before)
+            signal.signal(number, before or signal.SIG_DFL)  # None: Blender's own, which Python cannot put back
 
 
 @contextmanager

@@ -47,6 +47,7 @@ def render(bpy, tmp_path, monkeypatch):
         scene.render.image_settings.file_format = "PNG"
         scene.render.image_settings.color_depth = depth
         scene.render.image_settings.color_mode = "RGBA"
+        scene.render.image_settings.compression = 0
         pictures = {}
         for frame in frames:
             scene.frame_set(frame)

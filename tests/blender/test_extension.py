@@ -1,0 +1,157 @@
+"""The extension as Blender runs it: linked into its user folder, in the wheel and in a real Blender."""
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import read_picture, recipe
+
+ROOT = Path(__file__).parents[2]
+NAME = "bl_ext.user_default.virtual_shutter"
+LONG_AND_SHARP = recipe(
+    8,
+    np.ones(8),
+    {1: [1, 0, 0, 0, 0, 0, 0, 0], 9: [0, 0, 0, 0, 0, 0, 0, 1]},
+    regions=[
+        {"shutter": "S0", "strokes": [[[0.1, 0.1], [0.1, 0.9]]]},
+        {
+            "shutter": "S1",
+            "kind": "lasso",
+            "strokes": [[[0.4, 0.3], [0.6, 0.3], [0.5, 0.7]]],
+            "keys": [
+                {"frame": 1, "ease": "bezier"},
+                {"frame": 6, "location": [0.1, 0.05], "rotation": 30, "scale": 1.2},
+                {"frame": 9, "strokes": [[[0.5, 0.3], [0.8, 0.4], [0.7, 0.6], [0.5, 0.7]]]},
+            ],
+        },
+    ],
+)
+
+
+@pytest.fixture(scope="module")
+def user_folder(tmp_path_factory):
+    """A Blender user folder with the checkout as an installed extension."""
+    folder = tmp_path_factory.mktemp("user") / "resources"
+    (folder / "extensions" / "user_default").mkdir(parents=True)
+    (folder / "extensions" / "user_default" / "virtual_shutter").symlink_to(ROOT)
+    return folder
+
+
+def wheel(user_folder, code, *arguments):
+    """Runs code in the bpy wheel, with the extension installed."""
+    return subprocess.run(
+        [sys.executable, "-c", code, *map(str, arguments)],
+        env=os.environ | {"BLENDER_USER_RESOURCES": str(user_folder)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.fixture
+def blender(user_folder):
+    """Runs the real Blender that the environment names, with the extension enabled."""
+    if not os.environ.get("BLENDER"):
+        pytest.skip("NO REAL BLENDER: set BLENDER to the command that runs one")
+
+    def run(*arguments):
+        command = [*shlex.split(os.environ["BLENDER"]), "-b", "--factory-startup", "--addons", NAME]
+        return subprocess.run(
+            [*command, *map(str, arguments)],
+            env=os.environ | {"BLENDER_USER_RESOURCES": str(user_folder)},
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=ROOT,
+        )
+
+    return run
+
+
+def test_enable_and_disable_leave_nothing_behind(user_folder):
+    done = wheel(
+        user_folder,
+        f"""
+import bpy, addon_utils
+def traces():
+    handlers = sum((len(getattr(bpy.app.handlers, n)) for n in dir(bpy.app.handlers)
+                    if isinstance(getattr(bpy.app.handlers, n), list)))
+    return handlers, set(dir(bpy.types)), set(bpy.types.Scene.bl_rna.properties.keys()), set(
+        bpy.types.Strip.bl_rna.properties.keys()), {{c.__name__ for c in bpy.types.RenderEngine.__subclasses__()
+        if getattr(c, "is_registered", False)}}
+before = traces()
+for _ in range(3):
+    assert addon_utils.enable("{NAME}")
+    assert bpy.types.Scene.virtual_shutter
+    assert traces() != before
+    addon_utils.disable("{NAME}")
+    after = traces()
+    assert after == before, [set(a) ^ set(b) for a, b in zip(after[1:], before[1:])]
+""",
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_the_manifest_is_valid():
+    done = subprocess.run(
+        [sys.executable, "-c", f"import sys; sys.argv = ['', 'validate', {str(ROOT)!r}]; {_VALIDATE}"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+_VALIDATE = """
+import bpy, runpy, pathlib
+import bl_pkg
+runpy.run_path(str(pathlib.Path(bl_pkg.__file__).parent / 'cli' / 'blender_ext.py'), run_name='__main__')
+"""
+
+
+def test_a_saved_edit_renders_the_same_in_a_real_blender(blender, command, bunny, tmp_path):
+    """Plain `blender -b FILE -a`, another Python, another FFmpeg; moved to another folder with its footage."""
+    footage = tmp_path / "here" / "footage" / "bunny.mp4"
+    footage.parent.mkdir(parents=True)
+    footage.write_bytes(bunny.read_bytes())
+    save = tmp_path / "here" / "edit.blend"
+    command(footage, "--output", tmp_path / "wheel", "--save", save, "--frames", "1:9", recipe=LONG_AND_SHARP)
+    (tmp_path / "here").rename(tmp_path / "there")
+    done = blender(tmp_path / "there" / "edit.blend", "-o", f"{tmp_path}/real/", "-f", "1,5,6,9")
+    assert done.returncode == 0, done.stderr
+    for frame in (1, 5, 6, 9):
+        ours, real = (read_picture(tmp_path / where / f"{frame:04d}.png") for where in ("wheel", "real"))
+        assert np.abs(ours - real).max() <= 1, frame
+
+
+def test_the_command_in_a_real_blender(blender, command, bunny, tmp_path):
+    (tmp_path / "r.json").write_text(json.dumps(LONG_AND_SHARP))
+    options = ["--recipe", tmp_path / "r.json", "--frames", "3:4"]
+    done = blender("-c", "shutter", "render", bunny, *options, "--output", tmp_path / "real")
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    command(bunny, *options, "--output", tmp_path / "wheel")
+    for frame in (3, 4):
+        ours, real = (read_picture(tmp_path / where / f"{frame:04d}.png") for where in ("wheel", "real"))
+        assert np.abs(ours - real).max() <= 1
+    refused = blender("-c", "shutter", "render", tmp_path / "none.mp4", *options, "--output", tmp_path / "no")
+    assert refused.returncode == 2
+    assert "none.mp4" in refused.stderr
+
+
+def test_missing_footage_stops_a_farm(blender, command, bunny, tmp_path):
+    """Blender would render the frames without the effect and exit with 0."""
+    footage = tmp_path / "bunny.mp4"
+    footage.write_bytes(bunny.read_bytes())
+    command(footage, "--save", tmp_path / "edit.blend", recipe=LONG_AND_SHARP)
+    footage.unlink()
+    done = blender(tmp_path / "edit.blend", "-o", f"{tmp_path}/out/", "-f", "1")
+    assert done.returncode == 2
+    assert "Virtual Shutter: bunny.mp4: no such file" in done.stderr
+    assert not list(tmp_path.glob("out/*"))

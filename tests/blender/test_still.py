@@ -1,0 +1,77 @@
+"""A still-frame shutter reproduces the source: bit for bit at 8 bits, for every frame of a real film."""
+
+import json
+
+import av
+import numpy as np
+import pytest
+from support import recipe
+
+from shutter_addon.core import recipe as recipes
+
+
+@pytest.fixture
+def still_on(edit):
+    """An edit of a movie under a still-frame effect, in the movie's size; gives the effect's strip."""
+
+    def make(path):
+        from shutter_addon.blender import effects, strips
+
+        source = edit.sequence_editor.strips.new_movie("movie", str(path), 1, 1)
+        edit.render.resolution_x = source.elements[0].orig_width
+        edit.render.resolution_y = source.elements[0].orig_height
+        strip, effect = strips.add_effect(edit, source)
+        effects.apply(edit, effect, strip, recipes.parse(json.dumps(recipe(16, np.eye(16)[0]))))
+        edit.render.resolution_x, edit.render.resolution_y = (
+            strip.scene.render.resolution_x,
+            strip.scene.render.resolution_y,
+        )
+        return strip
+
+    return make
+
+
+def test_every_frame_of_big_buck_bunny_in_random_order(edit, render, bunny, still_on):
+    strip = still_on(bunny)
+    source = next(s for s in edit.sequence_editor.strips if s.type == "MOVIE")
+    order = np.random.default_rng(0).permutation(132)
+    for start in range(0, 132, 33):
+        strip.mute, source.mute = True, False
+        plain = render(edit, range(start + 1, start + 34))
+        strip.mute, source.mute = False, True  # or Blender would decode below the effect, and seek as well
+        for frame in (int(i) + 1 for i in order if start <= i < start + 33):
+            assert np.array_equal(render(edit, [frame])[frame], plain[frame]), f"frame {frame}"
+
+
+TAGGED = {
+    "bt601": ("yuv420p", 5, 1, {}),
+    "bt709": ("yuv420p", 1, 1, {}),
+    "full range": ("yuv420p", 1, 2, {}),
+    "4:4:4": ("yuv444p", 6, 1, {}),
+    "10 bit": ("yuv420p10le", 1, 1, {}),
+    "10 bit full range": ("yuv422p10le", 5, 2, {}),
+}
+
+
+@pytest.mark.parametrize("kind", TAGGED)
+def test_tagged_files(edit, render, tmp_path, still_on, kind, same_pixels):
+    pixels, matrix, color_range, options = TAGGED[kind]
+    path = tmp_path / "tagged.mkv"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=25, options={"qp": "0", **options})
+        stream.width, stream.height, stream.pix_fmt = 64, 48, pixels
+        stream.codec_context.colorspace, stream.codec_context.color_range = matrix, color_range
+        rng = np.random.default_rng(0)
+        for _ in range(3):
+            small = rng.integers(0, 256, (12, 16, 3), dtype=np.uint8).repeat(4, 0).repeat(4, 1)
+            frame = av.VideoFrame.from_ndarray(small, format="rgb24")
+            frame = frame.reformat(format=pixels, dst_colorspace=matrix, dst_color_range=color_range)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    strip = still_on(path)
+    shown = render(edit, [2, 1], "16")
+    strip.mute = True
+    plain = render(edit, [1, 2], "16")
+    for frame in (1, 2):
+        same_pixels(shown[frame], plain[frame], 1)
+        assert plain[frame][..., :3].std() > 20
