@@ -1,5 +1,5 @@
 // A pixel's own shutter by displacement interpolation, exact (paper §3.4.1): its quantile is Σ cᵢ Sᵢ⁻¹, linear
-// between the knots of the table. Knots and frames are walked together; each frame is fetched once.
+// between the knots of the table; each piece spreads its share evenly over the frames that it passes.
 #include "compose.glsl"
 
 void main()
@@ -9,23 +9,13 @@ void main()
     return;
   }
   load_coefficients();
-  int frame = 0;
-  float weight = 0.0;
   for (int row = 1; row <= rows; row++) {
-    float time = mixed(0, 2, row);
+    float start = mixed(0, 2, row);
     float end = mixed(1, 2, row);
-    float density = texelFetch(table, ivec3(2 * groups, row, 0), 0).r / max(end - time, 1e-7);
-    for (int next = int(time); time < end && next < window; next++) {
-      float step_end = min(end, float(next + 1));
-      if (next != frame) {
-        expose(frame, weight);
-        frame = next;
-        weight = 0.0;
-      }
-      weight += (step_end - time) * density;
-      time = step_end;
+    float density = texelFetch(table, ivec3(2 * GROUPS, row, 0), 0).r / max(end - start, 1e-7);
+    for (int frame = int(start); float(frame) < end; frame++) {
+      expose(frame, (min(end, float(frame + 1)) - max(start, float(frame))) * density);
     }
   }
-  expose(frame, weight);
   finish();
 }

@@ -1,4 +1,4 @@
-// A pixel's own shutter by value interpolation: q = Σ cᵢ sᵢ/eᵢ, a row of the table per frame.
+// A pixel's own shutter by value interpolation: q = Σ cᵢ sᵢ/eᵢ, a row of the table per frame that any of them exposes.
 #include "compose.glsl"
 
 void main()
@@ -8,8 +8,8 @@ void main()
     return;
   }
   load_coefficients();
-  for (int frame = 0; frame < window; frame++) {
-    expose(frame, mixed(0, 1, frame + 1));
+  for (int row = 1; row <= rows; row++) {
+    expose(first + row - 1, mixed(0, 1, row));
   }
   finish();
 }

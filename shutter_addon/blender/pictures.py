@@ -27,12 +27,11 @@ def picture(scene, scene_frame: float, say=print) -> np.ndarray:
     frame = strips.timeline_frame(strip, scene_frame)
     source = strips.source_of(edit, effect, strip)
     renderer = _renderer(scene, source, say)
-    fps = edit.render.fps / edit.render.fps_base
     moment = effects.instant(edit, effect, strip, frame)
     if weights_folder is not None:
         _write_weights(renderer.coefficients(moment), [s.name for s in effect.shutters], frame - strip.left_handle + 1)
-    index = timing.source_frame(source, frame, renderer.source.count, fps)
-    return renderer.picture(index, moment, backward=source.use_reverse_frames)
+    index = timing.source_frame(source, frame, renderer.source, edit.render.fps / edit.render.fps_base)
+    return renderer.picture(index, moment, -1 if source.use_reverse_frames else 1)
 
 
 def _renderer(scene, source_strip, say) -> Renderer:

@@ -19,14 +19,14 @@ class RetimingKey:
     factor: float
 
 
-def source_frame(strip, frame: float, count: int, scene_fps: float) -> int:
-    """Source frame that a movie or image strip shows at a timeline frame; count: frames of its medium.
+def source_frame(strip, frame: float, medium, scene_fps: float) -> int:
+    """Source frame that a movie or image strip shows at a timeline frame; medium: its opened medium.
 
     Trims, cuts, playback rate, retiming keys, reversed frames and strobe as Blender's sequencer applies them.
     """
-    length = max(1, count - strip.content_trim_start - strip.content_trim_end)
+    length = max(1, medium.count - strip.content_trim_start - strip.content_trim_end)
     keys = _retiming_keys(strip)
-    rate = _playback_rate(strip, keys, length, scene_fps)
+    rate = _playback_rate(strip, keys, length, float(medium.fps or 0) / scene_fps)
 
     def position(time):
         return _position(strip, keys, rate, length, time)
@@ -53,13 +53,11 @@ def _position(strip, keys, rate: float, length: int, frame: float) -> np.float32
     return position
 
 
-def _playback_rate(strip, keys, length: int, scene_fps: float) -> float:
+def _playback_rate(strip, keys, length: int, rate: float) -> float:
     """Source frames per timeline frame: 1, or the movie's rate over the scene's if the strip was added to keep its
     speed. Blender does not tell which; the strip's length does."""
-    fps = getattr(strip, "fps", 0.0)
-    if fps <= 0:
+    if rate <= 0:  # images
         return 1.0
-    rate = fps / scene_fps
     shown = strip.content_end - strip.content_start
     natural = keys[-1].index if len(keys) > 1 else length
     return rate if abs(natural / rate - shown) < abs(natural - shown) or int(natural / rate) == shown else 1.0

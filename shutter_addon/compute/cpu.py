@@ -6,7 +6,7 @@ from contextlib import nullcontext
 
 import numpy as np
 
-from ..core import light, shutters
+from ..core import compositor, light, shutters
 from ..core.recipe import Instant
 from .diffusion import diffuse
 
@@ -62,9 +62,10 @@ class CPUCompositor:
     def coefficients(self, handle: np.ndarray, count: int) -> np.ndarray:
         return handle[:count]
 
-    def compose(self, window: Window, indices, instant: Instant, handle, block: int) -> np.ndarray:
+    def compose(self, window: Window, index: int, direction: int, instant: Instant, handle, block: int) -> np.ndarray:
         """The picture (H, W, 4) float32; arguments as for GPUCompositor.compose."""
         source = window.source
+        indices = compositor.window_indices(instant.options, index, source.count, direction)
         summed = "srgb" if instant.options.light == "encoded" else "linear"
         values_of = _values(source, summed)
         picture = np.empty((source.height, source.width, 4), dtype=np.float32)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
-from ..core.recipe import Instant
+from ..core import compositor, light, shutters
+from ..core.recipe import Instant, Options
 from .diffusion import Diffusion
 from .gl import NoGLError
 from .passes import Image, Pass
@@ -17,44 +20,60 @@ RESIDENT_BYTES = 6 << 30
 
 _STORED = {np.uint8: "rgba8", np.uint16: "rgba16", np.float16: "rgba16f", np.float32: "rgba32f"}
 
-_COMPOSE = {
-    interpolation: Pass(
-        f"compose_{interpolation}",
-        samplers={
-            "frames": "sampler2DArray",
-            "slots": "sampler2DArray",
-            "coefficients": "sampler2DArray",
-            "table": "sampler2DArray",
-        },
+_EDGES = {"hold": 0, "mirror": 1, "shorten": 2}
+_SAMPLERS = dict.fromkeys(("frames", "coefficients", "table"), "sampler2DArray")
+_CONSTANTS = {"size": "ivec2"} | dict.fromkeys(
+    (
+        "top",
+        "height",
+        "aggregate",
+        "rows",
+        "first",
+        "origin",
+        "direction",
+        "count",
+        "capacity",
+        "lowest",
+        "lowest_layer",
+    ),
+    "int",
+)
+
+
+@cache
+def _composition(options: Options, groups: int, stored: str, premultiplied: bool) -> Pass:
+    """The pass for shutters in so many groups of four, and frames stored as "srgb" or "linear"."""
+    summed = "srgb" if options.light == "encoded" else "linear"
+    decode = 0 if stored == summed else 1 if summed == "linear" else 2
+    return Pass(
+        f"compose_{options.interpolation}",
+        samplers=_SAMPLERS,
         images={"picture": Image("rgba32f")},
-        constants={
-            "size": "ivec2",
-            "top": "int",
-            "height": "int",
-            "aggregate": "int",
-            "groups": "int",
-            "rows": "int",
-            "window": "int",
-            "decode": "int",
-            "premultiplied": "int",
-            "encoded": "int",
+        constants=_CONSTANTS,
+        defines={
+            "GROUPS": groups,
+            "EDGES": _EDGES[options.edges],
+            "DECODE": decode,
+            "PREMULTIPLIED": int(premultiplied),
+            "ENCODED": int(summed == "srgb"),
         },
     )
-    for interpolation in ("displacement", "value")
-}
 
 
 class Window:
     """The frames of a source that a window of `capacity` needs, each read once while it stays in the window.
 
-    Bands of rows, each a texture array of its own below BAND_BYTES. Where the device has no room for all of them,
-    the frames stay on the host and every picture sends them band by band.
+    Source frame i lies in layer i mod capacity. Bands of rows, each a texture array of its own below BAND_BYTES; where
+    the device has no room for all of them, the frames stay on the host and every picture sends them band by band.
     """
 
     def __init__(self, device, source, capacity: int):
         self._device, self.source, self.capacity = device, source, capacity
-        self._layer_of: dict[int, int] = {}
+        self._held: dict[int, int] = {}  # layer: source frame
         self._kind = _STORED[np.dtype(source.dtype).type]
+        # Encoded floats may be above 1, beyond the shaders' curve.
+        self._linearises = source.transfer == "srgb" and np.dtype(source.dtype).kind == "f"
+        self.transfer = "linear" if self._linearises else source.transfer
         row_bytes = source.width * 4 * np.dtype(source.dtype).itemsize * capacity
         rows = max(1, min(source.height, BAND_BYTES // row_bytes))
         self._tops = range(0, source.height, rows)
@@ -72,27 +91,17 @@ class Window:
             self._textures = [device.texture(source.width, rows, capacity, self._kind)]
 
     def load(self, wanted) -> None:
-        """Reads what is missing of the source frames `wanted`, at most `capacity` different ones."""
-        wanted = set(wanted)
-        missing = sorted(wanted - self._layer_of.keys())
-        if not missing:
-            return
-        for index in self._layer_of.keys() - wanted:
-            del self._layer_of[index]
-            if self._host is not None:
-                del self._host[index]
-        free = sorted(set(range(self.capacity)) - set(self._layer_of.values()))
-        for index, layer in zip(missing, free, strict=False):
-            frame = self.source.read(index)
-            if self._host is not None:
-                self._host[index] = frame
-            else:
+        """Reads what is missing of the source frames `wanted`, which lie within `capacity` of one another."""
+        for index in sorted(wanted):
+            layer = index % self.capacity
+            if self._held.get(layer) == index:
+                continue
+            frame = self._read(index)
+            if self._host is None:
                 self._write(frame, layer)
-            self._layer_of[index] = layer
-
-    def layers(self, indices) -> np.ndarray:
-        """Layer of each source frame, −1 for −1."""
-        return np.array([self._layer_of[i] if i >= 0 else -1 for i in indices], dtype=np.float32)
+            else:
+                self._host[layer] = frame
+            self._held[layer] = index
 
     def bands(self):
         """Each band as (top row, height, texture array)."""
@@ -100,9 +109,17 @@ class Window:
             if self._host is None:
                 yield top, height, self._textures[band]
                 continue
-            for index, layer in self._layer_of.items():
-                self._device.write(self._textures[0], self._host[index][top : top + height], layer)
+            for layer, frame in self._host.items():
+                self._device.write(self._textures[0], frame[top : top + height], layer)
             yield top, height, self._textures[0]
+
+    def _read(self, index: int) -> np.ndarray:
+        frame = self.source.read(index)
+        if self._linearises:
+            rgb = light.straight(frame)[..., :3] if self.source.alpha == "premultiplied" else frame[..., :3]
+            scale = frame[..., 3:] if self.source.alpha == "premultiplied" else 1
+            frame[..., :3] = light.to_linear(rgb) * scale
+        return frame
 
     def _write(self, frame: np.ndarray, layer: int) -> None:
         for texture, top, height in zip(self._textures, self._tops, self._heights, strict=True):
@@ -115,7 +132,7 @@ class Window:
 
     def release(self) -> None:
         self._free_textures()
-        self._layer_of, self._host = {}, None
+        self._held, self._host = {}, None
 
 
 class GPUCompositor:
@@ -146,23 +163,23 @@ class GPUCompositor:
         values = self._device.read(handle)
         return np.moveaxis(values, -1, 1).reshape(-1, *values.shape[1:3])[:count]
 
-    def compose(self, window: Window, indices, instant: Instant, handle, block: int) -> np.ndarray:
+    def compose(self, window: Window, index: int, direction: int, instant: Instant, handle, block: int) -> np.ndarray:
         """The picture (H, W, 4) float32, scene-linear and premultiplied, top row first.
 
-        indices: L source frames, −1 left out, all loaded; block: pixels that share a coefficient.
+        index, direction: as for core.compositor.window_indices; what is needed of the window is loaded.
+        handle: coefficients, of which `block` × `block` pixels share one.
         """
         source, options = window.source, instant.options
         values = table(instant)
-        textures = {
-            "slots": self._filled("slots", window.layers(indices)[None, None, :, None], "r32f"),
-            "table": self._filled("table", values[None], "rgba32f"),
-            "coefficients": handle,
-        }
+        textures = {"table": self._filled("table", values[None], "rgba32f"), "coefficients": handle}
         picture = self._texture("picture", source.width, source.height, 1, "rgba32f")
-        stored, summed = source.transfer, "srgb" if options.light == "encoded" else "linear"
+        groups = -(-len(instant.bars) // 4)
+        program = _composition(options, groups, window.transfer, source.alpha == "premultiplied")
+        indices = compositor.window_indices(options, index, source.count, direction)
+        lowest = int(indices[indices >= 0].min())
         for top, height, frames in window.bands():
             self._device.run(
-                _COMPOSE[options.interpolation],
+                program,
                 (source.width, height),
                 textures=textures | {"frames": frames},
                 images={"picture": picture},
@@ -170,12 +187,14 @@ class GPUCompositor:
                 top=top,
                 height=source.height,
                 aggregate=block,
-                groups=-(-len(instant.bars) // 4),
                 rows=len(values) - 1,
-                window=options.window,
-                decode=0 if stored == summed else 1 if summed == "linear" else 2,
-                premultiplied=int(source.alpha == "premultiplied"),
-                encoded=int(summed == "srgb"),
+                first=shutters.open_span(instant.bars)[0],
+                origin=index - direction * options.before,
+                direction=direction,
+                count=source.count,
+                capacity=window.capacity,
+                lowest=lowest,
+                lowest_layer=lowest % window.capacity,
             )
         return self._device.read(picture)[0, ::-1]
 

@@ -25,15 +25,17 @@ class Image:
 
 @dataclass(frozen=True)
 class Pass:
-    """A compute pass. samplers: name → GLSL type; images: name → Image (arrays); constants: name → GLSL type."""
+    """A compute pass. samplers: name → GLSL type; images: name → Image (arrays); constants: name → GLSL type;
+    defines: name → value, for what is known before it is compiled."""
 
     name: str
     samplers: dict[str, str] = field(default_factory=dict)
     images: dict[str, Image] = field(default_factory=dict)
     constants: dict[str, str] = field(default_factory=dict)
+    defines: dict[str, int] = field(default_factory=dict)
 
     def __hash__(self):
-        return hash(self.name)
+        return hash((self.name, *self.defines.values()))
 
 
 @cache
@@ -51,7 +53,8 @@ def _included(path: Path) -> str:
 def source(program: Pass) -> str:
     """The whole compute shader in GLSL 4.3, interface included."""
     x, y, z = LOCAL_SIZE
-    lines = ["#version 430", f"layout(local_size_x = {x}, local_size_y = {y}, local_size_z = {z}) in;"]
+    lines = ["#version 430", *(f"#define {name} {value}" for name, value in program.defines.items())]
+    lines.append(f"layout(local_size_x = {x}, local_size_y = {y}, local_size_z = {z}) in;")
     for unit, (name, kind) in enumerate(program.samplers.items()):
         lines.append(f"layout(binding = {unit}) uniform {kind} {name};")
     for unit, (name, image) in enumerate(program.images.items()):

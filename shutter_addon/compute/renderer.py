@@ -39,17 +39,16 @@ class Renderer:
         self._window = None
         self._solved = None
 
-    def picture(self, index: int, instant: Instant, *, backward: bool = False) -> np.ndarray:
+    def picture(self, index: int, instant: Instant, direction: int = 1) -> np.ndarray:
         """The picture (H, W, 4) float32 at source frame `index`: scene-linear, premultiplied, top row first.
 
-        backward: the source plays in reverse, and the window's next frames are those before `index`.
+        direction: −1 where the source plays in reverse, and the window's next frames are those before `index`.
         """
         with self.compositor.current():
             handle, instant, block = self._coefficients(instant)
-            indices = self._needed(index, instant, backward)
             window = self._window_for(instant.options.window)
-            window.load(indices[indices >= 0].tolist())
-            return self.compositor.compose(window, indices.tolist(), instant, handle, block)
+            window.load(self._needed(index, direction, instant))
+            return self.compositor.compose(window, index, direction, instant, handle, block)
 
     def coefficients(self, instant: Instant) -> np.ndarray:
         """Coefficients (N, h, w) float32 at an instant, one per pixel or per block that shares a shutter."""
@@ -86,16 +85,12 @@ class Renderer:
             self._solved = count, labels, self._solver.solve(labels, count)
         return self._solved[2]
 
-    def _needed(self, index: int, instant: Instant, backward: bool) -> np.ndarray:
-        """Source frames (L,) of the window, −1 for those left out and those that no shutter here exposes."""
-        last = self.source.count - 1
-        indices = compositor.window_indices(instant, last - index if backward else index, self.source.count)
-        if backward:
-            indices = np.where(indices >= 0, last - indices, -1)
+    def _needed(self, index: int, direction: int, instant: Instant) -> set[int]:
+        """The source frames that some shutter exposes; all of the window, where a shutter may lose all of its own."""
+        indices = compositor.window_indices(instant.options, index, self.source.count, direction)
         low, high = shutters.open_span(instant.bars)
-        if (indices[low:high] >= 0).all():
-            indices[:low] = indices[high:] = -1
-        return indices
+        needed = indices[low:high] if (indices[low:high] >= 0).all() else indices[indices >= 0]
+        return set(needed.tolist())
 
     def _window_for(self, length: int):
         if self._window is None or self._window.capacity != length:

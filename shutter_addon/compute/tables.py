@@ -20,7 +20,7 @@ def table(instant: Instant) -> np.ndarray:
     """The table (1 + rows, columns, 4) float32 that shaders/include/compose.glsl describes.
 
     Row 0: the gains. Displacement: a row per piece of the quantiles, start and end of each group of four shutters
-    side by side, dz in the last column. Value: a row per frame of the window, its normalised bars.
+    side by side, dz in the last column. Value: a row per frame of the shutters' open span, its normalised bars.
     """
     rows = _pieces(instant.bars) if instant.options.interpolation == "displacement" else _bars(instant.bars)
     result = np.zeros((1 + len(rows), rows.shape[1], 4), dtype=np.float32)
@@ -40,4 +40,5 @@ def _pieces(bars) -> np.ndarray:
 
 
 def _bars(bars) -> np.ndarray:
-    return padded((bars / bars.sum(axis=1, keepdims=True)).T)
+    first, last = shutters.open_span(bars)
+    return padded((bars / bars.sum(axis=1, keepdims=True)).T[first:last])

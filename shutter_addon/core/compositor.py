@@ -5,21 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from . import light, shutters
-from .recipe import Instant
+from .recipe import Instant, Options
 
 
-def window_indices(instant: Instant, index: int, count: int) -> np.ndarray:
+def window_indices(options: Options, index: int, count: int, direction: int = 1) -> np.ndarray:
     """Source frames (L,) of the window around source frame `index` of a clip of `count` frames; −1: left out.
 
+    direction: 1, or −1 where the source plays in reverse, and the window's next frames are those before `index`.
     Past the clip's ends "hold" repeats the last frame, "mirror" plays back from it without showing it twice.
-    "shorten" leaves frames out, but keeps the window's own ends when it lies outside altogether.
+    "shorten" leaves frames out, but keeps the nearest when the window lies outside altogether.
     """
-    wanted = index - instant.options.before + np.arange(instant.options.window)
+    wanted = index + direction * (np.arange(options.window) - options.before)
     held = np.clip(wanted, 0, count - 1)
-    if instant.options.edges == "mirror" and count > 1:
+    if options.edges == "mirror" and count > 1:
         folded = np.mod(wanted, 2 * (count - 1))
         return np.where(folded < count, folded, 2 * (count - 1) - folded)
-    if instant.options.edges == "shorten" and (wanted == held).any():
+    if options.edges == "shorten" and (wanted == held).any():
         return np.where(wanted == held, held, -1)
     return held
 

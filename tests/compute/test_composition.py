@@ -23,7 +23,7 @@ class Footage:
 
     def read(self, index):
         self.reads.append(index)
-        return self.frames[index]
+        return self.frames[index].copy()
 
     def linear(self):
         """All frames in float64, scene-linear, premultiplied."""
@@ -67,19 +67,19 @@ def device(request):
     return open_compositor(request.param)[0]
 
 
-def check(device, source, moment, index, tolerance=LEVEL):
+def check(device, source, moment, index, direction=1):
     renderer = Renderer(device, source)
-    picture = renderer.picture(index, moment)
+    picture = renderer.picture(index, moment, direction)
     c = renderer.coefficients(moment)
     block = moment.options.aggregate
     c = c.repeat(block, 1).repeat(block, 2)[:, : source.height, : source.width].astype(np.float64)
     c /= c.sum(axis=0)
-    indices = compositor.window_indices(moment, index, source.count)
+    indices = compositor.window_indices(moment.options, index, source.count, direction)
     expected = compositor.compose(moment, source.linear()[np.maximum(indices, 0)], indices >= 0, c)
     assert picture.shape == expected.shape
     # Light above white differs in proportion: compare it relatively.
     difference = np.abs(light.to_encoded(picture.astype(np.float64)) - light.to_encoded(expected))
-    assert (difference / np.maximum(1, np.abs(expected))).max() <= tolerance
+    assert (difference / np.maximum(1, np.abs(expected))).max() <= LEVEL
     renderer.release_window()
     return picture, expected
 
@@ -95,9 +95,10 @@ def test_random_bars(device, interpolation, light_, exposure):
 @pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
 @pytest.mark.parametrize("position", ["start", "center", "end"])
 @pytest.mark.parametrize("index", [0, 7, 19])
-def test_edges(device, edges, position, index):
+@pytest.mark.parametrize("direction", [1, -1])
+def test_edges(device, edges, position, index, direction):
     rng = np.random.default_rng(2)
-    check(device, footage(rng), instant(rng, edges=edges, position=position), index)
+    check(device, footage(rng), instant(rng, edges=edges, position=position), index, direction)
 
 
 @pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
@@ -177,6 +178,8 @@ def test_a_window_that_slides_reads_one_frame(device):
     renderer.picture(1, moment)
     renderer.picture(1, moment)
     assert source.reads == list(range(17))
+    renderer.picture(0, moment)
+    assert source.reads == [*range(17), 0]
 
 
 def test_frames_that_no_shutter_exposes_are_not_read(device):
