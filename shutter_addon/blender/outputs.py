@@ -84,7 +84,7 @@ def film(edit, output: Path) -> None:
         shutil.rmtree(part, ignore_errors=True)
 
     try:
-        with _leaving(clean_up), _quiet(), _frames_moved(part, folder, count):
+        with _leaving(clean_up), _quiet(), _uncached(edit.sequence_editor), _frames_moved(part, folder, count):
             bpy.ops.render.render(animation=True, scene=edit.name)
         if is_movie(output):
             if frames_in_movie(part / output.name) < count:
@@ -150,6 +150,17 @@ def _leaving(clean_up):
         engine.before_leaving.remove(clean_up)
         for number, before in stops.items():
             signal.signal(number, before or signal.SIG_DFL)  # None: Blender's own, which Python cannot put back
+
+
+@contextmanager
+def _uncached(editor):
+    """Keeps no finished frames: each is rendered once, and Blender would fill gigabytes with them."""
+    kept = editor.use_cache_raw, editor.use_cache_final
+    editor.use_cache_raw = editor.use_cache_final = False
+    try:
+        yield
+    finally:
+        editor.use_cache_raw, editor.use_cache_final = kept
 
 
 @contextmanager
