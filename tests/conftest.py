@@ -2,8 +2,13 @@
 
 from pathlib import Path
 
+import hypothesis
 import numpy as np
 import pytest
+
+# A slow machine is no fault of the mathematics.
+hypothesis.settings.register_profile("shutter", deadline=None)
+hypothesis.settings.load_profile("shutter")
 
 ROOT = Path(__file__).parents[1]
 

@@ -64,27 +64,27 @@ def _bars_at(curves, path: str, shutter, window: int, frame: float) -> np.ndarra
 
 def _shapes_at(edit, effect, strip, curves, frame: float):
     names = [shutter.name for shutter in effect.shutters]
-    size = effect.scene.render.resolution_x, effect.scene.render.resolution_y
-    to_picture = np.linalg.inv(geometry.picture_to_image(strip, size))
+    width, height = effect.scene.render.resolution_x, effect.scene.render.resolution_y
+    to_picture = np.linalg.inv(geometry.picture_to_image(strip, (width, height)))
     for i, region in enumerate(effect.regions):
         path = f"{effect.path_from_id()}.regions[{i}]"
         if region.shutter not in names:
             continue
-        strokes = _strokes_at(effect, region, curves.find(f"{path}.location"), frame)
+        timing = curves.find(f"{path}.location")
+        strokes = _strokes_at(effect, region, timing, frame, to_picture, width / height)
         location = curves.value(region, path, "location", frame)
         rotation = np.degrees(curves.value(region, path, "rotation", frame))
         scale = curves.value(region, path, "scale", frame)
-        strokes = [geometry.mapped(to_picture, stroke) for stroke in strokes]
         yield scribbles.Shape(
             names.index(region.shutter),
             region.kind.lower(),
             curves.value(region, path, "width", frame),
-            scribbles.transform(strokes, location, rotation, scale, size[0] / size[1]),
+            scribbles.transform(strokes, location, rotation, scale, width / height),
         )
 
 
-def _strokes_at(effect, region, timing, frame: float) -> list[np.ndarray]:
-    """A region's strokes (n, 2) in image space at a frame, between two drawings with the ease of `timing`'s keys."""
+def _strokes_at(effect, region, timing, frame: float, to_picture, aspect: float) -> list[np.ndarray]:
+    """A region's strokes (n, 2) on the picture at a frame, between two drawings with the ease of `timing`'s keys."""
     layer = effect.scene.annotation.layers.get(region.layer) if effect.scene.annotation else None
     if layer is None or not layer.frames:
         return []
@@ -92,16 +92,18 @@ def _strokes_at(effect, region, timing, frame: float) -> list[np.ndarray]:
     numbers = [drawing.frame_number for drawing in drawings]
     before, after, u = keyframes.span(numbers, frame)
     u = keyframes.eased(u, animation.ease_at(timing, numbers[before]))
-    return scribbles.between_strokes(_points(drawings[before]), _points(drawings[after]), u)
+    first, second = (_points(drawings[i], to_picture) for i in (before, after))
+    return scribbles.between_strokes(first, second, u, aspect)
 
 
-def _points(drawing) -> list[np.ndarray]:
+def _points(drawing, to_picture) -> list[np.ndarray]:
     result = []
     for stroke in drawing.strokes:
         flat = np.empty(len(stroke.points) * 3, dtype=np.float32)
         stroke.points.foreach_get("co", flat)
-        result.append(flat.reshape(-1, 3)[:, :2].astype(np.float64))
-    return [points for points in result if len(points)]
+        if len(flat):
+            result.append(geometry.mapped(to_picture, flat.reshape(-1, 3)[:, :2].astype(np.float64)))
+    return result
 
 
 def apply(edit, effect, strip, source: recipe.Recipe) -> None:

@@ -141,7 +141,8 @@ class Region:
             return scribbles.transform(self.strokes, (0, 0), 0, 1, aspect)
         drawn = self.drawings()
         a, b, u = keyframes.span([key.frame for key, _ in drawn], frame)
-        strokes = scribbles.between_strokes(drawn[a][1], drawn[b][1], keyframes.eased(u, drawn[a][0].ease))
+        u = keyframes.eased(u, drawn[a][0].ease)
+        strokes = scribbles.between_strokes(drawn[a][1], drawn[b][1], u, aspect)
         a, b, u = keyframes.span([key.frame for key in self.keys], frame)
         first, second, u = self.keys[a], self.keys[b], keyframes.eased(u, self.keys[a].ease)
         location, rotation, scale = (

@@ -28,10 +28,11 @@ class Shape:
     strokes: tuple[np.ndarray, ...]
 
 
-def resample(stroke, count: int) -> np.ndarray:
-    """`count` points (count, 2) at equal arc lengths along a stroke (n, 2), its ends kept."""
+def resample(stroke, count: int, aspect: float = 1.0) -> np.ndarray:
+    """`count` points (count, 2) at equal arc lengths along a stroke (n, 2), its ends kept. aspect: the picture's width
+    over its height, by which lengths are measured."""
     stroke = np.asarray(stroke, dtype=np.float64)
-    steps = np.hypot(*np.diff(stroke, axis=0).T) if len(stroke) > 1 else np.zeros(0)
+    steps = np.hypot(*(np.diff(stroke, axis=0) * (aspect, 1)).T) if len(stroke) > 1 else np.zeros(0)
     length = np.concatenate([[0.0], np.cumsum(steps)])
     if length[-1] == 0:
         return np.repeat(stroke[:1], count, axis=0)
@@ -39,11 +40,11 @@ def resample(stroke, count: int) -> np.ndarray:
     return np.stack([np.interp(at, length, stroke[:, axis]) for axis in (0, 1)], axis=1)
 
 
-def between_strokes(first, second, u: float) -> list[np.ndarray]:
+def between_strokes(first, second, u: float, aspect: float = 1.0) -> list[np.ndarray]:
     """Strokes a share u of the way from one drawing to the next, paired in order.
 
-    Strokes of the same number of points move point by point, others by arc length. A stroke without a partner
-    stays as it is until the next drawing.
+    Strokes of the same number of points move point by point, others by arc length (aspect: see `resample`). A stroke
+    without a partner stays as it is until the next drawing.
     """
     if u <= 0:
         return [np.asarray(s, dtype=np.float64) for s in first]
@@ -55,7 +56,7 @@ def between_strokes(first, second, u: float) -> list[np.ndarray]:
         if index < len(second):
             b = np.asarray(second[index], dtype=np.float64)
             if len(a) != len(b):
-                a, b = (resample(s, max(len(a), len(b))) for s in (a, b))
+                a, b = (resample(s, max(len(a), len(b)), aspect) for s in (a, b))
             a = (1 - u) * a + u * b
         result.append(a)
     return result

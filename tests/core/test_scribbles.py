@@ -126,6 +126,11 @@ def test_resampling_goes_by_length_not_by_points():
     assert scribbles.resample(stroke, 5)[:, 0] == pytest.approx([0, 0.25, 0.5, 0.75, 1])
 
 
+def test_lengths_are_those_on_the_picture():
+    corner = np.array([[0, 0], [0.5, 0], [0.5, 1.0]])  # two equal arms on a picture twice as wide as high
+    assert scribbles.resample(corner, 3, 2.0)[1] == pytest.approx([0.5, 0])
+
+
 def test_between_drawings_of_other_point_counts():
     (half,) = scribbles.between_strokes([[[0, 0], [1, 0]]], [[[0, 1], [0.5, 1], [1, 1]]], 0.5)
     assert half == pytest.approx(np.array([[0, 0.5], [0.5, 0.5], [1, 0.5]]))
