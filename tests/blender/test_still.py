@@ -4,6 +4,7 @@ import json
 
 import av
 import numpy as np
+import OpenImageIO
 import pytest
 from support import recipe
 
@@ -75,3 +76,49 @@ def test_tagged_files(edit, render, tmp_path, still_on, kind, same_pixels):
     for frame in (1, 2):
         same_pixels(shown[frame], plain[frame], 1)
         assert plain[frame][..., :3].std() > 20
+
+
+IMAGES = {
+    "8 bit": ("a.png", "uint8", 3),
+    "16 bit with alpha": ("a.png", "uint16", 4),
+    "jpeg": ("a.jpg", "uint8", 3),
+    "tiff": ("a.tif", "uint16", 3),
+    "float tiff": ("a.tif", "float", 3),
+    "dpx": ("a.dpx", "uint16", 3),
+    "half exr with alpha": ("a.exr", "half", 4),
+    "float exr": ("a.exr", "float", 3),
+    "grey": ("a.png", "uint8", 1),
+}
+
+
+@pytest.mark.parametrize("kind", IMAGES)
+def test_images(edit, render, tmp_path, kind, same_pixels):
+    """Every format, with Blender's own idea of its colour space and alpha; two steps of the window each way."""
+    name, samples, channels = IMAGES[kind]
+    rng = np.random.default_rng(0)
+    for i in (1, 2, 3):
+        pixels = rng.random((24, 32, channels), dtype=np.float32)
+        if channels == 4:
+            pixels[..., :3] *= pixels[..., 3:]
+        spec = OpenImageIO.ImageSpec(32, 24, channels, samples)
+        path = tmp_path / name.replace("a.", f"a{i}.")
+        output = OpenImageIO.ImageOutput.create(str(path))
+        assert output.open(str(path), spec), OpenImageIO.geterror()
+        output.write_image(pixels)
+        output.close()
+    source = edit.sequence_editor.strips.new_image("images", str(tmp_path / name.replace("a.", "a1.")), 1, 1)
+    for i in (2, 3):
+        source.elements.append(name.replace("a.", f"a{i}."))
+    edit.render.resolution_x, edit.render.resolution_y = 32, 24
+    plain = render(edit, [1, 2, 3], "16")
+    from shutter_addon.blender import effects, strips
+
+    _, effect = strips.add_effect(edit, source)
+    strip = next(s for s in edit.sequence_editor.strips if s.type == "SCENE")
+    effects.apply(edit, effect, strip, recipes.parse(json.dumps(recipe(2, [1, 0]))))
+    shown = render(edit, [3, 1, 2], "16")
+    for frame in (1, 2, 3):
+        solid = plain[frame][..., 3] > 25  # of less, straight colours are mostly rounding
+        same_pixels(shown[frame][solid][None], plain[frame][solid][None], 1)
+        same_pixels(shown[frame][..., 3:], plain[frame][..., 3:], 1)
+        assert plain[frame][..., 0].std() > 20
