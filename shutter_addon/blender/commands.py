@@ -11,7 +11,8 @@ from pathlib import Path
 
 import bpy
 
-from ..compute.renderer import DEVICES, NoDeviceError
+from ..compute.errors import NoDeviceError
+from ..compute.renderer import DEVICES
 from ..core import recipe
 from ..media import MediaError, open_source
 from . import edits, effects, outputs, pictures

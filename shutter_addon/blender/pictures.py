@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO
 
-from ..compute.renderer import NoDeviceError, Renderer, open_compositor
+from ..compute.errors import NoDeviceError
+from ..compute.renderer import Renderer, open_compositor
 from ..media import MediaError
 from ..media.exr import write_exr
 from . import effects, sources, strips, timing

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 import moderngl
 import numpy as np
 
+from .errors import NoDeviceError
 from .passes import LOCAL_SIZE, Pass, source
 
 # Format (as in GLSL): components, moderngl's type, NumPy's type of what is written and read.
@@ -21,10 +22,6 @@ FORMATS = {
 }
 
 
-class NoGLError(RuntimeError):
-    """There is no GL 4.3 here; the message is one sentence for the user."""
-
-
 class GLDevice:
     """Textures and compute passes. Calls belong inside `with device.current():`, on whatever thread renders."""
 
@@ -33,7 +30,7 @@ class GLDevice:
         try:
             self._context = moderngl.create_context(standalone=True, require=430, **backend)
         except Exception as error:  # moderngl raises whatever its platform raises
-            raise NoGLError(f"no OpenGL 4.3: {error}") from None
+            raise NoDeviceError(f"no OpenGL 4.3: {error}") from None
         self._programs = {}
         self.name = self._context.info["GL_RENDERER"]
         self.max_layers = self._context.info["GL_MAX_ARRAY_TEXTURE_LAYERS"]
@@ -46,12 +43,13 @@ class GLDevice:
             yield self
 
     def texture(self, width: int, height: int, layers: int, kind: str) -> moderngl.TextureArray:
-        """A texture array of `kind` in FORMATS, without filtering. NoGLError: the device has no room for it."""
+        """A texture array of `kind` in FORMATS, without filtering. NoDeviceError: the device has no room for it."""
         components, dtype, _ = FORMATS[kind]
-        try:
-            texture = self._context.texture_array((width, height, layers), components, dtype=dtype)
-        except moderngl.Error as error:
-            raise NoGLError(f"{self.name} has no room for {layers} layers of {width}×{height}: {error}") from None
+        texture = self._context.texture_array((width, height, layers), components, dtype=dtype)
+        # moderngl does not look: a texture without memory reads as black.
+        if (fault := self._context.error) != "GL_NO_ERROR":
+            texture.release()
+            raise NoDeviceError(f"{self.name} has no room for {layers} layers of {width}×{height}: {fault}")
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         texture.extra = kind
         return texture

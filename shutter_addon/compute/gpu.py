@@ -9,7 +9,7 @@ import numpy as np
 from ..core import compositor, light, shutters
 from ..core.recipe import Instant, Options
 from .diffusion import Diffusion
-from .gl import NoGLError
+from .errors import NoDeviceError
 from .passes import Image, Pass
 from .tables import padded, table
 
@@ -82,10 +82,10 @@ class Window:
         self._host: dict[int, np.ndarray] | None = None
         try:
             if row_bytes * source.height > RESIDENT_BYTES:
-                raise NoGLError("over the budget")
+                raise NoDeviceError("over the budget")
             for height in self._heights:
                 self._textures.append(device.texture(source.width, height, capacity, self._kind))
-        except NoGLError:
+        except NoDeviceError:
             self._free_textures()
             self._host = {}
             self._textures = [device.texture(source.width, rows, capacity, self._kind)]

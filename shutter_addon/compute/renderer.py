@@ -7,12 +7,9 @@ import numpy as np
 from ..core import compositor, scribbles, shutters
 from ..core.recipe import Instant
 from .cpu import CPUCompositor
+from .errors import NoDeviceError
 
 DEVICES = ("auto", "gpu", "cpu")
-
-
-class NoDeviceError(RuntimeError):
-    """The device asked for is not here; the message is one sentence for the user."""
 
 
 def open_compositor(device: str = "auto"):
@@ -24,7 +21,7 @@ def open_compositor(device: str = "auto"):
         from .gpu import GPUCompositor
 
         return GPUCompositor(GLDevice()), None
-    except (ImportError, RuntimeError) as error:
+    except (ImportError, NoDeviceError) as error:
         if device == "gpu":
             raise NoDeviceError(str(error)) from None
         return CPUCompositor(), f"{error}; composing with NumPy, which is slow"

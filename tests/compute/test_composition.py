@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.compute.cpu import CPUCompositor
+from shutter_addon.compute.errors import NoDeviceError
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.core import compositor, light
 from shutter_addon.core.recipe import Instant, Options
@@ -224,6 +225,38 @@ def test_bands_and_streaming_change_nothing(monkeypatch, resident):
     assert np.array_equal(picture, whole)
 
 
+def test_a_texture_without_room_is_refused():
+    from shutter_addon.compute.gl import GLDevice
+
+    device = GLDevice()
+    with device.current():
+        for size in ((16384, 16384, 512), (10**6, 4, 1)):
+            with pytest.raises(NoDeviceError, match="has no room"):
+                device.texture(*size, "rgba32f")
+        device.texture(4, 4, 1, "rgba8")
+
+
+def test_a_device_too_small_for_the_window_streams_it(monkeypatch):
+    from shutter_addon.compute.gl import GLDevice
+
+    rng = np.random.default_rng(17)
+    source, moment = footage(rng), instant(rng)
+    device = open_compositor("gpu")[0]
+    whole = Renderer(device, source).picture(0, moment)
+    texture = GLDevice.texture
+
+    def small(self, width, height, layers, kind):
+        if layers == 16 and height > 10:
+            raise NoDeviceError("no room")
+        return texture(self, width, height, layers, kind)
+
+    monkeypatch.setattr(GLDevice, "texture", small)
+    from shutter_addon.compute import gpu
+
+    monkeypatch.setattr(gpu, "BAND_BYTES", source.width * 4 * 16 * 10)
+    assert np.array_equal(Renderer(device, source).picture(0, moment), whole)
+
+
 def test_history_leaves_no_trace(device):
     rng = np.random.default_rng(15)
     source, moment = footage(rng), instant(rng)
@@ -247,11 +280,11 @@ def test_no_gl_says_so(monkeypatch):
     from shutter_addon.compute import gl
 
     def fail(self):
-        raise gl.NoGLError("no OpenGL 4.3: none here")
+        raise NoDeviceError("no OpenGL 4.3: none here")
 
     monkeypatch.setattr(gl.GLDevice, "__init__", fail)
     device, message = open_compositor("auto")
     assert isinstance(device, CPUCompositor)
     assert message == "no OpenGL 4.3: none here; composing with NumPy, which is slow"
-    with pytest.raises(RuntimeError, match="no OpenGL"):
+    with pytest.raises(NoDeviceError, match="no OpenGL"):
         open_compositor("gpu")
