@@ -12,7 +12,7 @@ from . import animation, strips
 def adopt() -> None:
     """Gives every effect strip that is a copy a scene, an effect and keys of its own; keys follow moved strips."""
     taken = set()
-    for edit in bpy.data.scenes:
+    for edit in [scene for scene in bpy.data.scenes if scene.library is None]:  # linked ones cannot be changed
         for scene, parts in _groups(edit).items():
             effect = strips.effect_of(edit, scene)
             if effect is None:  # Blender copied the scene with its strip

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 
+import av
 import numpy as np
 import pytest
 from support import read_picture, recipe, write_frames
@@ -54,8 +55,6 @@ def test_no_medium(command, tmp_path, name, content, words):
 
 
 def test_audio_only(command, tmp_path):
-    import av
-
     with av.open(str(tmp_path / "sound.mp4"), "w") as container:
         stream = container.add_stream("aac", rate=48000)
         sound = av.AudioFrame.from_ndarray(np.zeros((1, 1024), dtype=np.float32), format="fltp", layout="mono")
@@ -67,15 +66,33 @@ def test_audio_only(command, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_truncated_movie(command, bunny, tmp_path):
-    """The header is lost: nothing. The frames are: those before the damage are there, whole; none after it."""
+def test_a_movie_without_its_index(command, bunny, tmp_path):
     data = bunny.read_bytes()
-    (tmp_path / "header.mp4").write_bytes(data[: len(data) // 2])
-    with open_source(bunny) as source:
-        moov_first = data.find(b"moov") < data.find(b"mdat")
-        assert source.count == 132
-    done = command(tmp_path / "header.mp4", "--output", tmp_path / "out", "--frames", "1", recipe=STILL, check=False)
-    assert (done.returncode == 0) == moov_first
+    assert data.find(b"moov") > data.find(b"mdat")
+    (tmp_path / "half.mp4").write_bytes(data[: len(data) // 2])
+    refused(command(tmp_path / "half.mp4", "--output", tmp_path / "out", recipe=STILL, check=False), "half.mp4")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_movie_cut_off_in_the_middle(command, tmp_path):
+    """Frames before the end are good; a frame that is not there is said, and stops the render."""
+    pictures = np.random.default_rng(0).integers(0, 256, (40, 32, 48, 3), dtype=np.uint8)
+    with av.open(str(tmp_path / "whole.mkv"), "w") as container:
+        stream = container.add_stream("ffv1", rate=10)
+        stream.width, stream.height, stream.pix_fmt = 48, 32, "bgr0"
+        for picture in pictures:
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        container.mux(stream.encode())
+    data = (tmp_path / "whole.mkv").read_bytes()
+    (tmp_path / "cut.mkv").write_bytes(data[: len(data) // 2])
+    with open_source(tmp_path / "cut.mkv") as source:
+        assert source.count == 40
+    done = command(tmp_path / "cut.mkv", "--output", tmp_path / "out", recipe=recipe(1, [1]), check=False)
+    refused(done, "cut.mkv", "cannot be decoded")
+    finished = sorted((tmp_path / "out").iterdir())
+    assert 15 <= len(finished) <= 20
+    for path, picture in zip(finished, pictures, strict=False):
+        assert np.array_equal(np.rint(read_picture(path)), picture)
 
 
 def test_damaged_in_the_middle(command, frames, tmp_path):
