@@ -1,5 +1,6 @@
 """Which source frame an effect shows: what Blender itself shows for the plain strip, whatever was done to it."""
 
+import ctypes
 from contextlib import contextmanager
 
 import av
@@ -162,6 +163,21 @@ def test_retiming_keys(edit, render, effect_on, movie):
     assert len(keys) == 4
     strip, _ = effect_on(source)
     check(edit, render, [strip], range(1, 150))
+
+
+@pytest.mark.parametrize("operator", ["retiming_transition_add", "retiming_freeze_frame_add"])
+def test_speed_transitions_and_freeze_frames(bpy, edit, render, effect_on, movie, operator):
+    source = new_movie(edit, movie)
+    source.retiming_keys.add(timeline_frame=31)
+    source.retiming_keys[-1].timeline_frame = 120
+    edit.sequence_editor.active_strip, source.show_retiming_keys = source, True
+    # Python cannot select a retiming key: SEQ_KEY_SELECTED in its flag, behind a double.
+    ctypes.c_int.from_address(source.retiming_keys[1].as_pointer() + 8).value |= 1 << 4
+    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+        getattr(bpy.ops.sequencer, operator)(duration=10)
+    assert len(source.retiming_keys) == 4
+    strip, _ = effect_on(source)
+    check(edit, render, [strip], range(1, source.right_handle))
 
 
 def test_images(edit, render, effect_on, images):
