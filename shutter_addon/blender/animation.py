@@ -3,6 +3,7 @@
 The engine is called with the effect scene's depsgraph, which knows nothing of the edit's animation.
 """
 
+import re
 from itertools import pairwise
 
 import bpy
@@ -111,6 +112,22 @@ def copy_curves(scene, path: str, new_scene, new_path: str) -> None:
             curve, data_path=new_path + curve.data_path.removeprefix(path)
         )
         copy.array_index = curve.array_index
+
+
+def reindex(scene, path: str, places: dict[int, int | None]) -> None:
+    """Keeps F-curves with the items of the collection at `path` whose places changed: old index → new, None: removed.
+
+    Blender finds properties by index, and knows nothing of items that move.
+    """
+    item = re.compile(re.escape(path) + r"\[(\d+)\]")
+    for curve in _curves_under(scene, f"{path}["):
+        found = item.match(curve.data_path)
+        index = int(found[1])
+        place = places.get(index, index)
+        if place is None:
+            _channelbag(scene).fcurves.remove(curve)
+        elif place != index:
+            curve.data_path = f"{path}[{place}]{curve.data_path[found.end() :]}"
 
 
 def _curves_under(scene, path: str) -> list:
