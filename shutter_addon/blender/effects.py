@@ -19,7 +19,7 @@ def instant(edit, effect, strip, frame: float) -> recipe.Instant:
         raise EffectError(f'"{effect.name}" has no shutter')
     curves, path = animation.Curves(edit), effect.path_from_id()
     bars = [
-        _bars_at(curves, f"{path}.shutters[{i}]", shutter, effect.window, frame)
+        bars_at(curves, f"{path}.shutters[{i}]", shutter, effect.window, frame)
         for i, shutter in enumerate(effect.shutters)
     ]
     for shutter, values in zip(effect.shutters, bars, strict=True):
@@ -36,8 +36,9 @@ def options(effect) -> recipe.Options:
     return recipe.Options(effect.window, **words, aggregate=int(effect.aggregate), border=effect.border)
 
 
-def _bars_at(curves, path: str, shutter, window: int, frame: float) -> np.ndarray:
-    """Bars at a frame; between keys by displacement, with the ease of the F-curves."""
+def bars_at(curves, path: str, shutter, window: int, frame: float) -> np.ndarray:
+    """Bars (window,) of a shutter at a frame; between keys by displacement, with the ease of the F-curves. path: the
+    shutter's, from the scene."""
     stored = np.zeros(window)
     weights = [bar.weight for bar in shutter.bars][:window]
     stored[: len(weights)] = weights
@@ -64,14 +65,12 @@ def _bars_at(curves, path: str, shutter, window: int, frame: float) -> np.ndarra
 
 def _shapes_at(edit, effect, strip, curves, frame: float):
     names = [shutter.name for shutter in effect.shutters]
-    width, height = effect.scene.render.resolution_x, effect.scene.render.resolution_y
-    to_picture = np.linalg.inv(geometry.picture_to_image(strip, (width, height)))
+    width, height = picture_size(effect)
     for i, region in enumerate(effect.regions):
         path = f"{effect.path_from_id()}.regions[{i}]"
         if region.shutter not in names:
             continue
-        timing = curves.find(f"{path}.location")
-        strokes = _strokes_at(effect, region, timing, frame, to_picture, width / height)
+        strokes = strokes_at(edit, effect, strip, i, frame, curves)
         location = curves.value(region, path, "location", frame)
         rotation = np.degrees(curves.value(region, path, "rotation", frame))
         scale = curves.value(region, path, "scale", frame)
@@ -83,17 +82,26 @@ def _shapes_at(edit, effect, strip, curves, frame: float):
         )
 
 
-def _strokes_at(effect, region, timing, frame: float, to_picture, aspect: float) -> list[np.ndarray]:
-    """A region's strokes (n, 2) on the picture at a frame, between two drawings with the ease of `timing`'s keys."""
+def picture_size(effect) -> tuple[int, int]:
+    """Width and height of the effect's picture, which are its source's."""
+    return effect.scene.render.resolution_x, effect.scene.render.resolution_y
+
+
+def strokes_at(edit, effect, strip, index: int, frame: float, curves=None) -> list[np.ndarray]:
+    """A region's strokes (n, 2) on the picture at a frame, not moved yet; between two drawings with the ease of its
+    location's keys."""
+    region, (width, height) = effect.regions[index], picture_size(effect)
     layer = effect.scene.annotation.layers.get(region.layer) if effect.scene.annotation else None
     if layer is None or not layer.frames:
         return []
     drawings = sorted(layer.frames, key=lambda drawing: drawing.frame_number)
     numbers = [drawing.frame_number for drawing in drawings]
     before, after, u = keyframes.span(numbers, frame)
+    timing = (curves or animation.Curves(edit)).find(f"{effect.path_from_id()}.regions[{index}].location")
+    to_picture = np.linalg.inv(geometry.picture_to_image(strip, (width, height)))
     u = keyframes.eased(u, animation.ease_at(timing, numbers[before]))
     first, second = (_points(drawings[i], to_picture) for i in (before, after))
-    return scribbles.between_strokes(first, second, u, aspect)
+    return scribbles.between_strokes(first, second, u, width / height)
 
 
 def _points(drawing, to_picture) -> list[np.ndarray]:

@@ -18,6 +18,7 @@ from bpy.props import (
 from bpy.types import PropertyGroup
 
 from ..core.shutters import MAX_WINDOW
+from . import editing
 from .strips import effect_strips
 
 # Enum identifiers are the recipe's words in capitals.
@@ -60,6 +61,19 @@ def _changed(group, _context):
         strip.invalidate_cache("RAW")
 
 
+def _renamed(shutter, new: str, old: str, _is_set) -> str:
+    return editing.rename(editing.effect_of(shutter), old, new)
+
+
+def _recolored(shutter, _context):
+    editing.color_layers(editing.effect_of(shutter), shutter)
+
+
+def _lengthened(effect, context):
+    editing.fit_bars(effect)
+    _changed(effect, context)
+
+
 class ShutterBar(PropertyGroup):
     weight: FloatProperty(
         name="Weight",
@@ -72,8 +86,17 @@ class ShutterBar(PropertyGroup):
 
 
 class Shutter(PropertyGroup):
-    name: StringProperty(name="Name", default="Shutter")
-    color: FloatVectorProperty(name="Color", subtype="COLOR_GAMMA", size=3, min=0.0, max=1.0, default=(0.8, 0.8, 0.8))
+    name: StringProperty(name="Name", default="Shutter", set_transform=_renamed)
+    color: FloatVectorProperty(
+        name="Color",
+        description="Of its bars, its scribbles and its share in the coefficients",
+        subtype="COLOR_GAMMA",
+        size=3,
+        min=0.0,
+        max=1.0,
+        default=(0.8, 0.8, 0.8),
+        update=_recolored,
+    )
     bars: CollectionProperty(type=ShutterBar)
 
 
@@ -106,7 +129,7 @@ class ShutterEffect(PropertyGroup):
         default=8,
         min=1,
         max=MAX_WINDOW,
-        update=_changed,
+        update=_lengthened,
     )
     position: EnumProperty(name="Position", items=POSITIONS, update=_changed)
     interpolation: EnumProperty(name="Interpolation", items=INTERPOLATIONS, update=_changed)
@@ -119,6 +142,8 @@ class ShutterEffect(PropertyGroup):
     )
     shutters: CollectionProperty(type=Shutter)
     regions: CollectionProperty(type=ShutterRegion)
+    active_shutter: IntProperty(name="Active Shutter", min=0)
+    active_region: IntProperty(name="Active Region", min=0)
 
 
 class ShutterScene(PropertyGroup):

@@ -37,6 +37,57 @@ def find_edit(scene):
     raise effects.EffectError(f'scene "{scene.name}" belongs to no Shutter strip')
 
 
+def edit_of(context):
+    """The scene whose sequencer the context shows, or None."""
+    return getattr(context, "sequencer_scene", None) or context.scene
+
+
+def active_strip(context):
+    """The active strip of the context's edit, or None."""
+    edit = edit_of(context)
+    return edit.sequence_editor.active_strip if edit and edit.sequence_editor else None
+
+
+def active(context):
+    """Edit, effect and effect strip of the active strip, which may be the source as well; None: it has no effect."""
+    strip = active_strip(context)
+    if strip is None:
+        return None
+    edit = edit_of(context)
+    if strip.type != "SCENE":
+        above = [s for s in effect_strips(edit) if _shows(edit, s, strip)]
+        if not above:
+            return None
+        strip = min(above, key=lambda s: abs(s.left_handle - strip.left_handle))
+    effect = effect_of(edit, strip.scene) if strip.scene else None
+    return (edit, effect, strip) if effect else None
+
+
+def _shows(edit, strip, source) -> bool:
+    effect = effect_of(edit, strip.scene)
+    return effect is not None and effect.source == source.virtual_shutter_source != ""
+
+
+def choose(edit, strip) -> None:
+    """Makes a strip the active and only selected one."""
+    for other in edit.sequence_editor.strips_all:
+        other.select = other == strip
+    edit.sequence_editor.active_strip = strip
+
+
+def previews(context):
+    """Window and area of every sequencer that shows a preview."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "SEQUENCE_EDITOR" and area.spaces.active.view_type != "SEQUENCER":
+                yield window, area
+
+
+def preview_region(area):
+    """The region of a sequencer's area that shows the picture."""
+    return next(region for region in area.regions if region.type == "PREVIEW")
+
+
 def origin(strip) -> float:
     """Timeline frame at which the strip's untrimmed content would start: the same for all parts of a cut strip."""
     return strip.content_start - strip.content_trim_start

@@ -148,3 +148,17 @@ def open_span(shutters) -> tuple[int, int]:
     """First and one past the last frame of the window that any mix of these shutters (N, L) can expose."""
     used = np.flatnonzero(np.any(np.atleast_2d(shutters) > 0, axis=0))
     return int(used[0]), int(used[-1]) + 1
+
+
+def resample(bars, window: int) -> np.ndarray:
+    """Bars (window,) of the same shutter over a window of another length: its shape and its angle stay."""
+    bars = np.asarray(bars, dtype=np.float64)
+    total = np.concatenate([[0.0], np.cumsum(bars)])
+    at = np.linspace(0, len(bars), window + 1)
+    return np.diff(np.interp(at, np.arange(len(bars) + 1), total)) * window / len(bars)
+
+
+def open_angle(bars) -> float:
+    """The shutter angle in degrees: 360 for a window that is open throughout, however bright its brightest bar is."""
+    bars = np.asarray(bars, dtype=np.float64)
+    return 360.0 * exposure(bars) / (len(bars) * max(bars.max(), 1e-30))

@@ -1,0 +1,57 @@
+"""Flat shapes and texts in a region, in its pixels."""
+
+import blf
+import bpy
+import gpu
+import numpy as np
+from gpu_extras.batch import batch_for_shader
+
+
+def ui_scale() -> float:
+    """Pixels per unit of Blender's interface."""
+    return bpy.context.preferences.system.ui_scale
+
+
+def rectangles(boxes, colors) -> None:
+    """Filled boxes (n, 4) of left, bottom, right, top; colors: (n, 4), display code values with straight alpha."""
+    if not len(boxes):
+        return
+    left, bottom, right, top = np.asarray(boxes, dtype=np.float32).T
+    corners = np.stack([left, bottom, right, bottom, right, top, left, top], axis=1).reshape(-1, 2)
+    first = 4 * np.arange(len(left), dtype=np.int32)[:, None]
+    triangles = (first + np.array([0, 1, 2, 0, 2, 3], dtype=np.int32)).reshape(-1, 3)
+    _draw("TRIS", corners, np.repeat(np.asarray(colors, dtype=np.float32), 4, axis=0), triangles)
+
+
+def lines(points, color, closed: bool = False, width: float = 1.0) -> None:
+    """A line through points (n, 2)."""
+    points = np.asarray(points, dtype=np.float32)
+    if len(points) < 2:
+        return
+    steps = np.arange(len(points) if closed else len(points) - 1, dtype=np.int32)
+    pairs = np.stack([steps, (steps + 1) % len(points)], axis=1)
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    shader.uniform_float("lineWidth", width * ui_scale())
+    shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
+    shader.uniform_float("color", color)
+    gpu.state.blend_set("ALPHA")
+    batch_for_shader(shader, "LINES", {"pos": points}, indices=pairs).draw(shader)
+    gpu.state.blend_set("NONE")
+
+
+def text(x: float, y: float, words: str, size: float = 11, color=(1, 1, 1, 0.9)) -> None:
+    """Words with their lower left corner at a point."""
+    blf.size(0, size * ui_scale())
+    blf.color(0, *color)
+    blf.position(0, x, y, 0)
+    blf.enable(0, blf.SHADOW)
+    blf.shadow(0, 3, 0, 0, 0, 0.8)
+    blf.draw(0, words)
+    blf.disable(0, blf.SHADOW)
+
+
+def _draw(kind: str, corners, colors, indices) -> None:
+    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
+    gpu.state.blend_set("ALPHA")
+    batch_for_shader(shader, kind, {"pos": corners, "color": colors}, indices=indices).draw(shader)
+    gpu.state.blend_set("NONE")

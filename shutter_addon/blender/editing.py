@@ -1,0 +1,327 @@
+"""Changes to an effect: its shutters, their bars and keys, and its regions. Operators and gizmos call these.
+
+Shutters and regions are items of collections: where one goes or moves, its F-curves go and move with it.
+"""
+
+import bpy
+import numpy as np
+
+from ..core import presets, shutters
+from . import animation, copies, effects
+
+# Told apart on footage and by colour-blind eyes (Okabe and Ito).
+COLORS = (
+    (0.337, 0.706, 0.914),
+    (0.902, 0.624, 0.0),
+    (0.0, 0.62, 0.451),
+    (0.8, 0.475, 0.655),
+    (0.941, 0.894, 0.259),
+    (0.835, 0.369, 0.0),
+    (0.0, 0.447, 0.698),
+)
+CHANNELS = ("location", "rotation", "scale")
+
+
+def effect_of(item):
+    """The effect that a shutter or a region belongs to."""
+    path = item.path_from_id()
+    return item.id_data.path_resolve(path[: path.index("]") + 1])
+
+
+def active_shutter(effect):
+    """The shutter that is chosen in the list, or None."""
+    return effect.shutters[effect.active_shutter] if effect.active_shutter < len(effect.shutters) else None
+
+
+def active_region(effect):
+    """The region that is chosen in the list, if it is one of the active shutter's; or None."""
+    region = effect.regions[effect.active_region] if effect.active_region < len(effect.regions) else None
+    shutter = active_shutter(effect)
+    return region if region and shutter and region.shutter == shutter.name else None
+
+
+def unique(name: str, taken) -> str:
+    """The name, with a number behind it where it is taken, as Blender names things."""
+    base, number, wanted = name, 0, name
+    while wanted in taken:
+        number += 1
+        wanted = f"{base}.{number:03d}"
+    return wanted
+
+
+# Shutters
+
+
+def start(effect) -> None:
+    """What a new effect begins with: a long shutter everywhere, and a sharp one to scribble with."""
+    add_shutter(effect, "Long", presets.bars("ANGLE_360", effect.window))
+    add_shutter(effect, "Sharp", presets.bars("STILL", effect.window))
+
+
+def add_shutter(effect, name: str = "Shutter", bars=None):
+    """Appends a shutter, fully open unless bars (window,) are given, and makes it the active one."""
+    color = COLORS[len(effect.shutters) % len(COLORS)]
+    shutter = effect.shutters.add()
+    shutter.name, shutter.color = name, color
+    for weight in np.ones(effect.window) if bars is None else bars:
+        shutter.bars.add().weight = weight
+    effect.active_shutter = len(effect.shutters) - 1
+    return shutter
+
+
+def duplicate_shutter(effect, index: int):
+    """A copy of a shutter, with its keys, behind it; regions stay with the original."""
+    edit, path = effect.id_data, f"{effect.path_from_id()}.shutters"
+    effect.shutters.add()
+    last = len(effect.shutters) - 1
+    old, new = effect.shutters[index], effect.shutters[last]
+    copies.copy_properties(old, new)
+    new.color = COLORS[last % len(COLORS)]
+    animation.copy_curves(edit, f"{path}[{index}].", edit, f"{path}[{last}].")
+    move_shutter(effect, last, index + 1)
+    effect.active_shutter = index + 1
+    return effect.shutters[index + 1]
+
+
+def remove_shutter(effect, index: int) -> None:
+    """Removes a shutter, its keys and its regions. The first of those that remain is the default."""
+    name = effect.shutters[index].name
+    for i in reversed([i for i, region in enumerate(effect.regions) if region.shutter == name]):
+        remove_region(effect, i)
+    _remove(effect, "shutters", index)
+    effect.active_shutter = min(effect.active_shutter, max(len(effect.shutters) - 1, 0))
+
+
+def move_shutter(effect, index: int, to: int) -> None:
+    """Moves a shutter in the list; whichever comes first is the default."""
+    _move(effect, "shutters", index, to)
+    effect.active_shutter = to
+
+
+def rename(effect, old: str, new: str) -> str:
+    """The name that a shutter gets for a wish: a unique one. Its regions follow it."""
+    others = [shutter.name for shutter in effect.shutters]
+    others.remove(old)
+    new = unique(new or "Shutter", others)
+    # A name that is taken twice is that of a copy: the regions belong to the original.
+    if old not in others:
+        for region in effect.regions:
+            if region.shutter == old:
+                region.shutter = new
+    return new
+
+
+# Bars
+
+
+def bars(shutter) -> np.ndarray:
+    """A shutter's bars as they stand, float64 (L,)."""
+    values = np.empty(len(shutter.bars), dtype=np.float32)
+    shutter.bars.foreach_get("weight", values)
+    return values.astype(np.float64)
+
+
+def set_bars(shutter, values) -> None:
+    """Gives a shutter these bars (L,); those that stay are not touched."""
+    for bar, value in zip(shutter.bars, values, strict=True):
+        if bar.weight != np.float32(value):
+            bar.weight = value
+
+
+def paint(effect, index: int, values, key: bool = False) -> None:
+    """Gives a shutter bars (L,) as an editor does at the current frame; key: and keys them there."""
+    set_bars(effect.shutters[index], values)
+    if key:
+        key_bars(effect, index)
+
+
+def fit_bars(effect) -> None:
+    """After a change of the window's length: all shutters, their keys as well, keep their shape and angle."""
+    for index, shutter in enumerate(effect.shutters):
+        if len(shutter.bars) not in (0, effect.window):
+            _fit(effect, index, shutter)
+
+
+def _fit(effect, index: int, shutter) -> None:
+    edit, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
+    curves = animation.Curves(edit)
+    old = bars(shutter)
+    keyed = {k: curve for k in range(len(old)) if (curve := curves.find(f"{path}[{k}].weight"))}
+    keys = [_resampled_key(old, keyed, frame, effect.window) for frame in animation.key_frames(keyed.values())]
+    animation.remove_curves(edit, f"{path}[")
+    shutter.bars.clear()
+    for k, weight in enumerate(shutters.resample(old, effect.window)):
+        shutter.bars.add().weight = weight
+        if keys:
+            animation.set_keys(edit, f"{path}[{k}].weight", 0, [(frame, bar[k], ease) for frame, bar, ease in keys])
+
+
+def _resampled_key(old, keyed, frame: float, window: int):
+    """Frame, bars of the new length, and ease of the key at a frame."""
+    values = old.copy()
+    values[list(keyed)] = [max(curve.evaluate(frame), 0.0) for curve in keyed.values()]
+    own = next(c for c in keyed.values() if any(key.co[0] == frame for key in c.keyframe_points))
+    return frame, shutters.resample(values, window), animation.ease_at(own, frame)
+
+
+def key_bars(effect, index: int) -> None:
+    """Keys all bars of a shutter at the current frame, as Blender's own key buttons do."""
+    path, group = f"{effect.path_from_id()}.shutters[{index}].bars", effect.shutters[index].name
+    for k in range(len(effect.shutters[index].bars)):
+        effect.id_data.keyframe_insert(f"{path}[{k}].weight", group=group)
+
+
+def unkey_bars(effect, index: int) -> bool:
+    """Deletes the keys of a shutter's bars at the current frame; whether there were any."""
+    edit, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
+    curves = animation.Curves(edit)
+    keyed = [k for k in range(len(effect.shutters[index].bars)) if curves.find(f"{path}[{k}].weight")]
+    deleted = [_deleted(edit, f"{path}[{k}].weight") for k in keyed]
+    return any(deleted)
+
+
+def _deleted(edit, path: str) -> bool:
+    try:
+        return edit.keyframe_delete(path)
+    except RuntimeError:  # no key at this frame
+        return False
+
+
+def key_state(effect, index: int) -> list[str]:
+    """For each bar of a shutter, as Blender colours its fields: "", "animated", "keyed" here, or "changed" since."""
+    edit, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
+    curves = animation.Curves(edit)
+    return [
+        _state(curves.find(f"{path}[{k}].weight"), bar.weight, edit)
+        for k, bar in enumerate(effect.shutters[index].bars)
+    ]
+
+
+def _state(curve, value: float, edit) -> str:
+    if curve is None:
+        return ""
+    frame = edit.frame_current_final
+    if abs(curve.evaluate(frame) - value) > 1e-4:
+        return "changed"
+    return "keyed" if any(abs(key.co[0] - frame) < 1e-3 for key in curve.keyframe_points) else "animated"
+
+
+def bars_now(effect, index: int) -> np.ndarray:
+    """Bars (L,) that the picture at the current frame is made with: between keys by displacement.
+
+    Bars that were changed since, and not keyed yet, count as they stand.
+    """
+    stored = bars(effect.shutters[index])
+    if "changed" in key_state(effect, index):
+        return stored
+    path = f"{effect.path_from_id()}.shutters[{index}]"
+    return effects.bars_at(
+        animation.Curves(effect.id_data),
+        path,
+        effect.shutters[index],
+        effect.window,
+        effect.id_data.frame_current_final,
+    )
+
+
+# Regions
+
+
+def add_region(effect, shutter, kind: str = "LINE", name: str = ""):
+    """Appends a region of a shutter, on an empty annotation layer of its own, and makes it the active one."""
+    region = effect.regions.add()
+    region.name = unique(name or shutter.name, {r.name for r in effect.regions})
+    region.shutter, region.kind = shutter.name, kind
+    new_layer(effect, region)
+    effect.active_region = len(effect.regions) - 1
+    return region
+
+
+def new_layer(effect, region):
+    """Gives a region an empty annotation layer, named after it and in its shutter's colour."""
+    if effect.scene.annotation is None:
+        effect.scene.annotation = bpy.data.annotations.new(f"Scribbles {effect.name}")
+    layer = effect.scene.annotation.layers.new(region.name, set_active=True)
+    layer.color = effect.shutters[region.shutter].color
+    region.layer = layer.info
+    return layer
+
+
+def remove_region(effect, index: int) -> None:
+    """Removes a region, its keys and its annotation layer."""
+    layer = layer_of(effect, effect.regions[index])
+    if layer is not None:
+        effect.scene.annotation.layers.remove(layer)
+    _remove(effect, "regions", index)
+    effect.active_region = min(effect.active_region, max(len(effect.regions) - 1, 0))
+
+
+def move_region(effect, index: int, to: int) -> None:
+    """Moves a region in the list; later ones lie over earlier ones."""
+    _move(effect, "regions", index, to)
+    effect.active_region = to
+
+
+def layer_of(effect, region):
+    """The annotation layer of a region, or None."""
+    return effect.scene.annotation.layers.get(region.layer) if effect.scene.annotation else None
+
+
+def color_layers(effect, shutter) -> None:
+    """Scribbles have the colour of their shutter."""
+    for region in effect.regions:
+        if region.shutter == shutter.name and (layer := layer_of(effect, region)) is not None:
+            layer.color = shutter.color
+
+
+def take_layer(effect, shutter, layer):
+    """A region of a shutter from any annotation layer, whose drawings are copied unless it is one of the effect's."""
+    own = effect.scene.annotation and layer.id_data == effect.scene.annotation
+    region = add_region(effect, shutter, name=layer.info)
+    copy = layer_of(effect, region)
+    for drawing in layer.frames:
+        _copy_strokes(drawing, copy.frames.new(drawing.frame_number))
+    if own:
+        effect.scene.annotation.layers.remove(layer)
+    return region
+
+
+def _copy_strokes(old, new) -> None:
+    for stroke in old.strokes:
+        copy = new.strokes.new()
+        copy.display_mode = "2DSPACE"
+        copy.points.add(len(stroke.points))
+        flat = np.empty(len(stroke.points) * 3, dtype=np.float32)
+        stroke.points.foreach_get("co", flat)
+        copy.points.foreach_set("co", flat)
+
+
+def free_layers(effect, annotation) -> list:
+    """Layers of an annotation that are no region yet."""
+    taken = {region.layer for region in effect.regions} if annotation == effect.scene.annotation else set()
+    return [layer for layer in annotation.layers if layer.info not in taken] if annotation else []
+
+
+def key_region(effect, index: int) -> None:
+    """Keys a region's location, rotation and scale at the current frame."""
+    path = f"{effect.path_from_id()}.regions[{index}]"
+    for name in CHANNELS:
+        effect.id_data.keyframe_insert(f"{path}.{name}", group=effect.regions[index].name)
+
+
+# Collections
+
+
+def _remove(effect, collection: str, index: int) -> None:
+    items, path = getattr(effect, collection), f"{effect.path_from_id()}.{collection}"
+    places = {index: None} | {i: i - 1 for i in range(index + 1, len(items))}
+    items.remove(index)
+    animation.reindex(effect.id_data, path, places)
+
+
+def _move(effect, collection: str, index: int, to: int) -> None:
+    items, path = getattr(effect, collection), f"{effect.path_from_id()}.{collection}"
+    order = list(range(len(items)))
+    order.insert(to, order.pop(index))
+    items.move(index, to)
+    animation.reindex(effect.id_data, path, {old: new for new, old in enumerate(order)})

@@ -1,0 +1,424 @@
+"""Operators: what the user can do, as thin calls of plain functions."""
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.types import Operator
+from bpy_extras.io_utils import ExportHelper, ImportHelper
+
+from ..core import presets, recipe
+from . import editing, effects, icons, strips
+from .pictures import FAULTS
+from .properties import KINDS
+
+UNDOABLE = {"REGISTER", "UNDO"}
+
+
+def refused(cls, sentence: str) -> bool:
+    """For poll(): greys the operator out, and says why."""
+    cls.poll_message_set(sentence)
+    return False
+
+
+def redraw(context) -> None:
+    """Sequencer and properties show the effect's data, of whose changes Blender does not know."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in {"SEQUENCE_EDITOR", "PROPERTIES", "DOPESHEET_EDITOR", "GRAPH_EDITOR"}:
+                area.tag_redraw()
+
+
+class _OfEffect:
+    """Works on the effect of the active strip."""
+
+    bl_options = UNDOABLE
+
+    @classmethod
+    def poll(cls, context):
+        found = strips.active(context)
+        if found is None:
+            return refused(cls, "Select a Shutter strip, or its source strip")
+        if not found[0].is_editable:
+            return refused(cls, "The edit is linked from another file")
+        return cls.possible(found[1])
+
+    @classmethod
+    def possible(cls, effect):
+        return True
+
+    def execute(self, context):
+        result = self.change(context, strips.active(context)[1])
+        redraw(context)
+        return result or {"FINISHED"}
+
+
+class _OfShutter(_OfEffect):
+    """Works on the active shutter."""
+
+    @classmethod
+    def possible(cls, effect):
+        return editing.active_shutter(effect) is not None or refused(cls, "The effect has no shutter: add one")
+
+
+class _OfRegion(_OfEffect):
+    """Works on the active region."""
+
+    @classmethod
+    def possible(cls, effect):
+        return editing.active_region(effect) is not None or refused(cls, "The shutter has no region: draw one")
+
+
+class SHUTTER_OT_add_effect(Operator):
+    """Add a Shutter strip above the active strip: every pixel gets an exposure of its own"""
+
+    bl_idname = "shutter.add_effect"
+    bl_label = "Add Shutter"
+    bl_options = UNDOABLE
+
+    @classmethod
+    def poll(cls, context):
+        edit, source = strips.edit_of(context), strips.active_strip(context)
+        if edit is None or source is None:
+            return refused(cls, "Select a movie, image or clip strip")
+        if not edit.is_editable:
+            return refused(cls, "The edit is linked from another file")
+        if source.type not in strips.SOURCES:
+            return refused(cls, "The active strip is no movie, image or clip strip")
+        return True
+
+    def execute(self, context):
+        edit, source = strips.edit_of(context), strips.active_strip(context)
+        try:
+            strip, effect = strips.add_effect(edit, source)
+        except FAULTS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        editing.start(effect)
+        strips.choose(edit, strip)
+        redraw(context)
+        return {"FINISHED"}
+
+
+class SHUTTER_OT_shutter_add(_OfEffect, Operator):
+    """Add a shutter"""
+
+    bl_idname = "shutter.shutter_add"
+    bl_label = "Add Shutter"
+
+    def change(self, _context, effect):
+        editing.add_shutter(effect)
+
+
+class SHUTTER_OT_shutter_duplicate(_OfShutter, Operator):
+    """Add a copy of the active shutter, with its keys"""
+
+    bl_idname = "shutter.shutter_duplicate"
+    bl_label = "Duplicate Shutter"
+
+    def change(self, _context, effect):
+        editing.duplicate_shutter(effect, effect.active_shutter)
+
+
+class SHUTTER_OT_shutter_remove(_OfShutter, Operator):
+    """Remove the active shutter and its regions"""
+
+    bl_idname = "shutter.shutter_remove"
+    bl_label = "Remove Shutter"
+
+    @classmethod
+    def possible(cls, effect):
+        if len(effect.shutters) == 1:
+            return refused(cls, "An effect needs a shutter: this is its last one")
+        return super().possible(effect)
+
+    def change(self, _context, effect):
+        editing.remove_shutter(effect, effect.active_shutter)
+
+
+class _Move:
+    direction: EnumProperty(name="Direction", items=(("UP", "Up", ""), ("DOWN", "Down", "")))
+
+    def target(self, index: int, count: int) -> int:
+        return min(max(index + (1 if self.direction == "DOWN" else -1), 0), count - 1)
+
+
+class SHUTTER_OT_shutter_move(_Move, _OfShutter, Operator):
+    """Move the active shutter in the list. The first one holds wherever nothing is scribbled"""
+
+    bl_idname = "shutter.shutter_move"
+    bl_label = "Move Shutter"
+
+    def change(self, _context, effect):
+        index = effect.active_shutter
+        editing.move_shutter(effect, index, self.target(index, len(effect.shutters)))
+
+
+_preset_items = []
+
+
+def _presets(_self, _context):
+    """With icons, which exist only once the extension is registered; Blender needs the list kept."""
+    _preset_items[:] = [
+        (name, label, f"Give the active shutter these bars: {label}", icons.of(name), i)
+        for i, (name, (label, _make, _defaults)) in enumerate(presets.PRESETS.items())
+    ]
+    return _preset_items
+
+
+class SHUTTER_OT_preset(_OfShutter, Operator):
+    """Give the active shutter the bars of a preset"""
+
+    bl_idname = "shutter.preset"
+    bl_label = "Shutter Preset"
+
+    preset: EnumProperty(name="Preset", items=_presets)
+
+    def change(self, context, effect):
+        values = presets.bars(self.preset, effect.window)
+        editing.paint(effect, effect.active_shutter, values, auto_key(context))
+
+
+def auto_key(context) -> bool:
+    """Whether Blender's auto keying is on."""
+    return context.scene.tool_settings.use_keyframe_insert_auto
+
+
+class SHUTTER_OT_bars_key(_OfShutter, Operator):
+    """Insert a key on all bars of the active shutter"""
+
+    bl_idname = "shutter.bars_key"
+    bl_label = "Key Bars"
+
+    def change(self, _context, effect):
+        editing.key_bars(effect, effect.active_shutter)
+
+
+class SHUTTER_OT_bars_unkey(_OfShutter, Operator):
+    """Delete the keys of the active shutter's bars at the current frame"""
+
+    bl_idname = "shutter.bars_unkey"
+    bl_label = "Delete Keys of Bars"
+
+    def change(self, _context, effect):
+        if not editing.unkey_bars(effect, effect.active_shutter):
+            self.report({"WARNING"}, "No bar has a key at this frame")
+            return {"CANCELLED"}
+        return None
+
+
+class SHUTTER_OT_bar_set(_OfShutter, Operator):
+    """Type the weight of a bar"""
+
+    bl_idname = "shutter.bar_set"
+    bl_label = "Bar"
+
+    bar: IntProperty(name="Bar", description="Which bar, from 1", default=1, min=1)
+    weight: FloatProperty(name="Weight", description="How much this frame contributes", min=0.0, soft_max=1.0)
+
+    def invoke(self, context, event):
+        from .bar_editor import bar_under
+
+        effect = strips.active(context)[1]
+        place = bar_under(context, event.mouse_region_x, event.mouse_region_y)
+        if place is not None:
+            self.bar = place + 1
+        bars = editing.bars_now(effect, effect.active_shutter)
+        self.weight = bars[min(self.bar, len(bars)) - 1]
+        return context.window_manager.invoke_props_dialog(self, width=200, title=f"Bar {self.bar}")
+
+    def draw(self, _context):
+        self.layout.activate_init = True
+        self.layout.prop(self, "weight")
+
+    def change(self, context, effect):
+        values = editing.bars_now(effect, effect.active_shutter)
+        if self.bar > len(values):
+            self.report({"ERROR"}, f"The shutter has {len(values)} bars")
+            return {"CANCELLED"}
+        values[self.bar - 1] = self.weight
+        editing.paint(effect, effect.active_shutter, values, auto_key(context))
+        return None
+
+
+class SHUTTER_OT_draw(_OfShutter, Operator):
+    """Scribble in the preview where the active shutter holds. Drawn at another frame, a scribble is redrawn there"""
+
+    bl_idname = "shutter.draw"
+    bl_label = "Draw"
+
+    new: BoolProperty(name="New Region", description="Draw a region of its own, not one more stroke of the active one")
+    kind: EnumProperty(name="Kind", items=KINDS)
+
+    def change(self, context, effect):
+        region = editing.active_region(effect)
+        if self.new or region is None:
+            region = editing.add_region(effect, editing.active_shutter(effect), self.kind)
+        if not drawing_tool(context, effect, region, "builtin.annotate"):
+            self.report({"INFO"}, "Open a sequencer with a preview to draw")
+
+
+class SHUTTER_OT_erase(_OfRegion, Operator):
+    """Erase strokes of the active region in the preview"""
+
+    bl_idname = "shutter.erase"
+    bl_label = "Erase"
+
+    def change(self, context, effect):
+        if not drawing_tool(context, effect, editing.active_region(effect), "builtin.annotate_eraser"):
+            self.report({"INFO"}, "Open a sequencer with a preview to erase")
+
+
+def drawing_tool(context, effect, region, tool: str) -> bool:
+    """Makes the region's layer the active annotation of every preview, and the tool theirs; whether there is one."""
+    layer = editing.layer_of(effect, region)
+    if layer is None:
+        layer = editing.new_layer(effect, region)
+    annotation = effect.scene.annotation
+    annotation.layers.active_index = next(i for i, other in enumerate(annotation.layers) if other == layer)
+    found = False
+    for window, area in strips.previews(context):
+        area.spaces.active.annotation = annotation
+        area.spaces.active.preview_overlay.show_annotation = True
+        with context.temp_override(window=window, area=area, region=strips.preview_region(area)):
+            bpy.ops.wm.tool_set_by_id(name=tool, space_type="SEQUENCE_EDITOR")
+        found = True
+    return found
+
+
+_layer_items = []
+
+
+def _layers(_self, context):
+    found = strips.active(context)
+    layers = editing.free_layers(found[1], annotation_of(context)) if found else []
+    _layer_items[:] = [(layer.info, layer.info, "") for layer in layers]
+    return _layer_items
+
+
+def annotation_of(context):
+    """The annotation that the first preview shows."""
+    return next((area.spaces.active.annotation for _window, area in strips.previews(context)), None)
+
+
+class SHUTTER_OT_region_take(_OfShutter, Operator):
+    """Make an existing annotation layer a region of the active shutter"""
+
+    bl_idname = "shutter.region_take"
+    bl_label = "From Annotation Layer"
+
+    layer: EnumProperty(name="Layer", items=_layers)
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if not editing.free_layers(strips.active(context)[1], annotation_of(context)):
+            return refused(cls, "The preview shows no annotation layer that is not a region yet")
+        return True
+
+    def change(self, context, effect):
+        layer = annotation_of(context).layers[self.layer]
+        editing.take_layer(effect, editing.active_shutter(effect), layer)
+
+
+class SHUTTER_OT_region_remove(_OfRegion, Operator):
+    """Remove the active region and its strokes"""
+
+    bl_idname = "shutter.region_remove"
+    bl_label = "Remove Region"
+
+    def change(self, _context, effect):
+        editing.remove_region(effect, effect.active_region)
+
+
+class SHUTTER_OT_region_move(_Move, _OfRegion, Operator):
+    """Move the active region in the list. Later ones lie over earlier ones"""
+
+    bl_idname = "shutter.region_move"
+    bl_label = "Move Region"
+
+    def change(self, _context, effect):
+        index = effect.active_region
+        editing.move_region(effect, index, self.target(index, len(effect.regions)))
+
+
+class SHUTTER_OT_region_key(_OfRegion, Operator):
+    """Insert keys on location, rotation and scale of the active region"""
+
+    bl_idname = "shutter.region_key"
+    bl_label = "Key Region"
+
+    def change(self, _context, effect):
+        editing.key_region(effect, effect.active_region)
+
+
+class SHUTTER_OT_recipe_import(_OfEffect, ImportHelper, Operator):
+    """Replace the effect by a recipe: shutters, scribbles, keys and options"""
+
+    bl_idname = "shutter.recipe_import"
+    bl_label = "Import Recipe"
+    filename_ext = ".json"
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def change(self, context, effect):
+        edit, _effect, strip = strips.active(context)
+        try:
+            loaded = recipe.load(self.filepath)
+        except recipe.RecipeError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        effects.apply(edit, effect, strip, loaded)
+        return None
+
+
+class SHUTTER_OT_recipe_export(_OfEffect, ExportHelper, Operator):
+    """Write the effect to a recipe: shutters, scribbles, keys and options"""
+
+    bl_idname = "shutter.recipe_export"
+    bl_label = "Export Recipe"
+    bl_options = {"REGISTER"}
+    filename_ext = ".json"
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def change(self, context, effect):
+        edit, _effect, strip = strips.active(context)
+        try:
+            recipe.save(effects.export(edit, effect, strip), self.filepath)
+        except (recipe.RecipeError, effects.EffectError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        except OSError as error:
+            self.report({"ERROR"}, f"{self.filepath}: {error.strerror or error}")
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"Wrote {self.filepath}")
+        return None
+
+
+classes = (
+    SHUTTER_OT_add_effect,
+    SHUTTER_OT_shutter_add,
+    SHUTTER_OT_shutter_duplicate,
+    SHUTTER_OT_shutter_remove,
+    SHUTTER_OT_shutter_move,
+    SHUTTER_OT_preset,
+    SHUTTER_OT_bars_key,
+    SHUTTER_OT_bars_unkey,
+    SHUTTER_OT_bar_set,
+    SHUTTER_OT_draw,
+    SHUTTER_OT_erase,
+    SHUTTER_OT_region_take,
+    SHUTTER_OT_region_remove,
+    SHUTTER_OT_region_move,
+    SHUTTER_OT_region_key,
+    SHUTTER_OT_recipe_import,
+    SHUTTER_OT_recipe_export,
+)
+
+
+def register():
+    for cls in classes:
+        bpy.utils.register_class(cls)
+
+
+def unregister():
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,282 @@
+"""Panels, lists and menus: in the Properties editor's Strip tab, and as a tab in the sequencer's sidebar."""
+
+import bpy
+from bpy.types import Menu, Panel, UIList
+
+from ..core import presets, shutters
+from . import editing, icons, strips
+
+# Beyond this a column of numbers helps nobody: the bar editor and the Graph Editor do.
+_MOST_NUMBERS = 64
+
+
+class SHUTTER_UL_shutters(UIList):
+    def draw_item(self, _context, layout, effect, shutter, _icon, _active, _property, index):
+        row = layout.row(align=True)
+        color = row.row(align=True)
+        color.ui_units_x = 1.0
+        color.prop(shutter, "color", text="")
+        row.prop(shutter, "name", text="", emboss=False)
+        if index == 0:
+            hint = row.row()
+            hint.active = False
+            hint.label(text="default")
+
+
+class SHUTTER_UL_regions(UIList):
+    def draw_item(self, _context, layout, effect, region, _icon, _active, _property, _index):
+        row = layout.row(align=True)
+        row.prop(region, "kind", text="", icon_only=True, emboss=False)
+        row.prop(region, "name", text="", emboss=False)
+        layer = editing.layer_of(effect, region)
+        if layer is None or not any(drawing.strokes for drawing in layer.frames):
+            row.label(text="", icon="ERROR")
+        if layer is not None:
+            row.prop(layer, "annotation_hide", text="", emboss=False)
+
+    def filter_items(self, _context, effect, _property):
+        """Those of the active shutter."""
+        shutter = editing.active_shutter(effect)
+        own = [bool(shutter) and region.shutter == shutter.name for region in effect.regions]
+        return [self.bitflag_filter_item if is_own else 0 for is_own in own], []
+
+
+class SHUTTER_MT_presets(Menu):
+    bl_label = "Presets"
+
+    def draw(self, _context):
+        for name, (label, _make, _defaults) in presets.PRESETS.items():
+            self.layout.operator("shutter.preset", text=label, icon_value=icons.of(name)).preset = name
+
+
+class SHUTTER_MT_shutters(Menu):
+    bl_label = "Shutter Specials"
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.operator("shutter.shutter_duplicate", icon="DUPLICATE")
+        layout.separator()
+        layout.operator("shutter.recipe_import", icon="IMPORT")
+        layout.operator("shutter.recipe_export", icon="EXPORT")
+
+
+def _list_buttons(layout, kind: str, menu: str | None = None):
+    column = layout.column(align=True)
+    column.operator(f"shutter.{kind}_add" if kind == "shutter" else "shutter.draw", text="", icon="ADD")
+    column.operator(f"shutter.{kind}_remove", text="", icon="REMOVE")
+    if menu:
+        column.menu(menu, text="", icon="DOWNARROW_HLT")
+    column.separator()
+    column.operator(f"shutter.{kind}_move", text="", icon="TRIA_UP").direction = "UP"
+    column.operator(f"shutter.{kind}_move", text="", icon="TRIA_DOWN").direction = "DOWN"
+    return column
+
+
+class _Shutters:
+    bl_label = "Shutter"
+
+    def draw(self, context):
+        layout = self.layout
+        found = strips.active(context)
+        if found is None:
+            layout.operator("shutter.add_effect", icon="ADD")
+            return
+        effect = found[1]
+        _draw_live(layout, context)
+        row = layout.row()
+        row.template_list("SHUTTER_UL_shutters", "", effect, "shutters", effect, "active_shutter", rows=4)
+        _list_buttons(row, "shutter", "SHUTTER_MT_shutters")
+        shutter = editing.active_shutter(effect)
+        if shutter is None:
+            return
+        row = layout.row(align=True)
+        row.menu("SHUTTER_MT_presets", icon="PRESET")
+        row.operator("shutter.bars_key", text="", icon="KEY_HLT")
+        row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
+        layout.use_property_split = True
+        layout.prop(effect, "window")
+        values = editing.bars(shutter)
+        if not values.any():
+            layout.label(text="All bars are zero: the shutter never opens", icon="ERROR")
+        else:
+            info = layout.row()
+            info.active = False
+            info.label(text=f"{shutters.open_angle(values):.0f}°, {shutters.exposure(values):.3g} frames of light")
+
+
+def _draw_live(layout, context):
+    live = getattr(context.window_manager, "virtual_shutter", None)
+    if live is None:
+        return
+    row = layout.row(align=True)
+    row.prop(live, "live", toggle=True, icon="HIDE_OFF" if live.live else "HIDE_ON")
+    view = row.row(align=True)
+    view.active = live.live
+    view.prop(live, "view", text="")
+
+
+class _WithEffect:
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and strips.active(context) is not None
+
+
+class _Regions(_WithEffect):
+    bl_label = "Regions"
+
+    def draw(self, context):
+        layout = self.layout
+        effect = strips.active(context)[1]
+        row = layout.row()
+        row.template_list("SHUTTER_UL_regions", "", effect, "regions", effect, "active_region", rows=3)
+        _list_buttons(row, "region")
+        row = layout.row(align=True)
+        row.operator("shutter.draw", icon="GREASEPENCIL")
+        row.operator("shutter.erase", text="", icon="META_DATA")
+        new = row.operator("shutter.draw", text="", icon="ADD")
+        new.new = True
+        row.operator_menu_enum("shutter.region_take", "layer", text="", icon="DOWNARROW_HLT")
+        region = editing.active_region(effect)
+        if region is None:
+            return
+        layout.use_property_split = True
+        layout.prop_search(region, "shutter", effect, "shutters")
+        layout.prop(region, "kind")
+        if region.kind == "LINE":
+            layout.prop(region, "width")
+        column = layout.column(align=True)
+        column.prop(region, "location")
+        column.prop(region, "rotation")
+        column.prop(region, "scale")
+        layout.operator("shutter.region_key", icon="KEY_HLT")
+
+
+class _Bars(_WithEffect):
+    bl_label = "Bars"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        effect = strips.active(context)[1]
+        shutter = editing.active_shutter(effect)
+        if shutter is None:
+            return
+        layout = self.layout
+        layout.use_property_split = True
+        column = layout.column(align=True)
+        for k, bar in enumerate(shutter.bars[:_MOST_NUMBERS]):
+            column.prop(bar, "weight", text=f"Frame {k + 1}", slider=True)
+        if len(shutter.bars) > _MOST_NUMBERS:
+            column.label(text=f"and {len(shutter.bars) - _MOST_NUMBERS} more, in the bar editor")
+
+
+class _Options(_WithEffect):
+    bl_label = "Options"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        effect = strips.active(context)[1]
+        layout.use_property_split = True
+        for name in ("position", "interpolation", "light", "exposure", "edges", "aggregate", "border"):
+            layout.prop(effect, name)
+
+
+class _InProperties:
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "strip"
+
+    @classmethod
+    def poll(cls, context):
+        strip = strips.active_strip(context)
+        return strip is not None and (strip.type in strips.SOURCES or strips.active(context) is not None)
+
+
+class _InSidebar:
+    bl_space_type = "SEQUENCE_EDITOR"
+    bl_region_type = "UI"
+    bl_category = "Shutter"
+
+    @classmethod
+    def poll(cls, context):
+        return strips.active_strip(context) is not None
+
+
+class STRIP_PT_shutter(_Shutters, _InProperties, Panel):
+    pass
+
+
+class STRIP_PT_shutter_regions(_Regions, _InProperties, Panel):
+    bl_parent_id = "STRIP_PT_shutter"
+
+
+class STRIP_PT_shutter_bars(_Bars, _InProperties, Panel):
+    bl_parent_id = "STRIP_PT_shutter"
+
+
+class STRIP_PT_shutter_options(_Options, _InProperties, Panel):
+    bl_parent_id = "STRIP_PT_shutter"
+
+
+class SEQUENCER_PT_shutter(_Shutters, _InSidebar, Panel):
+    pass
+
+
+class SEQUENCER_PT_shutter_regions(_Regions, _InSidebar, Panel):
+    bl_parent_id = "SEQUENCER_PT_shutter"
+
+
+class SEQUENCER_PT_shutter_bars(_Bars, _InSidebar, Panel):
+    bl_parent_id = "SEQUENCER_PT_shutter"
+
+
+class SEQUENCER_PT_shutter_options(_Options, _InSidebar, Panel):
+    bl_parent_id = "SEQUENCER_PT_shutter"
+
+
+def _add_entry(self, _context):
+    self.layout.separator()
+    self.layout.operator("shutter.add_effect", text="Shutter")
+
+
+def _strip_entry(self, context):
+    strip = strips.active_strip(context)
+    if strip is not None and strip.type in strips.SOURCES:
+        self.layout.separator()
+        self.layout.operator("shutter.add_effect")
+
+
+MENUS = {
+    "SEQUENCER_MT_add_effect": _add_entry,
+    "SEQUENCER_MT_strip": _strip_entry,
+    "SEQUENCER_MT_context_menu": _strip_entry,
+}
+
+classes = (
+    SHUTTER_UL_shutters,
+    SHUTTER_UL_regions,
+    SHUTTER_MT_presets,
+    SHUTTER_MT_shutters,
+    STRIP_PT_shutter,
+    STRIP_PT_shutter_regions,
+    STRIP_PT_shutter_bars,
+    STRIP_PT_shutter_options,
+    SEQUENCER_PT_shutter,
+    SEQUENCER_PT_shutter_regions,
+    SEQUENCER_PT_shutter_bars,
+    SEQUENCER_PT_shutter_options,
+)
+
+
+def register():
+    for cls in classes:
+        bpy.utils.register_class(cls)
+    for menu, entry in MENUS.items():
+        getattr(bpy.types, menu).append(entry)
+
+
+def unregister():
+    for menu, entry in MENUS.items():
+        getattr(bpy.types, menu).remove(entry)
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

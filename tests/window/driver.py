@@ -1,0 +1,123 @@
+"""Drives a Blender window as a person does: mouse and keys by xdotool, a picture of the screen, steps with redraws.
+
+A story is a generator function, run inside Blender; each `yield` lets Blender handle events and redraw.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import traceback
+from pathlib import Path
+
+import bpy
+
+OUT = Path(os.environ.get("SHUTTER_PICTURES", "/tmp/shutter-window"))
+STEP = 0.25  # seconds that Blender gets for events and redraws
+_seen = []
+
+
+def enable():
+    """Enables the extension, linked into the user folder that the caller made."""
+    import addon_utils
+
+    module = addon_utils.enable("bl_ext.user_default.virtual_shutter", default_set=True)
+    assert module, "the extension could not be enabled"
+
+
+def play(story, seconds=STEP):
+    """Runs a story step by step; quits Blender with its end or its first failure."""
+    OUT.mkdir(parents=True, exist_ok=True)
+    steps = story()
+
+    def step():
+        try:
+            wait = next(steps)
+        except StopIteration:
+            _finish("")
+            return None
+        except BaseException:
+            shot("failure")
+            _finish(traceback.format_exc())
+            return None
+        return wait or seconds
+
+    bpy.app.timers.register(step, first_interval=1.0, persistent=True)
+
+
+def _finish(fault):
+    sys.stdout.flush()
+    (OUT / "result.json").write_text(json.dumps({"fault": fault, "seen": _seen}, indent=1))
+    if fault:
+        print(fault, file=sys.stderr, flush=True)
+    os._exit(1 if fault else 0)
+
+
+def saw(**facts):
+    """Notes facts for the report."""
+    _seen.append(facts)
+    print(facts, flush=True)
+
+
+def shot(name):
+    """A picture of the screen."""
+    path = OUT / f"{name}.png"
+    subprocess.run(["import", "-window", "root", str(path)], check=True)
+    return path
+
+
+def xdotool(*arguments):
+    subprocess.run(["xdotool", *map(str, arguments)], check=True)
+
+
+def area_of(kind, view=None):
+    """The first area of a kind; view: of a sequencer, its view type."""
+    for area in bpy.context.window_manager.windows[0].screen.areas:
+        if area.type == kind and (view is None or area.spaces.active.view_type == view):
+            return area
+    raise LookupError(f"no {kind} {view or ''}")
+
+
+def region_of(area, kind="WINDOW"):
+    return next(region for region in area.regions if region.type == kind)
+
+
+def screen(region, x, y):
+    """Screen coordinates, top row 0, of a point in a region, whose rows go up."""
+    height = bpy.context.window_manager.windows[0].height
+    return round(region.x + x), round(height - 1 - region.y - y)
+
+
+def move(region, x, y):
+    xdotool("mousemove", *screen(region, x, y))
+
+
+def click(region, x, y, repeat=1):
+    move(region, x, y)
+    xdotool("click", "--repeat", repeat, "--delay", 60, 1)
+
+
+def drag(region, points, hold=()):
+    """Presses at the first point, goes through the others, releases at the last; generator: yield from it."""
+    move(region, *points[0])
+    yield
+    for key in hold:
+        xdotool("keydown", key)
+    xdotool("mousedown", 1)
+    yield
+    for point in points[1:]:
+        move(region, *point)
+        yield 0.08
+    yield
+    xdotool("mouseup", 1)
+    for key in hold:
+        xdotool("keyup", key)
+    yield
+
+
+def key(*names):
+    xdotool("key", *names)
+
+
+def text(words):
+    xdotool("type", "--delay", 40, words)
