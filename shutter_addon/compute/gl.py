@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import ctypes
 import sys
 from contextlib import contextmanager
+from functools import cache
 
 import moderngl
 import numpy as np
 
 from .errors import NoDeviceError
 from .passes import LOCAL_SIZE, Pass, source
+
+_EGL = sys.platform == "linux"
 
 # Format (as in GLSL): components, moderngl's type, NumPy's type of what is written and read.
 FORMATS = {
@@ -22,24 +26,51 @@ FORMATS = {
 }
 
 
+@contextmanager
+def _kept_context():
+    """Leaves the thread's current context as it was: on EGL moderngl leaves none, and Blender would draw into it."""
+    if not _EGL:
+        yield
+        return
+    egl = _egl()
+    draw, read = (egl.eglGetCurrentSurface(end) for end in (0x3059, 0x305A))
+    display, context = egl.eglGetCurrentDisplay(), egl.eglGetCurrentContext()
+    try:
+        yield
+    finally:
+        if context:
+            egl.eglMakeCurrent(display, draw, read, context)
+
+
+@cache
+def _egl():
+    egl = ctypes.CDLL("libEGL.so.1")
+    for name in ("eglGetCurrentDisplay", "eglGetCurrentContext", "eglGetCurrentSurface"):
+        getattr(egl, name).restype = ctypes.c_void_p
+    egl.eglMakeCurrent.argtypes = [ctypes.c_void_p] * 4
+    return egl
+
+
 class GLDevice:
     """Textures and compute passes. Calls belong inside `with device.current():`, on whatever thread renders."""
 
     def __init__(self):
-        backend = {"backend": "egl"} if sys.platform == "linux" else {}
+        backend = {"backend": "egl"} if _EGL else {}
         try:
-            self._context = moderngl.create_context(standalone=True, require=430, **backend)
+            with _kept_context():
+                self._context = moderngl.create_context(standalone=True, require=430, **backend)
+                info = self._context.info
         except Exception as error:  # moderngl raises whatever its platform raises
             raise NoDeviceError(f"no OpenGL 4.3: {error}") from None
         self._programs = {}
-        self.name = self._context.info["GL_RENDERER"]
-        self.max_layers = self._context.info["GL_MAX_ARRAY_TEXTURE_LAYERS"]
-        self.max_size = self._context.info["GL_MAX_TEXTURE_SIZE"]
+        self.name = info["GL_RENDERER"]
+        self.max_layers = info["GL_MAX_ARRAY_TEXTURE_LAYERS"]
+        self.max_size = info["GL_MAX_TEXTURE_SIZE"]
 
     @contextmanager
     def current(self):
         """Makes the context current on this thread, and the previous one afterwards (Blender's, in a window)."""
-        with self._context:
+        with _kept_context(), self._context:
             yield self
 
     def texture(self, width: int, height: int, layers: int, kind: str) -> moderngl.TextureArray:
@@ -54,8 +85,11 @@ class GLDevice:
         texture.extra = kind
         return texture
 
-    def write(self, texture, array: np.ndarray, layer: int = 0) -> None:
-        """Fills a layer, or its first rows, from a C-contiguous array (rows, width[, 4]) of the format's type."""
+    def write(self, texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
+        """Fills a layer, or its first rows, from a C-contiguous array (rows, width[, 4]) of the format's type.
+
+        opaque: the array's alpha is full everywhere, so that a device may save itself sending it.
+        """
         height, width = array.shape[:2]
         texture.write(array, viewport=(0, 0, layer, width, height, 1), alignment=1)
 

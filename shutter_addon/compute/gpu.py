@@ -28,7 +28,6 @@ _CONSTANTS = {"size": "ivec2"} | dict.fromkeys(
         "height",
         "aggregate",
         "rows",
-        "first",
         "origin",
         "direction",
         "count",
@@ -44,12 +43,13 @@ _CONSTANTS = {"size": "ivec2"} | dict.fromkeys(
 def _composition(options: Options, groups: int, stored: str, premultiplied: bool) -> Pass:
     """The pass for shutters in so many groups of four, and frames stored as "srgb" or "linear"."""
     summed = "srgb" if options.light == "encoded" else "linear"
+    constants = _CONSTANTS if options.interpolation == "displacement" else _CONSTANTS | {"first": "int"}
     decode = 0 if stored == summed else 1 if summed == "linear" else 2
     return Pass(
         f"compose_{options.interpolation}",
         samplers=_SAMPLERS,
         images={"picture": Image("rgba32f")},
-        constants=_CONSTANTS,
+        constants=constants,
         defines={
             "GROUPS": groups,
             "EDGES": _EDGES[options.edges],
@@ -65,6 +65,7 @@ class Window:
 
     Source frame i lies in layer i mod capacity. Bands of rows, each a texture array of its own below BAND_BYTES; where
     the device has no room for all of them, the frames stay on the host and every picture sends them band by band.
+    `picture` is what is composed of them.
     """
 
     def __init__(self, device, source, capacity: int):
@@ -89,6 +90,7 @@ class Window:
             self._free_textures()
             self._host = {}
             self._textures = [device.texture(source.width, rows, capacity, self._kind)]
+        self.picture = device.texture(source.width, source.height, 1, "rgba32f")
 
     def load(self, wanted) -> None:
         """Reads what is missing of the source frames `wanted`, which lie within `capacity` of one another."""
@@ -110,7 +112,7 @@ class Window:
                 yield top, height, self._textures[band]
                 continue
             for layer, frame in self._host.items():
-                self._device.write(self._textures[0], frame[top : top + height], layer)
+                self._send(self._textures[0], frame[top : top + height], layer)
             yield top, height, self._textures[0]
 
     def _read(self, index: int) -> np.ndarray:
@@ -123,7 +125,10 @@ class Window:
 
     def _write(self, frame: np.ndarray, layer: int) -> None:
         for texture, top, height in zip(self._textures, self._tops, self._heights, strict=True):
-            self._device.write(texture, frame[top : top + height], layer)
+            self._send(texture, frame[top : top + height], layer)
+
+    def _send(self, texture, rows: np.ndarray, layer: int) -> None:
+        self._device.write(texture, rows, layer, opaque=self.source.alpha == "opaque")
 
     def _free_textures(self) -> None:
         for texture in self._textures:
@@ -132,6 +137,7 @@ class Window:
 
     def release(self) -> None:
         self._free_textures()
+        self.picture.release()
         self._held, self._host = {}, None
 
 
@@ -164,7 +170,12 @@ class GPUCompositor:
         return np.moveaxis(values, -1, 1).reshape(-1, *values.shape[1:3])[:count]
 
     def compose(self, window: Window, index: int, direction: int, instant: Instant, handle, block: int) -> np.ndarray:
-        """The picture (H, W, 4) float32, scene-linear and premultiplied, top row first.
+        """The picture (H, W, 4) float32, scene-linear and premultiplied, top row first; arguments as for `draw`."""
+        return self._device.read(self.draw(window, index, direction, instant, handle, block))[0, ::-1]
+
+    def draw(self, window: Window, index: int, direction: int, instant: Instant, handle, block: int):
+        """The picture on the device, the window's until it is drawn into again: a texture array rgba32f of one layer,
+        scene-linear and premultiplied, bottom row first.
 
         index, direction: as for core.compositor.window_indices; what is needed of the window is loaded.
         handle: coefficients, of which `block` × `block` pixels share one.
@@ -172,7 +183,6 @@ class GPUCompositor:
         source, options = window.source, instant.options
         values = table(instant)
         textures = {"table": self._filled("table", values[None], "rgba32f"), "coefficients": handle}
-        picture = self._texture("picture", source.width, source.height, 1, "rgba32f")
         groups = -(-len(instant.bars) // 4)
         program = _composition(options, groups, window.transfer, source.alpha == "premultiplied")
         indices = compositor.window_indices(options, index, source.count, direction)
@@ -182,7 +192,7 @@ class GPUCompositor:
                 program,
                 (source.width, height),
                 textures=textures | {"frames": frames},
-                images={"picture": picture},
+                images={"picture": window.picture},
                 size=(source.width, height),
                 top=top,
                 height=source.height,
@@ -196,7 +206,7 @@ class GPUCompositor:
                 lowest=lowest,
                 lowest_layer=lowest % window.capacity,
             )
-        return self._device.read(picture)[0, ::-1]
+        return window.picture
 
     def _texture(self, name: str, width: int, height: int, layers: int, kind: str):
         texture = self._textures.get(name)

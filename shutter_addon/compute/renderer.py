@@ -34,7 +34,7 @@ class Renderer:
         self.compositor, self.source = compositor, source
         self._solver = compositor.solver()
         self._window = None
-        self._solved = None
+        self._labelled = self._solved = None
 
     def picture(self, index: int, instant: Instant, direction: int = 1) -> np.ndarray:
         """The picture (H, W, 4) float32 at source frame `index`: scene-linear, premultiplied, top row first.
@@ -42,52 +42,85 @@ class Renderer:
         direction: −1 where the source plays in reverse, and the window's next frames are those before `index`.
         """
         with self.compositor.current():
-            handle, instant, block = self._coefficients(instant)
-            window = self._window_for(instant.options.window)
-            window.load(self._needed(index, direction, instant))
-            return self.compositor.compose(window, index, direction, instant, handle, block)
+            return self.compositor.compose(*self._parts(index, instant, direction))
+
+    def draw(self, index: int, instant: Instant, direction: int = 1):
+        """The same on the device, which must be a GPU: a texture array rgba32f of one layer, bottom row first.
+
+        It stays until the next one of this renderer.
+        """
+        with self.compositor.current():
+            return self.compositor.draw(*self._parts(index, instant, direction))
 
     def coefficients(self, instant: Instant) -> np.ndarray:
         """Coefficients (N, h, w) float32 at an instant, one per pixel or per block that shares a shutter."""
         count, (width, height) = len(instant.bars), self._grid(instant)
         with self.compositor.current():
-            labels = self._labels(instant)
+            labels = self.labels(instant)
             if (values := _uniform(labels, count)) is not None:
                 return np.broadcast_to(values.astype(np.float32)[:, None, None], (count, height, width))
             return self.compositor.coefficients(self._diffused(labels, count), count)
+
+    def drawn_coefficients(self, instant: Instant):
+        """Coefficients on the device, which must be a GPU: (texture array rgba32f of four shutters a layer, top row
+        first; the pixels along each side of a texel; the number of shutters).
+
+        The texture is one texel where they are the same everywhere. It stays until the next call of any method.
+        """
+        labels, count = self.labels(instant), len(instant.bars)
+        with self.compositor.current():
+            if (values := _uniform(labels, count)) is not None:
+                return self.compositor.constant(values), self._everywhere, count
+            return self._diffused(labels, count), instant.options.aggregate, count
+
+    def labels(self, instant: Instant) -> np.ndarray:
+        """Labels (h, w) uint16 of the pixels, or of the blocks that share a shutter: 0 free, 1 + shutter scribbled."""
+        strokes = [(s.shutter, s.kind, s.width, *(stroke.tobytes() for stroke in s.strokes)) for s in instant.shapes]
+        key = self._grid(instant), instant.options.border, strokes
+        if self._labelled is None or self._labelled[0] != key:
+            self._labelled = key, scribbles.rasterise(instant.shapes, *key[0], border=key[1])
+        return self._labelled[1]
+
+    def needed(self, index: int, direction: int, instant: Instant) -> set[int]:
+        """The source frames that some shutter exposes; all of the window, where a shutter may lose all of its own."""
+        indices = compositor.window_indices(instant.options, index, self.source.count, direction)
+        low, high = shutters.open_span(instant.bars)
+        needed = indices[low:high] if (indices[low:high] >= 0).all() else indices[indices >= 0]
+        return set(needed.tolist())
+
+    @property
+    def _everywhere(self) -> int:
+        """The block that holds the whole picture."""
+        return max(self.source.width, self.source.height)
 
     def _grid(self, instant: Instant) -> tuple[int, int]:
         block = instant.options.aggregate
         return -(-self.source.width // block), -(-self.source.height // block)
 
-    def _labels(self, instant: Instant) -> np.ndarray:
-        return scribbles.rasterise(instant.shapes, *self._grid(instant), border=instant.options.border)
+    def _parts(self, index: int, instant: Instant, direction: int):
+        """What the compositor needs, its window loaded."""
+        handle, instant, block = self._coefficients(instant)
+        window = self._window_for(instant.options.window)
+        window.load(self.needed(index, direction, instant))
+        return window, index, direction, instant, handle, block
 
     def _coefficients(self, instant: Instant):
         """The coefficients on the device, the instant to compose with them, and the block that shares one.
 
         Where one mix of shutters holds for the whole picture, that mix is the only shutter.
         """
-        labels = self._labels(instant)
+        labels = self.labels(instant)
         values = _uniform(labels, len(instant.bars))
         if values is None:
             return self._diffused(labels, len(instant.bars)), instant, instant.options.aggregate
         chosen = int(values.argmax())
-        everywhere = max(self.source.width, self.source.height)
-        return self.compositor.constant(np.ones(1)), instant.alone(chosen), everywhere
+        return self.compositor.constant(np.ones(1)), instant.alone(chosen), self._everywhere
 
     def _diffused(self, labels: np.ndarray, count: int):
         """Solves anew only when a scribble moved."""
         if self._solved is None or self._solved[0] != count or not np.array_equal(self._solved[1], labels):
             self._solved = count, labels, self._solver.solve(labels, count)
         return self._solved[2]
-
-    def _needed(self, index: int, direction: int, instant: Instant) -> set[int]:
-        """The source frames that some shutter exposes; all of the window, where a shutter may lose all of its own."""
-        indices = compositor.window_indices(instant.options, index, self.source.count, direction)
-        low, high = shutters.open_span(instant.bars)
-        needed = indices[low:high] if (indices[low:high] >= 0).all() else indices[indices >= 0]
-        return set(needed.tolist())
 
     def _window_for(self, length: int):
         if self._window is None or self._window.capacity != length:
@@ -111,8 +144,8 @@ class Renderer:
 
 def _uniform(labels: np.ndarray, count: int) -> np.ndarray | None:
     """Coefficients (N,) where they are the same everywhere: no scribble, or those of one shutter alone."""
-    present = np.unique(labels)
-    present = present[present != scribbles.FREE]
-    if len(present) > 1:
-        return None
-    return np.eye(count)[int(present[0]) - 1 if len(present) else 0]
+    highest = int(labels.max())
+    if highest == scribbles.FREE:
+        return np.eye(count)[0]
+    lowest = int((labels - np.uint16(1)).min())  # what is free wraps around to the top
+    return np.eye(count)[lowest] if lowest == highest - 1 else None
