@@ -1,65 +1,141 @@
-"""Pictures of effect scenes: one renderer each, all on one device, kept from frame to frame."""
+"""Pictures of effect scenes: renderers that keep their frames, on a device of Blender's own or one without a window."""
 
+import threading
+from dataclasses import dataclass
 from pathlib import Path
 
+import bpy
 import numpy as np
 import OpenImageIO
 
 from ..compute.errors import NoDeviceError
+from ..compute.gpu import GPUCompositor
 from ..compute.renderer import Renderer, open_compositor
+from ..core.recipe import Instant
 from ..media import MediaError
+from ..media.ahead import Ahead
 from ..media.exr import write_exr
 from . import effects, sources, strips, timing
+from .device import BlenderDevice
 
 FAULTS = (effects.EffectError, MediaError, NoDeviceError, MemoryError)
 
 device = "auto"
 weights_folder: Path | None = None
 
-_compositor = None
-_renderers: dict = {}
+# Renderers whose frames are kept: more effects than these in one frame decode their windows again for every frame.
+_KEPT = 4
 
 
-def picture(scene, scene_frame: float, say=print) -> np.ndarray:
+@dataclass(frozen=True)
+class Moment:
+    """All that a picture depends on; index, direction: as Renderer.picture has them."""
+
+    renderer: Renderer
+    index: int
+    instant: Instant
+    direction: int
+
+    def needed(self, ahead: int = 0) -> list[int]:
+        """Source frames that the picture needs, and those of the next `ahead` frames; the first needed first."""
+        frames = {}
+        for step in range(ahead + 1):
+            index = min(max(self.index + step * self.direction, 0), self.renderer.source.count - 1)
+            frames |= dict.fromkeys(sorted(self.renderer.needed(index, self.direction, self.instant)))
+        return list(frames)
+
+
+class Studio:
+    """A compositor, opened when it is first used, and the renderers of the effects that were shown last."""
+
+    def __init__(self, open_device):
+        self._open = open_device
+        self._compositor = None
+        self._renderers: dict = {}
+
+    def renderer(self, scene, source_strip, say, shrink: int) -> Renderer:
+        """The renderer of an effect scene; say: called with a sentence when the device is a lesser one. One of FAULTS:
+        no device, no source. shrink: pictures are that many times smaller."""
+        if self._compositor is None:
+            self._compositor, message = self._open()
+            if message:
+                say(message)
+        place, key = (scene.session_uid, shrink), sources.media_key(source_strip)
+        old_key, renderer = self._renderers.pop(place, (None, None))
+        if old_key != key:
+            if renderer is not None:
+                renderer.close()
+            renderer = Renderer(self._compositor, Ahead(sources.open_media(source_strip), shrink))
+        self._renderers[place] = key, renderer
+        while len(self._renderers) > _KEPT:
+            self._renderers.pop(next(iter(self._renderers)))[1].close()
+        return renderer
+
+    def forget(self) -> None:
+        """Closes all sources and frees the device."""
+        for _key, renderer in self._renderers.values():
+            renderer.close()
+        self._renderers.clear()
+        if self._compositor is not None:
+            self._compositor.release()
+            self._compositor = None
+
+
+# Blender's own GPU belongs to its main thread: renders on another one, and without a window, have a context apart.
+_apart = Studio(lambda: open_compositor(device))
+_window = Studio(lambda: _open_window())
+
+
+def _open_window():
+    try:
+        return GPUCompositor(BlenderDevice()), None
+    except NoDeviceError:
+        return open_compositor(device)
+
+
+def shrink(full: int, shown: int) -> int:
+    """How many times smaller pictures may be that are shown so wide instead of their full width: 1, 2 or 4."""
+    return next(factor for factor in (4, 2, 1) if factor == 1 or full >= factor * shown)
+
+
+def in_window() -> bool:
+    """Whether Blender's own GPU may be used: on the main thread of a Blender with a window."""
+    return not bpy.app.background and threading.current_thread() is threading.main_thread()
+
+
+def picture(scene, scene_frame: float, say=print, shrink: int = 1) -> np.ndarray:
     """The picture (H, W, 4) float32 of an effect scene at one of its frames: scene-linear, premultiplied, top row
     first. One of FAULTS: there is none, in one sentence. say: called with a sentence when the device is a lesser one.
+    shrink: the picture is that many times smaller.
     """
     edit, effect, strip = strips.find_edit(scene)
     frame = strips.timeline_frame(strip, scene_frame)
-    source = strips.source_of(edit, effect, strip)
-    renderer = _renderer(scene, source, say)
-    moment = effects.instant(edit, effect, strip, frame)
+    found = moment(edit, effect, strip, frame, say, shrink)
     if weights_folder is not None:
-        _write_weights(renderer.coefficients(moment), [s.name for s in effect.shutters], frame - strip.left_handle + 1)
+        values = found.renderer.coefficients(found.instant)
+        _write_weights(values, [s.name for s in effect.shutters], frame - strip.left_handle + 1)
+    result = found.renderer.picture(found.index, found.instant, found.direction)
+    found.renderer.source.want(found.needed(ahead=2))
+    return result
+
+
+def moment(edit, effect, strip, frame: float, say=print, shrink: int = 1) -> Moment:
+    """What an effect strip shows at a timeline frame. One of FAULTS: it cannot be shown."""
+    source = strips.source_of(edit, effect, strip)
+    renderer = _studio().renderer(effect.scene, source, say, shrink)
     index = timing.source_frame(source, frame, renderer.source, edit.render.fps / edit.render.fps_base)
-    return renderer.picture(index, moment, -1 if source.use_reverse_frames else 1)
+    instant = effects.instant(edit, effect, strip, frame)
+    return Moment(renderer, index, instant, -1 if source.use_reverse_frames else 1)
 
 
-def _renderer(scene, source_strip, say) -> Renderer:
-    global _compositor
-    if _compositor is None:
-        _compositor, message = open_compositor(device)
-        if message:
-            say(message)
-    key = sources.media_key(source_strip)
-    old_key, renderer = _renderers.get(scene.session_uid, (None, None))
-    if old_key != key:
-        if renderer is not None:
-            renderer.close()
-        renderer = Renderer(_compositor, sources.open_media(source_strip))
-        _renderers[scene.session_uid] = key, renderer
-    return renderer
+def _studio() -> Studio:
+    return _window if in_window() else _apart
 
 
 def forget(*_) -> None:
-    """Closes all sources and frees the device: when a file is loaded, and when the extension goes."""
-    global _compositor
-    for _key, renderer in _renderers.values():
-        renderer.close()
-    _renderers.clear()
-    if _compositor is not None:
-        _compositor.release()
-        _compositor = None
+    """Closes all sources and frees the devices: when a file is loaded, and when the extension goes."""
+    _apart.forget()
+    _window.forget()
 
 
 def resized(picture: np.ndarray, width: int, height: int) -> np.ndarray:

@@ -62,8 +62,11 @@ class CPUCompositor:
     def coefficients(self, handle: np.ndarray, count: int) -> np.ndarray:
         return handle[:count]
 
-    def compose(self, window: Window, index: int, direction: int, instant: Instant, handle, block: int) -> np.ndarray:
-        """The picture (H, W, 4) float32; arguments as for GPUCompositor.compose."""
+    def read(self, drawn: np.ndarray) -> np.ndarray:
+        return drawn
+
+    def draw(self, window: Window, index: int, direction: int, instant: Instant, handle, block: int) -> np.ndarray:
+        """The picture (H, W, 4) float32, top row first; arguments as for GPUCompositor.draw."""
         source = window.source
         indices = compositor.window_indices(instant.options, index, source.count, direction)
         summed = "srgb" if instant.options.light == "encoded" else "linear"

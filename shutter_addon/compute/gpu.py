@@ -146,32 +146,36 @@ class GPUCompositor:
 
     def __init__(self, device):
         self.name = device.name
-        self._device = device
+        self.device = device
         self._textures: dict[str, object] = {}
 
     def current(self):
         """What calls belong inside of: the device's context, on whatever thread renders."""
-        return self._device.current()
+        return self.device.current()
 
     def window(self, source, capacity: int) -> Window:
-        return Window(self._device, source, capacity)
+        return Window(self.device, source, capacity)
 
     def solver(self) -> Diffusion:
         """A diffusion whose solution stays valid until it solves again."""
-        return Diffusion(self._device)
+        return Diffusion(self.device)
 
     def constant(self, values: np.ndarray):
         """The same coefficients (N,) everywhere, on the device."""
         return self._filled("constant", padded(values).astype(np.float32)[:, None, None, :], "rgba32f")
 
+    def labels(self, values: np.ndarray):
+        """Labels (H, W) uint16 on the device."""
+        return self._filled("labels", values[None, ..., None], "r16ui")
+
     def coefficients(self, handle, count: int) -> np.ndarray:
         """Coefficients (N, h, w) float32 of what a solver or `constant` gave."""
-        values = self._device.read(handle)
+        values = self.device.read(handle)
         return np.moveaxis(values, -1, 1).reshape(-1, *values.shape[1:3])[:count]
 
-    def compose(self, window: Window, index: int, direction: int, instant: Instant, handle, block: int) -> np.ndarray:
-        """The picture (H, W, 4) float32, scene-linear and premultiplied, top row first; arguments as for `draw`."""
-        return self._device.read(self.draw(window, index, direction, instant, handle, block))[0, ::-1]
+    def read(self, drawn) -> np.ndarray:
+        """What `draw` gave, as an array (H, W, 4) float32, top row first."""
+        return self.device.read(drawn)[0, ::-1]
 
     def draw(self, window: Window, index: int, direction: int, instant: Instant, handle, block: int):
         """The picture on the device, the window's until it is drawn into again: a texture array rgba32f of one layer,
@@ -188,7 +192,7 @@ class GPUCompositor:
         indices = compositor.window_indices(options, index, source.count, direction)
         lowest = int(indices[indices >= 0].min())
         for top, height, frames in window.bands():
-            self._device.run(
+            self.device.run(
                 program,
                 (source.width, height),
                 textures=textures | {"frames": frames},
@@ -213,18 +217,18 @@ class GPUCompositor:
         if texture is None or texture.size != (width, height, layers):
             if texture is not None:
                 texture.release()
-            texture = self._textures[name] = self._device.texture(width, height, layers, kind)
+            texture = self._textures[name] = self.device.texture(width, height, layers, kind)
         return texture
 
     def _filled(self, name: str, values: np.ndarray, kind: str):
         layers, height, width, _ = values.shape
         texture = self._texture(name, width, height, layers, kind)
         for layer in range(layers):
-            self._device.write(texture, np.ascontiguousarray(values[layer]), layer)
+            self.device.write(texture, np.ascontiguousarray(values[layer]), layer)
         return texture
 
     def release(self) -> None:
-        with self._device.current():
+        with self.device.current():
             for texture in self._textures.values():
                 texture.release()
-        self._device.release()
+        self.device.release()

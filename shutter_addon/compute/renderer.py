@@ -34,7 +34,7 @@ class Renderer:
         self.compositor, self.source = compositor, source
         self._solver = compositor.solver()
         self._window = None
-        self._labelled = self._solved = None
+        self._labelled = self._solved = self._drawn = None
 
     def picture(self, index: int, instant: Instant, direction: int = 1) -> np.ndarray:
         """The picture (H, W, 4) float32 at source frame `index`: scene-linear, premultiplied, top row first.
@@ -42,15 +42,18 @@ class Renderer:
         direction: −1 where the source plays in reverse, and the window's next frames are those before `index`.
         """
         with self.compositor.current():
-            return self.compositor.compose(*self._parts(index, instant, direction))
+            return self.compositor.read(self.draw(index, instant, direction))
 
     def draw(self, index: int, instant: Instant, direction: int = 1):
-        """The same on the device, which must be a GPU: a texture array rgba32f of one layer, bottom row first.
+        """The same on the device: a texture array rgba32f of one layer, bottom row first (with NumPy: as `picture`).
 
-        It stays until the next one of this renderer.
+        It stays until the next one of this renderer; the same picture is not composed twice.
         """
-        with self.compositor.current():
-            return self.compositor.draw(*self._parts(index, instant, direction))
+        key = index, direction, instant.key
+        if self._drawn is None or self._drawn[0] != key:
+            with self.compositor.current():
+                self._drawn = key, self.compositor.draw(*self._parts(index, instant, direction))
+        return self._drawn[1]
 
     def coefficients(self, instant: Instant) -> np.ndarray:
         """Coefficients (N, h, w) float32 at an instant, one per pixel or per block that shares a shutter."""
@@ -73,10 +76,15 @@ class Renderer:
                 return self.compositor.constant(values), self._everywhere, count
             return self._diffused(labels, count), instant.options.aggregate, count
 
+    def drawn_labels(self, instant: Instant):
+        """Labels on the device, which must be a GPU: (texture array r16ui, top row first; the pixels along each side of
+        a texel). The texture stays until the next call."""
+        with self.compositor.current():
+            return self.compositor.labels(self.labels(instant)), instant.options.aggregate
+
     def labels(self, instant: Instant) -> np.ndarray:
         """Labels (h, w) uint16 of the pixels, or of the blocks that share a shutter: 0 free, 1 + shutter scribbled."""
-        strokes = [(s.shutter, s.kind, s.width, *(stroke.tobytes() for stroke in s.strokes)) for s in instant.shapes]
-        key = self._grid(instant), instant.options.border, strokes
+        key = self._grid(instant), instant.options.border, instant.key[-1]
         if self._labelled is None or self._labelled[0] != key:
             self._labelled = key, scribbles.rasterise(instant.shapes, *key[0], border=key[1])
         return self._labelled[1]
@@ -132,7 +140,7 @@ class Renderer:
         """Frees the frames; the next picture reads them again."""
         if self._window is not None:
             self._window.release()
-            self._window = None
+            self._window = self._drawn = None
 
     def close(self) -> None:
         """Frees everything on the device and closes the source."""

@@ -75,6 +75,12 @@ class Instant:
             return np.ones_like(exposures)
         return exposures / (self.reference or exposures[0])
 
+    @property
+    def key(self) -> tuple:
+        """Equal for instants that give the same picture; hashable."""
+        shapes = ((s.shutter, s.kind, s.width, *(stroke.tobytes() for stroke in s.strokes)) for s in self.shapes)
+        return self.options, self.bars.shape, self.bars.tobytes(), self.reference, tuple(shapes)
+
     def alone(self, chosen: int) -> Instant:
         """The same where one shutter alone holds for the whole picture."""
         return Instant(self.options, self.bars[chosen, None], (), self.reference or float(self.bars[0].sum()))

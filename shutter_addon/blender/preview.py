@@ -1,0 +1,272 @@
+"""The live preview: the effect's picture over the sequencer's own, composed and drawn on Blender's GPU."""
+
+from dataclasses import dataclass
+
+import bpy
+import gpu
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
+from bpy.types import PropertyGroup
+from gpu_extras.batch import batch_for_shader
+
+from ..compute.gpu import GPUCompositor
+from ..compute.passes import body
+from . import drawing, effects, geometry, pictures, strips
+from .device import BlenderDevice, Texture
+
+VIEWS = (
+    ("RESULT", "Result", "The finished picture"),
+    ("SPLIT", "Split", "The source on the left of the handle, the result on its right"),
+    ("SCRIBBLES", "Scribbles", "The source, and where each shutter is scribbled"),
+    ("COEFFICIENTS", "Coefficients", "How much of each shutter a pixel gets, in the shutters' colors"),
+)
+# Frames decoded in advance while the timeline plays.
+_AHEAD = 4
+# What a share of the sequencer's preview size leaves of the picture's width.
+_PROXY_SHRINK = {"PROXY_50": 2, "PROXY_25": 4}
+
+
+def redraw(*_) -> None:
+    """Draws all previews again."""
+    for _window, area in strips.previews(bpy.context):
+        area.tag_redraw()
+
+
+class ShutterPreview(PropertyGroup):
+    """How the live preview looks: of the window manager, neither saved nor undone."""
+
+    live: BoolProperty(name="Live", description="Show the effect while you work on it", default=True, update=redraw)
+    view: EnumProperty(name="View", description="What the live preview shows", items=VIEWS, update=redraw)
+    split: FloatProperty(
+        name="Split",
+        description="Where the source ends and the result begins",
+        default=0.5,
+        min=0.0,
+        max=1.0,
+        update=redraw,
+    )
+
+
+@dataclass(frozen=True)
+class Shown:
+    """The effect strip that a preview shows."""
+
+    edit: object
+    effect: object
+    strip: object
+    strips_above: bool
+
+
+def shown(context) -> Shown | None:
+    """The effect strip under the playhead that the preview shows: the active one, or the highest."""
+    edit, space = strips.edit_of(context), context.space_data
+    if edit is None or edit.sequence_editor is None or space.display_mode != "IMAGE" or space.display_channel:
+        return None
+    visible = _visible(edit)
+    found = [
+        strip for strip in visible if strip.type == "SCENE" and strip.scene and strips.effect_of(edit, strip.scene)
+    ]
+    if not found:
+        return None
+    active = strips.active(context)
+    strip = next((s for s in found if active and s == active[2]), max(found, key=lambda s: s.channel))
+    above = any(other.channel > strip.channel for other in visible)
+    return Shown(edit, strips.effect_of(edit, strip.scene), strip, above)
+
+
+def _visible(edit) -> list:
+    """Strips with a picture under the playhead, not muted, of the edit or of the meta strip that is open."""
+    editor, frame = edit.sequence_editor, edit.frame_current
+    level = editor.meta_stack[-1] if editor.meta_stack else editor
+    return [
+        strip
+        for strip in level.strips
+        if strip.left_handle <= frame < strip.right_handle
+        and strip.type != "SOUND"
+        and not strip.mute
+        and not level.channels[strip.channel].mute
+    ]
+
+
+def _draw() -> None:
+    """The draw handler of the previews."""
+    context = bpy.context
+    settings = context.window_manager.virtual_shutter
+    if not settings.live or bpy.app.is_job_running("RENDER"):
+        return
+    found = shown(context)
+    if found is None:
+        return
+    say = _Notes(context.region)
+    if found.strips_above:
+        say("Live: the strips above are hidden")
+    if found.edit.view_settings.view_transform != "Standard":
+        say("Live shows view transform Standard")
+    try:
+        _show(context, found, settings)
+    except pictures.FAULTS as error:
+        say(f"Shutter: {error}")
+    say.draw()
+
+
+def _show(context, found: Shown, settings) -> None:
+    frame = found.edit.frame_current
+    shrink = _PROXY_SHRINK.get(context.space_data.proxy_render_size, 1)
+    moment = pictures.moment(found.edit, found.effect, found.strip, frame, shrink=shrink)
+    renderer = moment.renderer
+    if not isinstance(renderer.compositor, GPUCompositor) or not isinstance(renderer.compositor.device, BlenderDevice):
+        raise pictures.NoDeviceError("the live preview needs compute shaders; the sequencer's own picture is shown")
+    quad = Quad(context.region, found.strip, effects.picture_size(found.effect))
+    plain = settings.view != "RESULT"
+    if plain:
+        _show_source(quad, found, moment, 0.0, settings.split if settings.view == "SPLIT" else 1.0)
+    if settings.view == "SCRIBBLES":
+        _show_scribbles(quad, found.effect, moment)
+    elif settings.view == "COEFFICIENTS":
+        _show_coefficients(quad, found.effect, moment)
+    else:
+        left = settings.split if settings.view == "SPLIT" else 0.0
+        texture = renderer.draw(moment.index, moment.instant, moment.direction)
+        quad.draw("show_picture", {"picture": texture}, left, 1.0, opacity=found.strip.blend_alpha)
+    renderer.source.want(moment.needed(ahead=_AHEAD))
+
+
+def _show_source(quad, found: Shown, moment, left: float, right: float) -> None:
+    """The source's own frame: a shutter that is open for it alone."""
+    options = moment.instant.options
+    still = np.zeros((1, options.window))
+    still[0, options.before] = 1
+    plain = type(moment.instant)(options, still)
+    texture = moment.renderer.draw(moment.index, plain, moment.direction)
+    quad.draw("show_picture", {"picture": texture}, left, right, opacity=found.strip.blend_alpha)
+
+
+def _show_scribbles(quad, effect, moment) -> None:
+    labels, block = moment.renderer.drawn_labels(moment.instant)
+    quad.draw(
+        "show_scribbles", {"labels": labels, "palette": _palette(effect)}, opacity=0.7, block=block, size=_size(moment)
+    )
+
+
+def _show_coefficients(quad, effect, moment) -> None:
+    coefficients, block, count = moment.renderer.drawn_coefficients(moment.instant)
+    textures = {"coefficients": coefficients, "palette": _palette(effect)}
+    quad.draw("show_coefficients", textures, opacity=0.75, block=block, count=count, size=_size(moment))
+
+
+def _size(moment) -> tuple[int, int]:
+    return moment.renderer.source.width, moment.renderer.source.height
+
+
+def _palette(effect) -> Texture:
+    """The shutters' colours, display code values, side by side."""
+    colors = np.ones((len(effect.shutters), 4), dtype=np.float32)
+    colors[:, :3] = [shutter.color for shutter in effect.shutters]
+    size = len(colors), 1
+    data = gpu.types.Buffer("FLOAT", colors.size, colors.reshape(-1))
+    return Texture(gpu.types.GPUTexture(size, layers=1, format="RGBA32F", data=data), (*size, 1), "rgba32f")
+
+
+class Quad:
+    """Where a strip's picture lies in a preview's region, its crop and flips considered."""
+
+    def __init__(self, region, strip, size):
+        self._view = region.view2d
+        self._matrix = geometry.picture_to_image(strip, size)
+        crop, (width, height) = strip.crop, size
+        self._low = np.array([crop.min_x / width, crop.min_y / height])
+        self._high = 1 - np.array([crop.max_x / width, crop.max_y / height])
+        self._flip = np.array([strip.use_flip_x, strip.use_flip_y])
+
+    def region_point(self, x: float, y: float) -> tuple[float, float]:
+        """A point of the strip's picture, in fractions, in pixels of the region."""
+        (image,) = geometry.mapped(self._matrix, np.array([[x, y]]))
+        return self._view.view_to_region(*image, clip=False)
+
+    def draw(self, name: str, textures: dict, left: float = 0.0, right: float = 1.0, **constants) -> None:
+        """Draws from `left` to `right`, in fractions of the picture's width, through a shader of shaders/."""
+        low, high = np.maximum(self._low, (left, 0)), np.minimum(self._high, (right, 1))
+        if (low >= high).any():
+            return
+        corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
+        places = [tuple(np.where(self._flip, 1 - np.array(corner), corner)) for corner in corners]
+        shader = _shader(name)
+        shader.bind()
+        for sampler, texture in textures.items():
+            shader.uniform_sampler(sampler, texture.gpu)
+        for constant, value in constants.items():
+            (shader.uniform_float if isinstance(value, float) else shader.uniform_int)(constant, value)
+        where = {"corner": [self.region_point(*corner) for corner in corners], "place": places}
+        gpu.state.blend_set("ALPHA_PREMULT")
+        batch_for_shader(shader, "TRI_FAN", where).draw(shader)
+        gpu.state.blend_set("NONE")
+
+
+_SAMPLERS = {
+    "show_picture": {"picture": "FLOAT_2D_ARRAY"},
+    "show_coefficients": {"coefficients": "FLOAT_2D_ARRAY", "palette": "FLOAT_2D_ARRAY"},
+    "show_scribbles": {"labels": "UINT_2D_ARRAY", "palette": "FLOAT_2D_ARRAY"},
+}
+_CONSTANTS = {
+    "show_picture": {"opacity": "FLOAT"},
+    "show_coefficients": {"opacity": "FLOAT", "size": "IVEC2", "block": "INT", "count": "INT"},
+    "show_scribbles": {"opacity": "FLOAT", "size": "IVEC2", "block": "INT"},
+}
+_shaders: dict = {}
+
+
+def _shader(name: str):
+    if name not in _shaders:
+        between = gpu.types.GPUStageInterfaceInfo("show_interface")
+        between.smooth("VEC2", "at")
+        info = gpu.types.GPUShaderCreateInfo()
+        info.push_constant("MAT4", "ModelViewProjectionMatrix")
+        for constant, kind in _CONSTANTS[name].items():
+            info.push_constant(kind, constant)
+        for slot, (sampler, kind) in enumerate(_SAMPLERS[name].items()):
+            info.sampler(slot, kind, sampler)
+        info.vertex_in(0, "VEC2", "corner")
+        info.vertex_in(1, "VEC2", "place")
+        info.vertex_out(between)
+        info.fragment_out(0, "VEC4", "shown")
+        info.vertex_source(body("show_quad"))
+        info.fragment_source(body(name))
+        _shaders[name] = gpu.shader.create_from_info(info)
+    return _shaders[name]
+
+
+class _Notes:
+    """Sentences at the upper left of a region."""
+
+    def __init__(self, region):
+        self._region, self._lines = region, []
+
+    def __call__(self, sentence: str):
+        self._lines.append(sentence)
+
+    def draw(self):
+        unit = drawing.ui_scale()
+        for i, line in enumerate(self._lines):
+            drawing.text(16 * unit, self._region.height - (i + 2) * 18 * unit, line)
+
+
+classes = (ShutterPreview,)
+_handler = None
+
+
+def register():
+    global _handler
+    for cls in classes:
+        bpy.utils.register_class(cls)
+    bpy.types.WindowManager.virtual_shutter = PointerProperty(type=ShutterPreview)
+    _handler = bpy.types.SpaceSequenceEditor.draw_handler_add(_draw, (), "PREVIEW", "POST_PIXEL")
+
+
+def unregister():
+    global _handler
+    bpy.types.SpaceSequenceEditor.draw_handler_remove(_handler, "PREVIEW")
+    _handler = None
+    _shaders.clear()
+    del bpy.types.WindowManager.virtual_shutter
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)
