@@ -1,9 +1,9 @@
-"""What happens by itself: copies of effect strips get data of their own, and an old file's sources are closed."""
+"""What happens by itself: effects follow their strips, and an old file's sources are closed."""
 
 import bpy
 from bpy.app.handlers import persistent
 
-from . import copies, pictures, strips
+from . import copies, lifecycle, pictures, strips
 
 
 @persistent
@@ -12,8 +12,13 @@ def _before_load(*_):
 
 
 @persistent
-def _adopt_copies(*_):
+def _after_load(*_):
     copies.adopt()
+
+
+@persistent
+def _update(scene=None, *_):
+    lifecycle.update(scene)
 
 
 @persistent
@@ -25,8 +30,8 @@ def _before_render(scene, *_):
 
 HANDLERS = {
     "load_pre": _before_load,
-    "load_post": _adopt_copies,
-    "depsgraph_update_post": _adopt_copies,
+    "load_post": _after_load,
+    "depsgraph_update_post": _update,
     "render_init": _before_render,
 }
 

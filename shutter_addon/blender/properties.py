@@ -137,10 +137,15 @@ def register():
     bpy.types.Scene.virtual_shutter = PointerProperty(type=ShutterScene)
     # A strip cannot be pointed to and may be renamed: the source strip carries the identity that effects look for.
     bpy.types.Strip.virtual_shutter_source = StringProperty(options={"HIDDEN"})
+    # The effect strip carries its scene's: Blender's clipboard drops the scene itself.
+    bpy.types.Strip.virtual_shutter_effect = StringProperty(options={"HIDDEN"})
+    # That the source was muted when the effect was made, and shall show again when it goes.
+    bpy.types.Strip.virtual_shutter_muted = BoolProperty(options={"HIDDEN"})
 
 
 def unregister():
-    del bpy.types.Strip.virtual_shutter_source
+    for name in ("source", "effect", "muted"):
+        delattr(bpy.types.Strip, f"virtual_shutter_{name}")
     del bpy.types.Scene.virtual_shutter
     for cls in reversed(classes):
         bpy.utils.unregister_class(cls)
