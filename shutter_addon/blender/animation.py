@@ -16,11 +16,7 @@ class Curves:
     """The F-curves of a scene, found by path."""
 
     def __init__(self, scene):
-        animation = scene.animation_data
-        bag = None
-        if animation and animation.action and animation.action_slot:
-            bag = anim_utils.action_get_channelbag_for_slot(animation.action, animation.action_slot)
-        self._curves = {(c.data_path, c.array_index): c for c in bag.fcurves if not c.mute} if bag else {}
+        self._curves = {(c.data_path, c.array_index): c for c in curves_under(scene, "") if not c.mute}
 
     def find(self, path: str, index: int = 0):
         """The F-curve of a property, or None; muted ones do not count."""
@@ -136,6 +132,8 @@ def reindex(scene, path: str, places: dict[int, int | None]) -> None:
 
 def curves_under(scene, path: str) -> list:
     """The scene's F-curves whose path starts with `path`."""
-    if not (scene.animation_data and scene.animation_data.action):
+    animation = scene.animation_data
+    if not (animation and animation.action and animation.action_slot):
         return []
-    return [curve for curve in _channelbag(scene).fcurves if curve.data_path.startswith(path)]
+    bag = anim_utils.action_get_channelbag_for_slot(animation.action, animation.action_slot)
+    return [curve for curve in bag.fcurves if curve.data_path.startswith(path)] if bag else []

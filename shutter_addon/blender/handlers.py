@@ -3,7 +3,7 @@
 import bpy
 from bpy.app.handlers import persistent
 
-from . import copies, lifecycle, pictures, strips
+from . import cache, copies, lifecycle, pictures, strips
 
 
 @persistent
@@ -22,16 +22,26 @@ def _update(scene=None, *_):
 
 
 @persistent
+def _after_undo(*_):
+    for edit in bpy.data.scenes:
+        cache.invalidate(edit)
+
+
+@persistent
 def _before_render(scene, *_):
     # In a window the render has a thread of its own, and the last update has seen to copies.
     if bpy.app.background and scene.render.engine != strips.ENGINE:
         copies.adopt()
+        for edit in bpy.data.scenes:
+            cache.invalidate_changed(edit)
 
 
 HANDLERS = {
     "load_pre": _before_load,
     "load_post": _after_load,
     "depsgraph_update_post": _update,
+    "undo_post": _after_undo,
+    "redo_post": _after_undo,
     "render_init": _before_render,
 }
 

@@ -4,7 +4,7 @@ import uuid
 
 import bpy
 
-from . import animation, copies, kept, strips
+from . import animation, cache, copies, kept, strips
 
 EFFECTS = "virtual_shutter.effects"
 
@@ -28,6 +28,8 @@ def update(updated=None) -> None:
         _follow_layers(edit)
     _remove_scenes(updated)
     _identify()
+    for edit in _edits():
+        cache.invalidate_changed(edit)
 
 
 def _edits() -> list:

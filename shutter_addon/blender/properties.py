@@ -18,7 +18,7 @@ from bpy.props import (
 from bpy.types import PropertyGroup
 
 from ..core.shutters import MAX_WINDOW
-from .strips import effect_strips
+from . import cache
 
 # Enum identifiers are the recipe's words in capitals.
 POSITIONS = (
@@ -56,8 +56,7 @@ KINDS = (
 
 def _changed(group, _context):
     """The sequencer keeps finished frames, and knows nothing of what the effect's strips depend on."""
-    for strip in effect_strips(group.id_data):
-        strip.invalidate_cache("RAW")
+    cache.invalidate(group.id_data)
 
 
 class ShutterBar(PropertyGroup):

@@ -50,19 +50,21 @@ def timeline_frame(strip, scene_frame: float) -> float:
 def source_of(edit, effect, strip):
     """The effect's source strip: of those with its identity (parts of a cut strip, copies) the nearest in time, then
     the nearest below. EffectError: there is none any more."""
-    if (source := _nearest_source(edit, effect, strip)) is None:
+    if (source := nearest_source(edit, effect, strip)) is None:
         raise effects.EffectError(f'the source strip of "{strip.name}" was deleted')
     return source
 
 
 def shown_sources(edit) -> set[str]:
     """Names of the strips that are sources of the edit's effect strips."""
-    pairs = [(strips_effect, strip) for strip in effect_strips(edit) if (strips_effect := effect_of(edit, strip.scene))]
-    sources = [_nearest_source(edit, effect, strip) for effect, strip in pairs]
+    pairs = [(effect, strip) for strip in effect_strips(edit) if (effect := effect_of(edit, strip.scene))]
+    sources = [nearest_source(edit, effect, strip) for effect, strip in pairs]
     return {source.name for source in sources if source is not None}
 
 
-def _nearest_source(edit, effect, strip):
+def nearest_source(edit, effect, strip):
+    """What source_of finds, or None."""
+
     def distance(other):
         apart = max(other.left_handle - strip.right_handle + 1, strip.left_handle - other.right_handle + 1, 0)
         return apart, other.channel > strip.channel, abs(strip.channel - other.channel)
