@@ -16,11 +16,7 @@ class Curves:
     """The F-curves of a scene, found by path."""
 
     def __init__(self, scene):
-        animation = scene.animation_data
-        bag = None
-        if animation and animation.action and animation.action_slot:
-            bag = anim_utils.action_get_channelbag_for_slot(animation.action, animation.action_slot)
-        self._curves = {(c.data_path, c.array_index): c for c in bag.fcurves if not c.mute} if bag else {}
+        self._curves = {(c.data_path, c.array_index): c for c in curves_under(scene, "") if not c.mute}
 
     def find(self, path: str, index: int = 0):
         """The F-curve of a property, or None; muted ones do not count."""
@@ -63,11 +59,7 @@ def ease_at(curve, frame: float) -> str:
 
 def set_keys(scene, path: str, index: int, keys) -> None:
     """Replaces a property's F-curve by keys (frame, value, ease of the span that follows)."""
-    bag = _channelbag(scene)
-    if (old := bag.fcurves.find(path, index=index)) is not None:
-        bag.fcurves.remove(old)
-    curve = bag.fcurves.new(path, index=index)
-    points = curve.keyframe_points
+    points = new_curve(scene, path, index).keyframe_points
     points.add(len(keys))
     points.foreach_set("co", [number for frame, value, _ in keys for number in (frame, value)])
     for point, (_, _, ease) in zip(points, keys, strict=True):
@@ -78,6 +70,14 @@ def set_keys(scene, path: str, index: int, keys) -> None:
     for point, before, after in zip(points, [1.0, *reach], [*reach, 1.0], strict=True):
         point.handle_left = point.co[0] - before, point.co[1]
         point.handle_right = point.co[0] + after, point.co[1]
+
+
+def new_curve(scene, path: str, index: int = 0):
+    """An empty F-curve for a property, in place of the one it may have."""
+    bag = _channelbag(scene)
+    if (old := bag.fcurves.find(path, index=index)) is not None:
+        bag.fcurves.remove(old)
+    return bag.fcurves.new(path, index=index)
 
 
 def _channelbag(scene):
@@ -91,13 +91,13 @@ def _channelbag(scene):
 
 def remove_curves(scene, path: str) -> None:
     """Removes the scene's F-curves whose path starts with `path`."""
-    for curve in _curves_under(scene, path):
+    for curve in curves_under(scene, path):
         _channelbag(scene).fcurves.remove(curve)
 
 
 def move_curves(scene, path: str, frames: float) -> None:
     """Moves the keys of the F-curves whose path starts with `path` in time."""
-    for curve in _curves_under(scene, path):
+    for curve in curves_under(scene, path):
         for point in curve.keyframe_points:
             point.co[0] += frames
             point.handle_left[0] += frames
@@ -107,7 +107,7 @@ def move_curves(scene, path: str, frames: float) -> None:
 
 def copy_curves(scene, path: str, new_scene, new_path: str) -> None:
     """Copies the F-curves whose path starts with `path` to the same properties under `new_path` of a scene."""
-    for curve in _curves_under(scene, path):
+    for curve in curves_under(scene, path):
         copy = _channelbag(new_scene).fcurves.new_from_fcurve(
             curve, data_path=new_path + curve.data_path.removeprefix(path)
         )
@@ -120,7 +120,7 @@ def reindex(scene, path: str, places: dict[int, int | None]) -> None:
     Blender finds properties by index, and knows nothing of items that move.
     """
     item = re.compile(re.escape(path) + r"\[(\d+)\]")
-    for curve in _curves_under(scene, f"{path}["):
+    for curve in curves_under(scene, f"{path}["):
         found = item.match(curve.data_path)
         index = int(found[1])
         place = places.get(index, index)
@@ -130,7 +130,10 @@ def reindex(scene, path: str, places: dict[int, int | None]) -> None:
             curve.data_path = f"{path}[{place}]{curve.data_path[found.end() :]}"
 
 
-def _curves_under(scene, path: str) -> list:
-    if not (scene.animation_data and scene.animation_data.action):
+def curves_under(scene, path: str) -> list:
+    """The scene's F-curves whose path starts with `path`."""
+    animation = scene.animation_data
+    if not (animation and animation.action and animation.action_slot):
         return []
-    return [curve for curve in _channelbag(scene).fcurves if curve.data_path.startswith(path)]
+    bag = anim_utils.action_get_channelbag_for_slot(animation.action, animation.action_slot)
+    return [curve for curve in bag.fcurves if curve.data_path.startswith(path)] if bag else []

@@ -15,10 +15,11 @@ def adopt() -> None:
     for edit in [scene for scene in bpy.data.scenes if scene.library is None]:  # linked ones cannot be changed
         for scene, parts in _groups(edit).items():
             effect = strips.effect_of(edit, scene)
-            if effect is None:  # Blender copied the scene with its strip
+            if effect is None:  # Blender copied the scene with its strip, or the strip is pasted from another edit
                 if (original := _original(edit, scene)) is not None:
                     for origin, same in parts.items():
-                        _duplicate(*original, edit, same, origin, scene)
+                        own = _copied(scene) if strips.effect_of(original[0], scene) else scene
+                        _duplicate(*original, edit, same, origin, own)
             else:
                 if scene in taken:  # the edit is a copy, its effects' data copied with it
                     effect.scene = _copied(scene)

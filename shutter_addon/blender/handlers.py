@@ -1,9 +1,9 @@
-"""What happens by itself: copies of effect strips get data of their own, and an old file's sources are closed."""
+"""What happens by itself: effects follow their strips, and an old file's sources are closed."""
 
 import bpy
 from bpy.app.handlers import persistent
 
-from . import copies, pictures, strips
+from . import cache, copies, lifecycle, pictures, strips
 
 
 @persistent
@@ -12,8 +12,19 @@ def _before_load(*_):
 
 
 @persistent
-def _adopt_copies(*_):
+def _after_load(*_):
     copies.adopt()
+
+
+@persistent
+def _update(scene=None, *_):
+    lifecycle.update(scene)
+
+
+@persistent
+def _after_undo(*_):
+    for edit in bpy.data.scenes:
+        cache.invalidate(edit)
 
 
 @persistent
@@ -21,12 +32,16 @@ def _before_render(scene, *_):
     # In a window the render has a thread of its own, and the last update has seen to copies.
     if bpy.app.background and scene.render.engine != strips.ENGINE:
         copies.adopt()
+        for edit in bpy.data.scenes:
+            cache.invalidate_changed(edit)
 
 
 HANDLERS = {
     "load_pre": _before_load,
-    "load_post": _adopt_copies,
-    "depsgraph_update_post": _adopt_copies,
+    "load_post": _after_load,
+    "depsgraph_update_post": _update,
+    "undo_post": _after_undo,
+    "redo_post": _after_undo,
     "render_init": _before_render,
 }
 

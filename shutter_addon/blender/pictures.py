@@ -25,6 +25,8 @@ weights_folder: Path | None = None
 
 # Renderers whose frames are kept: more effects than these in one frame decode their windows again for every frame.
 _KEPT = 4
+# Pictures whose frames are decoded in advance.
+_AHEAD = 2
 
 
 @dataclass(frozen=True)
@@ -36,13 +38,13 @@ class Moment:
     instant: Instant
     direction: int
 
-    def needed(self, ahead: int = 0) -> list[int]:
-        """Source frames that the picture needs, and those of the next `ahead` frames; the first needed first."""
-        frames = {}
+    def prefetch(self, ahead: int) -> None:
+        """Has the frames decoded that the picture lacks, then those of the next `ahead` pictures."""
+        wanted = {}
         for step in range(ahead + 1):
             index = min(max(self.index + step * self.direction, 0), self.renderer.source.count - 1)
-            frames |= dict.fromkeys(sorted(self.renderer.needed(index, self.direction, self.instant)))
-        return list(frames)
+            wanted |= dict.fromkeys(sorted(self.renderer.missing(index, self.direction, self.instant)))
+        self.renderer.source.want(wanted)
 
 
 class Studio:
@@ -114,9 +116,8 @@ def picture(scene, scene_frame: float, say=print, shrink: int = 1) -> np.ndarray
     if weights_folder is not None:
         values = found.renderer.coefficients(found.instant)
         _write_weights(values, [s.name for s in effect.shutters], frame - strip.left_handle + 1)
-    result = found.renderer.picture(found.index, found.instant, found.direction)
-    found.renderer.source.want(found.needed(ahead=2))
-    return result
+    found.prefetch(_AHEAD)
+    return found.renderer.picture(found.index, found.instant, found.direction)
 
 
 def moment(edit, effect, strip, frame: float, say=print, shrink: int = 1) -> Moment:

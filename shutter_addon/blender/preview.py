@@ -11,7 +11,7 @@ from gpu_extras.batch import batch_for_shader
 
 from ..compute.gpu import GPUCompositor
 from ..compute.passes import body
-from . import drawing, effects, geometry, pictures, strips
+from . import cache, drawing, effects, geometry, pictures, strips
 from .device import BlenderDevice, Texture
 
 VIEWS = (
@@ -29,7 +29,7 @@ _PROXY_SHRINK = {"PROXY_50": 2, "PROXY_25": 4}
 def redraw(*_) -> None:
     """Draws all previews again."""
     for _window, area in strips.previews(bpy.context):
-        area.tag_redraw()
+        area.tag_redraw()  # of the area alone, Blender's picture and ours
 
 
 class ShutterPreview(PropertyGroup):
@@ -92,7 +92,13 @@ def _draw() -> None:
     """The draw handler of the previews."""
     context = bpy.context
     settings = context.window_manager.virtual_shutter
-    if not settings.live or bpy.app.is_job_running("RENDER"):
+    if bpy.app.is_job_running("RENDER"):
+        return
+    # Blender tells nobody of strokes that are drawn or erased, but it draws the preview again.
+    edit = strips.edit_of(context)
+    if edit is not None and edit.library is None and cache.invalidate_changed(edit):
+        context.area.tag_redraw()
+    if not settings.live:
         return
     found = shown(context)
     if found is None:
@@ -116,6 +122,7 @@ def _show(context, found: Shown, settings) -> None:
     renderer = moment.renderer
     if not isinstance(renderer.compositor, GPUCompositor) or not isinstance(renderer.compositor.device, BlenderDevice):
         raise pictures.NoDeviceError("the live preview needs compute shaders; the sequencer's own picture is shown")
+    moment.prefetch(_AHEAD)
     quad = Quad(context.region, found.strip, effects.picture_size(found.effect))
     plain = settings.view != "RESULT"
     if plain:
@@ -128,7 +135,6 @@ def _show(context, found: Shown, settings) -> None:
         left = settings.split if settings.view == "SPLIT" else 0.0
         texture = renderer.draw(moment.index, moment.instant, moment.direction)
         quad.draw("show_picture", {"picture": texture}, left, 1.0, opacity=found.strip.blend_alpha)
-    renderer.source.want(moment.needed(ahead=_AHEAD))
 
 
 def _show_source(quad, found: Shown, moment, left: float, right: float) -> None:

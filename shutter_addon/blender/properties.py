@@ -18,8 +18,7 @@ from bpy.props import (
 from bpy.types import PropertyGroup
 
 from ..core.shutters import MAX_WINDOW
-from . import editing
-from .strips import effect_strips
+from . import cache, editing
 
 # Enum identifiers are the recipe's words in capitals.
 POSITIONS = (
@@ -57,8 +56,7 @@ KINDS = (
 
 def _changed(group, _context):
     """The sequencer keeps finished frames, and knows nothing of what the effect's strips depend on."""
-    for strip in effect_strips(group.id_data):
-        strip.invalidate_cache("RAW")
+    cache.invalidate(group.id_data)
 
 
 def _renamed(shutter, new: str, old: str, _is_set) -> str:
@@ -162,10 +160,15 @@ def register():
     bpy.types.Scene.virtual_shutter = PointerProperty(type=ShutterScene)
     # A strip cannot be pointed to and may be renamed: the source strip carries the identity that effects look for.
     bpy.types.Strip.virtual_shutter_source = StringProperty(options={"HIDDEN"})
+    # The effect strip carries its scene's: Blender's clipboard drops the scene itself.
+    bpy.types.Strip.virtual_shutter_effect = StringProperty(options={"HIDDEN"})
+    # That the source was muted when the effect was made, and shall show again when it goes.
+    bpy.types.Strip.virtual_shutter_muted = BoolProperty(options={"HIDDEN"})
 
 
 def unregister():
-    del bpy.types.Strip.virtual_shutter_source
+    for name in ("source", "effect", "muted"):
+        delattr(bpy.types.Strip, f"virtual_shutter_{name}")
     del bpy.types.Scene.virtual_shutter
     for cls in reversed(classes):
         bpy.utils.unregister_class(cls)

@@ -101,15 +101,27 @@ def timeline_frame(strip, scene_frame: float) -> float:
 def source_of(edit, effect, strip):
     """The effect's source strip: of those with its identity (parts of a cut strip, copies) the nearest in time, then
     the nearest below. EffectError: there is none any more."""
-    candidates = [s for s in edit.sequence_editor.strips_all if s.virtual_shutter_source == effect.source]
-    if not candidates:
+    if (source := nearest_source(edit, effect, strip)) is None:
         raise effects.EffectError(f'the source strip of "{strip.name}" was deleted')
+    return source
+
+
+def shown_sources(edit) -> set[str]:
+    """Names of the strips that are sources of the edit's effect strips."""
+    pairs = [(effect, strip) for strip in effect_strips(edit) if (effect := effect_of(edit, strip.scene))]
+    sources = [nearest_source(edit, effect, strip) for effect, strip in pairs]
+    return {source.name for source in sources if source is not None}
+
+
+def nearest_source(edit, effect, strip):
+    """What source_of finds, or None."""
 
     def distance(other):
         apart = max(other.left_handle - strip.right_handle + 1, strip.left_handle - other.right_handle + 1, 0)
         return apart, other.channel > strip.channel, abs(strip.channel - other.channel)
 
-    return min(candidates, key=distance)
+    candidates = [s for s in edit.sequence_editor.strips_all if s.virtual_shutter_source == effect.source]
+    return min(candidates, key=distance, default=None)
 
 
 def add_effect(edit, source):
@@ -120,7 +132,9 @@ def add_effect(edit, source):
     medium.close()
     if not source.virtual_shutter_source:
         source.virtual_shutter_source = uuid.uuid4().hex
-    scene = _new_scene(edit, f"Shutter {source.name}", (medium.width, medium.height), source)
+    length = max(1, int(source.content_end - source.content_start))
+    scene = new_scene(edit, f"Shutter {source.name}", (medium.width, medium.height), length)
+    scene.virtual_shutter.identity = uuid.uuid4().hex
     taken = {s.channel for s in edit.sequence_editor.strips_all if _overlap(s, source)}
     channel = next(c for c in range(source.channel + 1, source.channel + len(taken) + 2) if c not in taken)
     strip = edit.sequence_editor.strips.new_scene("Shutter", scene, channel, int(source.content_start))
@@ -128,7 +142,8 @@ def add_effect(edit, source):
     strip.blend_type = source.blend_type
     copy_look(source, strip)
     # Through a transparent picture the plain source would show. An opaque one stays: mute the effect to see it.
-    source.mute = medium.alpha != "opaque"
+    if medium.alpha != "opaque" and not source.mute:
+        source.mute = source.virtual_shutter_muted = True
     effect = edit.virtual_shutter.effects.add()
     effect.name, effect.scene, effect.source, effect.start = (
         strip.name,
@@ -136,7 +151,7 @@ def add_effect(edit, source):
         source.virtual_shutter_source,
         origin(strip),
     )
-    scene.annotation = bpy.data.annotations.new(f"Scribbles {source.name}")
+    strip.virtual_shutter_effect = scene.virtual_shutter.identity
     return strip, effect
 
 
@@ -155,17 +170,18 @@ def copy_look(source, strip) -> None:
         setattr(strip, name, getattr(source, name))
 
 
-def _new_scene(edit, name: str, size, source):
+def new_scene(edit, name: str, size, length: int):
+    """A scene for an effect of the edit, with a camera and an empty annotation."""
     scene = bpy.data.scenes.new(name)
     scene.render.engine = ENGINE
-    scene.virtual_shutter.identity = uuid.uuid4().hex
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
-    scene.frame_start, scene.frame_end = 1, max(1, int(source.content_end - source.content_start))
+    scene.frame_start, scene.frame_end = 1, length
     # A Scene strip plays at its scene's rate; at the edit's it shows one frame per timeline frame.
     scene.render.fps, scene.render.fps_base = edit.render.fps, edit.render.fps_base
     # Without a camera, Blender renders a Scene strip empty and never asks the engine.
     camera = bpy.data.objects.new(f"{name} Camera", bpy.data.cameras.new(f"{name} Camera"))
     scene.collection.objects.link(camera)
     scene.camera = camera
+    scene.annotation = bpy.data.annotations.new(name)
     return scene

@@ -21,6 +21,10 @@ class Window:
         self.source, self.capacity = source, capacity
         self.frames: dict[int, np.ndarray] = {}
 
+    @property
+    def held(self):
+        return self.frames.keys()
+
     def load(self, wanted) -> None:
         wanted = set(wanted)
         for index in self.frames.keys() - wanted:

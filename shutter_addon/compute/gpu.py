@@ -92,6 +92,11 @@ class Window:
             self._textures = [device.texture(source.width, rows, capacity, self._kind)]
         self.picture = device.texture(source.width, source.height, 1, "rgba32f")
 
+    @property
+    def held(self):
+        """The source frames that are loaded."""
+        return self._held.values()
+
     def load(self, wanted) -> None:
         """Reads what is missing of the source frames `wanted`, which lie within `capacity` of one another."""
         for index in sorted(wanted):

@@ -96,6 +96,11 @@ class Renderer:
         needed = indices[low:high] if (indices[low:high] >= 0).all() else indices[indices >= 0]
         return set(needed.tolist())
 
+    def missing(self, index: int, direction: int, instant: Instant) -> set[int]:
+        """Those of the needed source frames that still must be read."""
+        held = self._window.held if self._window and self._window.capacity == instant.options.window else ()
+        return self.needed(index, direction, instant).difference(held)
+
     @property
     def _everywhere(self) -> int:
         """The block that holds the whole picture."""

@@ -1,5 +1,7 @@
 """Pictures and recipes for the tests of the Blender layer."""
 
+from contextlib import contextmanager
+
 import numpy as np
 import OpenImageIO
 
@@ -41,3 +43,14 @@ def recipe(window, *shutters, regions=(), **options):
             entry["bars"] = [float(b) for b in bars]
         entries.append(entry)
     return {"version": 1, "window": window, "shutters": entries, "regions": list(regions), **options}
+
+
+@contextmanager
+def sequencer(bpy):
+    """The context of a sequencer: the operators of its menus ask for one. Gives its area."""
+    window = bpy.data.window_managers[0].windows[0]
+    window.workspace.sequencer_scene = bpy.context.scene
+    area = window.screen.areas[0]
+    area.type = "SEQUENCE_EDITOR"
+    with bpy.context.temp_override(window=window, area=area):
+        yield area

@@ -1,12 +1,11 @@
 """Which source frame an effect shows: what Blender itself shows for the plain strip, whatever was done to it."""
 
 import ctypes
-from contextlib import contextmanager
 
 import av
 import numpy as np
 import pytest
-from support import recipe, write_frames
+from support import recipe, sequencer, write_frames
 
 LEVELS = 1
 
@@ -201,17 +200,6 @@ def test_a_movie_of_240_fps_that_keeps_its_speed(bpy, edit, render, effect_on, f
     assert source.right_handle - source.left_handle < 10
     strip, _ = effect_on(source)
     check(edit, render, [strip], range(source.left_handle, source.right_handle))
-
-
-@contextmanager
-def sequencer(bpy):
-    """The context of a sequencer: the operators of its menus ask for one. Gives its area."""
-    window = bpy.data.window_managers[0].windows[0]
-    window.workspace.sequencer_scene = bpy.context.scene
-    area = window.screen.areas[0]
-    area.type = "SEQUENCE_EDITOR"
-    with bpy.context.temp_override(window=window, area=area):
-        yield area
 
 
 def add_by_operator(bpy, edit, path):

@@ -1,0 +1,100 @@
+"""The sequencer keeps finished frames; this drops them when what an effect depends on has changed.
+
+Blender knows of a strip's own properties only. Properties of the effect drop frames by their update callbacks; keys,
+strokes and the source are compared with what they were, as no callback tells of them.
+"""
+
+import numpy as np
+
+from . import animation, strips
+
+_signatures: dict = {}
+
+# Keyframe.interpolation as a number: constant, linear, bezier, then the others.
+_BEZIER = 2
+_PLACE = ("offset_x", "offset_y", "scale_x", "scale_y", "rotation")
+_TIMING = (
+    *("content_start", "content_end", "content_trim_start", "content_trim_end", "left_handle", "right_handle"),
+    *("use_reverse_frames", "strobe"),
+)
+_READING = ("filepath", "directory", "stream_index", "alpha_mode", "use_deinterlace")
+
+
+def invalidate(edit, scene=None) -> None:
+    """Drops the finished frames of an edit's effect strips; of those that show one scene, if given."""
+    for strip in strips.effect_strips(edit):
+        if scene is None or strip.scene == scene:
+            strip.invalidate_cache("RAW")  # and with them all that was composed of them
+
+
+def invalidate_changed(edit) -> bool:
+    """Drops the finished frames of the edit's effects whose keys, strokes or source have changed since the last call;
+    whether there were any.
+
+    The values of keyed properties do not count: they change with every frame that plays."""
+    if not edit.virtual_shutter.effects:
+        return False
+    changed = False
+    shown = {strip.scene: strip for strip in strips.effect_strips(edit)}
+    for effect in edit.virtual_shutter.effects:
+        if (strip := shown.get(effect.scene)) is None:
+            continue
+        signature = hash(tuple(_signature(edit, effect, strip)))
+        if _signatures.setdefault(effect.scene.session_uid, signature) != signature:
+            _signatures[effect.scene.session_uid] = signature
+            invalidate(edit, effect.scene)
+            changed = True
+    return changed
+
+
+def _signature(edit, effect, strip):
+    """All that the effect's pictures depend on, but for properties with an update callback."""
+    for shutter in effect.shutters:
+        yield shutter.name, len(shutter.bars)
+    for region in effect.regions:
+        yield region.shutter
+        yield from _strokes(effect.scene.annotation, region.layer)
+    path = effect.path_from_id()
+    for curve in animation.curves_under(edit, path + "."):
+        yield curve.data_path.removeprefix(path), curve.array_index, curve.mute, curve.extrapolation
+        yield from _keys(curve.keyframe_points)
+        for modifier in curve.modifiers:
+            yield from (
+                repr(getattr(modifier, p.identifier)) for p in modifier.bl_rna.properties if p.type != "POINTER"
+            )
+    transform = strip.transform
+    yield tuple(getattr(transform, name) for name in _PLACE), tuple(transform.origin)
+    if (source := strips.nearest_source(edit, effect, strip)) is not None:
+        yield from _source(source)
+
+
+def _keys(points):
+    for name in ("handle_left", "co", "handle_right"):
+        yield _bytes(points, name, 2, np.float32)
+    interpolations = _bytes(points, "interpolation", 1, np.int32)
+    yield interpolations
+    if max(interpolations, default=0) > _BEZIER:  # one of those that have parameters
+        yield _bytes(points, "easing", 1, np.int32)
+        for name in ("back", "amplitude", "period"):
+            yield _bytes(points, name, 1, np.float32)
+
+
+def _strokes(annotation, layer: str):
+    for drawing in annotation.layers[layer].frames if annotation and layer in annotation.layers else ():
+        yield drawing.frame_number
+        for stroke in drawing.strokes:
+            yield _bytes(stroke.points, "co", 3, np.float32)
+
+
+def _source(source):
+    yield tuple(getattr(source, name, None) for name in (*_TIMING, *_READING))
+    yield source.colorspace_settings.name
+    yield tuple(key.timeline_frame for key in source.retiming_keys)
+    if source.type == "IMAGE":
+        yield len(source.elements), source.elements[0].filename if source.elements else None
+
+
+def _bytes(collection, name: str, size: int, dtype) -> bytes:
+    values = np.empty(size * len(collection), dtype)
+    collection.foreach_get(name, values)
+    return values.tobytes()

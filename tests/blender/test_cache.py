@@ -1,0 +1,205 @@
+"""Every change that changes pictures reaches the sequencer's cache of finished frames; playing does not."""
+
+import json
+
+import numpy as np
+import pytest
+from support import recipe, write_frames
+
+from shutter_addon.core import recipe as recipes
+
+REGION = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
+MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
+KEYED = recipe(4, {1: [1, 0, 0, 0], 9: [0, 0, 1, 0]}, [1, 1, 1, 1], regions=[MOVED], border=True)
+FRAME = 5
+
+
+@pytest.fixture
+def images(tmp_path):
+    frames = np.random.default_rng(0).integers(0, 256, (30, 32, 32, 3), dtype=np.uint8)
+    return write_frames(tmp_path / "in", frames)
+
+
+@pytest.fixture
+def effect(bpy, edit, images):
+    """An effect on an image strip, with keyed bars and a region that moves."""
+    from shutter_addon.blender import effects, strips
+
+    edit.render.resolution_x = edit.render.resolution_y = 32
+    source = edit.sequence_editor.strips.new_image("images", str(images), 1, 1)
+    for file in sorted(images.parent.iterdir())[1:]:
+        source.elements.append(file.name)
+    strip, effect = strips.add_effect(edit, source)
+    effects.apply(edit, effect, strip, recipes.parse(json.dumps(KEYED)))
+    bpy.context.view_layer.update()
+    return effect
+
+
+def curve(edit, name):
+    from shutter_addon.blender import animation
+
+    return next(c for c in animation.curves_under(edit, "virtual_shutter") if c.data_path.endswith(name))
+
+
+def layer(edit):
+    return edit.virtual_shutter.effects[0].scene.annotation.layers[0]
+
+
+def insert_key(edit):
+    edit.virtual_shutter.effects[0].shutters[0].bars[3].weight = 1
+    edit.keyframe_insert("virtual_shutter.effects[0].shutters[0].bars[3].weight", frame=FRAME)
+
+
+def insert_key_only(edit):
+    key = curve(edit, "shutters[0].bars[1].weight").keyframe_points.insert(FRAME, 1)
+    assert key.co[1] == 1
+
+
+def move_key(edit):
+    curve(edit, "shutters[0].bars[0].weight").keyframe_points[1].co[0] = 6
+
+
+def change_value(edit):
+    curve(edit, "regions[0].location").keyframe_points[1].co[1] = 0.6
+
+
+def delete_key(edit):
+    points = curve(edit, "regions[0].location").keyframe_points
+    points.remove(points[1])
+
+
+def move_handle(edit):
+    points = curve(edit, "regions[0].location").keyframe_points
+    points[0].interpolation = "BEZIER"
+    points[0].handle_right = 8, 0.2
+    points[0].handle_right_type = "FREE"
+
+
+def change_ease(edit):
+    curve(edit, "regions[0].location").keyframe_points[0].interpolation = "CONSTANT"
+
+
+def change_exotic_ease(edit):
+    point = curve(edit, "regions[0].location").keyframe_points[0]
+    point.interpolation, point.back = "BACK", 9
+
+
+def mute_curve(edit):
+    edit.frame_set(1)  # the value stays what it is at this frame
+    curve(edit, "regions[0].location").mute = True
+
+
+def add_modifier(edit):
+    noise = curve(edit, "regions[0].location").modifiers.new("NOISE")
+    noise.strength = 2
+
+
+def draw_stroke(edit):
+    stroke = layer(edit).frames[0].strokes.new()
+    stroke.points.add(3)
+    stroke.points.foreach_set("co", [-16, 16, 0, 0, 16, 0, -16, 0, 0])
+
+
+def erase_stroke(edit):
+    strokes = layer(edit).frames[0].strokes
+    strokes.remove(strokes[0])
+
+
+def move_points(edit):
+    for point in layer(edit).frames[0].strokes[0].points:
+        point.co[0] -= 8
+
+
+def delete_layer(edit):
+    edit.virtual_shutter.effects[0].scene.annotation.layers.remove(layer(edit))
+
+
+def remove_shutter(edit):
+    edit.virtual_shutter.effects[0].shutters.remove(1)
+
+
+def rename_shutter(edit):
+    edit.virtual_shutter.effects[0].shutters[1].name = "Other"
+
+
+def change_property(edit):
+    edit.virtual_shutter.effects[0].interpolation = "VALUE"
+    edit.virtual_shutter.effects[0].position = "END"
+
+
+def reverse_source(edit):
+    edit.sequence_editor.strips["images"].use_reverse_frames = True
+
+
+def slip_source(edit):
+    edit.sequence_editor.strips["images"].content_start -= 3
+
+
+def move_effect_strip(edit):
+    """Strokes lie in the sequencer's image: they stay where they are."""
+    strip = next(s for s in edit.sequence_editor.strips if s.type == "SCENE")
+    strip.transform.offset_x += 6
+
+
+CHANGES = [
+    insert_key, insert_key_only, move_key, change_value, delete_key, move_handle, change_ease, change_exotic_ease,
+    mute_curve, add_modifier, draw_stroke, erase_stroke, move_points, delete_layer, remove_shutter, rename_shutter,
+    change_property, reverse_source, slip_source, move_effect_strip,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=lambda change: change.__name__)
+def test_a_change_is_rendered(bpy, edit, effect, render, change):
+    """And equals what a render without any cache gives."""
+    before = render(edit, [FRAME])[FRAME]
+    change(edit)
+    bpy.context.view_layer.update()
+    after = render(edit, [FRAME])[FRAME]
+    assert not np.array_equal(after, before)
+    edit.sequence_editor.use_cache_raw = edit.sequence_editor.use_cache_final = False
+    render(edit, [FRAME + 1])
+    assert np.array_equal(render(edit, [FRAME])[FRAME], after)
+
+
+@pytest.mark.parametrize("change", [change_value, change_property, draw_stroke, erase_stroke])
+def test_undo_and_redo_are_rendered(bpy, edit, effect, render, change):
+    before = render(edit, [FRAME])[FRAME]
+    bpy.ops.ed.undo_push(message="before")
+    change(edit)
+    bpy.ops.ed.undo_push(message="after")
+    after = render(edit, [FRAME])[FRAME]
+    assert not np.array_equal(after, before)
+    for _ in range(2):
+        bpy.ops.ed.undo()
+        assert np.array_equal(render(bpy.context.scene, [FRAME])[FRAME], before)
+        bpy.ops.ed.redo()
+        assert np.array_equal(render(bpy.context.scene, [FRAME])[FRAME], after)
+
+
+def test_the_cache_is_on(bpy, edit, effect, render):
+    """What the other tests rest on: without the handlers, a frame would be the old one."""
+    from shutter_addon.blender import handlers
+
+    before = render(edit, [FRAME])[FRAME]
+    handlers.unregister()
+    try:
+        change_value(edit)
+        assert np.array_equal(render(edit, [FRAME])[FRAME], before)
+    finally:
+        handlers.register()
+    assert not np.array_equal(render(edit, [FRAME])[FRAME], before)
+
+
+def test_finished_frames_are_kept_while_nothing_changes(bpy, edit, effect, render, images):
+    """Frames are there even when their files are not: playing and selecting drop none."""
+    before = render(edit, [3, FRAME])
+    for path in images.parent.iterdir():
+        path.unlink()
+    for frame in range(1, 20):
+        edit.frame_set(frame)
+        bpy.context.view_layer.update()
+    edit.frame_end += 1
+    curve(edit, "regions[0].location").keyframe_points[0].select_control_point = True
+    bpy.context.view_layer.update()
+    for frame, picture in render(edit, [FRAME, 3]).items():
+        assert np.array_equal(picture, before[frame])

@@ -1,0 +1,245 @@
+"""Effects go with their strips, and come back with them: deleted, undone, cut and pasted, copied."""
+
+import json
+
+import numpy as np
+import pytest
+from support import recipe, sequencer, write_frames
+
+from shutter_addon.core import recipe as recipes
+
+REGION = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
+MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
+KEYED = recipe(4, {1: [1, 0, 0, 0], 9: [0, 0, 0, 1]}, [1, 1, 1, 1], regions=[MOVED])
+
+
+@pytest.fixture(autouse=True)
+def _no_exception(capfd):
+    """Blender prints what a handler raises, and goes on."""
+    yield
+    assert "Traceback" not in capfd.readouterr().err
+
+
+@pytest.fixture
+def images(tmp_path):
+    frames = np.random.default_rng(0).integers(0, 256, (30, 32, 32, 4), dtype=np.uint8)
+    frames[..., 3] |= 128
+    return write_frames(tmp_path / "in", frames)
+
+
+@pytest.fixture
+def add(edit, images):
+    """Puts an image strip with an effect at a frame of the edit."""
+    from shutter_addon.blender import effects, strips
+
+    edit.render.resolution_x = edit.render.resolution_y = 32
+
+    def add(start=1, data=KEYED):
+        source = edit.sequence_editor.strips.new_image("images", str(images), 1, start)
+        for file in sorted(images.parent.iterdir())[1:]:
+            source.elements.append(file.name)
+        strip, effect = strips.add_effect(edit, source)
+        effects.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
+        return strip
+
+    return add
+
+
+def update(bpy):
+    bpy.context.view_layer.update()
+
+
+def census(bpy):
+    """How many there are of all that an effect needs."""
+    return {name: len(getattr(bpy.data, name)) for name in ("scenes", "cameras", "objects", "annotations", "actions")}
+
+
+def curves(edit):
+    from shutter_addon.blender import animation
+
+    return {
+        (curve.data_path, curve.array_index): [tuple(key.co) for key in curve.keyframe_points]
+        for curve in animation.curves_under(edit, "")
+    }
+
+
+def scene_strips(edit):
+    return [strip for strip in edit.sequence_editor.strips_all if strip.type == "SCENE"]
+
+
+def test_a_deleted_strip_takes_its_effect_along(bpy, edit, add, render):
+    first, second = add(1), add(101, recipe(4, {101: [0, 1, 0, 0], 111: [0, 0, 1, 0]}))
+    third = add(201)
+    shown = render(edit, [205])[205]
+    paths = {path for path, _ in curves(edit)}
+    edit.sequence_editor.strips.remove(second)
+    update(bpy)
+    assert [effect.start for effect in edit.virtual_shutter.effects] == [1, 201]
+    assert census(bpy) == {"scenes": 3, "cameras": 2, "objects": 2, "annotations": 2, "actions": 1}
+    assert {path for path, _ in curves(edit)} == {
+        p.replace("effects[2]", "effects[1]") for p in paths if "effects[1]" not in p
+    }
+    assert np.array_equal(render(edit, [205])[205], shown)
+    edit.sequence_editor.strips.remove(first)
+    edit.sequence_editor.strips.remove(third)
+    update(bpy)
+    assert not edit.virtual_shutter.effects
+    assert not curves(edit)
+    assert census(bpy) == {"scenes": 1, "cameras": 0, "objects": 0, "annotations": 0, "actions": 1}
+
+
+def test_a_source_that_was_muted_shows_again(bpy, edit, add):
+    strip = add()
+    source = edit.sequence_editor.strips["images"]
+    assert source.mute
+    right, right_source = strip.split(11, "SOFT"), source.split(11, "SOFT")
+    edit.sequence_editor.strips.remove(right)
+    update(bpy)
+    assert (source.mute, right_source.mute) == (True, False)
+    edit.sequence_editor.strips.remove(strip)
+    update(bpy)
+    assert not source.mute
+
+
+def test_a_source_that_the_user_muted_stays_so(bpy, edit, images):
+    from shutter_addon.blender import strips
+
+    source = edit.sequence_editor.strips.new_image("images", str(images), 1, 1)
+    source.mute = True
+    strip, _ = strips.add_effect(edit, source)
+    edit.sequence_editor.strips.remove(strip)
+    update(bpy)
+    assert source.mute
+
+
+def test_a_deleted_edit_takes_its_effects_along(bpy, edit, add):
+    add()
+    other = bpy.data.scenes.new("Other")
+    bpy.context.window.scene = other
+    bpy.data.scenes.remove(edit)
+    update(bpy)
+    assert [scene.name for scene in bpy.data.scenes] == ["Other"]
+    assert not bpy.data.cameras
+    assert not bpy.data.annotations
+
+
+def test_a_scene_that_the_window_shows_stays(bpy, edit, add):
+    strip = add()
+    scene = strip.scene
+    bpy.context.window.scene = scene
+    edit.sequence_editor.strips.remove(strip)
+    update(bpy)
+    assert bpy.context.window.scene == scene
+    bpy.context.window.scene = edit
+    edit.frame_end += 1
+    update(bpy)
+    assert list(bpy.data.scenes) == [edit]
+
+
+@pytest.mark.parametrize("late", [True, False])
+def test_undo_brings_an_effect_back_and_redo_removes_it_again(bpy, edit, add, render, late):
+    """late: in a window, the handler comes after the undo push."""
+    from shutter_addon.blender import handlers
+
+    add(1), add(101, recipe(4, {101: [0, 1, 0, 0], 111: [0, 0, 1, 0]}))
+    before = render(edit, [5, 105])
+    known, everything = curves(edit), census(bpy)
+    bpy.ops.ed.undo_push(message="add")
+    if late:
+        bpy.app.handlers.depsgraph_update_post.remove(handlers.HANDLERS["depsgraph_update_post"])
+    edit.sequence_editor.strips.remove(scene_strips(edit)[0])
+    bpy.ops.ed.undo_push(message="delete")
+    if late:
+        bpy.app.handlers.depsgraph_update_post.append(handlers.HANDLERS["depsgraph_update_post"])
+    handlers.HANDLERS["depsgraph_update_post"]()
+    assert len(edit.virtual_shutter.effects) == 1
+    for _ in range(2):
+        bpy.ops.ed.undo()
+        edit = bpy.context.scene
+        assert curves(edit) == known
+        assert census(bpy) == everything
+        after = render(edit, [5, 105])
+        assert all(np.array_equal(after[frame], before[frame]) for frame in before)
+        bpy.ops.ed.redo()
+        edit = bpy.context.scene
+        update(bpy)
+        assert [effect.start for effect in edit.virtual_shutter.effects] == [101]
+        assert census(bpy) == {"scenes": 2, "cameras": 1, "objects": 1, "annotations": 1, "actions": 1}
+
+
+@pytest.mark.parametrize("cut", [True, False])
+def test_pasted_strips_have_their_effect(bpy, edit, add, render, cut):
+    """Blender's clipboard does not hold the scenes that strips show."""
+    add()
+    before = render(edit, [1, 5, 9, 20])
+    assert not np.array_equal(before[1], before[20])
+    for s in edit.sequence_editor.strips:
+        s.select = True
+    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+        bpy.ops.sequencer.copy()
+        if cut:
+            bpy.ops.sequencer.delete()
+            update(bpy)
+            assert not edit.virtual_shutter.effects
+        for start in (101, 201):
+            edit.frame_set(start)
+            bpy.ops.sequencer.paste()
+            update(bpy)
+    shown = render(edit, [frame + 100 for frame in before] + [frame + 200 for frame in before])
+    assert [effect.start for effect in edit.virtual_shutter.effects] == ([101, 201] if cut else [1, 101, 201])
+    for frame, picture in before.items():
+        assert np.array_equal(shown[frame + 100], picture)
+        assert np.array_equal(shown[frame + 200], picture)
+    identities = [strip.scene.virtual_shutter.identity for strip in scene_strips(edit)]
+    assert len(set(identities)) == len(identities)
+
+
+def test_a_cut_strip_pasted_into_another_edit(bpy, edit, add, render):
+    add()
+    before = render(edit, [5])[5]
+    other = edit.copy()
+    update(bpy)
+    for s in list(other.sequence_editor.strips):
+        other.sequence_editor.strips.remove(s)
+    update(bpy)
+    assert not other.virtual_shutter.effects
+    assert curves(edit)
+    assert np.array_equal(render(edit, [5])[5], before)
+    for s in edit.sequence_editor.strips:
+        s.select = True
+    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+        bpy.ops.sequencer.copy()
+    bpy.context.window.scene = other
+    other.frame_set(1)
+    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+        bpy.ops.sequencer.paste()
+    assert np.array_equal(render(other, [5])[5], before)
+    assert other.virtual_shutter.effects[0].scene != edit.virtual_shutter.effects[0].scene
+
+
+def test_a_region_follows_its_layer(bpy, edit, add):
+    strip = add()
+    effect = edit.virtual_shutter.effects[0]
+    layer = strip.scene.annotation.layers[0]
+    strip.scene.annotation.layers.new("Another")
+    update(bpy)
+    layer.info = "Renamed"
+    update(bpy)
+    assert effect.regions[0].layer == "Renamed"
+    from shutter_addon.blender import effects
+
+    assert len(effects.instant(edit, effect, strip, 5).shapes[0].strokes) == 1
+    strip.scene.annotation.layers.remove(layer)
+    update(bpy)
+    assert effect.regions[0].layer == "Renamed"
+    assert effects.instant(edit, effect, strip, 5).shapes[0].strokes == ()
+
+
+def test_linked_scenes_stay(bpy, edit, add, tmp_path):
+    add()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, wanted):
+        wanted.scenes = ["Shutter images"]
+    update(bpy)
+    assert "Shutter images" in bpy.data.scenes
