@@ -1,5 +1,7 @@
 // The shutters' colours in shares of a pixel's coefficients.
 // coefficients: top row first, four shutters per layer, `block` pixels of `size` along each side of a texel.
+#include "show.glsl"
+
 void main()
 {
   ivec2 pixel = ivec2(vec2(at.x, 1.0 - at.y) * vec2(size));
@@ -10,5 +12,5 @@ void main()
     mix_of_colors += share * texelFetch(palette, ivec3(i, 0, 0), 0).rgb;
     sum += share;
   }
-  shown = vec4(mix_of_colors / max(sum, 1e-6), 1.0) * opacity;
+  shown = on_region(vec4(mix_of_colors / max(sum, 1e-6), 1.0) * opacity);
 }

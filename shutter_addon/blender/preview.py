@@ -26,7 +26,7 @@ _AHEAD = 4
 _PROXY_SHRINK = {"PROXY_50": 2, "PROXY_25": 4}
 
 
-def redraw(*_) -> None:
+def redraw(_settings, _context) -> None:
     """Draws all previews again."""
     for _window, area in strips.previews(bpy.context):
         area.tag_redraw()  # of the area alone, Blender's picture and ours
@@ -227,6 +227,7 @@ def _shader(name: str):
         between.smooth("VEC2", "at")
         info = gpu.types.GPUShaderCreateInfo()
         info.push_constant("MAT4", "ModelViewProjectionMatrix")
+        info.push_constant("BOOL", "srgbTarget")  # set by Blender: what is drawn into encodes by itself
         for constant, kind in _CONSTANTS[name].items():
             info.push_constant(kind, constant)
         for slot, (sampler, kind) in enumerate(_SAMPLERS[name].items()):
@@ -265,7 +266,8 @@ def register():
     for cls in classes:
         bpy.utils.register_class(cls)
     bpy.types.WindowManager.virtual_shutter = PointerProperty(type=ShutterPreview)
-    _handler = bpy.types.SpaceSequenceEditor.draw_handler_add(_draw, (), "PREVIEW", "POST_PIXEL")
+    # After the sequencer's picture and before annotations and gizmos, which stay visible.
+    _handler = bpy.types.SpaceSequenceEditor.draw_handler_add(_draw, (), "PREVIEW", "POST_VIEW")
 
 
 def unregister():
