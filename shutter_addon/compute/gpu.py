@@ -125,7 +125,7 @@ class Window:
         if self._linearises:
             rgb = light.straight(frame)[..., :3] if self.source.alpha == "premultiplied" else frame[..., :3]
             scale = frame[..., 3:] if self.source.alpha == "premultiplied" else 1
-            frame[..., :3] = light.to_linear(rgb) * scale
+            frame = np.concatenate([light.to_linear(rgb) * scale, frame[..., 3:]], axis=-1)
         return frame
 
     def _write(self, frame: np.ndarray, layer: int) -> None:

@@ -1,8 +1,9 @@
 """Frames of a source: movies by PyAV, image sequences by OpenImageIO. No bpy."""
 
+from .ahead import Ahead
 from .errors import MediaError
 from .movie import MovieSource
 from .sequence import SequenceSource
 from .source import Source, open_source
 
-__all__ = ["MediaError", "MovieSource", "SequenceSource", "Source", "open_source"]
+__all__ = ["Ahead", "MediaError", "MovieSource", "SequenceSource", "Source", "open_source"]
