@@ -178,8 +178,8 @@ class SHUTTER_GGT_bars(GizmoGroup):
     @classmethod
     def setup_keymap(cls, keyconfig):
         keymap = keyconfig.keymaps.new(cls.bl_idname, space_type=cls.bl_space_type, region_type="WINDOW")
-        keymap.keymap_items.new("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", any=True)
         keymap.keymap_items.new("shutter.bar_set", "LEFTMOUSE", "DOUBLE_CLICK")
+        keymap.keymap_items.new("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", any=True)
         keymap.keymap_items.new("shutter.bars_key", "I", "PRESS")
         keymap.keymap_items.new("shutter.bars_unkey", "I", "PRESS", alt=True)
         return keymap

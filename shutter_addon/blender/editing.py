@@ -53,7 +53,11 @@ def unique(name: str, taken) -> str:
 
 
 def start(effect) -> None:
-    """What a new effect begins with: a long shutter everywhere, and a sharp one to scribble with."""
+    """What a new effect begins with: a long shutter everywhere, and a sharp one to scribble with.
+
+    With the border, the first scribble is sharp around itself; without, it would be the only one, and hold everywhere.
+    """
+    effect.border = True
     add_shutter(effect, "Long", presets.bars("ANGLE_360", effect.window))
     add_shutter(effect, "Sharp", presets.bars("STILL", effect.window))
 

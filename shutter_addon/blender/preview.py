@@ -98,7 +98,8 @@ def _draw() -> None:
     edit = strips.edit_of(context)
     if edit is not None and edit.library is None and cache.invalidate_changed(edit):
         context.area.tag_redraw()
-    if not settings.live:
+    # A stroke that is being drawn would lie below our picture: Blender's own shows the same.
+    if not settings.live or any(op.bl_idname == "GPENCIL_OT_annotate" for op in context.window.modal_operators):
         return
     found = shown(context)
     if found is None:
@@ -135,6 +136,18 @@ def _show(context, found: Shown, settings) -> None:
         left = settings.split if settings.view == "SPLIT" else 0.0
         texture = renderer.draw(moment.index, moment.instant, moment.direction)
         quad.draw("show_picture", {"picture": texture}, left, 1.0, opacity=found.strip.blend_alpha)
+        _show_strokes(context, quad, found.effect, moment)
+
+
+def _show_strokes(context, quad, effect, moment) -> None:
+    """The scribbles where they are by now; Blender's own annotations lie below the picture, where they were drawn."""
+    space = context.space_data
+    if not (space.show_overlays and space.preview_overlay.show_annotation):
+        return
+    for shape in moment.instant.shapes:
+        color = (*effect.shutters[shape.shutter].color, 1.0)
+        for points in shape.strokes:
+            drawing.lines(quad.on_region(points), color, closed=shape.kind == "lasso", width=2)
 
 
 def _show_source(quad, found: Shown, moment, left: float, right: float) -> None:
@@ -177,17 +190,15 @@ class Quad:
     """Where a strip's picture lies in a preview's region, its crop and flips considered."""
 
     def __init__(self, region, strip, size):
-        self._view = region.view2d
-        self._matrix = geometry.picture_to_image(strip, size)
+        self._matrix = geometry.picture_to_region(strip, size, region)
         crop, (width, height) = strip.crop, size
         self._low = np.array([crop.min_x / width, crop.min_y / height])
         self._high = 1 - np.array([crop.max_x / width, crop.max_y / height])
         self._flip = np.array([strip.use_flip_x, strip.use_flip_y])
 
-    def region_point(self, x: float, y: float) -> tuple[float, float]:
-        """A point of the strip's picture, in fractions, in pixels of the region."""
-        (image,) = geometry.mapped(self._matrix, np.array([[x, y]]))
-        return self._view.view_to_region(*image, clip=False)
+    def on_region(self, points) -> np.ndarray:
+        """Points (n, 2) of the strip's picture, in fractions, in pixels of the region."""
+        return geometry.mapped(self._matrix, np.asarray(points, dtype=np.float64))
 
     def draw(self, name: str, textures: dict, left: float = 0.0, right: float = 1.0, **constants) -> None:
         """Draws from `left` to `right`, in fractions of the picture's width, through a shader of shaders/."""
@@ -202,7 +213,7 @@ class Quad:
             shader.uniform_sampler(sampler, texture.gpu)
         for constant, value in constants.items():
             (shader.uniform_float if isinstance(value, float) else shader.uniform_int)(constant, value)
-        where = {"corner": [self.region_point(*corner) for corner in corners], "place": places}
+        where = {"corner": self.on_region(corners).tolist(), "place": places}
         gpu.state.blend_set("ALPHA_PREMULT")
         batch_for_shader(shader, "TRI_FAN", where).draw(shader)
         gpu.state.blend_set("NONE")

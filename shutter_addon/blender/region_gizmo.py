@@ -1,5 +1,7 @@
 """Where the active region lies, and handles to move, turn and scale it in the sequencer's preview."""
 
+from dataclasses import dataclass
+
 import bpy
 import numpy as np
 from bpy.types import Gizmo, GizmoGroup
@@ -8,58 +10,53 @@ from ..core import scribbles
 from . import drawing, editing, effects, geometry, strips
 
 _RADIUS = 7  # of a handle, in units of the interface
+_NEAREST = 0.03  # of the corner's handle to the centre's, in parts of the picture
 _MARK = (1.0, 1.0, 1.0, 0.9)
 
 
+@dataclass(frozen=True)
 class Place:
-    """A region as the picture at the current frame has it, in pixels of the preview's region.
+    """Where a region's handles are at the current frame, in pixels of the preview's region.
 
-    strokes: lists of points (n, 2); centre and corner: the handles that move, and that turn and scale."""
+    centre: the handle that moves; corner: the one that turns and scales. to_region: the matrix from fractions of the
+    picture, whose width over its height is aspect."""
 
-    def __init__(self, context, found, region):
-        edit, effect, strip = found
-        index = list(effect.regions).index(region)
-        size = effects.picture_size(effect)
-        self.matrix = geometry.picture_to_image(strip, size)
-        self.aspect = size[0] / size[1]
-        self.view = context.region.view2d
-        path = f"{effect.path_from_id()}.regions[{index}]"
-        strokes = effects.strokes_at(edit, effect, strip, index, edit.frame_current_final)
-        moved = scribbles.transform(strokes, region.location, np.degrees(region.rotation), region.scale, self.aspect)
-        self.path = path
-        self.is_moved = any(region.location) or region.rotation or region.scale != 1
-        self.strokes = [self.to_region(points) for points in moved]
-        points = np.concatenate(strokes)
-        low, high = points.min(axis=0), points.max(axis=0)
-        anchor = np.stack([(low + high) / 2, np.maximum(high, (low + high) / 2 + 0.03)])
-        around = scribbles.transform(
-            [anchor - anchor[0], anchor[0] - anchor], (0, 0), np.degrees(region.rotation), region.scale, self.aspect
-        )
-        self.centre, self.corner = self.to_region(anchor[0] + np.asarray(region.location) + around[0])
+    centre: np.ndarray
+    corner: np.ndarray
+    to_region: np.ndarray
+    aspect: float
 
-    def to_region(self, points) -> np.ndarray:
-        image = geometry.mapped(self.matrix, np.asarray(points))
-        return np.array([self.view.view_to_region(x, y, clip=False) for x, y in image], dtype=np.float64)
-
-    def to_picture(self, x: float, y: float) -> np.ndarray:
-        image = np.array([self.view.region_to_view(x, y)])
-        return geometry.mapped(np.linalg.inv(self.matrix), image)[0]
+    def on_picture(self, point) -> np.ndarray:
+        """A point of the region, in fractions of the picture."""
+        return geometry.mapped(np.linalg.inv(self.to_region), np.array([point], dtype=np.float64))[0]
 
 
 def place(context) -> Place | None:
-    """The active region's place, or None where there is none or nothing is drawn."""
+    """The place of the active region's handles, or None where there is no region, or nothing of it is drawn."""
     found = strips.active(context)
     region = editing.active_region(found[1]) if found else None
     if region is None:
         return None
-    layer = editing.layer_of(found[1], region)
-    if layer is None or not any(stroke.points for drawing_ in layer.frames for stroke in drawing_.strokes):
-        return None
     edit, effect, strip = found
-    index = list(effect.regions).index(region)
-    if not effects.strokes_at(edit, effect, strip, index, edit.frame_current_final):
+    strokes = effects.strokes_at(edit, effect, strip, effect.active_region, edit.frame_current_final)
+    if not strokes:
         return None
-    return Place(context, found, region)
+    width, height = effects.picture_size(effect)
+    points = np.concatenate(strokes)
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = (low + high) / 2
+    corner = np.maximum(high, middle + _NEAREST)
+    # Mirrored at the middle as well, so that it is what the corner turns about.
+    ((_, moved, _),) = scribbles.transform(
+        [[2 * middle - corner, corner, middle]],
+        region.location,
+        np.degrees(region.rotation),
+        region.scale,
+        width / height,
+    )
+    to_region = geometry.picture_to_region(strip, (width, height), context.region)
+    ends = geometry.mapped(to_region, np.stack([middle + np.array(region.location), moved]))
+    return Place(*ends, to_region, width / height)
 
 
 class SHUTTER_GT_region(Gizmo):
@@ -74,9 +71,6 @@ class SHUTTER_GT_region(Gizmo):
         if (where := place(context)) is None:
             return
         if not self.turns:
-            color = (*editing.active_shutter(strips.active(context)[1]).color, 0.9)
-            for points in where.strokes if where.is_moved else ():
-                drawing.lines(points, color, width=1.5)
             drawing.lines([where.centre, where.corner], (1, 1, 1, 0.4))
         x, y = where.corner if self.turns else where.centre
         radius = drawing.ui_scale() * _RADIUS * (1.3 if self.is_highlight else 1.0)
@@ -110,7 +104,7 @@ class SHUTTER_GT_region(Gizmo):
         return {"RUNNING_MODAL"}
 
     def _move(self, region, point, snap: bool):
-        moved = self.where.to_picture(*point) - self.where.to_picture(*self.grabbed)
+        moved = self.where.on_picture(point) - self.where.on_picture(self.grabbed)
         if snap:  # along one axis
             moved[np.abs(moved * (self.where.aspect, 1)).argmin()] = 0
         region.location = np.array(self.before[0]) + moved
