@@ -19,15 +19,19 @@ def instant(edit, effect, strip, frame: float) -> recipe.Instant:
         raise EffectError(f'"{effect.name}" has no shutter')
     curves, path = animation.Curves(edit), effect.path_from_id()
     bars = [
-        _bars_at(curves, f"{path}.shutters[{i}]", shutter, effect.window, frame)
+        checked(shutter.name, bars_at(curves, f"{path}.shutters[{i}]", shutter, effect.window, frame), frame)
         for i, shutter in enumerate(effect.shutters)
     ]
-    for shutter, values in zip(effect.shutters, bars, strict=True):
-        try:
-            shutters.check_bars(values)
-        except shutters.ShutterError as error:
-            raise EffectError(f'shutter "{shutter.name}" at frame {frame:g}: {error}') from None
     return recipe.Instant(options(effect), np.stack(bars), tuple(_shapes_at(edit, effect, strip, curves, frame)))
+
+
+def checked(name: str, bars: np.ndarray, frame: float) -> np.ndarray:
+    """The bars of a shutter at a frame. EffectError: no picture can be made of them."""
+    try:
+        shutters.check_bars(bars)
+    except shutters.ShutterError as error:
+        raise EffectError(f'shutter "{name}" at frame {frame:g}: {error}') from None
+    return bars
 
 
 def options(effect) -> recipe.Options:
@@ -36,8 +40,8 @@ def options(effect) -> recipe.Options:
     return recipe.Options(effect.window, **words, aggregate=int(effect.aggregate), border=effect.border)
 
 
-def _bars_at(curves, path: str, shutter, window: int, frame: float) -> np.ndarray:
-    """Bars at a frame; between keys by displacement, with the ease of the F-curves."""
+def bars_at(curves, path: str, shutter, window: int, frame: float) -> np.ndarray:
+    """Bars (L,) of a shutter at a frame; between keys by displacement, with the ease of the F-curves."""
     stored = np.zeros(window)
     weights = [bar.weight for bar in shutter.bars][:window]
     stored[: len(weights)] = weights
@@ -51,6 +55,8 @@ def _bars_at(curves, path: str, shutter, window: int, frame: float) -> np.ndarra
         return bars
 
     frames = animation.key_frames(keyed.values())
+    if not frames:  # curves of samples or of modifiers alone
+        return at(frame)
     before, after, _ = keyframes.span(frames, frame)
     if before == after:
         return at(frames[before])
@@ -92,11 +98,12 @@ def _strokes_at(effect, region, timing, frame: float, to_picture, aspect: float)
     numbers = [drawing.frame_number for drawing in drawings]
     before, after, u = keyframes.span(numbers, frame)
     u = keyframes.eased(u, animation.ease_at(timing, numbers[before]))
-    first, second = (_points(drawings[i], to_picture) for i in (before, after))
+    first, second = (points(drawings[i], to_picture) for i in (before, after))
     return scribbles.between_strokes(first, second, u, aspect)
 
 
-def _points(drawing, to_picture) -> list[np.ndarray]:
+def points(drawing, to_picture) -> list[np.ndarray]:
+    """The strokes (n, 2) of an annotation's frame, on the picture."""
     result = []
     for stroke in drawing.strokes:
         flat = np.empty(len(stroke.points) * 3, dtype=np.float32)
