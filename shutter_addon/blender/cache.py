@@ -6,7 +6,7 @@ strokes and the source are compared with what they were, as no callback tells of
 
 import numpy as np
 
-from . import animation, strips
+from . import animation, sources, strips
 
 _signatures: dict = {}
 
@@ -17,7 +17,6 @@ _TIMING = (
     *("content_start", "content_end", "content_trim_start", "content_trim_end", "left_handle", "right_handle"),
     *("use_reverse_frames", "strobe"),
 )
-_READING = ("filepath", "directory", "stream_index", "alpha_mode", "use_deinterlace")
 
 
 def invalidate(edit, scene=None) -> None:
@@ -87,9 +86,10 @@ def _strokes(annotation, layer: str):
 
 
 def _source(source):
-    yield tuple(getattr(source, name, None) for name in (*_TIMING, *_READING))
-    yield source.colorspace_settings.name
-    yield tuple(key.timeline_frame for key in source.retiming_keys)
+    yield tuple(getattr(source, name) for name in _TIMING)
+    yield sources.reading(source)
+    yield getattr(source, "filepath", None), getattr(source, "directory", None)
+    yield tuple(key.timeline_frame for key in getattr(source, "retiming_keys", ()))
     if source.type == "IMAGE":
         yield len(source.elements), source.elements[0].filename if source.elements else None
 

@@ -19,15 +19,19 @@ def instant(edit, effect, strip, frame: float) -> recipe.Instant:
         raise EffectError(f'"{effect.name}" has no shutter')
     curves, path = animation.Curves(edit), effect.path_from_id()
     bars = [
-        bars_at(curves, f"{path}.shutters[{i}]", shutter, effect.window, frame)
+        checked(shutter.name, bars_at(curves, f"{path}.shutters[{i}]", shutter, effect.window, frame), frame)
         for i, shutter in enumerate(effect.shutters)
     ]
-    for shutter, values in zip(effect.shutters, bars, strict=True):
-        try:
-            shutters.check_bars(values)
-        except shutters.ShutterError as error:
-            raise EffectError(f'shutter "{shutter.name}" at frame {frame:g}: {error}') from None
     return recipe.Instant(options(effect), np.stack(bars), tuple(_shapes_at(edit, effect, strip, curves, frame)))
+
+
+def checked(name: str, bars: np.ndarray, frame: float) -> np.ndarray:
+    """The bars of a shutter at a frame. EffectError: no picture can be made of them."""
+    try:
+        shutters.check_bars(bars)
+    except shutters.ShutterError as error:
+        raise EffectError(f'shutter "{name}" at frame {frame:g}: {error}') from None
+    return bars
 
 
 def options(effect) -> recipe.Options:
@@ -52,6 +56,8 @@ def bars_at(curves, path: str, shutter, window: int, frame: float) -> np.ndarray
         return bars
 
     frames = animation.key_frames(keyed.values())
+    if not frames:  # curves of samples or of modifiers alone
+        return at(frame)
     before, after, _ = keyframes.span(frames, frame)
     if before == after:
         return at(frames[before])
@@ -100,11 +106,12 @@ def strokes_at(edit, effect, strip, index: int, frame: float, curves=None) -> li
     timing = (curves or animation.Curves(edit)).find(f"{effect.path_from_id()}.regions[{index}].location")
     to_picture = np.linalg.inv(geometry.picture_to_image(strip, (width, height)))
     u = keyframes.eased(u, animation.ease_at(timing, numbers[before]))
-    first, second = (_points(drawings[i], to_picture) for i in (before, after))
+    first, second = (points(drawings[i], to_picture) for i in (before, after))
     return scribbles.between_strokes(first, second, u, width / height)
 
 
-def _points(drawing, to_picture) -> list[np.ndarray]:
+def points(drawing, to_picture) -> list[np.ndarray]:
+    """The strokes (n, 2) of an annotation's frame, on the picture."""
     result = []
     for stroke in drawing.strokes:
         flat = np.empty(len(stroke.points) * 3, dtype=np.float32)

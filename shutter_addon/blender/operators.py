@@ -6,7 +6,7 @@ from bpy.types import Operator
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..core import presets, recipe
-from . import editing, effects, icons, strips
+from . import editing, effects, export, icons, strips
 from .pictures import FAULTS
 from .properties import KINDS
 
@@ -382,7 +382,7 @@ class SHUTTER_OT_recipe_export(_OfEffect, ExportHelper, Operator):
     def change(self, context, effect):
         edit, _effect, strip = strips.active(context)
         try:
-            recipe.save(effects.export(edit, effect, strip), self.filepath)
+            recipe.save(export.recipe_of(edit, effect, strip), self.filepath)
         except (recipe.RecipeError, effects.EffectError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

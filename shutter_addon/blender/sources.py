@@ -1,6 +1,7 @@
 """The medium of a source strip: what it is, opened as shutter_addon.media has it."""
 
 import os
+import re
 from pathlib import Path
 
 import bpy
@@ -11,33 +12,56 @@ from ..media import MediaError, open_source
 def media_key(strip) -> tuple:
     """What the strip reads and how; equal keys give the same frames."""
     paths = _paths(strip)
+    stamps = tuple(_stamp(path) for path in dict.fromkeys((paths[0], paths[-1])))
+    return strip.type, tuple(map(str, paths)), stamps, *reading(strip)
+
+
+def reading(strip) -> tuple:
+    """How the strip's files are read: colour space, alpha and the like."""
+    clip = strip.clip if strip.type == "MOVIECLIP" else None
     return (
-        strip.type,
-        tuple(map(str, paths)),
-        tuple(_stamp(path) for path in dict.fromkeys((paths[0], paths[-1]))),
-        strip.colorspace_settings.name,
+        (clip or strip).colorspace_settings.name,
         strip.alpha_mode,
         strip.use_deinterlace,
         getattr(strip, "stream_index", 0),
+        clip and (clip.filepath, clip.frame_offset, strip.undistort, strip.stabilize2d),
     )
 
 
 def open_media(strip):
     """The strip's medium, as Blender would show it. MediaError: it cannot be read."""
     paths = _paths(strip)
-    config = Path(bpy.utils.system_resource("DATAFILES", path="colormanagement/config.ocio"))
+    config = Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"), "config.ocio")  # finds folders only
     return open_source(
         paths[0],
-        files=paths if strip.type == "IMAGE" else None,
+        files=None if _is_movie(strip) else paths,
         stream=getattr(strip, "stream_index", 0),
-        colorspace=strip.colorspace_settings.name,
+        colorspace=reading(strip)[0],
         config=config,
-        alpha="premultiplied" if strip.alpha_mode == "PREMUL" else "straight",
-        deinterlace=strip.use_deinterlace,
+        alpha=_alpha(strip),
+        deinterlace=strip.type == "MOVIE" and strip.use_deinterlace,
     )
 
 
+def first_frame(strip) -> int:
+    """Which frame of the medium is the first of the strip's content."""
+    return strip.clip.frame_offset if strip.type == "MOVIECLIP" and _is_movie(strip) else 0
+
+
+def _is_movie(strip) -> bool:
+    return strip.type == "MOVIE" or (strip.type == "MOVIECLIP" and strip.clip.source == "MOVIE")
+
+
+def _alpha(strip) -> str | None:
+    """An image strip has its own idea of its files' alpha; a clip takes what is usual for them."""
+    if strip.type == "MOVIECLIP":
+        return None
+    return "premultiplied" if strip.alpha_mode == "PREMUL" else "straight"
+
+
 def _paths(strip) -> list[Path]:
+    if strip.type == "MOVIECLIP":
+        return _clip_paths(strip)
     library = strip.id_data.library
     if strip.type == "MOVIE":
         return [Path(bpy.path.abspath(strip.filepath, library=library))]
@@ -46,6 +70,25 @@ def _paths(strip) -> list[Path]:
     if not paths:
         raise MediaError(f'strip "{strip.name}" has no files')
     return paths
+
+
+def _clip_paths(strip) -> list[Path]:
+    """A clip's movie, or its images by their numbers, without a gap."""
+    clip = strip.clip
+    if clip is None:
+        raise MediaError(f'strip "{strip.name}" has no clip')
+    if strip.undistort or strip.stabilize2d:
+        raise MediaError(f'strip "{strip.name}": undistorted or stabilized clips are not supported')
+    path = Path(bpy.path.abspath(clip.filepath, library=clip.library))
+    number = re.search(r"(\d+)(\D*)$", path.stem)
+    if clip.source == "MOVIE" or number is None:
+        return [path]
+    first, digits = int(number[1]) + clip.frame_offset, len(number[1])
+    stem = path.stem[: number.start()]
+    return [
+        path.with_name(f"{stem}{first + i:0{digits}d}{number[2]}{path.suffix}")
+        for i in range(max(clip.frame_duration, 1))
+    ]
 
 
 def _stamp(path: Path):

@@ -7,7 +7,7 @@ import bpy
 from . import effects, sources
 
 ENGINE = "VIRTUAL_SHUTTER"
-SOURCES = ("MOVIE", "IMAGE")
+SOURCES = ("MOVIE", "IMAGE", "MOVIECLIP")
 _LOOK = ("use_flip_x", "use_flip_y", "color_multiply", "color_saturation", "multiply_alpha")
 
 
@@ -125,7 +125,7 @@ def nearest_source(edit, effect, strip):
 
 
 def add_effect(edit, source):
-    """Puts a new effect on a movie or image strip: its strip above the source, same range, transform and crop.
+    """Puts a new effect on a movie, image or clip strip: its strip above the source, same range, transform and crop.
 
     Returns strip and effect; the effect has no shutter yet. MediaError: the source cannot be read."""
     medium = sources.open_media(source)

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import sources
+
 # eSeqRetimingKeyFlag: the key starts a smooth transition between two speeds.
 _TRANSITION_IN = 1 << 0
 
@@ -20,7 +22,7 @@ class RetimingKey:
 
 
 def source_frame(strip, frame: float, medium, scene_fps: float) -> int:
-    """Source frame that a movie or image strip shows at a timeline frame; medium: its opened medium.
+    """Source frame that a source strip shows at a timeline frame; medium: its opened medium.
 
     Trims, cuts, playback rate, retiming keys, reversed frames and strobe as Blender's sequencer applies them.
     """
@@ -31,6 +33,8 @@ def source_frame(strip, frame: float, medium, scene_fps: float) -> int:
     def position(time):
         return _position(strip, keys, rate, length, time)
 
+    if strip.type == "MOVIECLIP":  # Blender takes the whole part
+        return int(position(frame)) + strip.content_trim_start + sources.first_frame(strip)
     # Blender decodes the nearest frame, but keeps it for every position with the same whole part: of a slow strip that
     # plays forward, the first of those positions decides.
     whole = int(position(frame))
@@ -66,13 +70,14 @@ def _playback_rate(strip, keys, length: int, rate: float) -> float:
 def _retiming_keys(strip) -> list[RetimingKey]:
     """The strip's retiming keys from Blender's memory: Python gets their timeline frames, but not what they show.
 
+    Of a clip strip it gets none at all.
     SeqRetimingKey begins with double strip_frame_index, int flag, float retiming_factor.
     """
 
     class Raw(ctypes.Structure):
         _fields_ = (("index", ctypes.c_double), ("flag", ctypes.c_int), ("factor", ctypes.c_float))
 
-    raw = [Raw.from_address(key.as_pointer()) for key in strip.retiming_keys]
+    raw = [Raw.from_address(key.as_pointer()) for key in getattr(strip, "retiming_keys", ())]
     return [RetimingKey(key.index, key.flag, key.factor) for key in raw]
 
 

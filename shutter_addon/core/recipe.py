@@ -378,8 +378,9 @@ def _check(recipe: Recipe) -> None:
         require(region.width >= 0, f"{place}.width", f"{region.width} is negative")
         require(region.drawings()[0][1], f"{place}.strokes", "empty: nothing is drawn")
         _check_frames(region.keys, place, require)
+        redrawn = any(key.strokes is not None for key in region.keys)
         for k, key in enumerate(region.keys):
-            whole = key.strokes is None or key.frame == int(key.frame)
+            whole = not (redrawn if k == 0 else key.strokes is not None) or key.frame == int(key.frame)
             require(whole, f"{place}.keys[{k}].frame", f"{key.frame:g} is no whole frame, but redrawn")
         for where, strokes in [(place, region.strokes)] + [
             (f"{place}.keys[{k}]", key.strokes) for k, key in enumerate(region.keys) if key.strokes is not None

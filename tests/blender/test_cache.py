@@ -118,10 +118,6 @@ def remove_shutter(edit):
     edit.virtual_shutter.effects[0].shutters.remove(1)
 
 
-def rename_shutter(edit):
-    edit.virtual_shutter.effects[0].shutters[1].name = "Other"
-
-
 def change_property(edit):
     edit.virtual_shutter.effects[0].interpolation = "VALUE"
     edit.virtual_shutter.effects[0].position = "END"
@@ -143,7 +139,7 @@ def move_effect_strip(edit):
 
 CHANGES = [
     insert_key, insert_key_only, move_key, change_value, delete_key, move_handle, change_ease, change_exotic_ease,
-    mute_curve, add_modifier, draw_stroke, erase_stroke, move_points, delete_layer, remove_shutter, rename_shutter,
+    mute_curve, add_modifier, draw_stroke, erase_stroke, move_points, delete_layer, remove_shutter,
     change_property, reverse_source, slip_source, move_effect_strip,
 ]  # fmt: skip
 

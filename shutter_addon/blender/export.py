@@ -1,0 +1,192 @@
+"""The recipe of an effect: the inverse of effects.apply.
+
+Blender keeps numbers as float32: a recipe gets the shortest decimals that give the same ones back, and points to a
+millionth of the picture. So a recipe's numbers come back as they were written, up to seven digits.
+Between two keys a recipe knows three eases. Where Blender's curves do something else, by free handles, channels keyed
+apart, modifiers, there is a key per frame: at every whole frame recipe and effect agree within TOLERANCE.
+"""
+
+import math
+from dataclasses import asdict
+from decimal import Decimal
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+
+from ..core import keyframes, recipe
+from . import animation, effects, geometry
+
+# Of bars, of fractions of the picture, of degrees; of the value itself where that is above 1.
+TOLERANCE = 1e-4
+_CHANNELS = (("location", 0), ("location", 1), ("rotation", 0), ("scale", 0))
+
+
+def recipe_of(edit, effect, strip) -> recipe.Recipe:
+    """The effect as a recipe, whose frame 1 is the strip's first. EffectError: it cannot be rendered as it stands.
+
+    Left out are regions without strokes or shutter, drawings before the first that has strokes, and keys of a width."""
+    if not effect.shutters:
+        raise effects.EffectError(f'"{effect.name}" has no shutter')
+    curves, path = animation.Curves(edit), effect.path_from_id()
+    names = _different([shutter.name for shutter in effect.shutters])
+    shutters = [
+        _shutter(curves, f"{path}.shutters[{i}]", shutter, names[i], effect.window, strip)
+        for i, shutter in enumerate(effect.shutters)
+    ]
+    regions = [
+        _region(curves, f"{path}.regions[{i}]", region, effect, strip)
+        for i, region in enumerate(effect.regions)
+        if region.shutter in names
+    ]
+    options = asdict(effects.options(effect))
+    found = recipe.Recipe(1, shutters=shutters, regions=[region for region in regions if region], **options)
+    return recipe.parse(recipe.dump(found))
+
+
+def _different(names: list[str]) -> list[str]:
+    """The names, those that occur again with a number: regions mean the first."""
+    result = []
+    for name in names:
+        number = 1
+        while (new := name if number == 1 else f"{name} {number}") in result:
+            number += 1
+        result.append(new)
+    return result
+
+
+def _shutter(curves, path: str, source, name: str, window: int, strip) -> recipe.Shutter:
+    def bars(frame):
+        return effects.checked(source.name, effects.bars_at(curves, path, source, window, frame), frame)
+
+    color = tuple(map(_short, source.color))
+    keyed = [curve for k in range(window) if (curve := curves.find(f"{path}.bars[{k}].weight"))]
+    if not keyed:
+        return recipe.Shutter(name, color, [_short(v) for v in bars(strip.left_handle)])
+    keys = _keys(bars, keyframes.between_bars, keyed, animation.key_frames(keyed), {}, strip)
+    return recipe.Shutter(
+        name,
+        color,
+        keys=[recipe.ShutterKey(_frame(frame, strip), [_short(v) for v in bars(frame)], ease) for frame, ease in keys],
+    )
+
+
+def _region(curves, path: str, source, effect, strip) -> recipe.Region | None:
+    drawings = _drawings(effect, source, strip)
+    if not drawings:
+        return None
+    width = _short(curves.value(source, path, "width", strip.left_handle))
+    keyed = [curve for name, index in _CHANNELS if (curve := curves.find(f"{path}.{name}", index))]
+    timing = curves.find(f"{path}.location")
+    place = partial(_place, curves, path, source)
+    frames = set(animation.key_frames(keyed))
+    # The ease from a drawing to the next is that of the key at its frame.
+    words = {number: animation.ease_at(timing, number) for number in drawings} if len(drawings) > 1 else {}
+    frames.update(words)
+    if not frames and tuple(place(strip.left_handle)) != (0, 0, 0, 1):
+        frames.add(strip.left_handle)
+    keys = _keys(place, _mixed, keyed, sorted(frames), words, strip) if frames or keyed else []
+    first = min(drawings)
+    redrawn = {number: strokes for number, strokes in drawings.items() if words and number != keys[0][0]}
+    return recipe.Region(
+        source.shutter,
+        source.name,
+        source.kind.lower(),
+        width,
+        drawings[first],
+        [_region_key(frame, place(frame), redrawn.get(frame), ease, strip) for frame, ease in keys],
+    )
+
+
+def _region_key(frame: float, place, strokes, ease: str, strip) -> recipe.RegionKey:
+    x, y, rotation, scale = place
+    return recipe.RegionKey(
+        _frame(frame, strip), (_short(x), _short(y)), _short_degrees(rotation), _short(scale), strokes, ease
+    )
+
+
+def _place(curves, path: str, source, frame: float) -> np.ndarray:
+    """Location, rotation in degrees and scale of a region at a frame."""
+    values = (curves.value(source, path, name, frame) for name in ("location", "rotation", "scale"))
+    (x, y), rotation, scale = values
+    return np.array([x, y, math.degrees(rotation), scale])
+
+
+def _mixed(first, second, u: float) -> np.ndarray:
+    return (1 - u) * first + u * second
+
+
+def _drawings(effect, source, strip) -> dict[int, list]:
+    """A region's strokes by the timeline frames they were drawn at, from the first that has any."""
+    annotation = effect.scene.annotation
+    layer = annotation.layers.get(source.layer) if annotation else None
+    size = effect.scene.render.resolution_x, effect.scene.render.resolution_y
+    to_picture = np.linalg.inv(geometry.picture_to_image(strip, size))
+    drawings = sorted(layer.frames, key=lambda drawing: drawing.frame_number) if layer else []
+    result = {}
+    for drawing in drawings:
+        strokes = [
+            [tuple(point) for point in np.round(points, 6).tolist()] for points in effects.points(drawing, to_picture)
+        ]
+        if strokes or result:
+            result[drawing.frame_number] = strokes
+    return result
+
+
+def _keys(truth, between, keyed, frames: list, words: dict, strip) -> list[tuple[float, str]]:
+    """Frames and eases of the keys by which `between` gives the truth at every whole frame.
+
+    keyed: the F-curves; frames: where there has to be a key; words: the ease that a key has to have."""
+    shown = range(strip.left_handle, strip.right_handle)
+    if not frames:
+        return [(frame, "linear") for frame in shown]
+
+    def baked(frames, held):
+        frames = list(frames)
+        still = all(_near(truth(frame), truth(held)) for frame in frames)
+        return [] if still else [(frame, "linear") for frame in frames]
+
+    keys = baked((frame for frame in shown if frame < frames[0]), frames[0])
+    for first, second in pairwise(frames):
+        inner = range(math.floor(first) + 1, math.ceil(second))
+        ends, values = (truth(first), truth(second)), [truth(frame) for frame in inner]
+        shares = [(frame - first) / (second - first) for frame in inner]
+        candidates = [words[first]] if first in words else [_word(keyed, first), *keyframes.EASES]
+
+        def fits(word, ends=ends, values=values, shares=shares):
+            found = (between(*ends, keyframes.eased(share, word)) for share in shares)
+            return all(map(_near, found, values))
+
+        word = next(filter(fits, candidates), None)
+        keys.append((first, word or candidates[0]))
+        keys += [] if word else [(frame, "linear") for frame in inner]
+    last = frames[-1]
+    keys.append((last, words.get(last) or _word(keyed, last)))
+    return keys + baked((frame for frame in shown if frame > last), last)
+
+
+def _word(keyed, frame: float) -> str:
+    """The ease of the first curve that has a key at a frame."""
+    curve = next((curve for curve in keyed if frame in animation.key_frames([curve])), None)
+    return animation.ease_at(curve, frame)
+
+
+def _near(values, others) -> bool:
+    return bool(np.all(np.abs(values - others) <= TOLERANCE * np.maximum(1, np.abs(others))))
+
+
+def _short(value: float) -> float:
+    """The shortest decimal that is the same float32."""
+    return float(str(np.float32(value)))
+
+
+def _short_degrees(degrees: float) -> float:
+    """The shortest decimal that is the same float32 in radians."""
+    wanted = np.float32(math.radians(degrees))
+    numbers = (float(f"{degrees:.{digits}g}") for digits in range(1, 17))
+    return next((number for number in numbers if np.float32(np.radians(number)) == wanted), degrees)
+
+
+def _frame(frame: float, strip) -> float:
+    """A timeline frame as the recipe counts; in decimals, where 31.1 less 30 is 1.1."""
+    return float(Decimal(str(np.float32(frame))) - (strip.left_handle - 1))

@@ -1,0 +1,136 @@
+"""Clip strips as sources: what Blender shows of the plain strip, whatever the clip's settings."""
+
+import json
+
+import av
+import numpy as np
+import OpenImageIO
+import pytest
+from support import recipe, write_frames
+
+from shutter_addon.core import recipe as recipes
+
+RNG = np.random.default_rng(0)
+
+
+@pytest.fixture(scope="module")
+def movie(tmp_path_factory):
+    path = tmp_path_factory.mktemp("movie") / "noise.mkv"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=24, options={"qp": "0"})
+        stream.width, stream.height, stream.pix_fmt = 48, 32, "yuv420p"
+        for _ in range(20):
+            small = RNG.integers(0, 256, (8, 12, 3), dtype=np.uint8).repeat(4, 0).repeat(4, 1)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(small, format="rgb24")))
+        container.mux(stream.encode())
+    return path
+
+
+def pngs(folder, channels=3, count=12, samples=np.uint8):
+    top = np.iinfo(samples).max
+    return write_frames(folder, RNG.integers(0, top, (count, 32, 48, channels), dtype=samples))
+
+
+def exrs(folder, count=4):
+    folder.mkdir()
+    for i in range(1, count + 1):
+        pixels = RNG.random((32, 48, 4), dtype=np.float32)
+        pixels[..., :3] *= pixels[..., 3:]
+        output = OpenImageIO.ImageOutput.create("exr")
+        output.open(str(folder / f"f{i:04d}.exr"), OpenImageIO.ImageSpec(48, 32, 4, "half"))
+        output.write_image(pixels)
+        output.close()
+    return folder / "f0001.exr"
+
+
+@pytest.fixture
+def clip_strip(bpy, edit):
+    """A clip strip of a file at frame 1 in an edit of its size."""
+    edit.render.resolution_x, edit.render.resolution_y = 48, 32
+    edit.frame_start, edit.frame_end = -100, 300
+
+    def make(path, start=1):
+        return edit.sequence_editor.strips.new_clip("clip", bpy.data.movieclips.load(str(path)), 1, start)
+
+    return make
+
+
+def check(edit, render, source, frames, depth="8", levels=1):
+    from shutter_addon.blender import effects, strips
+
+    plain = render(edit, frames, depth)
+    strip, effect = strips.add_effect(edit, source)
+    effects.apply(edit, effect, strip, recipes.parse(json.dumps(recipe(4, [1, 0, 0, 0]))))
+    shown = render(edit, [int(frame) for frame in np.random.default_rng(0).permutation(list(frames))], depth)
+    for frame in frames:
+        solid = plain[frame][..., 3] > 25
+        assert np.abs(shown[frame] - plain[frame])[solid].max() <= levels, f"at frame {frame}"
+        assert np.abs(shown[frame] - plain[frame])[..., 3].max() <= levels, f"at frame {frame}"
+        assert plain[frame][..., 0].std() > 20
+    return strip
+
+
+def test_a_movie(edit, render, clip_strip, movie):
+    check(edit, render, clip_strip(movie), range(1, 21, 2))
+
+
+def test_start_and_offset_of_a_movie(edit, render, clip_strip, movie):
+    source = clip_strip(movie, 40)
+    source.clip.frame_start, source.clip.frame_offset = 7, 5
+    check(edit, render, source, range(40, 54, 3))
+
+
+def test_trimmed_cut_and_reversed(edit, render, clip_strip, movie):
+    source = clip_strip(movie, 40)
+    source.left_handle, source.right_handle = 43, 55
+    source.use_reverse_frames = True
+    right = source.split(48, "HARD")
+    check(edit, render, right, range(48, 55))
+
+
+def test_a_real_film(edit, render, clip_strip, bunny):
+    edit.render.resolution_x, edit.render.resolution_y = 1280, 720
+    check(edit, render, clip_strip(bunny), [1, 50, 132], levels=0)
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+def test_images(edit, render, tmp_path, clip_strip, channels):
+    check(edit, render, clip_strip(pngs(tmp_path / "in", channels)), range(1, 13, 2))
+
+
+def test_deep_images(edit, render, tmp_path, clip_strip):
+    check(edit, render, clip_strip(pngs(tmp_path / "in", 4, samples=np.uint16)), [1, 5], depth="16")
+
+
+def test_start_and_offset_of_images(bpy, edit, render, tmp_path, clip_strip):
+    first = pngs(tmp_path / "in")
+    source = clip_strip(first.with_name("f0003.png"))
+    source.clip.frame_start, source.clip.frame_offset = 30, 2
+    check(edit, render, source, range(1, 8))
+
+
+def test_float_images(edit, render, tmp_path, clip_strip):
+    check(edit, render, clip_strip(exrs(tmp_path / "in")), [1, 2, 4], depth="16")
+
+
+@pytest.mark.parametrize("space", ["Non-Color", "Linear Rec.709", "Rec.2020", "AgX Log"])
+def test_colour_spaces(edit, render, tmp_path, clip_strip, movie, space):
+    source = clip_strip(pngs(tmp_path / "in"))
+    spaces = source.clip.colorspace_settings.bl_rna.properties["name"].enum_items.keys()
+    source.clip.colorspace_settings.name = next(name for name in spaces if name.startswith(space))
+    check(edit, render, source, [1, 2, 7], depth="16")
+
+
+def test_what_is_not_supported_is_said(edit, clip_strip, movie):
+    from shutter_addon.blender import pictures, strips
+
+    source = clip_strip(movie)
+    strip, effect = strips.add_effect(edit, source)
+    effect.shutters.add().bars.add()
+    pictures.picture(strip.scene, 1)
+    source.stabilize2d = True
+    with pytest.raises(pictures.FAULTS, match='"clip": undistorted or stabilized clips are not supported'):
+        pictures.picture(strip.scene, 1)
+    source.stabilize2d, source.clip = False, None
+    with pytest.raises(pictures.FAULTS, match='"clip" has no clip'):
+        pictures.picture(strip.scene, 1)

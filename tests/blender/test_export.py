@@ -1,0 +1,308 @@
+"""Effects as recipes: what was imported comes back exactly, and what Blender's own tools made agrees at every frame."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from support import write_frames
+
+from shutter_addon.core import recipe as recipes
+
+FIRST, LAST = 31, 70
+ASPECT = 40 / 24
+
+
+def short(value):
+    """A decimal that float32 keeps."""
+    return float(str(np.float32(value)))
+
+
+def numbers(low, high):
+    return st.floats(low, high, allow_subnormal=False, width=32).map(short)
+
+
+points = st.tuples(*[st.integers(-1_000_000, 2_000_000).map(lambda n: n / 1e6)] * 2)
+strokes = st.lists(st.lists(points, min_size=1, max_size=4), min_size=1, max_size=3)
+eases = st.sampled_from(["linear", "bezier", "constant"])
+text = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=12)
+frames = st.lists(st.integers(-20, 200).map(lambda n: n / 4), min_size=1, max_size=4, unique=True).map(sorted)
+whole_frames = st.lists(st.integers(-20, 60).map(float), min_size=1, max_size=4, unique=True).map(sorted)
+
+
+@st.composite
+def shutters(draw, name, window):
+    bars = st.lists(numbers(0, 1e6), min_size=window, max_size=window).filter(any)
+    color = draw(st.tuples(*[numbers(0, 1)] * 3))
+    if draw(st.booleans()):
+        return recipes.Shutter(name, color, draw(bars))
+    keys = [recipes.ShutterKey(frame, draw(bars), draw(eases)) for frame in draw(frames)]
+    return recipes.Shutter(name, color, keys=keys)
+
+
+@st.composite
+def regions(draw, names):
+    redrawn = draw(st.booleans())
+    keys = []
+    for i, frame in enumerate(draw(whole_frames if redrawn else frames) if draw(st.booleans()) else []):
+        location = draw(st.tuples(*[numbers(-100, 100)] * 2))
+        rotation = draw(st.integers(-720_00, 720_00)) / 100
+        drawn = draw(strokes) if redrawn and i and draw(st.booleans()) else None
+        keys.append(recipes.RegionKey(frame, location, rotation, draw(numbers(-50, 50)), drawn, draw(eases)))
+    kind, width = draw(st.sampled_from(["line", "lasso"])), draw(numbers(0, 10))
+    return recipes.Region(draw(st.sampled_from(names)), draw(text), kind, width, draw(strokes), keys)
+
+
+@st.composite
+def valid_recipes(draw):
+    window = draw(st.integers(1, 6))
+    names = draw(st.lists(text, min_size=1, max_size=3, unique=True))
+    return recipes.Recipe(
+        1,
+        window,
+        [draw(shutters(name, window)) for name in names],
+        draw(st.lists(regions(names), max_size=3)),
+        draw(st.sampled_from(["start", "center", "end"])),
+        draw(st.sampled_from(["displacement", "value"])),
+        draw(st.sampled_from(["linear", "encoded"])),
+        draw(st.sampled_from(["normalized", "weighted"])),
+        draw(st.sampled_from(["hold", "mirror", "shorten"])),
+        draw(st.sampled_from([1, 2, 4])),
+        draw(st.booleans()),
+    )
+
+
+@pytest.fixture
+def effect_on(bpy, edit, tmp_path):
+    """An effect on an image strip from frame 31 to 70; gives edit, effect and strip."""
+    from shutter_addon.blender import strips
+
+    first = write_frames(tmp_path / "in", np.zeros((2, 24, 40, 3), dtype=np.uint8))
+    source = edit.sequence_editor.strips.new_image("images", str(first), 1, FIRST)
+    source.right_handle = LAST + 1
+    strip, effect = strips.add_effect(edit, source)
+    return edit, effect, strip
+
+
+def apply(effect_on, data):
+    from shutter_addon.blender import effects
+
+    effects.apply(*effect_on, recipes.parse(json.dumps(data)) if isinstance(data, dict) else data)
+
+
+def export(effect_on):
+    from shutter_addon.blender.export import recipe_of
+
+    return recipe_of(*effect_on)
+
+
+@settings(max_examples=60, suppress_health_check=list(HealthCheck))
+@given(valid_recipes())
+def test_a_recipe_comes_back_as_it_was(effect_on, source):
+    apply(effect_on, source)
+    assert export(effect_on) == source
+
+
+@settings(max_examples=30, suppress_health_check=list(HealthCheck))
+@given(valid_recipes(), st.floats(-2, 2), st.floats(0.3, 3), st.floats(-300, 300))
+def test_on_a_moved_turned_and_scaled_strip(effect_on, source, rotation, scale, offset):
+    t = effect_on[2].transform
+    t.rotation, t.scale_x, t.scale_y, t.offset_x, t.origin = rotation, scale, 1.3, offset, (0.2, 0.7)
+    apply(effect_on, source)
+    found = export(effect_on)
+    for region, wanted in zip(found.regions, source.regions, strict=True):
+        for stroke, original in zip(region.strokes, wanted.strokes, strict=True):
+            assert np.allclose(stroke, original, rtol=0, atol=2e-6)
+    apply(effect_on, found)
+    again = export(effect_on)
+    assert dataclasses.replace(again, regions=[]) == dataclasses.replace(found, regions=[])
+
+
+@settings(max_examples=60, suppress_health_check=list(HealthCheck))
+@given(st.floats(1e-3, 1e3), st.floats(-1000, 1000), st.floats(0, 1e4))
+def test_numbers_that_float32_cannot_hold(effect_on, weight, degrees, width):
+    """The nearest that it can; and from then on the same."""
+    region = {"shutter": "A", "width": width, "strokes": [[[0.1, 0.2]]], "keys": [{"frame": 1, "rotation": degrees}]}
+    shutter = {"name": "A", "bars": [weight]}
+    apply(effect_on, {"version": 1, "window": 1, "shutters": [shutter], "regions": [region]})
+    found = export(effect_on)
+    assert np.float32(found.shutters[0].bars[0]) == np.float32(weight)
+    assert np.float32(found.regions[0].width) == np.float32(width)
+    assert np.float32(np.radians(found.regions[0].keys[0].rotation)) == np.float32(np.radians(degrees))
+    apply(effect_on, found)
+    assert export(effect_on) == found
+
+
+BASE = {
+    "version": 1,
+    "window": 4,
+    "shutters": [
+        {"name": "Plain", "bars": [1, 1, 1, 1]},
+        {
+            "name": "Keyed",
+            "keys": [
+                {"frame": 3, "bars": [1, 0, 0.5, 0], "ease": "bezier"},
+                {"frame": 17, "bars": [0, 0.2, 0, 1]},
+                {"frame": 30, "bars": [0.3, 0, 0, 1]},
+            ],
+        },
+    ],
+    "regions": [
+        {
+            "shutter": "Keyed",
+            "name": "Face",
+            "strokes": [[[0.1, 0.5], [0.4, 0.6]]],
+            "keys": [
+                {"frame": 2, "location": [0.1, 0]},
+                {"frame": 20, "location": [0.5, 0.3], "rotation": 90, "scale": 2, "ease": "bezier"},
+                {"frame": 33, "strokes": [[[0.3, 0.2], [0.9, 0.9], [0.8, 0.1]]], "scale": 0.5},
+            ],
+        }
+    ],
+}
+
+
+def curve(edit, name, index=0):
+    from shutter_addon.blender import animation
+
+    found = (c for c in animation.curves_under(edit, "virtual_shutter") if c.data_path.endswith(name))
+    return next(c for c in found if c.array_index == index)
+
+
+def blenders_own_handles(edit, effect):
+    for name in ("location", "rotation", "scale", "shutters[1].bars[2].weight"):
+        for key in curve(edit, name).keyframe_points:
+            key.interpolation, key.handle_left_type, key.handle_right_type = "BEZIER", "AUTO_CLAMPED", "AUTO_CLAMPED"
+        curve(edit, name).update()
+
+
+def free_handles(edit, effect):
+    key = curve(edit, "location").keyframe_points[0]
+    key.interpolation, key.handle_right_type, key.handle_right = "BEZIER", "FREE", (45, 3)
+
+
+def keyed_by_blender_in_part(edit, effect):
+    """Some bars, some channels, some frames."""
+    for name in ("bars[0].weight", "bars[3].weight", "rotation", "scale"):
+        from shutter_addon.blender import animation
+
+        found = next(c for c in animation.curves_under(edit, "") if c.data_path.endswith(name))
+        animation.remove_curves(edit, found.data_path)
+    for frame, weight in ((35, 0.9), (50, 0.2)):
+        effect.shutters[1].bars[1].weight = weight
+        edit.keyframe_insert("virtual_shutter.effects[0].shutters[1].bars[1].weight", frame=frame)
+    effect.regions[0].rotation = 1
+    edit.keyframe_insert("virtual_shutter.effects[0].regions[0].rotation", frame=44.5)
+    effect.regions[0].scale = 0.7
+
+
+def elastic(edit, effect):
+    for name in ("location", "shutters[1].bars[0].weight"):
+        curve(edit, name).keyframe_points[0].interpolation = "ELASTIC"
+
+
+def modifiers(edit, effect):
+    curve(edit, "location").modifiers.new("CYCLES")
+    curve(edit, "rotation").modifiers.new("NOISE")
+
+
+def extrapolated(edit, effect):
+    curve(edit, "location").extrapolation = "LINEAR"
+
+
+def muted(edit, effect):
+    curve(edit, "location", 1).mute = True
+    curve(edit, "shutters[1].bars[3].weight").mute = True
+
+
+def sampled(edit, effect):
+    for name in ("location", "shutters[1].bars[0].weight"):
+        curve(edit, name).convert_to_samples(25, 80)
+
+
+def placed_without_keys(edit, effect):
+    from shutter_addon.blender import animation
+
+    animation.remove_curves(edit, "virtual_shutter.effects[0].regions")
+    layer = effect.scene.annotation.layers[0]
+    layer.frames.remove(layer.frames[1])
+    effect.regions[0].location, effect.regions[0].rotation = (0.25, 0.5), 0.3
+
+
+def drawn_apart_from_keys(edit, effect):
+    """Drawings before the first key, between keys, and after the last."""
+    layer = effect.scene.annotation.layers[0]
+    for number, x in ((25, 3), (43, 9), (68, -4)):
+        drawing = layer.frames.new(number)
+        stroke = drawing.strokes.new()
+        stroke.points.add(2)
+        stroke.points.foreach_set("co", [x, 1, 0, -x, 5, 0])
+
+
+def two_of_a_name(edit, effect):
+    effect.shutters[0].name = "Keyed"
+
+
+CASES = [
+    blenders_own_handles, free_handles, keyed_by_blender_in_part, elastic, modifiers, extrapolated, muted, sampled,
+    placed_without_keys, drawn_apart_from_keys, two_of_a_name,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("change", CASES, ids=lambda change: change.__name__)
+def test_what_blender_made_agrees_at_every_frame(effect_on, change):
+    """Within the tolerance that export states, and again after importing it."""
+    from shutter_addon.blender import effects
+
+    apply(effect_on, BASE)
+    change(effect_on[0], effect_on[1])
+    found = export(effect_on)
+    wanted = {frame: effects.instant(*effect_on, frame) for frame in range(FIRST, LAST + 1)}
+    for frame, instant in wanted.items():
+        check(found.at(frame - FIRST + 1, ASPECT), instant)
+    apply(effect_on, found)
+    assert export(effect_on) == found
+
+
+def check(instant, wanted):
+    assert instant.options == wanted.options
+    assert instant.bars == pytest.approx(wanted.bars, abs=1e-4)
+    for shape, other in zip(instant.shapes, wanted.shapes, strict=True):
+        assert (shape.shutter, shape.kind, shape.width) == (other.shutter, other.kind, pytest.approx(other.width))
+        for points, others in zip(shape.strokes, other.strokes, strict=True):
+            assert points == pytest.approx(others, abs=3e-4)
+
+
+def test_a_plain_ease_stays_a_key_and_no_more(effect_on):
+    apply(effect_on, BASE)
+    found = export(effect_on)
+    assert [key.frame for key in found.shutters[1].keys] == [3, 17, 30]
+    assert [key.ease for key in found.regions[0].keys] == ["linear", "bezier", "linear"]
+    assert found == recipes.parse(json.dumps(BASE))
+
+
+def test_what_no_recipe_can_hold(effect_on):
+    from shutter_addon.blender.effects import EffectError
+
+    edit, effect, _ = effect_on
+    with pytest.raises(EffectError, match='"Shutter" has no shutter'):
+        export(effect_on)
+    apply(effect_on, BASE)
+    effect.regions[0].shutter = "Nobody"
+    assert export(effect_on).regions == []
+    effect.regions[0].shutter = "Keyed"
+    effect.scene.annotation.layers.remove(effect.scene.annotation.layers[0])
+    assert export(effect_on).regions == []
+    for k in range(4):
+        curve(edit, f"shutters[1].bars[{k}].weight").keyframe_points[1].co[1] = 0
+    with pytest.raises(EffectError, match='shutter "Keyed" at frame 47: all bars are zero'):
+        export(effect_on)
+
+
+def test_a_written_recipe_reads_the_same(effect_on, tmp_path):
+    apply(effect_on, BASE)
+    found = export(effect_on)
+    recipes.save(found, tmp_path / "r.json")
+    assert recipes.load(tmp_path / "r.json") == found
