@@ -1,5 +1,6 @@
 """Pictures of effect scenes: one renderer each, all on one device, kept from frame to frame."""
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,9 @@ FAULTS = (effects.EffectError, MediaError, NoDeviceError, MemoryError)
 device = "auto"
 weights_folder: Path | None = None
 
+# Blender renders on the main thread or on another one, and in a window the main one has Blender's own GL context, next
+# to which another one cannot always be current (see GLDevice): the device has a thread to itself.
+_thread = ThreadPoolExecutor(1, "Virtual Shutter")
 _compositor = None
 _renderers: dict = {}
 
@@ -30,22 +34,27 @@ def picture(scene, scene_frame: float, say=print) -> np.ndarray:
     renderer = _renderer(scene, source, say)
     moment = effects.instant(edit, effect, strip, frame)
     if weights_folder is not None:
-        _write_weights(renderer.coefficients(moment), [s.name for s in effect.shutters], frame - strip.left_handle + 1)
+        coefficients = _on_thread(renderer.coefficients, moment)
+        _write_weights(coefficients, [s.name for s in effect.shutters], frame - strip.left_handle + 1)
     index = timing.source_frame(source, frame, renderer.source, edit.render.fps / edit.render.fps_base)
-    return renderer.picture(index, moment, -1 if source.use_reverse_frames else 1)
+    return _on_thread(renderer.picture, index, moment, -1 if source.use_reverse_frames else 1)
+
+
+def _on_thread(function, *arguments):
+    return _thread.submit(function, *arguments).result()
 
 
 def _renderer(scene, source_strip, say) -> Renderer:
     global _compositor
     if _compositor is None:
-        _compositor, message = open_compositor(device)
+        _compositor, message = _on_thread(open_compositor, device)
         if message:
             say(message)
     key = sources.media_key(source_strip)
     old_key, renderer = _renderers.get(scene.session_uid, (None, None))
     if old_key != key:
         if renderer is not None:
-            renderer.close()
+            _on_thread(renderer.close)
         renderer = Renderer(_compositor, sources.open_media(source_strip))
         _renderers[scene.session_uid] = key, renderer
     return renderer
@@ -55,10 +64,10 @@ def forget(*_) -> None:
     """Closes all sources and frees the device: when a file is loaded, and when the extension goes."""
     global _compositor
     for _key, renderer in _renderers.values():
-        renderer.close()
+        _on_thread(renderer.close)
     _renderers.clear()
     if _compositor is not None:
-        _compositor.release()
+        _on_thread(_compositor.release)
         _compositor = None
 
 
