@@ -45,9 +45,6 @@ class BlenderDevice:
     """As compute.gl.GLDevice, wherever Blender's GPU context is current: in draw handlers, or after gpu.init()."""
 
     def __init__(self):
-        """Raises NoDeviceError where Blender draws without compute shaders."""
-        if not gpu.capabilities.compute_shader_support_get():
-            raise NoDeviceError("Blender's GPU has no compute shaders")
         self._shaders: dict[Pass, gpu.types.GPUShader] = {}
         self.name = gpu.platform.renderer_get()
         self.max_layers = gpu.capabilities.max_texture_layers_get()

@@ -1,6 +1,7 @@
 """Pictures of effect scenes: renderers that keep their frames, on a device of Blender's own or one without a window."""
 
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -50,41 +51,48 @@ class Moment:
 class Studio:
     """A compositor, opened when it is first used, and the renderers of the effects that were shown last."""
 
-    def __init__(self, open_device):
+    def __init__(self, open_device, executor: ThreadPoolExecutor | None = None):
+        """executor: the thread that the device belongs to; None: whichever calls."""
         self._open = open_device
+        self._executor = executor
         self._compositor = None
         self._renderers: dict = {}
+
+    def run(self, function, *arguments):
+        """The result of a function that uses the device."""
+        return self._executor.submit(function, *arguments).result() if self._executor else function(*arguments)
 
     def renderer(self, scene, source_strip, say, shrink: int) -> Renderer:
         """The renderer of an effect scene; say: called with a sentence when the device is a lesser one. One of FAULTS:
         no device, no source. shrink: pictures are that many times smaller."""
         if self._compositor is None:
-            self._compositor, message = self._open()
+            self._compositor, message = self.run(self._open)
             if message:
                 say(message)
         place, key = (scene.session_uid, shrink), sources.media_key(source_strip)
         old_key, renderer = self._renderers.pop(place, (None, None))
         if old_key != key:
             if renderer is not None:
-                renderer.close()
+                self.run(renderer.close)
             renderer = Renderer(self._compositor, Ahead(sources.open_media(source_strip), shrink))
         self._renderers[place] = key, renderer
         while len(self._renderers) > _KEPT:
-            self._renderers.pop(next(iter(self._renderers)))[1].close()
+            self.run(self._renderers.pop(next(iter(self._renderers)))[1].close)
         return renderer
 
     def forget(self) -> None:
         """Closes all sources and frees the device."""
         for _key, renderer in self._renderers.values():
-            renderer.close()
+            self.run(renderer.close)
         self._renderers.clear()
         if self._compositor is not None:
-            self._compositor.release()
+            self.run(self._compositor.release)
             self._compositor = None
 
 
-# Blender's own GPU belongs to its main thread: renders on another one, and without a window, have a context apart.
-_apart = Studio(lambda: open_compositor(device))
+# Blender's own GPU belongs to its main thread. Renders on another one, and without a window, have a context apart, and
+# a thread for it: beside Blender's own another one cannot always be current (see GLDevice).
+_apart = Studio(lambda: open_compositor(device), ThreadPoolExecutor(1, "Virtual Shutter"))
 _window = Studio(lambda: _open_window())
 
 
@@ -114,10 +122,10 @@ def picture(scene, scene_frame: float, say=print, shrink: int = 1) -> np.ndarray
     frame = strips.timeline_frame(strip, scene_frame)
     found = moment(edit, effect, strip, frame, say, shrink)
     if weights_folder is not None:
-        values = found.renderer.coefficients(found.instant)
+        values = _studio().run(found.renderer.coefficients, found.instant)
         _write_weights(values, [s.name for s in effect.shutters], frame - strip.left_handle + 1)
     found.prefetch(_AHEAD)
-    return found.renderer.picture(found.index, found.instant, found.direction)
+    return _studio().run(found.renderer.picture, found.index, found.instant, found.direction)
 
 
 def moment(edit, effect, strip, frame: float, say=print, shrink: int = 1) -> Moment:

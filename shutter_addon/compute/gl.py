@@ -28,12 +28,12 @@ FORMATS = {
 
 @contextmanager
 def _kept_context():
-    """Leaves the thread's current context as it was: on EGL moderngl leaves none, and Blender would draw into it."""
+    """Leaves the thread's current context as it was, where moderngl leaves none: on EGL."""
     if not _EGL:
         yield
         return
     egl = _egl()
-    draw, read = (egl.eglGetCurrentSurface(end) for end in (0x3059, 0x305A))
+    draw, read = (egl.eglGetCurrentSurface(which) for which in (0x3059, 0x305A))
     display, context = egl.eglGetCurrentDisplay(), egl.eglGetCurrentContext()
     try:
         yield
@@ -45,21 +45,26 @@ def _kept_context():
 @cache
 def _egl():
     egl = ctypes.CDLL("libEGL.so.1")
-    for name in ("eglGetCurrentDisplay", "eglGetCurrentContext", "eglGetCurrentSurface"):
-        getattr(egl, name).restype = ctypes.c_void_p
+    for name in ("Context", "Display", "Surface"):
+        getattr(egl, f"eglGetCurrent{name}").restype = ctypes.c_void_p
     egl.eglMakeCurrent.argtypes = [ctypes.c_void_p] * 4
     return egl
 
 
 class GLDevice:
-    """Textures and compute passes. Calls belong inside `with device.current():`, on whatever thread renders."""
+    """Textures and compute passes. Calls belong inside `with device.current():`, on whatever thread renders.
+
+    Not on one where a context of GLX is current, as Blender's is in a window of X11: EGL makes none current beside it,
+    and the calls would go to that one.
+    """
 
     def __init__(self):
         backend = {"backend": "egl"} if _EGL else {}
         try:
             with _kept_context():
                 self._context = moderngl.create_context(standalone=True, require=430, **backend)
-                info = self._context.info
+                with self._context:  # and not afterwards, so that another thread may have it
+                    info = self._context.info
         except Exception as error:  # moderngl raises whatever its platform raises
             raise NoDeviceError(f"no OpenGL 4.3: {error}") from None
         self._programs = {}
@@ -69,7 +74,7 @@ class GLDevice:
 
     @contextmanager
     def current(self):
-        """Makes the context current on this thread, and the previous one afterwards (Blender's, in a window)."""
+        """Makes the context current on this thread, and the previous one afterwards."""
         with _kept_context(), self._context:
             yield self
 

@@ -5,10 +5,11 @@ import pytest
 
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.errors import NoDeviceError
+from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.core import compositor, light
 from shutter_addon.core.recipe import Instant, Options
-from shutter_addon.core.scribbles import Shape
+from shutter_addon.core.scribbles import Shape, rasterise
 
 LEVEL = 1 / 255
 
@@ -63,8 +64,11 @@ def instant(rng, window=16, shapes=SHAPES, count=3, **options):
     return Instant(Options(window, **options), bars, shapes)
 
 
-@pytest.fixture(params=["gpu", "cpu"], scope="module")
+@pytest.fixture(params=["gpu", "cpu", "blender"], scope="module")
 def device(request):
+    """Blender's own GPU counts as well, where there is a Blender."""
+    if request.param == "blender":
+        return GPUCompositor(request.getfixturevalue("blender_device"))
     return open_compositor(request.param)[0]
 
 
@@ -190,6 +194,57 @@ def test_frames_that_no_shutter_exposes_are_not_read(device):
     bars[0, 5:7] = 1
     Renderer(device, source).picture(3, Instant(Options(16), bars))
     assert source.reads == [8, 9]
+
+
+def test_a_picture_stays_on_the_device(gpu_device):
+    rng = np.random.default_rng(18)
+    source, moment = footage(rng), instant(rng)
+    one, other = (Renderer(GPUCompositor(gpu_device), source) for _ in range(2))
+    drawn = one.draw(3, moment)
+    with gpu_device.current():
+        other.draw(4, moment)
+        assert drawn.size == (source.width, source.height, 1)
+        pixels = gpu_device.read(drawn)[0, ::-1]
+    assert np.array_equal(pixels, other.picture(3, moment))
+
+
+@pytest.mark.parametrize("shapes", [SHAPES, SHAPES[:1], ()])
+@pytest.mark.parametrize("block", [1, 2])
+def test_coefficients_stay_on_the_device(gpu_device, shapes, block):
+    rng = np.random.default_rng(19)
+    source, moment = footage(rng), instant(rng, shapes=shapes, count=6, aggregate=block)
+    renderer = Renderer(GPUCompositor(gpu_device), source)
+    texture, size, count = renderer.drawn_coefficients(moment)
+    assert count == 6
+    with gpu_device.current():
+        layers = gpu_device.read(texture)
+    values = np.moveaxis(layers, -1, 1).reshape(-1, *layers.shape[1:3])[:count]
+    y, x = np.mgrid[: source.height, : source.width]
+    expected = renderer.coefficients(moment)[:, y // block, x // block]
+    assert np.array_equal(values[:, y // size, x // size], expected)
+
+
+def test_labels_are_those_of_the_shapes(device):
+    rng = np.random.default_rng(20)
+    renderer = Renderer(device, footage(rng))
+    for shapes in (SHAPES, SHAPES[:1], (), SHAPES[::-1], SHAPES):
+        for options in ({}, {"aggregate": 4}, {"border": True}):
+            moment = instant(rng, shapes=shapes, **options)
+            size = (10, 6) if "aggregate" in options else (37, 23)
+            expected = rasterise(shapes, *size, border="border" in options)
+            assert np.array_equal(renderer.labels(moment), expected)
+
+
+def test_what_is_needed_is_what_is_read(device):
+    rng = np.random.default_rng(21)
+    for edges in ("hold", "mirror", "shorten"):
+        for index, direction in ((0, 1), (18, 1), (2, -1)):
+            source = footage(rng)
+            moment = instant(rng, edges=edges, position="center")
+            renderer = Renderer(device, source)
+            needed = renderer.needed(index, direction, moment)
+            renderer.picture(index, moment, direction)
+            assert set(source.reads) == needed
 
 
 def test_no_new_solve_when_nothing_moved(device, monkeypatch):

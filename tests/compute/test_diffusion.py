@@ -201,21 +201,31 @@ def device():
         device = gl.GLDevice()
     except gl.NoGLError as error:
         pytest.skip(str(error))
-    with device.current():
-        yield device
+    yield device
     device.release()
 
 
 @pytest.fixture(scope="module")
 def on_device(device):
+    yield from solving(device)
+
+
+@pytest.fixture(scope="module")
+def on_blender(blender_device):
+    yield from solving(blender_device)
+
+
+def solving(device):
     solver = Diffusion(device)
 
     def solve(labels, count):
-        layers = device.read(solver.solve(labels, count))
+        with device.current():
+            layers = device.read(solver.solve(labels, count))
         return np.moveaxis(layers, 3, 1).reshape(-1, *labels.shape)[:count]
 
     yield solve
-    solver.release()
+    with device.current():
+        solver.release()
 
 
 @pytest.fixture(scope="module", params=["numpy", "device"])
@@ -240,6 +250,12 @@ def test_is_the_exact_solution_on_both(scene, on_device):
         np.testing.assert_array_equal(got[:, labels > 0], want[:, labels > 0])
         np.testing.assert_allclose(got, want, rtol=0, atol=LEVEL / 4)
     np.testing.assert_allclose(*both, rtol=0, atol=LEVEL / 4)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_blenders_gpu_solves_the_same(scene, on_device, on_blender):
+    labels, count = SCENES[scene]
+    np.testing.assert_allclose(on_blender(labels, count), on_device(labels, count), rtol=0, atol=LEVEL / 100)
 
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -312,21 +328,23 @@ def test_one_shutter_alone_is_everywhere(solve):
 def test_the_device_forgets_earlier_frames(device, on_device):
     labels, count = SCENES["random, 9"]
     fresh = Diffusion(device)
-    want = device.read(fresh.solve(labels, count))
-    for other in (labels[::-1], blank(*labels.shape[::-1]), *(scene for scene, _ in list(SCENES.values())[:3])):
-        fresh.solve(other, count)
-        np.testing.assert_array_equal(device.read(fresh.solve(labels, count)), want)
-    fresh.release()
+    with device.current():
+        want = device.read(fresh.solve(labels, count))
+        for other in (labels[::-1], blank(*labels.shape[::-1]), *(scene for scene, _ in list(SCENES.values())[:3])):
+            fresh.solve(other, count)
+            np.testing.assert_array_equal(device.read(fresh.solve(labels, count)), want)
+        fresh.release()
 
 
 def test_textures_stay_while_size_and_shutters_do(device):
     solver = Diffusion(device)
     labels, count = dots()
-    texture = solver.solve(labels, count)
-    assert solver.solve(labels[::-1], count) is texture
-    assert solver.solve(labels[:90], count) is not texture
-    assert texture.size[2] == 2
-    solver.release()
+    with device.current():
+        texture = solver.solve(labels, count)
+        assert solver.solve(labels[::-1], count) is texture
+        assert solver.solve(labels[:90], count) is not texture
+        assert texture.size[2] == 2
+        solver.release()
 
 
 def test_more_cycles_come_closer(monkeypatch, solve):

@@ -1,0 +1,82 @@
+"""What is written to a device is what it holds, to the bit."""
+
+import numpy as np
+import pytest
+
+from shutter_addon.compute.errors import NoDeviceError
+
+KINDS = {
+    "rgba8": np.uint8,
+    "rgba16": np.uint16,
+    "rgba16f": np.float16,
+    "rgba32f": np.float32,
+    "r32f": np.float32,
+    "r16ui": np.uint16,
+}
+
+
+def samples(kind, *shape):
+    """Every value of 8 and 16 bits, where there is room for them; read-only, as frames decoded ahead."""
+    dtype, rng = np.dtype(KINDS[kind]), np.random.default_rng(1)
+    shape = (*shape, 4) if kind.startswith("rgba") else shape
+    if dtype.kind == "u":
+        array = (np.arange(np.prod(shape)) % (np.iinfo(dtype).max + 1)).astype(dtype)
+        rng.shuffle(array)
+        array = array.reshape(shape)
+    else:
+        array = (rng.normal(size=shape) * 100).astype(dtype)
+    array.flags.writeable = False
+    return array
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_layers_hold_what_was_written(gpu_device, kind):
+    layers = samples(kind, 3, 130, 257)
+    with gpu_device.current():
+        texture = gpu_device.texture(257, 130, 3, kind)
+        assert texture.size == (257, 130, 3)
+        for layer in (2, 0, 1):
+            gpu_device.write(texture, layers[layer], layer)
+        got = gpu_device.read(texture)
+        assert got.dtype == layers.dtype
+        assert np.array_equal(got.reshape(layers.shape), layers)
+        gpu_device.write(texture, layers[2][:5], 1)
+        assert np.array_equal(gpu_device.read(texture)[1].reshape(layers[1].shape), [*layers[2][:5], *layers[1][5:]])
+        texture.release()
+
+
+@pytest.mark.parametrize("kind", ["rgba8", "rgba16"])
+def test_opaque_pixels_hold_what_was_written(gpu_device, kind):
+    frame = samples(kind, 130, 257).copy()
+    frame[..., 3] = np.iinfo(frame.dtype).max
+    with gpu_device.current():
+        texture = gpu_device.texture(257, 130, 2, kind)
+        gpu_device.write(texture, frame, 1, opaque=True)
+        assert np.array_equal(gpu_device.read(texture)[1], frame)
+        texture.release()
+
+
+def test_there_are_limits(gpu_device):
+    assert gpu_device.name
+    assert gpu_device.max_layers >= 256
+    assert gpu_device.max_size >= 4096
+    with gpu_device.current():
+        for size in ((gpu_device.max_size + 1, 4, 1), (4, 4, gpu_device.max_layers + 1)):
+            with pytest.raises(NoDeviceError, match="has no room"):
+                gpu_device.texture(*size, "rgba8")
+
+
+def test_moderngl_leaves_blenders_context_current(blender_device):
+    from shutter_addon.compute.gl import GLDevice
+
+    other = GLDevice()
+    frame = samples("rgba8", 4, 4)
+    with other.current():
+        with other.current():
+            pass
+        texture = other.texture(4, 4, 1, "rgba8")
+        other.write(texture, frame)
+        assert np.array_equal(other.read(texture)[0], frame)
+    texture = blender_device.texture(4, 4, 1, "rgba8")
+    blender_device.write(texture, frame)
+    assert np.array_equal(blender_device.read(texture)[0], frame)
