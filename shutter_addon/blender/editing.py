@@ -106,7 +106,7 @@ def rename(effect, old: str, new: str) -> str:
     """The name that a shutter gets for a wish: a unique one. Its regions follow it."""
     others = [shutter.name for shutter in effect.shutters]
     others.remove(old)
-    new = unique(new or "Shutter", others)
+    new = unique(new, others)
     # A name that is taken twice is that of a copy: the regions belong to the original.
     if old not in others:
         for region in effect.regions:

@@ -93,14 +93,7 @@ class Studio:
 # Blender's own GPU belongs to its main thread. Renders on another one, and without a window, have a context apart, and
 # a thread for it: beside Blender's own another one cannot always be current (see GLDevice).
 _apart = Studio(lambda: open_compositor(device), ThreadPoolExecutor(1, "Virtual Shutter"))
-_window = Studio(lambda: _open_window())
-
-
-def _open_window():
-    try:
-        return GPUCompositor(BlenderDevice()), None
-    except NoDeviceError:
-        return open_compositor(device)
+_window = Studio(lambda: (GPUCompositor(BlenderDevice()), None))
 
 
 def shrink(full: int, shown: int) -> int:

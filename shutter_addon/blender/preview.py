@@ -9,10 +9,9 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
 from bpy.types import PropertyGroup
 from gpu_extras.batch import batch_for_shader
 
-from ..compute.gpu import GPUCompositor
 from ..compute.passes import body
 from . import cache, drawing, effects, geometry, pictures, strips
-from .device import BlenderDevice, Texture
+from .device import Texture
 
 VIEWS = (
     ("RESULT", "Result", "The finished picture"),
@@ -121,8 +120,6 @@ def _show(context, found: Shown, settings) -> None:
     shrink = _PROXY_SHRINK.get(context.space_data.proxy_render_size, 1)
     moment = pictures.moment(found.edit, found.effect, found.strip, frame, shrink=shrink)
     renderer = moment.renderer
-    if not isinstance(renderer.compositor, GPUCompositor) or not isinstance(renderer.compositor.device, BlenderDevice):
-        raise pictures.NoDeviceError("the live preview needs compute shaders; the sequencer's own picture is shown")
     moment.prefetch(_AHEAD)
     quad = Quad(context.region, found.strip, effects.picture_size(found.effect))
     plain = settings.view != "RESULT"
