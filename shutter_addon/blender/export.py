@@ -9,7 +9,7 @@ apart, modifiers, there is a key per frame: at every whole frame recipe and effe
 import math
 from dataclasses import asdict
 from decimal import Decimal
-from functools import partial
+from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from ..core import keyframes, recipe
 from . import animation, effects, geometry
 
-# Of bars, of fractions of the picture, of degrees; of the value itself where that is above 1.
+# Of the largest bar, of fractions of the picture, of degrees; of the larger key's value where that is above 1.
 TOLERANCE = 1e-4
 _CHANNELS = (("location", 0), ("location", 1), ("rotation", 0), ("scale", 0))
 
@@ -56,6 +56,7 @@ def _different(names: list[str]) -> list[str]:
 
 
 def _shutter(curves, path: str, source, name: str, window: int, strip) -> recipe.Shutter:
+    @cache
     def bars(frame):
         return effects.checked(source.name, effects.bars_at(curves, path, source, window, frame), frame)
 
@@ -63,7 +64,13 @@ def _shutter(curves, path: str, source, name: str, window: int, strip) -> recipe
     keyed = [curve for k in range(window) if (curve := curves.find(f"{path}.bars[{k}].weight"))]
     if not keyed:
         return recipe.Shutter(name, color, [_short(v) for v in bars(strip.left_handle)])
-    keys = _keys(bars, keyframes.between_bars, keyed, animation.key_frames(keyed), {}, strip)
+
+    def fits(first, second, frame, share):
+        apart = abs(animation.progress(keyed, first, second, frame) - share)
+        ends = np.array([bars(first), bars(second)])
+        return apart * np.ptp(ends, axis=0).max() <= TOLERANCE * ends.max()
+
+    keys = _keys(fits, lambda *_: True, keyed, animation.key_frames(keyed), {}, strip)
     return recipe.Shutter(
         name,
         color,
@@ -85,7 +92,16 @@ def _region(curves, path: str, source, effect, strip) -> recipe.Region | None:
     frames.update(words)
     if not frames and tuple(place(strip.left_handle)) != (0, 0, 0, 1):
         frames.add(strip.left_handle)
-    keys = _keys(place, _mixed, keyed, sorted(frames), words, strip) if frames or keyed else []
+
+    def fits(first, second, frame, share):
+        ends = np.array([place(first), place(second)])
+        apart = np.abs((1 - share) * ends[0] + share * ends[1] - place(frame))
+        return bool(np.all(apart <= TOLERANCE * np.maximum(1, np.abs(ends).max(axis=0))))
+
+    def still(frame, held):
+        return fits(held, held, frame, 0)
+
+    keys = _keys(fits, still, keyed, sorted(frames), words, strip) if frames or keyed else []
     first = min(drawings)
     redrawn = {number: strokes for number, strokes in drawings.items() if words and number != keys[0][0]}
     return recipe.Region(
@@ -112,10 +128,6 @@ def _place(curves, path: str, source, frame: float) -> np.ndarray:
     return np.array([x, y, math.degrees(rotation), scale])
 
 
-def _mixed(first, second, u: float) -> np.ndarray:
-    return (1 - u) * first + u * second
-
-
 def _drawings(effect, source, strip) -> dict[int, list]:
     """A region's strokes by the timeline frames they were drawn at, from the first that has any."""
     annotation = effect.scene.annotation
@@ -133,46 +145,41 @@ def _drawings(effect, source, strip) -> dict[int, list]:
     return result
 
 
-def _keys(truth, between, keyed, frames: list, words: dict, strip) -> list[tuple[float, str]]:
-    """Frames and eases of the keys by which `between` gives the truth at every whole frame.
+def _keys(fits, still, keyed, frames: list, words: dict, strip) -> list[tuple[float, str]]:
+    """Frames and eases of the keys that give the effect at every whole frame.
 
+    fits: whether at a frame a share is right between two keys; still: whether a frame shows what another does;
     keyed: the F-curves; frames: where there has to be a key; words: the ease that a key has to have."""
     shown = range(strip.left_handle, strip.right_handle)
     if not frames:
         return [(frame, "linear") for frame in shown]
 
-    def baked(frames, held):
-        frames = list(frames)
-        still = all(_near(truth(frame), truth(held)) for frame in frames)
-        return [] if still else [(frame, "linear") for frame in frames]
+    def baked(outside, held):
+        return [] if all(still(frame, held) for frame in outside) else [(frame, "linear") for frame in outside]
 
-    keys = baked((frame for frame in shown if frame < frames[0]), frames[0])
+    keys = baked([frame for frame in shown if frame < frames[0]], frames[0])
     for first, second in pairwise(frames):
-        inner = range(math.floor(first) + 1, math.ceil(second))
-        ends, values = (truth(first), truth(second)), [truth(frame) for frame in inner]
-        shares = [(frame - first) / (second - first) for frame in inner]
+        shares = {frame: (frame - first) / (second - first) for frame in _whole_between(first, second)}
         candidates = [words[first]] if first in words else [_word(keyed, first), *keyframes.EASES]
-
-        def fits(word, ends=ends, values=values, shares=shares):
-            found = (between(*ends, keyframes.eased(share, word)) for share in shares)
-            return all(map(_near, found, values))
-
-        word = next(filter(fits, candidates), None)
-        keys.append((first, word or candidates[0]))
-        keys += [] if word else [(frame, "linear") for frame in inner]
+        for word in candidates:
+            if all(fits(first, second, frame, keyframes.eased(share, word)) for frame, share in shares.items()):
+                keys.append((first, word))
+                break
+        else:
+            keys += [(first, candidates[0]), *((frame, "linear") for frame in shares)]
     last = frames[-1]
     keys.append((last, words.get(last) or _word(keyed, last)))
-    return keys + baked((frame for frame in shown if frame > last), last)
+    return keys + baked([frame for frame in shown if frame > last], last)
+
+
+def _whole_between(first: float, second: float) -> range:
+    return range(math.floor(first) + 1, math.ceil(second))
 
 
 def _word(keyed, frame: float) -> str:
     """The ease of the first curve that has a key at a frame."""
     curve = next((curve for curve in keyed if frame in animation.key_frames([curve])), None)
     return animation.ease_at(curve, frame)
-
-
-def _near(values, others) -> bool:
-    return bool(np.all(np.abs(values - others) <= TOLERANCE * np.maximum(1, np.abs(others))))
 
 
 def _short(value: float) -> float:

@@ -8,6 +8,9 @@ from . import effects, sources
 
 ENGINE = "VIRTUAL_SHUTTER"
 SOURCES = ("MOVIE", "IMAGE", "MOVIECLIP")
+# Past its scene's end a Scene strip shows the last frame. Source and strip may be made longer, by hand or by speed.
+_SPARE = 100_000
+_COLOR = "COLOR_06"
 _LOOK = ("use_flip_x", "use_flip_y", "color_multiply", "color_saturation", "multiply_alpha")
 
 
@@ -132,8 +135,8 @@ def add_effect(edit, source):
     medium.close()
     if not source.virtual_shutter_source:
         source.virtual_shutter_source = uuid.uuid4().hex
-    length = max(1, int(source.content_end - source.content_start))
-    scene = new_scene(edit, f"Shutter {source.name}", (medium.width, medium.height), length)
+    length = max(source.content_end, source.right_handle) - source.content_start
+    scene = new_scene(edit, f"Shutter {source.name}", (medium.width, medium.height), int(length) + _SPARE)
     scene.virtual_shutter.identity = uuid.uuid4().hex
     taken = {s.channel for s in edit.sequence_editor.strips_all if _overlap(s, source)}
     channel = next(c for c in range(source.channel + 1, source.channel + len(taken) + 2) if c not in taken)
@@ -152,7 +155,24 @@ def add_effect(edit, source):
         origin(strip),
     )
     strip.virtual_shutter_effect = scene.virtual_shutter.identity
-    return strip, effect
+    edit.render.sequencer_gl_preview = "RENDERED"  # or the preview shows the effect's empty scene
+    strip.color_tag = _COLOR
+    connect(edit, [strip, source, *source.connections])
+    return strip, effect_of(edit, scene)  # again: an operator's update may move the collection's items in memory
+
+
+def connect(edit, connected) -> None:
+    """Connects strips, so that they are selected and moved together; each leaves the strips it was connected to."""
+    selected = [strip for strip in edit.sequence_editor.strips_all if strip.select]
+    for strip in selected:
+        strip.select = False
+    for strip in connected:
+        strip.select = True
+    # Blender has an operator only, which takes the selection; this override is all it asks for.
+    with bpy.context.temp_override(sequencer_scene=edit):
+        bpy.ops.sequencer.connect(toggle=False)
+    for strip in connected:
+        strip.select = strip in selected
 
 
 def _overlap(a, b) -> bool:

@@ -92,7 +92,8 @@ def test_a_source_that_was_muted_shows_again(bpy, edit, add):
     strip = add()
     source = edit.sequence_editor.strips["images"]
     assert source.mute
-    right, right_source = strip.split(11, "SOFT"), source.split(11, "SOFT")
+    right = strip.split(11, "SOFT")  # and the source, which is connected
+    right_source = next(s for s in edit.sequence_editor.strips if s.type == "IMAGE" and s != source)
     edit.sequence_editor.strips.remove(right)
     update(bpy)
     assert (source.mute, right_source.mute) == (True, False)
@@ -243,3 +244,26 @@ def test_linked_scenes_stay(bpy, edit, add, tmp_path):
         wanted.scenes = ["Shutter images"]
     update(bpy)
     assert "Shutter images" in bpy.data.scenes
+
+
+def test_effect_and_source_are_connected_as_the_source_was(edit, add, images):
+    from shutter_addon.blender import strips
+
+    source = edit.sequence_editor.strips.new_image("images", str(images), 1, 1)
+    friend = edit.sequence_editor.strips.new_image("friend", str(images), 2, 1)
+    strips.connect(edit, [source, friend])
+    source.select, friend.select = True, False
+    strip, _ = strips.add_effect(edit, source)
+    assert {s.name for s in strip.connections} == {"images", "friend"}
+    assert {s.name for s in friend.connections} == {"images", "Shutter"}
+    assert (source.select, friend.select) == (True, False)
+    assert edit.render.sequencer_gl_preview == "RENDERED"
+
+
+def test_an_effect_made_longer_goes_on(edit, add, render):
+    """Keys after the end that the source had when the effect was made."""
+    data = recipe(4, {100: [1, 0, 0, 0], 120: [0, 0, 0, 1]}, edges="mirror")
+    strip = add(1, data)
+    edit.sequence_editor.strips["images"].right_handle = strip.right_handle = 200
+    shown = render(edit, [60, 150])
+    assert not np.array_equal(shown[60], shown[150])
