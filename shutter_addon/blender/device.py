@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import cache
 
 import gpu
 import numpy as np
@@ -91,9 +92,9 @@ class BlenderDevice:
         return array.astype(dtype, copy=False)
 
     def run(self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, **constants) -> None:
-        if program not in self._shaders:
-            self._shaders[program] = _compiled(program)
-        shader = self._shaders[program]
+        shader = self._shaders.get(program)
+        if shader is None:
+            shader = self._shaders[program] = _compiled(program)
         shader.bind()
         for name in program.samplers:
             shader.uniform_sampler(name, textures[name].gpu)
@@ -109,6 +110,7 @@ class BlenderDevice:
         self._shaders = {}
 
 
+@cache
 def _unpack(kind: str, packing: int) -> Pass:
     return Pass(
         "unpack",
