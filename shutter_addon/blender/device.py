@@ -7,7 +7,7 @@ exactly; a pass unpacks them into the layer. (Bit patterns would be simpler, but
 
 from __future__ import annotations
 
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from functools import cache
 
@@ -55,11 +55,11 @@ class BlenderDevice:
         return nullcontext(self)
 
     def texture(self, width: int, height: int, layers: int, kind: str) -> Texture:
-        try:
-            texture = gpu.types.GPUTexture((width, height), layers=layers, format=kind.upper())
-        except RuntimeError as error:
-            raise NoDeviceError(f"{self.name} has no room for {layers} layers of {width}×{height}: {error}") from None
-        return Texture(texture, (width, height, layers), kind)
+        if max(width, height) <= self.max_size and layers <= self.max_layers:  # on Vulkan Blender does not look
+            with suppress(RuntimeError):
+                texture = gpu.types.GPUTexture((width, height), layers=layers, format=kind.upper())
+                return Texture(texture, (width, height, layers), kind)
+        raise NoDeviceError(f"{self.name} has no room for {layers} layers of {width}×{height}")
 
     def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
         height, width = array.shape[:2]
@@ -78,6 +78,7 @@ class BlenderDevice:
         )
 
     def read(self, texture: Texture) -> np.ndarray:
+        """As GLDevice.read; by framebuffers, for GPUTexture.read() gives a first layer alone."""
         width, height, layers = texture.size
         dtype, _, packing = _FORMATS[texture.kind]
         components = 4 if texture.kind.startswith("rgba") else 1
