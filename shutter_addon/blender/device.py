@@ -7,8 +7,9 @@ exactly; a pass unpacks them into the layer. (Bit patterns would be simpler, but
 
 from __future__ import annotations
 
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
+from functools import cache
 
 import gpu
 import numpy as np
@@ -54,11 +55,11 @@ class BlenderDevice:
         return nullcontext(self)
 
     def texture(self, width: int, height: int, layers: int, kind: str) -> Texture:
-        try:
-            texture = gpu.types.GPUTexture((width, height), layers=layers, format=kind.upper())
-        except RuntimeError as error:
-            raise NoDeviceError(f"{self.name} has no room for {layers} layers of {width}×{height}: {error}") from None
-        return Texture(texture, (width, height, layers), kind)
+        if max(width, height) <= self.max_size and layers <= self.max_layers:  # on Vulkan Blender does not look
+            with suppress(RuntimeError):
+                texture = gpu.types.GPUTexture((width, height), layers=layers, format=kind.upper())
+                return Texture(texture, (width, height, layers), kind)
+        raise NoDeviceError(f"{self.name} has no room for {layers} layers of {width}×{height}")
 
     def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
         height, width = array.shape[:2]
@@ -77,6 +78,7 @@ class BlenderDevice:
         )
 
     def read(self, texture: Texture) -> np.ndarray:
+        """As GLDevice.read; by framebuffers, for GPUTexture.read() gives a first layer alone."""
         width, height, layers = texture.size
         dtype, _, packing = _FORMATS[texture.kind]
         components = 4 if texture.kind.startswith("rgba") else 1
@@ -91,9 +93,9 @@ class BlenderDevice:
         return array.astype(dtype, copy=False)
 
     def run(self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, **constants) -> None:
-        if program not in self._shaders:
-            self._shaders[program] = _compiled(program)
-        shader = self._shaders[program]
+        shader = self._shaders.get(program)
+        if shader is None:
+            shader = self._shaders[program] = _compiled(program)
         shader.bind()
         for name in program.samplers:
             shader.uniform_sampler(name, textures[name].gpu)
@@ -109,6 +111,7 @@ class BlenderDevice:
         self._shaders = {}
 
 
+@cache
 def _unpack(kind: str, packing: int) -> Pass:
     return Pass(
         "unpack",

@@ -90,7 +90,8 @@ class Renderer:
         return self._labelled[1]
 
     def needed(self, index: int, direction: int, instant: Instant) -> set[int]:
-        """The source frames that some shutter exposes; all of the window, where a shutter may lose all of its own."""
+        """The source frames that some shutter exposes, on the picture or not; all of the window, where a shutter may
+        lose all of its own."""
         indices = compositor.window_indices(instant.options, index, self.source.count, direction)
         low, high = shutters.open_span(instant.bars)
         needed = indices[low:high] if (indices[low:high] >= 0).all() else indices[indices >= 0]

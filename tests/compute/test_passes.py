@@ -1,0 +1,34 @@
+"""The sources of passes suit every device, those that a test machine does not have included."""
+
+import re
+
+import pytest
+
+from shutter_addon.compute import diffusion, gpu
+from shutter_addon.compute.passes import SHADERS, Pass, body
+from shutter_addon.core.recipe import Options
+
+PASSES = [value for value in vars(diffusion).values() if isinstance(value, Pass)]
+PASSES += [gpu._composition(Options(8, interpolation=kind), 3, "srgb", True) for kind in ("displacement", "value")]
+# Of what is declared inside the sources, whatever it is: variables, parameters, functions.
+DECLARED = re.compile(r"\b(?:bool|u?int|float|[biu]?vec[234])\s+(\w+)")
+BYTES = {"int": 4, "float": 4, "ivec2": 8}
+
+
+@pytest.mark.parametrize("program", PASSES, ids=lambda program: program.name)
+def test_constants_and_textures_share_no_name_with_a_variable(program):
+    """On Vulkan they are macros."""
+    declared = set(DECLARED.findall(body(program.name)))
+    assert declared
+    assert not declared & {*program.constants, *program.samplers, *program.images}
+
+
+@pytest.mark.parametrize("program", PASSES, ids=lambda program: program.name)
+def test_constants_fit(program):
+    """128 bytes are what every Vulkan driver has."""
+    assert sum(BYTES[kind] for kind in program.constants.values()) <= 128
+
+
+def test_every_source_has_its_pass():
+    names = {program.name for program in PASSES} | {"unpack"}
+    assert names == {path.stem for path in SHADERS.glob("*.glsl")}
