@@ -267,3 +267,60 @@ def test_an_effect_made_longer_goes_on(edit, add, render):
     edit.sequence_editor.strips["images"].right_handle = strip.right_handle = 200
     shown = render(edit, [60, 150])
     assert not np.array_equal(shown[60], shown[150])
+
+
+@pytest.fixture
+def library(bpy, edit, add, render, tmp_path):
+    """A saved edit with an effect, and a frame of it."""
+    add()
+    add(101, recipe(4, {101: [0, 1, 0, 0], 111: [0, 0, 1, 0]}))
+    edit.name = "Film"
+    pictures = render(edit, [5, 105])
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    return tmp_path / "library.blend", pictures
+
+
+@pytest.mark.parametrize("link", [True, False])
+def test_a_linked_or_appended_edit_renders_the_same(bpy, library, render, link):
+    path, pictures = library
+    with bpy.data.libraries.load(str(path), link=link) as (_, wanted):
+        wanted.scenes = ["Film"]
+    film = bpy.data.scenes["Film"]
+    update(bpy)
+    assert [effect.start for effect in film.virtual_shutter.effects] == [1, 101]
+    assert len(curves(film)) > 8
+    bpy.context.window.scene = film
+    shown = render(edit_that_shows(bpy, film) if link else film, list(pictures))
+    for frame, picture in pictures.items():
+        assert np.array_equal(shown[frame], picture)
+    assert all(scene.library is not None for scene in bpy.data.scenes if scene.virtual_shutter.identity) == link
+
+
+def edit_that_shows(bpy, film):
+    """A linked scene's settings cannot be changed, not even its current frame: a Scene strip shows its sequence."""
+    edit = bpy.data.scenes.new("Local")
+    edit.render.resolution_x, edit.render.resolution_y = film.render.resolution_x, film.render.resolution_y
+    edit.render.dither_intensity = 0
+    edit.view_settings.view_transform = "Standard"
+    strip = edit.sequence_editor_create().strips.new_scene("film", film, 1, film.frame_start)
+    strip.scene_input = "SEQUENCER"
+    bpy.context.window.scene = edit
+    return edit
+
+
+def test_an_edit_appended_twice_has_two_effects_of_its_own(bpy, library, render):
+    path, pictures = library
+    for _ in range(2):
+        with bpy.data.libraries.load(str(path), link=False) as (_, wanted):
+            wanted.scenes = ["Film"]
+        update(bpy)
+    films = [scene for scene in bpy.data.scenes if scene.virtual_shutter.effects]
+    assert len(films) == 2
+    films[0].virtual_shutter.effects[0].shutters[0].bars[0].weight = 0.5
+    films[0].sequence_editor.strips.remove(scene_strips(films[0])[0])
+    update(bpy)
+    assert [len(film.virtual_shutter.effects) for film in films] == [1, 2]
+    bpy.context.window.scene = films[1]  # an operator renders at the frame of the window's scene
+    shown = render(films[1], list(pictures))
+    assert all(np.array_equal(shown[frame], picture) for frame, picture in pictures.items())
