@@ -6,7 +6,6 @@ import bpy
 import numpy as np
 from bpy.types import Gizmo, GizmoGroup
 
-from ..core import shutters
 from . import drawing, editing, strips
 
 _MARGIN, _HEIGHT, _BAR = 16, 96, 16  # in units of the interface
@@ -158,8 +157,7 @@ def _draw(place: Layout, shutter, values, states) -> None:
         [(edges[k] - 0.5, bottom - foot - 4, edges[k] + 0.5, bottom - 1) for k in ticks],
         np.tile((1, 1, 1, 0.5), (len(ticks), 1)),
     )
-    words = f"{shutter.name}   "
-    words += f"{shutters.open_angle(values):.0f}°   {shutters.exposure(values):.3g} frames" if any(values) else "closed"
+    words = f"{shutter.name}   {editing.summary(values)}"
     drawing.text(left, top + drawing.ui_scale() * 4, words)
 
 

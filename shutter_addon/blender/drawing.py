@@ -1,15 +1,30 @@
 """Flat shapes and texts in a region, in its pixels."""
 
+from contextlib import contextmanager
+
 import blf
 import bpy
 import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
+from mathutils import Matrix
 
 
 def ui_scale() -> float:
     """Pixels per unit of Blender's interface."""
     return bpy.context.preferences.system.ui_scale
+
+
+@contextmanager
+def pixel_space(region):
+    """Coordinates are the region's pixels, whatever was drawn before: Blender's own state varies in draw handlers."""
+    with gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
+        gpu.matrix.load_identity()
+        width, height = region.width, region.height
+        gpu.matrix.load_projection_matrix(
+            Matrix(((2 / width, 0, 0, -1), (0, 2 / height, 0, -1), (0, 0, 1, 0), (0, 0, 0, 1)))
+        )
+        yield
 
 
 def rectangles(boxes, colors) -> None:

@@ -125,6 +125,14 @@ def bars(shutter) -> np.ndarray:
     return values.astype(np.float64)
 
 
+def summary(values) -> str:
+    """A shutter's bars (L,) in words: its angle, and how many frames' light it gathers."""
+    light = shutters.exposure(values)
+    if not light:
+        return "All bars are zero: the shutter never opens"
+    return f"{shutters.open_angle(values):.0f}°, {light:.3g} {'frame' if light == 1 else 'frames'} of light"
+
+
 def set_bars(shutter, values) -> None:
     """Gives a shutter these bars (L,); those that stay are not touched."""
     for bar, value in zip(shutter.bars, values, strict=True):

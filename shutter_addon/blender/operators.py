@@ -94,8 +94,26 @@ class SHUTTER_OT_add_effect(Operator):
             return {"CANCELLED"}
         editing.start(effect)
         strips.choose(edit, strip)
+        if not bpy.app.background:
+            show_panel(context)
         redraw(context)
         return {"FINISHED"}
+
+
+def show_panel(context) -> None:
+    """Opens the sidebar's Shutter tab beside the picture: in the Properties editor it is below all other panels."""
+    for _window, area in strips.previews(context):
+        area.spaces.active.show_region_ui = True
+    # A sidebar has tabs once it has been drawn.
+    bpy.app.timers.register(_choose_tab, first_interval=0.1)
+
+
+def _choose_tab() -> None:
+    for _window, area in strips.previews(bpy.context):
+        sidebar = next(region for region in area.regions if region.type == "UI")
+        if not sidebar.is_property_readonly("active_panel_category"):
+            sidebar.active_panel_category = "Shutter"
+            area.tag_redraw()
 
 
 class SHUTTER_OT_shutter_add(_OfEffect, Operator):

@@ -3,7 +3,7 @@
 import bpy
 from bpy.types import Menu, Panel, UIList
 
-from ..core import presets, shutters
+from ..core import presets
 from . import editing, icons, strips
 
 # Beyond this a column of numbers helps nobody: the bar editor and the Graph Editor do.
@@ -95,13 +95,10 @@ class _Shutters:
         row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
         layout.use_property_split = True
         layout.prop(effect, "window")
-        values = editing.bars(shutter)
-        if not values.any():
-            layout.label(text="All bars are zero: the shutter never opens", icon="ERROR")
-        else:
-            info = layout.row()
-            info.active = False
-            info.label(text=f"{shutters.open_angle(values):.0f}°, {shutters.exposure(values):.3g} frames of light")
+        values = editing.bars_now(effect, effect.active_shutter)
+        row = layout.row()
+        row.active = not values.any()
+        row.label(text=editing.summary(values), icon="NONE" if values.any() else "ERROR")
 
 
 def _draw_live(layout, context):

@@ -108,11 +108,12 @@ def _draw() -> None:
         say("Live: the strips above are hidden")
     if found.edit.view_settings.view_transform != "Standard":
         say("Live shows view transform Standard")
-    try:
-        _show(context, found, settings)
-    except pictures.FAULTS as error:
-        say(f"Shutter: {error}")
-    say.draw()
+    with drawing.pixel_space(context.region):
+        try:
+            _show(context, found, settings)
+        except pictures.FAULTS as error:
+            say(f"Shutter: {error}")
+        say.draw()
 
 
 def _show(context, found: Shown, settings) -> None:

@@ -1,0 +1,194 @@
+"""How quick the live preview is, measured in Blender's own window beside two references, interleaved in one run.
+
+    blender --factory-startup --python scripts/window_speed.py -- FOOTAGE.mp4 OUT.json
+
+Any Blender 5.2 with the extension enabled, started with a window and `--python` this file, will do. Ways:
+plain: the movie strip alone; texture: its picture replaced by a draw handler that draws one texture of its size;
+engine: the effect strip, live preview off; live: the effect strip with its live preview.
+"""
+
+import json
+import statistics
+import sys
+import time
+
+import bpy
+import gpu
+import numpy as np
+from gpu_extras.batch import batch_for_shader
+
+WINDOW, ROUNDS, SECONDS = 16, 3, 4.0
+FOOTAGE, OUT = sys.argv[sys.argv.index("--") + 1 :][:2]
+
+
+def extension():
+    """The extension's package of Blender's layer, under whatever name it is installed."""
+    return next(m for n, m in sys.modules.items() if n.endswith("virtual_shutter.shutter_addon.blender"))
+
+
+def make_edit():
+    import addon_utils
+
+    addon_utils.enable("bl_ext.user_default.virtual_shutter")
+    bpy.ops.wm.read_homefile(app_template="Video_Editing")
+    addon_utils.enable("bl_ext.user_default.virtual_shutter")
+    edit = bpy.data.scenes[0]
+    edit.render.resolution_x, edit.render.resolution_y = 1280, 720
+    edit.render.fps, edit.frame_start, edit.frame_end = 240, 1, 116
+    edit.sync_mode = "NONE"
+    editor = edit.sequence_editor_create()
+    # Finished frames would be shown again without any work: not what is measured.
+    editor.use_cache_raw = editor.use_cache_final = False
+    source = editor.strips.new_movie("Footage", FOOTAGE, 1, 1)
+    editor.active_strip = source
+    return edit, source
+
+
+def add_effect(edit, source):
+    """Three shutters on two lines and the border."""
+    from importlib import import_module
+
+    layer = extension().__name__
+    strips, effects = (import_module(f"{layer}.{name}") for name in ("strips", "effects"))
+    recipe = import_module(f"{layer.rpartition('.')[0]}.core.recipe")
+    presets = import_module(f"{layer.rpartition('.')[0]}.core.presets")
+    strip, effect = strips.add_effect(edit, source)
+    lines = {"Sharp": [[0.3, 0.2], [0.5, 0.8]], "Ramp": [[0.7, 0.2], [0.7, 0.8]]}
+    bars = {"Long": "ANGLE_360", "Sharp": "STILL", "Ramp": "RAMP_UP"}
+    data = {
+        "version": 1,
+        "window": WINDOW,
+        "border": True,
+        "shutters": [{"name": n, "bars": presets.bars(p, WINDOW).tolist()} for n, p in bars.items()],
+        "regions": [{"shutter": n, "kind": "line", "width": 0.02, "strokes": [points]} for n, points in lines.items()],
+    }
+    effects.apply(edit, effect, strip, recipe.parse(json.dumps(data)))
+    return strip, effect
+
+
+def texture_handler():
+    """A draw handler that draws one texture of the picture's size over the preview."""
+    pixels = np.random.default_rng(0).random((720, 1280, 4), dtype=np.float32)
+    texture = gpu.types.GPUTexture(
+        (1280, 720), format="RGBA32F", data=gpu.types.Buffer("FLOAT", pixels.size, pixels.ravel())
+    )
+    shader = gpu.shader.from_builtin("IMAGE")
+
+    def draw():
+        region = bpy.context.region
+        corners = [(0, 0), (region.width, 0), (region.width, region.height), (0, region.height)]
+        shader.bind()
+        shader.uniform_sampler("image", texture)
+        places = [(0, 0), (1, 0), (1, 1), (0, 1)]
+        batch_for_shader(shader, "TRI_FAN", {"pos": corners, "texCoord": places}).draw(shader)
+
+    return draw
+
+
+class Ways:
+    """Switches between the ways; each leaves the others' work undone."""
+
+    def __init__(self, source, strip):
+        self.source, self.strip, self.handler = source, strip, None
+
+    def __call__(self, way):
+        if self.handler:
+            bpy.types.SpaceSequenceEditor.draw_handler_remove(self.handler, "PREVIEW")
+            self.handler = None
+        self.strip.mute = way not in ("engine", "live")
+        self.source.mute = way == "texture"
+        bpy.context.window_manager.virtual_shutter.live = way == "live"
+        if way == "texture":
+            self.handler = bpy.types.SpaceSequenceEditor.draw_handler_add(texture_handler(), (), "PREVIEW", "POST_VIEW")
+
+
+def timeline():
+    for area in bpy.context.window_manager.windows[0].screen.areas:
+        if area.type == "SEQUENCE_EDITOR" and area.spaces.active.view_type == "SEQUENCER":
+            region = next(region for region in area.regions if region.type == "WINDOW")
+            return {"window": bpy.context.window_manager.windows[0], "area": area, "region": region}
+
+
+def playing(edit, seconds):
+    """Frames per second; generator, whose last value is the number."""
+    count = []
+    handler = lambda *_: count.append(time.perf_counter())  # noqa: E731
+    with bpy.context.temp_override(**timeline()):
+        bpy.ops.screen.animation_play()
+    yield 1.0
+    bpy.app.handlers.frame_change_post.append(handler)
+    yield seconds
+    bpy.app.handlers.frame_change_post.remove(handler)
+    with bpy.context.temp_override(**timeline()):
+        bpy.ops.screen.animation_cancel(restore_frame=False)
+    yield (len(count) - 1) / (count[-1] - count[0])
+
+
+def drawing(change):
+    """Milliseconds from a change to the window drawn with it, the median of several."""
+    times = []
+    for step in range(9):
+        start = time.perf_counter()
+        change(step)
+        for area in bpy.context.window_manager.windows[0].screen.areas:
+            if area.type == "SEQUENCE_EDITOR" and area.spaces.active.view_type == "PREVIEW":
+                area.tag_redraw()
+        with bpy.context.temp_override(**timeline()):
+            bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
+        times.append((time.perf_counter() - start) * 1000)
+    return statistics.median(times)
+
+
+def story():
+    edit, source = make_edit()
+    yield 1.0
+    strip, effect = add_effect(edit, source)
+    ways = Ways(source, strip)
+    bar = effect.shutters[0].bars[3]
+
+    def drag(step):
+        bar.weight = 0.2 + 0.05 * step
+
+    results = {f"{way} {what}": [] for way in ("plain", "texture", "engine", "live") for what in ("fps", "ms")}
+    for _ in range(ROUNDS):
+        for way in ("plain", "texture", "engine", "live"):
+            ways(way)
+            edit.frame_set(1)
+            yield 0.5
+            *_, fps = yield from _collect(playing(edit, SECONDS))
+            edit.frame_set(40)
+            yield 0.5
+            results[f"{way} fps"].append(fps)
+            results[f"{way} ms"].append(drawing(drag if way in ("engine", "live") else lambda step: None))
+            yield 0.2
+    summary = {name: {"median": statistics.median(v), "all": v} for name, v in results.items()}
+    summary["renderer"] = gpu.platform.renderer_get(), gpu.platform.backend_type_get()
+    with open(OUT, "w", encoding="utf-8") as file:
+        json.dump(summary, file, indent=1)
+    for name, value in summary.items():
+        print(name, f"{value['median']:.1f}" if isinstance(value, dict) else value, flush=True)
+    bpy.ops.wm.quit_blender()
+
+
+def _collect(steps):
+    values = []
+    for value in steps:
+        values.append(value)
+        if len(values) < 3:
+            yield value
+    return values
+
+
+def start():
+    steps = story()
+
+    def step():
+        try:
+            return next(steps) or 0.1
+        except StopIteration:
+            return None
+
+    bpy.app.timers.register(step, first_interval=1.0, persistent=True)
+
+
+start()
