@@ -26,12 +26,14 @@ def invalidate(edit, scene=None) -> None:
             strip.invalidate_cache("RAW")  # and with them all that was composed of them
 
 
-def invalidate_changed(edit) -> None:
-    """Drops the finished frames of the edit's effects whose keys, strokes or source have changed since the last call.
+def invalidate_changed(edit) -> bool:
+    """Drops the finished frames of the edit's effects whose keys, strokes or source have changed since the last call;
+    whether there are any.
 
     The values of keyed properties do not count: they change with every frame that plays."""
     if not edit.virtual_shutter.effects:
-        return
+        return False
+    changed = False
     shown = {strip.scene: strip for strip in strips.effect_strips(edit)}
     for effect in edit.virtual_shutter.effects:
         if (strip := shown.get(effect.scene)) is None:
@@ -40,6 +42,8 @@ def invalidate_changed(edit) -> None:
         if _signatures.setdefault(effect.scene.session_uid, signature) != signature:
             _signatures[effect.scene.session_uid] = signature
             invalidate(edit, effect.scene)
+            changed = True
+    return changed
 
 
 def _signature(edit, effect, strip):

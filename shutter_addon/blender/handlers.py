@@ -36,6 +36,22 @@ def _before_render(scene, *_):
             cache.invalidate_changed(edit)
 
 
+def _after_draw():
+    if not (bpy.context.screen.is_animation_playing or bpy.app.timers.is_registered(_look)):
+        bpy.app.timers.register(_look)
+
+
+def _look():
+    """Drawing and erasing a stroke updates no depsgraph, but redraws the preview."""
+    if bpy.app.is_job_running("RENDER"):
+        return
+    changed = [cache.invalidate_changed(edit) for edit in bpy.data.scenes]
+    if any(changed):
+        for area in (area for window in bpy.context.window_manager.windows for area in window.screen.areas):
+            if area.type == "SEQUENCE_EDITOR":
+                area.tag_redraw()
+
+
 HANDLERS = {
     "load_pre": _before_load,
     "load_post": _after_load,
@@ -46,12 +62,22 @@ HANDLERS = {
 }
 
 
+_draw_handlers = []
+
+
 def register():
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).append(function)
+    if not bpy.app.background:
+        space = bpy.types.SpaceSequenceEditor
+        _draw_handlers.append(space.draw_handler_add(_after_draw, (), "PREVIEW", "POST_PIXEL"))
 
 
 def unregister():
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).remove(function)
+    while _draw_handlers:
+        bpy.types.SpaceSequenceEditor.draw_handler_remove(_draw_handlers.pop(), "PREVIEW")
+    if bpy.app.timers.is_registered(_look):
+        bpy.app.timers.unregister(_look)
     pictures.forget()
