@@ -28,7 +28,7 @@ def invalidate(edit, scene=None) -> None:
 
 def invalidate_changed(edit) -> bool:
     """Drops the finished frames of the edit's effects whose keys, strokes or source have changed since the last call;
-    whether there were any.
+    whether there are any.
 
     The values of keyed properties do not count: they change with every frame that plays."""
     if not edit.virtual_shutter.effects:

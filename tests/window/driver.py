@@ -56,7 +56,11 @@ def _finish(fault):
 def saw(**facts):
     """Notes facts for the report."""
     _seen.append(facts)
-    print(facts, flush=True)
+
+
+def seen_so_far():
+    """The facts noted until now."""
+    return list(_seen)
 
 
 def shot(name):

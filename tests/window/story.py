@@ -1,0 +1,317 @@
+"""The first minutes of an editor, in a real window, by mouse and keyboard: run inside Blender, by test_window.py.
+
+From an empty Video Editing file to a finished picture. After every step the effect's data and the preview's picture are
+kept; then every step is undone and redone, and both must be what they were. Pictures and facts go to SHUTTER_PICTURES.
+"""
+
+import os
+import sys
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+import driver
+
+FOOTAGE = os.environ["SHUTTER_FOOTAGE"]
+FRAME, LATER = 50, 90
+PARKED = (-20, -20)  # where the pointer highlights nothing: over the preview's header
+
+
+def edit():
+    """Undo makes a new scene of it: never keep it."""
+    return bpy.data.scenes["Edit"]
+
+
+def effect():
+    return edit().virtual_shutter.effects[0]
+
+
+def preview():
+    return driver.region_of(driver.area_of("SEQUENCE_EDITOR", "PREVIEW"), "PREVIEW")
+
+
+def timeline():
+    return driver.region_of(driver.area_of("SEQUENCE_EDITOR", "SEQUENCER"), "WINDOW")
+
+
+def override(area_view):
+    area = driver.area_of("SEQUENCE_EDITOR", area_view)
+    region = driver.region_of(area, "PREVIEW" if area_view == "PREVIEW" else "WINDOW")
+    return bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=area, region=region)
+
+
+def curves():
+    data = edit().animation_data
+    if not (data and data.action and data.action_slot):
+        return []
+    from bpy_extras.anim_utils import action_get_channelbag_for_slot as bag_of
+
+    bag = bag_of(data.action, data.action_slot)
+    found = bag.fcurves if bag else []
+    return sorted((c.data_path, [tuple(round(v, 4) for v in key.co) for key in c.keyframe_points]) for c in found)
+
+
+def facts():
+    """All that the steps change, as plain data."""
+    strips = sorted((s.name, s.channel, s.left_handle, s.right_handle) for s in edit().sequence_editor.strips_all)
+    effects = []
+    for e in edit().virtual_shutter.effects:
+        layers = e.scene.annotation.layers if e.scene.annotation else []
+        drawn = [(l.info, [(f.frame_number, [len(s.points) for s in f.strokes]) for f in l.frames]) for l in layers]
+        bars = [(s.name, [round(b.weight, 4) for b in s.bars]) for s in e.shutters]
+        regions = [(r.name, r.shutter, [round(v, 4) for v in (*r.location, r.rotation, r.scale)]) for r in e.regions]
+        effects.append([e.window, bars, regions, drawn])
+    return repr([strips, effects, curves()])
+
+
+def crop():
+    """Where the preview lies on the screen: left, top, width, height."""
+    region = preview()
+    left, bottom = driver.screen(region, 0, 0)
+    return [left, bottom - region.height + 1, region.width, region.height]
+
+
+def seen(name):
+    """Data and picture as they are now; generator."""
+    region = preview()
+    driver.move(region, region.width / 2, region.height + 12)
+    yield 0.8
+    driver.shot(name)
+    driver.saw(step=name, facts=facts(), crop=crop(), frame=edit().frame_current)
+
+
+def opened():
+    driver.enable()
+    bpy.ops.wm.read_homefile(app_template="Video_Editing")
+    yield 1.0
+    driver.enable()
+    scene = bpy.data.scenes[0]
+    scene.name = "Edit"
+    scene.render.resolution_x, scene.render.resolution_y = 1280, 720
+    scene.frame_end = 132
+    scene.view_settings.view_transform = "Standard"
+    scene.sequence_editor_create()
+    bpy.context.preferences.inputs.use_mouse_emulate_3_button = False
+    bpy.context.preferences.view.show_splash = False
+    yield 0.5
+    bpy.ops.ed.undo_push(message="Start")
+
+
+def movie_added():
+    with override("SEQUENCER"):
+        bpy.ops.sequencer.movie_strip_add(
+            "EXEC_DEFAULT",
+            True,
+            filepath=FOOTAGE,
+            channel=1,
+            frame_start=1,
+            sound=False,
+            move_strips=False,
+            move_strips=False,
+        )
+    yield 0.5
+    assert [s.type for s in edit().sequence_editor.strips_all] == ["MOVIE"]
+    edit().frame_set(FRAME)
+    yield
+
+
+def effect_added():
+    region = timeline()
+    driver.move(region, region.width / 2, region.height / 2)
+    yield
+    driver.key("shift+a")
+    yield 0.5
+    driver.text("shutter")
+    yield 0.7
+    driver.shot("menu")
+    driver.key("Return")
+    yield 1.5
+    assert [shutter.name for shutter in effect().shutters] == ["Long", "Sharp"]
+    with override("PREVIEW"):
+        bpy.ops.sequencer.view_all_preview()
+    yield 0.5
+    assert driver.region_of(driver.area_of("SEQUENCE_EDITOR", "PREVIEW"), "UI").active_panel_category == "Shutter"
+
+
+def scribbled():
+    with override("PREVIEW"):
+        bpy.ops.shutter.draw("INVOKE_DEFAULT", True)
+    yield 0.5
+    region = preview()
+    w, h = region.width, region.height
+    yield from driver.drag(region, [(w * x, h * y) for x, y in ((0.4, 0.5), (0.45, 0.6), (0.5, 0.6), (0.55, 0.5))])
+    layer = effect().scene.annotation.layers[effect().regions[0].layer]
+    assert [len(frame.strokes) for frame in layer.frames] == [1]
+    with override("PREVIEW"):
+        bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+    yield
+
+
+def preset_chosen():
+    effect().active_shutter = 1
+    region = preview()
+    driver.move(region, region.width / 2, region.height / 2)
+    yield
+    with override("PREVIEW"):
+        bpy.ops.wm.call_menu(name="SHUTTER_MT_presets")
+    yield 0.5
+    driver.shot("presets")
+    driver.text("90")  # types to search, or goes to the entry that begins so
+    yield 0.3
+    driver.key("Return")
+    yield 0.5
+
+
+def bars():
+    return [round(bar.weight, 4) for bar in effect().shutters[1].bars]
+
+
+def bars_dragged(points, hold=()):
+    before = bars()
+    region = preview()
+    yield from driver.drag(region, points, hold)
+    assert bars() != before, "the bars did not change"
+
+
+def keyed():
+    region = preview()
+    driver.move(region, 60, 60)
+    yield 0.4
+    driver.key("i")
+    yield 0.5
+    frame = edit().frame_current
+    found = [path for path, keys in curves() if any(key[0] == frame for key in keys)]
+    assert len(found) == effect().window, f"{len(found)} bars have a key at {frame}"
+
+
+def moved_to(frame):
+    """Scrubs by mouse to about a frame, then goes there."""
+    area = driver.area_of("SEQUENCE_EDITOR", "SEQUENCER")
+    window = driver.region_of(area, "WINDOW")
+    x, _ = window.view2d.view_to_region(frame, 0, clip=False)
+    start, _ = window.view2d.view_to_region(edit().frame_current, 0, clip=False)
+    top = window.height - 10
+    yield from driver.drag(window, [(start, top), ((start + x) / 2, top), (x, top)])
+    assert abs(edit().frame_current - frame) <= 2, f"scrubbed to {edit().frame_current}"
+    edit().frame_set(frame)
+    yield
+
+
+STEPS = {
+    "1_movie": movie_added,
+    "2_effect": effect_added,
+    "3_scribble": scribbled,
+    "4_preset": preset_chosen,
+    "5_bars": lambda: bars_dragged([(50, 90), (90, 60), (140, 40)]),
+    "6_key": keyed,
+    "7_later": lambda: bars_dragged([(150, 50), (190, 90)]),
+    "8_key_later": keyed,
+}
+
+
+def undone_and_redone():
+    """Every step, back to the movie alone and forth again; frame changes are no steps of their own."""
+    names = list(STEPS)
+    region = preview()
+    states = {entry["step"]: entry for entry in driver.seen_so_far() if "step" in entry}
+    for direction, keys, order in (("undo", "ctrl+z", names[-2::-1]), ("redo", "ctrl+shift+z", names[1:])):
+        for name in order:
+            wanted = states[name]
+            for _ in range(4):  # a step may be two for Blender: a stroke, and the tool that drew it
+                driver.move(preview(), region.width / 2, region.height / 2)
+                yield 0.2
+                driver.key(keys)
+                yield 0.5
+                if facts() == wanted["facts"]:
+                    break
+            assert facts() == wanted["facts"], f"{direction} to {name}:\n{facts()}\n{wanted['facts']}"
+            edit().frame_set(wanted["frame"])
+            yield from seen(f"{name}_{direction}")
+
+
+def saved_and_loaded():
+    path = driver.OUT / "edit.blend"
+    before = facts()
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    yield 1.5
+    assert facts() == before
+    with override("PREVIEW"):
+        bpy.ops.sequencer.view_all_preview()
+    yield from seen("9_loaded")
+
+
+def in_agreement():
+    """Live preview, sequencer's picture and final render of one frame, pixel by pixel at full size."""
+    edit().frame_set(70)
+    area = driver.area_of("SEQUENCE_EDITOR", "PREVIEW")
+    space = area.spaces.active
+    space.show_overlays = space.show_gizmo = space.show_region_ui = False
+    with override("PREVIEW"):
+        bpy.ops.screen.screen_full_area()
+    yield 1.0
+    area = driver.area_of("SEQUENCE_EDITOR", "PREVIEW")
+    area.spaces.active.show_overlays = area.spaces.active.show_gizmo = False
+    with override("PREVIEW"):
+        bpy.ops.sequencer.view_all_preview()
+        bpy.ops.sequencer.view_zoom_ratio(ratio=1.0)
+    yield 1.0
+    for name, live in (("live", True), ("sequencer", False)):
+        bpy.context.window_manager.virtual_shutter.live = live
+        region = preview()
+        driver.move(region, 5, region.height - 5)
+        yield 1.5
+        driver.shot(name)
+        corners = [region.view2d.view_to_region(*corner, clip=False) for corner in ((-640, 360), (640, -360))]
+        (left, top), (right, bottom) = (driver.screen(region, *corner) for corner in corners)
+        driver.saw(picture=name, box=[left, top + 1, right, bottom + 1])
+    bpy.context.window_manager.virtual_shutter.live = True
+    with override("PREVIEW"):
+        bpy.ops.screen.back_to_previous()
+    yield 1.0
+    render = edit().render
+    render.image_settings.media_type = "IMAGE"
+    render.image_settings.file_format = "PNG"
+    render.dither_intensity = 0
+    render.filepath = str(driver.OUT / "final.png")
+    done = []
+    bpy.app.handlers.render_complete.append(lambda *_: done.append(True))
+    # As with F12: a job on another thread, after the preview has filled the sequencer's cache.
+    with override("PREVIEW"):
+        bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
+    for _ in range(60):
+        yield 0.5
+        if done:
+            break
+    assert done, "the render did not end"
+    driver.saw(picture="final")
+
+
+def disabled_and_enabled():
+    import addon_utils
+
+    addon_utils.disable("bl_ext.user_default.virtual_shutter", default_set=True)
+    yield 0.5
+    driver.shot("disabled")
+    assert not hasattr(bpy.types.Scene, "virtual_shutter")
+    driver.enable()
+    yield 1.0
+    assert [shutter.name for shutter in effect().shutters] == ["Long", "Sharp"]
+    driver.shot("enabled")
+
+
+def story():
+    yield from opened()
+    for name, step in STEPS.items():
+        if name == "7_later":
+            yield from moved_to(LATER)
+        yield from step()
+        yield from seen(name)
+    yield from undone_and_redone()
+    yield from saved_and_loaded()
+    yield from in_agreement()
+    yield from disabled_and_enabled()
+
+
+driver.play(story)
