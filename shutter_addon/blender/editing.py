@@ -40,6 +40,15 @@ def active_region(effect):
     return region if region and shutter and region.shutter == shutter.name else None
 
 
+def choose_region(effect) -> None:
+    """Makes a region of the active shutter the active one, the nearest in the list, unless it is one or there is none:
+    the list shows that shutter's alone."""
+    shutter = active_shutter(effect)
+    own = [i for i, region in enumerate(effect.regions) if shutter and region.shutter == shutter.name]
+    if own and effect.active_region not in own:
+        effect.active_region = min(own, key=lambda i: abs(i - effect.active_region))
+
+
 def unique(name: str, taken) -> str:
     """The name, with a number behind it where it is taken, as Blender names things."""
     base, number, wanted = name, 0, name
@@ -269,6 +278,7 @@ def remove_region(effect, index: int) -> None:
         effect.scene.annotation.layers.remove(layer)
     _remove(effect, "regions", index)
     effect.active_region = min(effect.active_region, max(len(effect.regions) - 1, 0))
+    choose_region(effect)
 
 
 def move_region(effect, index: int, to: int) -> None:

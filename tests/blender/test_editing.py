@@ -89,6 +89,22 @@ def test_the_active_shutter_and_its_active_region(effect, editing):
     assert editing.active_region(effect) is None
 
 
+def test_with_a_shutter_one_of_its_regions_is_active(effect, editing):
+    """Else the list shows regions, and every button says that there is none."""
+    for shutter in (0, 0, 1, 1, 0):
+        editing.add_region(effect, effect.shutters[shutter])
+    effect.active_shutter = 1
+    assert effect.active_region == 3
+    editing.remove_region(effect, 3)
+    assert effect.active_region == 2
+    editing.remove_region(effect, 2)
+    assert editing.active_region(effect) is None
+    effect.active_shutter = 0
+    assert editing.active_region(effect).shutter == "Long"
+    editing.remove_shutter(effect, 0)
+    assert effect.active_region == 0
+
+
 @given(st.text(max_size=5), st.sets(st.text(max_size=5)))
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_unique_name_is_the_wish_or_begins_with_it(editing, name, taken):
