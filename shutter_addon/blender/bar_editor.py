@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from bpy.types import Gizmo, GizmoGroup
 
-from . import drawing, editing, strips
+from . import drawing, editing, keymaps, strips
 
 _MARGIN, _HEIGHT, _BAR = 16, 96, 16  # in units of the interface
 _PAD, _HEADER = 8, 18
@@ -182,7 +182,7 @@ class SHUTTER_GGT_bars(GizmoGroup):
 
     @classmethod
     def setup_keymap(cls, keyconfig):
-        keymap = keyconfig.keymaps.new(cls.bl_idname, space_type=cls.bl_space_type, region_type="WINDOW")
+        keymap = keymaps.new(cls, keyconfig)
         keymap.keymap_items.new("shutter.bar_set", "LEFTMOUSE", "DOUBLE_CLICK")
         keymap.keymap_items.new("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", any=True)
         keymap.keymap_items.new("shutter.bars_key", "I", "PRESS")
@@ -204,3 +204,4 @@ def register():
 def unregister():
     for cls in reversed(classes):
         bpy.utils.unregister_class(cls)
+    keymaps.remove(SHUTTER_GGT_bars)

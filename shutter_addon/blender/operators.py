@@ -446,5 +446,7 @@ def register():
 
 
 def unregister():
+    if bpy.app.timers.is_registered(_choose_tab):
+        bpy.app.timers.unregister(_choose_tab)
     for cls in reversed(classes):
         bpy.utils.unregister_class(cls)
