@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from bpy.types import Gizmo, GizmoGroup
 
-from . import drawing, editing, strips
+from . import drawing, editing, keymaps, strips
 
 _MARGIN, _HEIGHT, _BAR = 16, 96, 16  # in units of the interface
 _PAD, _HEADER = 8, 18
@@ -39,14 +39,19 @@ class Layout:
         return left <= x < right and bottom <= y < top
 
 
-def layout(region, bars) -> Layout:
-    """The bar editor's place at the lower left of a region (`width`, in pixels) for bars (L,)."""
-    unit = drawing.ui_scale()
+def layout(width: float, bars, unit: float) -> Layout:
+    """The bar editor's place at the lower left of a region of this width for bars (L,); unit: of the interface, in
+    pixels."""
     margin, pad = _MARGIN * unit, _PAD * unit
-    width = min(max(len(bars) * _BAR, 200) * unit, region.width - 2 * margin)
+    # A region that is too narrow shows the editor's left part.
+    width = max(min(max(len(bars) * _BAR, 200) * unit, width - 2 * margin), 4 * pad)
     frame = margin, margin, margin + width, margin + _HEIGHT * unit
     box = frame[0] + pad, frame[1] + pad, frame[2] - pad, frame[3] - _HEADER * unit
     return Layout(frame, box, len(bars), max(1.0, float(np.max(bars, initial=0.0))))
+
+
+def _layout(context, bars) -> Layout:
+    return layout(context.region.width, bars, drawing.ui_scale())
 
 
 def painted(values, place: Layout, start, end, snap: bool) -> np.ndarray:
@@ -70,7 +75,7 @@ def bar_under(context, x: float, y: float) -> int | None:
     effect = found[1]
     if editing.active_shutter(effect) is None:
         return None
-    place = layout(context.region, editing.bars(editing.active_shutter(effect)))
+    place = _layout(context, editing.bars(editing.active_shutter(effect)))
     return place.bar_at(x) if place.contains(x, y) else None
 
 
@@ -91,7 +96,7 @@ class SHUTTER_GT_bars(Gizmo):
         effect = strips.active(context)[1]
         shutter = editing.active_shutter(effect)
         values = editing.bars_now(effect, effect.active_shutter)
-        _draw(layout(context.region, values), shutter, values, editing.key_state(effect, effect.active_shutter))
+        _draw(_layout(context, values), shutter, values, editing.key_state(effect, effect.active_shutter))
 
     def test_select(self, context, location):
         return 0 if bar_under(context, *location) is not None else -1
@@ -99,9 +104,11 @@ class SHUTTER_GT_bars(Gizmo):
     def invoke(self, context, event):
         effect = strips.active(context)[1]
         self.index = effect.active_shutter
-        self.before = editing.bars_now(effect, self.index)
+        self.before = editing.bars(effect.shutters[self.index])
+        # Between keys what is shown, and painted on, is not what is stored.
+        self.values = editing.bars_now(effect, self.index)
         # The scale stays while dragging, or a bar would run away from the pointer.
-        self.place = layout(context.region, self.before)
+        self.place = _layout(context, self.values)
         self.mouse = self.point = event.mouse_region_x, event.mouse_region_y
         self._paint(context, self.point, False)
         return {"RUNNING_MODAL"}
@@ -117,8 +124,8 @@ class SHUTTER_GT_bars(Gizmo):
 
     def _paint(self, context, point, snap: bool):
         effect = strips.active(context)[1]
-        values = editing.bars(effect.shutters[self.index])
-        editing.paint(effect, self.index, painted(values, self.place, self.point, point, snap))
+        self.values = painted(self.values, self.place, self.point, point, snap)
+        editing.paint(effect, self.index, self.values)
         self.point = point
         context.area.tag_redraw()
 
@@ -175,7 +182,7 @@ class SHUTTER_GGT_bars(GizmoGroup):
 
     @classmethod
     def setup_keymap(cls, keyconfig):
-        keymap = keyconfig.keymaps.new(cls.bl_idname, space_type=cls.bl_space_type, region_type="WINDOW")
+        keymap = keymaps.new(cls, keyconfig)
         keymap.keymap_items.new("shutter.bar_set", "LEFTMOUSE", "DOUBLE_CLICK")
         keymap.keymap_items.new("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", any=True)
         keymap.keymap_items.new("shutter.bars_key", "I", "PRESS")
@@ -197,3 +204,4 @@ def register():
 def unregister():
     for cls in reversed(classes):
         bpy.utils.unregister_class(cls)
+    keymaps.remove(SHUTTER_GGT_bars)

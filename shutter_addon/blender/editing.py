@@ -40,6 +40,15 @@ def active_region(effect):
     return region if region and shutter and region.shutter == shutter.name else None
 
 
+def choose_region(effect) -> None:
+    """Makes a region of the active shutter the active one, the nearest in the list, unless it is one or there is none:
+    the list shows that shutter's alone."""
+    shutter = active_shutter(effect)
+    own = [i for i, region in enumerate(effect.regions) if shutter and region.shutter == shutter.name]
+    if own and effect.active_region not in own:
+        effect.active_region = min(own, key=lambda i: abs(i - effect.active_region))
+
+
 def unique(name: str, taken) -> str:
     """The name, with a number behind it where it is taken, as Blender names things."""
     base, number, wanted = name, 0, name
@@ -130,7 +139,8 @@ def summary(values) -> str:
     light = shutters.exposure(values)
     if not light:
         return "All bars are zero: the shutter never opens"
-    return f"{shutters.open_angle(values):.0f}°, {light:.3g} {'frame' if light == 1 else 'frames'} of light"
+    frames = f"{light:.3g}"
+    return f"{shutters.open_angle(values):.0f}°, {frames} {'frame' if frames == '1' else 'frames'} of light"
 
 
 def set_bars(shutter, values) -> None:
@@ -148,7 +158,7 @@ def paint(effect, index: int, values, key: bool = False) -> None:
 
 
 def fit_bars(effect) -> None:
-    """After a change of the window's length: all shutters, their keys as well, keep their shape and angle."""
+    """After a change of the window's length: all shutters, their keys as well, keep their shape and share of light."""
     for index, shutter in enumerate(effect.shutters):
         if len(shutter.bars) not in (0, effect.window):
             _fit(effect, index, shutter)
@@ -179,6 +189,8 @@ def _resampled_key(old, keyed, frame: float, window: int):
 def key_bars(effect, index: int) -> None:
     """Keys all bars of a shutter at the current frame, as Blender's own key buttons do."""
     path, group = f"{effect.path_from_id()}.shutters[{index}].bars", effect.shutters[index].name
+    # Between keys the bars stand where their F-curves are, a cross-fade: the picture is made with others.
+    set_bars(effect.shutters[index], bars_now(effect, index))
     for k in range(len(effect.shutters[index].bars)):
         effect.id_data.keyframe_insert(f"{path}[{k}].weight", group=group)
 
@@ -266,6 +278,7 @@ def remove_region(effect, index: int) -> None:
         effect.scene.annotation.layers.remove(layer)
     _remove(effect, "regions", index)
     effect.active_region = min(effect.active_region, max(len(effect.regions) - 1, 0))
+    choose_region(effect)
 
 
 def move_region(effect, index: int, to: int) -> None:

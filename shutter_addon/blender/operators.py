@@ -369,6 +369,13 @@ class SHUTTER_OT_region_key(_OfRegion, Operator):
         editing.key_region(effect, effect.active_region)
 
 
+def chosen_file(operator) -> str:
+    """The path that an operator got. RecipeError: it got none."""
+    if not operator.filepath:
+        raise recipe.RecipeError("Choose a file")
+    return operator.filepath
+
+
 class SHUTTER_OT_recipe_import(_OfEffect, ImportHelper, Operator):
     """Replace the effect by a recipe: shutters, scribbles, keys and options"""
 
@@ -380,7 +387,7 @@ class SHUTTER_OT_recipe_import(_OfEffect, ImportHelper, Operator):
     def change(self, context, effect):
         edit, _effect, strip = strips.active(context)
         try:
-            loaded = recipe.load(self.filepath)
+            loaded = recipe.load(chosen_file(self))
         except recipe.RecipeError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -400,14 +407,15 @@ class SHUTTER_OT_recipe_export(_OfEffect, ExportHelper, Operator):
     def change(self, context, effect):
         edit, _effect, strip = strips.active(context)
         try:
-            recipe.save(export.recipe_of(edit, effect, strip), self.filepath)
+            path = chosen_file(self)
+            recipe.save(export.recipe_of(edit, effect, strip), path)
         except (recipe.RecipeError, effects.EffectError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         except OSError as error:
             self.report({"ERROR"}, f"{self.filepath}: {error.strerror or error}")
             return {"CANCELLED"}
-        self.report({"INFO"}, f"Wrote {self.filepath}")
+        self.report({"INFO"}, f"Wrote {path}")
         return None
 
 
@@ -438,5 +446,7 @@ def register():
 
 
 def unregister():
+    if bpy.app.timers.is_registered(_choose_tab):
+        bpy.app.timers.unregister(_choose_tab)
     for cls in reversed(classes):
         bpy.utils.unregister_class(cls)

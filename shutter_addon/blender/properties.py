@@ -72,6 +72,10 @@ def _lengthened(effect, context):
     _changed(effect, context)
 
 
+def _chosen(effect, _context):
+    editing.choose_region(effect)
+
+
 class ShutterBar(PropertyGroup):
     weight: FloatProperty(
         name="Weight",
@@ -140,7 +144,7 @@ class ShutterEffect(PropertyGroup):
     )
     shutters: CollectionProperty(type=Shutter)
     regions: CollectionProperty(type=ShutterRegion)
-    active_shutter: IntProperty(name="Active Shutter", min=0)
+    active_shutter: IntProperty(name="Active Shutter", min=0, update=_chosen)
     active_region: IntProperty(name="Active Region", min=0)
 
 

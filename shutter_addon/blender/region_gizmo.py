@@ -7,7 +7,7 @@ import numpy as np
 from bpy.types import Gizmo, GizmoGroup
 
 from ..core import scribbles
-from . import drawing, editing, effects, geometry, strips
+from . import drawing, editing, effects, geometry, keymaps, strips
 
 _RADIUS = 7  # of a handle, in units of the interface
 _NEAREST = 0.03  # of the corner's handle to the centre's, in parts of the picture
@@ -143,7 +143,7 @@ class SHUTTER_GGT_region(GizmoGroup):
 
     @classmethod
     def setup_keymap(cls, keyconfig):
-        keymap = keyconfig.keymaps.new(cls.bl_idname, space_type=cls.bl_space_type, region_type="WINDOW")
+        keymap = keymaps.new(cls, keyconfig)
         keymap.keymap_items.new("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", any=True)
         keymap.keymap_items.new("shutter.region_key", "I", "PRESS")
         return keymap
@@ -164,3 +164,4 @@ def register():
 def unregister():
     for cls in reversed(classes):
         bpy.utils.unregister_class(cls)
+    keymaps.remove(SHUTTER_GGT_region)

@@ -151,7 +151,8 @@ def open_span(shutters) -> tuple[int, int]:
 
 
 def resample(bars, window: int) -> np.ndarray:
-    """Bars (window,) of the same shutter over a window of another length: its shape and its angle stay."""
+    """Bars (window,) of the same shutter over a window of another length. Its shape stays, and its share of
+    the window's light; its angle where no bar is averaged with others."""
     bars = np.asarray(bars, dtype=np.float64)
     total = np.concatenate([[0.0], np.cumsum(bars)])
     at = np.linspace(0, len(bars), window + 1)

@@ -6,8 +6,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
-from support import read_picture
+from support import read_picture, write_frames
 
 ROOT = Path(__file__).parents[2]
 
@@ -33,6 +34,20 @@ def edit(bpy):
     scene.render.dither_intensity = 0
     scene.view_settings.view_transform = "Standard"
     return scene
+
+
+@pytest.fixture
+def effect(bpy, edit, tmp_path):
+    """What the button makes: an effect with two shutters, on an image strip from frame 1 to 40; its strip active."""
+    from shutter_addon.blender import editing, strips
+
+    first = write_frames(tmp_path / "in", np.zeros((3, 24, 40, 3), dtype=np.uint8))
+    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
+    source.right_handle = 41
+    strip, effect = strips.add_effect(edit, source)
+    editing.start(effect)
+    strips.choose(edit, strip)
+    return effect
 
 
 @pytest.fixture

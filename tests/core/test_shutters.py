@@ -159,3 +159,47 @@ def test_no_shutter(bars, sentence):
 def test_open_span():
     assert shutters.open_span([[0, 0, 1, 0], [0, 1, 0, 0]]) == (1, 3)
     assert shutters.open_span(np.ones((1, 1))) == (0, 1)
+
+
+@given(bars_lists(most=1), st.integers(1, 80))
+def test_another_window_keeps_the_share_of_light(bars, window):
+    new = shutters.resample(bars[0], window)
+    assert new.shape == (window,)
+    assert (new >= -1e-12).all()
+    assert new.mean() == pytest.approx(bars[0].mean())
+    assert new.max() <= bars[0].max() + 1e-12
+
+
+@given(bars_lists(most=1), st.integers(1, 80))
+def test_another_window_keeps_the_shape(bars, window):
+    """What has been gathered by any share of the window is the same, at every boundary of the new bars."""
+    new = shutters.accumulation(shutters.resample(bars[0], window))
+    old = shutters.accumulation(bars[0])
+    at = np.linspace(0, 1, window + 1)
+    assert new == pytest.approx(np.interp(at, np.linspace(0, 1, len(old)), old), abs=1e-9)
+
+
+@given(bars_lists(most=1), st.integers(1, 6))
+def test_a_window_times_longer_splits_each_bar_and_comes_back(bars, times):
+    longer = shutters.resample(bars[0], len(bars[0]) * times)
+    assert longer == pytest.approx(np.repeat(bars[0], times), abs=1e-9)
+    assert shutters.resample(longer, len(bars[0])) == pytest.approx(bars[0], abs=1e-9)
+    assert shutters.open_angle(longer) == pytest.approx(shutters.open_angle(bars[0]))
+
+
+@given(bars_lists(most=1), st.floats(0.01, 100))
+def test_an_angle_is_that_of_the_shape_however_bright(bars, gain):
+    angle = shutters.open_angle(bars[0])
+    assert 0 < angle <= 360 + 1e-9
+    assert shutters.open_angle(bars[0] * gain) == pytest.approx(angle)
+
+
+@given(st.integers(1, 256), st.floats(0.01, 360))
+def test_a_disc_has_its_angle(window, degrees):
+    bars = np.clip(window * degrees / 360 - np.arange(window), 0, 1)
+    # A slit narrower than one bar is a dimmer bar: its angle is that bar's.
+    assert shutters.open_angle(bars) == pytest.approx(max(degrees, 360 / window))
+
+
+def test_a_closed_shutter_has_no_angle():
+    assert shutters.open_angle([0.0, 0.0]) == 0

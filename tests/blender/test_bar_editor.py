@@ -1,0 +1,89 @@
+"""Where the bar editor's bars lie, and what a stroke makes of them."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+
+@pytest.fixture(scope="module")
+def editor(bpy):
+    from shutter_addon.blender import bar_editor
+
+    return bar_editor
+
+
+WIDTH = 2000  # of the region
+
+
+def centre(place, bar, weight):
+    left, bottom, right, top = place.box
+    return left + (bar + 0.5) * (right - left) / place.count, bottom + weight / place.top * (top - bottom)
+
+
+@st.composite
+def strokes(draw):
+    """Bars and two ends (bar, weight) of a stroke, some beyond the bars."""
+    count = draw(st.integers(1, 60))
+    end = st.tuples(st.integers(-3, count + 2), st.floats(-0.5, 2.5))
+    return np.array(draw(st.lists(st.floats(0, 2), min_size=count, max_size=count))), draw(end), draw(end)
+
+
+@given(st.integers(1, 256), st.integers(1, 4000), st.floats(0, 5), st.floats(0.5, 3))
+def test_the_bars_lie_in_the_region(editor, count, width, most, unit):
+    place = editor.layout(width, np.full(count, most), unit)
+    left, bottom, right, top = place.frame
+    assert 0 < left < place.box[0] < place.box[2] < right
+    assert right < width or width < 80 * unit
+    assert 0 < bottom < place.box[1] < place.box[3] < top
+    assert place.top == max(1.0, most)
+    for bar in range(count):
+        x, y = centre(place, bar, most)
+        assert place.bar_at(x) == bar
+        assert place.weight_at(y) == pytest.approx(most)
+        assert place.contains(x, y)
+    assert place.bar_at(left - 100) == 0
+    assert place.bar_at(right + 100) == count - 1
+    assert place.weight_at(bottom - 100) == 0
+    assert not place.contains(right, bottom)
+    assert not place.contains(left, top)
+
+
+def test_many_bars_take_more_room_until_the_region_ends(editor):
+    widths = [editor.layout(WIDTH, np.ones(n), 1.0).frame[2] for n in (1, 8, 32, 64, 200, 256)]
+    assert widths == sorted(widths)
+    assert widths[0] < widths[2] < widths[3] < widths[4] == widths[5] < WIDTH
+
+
+@given(strokes())
+def test_a_stroke_gives_every_bar_it_crosses_its_height(editor, stroke):
+    values, (first, low), (last, high) = stroke
+    place = editor.layout(WIDTH, values, 1.0)
+    new = editor.painted(values, place, centre(place, first, low), centre(place, last, high), snap=False)
+    a, b = (min(max(bar, 0), len(values) - 1) for bar in (first, last))
+    crossed = range(min(a, b), max(a, b) + 1)
+    for bar in range(len(values)):
+        if bar not in crossed:
+            assert new[bar] == values[bar]
+    u = np.abs(np.array(crossed) - a) / abs(b - a) if a != b else np.ones(1)
+    heights = np.clip((1 - u) * low + u * high, 0, place.top)
+    assert new[list(crossed)] == pytest.approx(heights, abs=1e-6)
+
+
+@given(strokes())
+def test_a_snapped_stroke_gives_tenths(editor, stroke):
+    values, (first, low), (last, high) = stroke
+    place = editor.layout(WIDTH, values, 1.0)
+    ends = centre(place, first, low), centre(place, last, high)
+    free, snapped = (editor.painted(values, place, *ends, snap) for snap in (False, True))
+    changed = free != values
+    assert snapped[changed] * 10 == pytest.approx(np.round(snapped[changed] * 10), abs=1e-9)
+    assert np.abs(snapped - free).max() <= 0.1 + 1e-9
+    assert (snapped >= 0).all()
+
+
+def test_a_stroke_leaves_the_given_bars_alone(editor):
+    values = np.ones(4)
+    place = editor.layout(WIDTH, values, 1.0)
+    editor.painted(values, place, centre(place, 0, 0), centre(place, 3, 0), snap=False)
+    assert values.tolist() == [1, 1, 1, 1]

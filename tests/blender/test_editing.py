@@ -1,0 +1,484 @@
+"""Changes to an effect: data, F-curves and annotation layers stay together."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+RNG = np.random.default_rng(5)
+
+
+@pytest.fixture
+def editing(bpy):
+    from shutter_addon.blender import editing
+
+    return editing
+
+
+@pytest.fixture
+def three(effect, editing):
+    """An effect with shutters A, B and C of random bars, keyed at frames 1 and 9."""
+    edit = effect.id_data
+    for i, name in enumerate("ABC"):
+        if i == len(effect.shutters):
+            editing.add_shutter(effect)
+        effect.shutters[i].name = name
+        for frame in (1, 9):
+            edit.frame_set(frame)
+            editing.set_bars(effect.shutters[i], RNG.random(effect.window))
+            editing.key_bars(effect, i)
+    return effect
+
+
+def curves(effect, under):
+    """Keys of the effect's F-curves under a path: {(path from there, index): [(frame, value, interpolation)]}."""
+    from shutter_addon.blender import animation
+
+    path = f"{effect.path_from_id()}.{under}"
+    return {
+        (c.data_path.removeprefix(path), c.array_index): [(*k.co, k.interpolation) for k in c.keyframe_points]
+        for c in animation.curves_under(effect.id_data, path)
+    }
+
+
+def shutters_of(effect):
+    """By name: color and keys."""
+    return {s.name: (tuple(s.color), curves(effect, f"shutters[{i}].")) for i, s in enumerate(effect.shutters)}
+
+
+def regions_of(effect):
+    return {r.name: (r.shutter, r.layer, curves(effect, f"regions[{i}].")) for i, r in enumerate(effect.regions)}
+
+
+def layers(effect):
+    return [layer.info for layer in effect.scene.annotation.layers]
+
+
+def draw(effect, editing, index, points=((0, 0), (5, 5)), frame=1):
+    stroke = editing.layer_of(effect, effect.regions[index]).frames.new(frame).strokes.new()
+    stroke.points.add(len(points))
+    stroke.points.foreach_set("co", np.ravel([(*p, 0) for p in points]))
+
+
+def picture_bars(effect, index, frame):
+    """What a picture at a frame is made with."""
+    from shutter_addon.blender import effects, strips
+
+    edit, _, strip = strips.find_edit(effect.scene)
+    return effects.instant(edit, effect, strip, frame).bars[index]
+
+
+# Finding
+
+
+def test_what_belongs_to_an_effect_finds_it(effect, editing):
+    region = editing.add_region(effect, effect.shutters[1])
+    assert editing.effect_of(region) == editing.effect_of(effect.shutters[1]) == effect
+
+
+def test_the_active_shutter_and_its_active_region(effect, editing):
+    effect.active_shutter = 1
+    assert editing.active_shutter(effect) == effect.shutters[1]
+    assert editing.active_region(effect) is None
+    editing.add_region(effect, effect.shutters[1])
+    assert editing.active_region(effect) == effect.regions[0]
+    effect.active_shutter = 0
+    assert editing.active_region(effect) is None, "the region is the other shutter's"
+    effect.shutters.clear()
+    assert editing.active_shutter(effect) is None
+    assert editing.active_region(effect) is None
+
+
+def test_with_a_shutter_one_of_its_regions_is_active(effect, editing):
+    """Else the list shows regions, and every button says that there is none."""
+    for shutter in (0, 0, 1, 1, 0):
+        editing.add_region(effect, effect.shutters[shutter])
+    effect.active_shutter = 1
+    assert effect.active_region == 3
+    editing.remove_region(effect, 3)
+    assert effect.active_region == 2
+    editing.remove_region(effect, 2)
+    assert editing.active_region(effect) is None
+    effect.active_shutter = 0
+    assert editing.active_region(effect).shutter == "Long"
+    editing.remove_shutter(effect, 0)
+    assert effect.active_region == 0
+
+
+@given(st.text(max_size=5), st.sets(st.text(max_size=5)))
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_unique_name_is_the_wish_or_begins_with_it(editing, name, taken):
+    found = editing.unique(name, taken)
+    assert found not in taken
+    assert found.startswith(name)
+    assert (found == name) == (name not in taken)
+
+
+# Shutters
+
+
+def test_a_new_effect_has_a_long_and_a_sharp_shutter(effect, editing):
+    assert [shutter.name for shutter in effect.shutters] == ["Long", "Sharp"]
+    assert editing.bars(effect.shutters[0]).tolist() == [1] * 8
+    assert editing.bars(effect.shutters[1]).tolist() == [1] + [0] * 7
+    assert effect.border
+    assert effect.active_shutter == 1
+
+
+def test_an_added_shutter_is_open_has_a_name_and_a_color_and_is_active(effect, editing):
+    first, second = (editing.add_shutter(effect).name for _ in range(2))
+    assert (first, second) == ("Shutter", "Shutter.001")
+    assert effect.active_shutter == 3
+    assert editing.bars(effect.shutters[3]).tolist() == [1] * 8
+    assert len({tuple(shutter.color) for shutter in effect.shutters}) == 4
+    for _ in editing.COLORS:  # there are more shutters than colours
+        editing.add_shutter(effect)
+    assert len({shutter.name for shutter in effect.shutters}) == 4 + len(editing.COLORS)
+
+
+def test_a_duplicate_comes_behind_with_bars_and_keys_of_its_own(three, editing):
+    before = shutters_of(three)
+    editing.add_region(three, three.shutters[0])
+    copy = editing.duplicate_shutter(three, 0)
+    assert copy == three.shutters[1]
+    assert three.active_shutter == 1
+    assert [shutter.name for shutter in three.shutters] == ["A", "A.001", "B", "C"]
+    after = shutters_of(three)
+    assert {name: after[name] for name in "ABC"} == before
+    assert after["A.001"][1] == before["A"][1] != {}
+    assert after["A.001"][0] not in [color for color, _ in before.values()]
+    assert editing.bars(three.shutters[1]).tolist() == editing.bars(three.shutters[0]).tolist()
+    assert three.regions[0].shutter == "A"
+
+
+def test_a_removed_shutter_takes_its_keys_regions_and_layers_along(three, editing):
+    for name in "BAB":
+        editing.add_region(three, three.shutters[name])
+        editing.key_region(three, len(three.regions) - 1)
+    shutters, regions = shutters_of(three), regions_of(three)
+    editing.remove_shutter(three, 1)
+    del shutters["B"], regions["B"], regions["B.001"]
+    assert shutters_of(three) == shutters
+    assert regions_of(three) == regions
+    assert layers(three) == ["A"]
+    assert [shutter.name for shutter in three.shutters] == ["A", "C"]
+    assert three.active_shutter == 1
+    editing.remove_shutter(three, 1)
+    editing.remove_shutter(three, 0)
+    assert three.active_shutter == three.active_region == 0
+    assert curves(three, "") == {}
+    assert layers(three) == []
+
+
+@pytest.mark.parametrize(("index", "to", "order"), [(0, 2, "BCA"), (2, 0, "CAB"), (1, 1, "ABC"), (1, 2, "ACB")])
+def test_a_moved_shutter_keeps_its_keys(three, editing, index, to, order):
+    before = shutters_of(three)
+    editing.move_shutter(three, index, to)
+    assert "".join(shutter.name for shutter in three.shutters) == order
+    assert shutters_of(three) == before
+    assert three.active_shutter == to
+
+
+def test_regions_follow_a_renamed_shutter(three, editing):
+    for name in "AB":
+        editing.add_region(three, three.shutters[name])
+    three.shutters[0].name = "B"
+    assert three.shutters[0].name == "B.001"
+    assert [region.shutter for region in three.regions] == ["B.001", "B"]
+    three.shutters[0].name = "B.001"
+    assert three.shutters[0].name == "B.001"
+
+
+def test_a_copy_with_the_same_name_takes_no_regions_along(three, editing):
+    """As in old files, or of a recipe: the regions are those of the first."""
+    editing.add_region(three, three.shutters[0])
+    three.shutters[1]["name"] = "A"  # past the property's own check
+    assert editing.rename(three, "A", "Z") == "Z"
+    assert three.regions[0].shutter == "A"
+
+
+def test_scribbles_have_the_color_of_their_shutter(effect, editing):
+    for shutter in (0, 1):
+        editing.add_region(effect, effect.shutters[shutter])
+    colors = [tuple(layer.color) for layer in effect.scene.annotation.layers]
+    assert colors == [pytest.approx(tuple(shutter.color)) for shutter in effect.shutters]
+    effect.shutters[1].color = (0.1, 0.2, 0.3)
+    assert tuple(effect.scene.annotation.layers[0].color) == colors[0]
+    assert tuple(effect.scene.annotation.layers[1].color) == pytest.approx((0.1, 0.2, 0.3))
+
+
+# Bars
+
+
+def test_set_bars(effect, editing):
+    values = RNG.random(8)
+    editing.set_bars(effect.shutters[0], values)
+    assert editing.bars(effect.shutters[0]) == pytest.approx(values, abs=1e-7)
+    with pytest.raises(ValueError, match="shorter"):
+        editing.set_bars(effect.shutters[0], values[:5])
+
+
+def test_bars_that_stay_keep_the_sequencers_frames(effect, editing, monkeypatch):
+    from shutter_addon.blender import cache
+
+    dropped = []
+    monkeypatch.setattr(cache, "invalidate", dropped.append)
+    editing.set_bars(effect.shutters[0], np.ones(8))
+    assert not dropped
+    editing.set_bars(effect.shutters[0], [0.5, *np.ones(7)])
+    assert len(dropped) == 1
+
+
+def test_painted_bars_are_keyed_if_asked(effect, editing):
+    editing.paint(effect, 0, np.full(8, 0.5))
+    assert editing.key_state(effect, 0) == [""] * 8
+    editing.paint(effect, 0, np.full(8, 0.25), key=True)
+    assert editing.bars(effect.shutters[0]).tolist() == [0.25] * 8
+    assert editing.key_state(effect, 0) == ["keyed"] * 8
+
+
+def test_a_summary_in_words(editing):
+    assert editing.summary(np.ones(8)) == "360°, 8 frames of light"
+    assert editing.summary([1, 0, 0, 0]) == "90°, 1 frame of light"
+    assert editing.summary([0.5, 0.5]) == "360°, 1 frame of light"
+    assert editing.summary(np.float32([0.1] * 10)) == "360°, 1 frame of light"
+    assert "never opens" in editing.summary([0, 0])
+
+
+@given(st.integers(1, 24), st.sampled_from([(1, 1), (2, 4), (3, 3), (4, 2)]), st.booleans())
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=20)
+def test_another_window_keeps_shape_and_share_of_light(effect, editing, window, shape, closed):
+    from shutter_addon.core import shutters
+
+    editing.set_bars(effect.shutters[0], np.repeat([1.0, 0.25][: 2 - closed] + [0.0] * closed, 4))
+    before = [editing.bars(shutter) for shutter in effect.shutters]
+    effect.window = window
+    for shutter, old in zip(effect.shutters, before, strict=True):
+        assert editing.bars(shutter) == pytest.approx(shutters.resample(old, window), abs=1e-6)
+        assert editing.bars(shutter).mean() == pytest.approx(old.mean(), abs=1e-6)
+    effect.window = 8
+
+
+@pytest.mark.parametrize("window", [16, 24, 80])
+def test_another_window_and_back_is_exact(three, editing, window):
+    editing.add_shutter(three)  # without keys
+    before = shutters_of(three)
+    bars = [editing.bars(shutter) for shutter in three.shutters]
+    three.window = window
+    assert [len(shutter.bars) for shutter in three.shutters] == [window] * 4
+    assert len(curves(three, "shutters")) == 3 * window
+    for shutter, old in zip(three.shutters, bars, strict=True):
+        assert editing.bars(shutter).tolist() == np.repeat(old, window // 8).tolist()
+    three.window = 8
+    assert shutters_of(three) == before
+    assert [editing.bars(shutter).tolist() for shutter in three.shutters] == [b.tolist() for b in bars]
+
+
+def test_another_window_keeps_keys_at_their_frames_with_their_ease(three, editing):
+    from shutter_addon.blender import animation
+    from shutter_addon.core import shutters
+
+    for curve in animation.curves_under(three.id_data, f"{three.path_from_id()}.shutters[0]"):
+        curve.keyframe_points[0].interpolation = "CONSTANT"
+    old = {frame: picture_bars(three, 0, frame) for frame in (1, 5, 9)}
+    three.window = 6
+    keys = curves(three, "shutters[0]").values()
+    assert {tuple((frame, ease) for frame, _, ease in c) for c in keys} == {((1, "CONSTANT"), (9, "BEZIER"))}
+    for frame in (1, 5, 9):
+        assert picture_bars(three, 0, frame) == pytest.approx(shutters.resample(old[frame], 6), abs=1e-6)
+
+
+def test_a_single_keyed_bar_becomes_keys_on_all(effect, editing):
+    edit = effect.id_data
+    for frame, weight in ((1, 0.0), (9, 1.0)):
+        effect.shutters[0].bars[2].weight = weight
+        edit.keyframe_insert(effect.shutters[0].bars[2].path_from_id("weight"), frame=frame)
+    effect.window = 4
+    assert len(curves(effect, "shutters[0]")) == 4
+    assert picture_bars(effect, 0, 1) == pytest.approx([1, 0.5, 1, 1])
+    assert picture_bars(effect, 0, 9) == pytest.approx([1, 1, 1, 1])
+
+
+def test_key_states_as_blender_colors_them(effect, editing):
+    edit = effect.id_data
+    edit.frame_set(4)
+    assert editing.key_state(effect, 0) == [""] * 8
+    edit.keyframe_insert(effect.shutters[0].bars[2].path_from_id("weight"))
+    assert editing.key_state(effect, 0) == ["", "", "keyed", *[""] * 5]
+    edit.frame_set(5)
+    assert editing.key_state(effect, 0)[2] == "animated"
+    effect.shutters[0].bars[2].weight = 0.25
+    assert editing.key_state(effect, 0)[2] == "changed"
+    edit.frame_set(5)
+    assert editing.key_state(effect, 0)[2] == "animated", "an unkeyed change goes with the frame"
+
+
+def test_keys_go_at_the_current_frame_alone(three, editing):
+    edit = three.id_data
+    before = shutters_of(three)
+    edit.frame_set(5)
+    assert not editing.unkey_bars(three, 1)
+    assert shutters_of(three) == before
+    editing.key_bars(three, 1)
+    assert {len(keys) for keys in curves(three, "shutters[1]").values()} == {3}
+    assert editing.unkey_bars(three, 1)
+    assert not editing.unkey_bars(three, 1)
+    assert shutters_of(three) == before
+    for frame in (1, 9):
+        edit.frame_set(frame)
+        assert editing.unkey_bars(three, 1)
+    del before["B"]
+    after = shutters_of(three)
+    assert after.pop("B")[1] == {}, "an F-curve without keys would hold the bars at zero"
+    assert after == before
+
+
+def test_bars_now_are_those_of_the_picture(three, editing):
+    edit = three.id_data
+    for frame in np.arange(-2, 12, 0.5):
+        edit.frame_set(int(frame // 1), subframe=frame % 1)
+        for index in range(3):
+            now = editing.bars_now(three, index)
+            assert now == pytest.approx(picture_bars(three, index, frame), abs=1e-9), frame
+    # Between keys that is not what the F-curves show: times move.
+    edit.frame_set(5)
+    assert np.abs(editing.bars_now(three, 0) - editing.bars(three.shutters[0])).max() > 0.01
+
+
+def test_bars_now_are_the_changed_ones_until_the_frame_changes(three, editing):
+    edit = three.id_data
+    edit.frame_set(5)
+    shown = editing.bars_now(three, 0)
+    editing.set_bars(three.shutters[0], np.full(8, 0.5))
+    assert editing.bars_now(three, 0).tolist() == [0.5] * 8
+    edit.frame_set(5)
+    assert editing.bars_now(three, 0) == pytest.approx(shown)
+
+
+def test_a_key_between_keys_keeps_the_picture(effect, editing):
+    """Between two sharp frames lies a sharp frame: the F-curves, a cross-fade, would key two half ones."""
+    edit = effect.id_data
+    for frame, bars in ((1, np.eye(8)[0]), (9, np.eye(8)[7])):
+        edit.frame_set(frame)
+        editing.paint(effect, 0, bars, key=True)
+    edit.frame_set(5)
+    shown = editing.bars_now(effect, 0)
+    assert shown[[3, 4]] == pytest.approx([0.5, 0.5])
+    editing.key_bars(effect, 0)
+    assert editing.key_state(effect, 0) == ["keyed"] * 8
+    assert editing.bars_now(effect, 0) == pytest.approx(shown, abs=1e-6)
+    assert picture_bars(effect, 0, 5) == pytest.approx(shown, abs=1e-6)
+
+
+def test_changed_bars_are_keyed_as_they_stand(three, editing):
+    three.id_data.frame_set(5)
+    values = RNG.random(8)
+    editing.paint(three, 0, values, key=True)
+    assert picture_bars(three, 0, 5) == pytest.approx(values, abs=1e-6)
+
+
+# Regions
+
+
+def test_a_region_has_a_layer_of_its_own(effect, editing):
+    effect.scene.annotation = None
+    region = editing.add_region(effect, effect.shutters[1], "LASSO")
+    assert (region.name, region.shutter, region.kind, region.layer) == ("Sharp", "Sharp", "LASSO", "Sharp")
+    region = editing.add_region(effect, effect.shutters[1])
+    assert (region.name, region.kind, region.layer) == ("Sharp.001", "LINE", "Sharp.001")
+    assert effect.active_region == 1
+    assert layers(effect) == ["Sharp", "Sharp.001"]
+    assert editing.layer_of(effect, region).info == "Sharp.001"
+    assert effect.scene.annotation.layers.active_note == "Sharp.001"
+
+
+def test_a_region_without_annotation_has_no_layer(effect, editing):
+    region = editing.add_region(effect, effect.shutters[1])
+    effect.scene.annotation.layers.remove(effect.scene.annotation.layers[0])
+    assert editing.layer_of(effect, region) is None
+    effect.scene.annotation = None
+    assert editing.layer_of(effect, region) is None
+    editing.remove_region(effect, 0)
+    assert len(effect.regions) == 0
+
+
+def test_a_removed_region_takes_its_keys_and_its_layer_along(effect, editing):
+    for _ in range(3):
+        editing.add_region(effect, effect.shutters[1])
+        editing.key_region(effect, len(effect.regions) - 1)
+    before = regions_of(effect)
+    editing.remove_region(effect, 1)
+    del before["Sharp.001"]
+    assert regions_of(effect) == before
+    assert layers(effect) == ["Sharp", "Sharp.002"]
+
+
+@pytest.mark.parametrize(("index", "to"), [(0, 2), (2, 0), (1, 2)])
+def test_a_moved_region_keeps_its_keys(effect, editing, index, to):
+    for i in range(3):
+        region = editing.add_region(effect, effect.shutters[1])
+        region.location = (i / 10, 0.5)
+        editing.key_region(effect, i)
+    before, names = regions_of(effect), [region.name for region in effect.regions]
+    editing.move_region(effect, index, to)
+    names.insert(to, names.pop(index))
+    assert [region.name for region in effect.regions] == names
+    assert regions_of(effect) == before
+    assert effect.active_region == to
+
+
+def test_keys_of_a_region(effect, editing):
+    editing.add_region(effect, effect.shutters[1])
+    region = effect.regions[0]
+    region.location, region.rotation, region.scale = (0.25, 0.5), 1.5, 2.0
+    effect.id_data.frame_set(7)
+    editing.key_region(effect, 0)
+    keys = {place: [key[:2] for key in keys] for place, keys in curves(effect, "regions[0].").items()}
+    assert keys == {
+        ("location", 0): [(7, 0.25)],
+        ("location", 1): [(7, 0.5)],
+        ("rotation", 0): [(7, 1.5)],
+        ("scale", 0): [(7, 2.0)],
+    }
+
+
+def test_a_layer_of_the_effect_becomes_a_region(effect, editing):
+    editing.add_region(effect, effect.shutters[0])
+    draw(effect, editing, 0)
+    own = effect.scene.annotation.layers.new("Mine", set_active=False)
+    stroke = own.frames.new(3).strokes.new()
+    stroke.points.add(1)
+    stroke.points[0].co = (7, 8, 0)
+    free = editing.free_layers(effect, effect.scene.annotation)
+    assert [layer.info for layer in free] == ["Mine"]
+    region = editing.take_layer(effect, effect.shutters[1], own)
+    assert (region.name, region.shutter) == ("Mine", "Sharp")
+    (drawing,) = editing.layer_of(effect, region).frames
+    assert drawing.frame_number == 3
+    assert [tuple(point.co) for point in drawing.strokes[0].points] == [(7, 8, 0)]
+    assert len(layers(effect)) == 2
+    assert editing.free_layers(effect, effect.scene.annotation) == []
+
+
+def test_a_layer_of_another_annotation_is_copied(bpy, effect, editing):
+    other = bpy.data.annotations.new("Notes")
+    layer = other.layers.new("Sharp")
+    for frame, count in ((2, 3), (5, 1)):
+        stroke = layer.frames.new(frame).strokes.new()
+        stroke.points.add(count)
+        stroke.points.foreach_set("co", np.arange(3 * count))
+    editing.add_region(effect, effect.shutters[1])  # takes the name
+    assert [found.info for found in editing.free_layers(effect, other)] == ["Sharp"]
+    region = editing.take_layer(effect, effect.shutters[1], layer)
+    assert region.name == region.layer == "Sharp.001"
+    copy = editing.layer_of(effect, region)
+    for old, new in zip(layer.frames, copy.frames, strict=True):
+        assert new.frame_number == old.frame_number
+        for a, b in zip(old.strokes, new.strokes, strict=True):
+            assert [tuple(p.co) for p in a.points] == [tuple(p.co) for p in b.points]
+            assert b.display_mode == "2DSPACE"
+    assert len(other.layers) == 1
+
+
+def test_no_annotation_has_no_free_layers(effect, editing):
+    assert editing.free_layers(effect, None) == []

@@ -1,0 +1,419 @@
+"""What the user can do: every operator works, is one step of undo, and says why it cannot be used where it cannot."""
+
+import json
+import os
+import wave
+
+import numpy as np
+import pytest
+from support import recipe, sequencer
+
+from shutter_addon.core import recipe as recipes
+
+
+@pytest.fixture
+def operators(bpy):
+    from shutter_addon.blender import operators
+
+    return operators
+
+
+@pytest.fixture
+def editing(bpy):
+    from shutter_addon.blender import editing
+
+    return editing
+
+
+def call(bpy, name, *arguments, **settings):
+    """Calls an operator as a menu does, with its step of undo."""
+    return getattr(bpy.ops.shutter, name)("EXEC_DEFAULT", True, *arguments, **settings)
+
+
+def effect_now(bpy):
+    """After an undo, what was found before is gone."""
+    return bpy.context.scene.virtual_shutter.effects[0]
+
+
+def state(bpy):
+    """All that operators change."""
+    from shutter_addon.blender import animation
+
+    edit = bpy.context.scene
+    keys = {
+        (c.data_path, c.array_index): [tuple(k.co) for k in c.keyframe_points]
+        for c in animation.curves_under(edit, "virtual_shutter")
+    }
+    effects = [
+        (
+            effect.window,
+            [(s.name, [b.weight for b in s.bars]) for s in effect.shutters],
+            [(r.name, r.shutter, r.layer, tuple(r.location)) for r in effect.regions],
+            [(y.info, len(y.frames)) for y in effect.scene.annotation.layers],
+        )
+        for effect in edit.virtual_shutter.effects
+    ]
+    return [(s.name, s.channel) for s in edit.sequence_editor.strips], effects, keys
+
+
+@pytest.fixture
+def does(bpy):
+    """Calls an operator, which changes something; undone and done again, nothing else than that."""
+
+    def check(name, **settings):
+        bpy.context.view_layer.update()
+        bpy.ops.ed.undo_push(message="before")
+        before = state(bpy)
+        assert call(bpy, name, **settings) == {"FINISHED"}
+        after = state(bpy)
+        assert after != before
+        bpy.ops.ed.undo()
+        assert state(bpy) == before
+        bpy.ops.ed.redo()
+        assert state(bpy) == after
+        return effect_now(bpy)
+
+    return check
+
+
+@pytest.fixture
+def preview(bpy, effect):
+    """A sequencer with a picture, as the Video Editing workspace has one; its space."""
+    with sequencer(bpy) as area:
+        area.spaces.active.view_type = "SEQUENCER_PREVIEW"
+        yield area.spaces.active
+
+
+def tool(bpy):
+    found = bpy.context.workspace.tools.from_space_sequencer("SEQUENCER_PREVIEW")
+    return found and found.idname
+
+
+# Each does what it says
+
+
+def test_add_effect(bpy, edit, effect, does):
+    strip = edit.sequence_editor.active_strip
+    edit.sequence_editor.strips.remove(strip)
+    bpy.context.view_layer.update()
+    edit.sequence_editor.active_strip = edit.sequence_editor.strips[0]
+    effect = does("add_effect")
+    assert [shutter.name for shutter in effect.shutters] == ["Long", "Sharp"]
+    edit = bpy.context.scene
+    assert edit.sequence_editor.active_strip.scene == effect.scene
+    assert [strip.name for strip in edit.sequence_editor.strips if strip.select] == ["Shutter"]
+
+
+def test_add_effect_says_what_is_wrong_with_the_footage(bpy, edit, tmp_path):
+    edit.sequence_editor.active_strip = edit.sequence_editor.strips.new_image("i", str(tmp_path / "none.png"), 1, 1)
+    with pytest.raises(RuntimeError, match=r"none\.png: no such file"):
+        call(bpy, "add_effect")
+    assert len(edit.sequence_editor.strips) == 1
+    assert len(edit.virtual_shutter.effects) == 0
+    assert len(bpy.data.scenes) == 1
+
+
+def test_the_source_strip_stands_for_its_effect(bpy, edit, effect, does):
+    from shutter_addon.blender import strips
+
+    strips.choose(edit, next(strip for strip in edit.sequence_editor.strips if strip.type == "IMAGE"))
+    assert len(does("shutter_add").shutters) == 3
+
+
+def test_shutters_come_go_and_move(bpy, effect, does):
+    def order():
+        return [shutter.name for shutter in effect_now(bpy).shutters]
+
+    does("shutter_add")
+    assert order() == ["Long", "Sharp", "Shutter"]
+    does("shutter_move", direction="UP")
+    assert order() == ["Long", "Shutter", "Sharp"]
+    does("shutter_duplicate")
+    assert order() == ["Long", "Shutter", "Shutter.001", "Sharp"]
+    does("shutter_move", direction="DOWN")
+    assert order() == ["Long", "Shutter", "Sharp", "Shutter.001"]
+    does("shutter_remove")
+    assert order() == ["Long", "Shutter", "Sharp"]
+    assert effect_now(bpy).active_shutter == 2
+    # At the end of the list there is nowhere to go.
+    assert call(bpy, "shutter_move", direction="DOWN") == {"FINISHED"}
+    assert order() == ["Long", "Shutter", "Sharp"]
+
+
+@pytest.mark.parametrize("preset", ["ANGLE_180", "GAUSSIAN", "LAST"])
+def test_preset(bpy, effect, editing, does, preset):
+    from shutter_addon.core import presets
+
+    effect = does("preset", preset=preset)
+    assert editing.bars(effect.shutters[1]) == pytest.approx(presets.bars(preset, 8), abs=1e-6)
+    assert editing.key_state(effect, 1) == [""] * 8
+    bpy.context.scene.tool_settings.use_keyframe_insert_auto = True
+    effect = does("preset", preset="TRAIL")
+    assert editing.key_state(effect, 1) == ["keyed"] * 8
+
+
+def test_bars_are_keyed_unkeyed_and_typed(bpy, effect, editing, does):
+    effect = does("bars_key")
+    assert editing.key_state(effect, 1) == ["keyed"] * 8
+    effect = does("bars_unkey")
+    assert editing.key_state(effect, 1) == [""] * 8
+    effect = does("bar_set", bar=3, weight=0.25)
+    assert editing.bars(effect.shutters[1]).tolist() == [1, 0, 0.25, 0, 0, 0, 0, 0]
+    with pytest.raises(RuntimeError, match="The shutter has 8 bars"):
+        call(bpy, "bar_set", bar=9, weight=0.5)
+
+
+def test_no_key_to_delete(bpy, effect, capfd):
+    assert call(bpy, "bars_unkey") == {"CANCELLED"}
+    assert "No bar has a key at this frame" in capfd.readouterr().out
+
+
+def test_a_typed_bar_between_keys_leaves_the_others_as_they_show(bpy, effect, editing):
+    edit = bpy.context.scene
+    for frame, bars in ((1, np.eye(8)[0]), (9, np.eye(8)[7])):
+        edit.frame_set(frame)
+        editing.paint(effect, 1, bars, key=True)
+    edit.frame_set(5)
+    assert call(bpy, "bar_set", bar=1, weight=0.75) == {"FINISHED"}
+    assert editing.bars(effect.shutters[1]) == pytest.approx([0.75, 0, 0, 0.5, 0.5, 0, 0, 0])
+
+
+def test_a_drawn_region_is_one_step_of_undo(bpy, effect, does):
+    """Without a preview: in the background Blender crashes where an operator that chooses a tool makes a step."""
+    effect = does("draw")
+    assert [(region.name, region.kind) for region in effect.regions] == [("Sharp", "LINE")]
+
+
+def test_draw_makes_a_region_and_takes_up_the_pen(bpy, effect, preview):
+    assert bpy.ops.shutter.draw() == {"FINISHED"}
+    assert [(region.name, region.kind) for region in effect.regions] == [("Sharp", "LINE")]
+    assert preview.annotation == effect.scene.annotation
+    assert preview.annotation.layers.active_note == "Sharp"
+    assert preview.preview_overlay.show_annotation
+    assert tool(bpy) == "builtin.annotate"
+    assert bpy.ops.shutter.draw() == {"FINISHED"}
+    assert len(effect.regions) == 1, "one more stroke of the same region"
+    assert bpy.ops.shutter.draw(new=True, kind="LASSO") == {"FINISHED"}
+    assert [(region.name, region.kind) for region in effect.regions] == [("Sharp", "LINE"), ("Sharp.001", "LASSO")]
+    assert bpy.ops.shutter.erase() == {"FINISHED"}
+    assert tool(bpy) == "builtin.annotate_eraser"
+
+
+def test_the_pen_draws_on_the_layer_of_the_active_region(bpy, effect, editing, preview):
+    for _ in range(2):
+        editing.add_region(effect, effect.shutters[1])
+    effect.active_region = 0
+    bpy.ops.shutter.draw()
+    assert preview.annotation.layers.active_note == "Sharp"
+    effect.scene.annotation.layers.remove(effect.scene.annotation.layers["Sharp"])
+    bpy.ops.shutter.draw()
+    assert preview.annotation.layers.active_note == effect.regions[0].layer
+    assert editing.layer_of(effect, effect.regions[0]) is not None
+
+
+@pytest.mark.parametrize("name", ["draw", "erase"])
+def test_without_a_preview_the_user_is_told(bpy, effect, editing, capfd, name):
+    editing.add_region(effect, effect.shutters[1])
+    assert call(bpy, name) == {"FINISHED"}
+    assert "Open a sequencer with a preview" in capfd.readouterr().out
+
+
+def test_region_take(bpy, effect, preview, does):
+    preview.annotation = effect.scene.annotation
+    preview.annotation.layers.new("Notes").frames.new(3)
+    effect = does("region_take", layer="Notes")
+    assert [(region.name, region.shutter) for region in effect.regions] == [("Notes", "Sharp")]
+    with pytest.raises(RuntimeError, match="no annotation layer"):
+        call(bpy, "region_take")
+
+
+def test_regions_are_keyed_move_and_go(bpy, effect, editing, does):
+    for _ in range(2):
+        editing.add_region(effect, effect.shutters[1])
+    effect = does("region_key")
+    assert len(state(bpy)[2]) == 4
+    effect = does("region_move", direction="UP")
+    assert [region.name for region in effect.regions] == ["Sharp.001", "Sharp"]
+    effect = does("region_remove")
+    assert [region.name for region in effect.regions] == ["Sharp"]
+    assert state(bpy)[2] == {}
+
+
+# Recipes
+
+REGION = {"shutter": "S1", "name": "Face", "kind": "lasso", "strokes": [[[0.25, 0.25], [0.75, 0.25], [0.5, 0.75]]]}
+RECIPE = recipe(3, [1, 1, 0.5], {1: [1, 0, 0], 9: [0, 0, 1]}, regions=[REGION], light="encoded")
+
+
+def test_a_recipe_is_imported_and_exported_the_same(bpy, effect, does, tmp_path):
+    (tmp_path / "in.json").write_text(json.dumps(RECIPE))
+    effect = does("recipe_import", filepath=str(tmp_path / "in.json"))
+    assert effect.light == "ENCODED"
+    assert call(bpy, "recipe_export", filepath=str(tmp_path / "out.json")) == {"FINISHED"}
+    first, second = (recipes.load(tmp_path / f"{name}.json") for name in ("in", "out"))
+    assert recipes.dump(first) == recipes.dump(second)
+    assert sorted(path.name for path in tmp_path.glob("*.json*")) == ["in.json", "out.json"]
+
+
+def test_an_export_replaces_the_file(bpy, effect, tmp_path):
+    path = tmp_path / "out.json"
+    path.write_text("old")
+    call(bpy, "recipe_export", filepath=str(path))
+    assert recipes.load(path).window == 8
+
+
+def refusal(bpy, name, **settings):
+    """What an operator says when it cannot: one sentence, no traceback."""
+    with pytest.raises(RuntimeError) as caught:
+        call(bpy, name, **settings)
+    said = str(caught.value)
+    assert "Traceback" not in said
+    assert said.startswith("Error: ")
+    assert said.count("\n") == 1
+    return said
+
+
+BROKEN = {
+    "no JSON": ("{", "not JSON"),
+    "no recipe": ("{}", "missing"),
+    "no text": (b"\xff\xfe\x00", "not a text file"),
+    "a shutter that never opens": (json.dumps(recipe(2, [0, 0])), "never opens"),
+    "a region of no shutter": (json.dumps(RECIPE | {"regions": [REGION | {"shutter": "S7"}]}), "S7"),
+}
+
+
+@pytest.mark.parametrize("kind", BROKEN)
+def test_a_broken_recipe_changes_nothing(bpy, effect, tmp_path, kind):
+    content, sentence = BROKEN[kind]
+    path = tmp_path / "broken.json"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    before = state(bpy)
+    said = refusal(bpy, "recipe_import", filepath=str(path))
+    assert sentence in said
+    assert str(path) in said
+    assert state(bpy) == before
+
+
+@pytest.mark.parametrize("name", ["recipe_import", "recipe_export"])
+def test_no_such_file(bpy, effect, tmp_path, name):
+    before = state(bpy)
+    path = tmp_path / "none" / "r.json"
+    assert f"{path}: No such file or directory" in refusal(bpy, name, filepath=str(path))
+    assert "Is a directory" in refusal(bpy, name, filepath=str(tmp_path))
+    assert "Choose a file" in refusal(bpy, name)
+    (tmp_path / "file").write_text("")
+    assert "Not a directory" in refusal(bpy, name, filepath=str(tmp_path / "file" / "r.json"))
+    assert state(bpy) == before
+    assert not path.parent.exists()
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_that_cannot_be_written(bpy, effect, tmp_path):
+    (tmp_path / "locked").mkdir(mode=0o500)
+    assert "Permission denied" in refusal(bpy, "recipe_export", filepath=str(tmp_path / "locked" / "r.json"))
+
+
+def test_a_full_disk_leaves_the_old_recipe(bpy, effect, tmp_path):
+    """/dev/full takes no byte: as the place of the new file's first half, it is a disk without room."""
+    path = tmp_path / "out.json"
+    path.write_text("old")
+    (tmp_path / "out.json.part").symlink_to("/dev/full")
+    assert "No space left" in refusal(bpy, "recipe_export", filepath=str(path))
+    assert path.read_text() == "old"
+    assert [file.name for file in tmp_path.glob("out*")] == ["out.json"]
+
+
+def test_an_effect_that_cannot_be_rendered_is_not_exported(bpy, effect, editing, tmp_path):
+    editing.set_bars(effect.shutters[1], np.zeros(8))
+    path = tmp_path / "out.json"
+    assert "never opens" in refusal(bpy, "recipe_export", filepath=str(path))
+    assert not path.exists()
+
+
+# Where nothing can be done
+
+NO_SOURCE = "The active strip is no movie, image or clip strip"
+SELECT = "Select a Shutter strip, or its source strip"
+NO_SHUTTER = "The effect has no shutter: add one"
+NO_REGION = "The shutter has no region: draw one"
+NO_LAYER = "The preview shows no annotation layer that is not a region yet"
+LINKED = "The edit is linked from another file"
+ANY_EFFECT = ("shutter_add", "recipe_import", "recipe_export")  # need nothing in it
+REGION_NEEDED = dict.fromkeys(("erase", "region_remove", "region_move", "region_key"), NO_REGION)
+
+
+def nothing(bpy, edit, effect, tmp_path):
+    edit.sequence_editor.active_strip = None
+
+
+def no_sequencer(bpy, edit, effect, tmp_path):
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+
+
+def sound(bpy, edit, effect, tmp_path):
+    with wave.open(str(tmp_path / "s.wav"), "wb") as file:
+        file.setparams((1, 2, 48000, 4800, "NONE", ""))
+        file.writeframes(bytes(9600))
+    edit.sequence_editor.active_strip = edit.sequence_editor.strips.new_sound("s", str(tmp_path / "s.wav"), 5, 1)
+
+
+def plain(bpy, edit, effect, tmp_path):
+    first = edit.sequence_editor.strips[0]
+    edit.sequence_editor.active_strip = edit.sequence_editor.strips.new_image("i", first.directory, 5, 1)
+
+
+def color(bpy, edit, effect, tmp_path):
+    edit.sequence_editor.active_strip = edit.sequence_editor.strips.new_effect("c", "COLOR", 5, 1, length=9)
+
+
+def linked(bpy, edit, effect, tmp_path):
+    name, path = edit.name, str(tmp_path / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (_, wanted):
+        wanted.scenes = [name]
+    linked = next(s for s in bpy.data.scenes if s.library and s.sequence_editor)
+    bpy.data.window_managers[0].windows[0].workspace.sequencer_scene = linked
+
+
+def no_shutter(bpy, edit, effect, tmp_path):
+    effect.shutters.clear()
+
+
+def no_region(bpy, edit, effect, tmp_path):
+    pass
+
+
+# Situation: why an operator cannot be used there, and for some of them another reason; None: it can be used.
+SITUATIONS = {
+    nothing: (SELECT, {"add_effect": "Select a movie, image or clip strip"}),
+    no_sequencer: (SELECT, {"add_effect": "Select a movie, image or clip strip"}),
+    sound: (SELECT, {"add_effect": NO_SOURCE}),
+    color: (SELECT, {"add_effect": NO_SOURCE}),
+    plain: (SELECT, {"add_effect": None}),
+    linked: (LINKED, {}),
+    no_shutter: (NO_SHUTTER, {"add_effect": NO_SOURCE, **dict.fromkeys(ANY_EFFECT), **REGION_NEEDED}),
+    no_region: (None, {"add_effect": NO_SOURCE, "region_take": NO_LAYER, **REGION_NEEDED}),
+}
+
+
+@pytest.mark.parametrize("situation", SITUATIONS, ids=lambda situation: situation.__name__)
+def test_what_cannot_be_used_says_why(bpy, operators, edit, effect, tmp_path, situation):
+    situation(bpy, edit, effect, tmp_path)
+    usual, others = SITUATIONS[situation]
+    with bpy.context.temp_override(window=bpy.data.window_managers[0].windows[0]):
+        for cls in operators.classes:
+            name = cls.bl_idname.removeprefix("shutter.")
+            operator = getattr(bpy.ops.shutter, name)
+            sentence = others.get(name, usual)
+            assert operator.poll() == (sentence is None), name
+            if sentence:
+                with pytest.raises(RuntimeError, match=sentence):
+                    operator()
+
+
+def test_the_last_shutter_stays(bpy, effect):
+    assert call(bpy, "shutter_remove") == {"FINISHED"}
+    with pytest.raises(RuntimeError, match="An effect needs a shutter: this is its last one"):
+        call(bpy, "shutter_remove")
+    assert len(effect.shutters) == 1
