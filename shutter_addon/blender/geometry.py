@@ -28,10 +28,11 @@ def mapped(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 def picture_to_region(strip, size, region) -> np.ndarray:
     """Matrix (3, 3) from fractions of the strip's picture to pixels of a preview's region."""
-    # view_to_region rounds to whole pixels; region_to_view does not.
-    corners = np.array([(0.0, 0.0), (region.width, region.height)])
-    (left, bottom), (right, top) = (region.view2d.region_to_view(*corner) for corner in corners)
-    scale = corners[1] / (right - left, top - bottom)
+    # view_to_region rounds to whole pixels, region_to_view does not; and its last pixel is what is drawn at the edge.
+    (left, bottom), (right, top) = (
+        region.view2d.region_to_view(x, y) for x, y in ((0, 0), (region.width - 1, region.height - 1))
+    )
+    scale = np.array([region.width, region.height]) / (right - left, top - bottom)
     to_region = np.diag([*scale, 1.0])
     to_region[:2, 2] = -scale * (left, bottom)
     return to_region @ picture_to_image(strip, size)

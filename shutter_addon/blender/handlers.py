@@ -25,6 +25,15 @@ def _update(scene=None, *_):
 def _after_undo(*_):
     for edit in bpy.data.scenes:
         cache.invalidate(edit)
+    _show_scribbles()
+
+
+def _show_scribbles():
+    """Previews lose their annotation when undo removes it, and do not find it again with redo."""
+    found = strips.active(bpy.context)
+    for _window, area in strips.previews(bpy.context):
+        if found and area.spaces.active.annotation is None:
+            area.spaces.active.annotation = found[1].scene.annotation
 
 
 @persistent

@@ -27,7 +27,7 @@ weights_folder: Path | None = None
 # Renderers whose frames are kept: more effects than these in one frame decode their windows again for every frame.
 _KEPT = 4
 # Pictures whose frames are decoded in advance.
-_AHEAD = 2
+_AHEAD = 4
 
 
 @dataclass(frozen=True)

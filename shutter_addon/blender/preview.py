@@ -1,4 +1,4 @@
-"""The live preview: the effect's picture over the sequencer's own, composed and drawn on Blender's GPU."""
+"""The live preview: what is drawn over the sequencer's picture, composed on Blender's GPU: views, and scribbles."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ VIEWS = (
     ("SCRIBBLES", "Scribbles", "The source, and where each shutter is scribbled"),
     ("COEFFICIENTS", "Coefficients", "How much of each shutter a pixel gets, in the shutters' colors"),
 )
-# Frames decoded in advance while the timeline plays.
+# Pictures whose frames are decoded in advance.
 _AHEAD = 4
 # What a share of the sequencer's preview size leaves of the picture's width.
 _PROXY_SHRINK = {"PROXY_50": 2, "PROXY_25": 4}
@@ -31,10 +31,16 @@ def redraw(_settings, _context) -> None:
         area.tag_redraw()  # of the area alone, Blender's picture and ours
 
 
+def _redraw_once() -> None:
+    redraw(None, bpy.context)
+
+
 class ShutterPreview(PropertyGroup):
     """How the live preview looks: of the window manager, neither saved nor undone."""
 
-    live: BoolProperty(name="Live", description="Show the effect while you work on it", default=True, update=redraw)
+    live: BoolProperty(
+        name="Live", description="Show scribbles and views of the effect in the preview", default=True, update=redraw
+    )
     view: EnumProperty(name="View", description="What the live preview shows", items=VIEWS, update=redraw)
     split: FloatProperty(
         name="Split",
@@ -96,7 +102,7 @@ def _draw() -> None:
     # Blender tells nobody of strokes that are drawn or erased, but it draws the preview again.
     edit = strips.edit_of(context)
     if edit is not None and edit.library is None and cache.invalidate_changed(edit):
-        context.area.tag_redraw()
+        bpy.app.timers.register(_redraw_once)  # what is tagged while it is drawn is not drawn again
     # A stroke that is being drawn would lie below our picture: Blender's own shows the same.
     if not settings.live or any(op.bl_idname == "GPENCIL_OT_annotate" for op in context.window.modal_operators):
         return
@@ -104,41 +110,49 @@ def _draw() -> None:
     if found is None:
         return
     say = _Notes(context.region)
-    if found.strips_above:
-        say("Live: the strips above are hidden")
-    if found.edit.view_settings.view_transform != "Standard":
-        say("Live shows view transform Standard")
     with drawing.pixel_space(context.region):
         try:
-            _show(context, found, settings)
+            _show(context, found, settings, say)
         except pictures.FAULTS as error:
             say(f"Shutter: {error}")
         say.draw()
 
 
-def _show(context, found: Shown, settings) -> None:
-    frame = found.edit.frame_current
+def _show(context, found: Shown, settings, say) -> None:
     shrink = _PROXY_SHRINK.get(context.space_data.proxy_render_size, 1)
-    moment = pictures.moment(found.edit, found.effect, found.strip, frame, shrink=shrink)
-    renderer = moment.renderer
-    moment.prefetch(_AHEAD)
+    moment = pictures.moment(found.edit, found.effect, found.strip, found.edit.frame_current, shrink=shrink)
     quad = Quad(context.region, found.strip, effects.picture_size(found.effect))
-    plain = settings.view != "RESULT"
-    if plain:
-        _show_source(quad, found, moment, 0.0, settings.split if settings.view == "SPLIT" else 1.0)
+    has_result = settings.view in ("RESULT", "SPLIT")
+    left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
+    # Where the sequencer renders its preview, the engine has composed the result on this GPU by now, and it lies there
+    # in its place among the other strips, exact; what is drawn here passes through 8 bits on its way to the screen.
+    draws_result = has_result and found.edit.render.sequencer_gl_preview != "RENDERED"
+    if left > 0 or draws_result:
+        _warn(found, say)
+        moment.prefetch(_AHEAD)
+    if left > 0:
+        _show_source(quad, found, moment, left)
+    if draws_result:
+        texture = moment.renderer.draw(moment.index, moment.instant, moment.direction)
+        quad.draw("show_picture", {"picture": texture}, left, 1.0, opacity=found.strip.blend_alpha)
     if settings.view == "SCRIBBLES":
         _show_scribbles(quad, found.effect, moment)
     elif settings.view == "COEFFICIENTS":
         _show_coefficients(quad, found.effect, moment)
     else:
-        left = settings.split if settings.view == "SPLIT" else 0.0
-        texture = renderer.draw(moment.index, moment.instant, moment.direction)
-        quad.draw("show_picture", {"picture": texture}, left, 1.0, opacity=found.strip.blend_alpha)
         _show_strokes(context, quad, found.effect, moment)
 
 
+def _warn(found: Shown, say) -> None:
+    """Says what a picture that is drawn over the sequencer's cannot show."""
+    if found.strips_above:
+        say("The strips above are hidden in this view")
+    if found.edit.view_settings.view_transform != "Standard":
+        say("This view shows view transform Standard")
+
+
 def _show_strokes(context, quad, effect, moment) -> None:
-    """The scribbles where they are by now; Blender's own annotations lie below the picture, where they were drawn."""
+    """The scribbles where they are by now; Blender's own annotations show where they were drawn."""
     space = context.space_data
     if not (space.show_overlays and space.preview_overlay.show_annotation):
         return
@@ -148,14 +162,14 @@ def _show_strokes(context, quad, effect, moment) -> None:
             drawing.lines(quad.on_region(points), color, closed=shape.kind == "lasso", width=2)
 
 
-def _show_source(quad, found: Shown, moment, left: float, right: float) -> None:
-    """The source's own frame: a shutter that is open for it alone."""
+def _show_source(quad, found: Shown, moment, right: float) -> None:
+    """The source's own frame, from the left edge on: that of a shutter that is open for it alone."""
     options = moment.instant.options
     still = np.zeros((1, options.window))
     still[0, options.before] = 1
     plain = type(moment.instant)(options, still)
     texture = moment.renderer.draw(moment.index, plain, moment.direction)
-    quad.draw("show_picture", {"picture": texture}, left, right, opacity=found.strip.blend_alpha)
+    quad.draw("show_picture", {"picture": texture}, 0.0, right, opacity=found.strip.blend_alpha)
 
 
 def _show_scribbles(quad, effect, moment) -> None:
@@ -283,6 +297,8 @@ def unregister():
     global _handler
     bpy.types.SpaceSequenceEditor.draw_handler_remove(_handler, "PREVIEW")
     _handler = None
+    if bpy.app.timers.is_registered(_redraw_once):
+        bpy.app.timers.unregister(_redraw_once)
     _shaders.clear()
     del bpy.types.WindowManager.virtual_shutter
     for cls in reversed(classes):

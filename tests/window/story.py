@@ -15,7 +15,6 @@ import driver
 
 FOOTAGE = os.environ["SHUTTER_FOOTAGE"]
 FRAME, LATER = 50, 90
-PARKED = (-20, -20)  # where the pointer highlights nothing: over the preview's header
 
 
 def edit():
@@ -73,7 +72,7 @@ def crop():
 
 
 def seen(name):
-    """Data and picture as they are now; generator."""
+    """Data and picture as they are now, the pointer where it highlights nothing: over the preview's header."""
     region = preview()
     driver.move(region, region.width / 2, region.height + 12)
     yield 0.8
@@ -92,8 +91,7 @@ def opened():
     scene.frame_end = 132
     scene.view_settings.view_transform = "Standard"
     scene.sequence_editor_create()
-    bpy.context.preferences.inputs.use_mouse_emulate_3_button = False
-    bpy.context.preferences.view.show_splash = False
+    bpy.context.preferences.view.smooth_view = 0  # a view that still moves is nowhere
     yield 0.5
     bpy.ops.ed.undo_push(message="Start")
 
@@ -107,7 +105,6 @@ def movie_added():
             channel=1,
             frame_start=1,
             sound=False,
-            move_strips=False,
             move_strips=False,
         )
     yield 0.5
@@ -226,7 +223,8 @@ def undone_and_redone():
                 if facts() == wanted["facts"]:
                     break
             assert facts() == wanted["facts"], f"{direction} to {name}:\n{facts()}\n{wanted['facts']}"
-            edit().frame_set(wanted["frame"])
+            if edit().frame_current != wanted["frame"]:  # it would take back what is not keyed yet
+                edit().frame_set(wanted["frame"])
             yield from seen(f"{name}_{direction}")
 
 
@@ -255,7 +253,8 @@ def in_agreement():
     area.spaces.active.show_overlays = area.spaces.active.show_gizmo = False
     with override("PREVIEW"):
         bpy.ops.sequencer.view_all_preview()
-        bpy.ops.sequencer.view_zoom_ratio(ratio=1.0)
+        # A pixel of the picture to one of the screen: the operator takes the region for one pixel larger.
+        bpy.ops.sequencer.view_zoom_ratio(ratio=(preview().height + 1) / preview().height)
     yield 1.0
     for name, live in (("live", True), ("sequencer", False)):
         bpy.context.window_manager.virtual_shutter.live = live
@@ -263,9 +262,8 @@ def in_agreement():
         driver.move(region, 5, region.height - 5)
         yield 1.5
         driver.shot(name)
-        corners = [region.view2d.view_to_region(*corner, clip=False) for corner in ((-640, 360), (640, -360))]
-        (left, top), (right, bottom) = (driver.screen(region, *corner) for corner in corners)
-        driver.saw(picture=name, box=[left, top + 1, right, bottom + 1])
+        left, top = driver.screen(region, region.width / 2 - 640, region.height / 2 + 360)
+        driver.saw(picture=name, box=[left, top + 1, left + 1280, top + 721])
     bpy.context.window_manager.virtual_shutter.live = True
     with override("PREVIEW"):
         bpy.ops.screen.back_to_previous()

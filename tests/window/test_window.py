@@ -1,0 +1,115 @@
+"""The extension in a real window: an editor's first minutes, by mouse and keyboard, on both of Blender's backends.
+
+BLENDER_WINDOW is the command that opens a Blender on a screen and runs a script in it (its argument); BACKEND, opengl
+or vulkan, is set for it, and SCREEN. It needs xdotool and ImageMagick's `import` beside that Blender.
+"""
+
+import json
+import os
+import shlex
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FOOTAGE = ROOT / "assets" / "bigbuckbunny.mp4"
+WINDOW = os.environ.get("BLENDER_WINDOW", "")
+# Even numbers of pixels around the picture, so that its pixels fall on the screen's.
+SCREEN = "1600x1001x24"
+TOLERANCE = 2
+
+pytestmark = pytest.mark.skipif(
+    not WINDOW, reason="NO WINDOW: set BLENDER_WINDOW to the command that runs a script in a Blender with a window"
+)
+
+
+def pixels(path, box=None):
+    """8-bit RGB of a picture file, or of its box of left, top, right, bottom."""
+    image = OpenImageIO.ImageBuf(str(path)).get_pixels(OpenImageIO.UINT8)[..., :3].astype(int)
+    left, top, right, bottom = box or (0, 0, image.shape[1], image.shape[0])
+    return image[top:bottom, left:right]
+
+
+def assert_alike(picture, expected, keep):
+    """Within the tolerance; otherwise the amplified difference is kept."""
+    assert picture.shape == expected.shape
+    apart = np.abs(picture - expected)
+    if apart.max() > TOLERANCE:
+        image = OpenImageIO.ImageBuf(OpenImageIO.ImageSpec(*apart.shape[1::-1], 3, "uint8"))
+        image.set_pixels(OpenImageIO.ROI(), np.minimum(apart * 20, 255).astype(np.uint8))
+        image.write(str(keep))
+    assert apart.max() <= TOLERANCE, f"{apart.max()} levels apart, {(apart > TOLERANCE).mean():.2%}; see {keep}"
+
+
+@pytest.fixture(scope="session", params=["opengl", "vulkan"])
+def told(request, tmp_path_factory):
+    """The story of tests/window/story.py on a backend: the folder of its pictures, and what it noted."""
+    folder = tmp_path_factory.mktemp(request.param)
+    extension = folder / "user" / "extensions" / "user_default" / "virtual_shutter"
+    extension.parent.mkdir(parents=True)
+    extension.symlink_to(ROOT)
+    environment = {
+        "BACKEND": request.param,
+        "SCREEN": SCREEN,
+        "SHUTTER_PICTURES": str(folder),
+        "SHUTTER_FOOTAGE": str(FOOTAGE),
+        "BLENDER_USER_RESOURCES": str(folder / "user"),
+    }
+    done = subprocess.run(
+        [*shlex.split(WINDOW), str(Path(__file__).with_name("story.py"))],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    (folder / "console.txt").write_text(done.stdout + done.stderr)
+    assert (folder / "result.json").exists(), done.stdout[-2000:] + done.stderr[-2000:]
+    result = json.loads((folder / "result.json").read_text())
+    assert not result["fault"], f"{result['fault']}\nPictures: {folder}"
+    return folder, result["seen"], done.stdout + done.stderr
+
+
+def test_no_exception_reaches_the_console(told):
+    _folder, _seen, console = told
+    assert "Traceback" not in console
+    assert "Error" not in console, console
+
+
+def test_every_step_is_undone_and_redone(told):
+    """Data is compared in the window; here, what the preview showed."""
+    folder, seen, _console = told
+    steps = {entry["step"]: entry for entry in seen if "step" in entry}
+    repeated = [name for name in steps if name.endswith(("_undo", "_redo"))]
+    assert len(repeated) == 14
+    for name in repeated:
+        first = name.rpartition("_")[0]
+        if steps[name]["crop"][2:] != steps[first]["crop"][2:]:
+            continue  # the sidebar, which is no data, was not open yet
+        shown, before = (crop(folder, steps[step]) for step in (name, first))
+        assert_alike(shown, before, folder / f"{name}_difference.png")
+
+
+def test_every_step_changes_the_picture(told):
+    folder, seen, _console = told
+    steps = [entry for entry in seen if entry.get("step", "").count("_") == 1 or entry.get("step") == "8_key_later"]
+    shown = [crop(folder, entry) for entry in steps]
+    for before, after, entry in zip(shown, shown[1:], steps[1:], strict=False):
+        changed = before.shape != after.shape or (np.abs(before - after) > TOLERANCE).any()
+        assert changed, f"{entry['step']} shows nothing new"
+
+
+def test_preview_and_render_agree(told):
+    """With the live preview, without it, and as rendered by a job of its own."""
+    folder, seen, _console = told
+    boxes = {entry["picture"]: entry.get("box") for entry in seen if "picture" in entry}
+    final = pixels(folder / "final.png")
+    for name in ("live", "sequencer"):
+        assert_alike(pixels(folder / f"{name}.png", boxes[name]), final, folder / f"{name}_difference.png")
+
+
+def crop(folder, entry):
+    left, top, width, height = entry["crop"]
+    return pixels(folder / f"{entry['step']}.png", (left, top, left + width, top + height))
