@@ -2,6 +2,7 @@
 
 Run in a Blender with a window, the checkout linked as an extension."""
 
+# ruff: noqa: E402 (Blender finds the helpers once it knows their folders)
 import sys
 from pathlib import Path
 
