@@ -53,6 +53,9 @@ KINDS = (
     ("LASSO", "Lasso", "What the strokes enclose"),
 )
 
+# The renderer asks F-curves for bars, and for place and width of regions: keys on anything else would show, not render.
+_UNKEYED = set()
+
 
 def _changed(group, _context):
     """The sequencer keeps finished frames, and knows nothing of what the effect's strips depend on."""
@@ -98,6 +101,7 @@ class Shutter(PropertyGroup):
         max=1.0,
         default=(0.8, 0.8, 0.8),
         update=_recolored,
+        options=_UNKEYED,
     )
     bars: CollectionProperty(type=ShutterBar)
 
@@ -106,7 +110,7 @@ class ShutterRegion(PropertyGroup):
     name: StringProperty(name="Name", default="Region")
     shutter: StringProperty(name="Shutter", description="Name of the shutter that holds here", update=_changed)
     layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=_changed)
-    kind: EnumProperty(name="Kind", items=KINDS, update=_changed)
+    kind: EnumProperty(name="Kind", items=KINDS, update=_changed, options=_UNKEYED)
     width: FloatProperty(
         name="Width",
         description="Width of lines, as a part of the picture's height",
@@ -124,7 +128,7 @@ class ShutterEffect(PropertyGroup):
     name: StringProperty(name="Name", default="Shutter")
     scene: PointerProperty(name="Scene", description="Scene that the effect's strips show", type=bpy.types.Scene)
     source: StringProperty(name="Source", description="Identity of the source strip")
-    start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts")
+    start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts", options=_UNKEYED)
     window: IntProperty(
         name="Window",
         description="Source frames that a shutter can expose",
@@ -132,20 +136,24 @@ class ShutterEffect(PropertyGroup):
         min=1,
         max=MAX_WINDOW,
         update=_lengthened,
+        options=_UNKEYED,
     )
-    position: EnumProperty(name="Position", items=POSITIONS, update=_changed)
-    interpolation: EnumProperty(name="Interpolation", items=INTERPOLATIONS, update=_changed)
-    light: EnumProperty(name="Light", items=LIGHTS, update=_changed)
-    exposure: EnumProperty(name="Exposure", items=EXPOSURES, update=_changed)
-    edges: EnumProperty(name="Edges", items=EDGES, update=_changed)
-    aggregate: EnumProperty(name="Aggregate", items=AGGREGATES, update=_changed)
+    position: EnumProperty(name="Position", items=POSITIONS, update=_changed, options=_UNKEYED)
+    interpolation: EnumProperty(name="Interpolation", items=INTERPOLATIONS, update=_changed, options=_UNKEYED)
+    light: EnumProperty(name="Light", items=LIGHTS, update=_changed, options=_UNKEYED)
+    exposure: EnumProperty(name="Exposure", items=EXPOSURES, update=_changed, options=_UNKEYED)
+    edges: EnumProperty(name="Edges", items=EDGES, update=_changed, options=_UNKEYED)
+    aggregate: EnumProperty(name="Aggregate", items=AGGREGATES, update=_changed, options=_UNKEYED)
     border: BoolProperty(
-        name="Border", description="The frame's edge is a scribble of the default shutter", update=_changed
+        name="Border",
+        description="The frame's edge is a scribble of the default shutter",
+        update=_changed,
+        options=_UNKEYED,
     )
     shutters: CollectionProperty(type=Shutter)
     regions: CollectionProperty(type=ShutterRegion)
-    active_shutter: IntProperty(name="Active Shutter", min=0, update=_chosen)
-    active_region: IntProperty(name="Active Region", min=0)
+    active_shutter: IntProperty(name="Active Shutter", min=0, update=_chosen, options=_UNKEYED)
+    active_region: IntProperty(name="Active Region", min=0, options=_UNKEYED)
 
 
 class ShutterScene(PropertyGroup):

@@ -482,3 +482,30 @@ def test_a_layer_of_another_annotation_is_copied(bpy, effect, editing):
 
 def test_no_annotation_has_no_free_layers(effect, editing):
     assert editing.free_layers(effect, None) == []
+
+
+# What can be keyed
+
+
+def test_only_what_renders_by_its_keys_can_be_keyed(effect, editing):
+    """The renderer evaluates F-curves itself, as the effect's scene is another: keys on anything else would do
+    nothing, or for the window leave the bars behind."""
+    editing.add_region(effect, effect.shutters[1])
+    groups = effect, effect.shutters[0], effect.shutters[0].bars[0], effect.regions[0]
+    can = {
+        (type(group).__name__, prop.identifier)
+        for group in groups
+        for prop in group.bl_rna.properties
+        if keyable(group, prop)
+    }
+    assert can == {
+        ("ShutterBar", "weight"),
+        *(("ShutterRegion", name) for name in ("width", "location", "rotation", "scale")),
+    }
+
+
+def keyable(group, prop) -> bool:
+    try:
+        return group.keyframe_insert(prop.identifier)
+    except TypeError:
+        return False

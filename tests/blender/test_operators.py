@@ -138,6 +138,7 @@ def test_shutters_come_go_and_move(bpy, effect, does):
     # At the end of the list there is nowhere to go.
     assert call(bpy, "shutter_move", direction="DOWN") == {"FINISHED"}
     assert order() == ["Long", "Shutter", "Sharp"]
+    assert effect_now(bpy).active_shutter == 2
 
 
 @pytest.mark.parametrize("preset", ["ANGLE_180", "GAUSSIAN", "LAST"])
