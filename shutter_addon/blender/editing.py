@@ -231,21 +231,15 @@ def _state(curve, value: float, edit) -> str:
 
 
 def bars_now(effect, index: int) -> np.ndarray:
-    """Bars (L,) that the picture at the current frame is made with: between keys by displacement.
+    """Bars (L,) that the picture at the current frame is made with, interpolated between keys.
 
     Bars that were changed since, and not keyed yet, count as they stand.
     """
     stored = bars(effect.shutters[index])
     if "changed" in key_state(effect, index):
         return stored
-    path = f"{effect.path_from_id()}.shutters[{index}]"
-    return effects.bars_at(
-        animation.Curves(effect.id_data),
-        path,
-        effect.shutters[index],
-        effect.window,
-        effect.id_data.frame_current_final,
-    )
+    edit, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}]"
+    return effects.bars_at(animation.Curves(edit), path, effect, effect.shutters[index], edit.frame_current_final)
 
 
 # Regions

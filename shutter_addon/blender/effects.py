@@ -19,7 +19,7 @@ def instant(edit, effect, strip, frame: float) -> recipe.Instant:
         raise EffectError(f'"{effect.name}" has no shutter')
     curves, path = animation.Curves(edit), effect.path_from_id()
     bars = [
-        checked(shutter.name, bars_at(curves, f"{path}.shutters[{i}]", shutter, effect.window, frame), frame)
+        checked(shutter.name, bars_at(curves, f"{path}.shutters[{i}]", effect, shutter, frame), frame)
         for i, shutter in enumerate(effect.shutters)
     ]
     return recipe.Instant(options(effect), np.stack(bars), tuple(_shapes_at(edit, effect, strip, curves, frame)))
@@ -40,9 +40,10 @@ def options(effect) -> recipe.Options:
     return recipe.Options(effect.window, **words, aggregate=int(effect.aggregate), border=effect.border)
 
 
-def bars_at(curves, path: str, shutter, window: int, frame: float) -> np.ndarray:
-    """Bars (window,) of a shutter at a frame; between keys by displacement, with the ease of the F-curves. path: the
-    shutter's, from the scene."""
+def bars_at(curves, path: str, effect, shutter, frame: float) -> np.ndarray:
+    """Bars (window,) of a shutter of the effect at a frame; between keys by displacement with the ease of the F-curves,
+    or as the F-curves are, if that is the effect's interpolation. path: the shutter's, from the scene."""
+    window = effect.window
     stored = np.zeros(window)
     weights = [bar.weight for bar in shutter.bars][:window]
     stored[: len(weights)] = weights
@@ -62,7 +63,8 @@ def bars_at(curves, path: str, shutter, window: int, frame: float) -> np.ndarray
     if before == after:
         return at(frames[before])
     first, second = at(frames[before]), at(frames[after])
-    if not (first.any() and second.any()):  # the way to a closed shutter is no displacement
+    # The way to a closed shutter is no displacement.
+    if effect.interpolation == "VALUE" or not (first.any() and second.any()):
         return at(frame)
     return keyframes.between_bars(
         first, second, animation.progress(keyed.values(), frames[before], frames[after], frame)

@@ -31,7 +31,7 @@ def recipe_of(edit, effect, strip) -> recipe.Recipe:
     curves, path = animation.Curves(edit), effect.path_from_id()
     names = _different([shutter.name for shutter in effect.shutters])
     shutters = [
-        _shutter(curves, f"{path}.shutters[{i}]", shutter, names[i], effect.window, strip)
+        _shutter(curves, f"{path}.shutters[{i}]", effect, shutter, names[i], strip)
         for i, shutter in enumerate(effect.shutters)
     ]
     regions = [
@@ -55,20 +55,23 @@ def _different(names: list[str]) -> list[str]:
     return result
 
 
-def _shutter(curves, path: str, source, name: str, window: int, strip) -> recipe.Shutter:
+def _shutter(curves, path: str, effect, source, name: str, strip) -> recipe.Shutter:
     @cache
     def bars(frame):
-        return effects.checked(source.name, effects.bars_at(curves, path, source, window, frame), frame)
+        return effects.checked(source.name, effects.bars_at(curves, path, effect, source, frame), frame)
 
     color = tuple(map(_short, source.color))
-    keyed = [curve for k in range(window) if (curve := curves.find(f"{path}.bars[{k}].weight"))]
+    keyed = [curve for k in range(effect.window) if (curve := curves.find(f"{path}.bars[{k}].weight"))]
     if not keyed:
         return recipe.Shutter(name, color, [_short(v) for v in bars(strip.left_handle)])
 
     def fits(first, second, frame, share):
-        apart = abs(animation.progress(keyed, first, second, frame) - share)
         ends = np.array([bars(first), bars(second)])
-        return apart * np.ptp(ends, axis=0).max() <= TOLERANCE * ends.max()
+        if effect.interpolation == "VALUE":  # every curve has an ease of its own
+            apart = np.abs(bars(frame) - keyframes.between_bars(*ends, share, "value")).max()
+        else:
+            apart = abs(animation.progress(keyed, first, second, frame) - share) * np.ptp(ends, axis=0).max()
+        return apart <= TOLERANCE * ends.max()
 
     keys = _keys(fits, lambda *_: True, keyed, animation.key_frames(keyed), {}, strip)
     return recipe.Shutter(

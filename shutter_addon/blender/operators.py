@@ -155,8 +155,10 @@ class SHUTTER_OT_shutter_remove(_OfShutter, Operator):
 class _Move:
     direction: EnumProperty(name="Direction", items=(("UP", "Up", ""), ("DOWN", "Down", "")))
 
-    def target(self, index: int, count: int) -> int:
-        return min(max(index + (1 if self.direction == "DOWN" else -1), 0), count - 1)
+    def target(self, places: list[int], index: int) -> int:
+        """The place after or before `index` in the list, among the places that it shows."""
+        step = places.index(index) + (1 if self.direction == "DOWN" else -1)
+        return places[min(max(step, 0), len(places) - 1)]
 
 
 class SHUTTER_OT_shutter_move(_Move, _OfShutter, Operator):
@@ -167,7 +169,7 @@ class SHUTTER_OT_shutter_move(_Move, _OfShutter, Operator):
 
     def change(self, _context, effect):
         index = effect.active_shutter
-        editing.move_shutter(effect, index, self.target(index, len(effect.shutters)))
+        editing.move_shutter(effect, index, self.target(list(range(len(effect.shutters))), index))
 
 
 _preset_items = []
@@ -355,8 +357,9 @@ class SHUTTER_OT_region_move(_Move, _OfRegion, Operator):
     bl_label = "Move Region"
 
     def change(self, _context, effect):
-        index = effect.active_region
-        editing.move_region(effect, index, self.target(index, len(effect.regions)))
+        index, name = effect.active_region, editing.active_shutter(effect).name
+        listed = [i for i, region in enumerate(effect.regions) if region.shutter == name]
+        editing.move_region(effect, index, self.target(listed, index))
 
 
 class SHUTTER_OT_region_key(_OfRegion, Operator):

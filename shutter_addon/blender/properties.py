@@ -27,8 +27,8 @@ POSITIONS = (
     ("END", "End", "The window ends at the frame"),
 )
 INTERPOLATIONS = (
-    ("DISPLACEMENT", "Displacement", "Between shutters, times move"),
-    ("VALUE", "Value", "Between shutters, pictures cross-fade"),
+    ("DISPLACEMENT", "Displacement", "Between shutters and between keys, times move"),
+    ("VALUE", "Value", "Between shutters, pictures cross-fade, and between keys every bar fades by itself"),
 )
 LIGHTS = (
     ("LINEAR", "Linear", "Sum light, as a camera does: bright streaks stay bright"),

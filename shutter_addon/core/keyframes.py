@@ -32,10 +32,13 @@ def span(frames: list[float], frame: float) -> tuple[int, int, float]:
     return before, after, (frame - frames[before]) / (frames[after] - frames[before])
 
 
-def between_bars(first, second, u: float) -> np.ndarray:
-    """Bars (L,) a share u of the way from one shutter to another, by displacement (DESIGN: also over time)."""
+def between_bars(first, second, u: float, interpolation: str = "displacement") -> np.ndarray:
+    """Bars (L,) a share u of the way from one shutter to another: by displacement, or, as F-curves do, bar by bar
+    ("value")."""
     if u <= 0:
         return np.asarray(first, dtype=np.float64)
     if u >= 1:
         return np.asarray(second, dtype=np.float64)
+    if interpolation == "value":
+        return (1 - u) * np.asarray(first, dtype=np.float64) + u * np.asarray(second, dtype=np.float64)
     return shutters.displace([first, second], [1 - u, u])

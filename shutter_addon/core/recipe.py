@@ -102,12 +102,13 @@ class Shutter:
     bars: list[float] | None = None
     keys: list[ShutterKey] = field(default_factory=list)
 
-    def at(self, frame: float) -> np.ndarray:
-        """Bars (L,) at a frame; between keys by displacement."""
+    def at(self, frame: float, interpolation: Interpolation = "displacement") -> np.ndarray:
+        """Bars (L,) at a frame; between keys by `interpolation`."""
         if not self.keys:
             return np.asarray(self.bars, dtype=np.float64)
         a, b, u = keyframes.span([key.frame for key in self.keys], frame)
-        return keyframes.between_bars(self.keys[a].bars, self.keys[b].bars, keyframes.eased(u, self.keys[a].ease))
+        u = keyframes.eased(u, self.keys[a].ease)
+        return keyframes.between_bars(self.keys[a].bars, self.keys[b].bars, u, interpolation)
 
 
 @dataclass(frozen=True)
@@ -181,7 +182,7 @@ class Recipe:
         order = [shutter.name for shutter in self.shutters]
         return Instant(
             self.options,
-            np.stack([shutter.at(frame) for shutter in self.shutters]),
+            np.stack([shutter.at(frame, self.interpolation) for shutter in self.shutters]),
             tuple(
                 scribbles.Shape(order.index(region.shutter), region.kind, region.width, region.at(frame, aspect))
                 for region in self.regions

@@ -34,3 +34,7 @@ def test_ends_are_exact():
     assert np.array_equal(keyframes.between_bars(first, second, 0), first)
     assert np.array_equal(keyframes.between_bars(first, second, 1), second)
     assert keyframes.between_bars(first, second, 0.5).sum() == pytest.approx(0.65)
+
+
+def test_bars_by_value_are_the_curves_own():
+    assert keyframes.between_bars([1, 0, 3], [0, 2, 1], 0.25, "value") == pytest.approx([0.75, 0.5, 2.5])

@@ -44,32 +44,43 @@ def assert_alike(picture, expected, keep):
     assert apart.max() <= TOLERANCE, f"{apart.max()} levels apart, {(apart > TOLERANCE).mean():.2%}; see {keep}"
 
 
-@pytest.fixture(scope="session", params=["opengl", "vulkan"])
-def told(request, tmp_path_factory):
-    """The story of tests/window/story.py on a backend: the folder of its pictures, and what it noted."""
-    folder = tmp_path_factory.mktemp(request.param)
+def tell(story, backend, folder):
+    """Runs a story in Blender's window; what it noted, and what Blender said on the console."""
     extension = folder / "user" / "extensions" / "user_default" / "virtual_shutter"
     extension.parent.mkdir(parents=True)
     extension.symlink_to(ROOT)
     environment = {
-        "BACKEND": request.param,
+        "BACKEND": backend,
         "SCREEN": SCREEN,
         "SHUTTER_PICTURES": str(folder),
         "SHUTTER_FOOTAGE": str(FOOTAGE),
         "BLENDER_USER_RESOURCES": str(folder / "user"),
     }
     done = subprocess.run(
-        [*shlex.split(WINDOW), str(Path(__file__).with_name("story.py"))],
+        [*shlex.split(WINDOW), str(Path(__file__).with_name(story))],
         env=os.environ | environment,
         capture_output=True,
         text=True,
         check=False,
     )
-    (folder / "console.txt").write_text(done.stdout + done.stderr)
-    assert (folder / "result.json").exists(), done.stdout[-2000:] + done.stderr[-2000:]
+    console = done.stdout + done.stderr
+    (folder / "console.txt").write_text(console)
+    assert (folder / "result.json").exists(), console[-4000:]
     result = json.loads((folder / "result.json").read_text())
     assert not result["fault"], f"{result['fault']}\nPictures: {folder}"
-    return folder, result["seen"], done.stdout + done.stderr
+    return result["seen"], console
+
+
+@pytest.fixture(scope="session", params=["opengl", "vulkan"])
+def told(request, tmp_path_factory):
+    """The first minutes, on a backend: the folder of the pictures, what was noted, and the console."""
+    folder = tmp_path_factory.mktemp(request.param)
+    return folder, *tell("story.py", request.param, folder)
+
+
+def test_bars_between_keys_and_the_extension_disabled(tmp_path):
+    _seen, console = tell("bars_and_disable.py", "opengl", tmp_path)
+    assert "Traceback" not in console
 
 
 def test_no_exception_reaches_the_console(told):
@@ -94,11 +105,19 @@ def test_every_step_is_undone_and_redone(told):
 
 def test_every_step_changes_the_picture(told):
     folder, seen, _console = told
-    steps = [entry for entry in seen if entry.get("step", "").count("_") == 1 or entry.get("step") == "8_key_later"]
+    steps = [entry for entry in seen if not entry.get("step", "_undo").endswith(("_undo", "_redo", "_loaded"))]
+    assert len(steps) == 8
     shown = [crop(folder, entry) for entry in steps]
     for before, after, entry in zip(shown, shown[1:], steps[1:], strict=False):
         changed = before.shape != after.shape or (np.abs(before - after) > TOLERANCE).any()
         assert changed, f"{entry['step']} shows nothing new"
+
+
+def test_a_loaded_file_shows_what_was_saved(told):
+    folder, seen, _console = told
+    steps = {entry["step"]: entry for entry in seen if "step" in entry}
+    saved, loaded = (crop(folder, steps[name]) for name in ("8_key_later_redo", "9_loaded"))
+    assert_alike(loaded, saved, folder / "loaded_difference.png")
 
 
 def test_preview_and_render_agree(told):
