@@ -104,16 +104,25 @@ def show_panel(context) -> None:
     """Opens the sidebar's Shutter tab beside the picture: in the Properties editor it is below all other panels."""
     for _window, area in strips.previews(context):
         area.spaces.active.show_region_ui = True
-    # A sidebar has tabs once it has been drawn.
-    bpy.app.timers.register(_choose_tab, first_interval=0.1)
+    # A sidebar has tabs once it has been drawn, which a slow window does late, and one without room never.
+    _waits[:] = [0.1] * 30
+    if not bpy.app.timers.is_registered(_choose_tab):
+        bpy.app.timers.register(_choose_tab, first_interval=0.1)
 
 
-def _choose_tab() -> None:
-    for _window, area in strips.previews(bpy.context):
-        sidebar = next(region for region in area.regions if region.type == "UI")
-        if not sidebar.is_property_readonly("active_panel_category"):
-            sidebar.active_panel_category = "Shutter"
-            area.tag_redraw()
+_waits: list[float] = []
+
+
+def _choose_tab() -> float | None:
+    areas = [area for _window, area in strips.previews(bpy.context)]
+    sidebars = [next(region for region in area.regions if region.type == "UI") for area in areas]
+    drawn = [s for s in sidebars if not s.is_property_readonly("active_panel_category")]
+    if len(drawn) < len(sidebars) and _waits:
+        return _waits.pop()
+    for sidebar in drawn:
+        sidebar.active_panel_category = "Shutter"
+        sidebar.tag_redraw()
+    return None
 
 
 class SHUTTER_OT_shutter_add(_OfEffect, Operator):

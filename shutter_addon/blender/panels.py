@@ -26,7 +26,7 @@ class SHUTTER_UL_shutters(UIList):
 class SHUTTER_UL_regions(UIList):
     def draw_item(self, _context, layout, effect, region, _icon, _active, _property, _index):
         row = layout.row(align=True)
-        row.prop(region, "kind", text="", icon_only=True, emboss=False)
+        row.label(text="", icon="IPO_LINEAR" if region.kind == "LINE" else "MESH_CIRCLE")
         row.prop(region, "name", text="", emboss=False)
         layer = editing.layer_of(effect, region)
         if layer is None or not any(drawing.strokes for drawing in layer.frames):
@@ -129,7 +129,7 @@ class _Regions(_WithEffect):
         _list_buttons(row, "region")
         row = layout.row(align=True)
         row.operator("shutter.draw", icon="GREASEPENCIL")
-        row.operator("shutter.erase", text="", icon="META_DATA")
+        row.operator("shutter.erase")
         new = row.operator("shutter.draw", text="", icon="ADD")
         new.new = True
         row.operator_menu_enum("shutter.region_take", "layer", text="", icon="DOWNARROW_HLT")
