@@ -62,7 +62,10 @@ class SHUTTER_MT_shutters(Menu):
 
 def _list_buttons(layout, kind: str, menu: str | None = None):
     column = layout.column(align=True)
-    column.operator(f"shutter.{kind}_add" if kind == "shutter" else "shutter.draw", text="", icon="ADD")
+    if kind == "shutter":
+        column.operator("shutter.shutter_add", text="", icon="ADD")
+    else:
+        column.operator("shutter.draw", text="", icon="ADD").new = True
     column.operator(f"shutter.{kind}_remove", text="", icon="REMOVE")
     if menu:
         column.menu(menu, text="", icon="DOWNARROW_HLT")
@@ -130,8 +133,6 @@ class _Regions(_WithEffect):
         row = layout.row(align=True)
         row.operator("shutter.draw", icon="GREASEPENCIL")
         row.operator("shutter.erase")
-        new = row.operator("shutter.draw", text="", icon="ADD")
-        new.new = True
         row.operator_menu_enum("shutter.region_take", "layer", text="", icon="DOWNARROW_HLT")
         region = editing.active_region(effect)
         if region is None:
