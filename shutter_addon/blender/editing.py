@@ -49,6 +49,15 @@ def choose_region(effect) -> None:
         effect.active_region = min(own, key=lambda i: abs(i - effect.active_region))
 
 
+def aim_pen(effect) -> None:
+    """Strokes are drawn on the active region's layer from now on."""
+    region = active_region(effect)
+    layer = layer_of(effect, region) if region else None
+    if layer is not None:
+        layers = effect.scene.annotation.layers
+        layers.active_index = next(i for i, other in enumerate(layers) if other == layer)
+
+
 def unique(name: str, taken) -> str:
     """The name, with a number behind it where it is taken, as Blender names things."""
     base, number, wanted = name, 0, name

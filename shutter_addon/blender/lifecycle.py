@@ -4,7 +4,7 @@ import uuid
 
 import bpy
 
-from . import animation, cache, copies, kept, strips
+from . import animation, cache, copies, kept, pictures, strips
 
 EFFECTS = "virtual_shutter.effects"
 
@@ -105,6 +105,7 @@ def _remove_scenes(updated) -> None:
 
 def _remove(scene) -> None:
     camera, annotation = scene.camera, scene.annotation
+    pictures.drop(scene)
     bpy.data.scenes.remove(scene)
     if camera is not None and camera.library is None and not camera.users:
         data = camera.data

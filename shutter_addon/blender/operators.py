@@ -298,11 +298,10 @@ class SHUTTER_OT_erase(_OfRegion, Operator):
 
 def drawing_tool(context, effect, region, tool: str) -> bool:
     """Makes the region's layer the active annotation of every preview, and the tool theirs; whether there is one."""
-    layer = editing.layer_of(effect, region)
-    if layer is None:
-        layer = editing.new_layer(effect, region)
+    if editing.layer_of(effect, region) is None:
+        editing.new_layer(effect, region)
+    editing.aim_pen(effect)
     annotation = effect.scene.annotation
-    annotation.layers.active_index = next(i for i, other in enumerate(annotation.layers) if other == layer)
     found = False
     for window, area in strips.previews(context):
         area.spaces.active.annotation = annotation

@@ -80,6 +80,11 @@ class Studio:
             self.run(self._renderers.pop(next(iter(self._renderers)))[1].close)
         return renderer
 
+    def drop(self, scene) -> None:
+        """Closes what belongs to an effect scene."""
+        for place in [place for place in self._renderers if place[0] == scene.session_uid]:
+            self.run(self._renderers.pop(place)[1].close)
+
     def forget(self) -> None:
         """Closes all sources and frees the device."""
         for _key, renderer in self._renderers.values():
@@ -132,6 +137,12 @@ def moment(edit, effect, strip, frame: float, say=print, shrink: int = 1) -> Mom
 
 def _studio() -> Studio:
     return _window if in_window() else _apart
+
+
+def drop(scene) -> None:
+    """Closes the source of an effect scene that goes, and frees its frames."""
+    _apart.drop(scene)
+    _window.drop(scene)
 
 
 def forget(*_) -> None:

@@ -75,8 +75,13 @@ def _lengthened(effect, context):
     _changed(effect, context)
 
 
-def _chosen(effect, _context):
+def _chosen(effect, context):
     editing.choose_region(effect)
+    _aimed(effect, context)
+
+
+def _aimed(effect, _context):
+    editing.aim_pen(effect)
 
 
 class ShutterBar(PropertyGroup):
@@ -153,7 +158,7 @@ class ShutterEffect(PropertyGroup):
     shutters: CollectionProperty(type=Shutter)
     regions: CollectionProperty(type=ShutterRegion)
     active_shutter: IntProperty(name="Active Shutter", min=0, update=_chosen, options=_UNKEYED)
-    active_region: IntProperty(name="Active Region", min=0, options=_UNKEYED)
+    active_region: IntProperty(name="Active Region", min=0, update=_aimed, options=_UNKEYED)
 
 
 class ShutterScene(PropertyGroup):

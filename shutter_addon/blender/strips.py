@@ -138,9 +138,10 @@ def add_effect(edit, source):
     length = max(source.content_end, source.right_handle) - source.content_start
     scene = new_scene(edit, f"Shutter {source.name}", (medium.width, medium.height), int(length) + _SPARE)
     scene.virtual_shutter.identity = uuid.uuid4().hex
-    taken = {s.channel for s in edit.sequence_editor.strips_all if _overlap(s, source)}
+    level = (source.parent_meta() or edit.sequence_editor).strips
+    taken = {s.channel for s in level if _overlap(s, source)}
     channel = next(c for c in range(source.channel + 1, source.channel + len(taken) + 2) if c not in taken)
-    strip = edit.sequence_editor.strips.new_scene("Shutter", scene, channel, int(source.content_start))
+    strip = level.new_scene("Shutter", scene, channel, int(source.content_start))
     strip.left_handle, strip.right_handle = source.left_handle, source.right_handle
     strip.blend_type = source.blend_type
     copy_look(source, strip)

@@ -392,6 +392,17 @@ def test_a_region_has_a_layer_of_its_own(effect, editing):
     assert effect.scene.annotation.layers.active_note == "Sharp.001"
 
 
+def test_the_pen_draws_for_the_chosen_shutter(effect, editing):
+    editing.start(effect)
+    for shutter in effect.shutters:
+        editing.add_region(effect, shutter)
+    layers = effect.scene.annotation.layers
+    for index, shutter in enumerate(effect.shutters):
+        effect.active_shutter = index
+        assert editing.active_region(effect).shutter == shutter.name
+        assert layers[layers.active_index] == editing.layer_of(effect, editing.active_region(effect))
+
+
 def test_a_region_without_annotation_has_no_layer(effect, editing):
     region = editing.add_region(effect, effect.shutters[1])
     effect.scene.annotation.layers.remove(effect.scene.annotation.layers[0])

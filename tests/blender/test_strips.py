@@ -276,6 +276,16 @@ def test_an_effect_moved_with_its_source_takes_its_keys_along(edit, render, effe
         assert np.array_equal(after[frame + 40], before[frame])
 
 
+def test_inside_a_meta_strip(edit, render, effect_on, movie):
+    meta = edit.sequence_editor.strips.new_meta("Meta", 1, 1)
+    source = meta.strips.new_movie("movie", str(movie), 1, 1)
+    strip, _effect = effect_on(source)
+    assert strip.parent_meta() == meta
+    assert strip.channel == source.channel + 1
+    meta.right_handle = 61
+    check(edit, render, [strip], [1, 20, 60])
+
+
 def test_two_effects_on_two_strips_of_one_movie(edit, render, effect_on, movie):
     first, second = new_movie(edit, movie, 1, 1), new_movie(edit, movie, 81, 1)
     effect_on(first, recipe(4, [1, 0, 0, 0]))
