@@ -312,4 +312,5 @@ def story():
     yield from disabled_and_enabled()
 
 
-driver.play(story)
+if __name__ == "__main__":
+    driver.play(story)
