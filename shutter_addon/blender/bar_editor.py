@@ -12,6 +12,7 @@ _MARGIN, _HEIGHT, _BAR = 16, 96, 16  # in units of the interface
 _PAD, _HEADER = 8, 18
 _SNAP = 0.1
 _FINE = 0.1
+_THRESHOLD = 3  # pixels that make a click a drag
 _BACK = (0.08, 0.08, 0.08, 0.8)
 
 
@@ -110,16 +111,18 @@ class SHUTTER_GT_bars(Gizmo):
         # The scale stays while dragging, or a bar would run away from the pointer.
         self.place = _layout(context, self.values)
         self.mouse = self.point = event.mouse_region_x, event.mouse_region_y
-        self._paint(context, self.point, False)
+        self.paints = False  # a click does not, nor the two of a double click
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event, tweak):
         mouse = event.mouse_region_x, event.mouse_region_y
-        if mouse != self.mouse or "SNAP" in tweak:
-            fine = _FINE if "PRECISE" in tweak else 1.0
-            point = mouse[0], self.point[1] + (mouse[1] - self.mouse[1]) * fine
+        self.paints = self.paints or max(abs(a - b) for a, b in zip(mouse, self.mouse, strict=True)) >= _THRESHOLD
+        # `tweak` knows of keys that are pressed while dragging, the event of those that were held before.
+        fine, snap = "PRECISE" in tweak or event.shift, "SNAP" in tweak or event.ctrl
+        if self.paints and (mouse != self.mouse or snap):
+            point = mouse[0], self.point[1] + (mouse[1] - self.mouse[1]) * (_FINE if fine else 1.0)
             self.mouse = mouse
-            self._paint(context, point, "SNAP" in tweak)
+            self._paint(context, point, snap)
         return {"RUNNING_MODAL"}
 
     def _paint(self, context, point, snap: bool):
@@ -131,7 +134,7 @@ class SHUTTER_GT_bars(Gizmo):
 
     def exit(self, context, cancel):
         found = strips.active(context)
-        if found is None:
+        if found is None or not self.paints:
             return
         effect = found[1]
         if cancel:

@@ -6,6 +6,7 @@ strokes and the source are compared with what they were, as no callback tells of
 
 import numpy as np
 
+from ..media import MediaError
 from . import animation, sources, strips
 
 _signatures: dict = {}
@@ -17,6 +18,11 @@ _TIMING = (
     *("content_start", "content_end", "content_trim_start", "content_trim_end", "left_handle", "right_handle"),
     *("use_reverse_frames", "strobe"),
 )
+
+
+def forget() -> None:
+    """Forgets what the effects of a file were, before another one is loaded."""
+    _signatures.clear()
 
 
 def invalidate(edit, scene=None) -> None:
@@ -88,10 +94,11 @@ def _strokes(annotation, layer: str):
 def _source(source):
     yield tuple(getattr(source, name) for name in _TIMING)
     yield sources.reading(source)
-    yield getattr(source, "filepath", None), getattr(source, "directory", None)
     yield tuple(key.timeline_frame for key in getattr(source, "retiming_keys", ()))
-    if source.type == "IMAGE":
-        yield len(source.elements), source.elements[0].filename if source.elements else None
+    try:
+        yield sources.files_key(source)  # a file that was missing may be there again
+    except MediaError as error:
+        yield str(error)
 
 
 def _bytes(collection, name: str, size: int, dtype) -> bytes:

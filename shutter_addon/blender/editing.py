@@ -3,7 +3,6 @@
 Shutters and regions are items of collections: where one goes or moves, its F-curves go and move with it.
 """
 
-import bpy
 import numpy as np
 
 from ..core import presets, shutters
@@ -234,7 +233,7 @@ def _state(curve, value: float, edit) -> str:
     if curve is None:
         return ""
     frame = edit.frame_current_final
-    if abs(curve.evaluate(frame) - value) > 1e-4:
+    if abs(max(curve.evaluate(frame), 0.0) - value) > 1e-4:  # no bar is below 0, a curve may be
         return "changed"
     return "keyed" if any(abs(key.co[0] - frame) < 1e-3 for key in curve.keyframe_points) else "animated"
 
@@ -248,7 +247,9 @@ def bars_now(effect, index: int) -> np.ndarray:
     if "changed" in key_state(effect, index):
         return stored
     edit, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}]"
-    return effects.bars_at(animation.Curves(edit), path, effect, effect.shutters[index], edit.frame_current_final)
+    curves, frame = animation.Curves(edit), edit.frame_current_final
+    chosen = effects.options(effect, curves, frame)
+    return effects.bars_at(curves, path, effect.shutters[index], chosen, frame)
 
 
 # Regions
@@ -266,9 +267,7 @@ def add_region(effect, shutter, kind: str = "LINE", name: str = ""):
 
 def new_layer(effect, region):
     """Gives a region an empty annotation layer, named after it and in its shutter's colour."""
-    if effect.scene.annotation is None:
-        effect.scene.annotation = bpy.data.annotations.new(f"Scribbles {effect.name}")
-    layer = effect.scene.annotation.layers.new(region.name, set_active=True)
+    layer = effects.annotation(effect).layers.new(region.name, set_active=True)
     layer.color = effect.shutters[region.shutter].color
     region.layer = layer.info
     return layer
@@ -293,6 +292,14 @@ def move_region(effect, index: int, to: int) -> None:
 def layer_of(effect, region):
     """The annotation layer of a region, or None."""
     return effect.scene.annotation.layers.get(region.layer) if effect.scene.annotation else None
+
+
+def assign_region(effect, index: int, shutter) -> None:
+    """Gives a region to another shutter, which becomes the active one."""
+    effect.regions[index].shutter = shutter.name
+    color_layers(effect, shutter)
+    effect.active_region = index
+    effect.active_shutter = list(effect.shutters).index(shutter)
 
 
 def color_layers(effect, shutter) -> None:

@@ -1,5 +1,6 @@
 """The effect at a frame, from Blender's data to core's; and recipes into Blender's data."""
 
+import bpy
 import numpy as np
 
 from ..core import keyframes, recipe, scribbles, shutters
@@ -18,11 +19,12 @@ def instant(edit, effect, strip, frame: float) -> recipe.Instant:
     if not effect.shutters:
         raise EffectError(f'"{effect.name}" has no shutter')
     curves, path = animation.Curves(edit), effect.path_from_id()
+    chosen = options(effect, curves, frame)
     bars = [
-        checked(shutter.name, bars_at(curves, f"{path}.shutters[{i}]", effect, shutter, frame), frame)
+        checked(shutter.name, bars_at(curves, f"{path}.shutters[{i}]", shutter, chosen, frame), frame)
         for i, shutter in enumerate(effect.shutters)
     ]
-    return recipe.Instant(options(effect), np.stack(bars), tuple(_shapes_at(edit, effect, strip, curves, frame)))
+    return recipe.Instant(chosen, np.stack(bars), tuple(_shapes_at(edit, effect, strip, curves, frame)))
 
 
 def checked(name: str, bars: np.ndarray, frame: float) -> np.ndarray:
@@ -34,16 +36,25 @@ def checked(name: str, bars: np.ndarray, frame: float) -> np.ndarray:
     return bars
 
 
-def options(effect) -> recipe.Options:
-    """The effect's options in the recipe's words."""
-    words = {name: getattr(effect, name).lower() for name in OPTIONS}
-    return recipe.Options(effect.window, **words, aggregate=int(effect.aggregate), border=effect.border)
+def options(effect, curves=None, frame: float = 0.0) -> recipe.Options:
+    """The effect's options in the recipe's words: at a frame of the edit, given its curves; otherwise as they stand."""
+    path = effect.path_from_id()
+
+    def at(name):
+        curve = curves.find(f"{path}.{name}") if curves else None
+        if curve is None or curve.is_empty:
+            return getattr(effect, name)
+        value, prop = curve.evaluate(frame), effect.bl_rna.properties[name]
+        return value >= 0.5 if prop.type == "BOOLEAN" else prop.enum_items[round(value)].identifier
+
+    words = {name: at(name).lower() for name in OPTIONS}
+    return recipe.Options(effect.window, **words, aggregate=int(at("aggregate")), border=at("border"))
 
 
-def bars_at(curves, path: str, effect, shutter, frame: float) -> np.ndarray:
-    """Bars (window,) of a shutter of the effect at a frame; between keys by displacement with the ease of the F-curves,
-    or as the F-curves are, if that is the effect's interpolation. path: the shutter's, from the scene."""
-    window = effect.window
+def bars_at(curves, path: str, shutter, chosen: recipe.Options, frame: float) -> np.ndarray:
+    """Bars (window,) of a shutter at a frame; between keys by displacement with the ease of the F-curves, or as the
+    F-curves are, if that is the interpolation. path: the shutter's, from the scene; chosen: the effect's options."""
+    window = chosen.window
     stored = np.zeros(window)
     weights = [bar.weight for bar in shutter.bars][:window]
     stored[: len(weights)] = weights
@@ -64,11 +75,17 @@ def bars_at(curves, path: str, effect, shutter, frame: float) -> np.ndarray:
         return at(frames[before])
     first, second = at(frames[before]), at(frames[after])
     # The way to a closed shutter is no displacement.
-    if effect.interpolation == "VALUE" or not (first.any() and second.any()):
+    if chosen.interpolation == "value" or not (first.any() and second.any()):
         return at(frame)
     return keyframes.between_bars(
         first, second, animation.progress(keyed.values(), frames[before], frames[after], frame)
     )
+
+
+def drawn_regions(effect) -> list:
+    """The regions that have a shutter, in order: those that an instant has shapes of."""
+    names = {shutter.name for shutter in effect.shutters}
+    return [region for region in effect.regions if region.shutter in names]
 
 
 def _shapes_at(edit, effect, strip, curves, frame: float):
@@ -143,6 +160,7 @@ def clear(edit, effect) -> None:
     animation.remove_curves(edit, effect.path_from_id() + ".")
     effect.shutters.clear()
     effect.regions.clear()
+    effect.active_shutter = effect.active_region = 0
     if effect.scene.annotation is not None:
         for layer in list(effect.scene.annotation.layers):
             effect.scene.annotation.layers.remove(layer)
@@ -180,9 +198,16 @@ def _add_region(edit, effect, strip, path: str, source: recipe.Region, first: fl
         animation.set_keys(edit, f"{path}.{name}", index, keys)
 
 
+def annotation(effect):
+    """What the effect's scribbles are drawn on; made where somebody has removed it."""
+    if effect.scene.annotation is None:
+        effect.scene.annotation = bpy.data.annotations.new(f"Scribbles {effect.name}")
+    return effect.scene.annotation
+
+
 def _draw(effect, strip, source: recipe.Region, color, first: float) -> str:
     """Draws a region's strokes on an annotation layer of its own, a frame per drawing; the layer's name."""
-    layer = effect.scene.annotation.layers.new(source.name or "Region", set_active=False)
+    layer = annotation(effect).layers.new(source.name or "Region", set_active=False)
     layer.color = color
     size = effect.scene.render.resolution_x, effect.scene.render.resolution_y
     to_image = geometry.picture_to_image(strip, size)

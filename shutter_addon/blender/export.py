@@ -25,13 +25,15 @@ _CHANNELS = (("location", 0), ("location", 1), ("rotation", 0), ("scale", 0))
 def recipe_of(edit, effect, strip) -> recipe.Recipe:
     """The effect as a recipe, whose frame 1 is the strip's first. EffectError: it cannot be rendered as it stands.
 
-    Left out are regions without strokes or shutter, drawings before the first that has strokes, and keys of a width."""
+    Left out are regions without strokes or shutter, drawings before the first that has strokes, and keys of widths and
+    of options, which are as at the strip's first frame."""
     if not effect.shutters:
         raise effects.EffectError(f'"{effect.name}" has no shutter')
     curves, path = animation.Curves(edit), effect.path_from_id()
+    chosen = effects.options(effect, curves, strip.left_handle)
     names = _different([shutter.name for shutter in effect.shutters])
     shutters = [
-        _shutter(curves, f"{path}.shutters[{i}]", effect, shutter, names[i], strip)
+        _shutter(curves, f"{path}.shutters[{i}]", chosen, shutter, names[i], strip)
         for i, shutter in enumerate(effect.shutters)
     ]
     regions = [
@@ -39,8 +41,7 @@ def recipe_of(edit, effect, strip) -> recipe.Recipe:
         for i, region in enumerate(effect.regions)
         if region.shutter in names
     ]
-    options = asdict(effects.options(effect))
-    found = recipe.Recipe(1, shutters=shutters, regions=[region for region in regions if region], **options)
+    found = recipe.Recipe(1, shutters=shutters, regions=[region for region in regions if region], **asdict(chosen))
     return recipe.parse(recipe.dump(found))
 
 
@@ -55,19 +56,19 @@ def _different(names: list[str]) -> list[str]:
     return result
 
 
-def _shutter(curves, path: str, effect, source, name: str, strip) -> recipe.Shutter:
+def _shutter(curves, path: str, chosen, source, name: str, strip) -> recipe.Shutter:
     @cache
     def bars(frame):
-        return effects.checked(source.name, effects.bars_at(curves, path, effect, source, frame), frame)
+        return effects.checked(source.name, effects.bars_at(curves, path, source, chosen, frame), frame)
 
     color = tuple(map(_short, source.color))
-    keyed = [curve for k in range(effect.window) if (curve := curves.find(f"{path}.bars[{k}].weight"))]
+    keyed = [curve for k in range(chosen.window) if (curve := curves.find(f"{path}.bars[{k}].weight"))]
     if not keyed:
         return recipe.Shutter(name, color, [_short(v) for v in bars(strip.left_handle)])
 
     def fits(first, second, frame, share):
         ends = np.array([bars(first), bars(second)])
-        if effect.interpolation == "VALUE":  # every curve has an ease of its own
+        if chosen.interpolation == "value":  # every curve has an ease of its own
             apart = np.abs(bars(frame) - keyframes.between_bars(*ends, share, "value")).max()
         else:
             apart = abs(animation.progress(keyed, first, second, frame) - share) * np.ptp(ends, axis=0).max()

@@ -7,7 +7,7 @@ def picture_to_image(strip, size) -> np.ndarray:
     """Matrix (3, 3) from fractions of the strip's picture to the sequencer's image space.
 
     Image space, as annotations have it: pixels, origin at the image's centre, y up. size: the picture's, in pixels.
-    Blender scales and turns a strip about its transform's origin.
+    Blender scales and turns a strip about its transform's origin, and mirrors the whole image after that.
     """
     width, height = size
     t = strip.transform
@@ -18,7 +18,7 @@ def picture_to_image(strip, size) -> np.ndarray:
     offset = np.array([t.offset_x, t.offset_y]) + pivot + linear @ corner
     matrix = np.eye(3)
     matrix[:2, :2], matrix[:2, 2] = linear * (width, height), offset
-    return matrix
+    return np.diag([-1.0 if strip.use_flip_x else 1.0, -1.0 if strip.use_flip_y else 1.0, 1.0]) @ matrix
 
 
 def mapped(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ from . import cache, copies, lifecycle, pictures, strips
 @persistent
 def _before_load(*_):
     pictures.forget()
+    cache.forget()
 
 
 @persistent
@@ -25,6 +26,7 @@ def _update(scene=None, *_):
 def _after_undo(*_):
     for edit in bpy.data.scenes:
         cache.invalidate(edit)
+    pictures.drop_removed()
     _show_scribbles()
 
 

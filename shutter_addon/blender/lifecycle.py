@@ -105,8 +105,8 @@ def _remove_scenes(updated) -> None:
 
 def _remove(scene) -> None:
     camera, annotation = scene.camera, scene.annotation
-    pictures.drop(scene)
     bpy.data.scenes.remove(scene)
+    pictures.drop_removed()
     if camera is not None and camera.library is None and not camera.users:
         data = camera.data
         bpy.data.objects.remove(camera)

@@ -162,7 +162,7 @@ class SHUTTER_OT_shutter_remove(_OfShutter, Operator):
 
 
 class _Move:
-    direction: EnumProperty(name="Direction", items=(("UP", "Up", ""), ("DOWN", "Down", "")))
+    direction: EnumProperty(name="Direction", items=(("UP", "Up", ""), ("DOWN", "Down", "")), options={"SKIP_SAVE"})
 
     def target(self, places: list[int], index: int) -> int:
         """The place after or before `index` in the list, among the places that it shows."""
@@ -178,7 +178,11 @@ class SHUTTER_OT_shutter_move(_Move, _OfShutter, Operator):
 
     def change(self, _context, effect):
         index = effect.active_shutter
-        editing.move_shutter(effect, index, self.target(list(range(len(effect.shutters))), index))
+        to = self.target(list(range(len(effect.shutters))), index)
+        if to == index:
+            return {"CANCELLED"}
+        editing.move_shutter(effect, index, to)
+        return None
 
 
 _preset_items = []
@@ -274,8 +278,13 @@ class SHUTTER_OT_draw(_OfShutter, Operator):
     bl_idname = "shutter.draw"
     bl_label = "Draw"
 
-    new: BoolProperty(name="New Region", description="Draw a region of its own, not one more stroke of the active one")
-    kind: EnumProperty(name="Kind", items=KINDS)
+    # Blender would use again what a button was pressed with before.
+    new: BoolProperty(
+        name="New Region",
+        description="Draw a region of its own, not one more stroke of the active one",
+        options={"SKIP_SAVE"},
+    )
+    kind: EnumProperty(name="Kind", items=KINDS, options={"SKIP_SAVE"})
 
     def change(self, context, effect):
         region = editing.active_region(effect)
@@ -346,6 +355,30 @@ class SHUTTER_OT_region_take(_OfShutter, Operator):
     def change(self, context, effect):
         layer = annotation_of(context).layers[self.layer]
         editing.take_layer(effect, editing.active_shutter(effect), layer)
+        for _window, area in strips.previews(context):
+            area.spaces.active.annotation = effect.scene.annotation
+
+
+_shutter_items = []
+
+
+def _shutters(_self, context):
+    found = strips.active(context)
+    shutters = found[1].shutters if found else []
+    _shutter_items[:] = [(str(i), shutter.name, "") for i, shutter in enumerate(shutters)]
+    return _shutter_items
+
+
+class SHUTTER_OT_region_assign(_OfRegion, Operator):
+    """Give the active region to another shutter"""
+
+    bl_idname = "shutter.region_assign"
+    bl_label = "Region's Shutter"
+
+    shutter: EnumProperty(name="Shutter", items=_shutters)
+
+    def change(self, _context, effect):
+        editing.assign_region(effect, effect.active_region, effect.shutters[int(self.shutter)])
 
 
 class SHUTTER_OT_region_remove(_OfRegion, Operator):
@@ -367,7 +400,10 @@ class SHUTTER_OT_region_move(_Move, _OfRegion, Operator):
     def change(self, _context, effect):
         index, name = effect.active_region, editing.active_shutter(effect).name
         listed = [i for i, region in enumerate(effect.regions) if region.shutter == name]
-        editing.move_region(effect, index, self.target(listed, index))
+        if (to := self.target(listed, index)) == index:
+            return {"CANCELLED"}
+        editing.move_region(effect, index, to)
+        return None
 
 
 class SHUTTER_OT_region_key(_OfRegion, Operator):
@@ -443,6 +479,7 @@ classes = (
     SHUTTER_OT_draw,
     SHUTTER_OT_erase,
     SHUTTER_OT_region_take,
+    SHUTTER_OT_region_assign,
     SHUTTER_OT_region_remove,
     SHUTTER_OT_region_move,
     SHUTTER_OT_region_key,

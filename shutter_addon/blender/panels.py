@@ -138,7 +138,10 @@ class _Regions(_WithEffect):
         if region is None:
             return
         layout.use_property_split = True
-        layout.prop_search(region, "shutter", effect, "shutters")
+        row = layout.split(factor=0.4)
+        row.alignment = "RIGHT"
+        row.label(text="Shutter")
+        row.operator_menu_enum("shutter.region_assign", "shutter", text=region.shutter)
         layout.prop(region, "kind")
         if region.kind == "LINE":
             layout.prop(region, "width")

@@ -26,8 +26,8 @@ weights_folder: Path | None = None
 
 # Renderers whose frames are kept: more effects than these in one frame decode their windows again for every frame.
 _KEPT = 4
-# Pictures whose frames are decoded in advance.
-_AHEAD = 4
+# Pictures whose frames are decoded in advance, and how many frames at most lie decoded, besides those on the device.
+_AHEAD, _DECODED = 4, 8
 
 
 @dataclass(frozen=True)
@@ -45,22 +45,27 @@ class Moment:
         for step in range(ahead + 1):
             index = min(max(self.index + step * self.direction, 0), self.renderer.source.count - 1)
             wanted |= dict.fromkeys(sorted(self.renderer.missing(index, self.direction, self.instant)))
-        self.renderer.source.want(wanted)
+        self.renderer.source.want(list(wanted)[:_DECODED])
 
 
 class Studio:
     """A compositor, opened when it is first used, and the renderers of the effects that were shown last."""
 
-    def __init__(self, open_device, executor: ThreadPoolExecutor | None = None):
-        """executor: the thread that the device belongs to; None: whichever calls."""
+    def __init__(self, open_device, threaded: bool = False):
+        """threaded: the device belongs to a thread of its own; otherwise to whichever calls."""
         self._open = open_device
-        self._executor = executor
+        self._threaded = threaded
+        self._executor: ThreadPoolExecutor | None = None
         self._compositor = None
         self._renderers: dict = {}
 
     def run(self, function, *arguments):
         """The result of a function that uses the device."""
-        return self._executor.submit(function, *arguments).result() if self._executor else function(*arguments)
+        if not self._threaded:
+            return function(*arguments)
+        if self._executor is None:
+            self._executor = ThreadPoolExecutor(1, "Virtual Shutter")
+        return self._executor.submit(function, *arguments).result()
 
     def renderer(self, scene, source_strip, say, shrink: int) -> Renderer:
         """The renderer of an effect scene; say: called with a sentence when the device is a lesser one. One of FAULTS:
@@ -80,9 +85,9 @@ class Studio:
             self.run(self._renderers.pop(next(iter(self._renderers)))[1].close)
         return renderer
 
-    def drop(self, scene) -> None:
-        """Closes what belongs to an effect scene."""
-        for place in [place for place in self._renderers if place[0] == scene.session_uid]:
+    def keep(self, scenes: set[int]) -> None:
+        """Closes what belongs to other scenes than those of these session_uids."""
+        for place in [place for place in self._renderers if place[0] not in scenes]:
             self.run(self._renderers.pop(place)[1].close)
 
     def forget(self) -> None:
@@ -93,11 +98,14 @@ class Studio:
         if self._compositor is not None:
             self.run(self._compositor.release)
             self._compositor = None
+        if self._executor is not None:
+            self._executor.shutdown()
+            self._executor = None
 
 
 # Blender's own GPU belongs to its main thread. Renders on another one, and without a window, have a context apart, and
 # a thread for it: beside Blender's own another one cannot always be current (see GLDevice).
-_apart = Studio(lambda: open_compositor(device), ThreadPoolExecutor(1, "Virtual Shutter"))
+_apart = Studio(lambda: open_compositor(device), threaded=True)
 _window = Studio(lambda: (GPUCompositor(BlenderDevice()), None))
 
 
@@ -123,7 +131,9 @@ def picture(scene, scene_frame: float, say=print, shrink: int = 1) -> np.ndarray
         values = _studio().run(found.renderer.coefficients, found.instant)
         _write_weights(values, [s.name for s in effect.shutters], frame - strip.left_handle + 1)
     found.prefetch(_AHEAD)
-    return _studio().run(found.renderer.picture, found.index, found.instant, found.direction)
+    result = _studio().run(found.renderer.picture, found.index, found.instant, found.direction)
+    found.prefetch(_AHEAD)  # and lets go of what is on the device by now
+    return result
 
 
 def moment(edit, effect, strip, frame: float, say=print, shrink: int = 1) -> Moment:
@@ -139,10 +149,11 @@ def _studio() -> Studio:
     return _window if in_window() else _apart
 
 
-def drop(scene) -> None:
-    """Closes the source of an effect scene that goes, and frees its frames."""
-    _apart.drop(scene)
-    _window.drop(scene)
+def drop_removed() -> None:
+    """Closes the sources of effect scenes that are gone, and frees their frames."""
+    scenes = {scene.session_uid for scene in bpy.data.scenes}
+    _apart.keep(scenes)
+    _window.keep(scenes)
 
 
 def forget(*_) -> None:

@@ -1,6 +1,6 @@
 """The live preview: what is drawn over the sequencer's picture, composed on Blender's GPU: views, and scribbles."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import gpu
@@ -10,7 +10,8 @@ from bpy.types import PropertyGroup
 from gpu_extras.batch import batch_for_shader
 
 from ..compute.passes import body
-from . import cache, drawing, effects, geometry, pictures, strips
+from ..core.recipe import Instant
+from . import cache, drawing, editing, effects, geometry, pictures, strips
 from .device import Texture
 
 VIEWS = (
@@ -33,6 +34,23 @@ def redraw(_settings, _context) -> None:
 
 def _redraw_once() -> None:
     redraw(None, bpy.context)
+
+
+def _follow_once() -> None:
+    """Previews that have the scribbles of another effect get those of the active one, and the pen draws there."""
+    if (found := strips.active(bpy.context)) is None:
+        return
+    for _window, area in strips.previews(bpy.context):
+        if _is_of_another(area.spaces.active.annotation, *found[:2]):
+            area.spaces.active.annotation = found[1].scene.annotation
+
+
+def _is_of_another(annotation, edit, effect) -> bool:
+    others = (other.scene.annotation for other in edit.virtual_shutter.effects if other.scene)
+    return annotation is not None and annotation != effect.scene.annotation and annotation in others
+
+
+_TIMERS = (_redraw_once, _follow_once)
 
 
 class ShutterPreview(PropertyGroup):
@@ -103,6 +121,9 @@ def _draw() -> None:
     edit = strips.edit_of(context)
     if edit is not None and edit.library is None and cache.invalidate_changed(edit):
         bpy.app.timers.register(_redraw_once)  # what is tagged while it is drawn is not drawn again
+    active = strips.active(context)
+    if active is not None and _is_of_another(context.space_data.annotation, *active[:2]):
+        bpy.app.timers.register(_follow_once)  # nothing may be changed while it is drawn
     # A stroke that is being drawn would lie below our picture: Blender's own shows the same.
     if not settings.live or any(op.bl_idname == "GPENCIL_OT_annotate" for op in context.window.modal_operators):
         return
@@ -129,10 +150,10 @@ def _show(context, found: Shown, settings, say) -> None:
     draws_result = has_result and found.edit.render.sequencer_gl_preview != "RENDERED"
     if left > 0 or draws_result:
         _warn(found, say)
-        moment.prefetch(_AHEAD)
     if left > 0:
         _show_source(quad, found, moment, left)
     if draws_result:
+        moment.prefetch(_AHEAD)
         texture = moment.renderer.draw(moment.index, moment.instant, moment.direction)
         quad.draw("show_picture", {"picture": texture}, left, 1.0, opacity=found.strip.blend_alpha)
     if settings.view == "SCRIBBLES":
@@ -156,7 +177,10 @@ def _show_strokes(context, quad, effect, moment) -> None:
     space = context.space_data
     if not (space.show_overlays and space.preview_overlay.show_annotation):
         return
-    for shape in moment.instant.shapes:
+    for region, shape in zip(effects.drawn_regions(effect), moment.instant.shapes, strict=True):
+        layer = editing.layer_of(effect, region)
+        if layer is not None and layer.annotation_hide:
+            continue
         color = (*effect.shutters[shape.shutter].color, 1.0)
         for points in shape.strokes:
             drawing.lines(quad.on_region(points), color, closed=shape.kind == "lasso", width=2)
@@ -167,8 +191,9 @@ def _show_source(quad, found: Shown, moment, right: float) -> None:
     options = moment.instant.options
     still = np.zeros((1, options.window))
     still[0, options.before] = 1
-    plain = type(moment.instant)(options, still)
-    texture = moment.renderer.draw(moment.index, plain, moment.direction)
+    plain = replace(moment, instant=Instant(options, still))
+    plain.prefetch(_AHEAD)
+    texture = moment.renderer.draw(plain.index, plain.instant, plain.direction)
     quad.draw("show_picture", {"picture": texture}, 0.0, right, opacity=found.strip.blend_alpha)
 
 
@@ -199,14 +224,13 @@ def _palette(effect) -> Texture:
 
 
 class Quad:
-    """Where a strip's picture lies in a preview's region, its crop and flips considered."""
+    """Where a strip's picture lies in a preview's region, its crop considered."""
 
     def __init__(self, region, strip, size):
         self._matrix = geometry.picture_to_region(strip, size, region)
         crop, (width, height) = strip.crop, size
         self._low = np.array([crop.min_x / width, crop.min_y / height])
         self._high = 1 - np.array([crop.max_x / width, crop.max_y / height])
-        self._flip = np.array([strip.use_flip_x, strip.use_flip_y])
 
     def on_region(self, points) -> np.ndarray:
         """Points (n, 2) of the strip's picture, in fractions, in pixels of the region."""
@@ -218,14 +242,13 @@ class Quad:
         if (low >= high).any():
             return
         corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
-        places = [tuple(np.where(self._flip, 1 - np.array(corner), corner)) for corner in corners]
         shader = _shader(name)
         shader.bind()
         for sampler, texture in textures.items():
             shader.uniform_sampler(sampler, texture.gpu)
         for constant, value in constants.items():
             (shader.uniform_float if isinstance(value, float) else shader.uniform_int)(constant, value)
-        where = {"corner": self.on_region(corners).tolist(), "place": places}
+        where = {"corner": self.on_region(corners).tolist(), "place": corners}
         gpu.state.blend_set("ALPHA_PREMULT")
         batch_for_shader(shader, "TRI_FAN", where).draw(shader)
         gpu.state.blend_set("NONE")
@@ -297,8 +320,9 @@ def unregister():
     global _handler
     bpy.types.SpaceSequenceEditor.draw_handler_remove(_handler, "PREVIEW")
     _handler = None
-    if bpy.app.timers.is_registered(_redraw_once):
-        bpy.app.timers.unregister(_redraw_once)
+    for timer in _TIMERS:
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
     _shaders.clear()
     del bpy.types.WindowManager.virtual_shutter
     for cls in reversed(classes):

@@ -53,7 +53,7 @@ KINDS = (
     ("LASSO", "Lasso", "What the strokes enclose"),
 )
 
-# The renderer asks F-curves for bars, and for place and width of regions: keys on anything else would show, not render.
+# The renderer asks the F-curves itself: keys on these would show, and not render.
 _UNKEYED = set()
 
 
@@ -143,17 +143,16 @@ class ShutterEffect(PropertyGroup):
         update=_lengthened,
         options=_UNKEYED,
     )
-    position: EnumProperty(name="Position", items=POSITIONS, update=_changed, options=_UNKEYED)
-    interpolation: EnumProperty(name="Interpolation", items=INTERPOLATIONS, update=_changed, options=_UNKEYED)
-    light: EnumProperty(name="Light", items=LIGHTS, update=_changed, options=_UNKEYED)
-    exposure: EnumProperty(name="Exposure", items=EXPOSURES, update=_changed, options=_UNKEYED)
-    edges: EnumProperty(name="Edges", items=EDGES, update=_changed, options=_UNKEYED)
-    aggregate: EnumProperty(name="Aggregate", items=AGGREGATES, update=_changed, options=_UNKEYED)
+    position: EnumProperty(name="Position", items=POSITIONS, update=_changed)
+    interpolation: EnumProperty(name="Interpolation", items=INTERPOLATIONS, update=_changed)
+    light: EnumProperty(name="Light", items=LIGHTS, update=_changed)
+    exposure: EnumProperty(name="Exposure", items=EXPOSURES, update=_changed)
+    edges: EnumProperty(name="Edges", items=EDGES, update=_changed)
+    aggregate: EnumProperty(name="Aggregate", items=AGGREGATES, update=_changed)
     border: BoolProperty(
         name="Border",
         description="The frame's edge is a scribble of the default shutter",
         update=_changed,
-        options=_UNKEYED,
     )
     shutters: CollectionProperty(type=Shutter)
     regions: CollectionProperty(type=ShutterRegion)

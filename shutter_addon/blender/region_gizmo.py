@@ -96,10 +96,10 @@ class SHUTTER_GT_region(Gizmo):
 
     def modal(self, context, event, tweak):
         mouse = event.mouse_region_x, event.mouse_region_y
-        fine = 0.1 if "PRECISE" in tweak else 1.0
+        fine = 0.1 if "PRECISE" in tweak or event.shift else 1.0
         point = np.array(self.grabbed) + fine * (np.array(mouse) - self.grabbed)
         region = editing.active_region(strips.active(context)[1])
-        (self._turn if self.turns else self._move)(region, point, "SNAP" in tweak)
+        (self._turn if self.turns else self._move)(region, point, "SNAP" in tweak or event.ctrl)
         context.area.tag_redraw()
         return {"RUNNING_MODAL"}
 

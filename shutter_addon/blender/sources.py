@@ -11,9 +11,14 @@ from ..media import MediaError, open_source
 
 def media_key(strip) -> tuple:
     """What the strip reads and how; equal keys give the same frames."""
-    paths = _paths(strip)
-    stamps = tuple(_stamp(path) for path in dict.fromkeys((paths[0], paths[-1])))
-    return strip.type, tuple(map(str, paths)), stamps, *reading(strip)
+    return strip.type, *files_key(strip), *reading(strip)
+
+
+def files_key(strip) -> tuple:
+    """The strip's files as they are now, as far as its first and last tell. MediaError: it has none."""
+    count, path = _files(strip)
+    ends = dict.fromkeys((path(0), path(count - 1)))  # an image sequence may be long
+    return count, *((str(end), _stamp(end)) for end in ends)
 
 
 def reading(strip) -> tuple:
@@ -30,7 +35,8 @@ def reading(strip) -> tuple:
 
 def open_media(strip):
     """The strip's medium, as Blender would show it. MediaError: it cannot be read."""
-    paths = _paths(strip)
+    count, path = _files(strip)
+    paths = [path(i) for i in range(count)]
     config = Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"), "config.ocio")  # finds folders only
     return open_source(
         paths[0],
@@ -59,20 +65,21 @@ def _alpha(strip) -> str | None:
     return "premultiplied" if strip.alpha_mode == "PREMUL" else "straight"
 
 
-def _paths(strip) -> list[Path]:
+def _files(strip):
+    """How many files the strip reads, and a function that gives the path of each."""
     if strip.type == "MOVIECLIP":
-        return _clip_paths(strip)
+        return _clip_files(strip)
     library = strip.id_data.library
     if strip.type == "MOVIE":
-        return [Path(bpy.path.abspath(strip.filepath, library=library))]
-    folder = Path(bpy.path.abspath(strip.directory, library=library))
-    paths = [folder / element.filename for element in strip.elements]
-    if not paths:
+        movie = Path(bpy.path.abspath(strip.filepath, library=library))
+        return 1, lambda _i: movie
+    folder, elements = Path(bpy.path.abspath(strip.directory, library=library)), strip.elements
+    if not elements:
         raise MediaError(f'strip "{strip.name}" has no files')
-    return paths
+    return len(elements), lambda i: folder / elements[i].filename
 
 
-def _clip_paths(strip) -> list[Path]:
+def _clip_files(strip):
     """A clip's movie, or its images by their numbers, without a gap."""
     clip = strip.clip
     if clip is None:
@@ -82,13 +89,12 @@ def _clip_paths(strip) -> list[Path]:
     path = Path(bpy.path.abspath(clip.filepath, library=clip.library))
     number = re.search(r"(\d+)(\D*)$", path.stem)
     if clip.source == "MOVIE" or number is None:
-        return [path]
+        return 1, lambda _i: path
     first, digits = int(number[1]) + clip.frame_offset, len(number[1])
     stem = path.stem[: number.start()]
-    return [
-        path.with_name(f"{stem}{first + i:0{digits}d}{number[2]}{path.suffix}")
-        for i in range(max(clip.frame_duration, 1))
-    ]
+    return max(clip.frame_duration, 1), lambda i: path.with_name(
+        f"{stem}{first + i:0{digits}d}{number[2]}{path.suffix}"
+    )
 
 
 def _stamp(path: Path):

@@ -187,9 +187,9 @@ def test_the_cache_is_on(bpy, edit, effect, render):
 
 
 def test_finished_frames_are_kept_while_nothing_changes(bpy, edit, effect, render, images):
-    """Frames are there even when their files are not: playing and selecting drop none."""
+    """Frames are there even when files in between are not: playing and selecting drop none."""
     before = render(edit, [3, FRAME])
-    for path in images.parent.iterdir():
+    for path in sorted(images.parent.iterdir())[1:-1]:
         path.unlink()
     for frame in range(1, 20):
         edit.frame_set(frame)

@@ -136,7 +136,7 @@ def test_shutters_come_go_and_move(bpy, effect, does):
     assert order() == ["Long", "Shutter", "Sharp"]
     assert effect_now(bpy).active_shutter == 2
     # At the end of the list there is nowhere to go.
-    assert call(bpy, "shutter_move", direction="DOWN") == {"FINISHED"}
+    assert call(bpy, "shutter_move", direction="DOWN") == {"CANCELLED"}
     assert order() == ["Long", "Shutter", "Sharp"]
     assert effect_now(bpy).active_shutter == 2
 
@@ -226,6 +226,14 @@ def test_region_take(bpy, effect, preview, does):
     assert [(region.name, region.shutter) for region in effect.regions] == [("Notes", "Sharp")]
     with pytest.raises(RuntimeError, match="no annotation layer"):
         call(bpy, "region_take")
+
+
+def test_region_assign(bpy, effect, editing, does):
+    editing.add_region(effect, effect.shutters[1])
+    effect = does("region_assign", shutter="0")
+    region = editing.active_region(effect)
+    assert (region.shutter, effect.active_shutter) == ("Long", 0)
+    assert editing.layer_of(effect, region).color == effect.shutters[0].color
 
 
 def test_regions_are_keyed_move_and_go(bpy, effect, editing, does):
@@ -340,7 +348,7 @@ NO_REGION = "The shutter has no region: draw one"
 NO_LAYER = "The preview shows no annotation layer that is not a region yet"
 LINKED = "The edit is linked from another file"
 ANY_EFFECT = ("shutter_add", "recipe_import", "recipe_export")  # need nothing in it
-REGION_NEEDED = dict.fromkeys(("erase", "region_remove", "region_move", "region_key"), NO_REGION)
+REGION_NEEDED = dict.fromkeys(("erase", "region_assign", "region_remove", "region_move", "region_key"), NO_REGION)
 
 
 def nothing(bpy, edit, effect, tmp_path):

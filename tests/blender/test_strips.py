@@ -276,6 +276,26 @@ def test_an_effect_moved_with_its_source_takes_its_keys_along(edit, render, effe
         assert np.array_equal(after[frame + 40], before[frame])
 
 
+@pytest.mark.parametrize("flips", [(True, False), (False, True), (True, True)])
+def test_scribbles_lie_where_they_are_seen_on_a_mirrored_strip(bpy, edit, render, effect_on, images, flips):
+    """Drawn at the upper left of the image: there it is the last frame, whichever part of the source that is."""
+    source = new_images(edit, images)
+    source.use_flip_x, source.use_flip_y = flips
+    _strip, effect = effect_on(source, recipe(4, [1, 0, 0, 0], [0, 0, 0, 1], border=True))
+    region = effect.regions.add()
+    region.shutter, region.kind = "S1", "LASSO"
+    layer = effect.scene.annotation.layers.new("corner")
+    region.layer = layer.info
+    stroke = layer.frames.new(1).strokes.new()
+    stroke.display_mode = "2DSPACE"
+    corner = [(-12, 4), (-4, 4), (-4, 12), (-12, 12)]
+    stroke.points.add(len(corner))
+    stroke.points.foreach_set("co", [value for x, y in corner for value in (x, y, 0.0)])
+    picture = render(edit, [5])[5]
+    assert picture[16 - 8, 16 - 8, 0] == 12 * 7 + 5
+    assert picture[16 + 8, 16 + 8, 0] < 12 * 6
+
+
 def test_inside_a_meta_strip(edit, render, effect_on, movie):
     meta = edit.sequence_editor.strips.new_meta("Meta", 1, 1)
     source = meta.strips.new_movie("movie", str(movie), 1, 1)

@@ -264,7 +264,13 @@ def in_agreement():
         driver.shot(name)
         left, top = driver.screen(region, region.width / 2 - 640, region.height / 2 + 360)
         driver.saw(picture=name, box=[left, top + 1, left + 1280, top + 721])
+    # Where the sequencer does not render its preview, the draw handler draws the result itself.
     bpy.context.window_manager.virtual_shutter.live = True
+    edit().render.sequencer_gl_preview = "SOLID"
+    yield 1.5
+    driver.shot("drawn")
+    driver.saw(picture="drawn", box=[left, top + 1, left + 1280, top + 721])
+    edit().render.sequencer_gl_preview = "RENDERED"
     with override("PREVIEW"):
         bpy.ops.screen.back_to_previous()
     yield 1.0

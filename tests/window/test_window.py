@@ -129,6 +129,17 @@ def test_preview_and_render_agree(told):
         assert_alike(pixels(folder / f"{name}.png", boxes[name]), final, folder / f"{name}_difference.png")
 
 
+def test_what_is_drawn_over_the_preview_agrees(told):
+    """All but colours next to black: Blender keeps what is drawn in 8 bits, and shows them with a gamma of 2.2."""
+    folder, seen, _console = told
+    box = next(entry["box"] for entry in seen if entry.get("picture") == "drawn")
+    drawn, final = pixels(folder / "drawn.png", box), pixels(folder / "final.png")
+    dark = final < 8
+    assert dark.mean() < 0.2
+    assert_alike(np.where(dark, 0, drawn), np.where(dark, 0, final), folder / "drawn_difference.png")
+    assert np.abs(drawn - final).max() <= 6
+
+
 def crop(folder, entry):
     left, top, width, height = entry["crop"]
     return pixels(folder / f"{entry['step']}.png", (left, top, left + width, top + height))
