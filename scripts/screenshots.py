@@ -30,6 +30,8 @@ def areas_arranged():
         edge = {"x": area.x + area.width // 2, "y": area.y + area.height}
         bpy.ops.screen.area_move(**edge, delta=TIMELINE - area.height)
     yield 0.5
+    # The strips' paths are this machine's.
+    driver.area_of("SEQUENCE_EDITOR", "SEQUENCER").spaces.active.timeline_overlay.show_strip_source = False
 
 
 def on_picture(points):

@@ -119,6 +119,15 @@ def drag(region, points, hold=()):
     yield
 
 
+def until(condition, what, seconds=10):
+    """Waits for a condition; generator: yield from it."""
+    for _ in range(int(seconds / STEP)):
+        if condition():
+            return
+        yield STEP
+    raise AssertionError(f"it did not come about that {what}")
+
+
 def key(*names):
     xdotool("key", *names)
 

@@ -123,12 +123,13 @@ def effect_added():
     yield 0.7
     driver.shot("menu")
     driver.key("Return")
-    yield 1.5
+    yield from driver.until(lambda: len(edit().virtual_shutter.effects), "the menu adds the effect")
     assert [shutter.name for shutter in effect().shutters] == ["Long", "Sharp"]
+    sidebar = driver.region_of(driver.area_of("SEQUENCE_EDITOR", "PREVIEW"), "UI")
+    yield from driver.until(lambda: sidebar.active_panel_category == "Shutter", "the Shutter tab opens")
     with override("PREVIEW"):
         bpy.ops.sequencer.view_all_preview()
     yield 0.5
-    assert driver.region_of(driver.area_of("SEQUENCE_EDITOR", "PREVIEW"), "UI").active_panel_category == "Shutter"
 
 
 def scribbled():
@@ -284,11 +285,7 @@ def in_agreement():
     # As with F12: a job on another thread, after the preview has filled the sequencer's cache.
     with override("PREVIEW"):
         bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
-    for _ in range(60):
-        yield 0.5
-        if done:
-            break
-    assert done, "the render did not end"
+    yield from driver.until(lambda: done, "the render ends", 30)
     driver.saw(picture="final")
 
 
