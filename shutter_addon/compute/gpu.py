@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from ..core import compositor, light, shutters
-from ..core.recipe import Instant, Options
+from ..core.instant import Instant, Options
 from .diffusion import Diffusion
 from .errors import NoDeviceError
 from .passes import Image, Pass

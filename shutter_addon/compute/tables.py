@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core import shutters
-from ..core.recipe import Instant
+from ..core.instant import Instant
 
 
 def padded(values: np.ndarray) -> np.ndarray:

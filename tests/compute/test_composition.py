@@ -8,7 +8,7 @@ from shutter_addon.compute.errors import NoDeviceError
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.core import compositor, light
-from shutter_addon.core.recipe import Instant, Options
+from shutter_addon.core.instant import Instant, Options
 from shutter_addon.core.scribbles import Shape, rasterise
 
 LEVEL = 1 / 255

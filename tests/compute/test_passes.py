@@ -6,7 +6,7 @@ import pytest
 
 from shutter_addon.compute import diffusion, gpu
 from shutter_addon.compute.passes import SHADERS, Pass, body
-from shutter_addon.core.recipe import Options
+from shutter_addon.core.instant import Options
 
 PASSES = [value for value in vars(diffusion).values() if isinstance(value, Pass)]
 PASSES += [gpu._composition(Options(8, interpolation=kind), 3, "srgb", True) for kind in ("displacement", "value")]
