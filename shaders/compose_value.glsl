@@ -3,13 +3,11 @@
 
 void main()
 {
-  pixel = ivec2(gl_GlobalInvocationID.xy);
-  if (pixel.x >= size.x || pixel.y >= size.y) {
+  if (!start_block()) {
     return;
   }
-  load_coefficients();
-  for (int row = 1; row <= rows; row++) {
-    expose(first + row - 1, mixed(0, 1, row));
+  for (int frame = first; frame < last; frame++) {
+    expose(frame, mixed(0, 1 + frame - first));
   }
   finish();
 }
