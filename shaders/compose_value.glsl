@@ -1,13 +1,20 @@
 // A pixel's own shutter by value interpolation: q = Σ cᵢ sᵢ/eᵢ, a row of the table per frame that any of them exposes.
 #include "compose.glsl"
 
+int frame;
+
+void add_frame(int quad)
+{
+  expose(quad, frame, mixed(quad, 0, 1 + frame - first));
+}
+
 void main()
 {
   if (!start_block()) {
     return;
   }
-  for (int frame = first; frame < last; frame++) {
-    expose(frame, mixed(0, 1 + frame - first));
+  for (frame = first; frame < last; frame++) {
+    EACH(add_frame);
   }
-  finish();
+  EACH(finish_quad);
 }

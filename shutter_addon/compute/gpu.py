@@ -19,7 +19,7 @@ BAND_BYTES = 1 << 30
 RESIDENT_BYTES = 6 << 30
 
 # Pixels above one another that one invocation composes.
-BLOCK = 4
+BLOCK = 16
 
 _STORED = {np.uint8: "rgba8", np.uint16: "rgba16", np.float16: "rgba16f", np.float32: "rgba32f"}
 
