@@ -67,7 +67,9 @@ def _way(options: Options, rows: int, frames: int) -> str:
     """The quickest pass for so many rows of the table and frames that any shutter exposes."""
     if options.interpolation == "value":
         return "value"
-    return "pieces" if rows < frames else "frames"
+    # Measured for 1, 2 and 4 shutters over 16 and 64 frames, in times of the plain average: piece by piece about
+    # 1.5 + 1.4 · rows / frames, frame by frame 2.1 to 2.8.
+    return "pieces" if 3 * rows < 2 * frames else "frames"
 
 
 class Window:
