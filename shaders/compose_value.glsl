@@ -1,15 +1,20 @@
 // A pixel's own shutter by value interpolation: q = Σ cᵢ sᵢ/eᵢ, a row of the table per frame that any of them exposes.
 #include "compose.glsl"
 
+int frame;
+
+void add_frame(int quad)
+{
+  expose(quad, frame, mixed(quad, 0, 1 + frame - first));
+}
+
 void main()
 {
-  pixel = ivec2(gl_GlobalInvocationID.xy);
-  if (pixel.x >= size.x || pixel.y >= size.y) {
+  if (!start_block()) {
     return;
   }
-  load_coefficients();
-  for (int row = 1; row <= rows; row++) {
-    expose(first + row - 1, mixed(0, 1, row));
+  for (frame = first; frame < last; frame++) {
+    EACH(add_frame);
   }
-  finish();
+  EACH(finish_quad);
 }

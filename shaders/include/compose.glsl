@@ -1,40 +1,77 @@
-// What both compositions share: the pixel's coefficients, the sum over its frames, the finished picture.
+// What both compositions share: the coefficients of a block's pixels, the sums over their frames, the finished picture.
+// An invocation composes four QUADS of four pixels above one another, so that what it looks up in the table serves all of
+// them. A quad is a matrix: a column each, of coefficients or of light. EACH calls a function for every quad: a compiler
+// that did not unroll a loop over them would keep their arrays in memory.
 // frames: source frame i in layer i mod `capacity`; coefficients: four shutters per layer; table: row 0 the gains, then
 // the knots or the bars, four shutters per texel. The window's frame k is source frame `origin` + k · `direction`.
 // GROUPS of four shutters, EDGES, DECODE, PREMULTIPLIED, ENCODED: see compute/gpu.py. Software renderers run both sides
 // of every branch: what is costly stands in loops or behind these definitions.
 #include "light.glsl"
 
-vec4 c[GROUPS];
-ivec2 pixel;
-vec4 total = vec4(0.0);
-float share = 0.0;  // of the exposure that fell on frames that are there
-float centre = 0.0;  // of the exposure in time, frames left out included
+#define QUADS 4
+#define EACH(does) \
+  does(0); \
+  does(1); \
+  does(2); \
+  does(3)
 
-void load_coefficients()
+ivec2 corner;
+mat4 c[QUADS * GROUPS];
+mat4 total[QUADS];
+vec4 share[QUADS];  // of the exposure that fell on frames that are there
+vec4 centre[QUADS];  // of the exposure in time, frames left out included
+
+// A pixel of a quad; beyond the picture's edge the last one inside.
+ivec2 place(int quad, int pixel)
 {
-  float sum = 0.0;
+  return min(corner + ivec2(0, 4 * quad + pixel), size - 1);
+}
+
+vec4 coefficients_at(ivec2 pixel, int group)
+{
+  return max(texelFetch(coefficients, ivec3((pixel + ivec2(0, top)) / aggregate, group), 0), 0.0);
+}
+
+void start_quad(int quad)
+{
+  vec4 sum = vec4(0.0);
   for (int g = 0; g < GROUPS; g++) {
-    c[g] = max(texelFetch(coefficients, ivec3((pixel + ivec2(0, top)) / aggregate, g), 0), 0.0);
-    sum += dot(c[g], vec4(1.0));
+    mat4 loaded = mat4(coefficients_at(place(quad, 0), g),
+                       coefficients_at(place(quad, 1), g),
+                       coefficients_at(place(quad, 2), g),
+                       coefficients_at(place(quad, 3), g));
+    sum += vec4(1.0) * loaded;
+    c[quad * GROUPS + g] = loaded;
   }
   for (int g = 0; g < GROUPS; g++) {
-    c[g] /= sum;
+    mat4 loaded = c[quad * GROUPS + g];
+    c[quad * GROUPS + g] = mat4(loaded[0] / sum.x, loaded[1] / sum.y, loaded[2] / sum.z, loaded[3] / sum.w);
   }
+  total[quad] = mat4(0.0);
+  share[quad] = vec4(0.0);
+  centre[quad] = vec4(0.0);
+}
+
+// False where the block lies outside the picture.
+bool start_block()
+{
+  corner = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, 4 * QUADS);
+  EACH(start_quad);
+  return corner.x < size.x && corner.y < size.y;
 }
 
 // Σ cᵢ tableᵢ, for the table's row and the first of its columns.
-float mixed(int column, int stride, int row)
+vec4 mixed(int quad, int column, int row)
 {
-  float sum = 0.0;
+  vec4 sum = vec4(0.0);
   for (int g = 0; g < GROUPS; g++) {
-    sum += dot(c[g], texelFetch(table, ivec3(column + g * stride, row, 0), 0));
+    sum += texelFetch(table, ivec3(column + g, row, 0), 0) * c[quad * GROUPS + g];
   }
   return sum;
 }
 
 // The frame's light as it is summed, premultiplied.
-vec4 frame_light(int slot)
+vec4 frame_light(ivec2 pixel, int slot)
 {
   vec4 color = texelFetch(frames, ivec3(pixel, slot), 0);
 #if DECODE != 0
@@ -67,28 +104,45 @@ int layer_of(int frame)
   return layer < capacity ? layer : layer - capacity;
 }
 
-void expose(int frame, float weight)
+void expose(int quad, int frame, vec4 weight)
 {
 #if EDGES == 2  // shorten
-  centre += weight * (float(frame) + 0.5);
+  centre[quad] += weight * (float(frame) + 0.5);
   int index = origin + direction * frame;
-  weight = index >= 0 && index < count ? weight : 0.0;
+  weight = index >= 0 && index < count ? weight : vec4(0.0);
 #endif
-  total += weight * frame_light(layer_of(frame));
-  share += weight;
+  share[quad] += weight;
+  int layer = layer_of(frame);
+  total[quad] += mat4(weight.x * frame_light(place(quad, 0), layer),
+                      weight.y * frame_light(place(quad, 1), layer),
+                      weight.z * frame_light(place(quad, 2), layer),
+                      weight.w * frame_light(place(quad, 3), layer));
 }
 
-void finish()
+void store(ivec2 pixel, vec4 color, float exposed, float time, float gain)
 {
-  vec4 color = total / max(share, 1e-6);
+  if (pixel.y >= size.y) {
+    return;
+  }
+  color /= max(exposed, 1e-6);
 #if EDGES == 2
   // Where nothing of the shutter is left, the nearest frame that there is.
-  color = share > 1e-6 ? color : frame_light(layer_of(int(centre)));
+  color = exposed > 1e-6 ? color : frame_light(pixel, layer_of(int(time)));
 #endif
 #if ENCODED
   color.rgb = to_linear_exact(straight(color)) * color.a;
 #endif
-  color.rgb *= mixed(0, 1, 0);
+  color.rgb *= gain;
   // Bottom row first: Blender's order, and GL's.
   imageStore(picture, ivec3(pixel.x, height - 1 - top - pixel.y, 0), color);
+}
+
+void finish_quad(int quad)
+{
+  vec4 gain = mixed(quad, 0, 0);
+  ivec2 pixel = corner + ivec2(0, 4 * quad);
+  store(pixel, total[quad][0], share[quad].x, centre[quad].x, gain.x);
+  store(pixel + ivec2(0, 1), total[quad][1], share[quad].y, centre[quad].y, gain.y);
+  store(pixel + ivec2(0, 2), total[quad][2], share[quad].z, centre[quad].z, gain.z);
+  store(pixel + ivec2(0, 3), total[quad][3], share[quad].w, centre[quad].w, gain.w);
 }

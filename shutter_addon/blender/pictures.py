@@ -12,7 +12,7 @@ import OpenImageIO
 from ..compute.errors import NoDeviceError
 from ..compute.gpu import GPUCompositor
 from ..compute.renderer import Renderer, open_compositor
-from ..core.recipe import Instant
+from ..core.instant import Instant
 from ..media import MediaError
 from ..media.ahead import Ahead
 from ..media.exr import write_exr

@@ -7,7 +7,7 @@ from contextlib import nullcontext
 import numpy as np
 
 from ..core import compositor, light, shutters
-from ..core.recipe import Instant
+from ..core.instant import Instant
 from .diffusion import diffuse
 
 # Pixels that are composed together: what they need at a time stays within the processor's cache.

@@ -121,5 +121,9 @@ class GLDevice:
         shader.run(*(-(-n // local) for n, local in zip((*extent, 1)[:3], LOCAL_SIZE, strict=True)))
         self._context.memory_barrier()
 
+    def finish(self) -> None:
+        """Waits until all that was run is done."""
+        self._context.finish()
+
     def release(self) -> None:
         self._context.release()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core import compositor, scribbles, shutters
-from ..core.recipe import Instant
+from ..core.instant import Instant
 from .cpu import CPUCompositor
 from .errors import NoDeviceError
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core import shutters
-from ..core.recipe import Instant
+from ..core.instant import Instant
 
 
 def padded(values: np.ndarray) -> np.ndarray:
@@ -19,8 +19,8 @@ def padded(values: np.ndarray) -> np.ndarray:
 def table(instant: Instant) -> np.ndarray:
     """The table (1 + rows, columns, 4) float32 that shaders/include/compose.glsl describes.
 
-    Row 0: the gains. Displacement: a row per piece of the quantiles, start and end of each group of four shutters
-    side by side, dz in the last column. Value: a row per frame of the shutters' open span, its normalised bars.
+    Row 0: the gains. Displacement: a row per piece of the quantiles: starts, ends, then dz and the time by which the
+    shutters differ at most at either. Value: a row per frame of the shutters' open span, its normalised bars.
     """
     rows = _pieces(instant.bars) if instant.options.interpolation == "displacement" else _bars(instant.bars)
     result = np.zeros((1 + len(rows), rows.shape[1], 4), dtype=np.float32)
@@ -33,10 +33,10 @@ def table(instant: Instant) -> np.ndarray:
 def _pieces(bars) -> np.ndarray:
     knots = shutters.knots(bars)
     start, end = padded(knots.start), padded(knots.end)
-    rows = np.zeros((len(start), 2 * start.shape[1] + 1, 4))
-    rows[:, 0:-1:2], rows[:, 1:-1:2] = start, end
-    rows[:, -1, 0] = np.diff(knots.z)
-    return rows
+    last = np.zeros((len(start), 1, 4))
+    last[:, 0, 0] = np.diff(knots.z)
+    last[:, 0, 1] = np.maximum(np.ptp(knots.start, axis=1), np.ptp(knots.end, axis=1))
+    return np.concatenate([start, end, last], axis=1)
 
 
 def _bars(bars) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from . import light, shutters
-from .recipe import Instant, Options
+from .instant import Instant, Options
 
 
 def window_indices(options: Options, index: int, count: int, direction: int = 1) -> np.ndarray:

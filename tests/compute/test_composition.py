@@ -7,8 +7,8 @@ from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.errors import NoDeviceError
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
-from shutter_addon.core import compositor, light
-from shutter_addon.core.recipe import Instant, Options
+from shutter_addon.core import compositor, light, presets
+from shutter_addon.core.instant import Instant, Options
 from shutter_addon.core.scribbles import Shape, rasterise
 
 LEVEL = 1 / 255
@@ -95,6 +95,17 @@ def check(device, source, moment, index, direction=1):
 def test_random_bars(device, interpolation, light_, exposure):
     rng = np.random.default_rng(1)
     check(device, footage(rng), instant(rng, interpolation=interpolation, light=light_, exposure=exposure), 2)
+
+
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize("index", [0, 7, 19])
+@pytest.mark.parametrize("light_", ["linear", "encoded"])
+def test_bars_of_few_pieces(device, edges, index, light_):
+    """Boxes, deltas and cuts, which are composed piece by piece."""
+    rng = np.random.default_rng(22)
+    moment = instant(rng, edges=edges, light=light_, exposure="weighted", position="center")
+    moment.bars[:] = np.stack([presets.bars(name, 16) for name in ("ANGLE_360", "STILL", "CUTS")])
+    check(device, footage(rng), moment, index)
 
 
 @pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])

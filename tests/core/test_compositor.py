@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.core import compositor, light, shutters
-from shutter_addon.core.recipe import Instant, Options
+from shutter_addon.core.instant import Instant, Options
 
 
 def instant(bars, **options):

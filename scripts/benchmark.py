@@ -1,0 +1,356 @@
+"""How long every pass takes beside the paper's method and a plain average, measured in one run, interleaved.
+
+    python scripts/benchmark.py --json FILE [--sizes 1920x1080,3840x2160] [--shutters 2,3,4] … [--table]
+
+Needs Python 3.11, NumPy and moderngl alone. Passes:
+compose: a picture from a window on the device; accumulate: the next frame into the window (average: its upload alone);
+diffuse: coefficients from new labels; readback: the picture to the host; frame: accumulate, compose and readback.
+Methods: ours; paper: its Appendix A with search bounds (scripts/benchmark/appendix_a.glsl); average: the plain mean of
+the window's frames in the same light. Times are medians in milliseconds.
+Frames are random noise. Errors are the largest over random pixels of the picture (--pixels) in 8-bit levels against
+the float64 reference; those of diffusion over all coefficients, times 255, against twelve cycles instead of its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import statistics
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from shutter_addon.compute import diffusion
+from shutter_addon.compute.gl import GLDevice
+from shutter_addon.compute.gpu import GPUCompositor
+from shutter_addon.compute.passes import Image, Pass
+from shutter_addon.core import compositor, light, presets, scribbles, shutters
+from shutter_addon.core.instant import Instant, Options
+
+HERE = Path(__file__).resolve().with_suffix("")
+METHODS = ("ours", "paper", "average")
+PASSES = ("compose", "accumulate", "diffuse", "readback", "frame")
+BARS = {
+    # Bars that are constant over spans, and bars that change from frame to frame.
+    "preset": ("ANGLE_360", "STILL", "TWO_CUTS", "ANGLE_180", "LAST", "CUTS", "ANGLE_90", "ANGLE_45"),
+    "smooth": ("RAMP_UP", "GAUSSIAN", "TRAIL", "TRIANGLE", "RAMP_DOWN", "STILL", "ANGLE_360", "ANGLE_180"),
+}
+
+
+class Noise:
+    """A clip of random frames, every one another cut of the same noise; as a source of shutter_addon.media."""
+
+    transfer, alpha, dtype, count = "srgb", "opaque", np.uint8, 100_000
+
+    def __init__(self, width: int, height: int):
+        self.width, self.height = width, height
+        self._size = width * height
+        rng = np.random.default_rng(0)
+        pixels = rng.integers(0, 256, (self._size + 1_000_003, 4), dtype=np.uint8)
+        pixels[:, 3] = 255
+        self._pixels = pixels
+
+    def read(self, index: int) -> np.ndarray:
+        start = index * 7919 % 1_000_003
+        return self._pixels[start : start + self._size].reshape(self.height, self.width, 4)
+
+
+def bars(kind: str, count: int, window: int) -> np.ndarray:
+    if kind == "random":
+        return np.random.default_rng(window).random((count, window))
+    return np.stack([presets.bars(name, window) for name in BARS[kind][:count]])
+
+
+def shapes(count: int) -> tuple:
+    """The paper's two lines and two lassos, and more lines where there are more shutters."""
+    drawn = [
+        ("line", [[0.1, 0.1], [0.2, 0.8]]),
+        ("line", [[0.4, 0.9], [0.6, 0.7]]),
+        ("lasso", [[0.4, 0.2], [0.6, 0.2], [0.6, 0.4], [0.4, 0.4]]),
+        ("lasso", [[0.75, 0.5], [0.9, 0.5], [0.8, 0.7]]),
+        *(("line", [[0.1 * k, 0.02], [0.1 * k, 0.08]]) for k in range(1, 10)),
+    ]
+    shutter = itertools.cycle(range(count))
+    return tuple(
+        scribbles.Shape(next(shutter), kind, 0.02, (np.array(points),)) for kind, points in drawn[: max(count, 4)]
+    )
+
+
+@dataclass
+class Case:
+    """One configuration on the device. `index`: the source frame that is composed; what slides the window moves it."""
+
+    device: GLDevice
+    source: Noise
+    instant: Instant
+    kind: str
+    index: int = 0
+    shared: bool = True
+
+    def __post_init__(self):
+        count, block = len(self.instant.bars), self.instant.options.aggregate
+        self.compositor = GPUCompositor(self.device)
+        self.window = self.compositor.window(self.source, self.instant.options.window)
+        self.window.load(self._wanted)
+        self.labels = scribbles.rasterise(
+            self.instant.shapes, -(-self.source.width // block), -(-self.source.height // block)
+        )
+        self.solver = self.compositor.solver()
+        self.handle = self.solver.solve(self.labels, count)
+        self.coefficients = self.compositor.coefficients(self.handle, count)
+        accumulations = np.stack([shutters.accumulation(b) for b in self.instant.bars])
+        self.sums = self.device.texture(accumulations.shape[1], count, 1, "r32f")
+        self.device.write(self.sums, np.ascontiguousarray(accumulations[..., None], dtype=np.float32))
+        self.spare = self.device.texture(self.source.width, self.source.height, 1, "rgba8")
+
+    @property
+    def _wanted(self) -> range:
+        return range(self.index, self.index + self.instant.options.window)
+
+    def compose(self, method: str) -> None:
+        if method == "ours":
+            block = self.instant.options.aggregate
+            self.compositor.draw(self.window, self.index, 1, self.instant, self.handle, block)
+            return
+        block = self.instant.options.aggregate if method == "paper" else 1
+        program = _appendix_a(self.instant, self.shared) if method == "paper" else _average(self.instant)
+        for top, height, frames in self.window.bands():
+            extent = (-(-self.source.width // block), -(-height // block))
+            textures = {"frames": frames, "coefficients": self.handle, "sums": self.sums}
+            self.device.run(
+                program,
+                extent,
+                textures=textures,
+                images={"picture": self.window.picture},
+                size=(self.source.width, height),
+                top=top,
+                height=self.source.height,
+                first_layer=self.index % self.window.capacity,
+            )
+
+    def accumulate(self, method: str) -> None:
+        if method == "average":
+            self.device.write(self.spare, self.source.read(self.index))
+            return
+        self.index += 1
+        self.window.load(self._wanted)
+
+    def diffuse(self, method: str) -> None:
+        self.solver.solve(self.labels, len(self.instant.bars))
+
+    def readback(self, method: str) -> np.ndarray:
+        return self.device.read(self.window.picture)
+
+    def frame(self, method: str) -> None:
+        self.accumulate("ours")
+        self.compose(method)
+        self.readback(method)
+
+    def error(self, name: str, method: str, pixels: int) -> float | None:
+        """The largest error of what a pass just made."""
+        if name == "diffuse":
+            return self._diffusion_error()
+        if name == "readback" or (name, method) == ("accumulate", "average"):
+            return None
+        if name == "accumulate":
+            self.compose(method)
+        rng = np.random.default_rng(self.index)
+        y, x = rng.integers(0, self.source.height, pixels), rng.integers(0, self.source.width, pixels)
+        picture = self.compositor.read(self.window.picture)[y, x, :3].astype(np.float64)
+        expected = self._reference(y, x, method)
+        return float(np.abs(light.to_encoded(picture) - light.to_encoded(expected)).max() * 255)
+
+    def _reference(self, y, x, method: str) -> np.ndarray:
+        """float64 colours (P, 3) of pixels; a few at a time, for their weights are large in between."""
+        options, block = self.instant.options, self.instant.options.aggregate
+        codes = np.stack([self.source.read(k)[y, x] for k in self._wanted]) / 255.0
+        frames = light.premultiplied(codes, light.to_linear)[:, None]
+        if method == "average":
+            codes = codes if options.light == "encoded" else frames[:, 0]
+            mean = codes[..., :3].mean(axis=0)
+            return light.to_linear(mean) if options.light == "encoded" else mean
+        c = self.coefficients[:, y // block, x // block][:, None].astype(np.float64)
+        present, step = np.ones(len(frames), dtype=bool), max(1, (1 << 21) // self.instant.bars.size // len(frames))
+        parts = (slice(start, start + step) for start in range(0, len(y), step))
+        return np.concatenate(
+            [compositor.compose(self.instant, frames[:, :, p], present, c[..., p])[0, :, :3] for p in parts]
+        )
+
+    def _diffusion_error(self) -> float:
+        usual, count = diffusion.CYCLES, len(self.instant.bars)
+        solved = self.compositor.coefficients(self.solver.solve(self.labels, count), count)
+        try:
+            diffusion.CYCLES = 12
+            exact = self.compositor.coefficients(self.solver.solve(self.labels, count), count)
+        finally:
+            diffusion.CYCLES = usual
+        self.solver.solve(self.labels, count)
+        return float(np.abs(solved - exact).max() * 255)
+
+    def release(self) -> None:
+        self.window.release()
+        self.solver.release()
+        self.sums.release()
+        self.spare.release()
+        for texture in self.compositor._textures.values():
+            texture.release()
+
+
+def _program(name: str, samplers, instant: Instant, **defines) -> Pass:
+    return Pass(
+        str(HERE / name),
+        dict.fromkeys(samplers, "sampler2DArray"),
+        {"picture": Image("rgba32f")},
+        {"size": "ivec2", "top": "int", "height": "int", "first_layer": "int"},
+        {"LAST": instant.options.window, "DECODE": int(instant.options.light == "linear"), **defines},
+    )
+
+
+def _appendix_a(instant: Instant, shared: bool) -> Pass:
+    defines = {"SHUTTERS": len(instant.bars), "AGGREGATE": instant.options.aggregate, "SHARED": int(shared)}
+    return _program("appendix_a", ("frames", "coefficients", "sums"), instant, **defines)
+
+
+def _average(instant: Instant) -> Pass:
+    return _program("average", ("frames",), instant)
+
+
+def jobs(case: Case, passes, methods):
+    """(pass, method) of what is measured in a case."""
+    for name, method in itertools.product(passes, methods):
+        has = {"ours": PASSES, "paper": ("compose",), "average": ("compose", "accumulate", "frame")}
+        if name in has[method] and (method != "average" or case.instant.options.aggregate == 1):
+            yield name, method
+
+
+def measure(case: Case, args) -> list[dict]:
+    """The rows of a case. What took `patience` seconds is not repeated."""
+    todo, errors, times = list(jobs(case, args.passes, args.methods)), {}, {}
+    for name, method in todo:
+        first = timed(case, name, method)
+        times[name, method] = [first] if first > args.patience else []  # else it has compiled and warmed up
+        errors[name, method] = case.error(name, method, args.pixels)
+    for _ in range(args.repeats):
+        for name, method in todo:
+            if sum(times[name, method]) < args.patience:
+                times[name, method].append(timed(case, name, method))
+    options = case.instant.options
+    common = {
+        "bars": case.kind,
+        "width": case.source.width,
+        "height": case.source.height,
+        "shutters": len(case.instant.bars),
+        "window": options.window,
+        "aggregate": options.aggregate,
+        "device": case.device.name,
+    }
+    return [
+        {"pass": name, "method": method, **common, "ms": statistics.median(times[name, method]) * 1000, "error": error}
+        for (name, method), error in errors.items()
+    ]
+
+
+def timed(case: Case, name: str, method: str) -> float:
+    case.device.finish()
+    start = time.perf_counter()
+    getattr(case, name)(method)
+    case.device.finish()
+    return time.perf_counter() - start
+
+
+def run(args) -> list[dict]:
+    device, rows = GLDevice(), []
+    with device.current():
+        for width, height in args.sizes:
+            source = Noise(width, height)
+            for window, count, kind, block in itertools.product(
+                args.windows, args.shutters, args.bars, args.aggregates
+            ):
+                options = Options(window, light=args.light, aggregate=block)
+                instant = Instant(options, bars(kind, count, window), shapes(count))
+                case = Case(device, source, instant, kind, shared=args.sums == "shared")
+                made = measure(case, args)
+                case.release()
+                for row in made:
+                    print(_line(row), flush=True)
+                rows += made
+    return rows
+
+
+def _line(row: dict) -> str:
+    error = "" if row["error"] is None else f"  error {row['error']:.3f}"
+    place = f"{row['width']}×{row['height']} N={row['shutters']} L={row['window']} {row['bars']} {row['aggregate']}×"
+    return f"{place:34s} {row['pass']:10s} {row['method']:8s} {row['ms']:10.2f} ms{error}"
+
+
+def table(rows: list[dict]) -> str:
+    """The paper's Table 1: a column group per method and aggregation, N down and T (the window) across."""
+    lines = []
+    for width, height, kind in dict.fromkeys((r["width"], r["height"], r["bars"]) for r in rows):
+        mine = [r for r in rows if (r["width"], r["height"], r["bars"]) == (width, height, kind)]
+        columns = dict.fromkeys((r["method"], r["aggregate"]) for r in mine if r["pass"] == "compose")
+        windows = sorted({r["window"] for r in mine})
+        lines += [f"\n{width}×{height}, {kind} bars, {mine[0]['device']}; milliseconds"]
+        for name in ("diffuse", "accumulate", "readback"):
+            times = [r["ms"] for r in mine if r["pass"] == name and r["method"] == "ours" and r["aggregate"] == 1]
+            lines += [f"{name}: {statistics.median(times):.2f}"] if times else []
+        heads = [f"{method} {a}×{a}" if a > 1 else method for method, a in columns]
+        lines.append("| N\\T |" + "|".join(f" {head} T={w} " for head in heads for w in windows) + "|")
+        lines.append("|---" * (1 + len(heads) * len(windows)) + "|")
+        found = {(r["method"], r["aggregate"], r["shutters"], r["window"]): r for r in mine if r["pass"] == "compose"}
+        for count in sorted({r["shutters"] for r in mine}):
+            cells = [f"{found[(*c, count, w)]['ms']:.2f}" for c in columns for w in windows]
+            lines.append(f"| {count} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def parse(arguments=None):
+    def listed(of, allowed=None):
+        def split(text):
+            values = [of(part) for part in text.split(",")]
+            if allowed and not set(values) <= set(allowed):
+                raise argparse.ArgumentTypeError(f"of {', '.join(map(str, allowed))}")
+            return values
+
+        return split
+
+    def size(text):
+        width, height = text.split("x")
+        return int(width), int(height)
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    add = parser.add_argument
+    add("--json", type=Path, help="where the rows are written")
+    add("--sizes", type=listed(size), default="1920x1080,3840x2160")
+    add("--shutters", type=listed(int, range(1, 9)), default="2,3,4,8")
+    add("--windows", type=listed(int, range(1, 257)), default="8,16,32,64,128")
+    add("--bars", type=listed(str, (*BARS, "random")), default="preset,random")
+    add("--methods", type=listed(str, METHODS), default=",".join(METHODS))
+    add("--passes", type=listed(str, PASSES), default=",".join(PASSES))
+    add("--aggregates", type=listed(int, (1, 2, 4)), default="1,2")
+    add("--light", choices=("linear", "encoded"), default="linear")
+    add("--sums", choices=("shared", "texture"), default="shared", help="where Appendix A has its S")
+    add("--repeats", type=int, default=5)
+    add("--patience", type=float, default=20.0, help="seconds after which a pass is not repeated")
+    add("--pixels", type=int, default=2048, help="how many are compared with the reference")
+    add("--table", action="store_true", help="print the paper's Table 1 of what was measured")
+    return parser.parse_args(arguments)
+
+
+def main(arguments=None) -> None:
+    args = parse(arguments)
+    rows = run(args)
+    if args.json:
+        args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    if args.table:
+        print(table(rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,104 @@
+// A pixel's own shutter by displacement interpolation, exact (paper §3.4.1): its quantile is Σ cᵢ Sᵢ⁻¹, linear
+// between the knots of the table. A frame's weight is Q at its end less Q at its start.
+// For many pieces: every frame is fetched once. Pieces that end before in every pixel of the block are summed for all of
+// them; only those that a pixel may be inside of are looked at pixel by pixel, about one to a frame.
+#include "compose.glsl"
+
+int frame;
+float boundary;  // the frame's end
+vec4 before[QUADS];  // Q at the frame's start
+vec4 after[QUADS];
+vec4 middle[GROUPS];  // of the block's coefficients
+float reach = 0.0;  // how far they lie from it at most: half the sum of what they differ by
+
+void add_to_middle(int quad)
+{
+  for (int g = 0; g < GROUPS; g++) {
+    middle[g] += c[quad * GROUPS + g] * vec4(0.25 / float(QUADS));
+  }
+}
+
+void widen_reach(int quad)
+{
+  vec4 apart = vec4(0.0);
+  for (int g = 0; g < GROUPS; g++) {
+    mat4 own = c[quad * GROUPS + g];
+    apart += vec4(dot(abs(own[0] - middle[g]), vec4(0.5)),
+                  dot(abs(own[1] - middle[g]), vec4(0.5)),
+                  dot(abs(own[2] - middle[g]), vec4(0.5)),
+                  dot(abs(own[3] - middle[g]), vec4(0.5)));
+  }
+  reach = max(reach, max(max(apart.x, apart.y), max(apart.z, apart.w)));
+}
+
+void find_middle()
+{
+  for (int g = 0; g < GROUPS; g++) {
+    middle[g] = vec4(0.0);
+  }
+  EACH(add_to_middle);
+  EACH(widen_reach);
+}
+
+// The middle's quantile in the table's row, at the piece's start (column 0) or end (column GROUPS).
+float middle_time(int column, int row)
+{
+  float time = 0.0;
+  for (int g = 0; g < GROUPS; g++) {
+    time += dot(middle[g], texelFetch(table, ivec3(column + g, row, 0), 0));
+  }
+  return time;
+}
+
+// dz, and the time by which the shutters differ at most: no pixel is further from the middle than `reach` times that.
+vec2 extent_of(int row)
+{
+  return texelFetch(table, ivec3(2 * GROUPS, row, 0), 0).rg;
+}
+
+void add_piece(int quad, int row, float dz)
+{
+  vec4 start = mixed(quad, 0, row);
+  vec4 end = mixed(quad, GROUPS, row);
+  after[quad] += dz * clamp((boundary - start) / max(end - start, 1e-7), 0.0, 1.0);
+}
+
+void add_frame(int quad)
+{
+  expose(quad, frame, after[quad] - before[quad]);
+  before[quad] = after[quad];
+}
+
+void main()
+{
+  if (!start_block()) {
+    return;
+  }
+  find_middle();
+#define CLEAR(quad) before[quad] = vec4(0.0)
+  EACH(CLEAR);
+  float passed = 0.0;
+  int row = 1;
+  for (frame = first; frame < last; frame++) {
+    boundary = float(frame + 1);
+    for (; row <= rows; row++) {
+      vec2 extent = extent_of(row);
+      if (middle_time(GROUPS, row) + reach * extent.y > boundary) {
+        break;
+      }
+      passed += extent.x;
+    }
+#define PASS(quad) after[quad] = vec4(passed)
+    EACH(PASS);
+    for (int inside = row; inside <= rows; inside++) {
+      vec2 extent = extent_of(inside);
+      if (middle_time(0, inside) - reach * extent.y >= boundary) {
+        break;
+      }
+#define ADD(quad) add_piece(quad, inside, extent.x)
+      EACH(ADD);
+    }
+    EACH(add_frame);
+  }
+  EACH(finish_quad);
+}

@@ -1,0 +1,44 @@
+// A pixel's own shutter by displacement interpolation, exact (paper §3.4.1): its quantile is Σ cᵢ Sᵢ⁻¹, linear
+// between the knots of the table; each piece spreads its share evenly over the frames that it passes.
+// For few pieces: a frame is fetched again for every piece that touches it.
+#include "compose.glsl"
+
+int frame;
+vec4 start[QUADS];  // of the piece's time in every pixel
+vec4 end[QUADS];
+vec4 density[QUADS];
+float from, until;  // the block's times
+
+void start_piece(int quad, int row)
+{
+  start[quad] = mixed(quad, 0, row);
+  end[quad] = mixed(quad, GROUPS, row);
+  density[quad] = texelFetch(table, ivec3(2 * GROUPS, row, 0), 0).r / max(end[quad] - start[quad], 1e-7);
+  vec2 low = min(start[quad].xy, start[quad].zw);
+  vec2 high = max(end[quad].xy, end[quad].zw);
+  from = min(from, min(low.x, low.y));
+  until = max(until, max(high.x, high.y));
+}
+
+void add_frame(int quad)
+{
+  vec4 open = min(end[quad], float(frame + 1)) - max(start[quad], float(frame));
+  expose(quad, frame, max(open, 0.0) * density[quad]);
+}
+
+void main()
+{
+  if (!start_block()) {
+    return;
+  }
+  for (int row = 1; row <= rows; row++) {
+    from = 1e9;
+    until = 0.0;
+#define START(quad) start_piece(quad, row)
+    EACH(START);
+    for (frame = int(from); float(frame) < until; frame++) {
+      EACH(add_frame);
+    }
+  }
+  EACH(finish_quad);
+}

@@ -1,0 +1,66 @@
+"""The effect as it stands at one frame: what a picture is composed with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from . import scribbles
+
+Interpolation = Literal["displacement", "value"]
+Light = Literal["linear", "encoded"]
+Exposure = Literal["normalized", "weighted"]
+Edges = Literal["hold", "mirror", "shorten"]
+Position = Literal["start", "center", "end"]
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a window of L frames becomes a picture; the recipe's fields of the same names."""
+
+    window: int
+    position: Position = "start"
+    interpolation: Interpolation = "displacement"
+    light: Light = "linear"
+    exposure: Exposure = "normalized"
+    edges: Edges = "hold"
+    aggregate: Literal[1, 2, 4] = 1
+    border: bool = False
+
+    @property
+    def before(self) -> int:
+        """How many frames of the window lie before the frame itself."""
+        return {"start": 0, "center": (self.window - 1) // 2, "end": self.window - 1}[self.position]
+
+
+@dataclass(frozen=True)
+class Instant:
+    """The effect at one frame: bars (N, L) float64, the first shutter is the default; moved shapes in order.
+
+    reference: the exposure that counts as full brightness where exposure is "weighted"; the default shutter's.
+    """
+
+    options: Options
+    bars: np.ndarray
+    shapes: tuple[scribbles.Shape, ...] = ()
+    reference: float | None = None
+
+    @property
+    def gains(self) -> np.ndarray:
+        """Brightness (N,) of each shutter: all 1, or its exposure over the reference ("weighted")."""
+        exposures = self.bars.sum(axis=1)
+        if self.options.exposure == "normalized":
+            return np.ones_like(exposures)
+        return exposures / (self.reference or exposures[0])
+
+    @property
+    def key(self) -> tuple:
+        """Equal for instants that give the same picture; hashable."""
+        shapes = ((s.shutter, s.kind, s.width, *(stroke.tobytes() for stroke in s.strokes)) for s in self.shapes)
+        return self.options, self.bars.shape, self.bars.tobytes(), self.reference, tuple(shapes)
+
+    def alone(self, chosen: int) -> Instant:
+        """The same where one shutter alone holds for the whole picture."""
+        return Instant(self.options, self.bars[chosen, None], (), self.reference or float(self.bars[0].sum()))

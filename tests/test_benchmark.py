@@ -1,0 +1,54 @@
+"""The benchmark runs, its rows are what DESIGN says, and every method that is timed composes what it should."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+KEYS = {"pass", "method", "bars", "width", "height", "shutters", "window", "aggregate", "device", "ms", "error"}
+# Appendix A's z is within 2⁻¹⁰ of Q: a jump of the quantile may move that much of the light.
+ALLOWED = {"ours": 0.5, "average": 0.5, "paper": 8.0}
+
+# Numbers and pictures alone: everything else must not be needed.
+ALONE = """
+import sys
+for name in ("bpy", "cattrs", "av", "OpenImageIO", "scipy", "tqdm"):
+    sys.modules[name] = None
+import runpy
+sys.argv = sys.argv[1:]
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    file = tmp_path_factory.mktemp("benchmark") / "rows.json"
+    options = "--sizes 45x27 --shutters 2,5 --windows 8 --bars preset,smooth,random --repeats 2 --pixels 300 --table"
+    command = [sys.executable, "-c", ALONE, "scripts/benchmark.py", "--json", str(file), *options.split()]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    return json.loads(file.read_text()), done.stdout
+
+
+def test_rows(ran):
+    rows, _ = ran
+    assert all(set(row) == KEYS and row["ms"] > 0 for row in rows)
+    assert {row["pass"] for row in rows} == {"compose", "accumulate", "diffuse", "readback", "frame"}
+    composed = [row for row in rows if row["pass"] == "compose"]
+    # For each of the cases: ours and the paper's at either aggregation, and the average.
+    assert len(composed) == 2 * 3 * 5
+
+
+def test_errors(ran):
+    rows, _ = ran
+    for row in rows:
+        if row["pass"] in ("compose", "frame", "diffuse"):
+            assert row["error"] <= ALLOWED[row["method"]], row
+
+
+def test_table(ran):
+    _, printed = ran
+    assert "45×27, random bars" in printed
+    assert "| N\\T | ours T=8 | paper T=8 | average T=8 | ours 2×2 T=8 | paper 2×2 T=8 |" in printed
