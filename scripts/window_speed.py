@@ -110,15 +110,21 @@ def timeline():
 
 
 def playing(edit, seconds):
-    """Frames per second; generator, whose last value is the number."""
-    count = []
-    handler = lambda *_: count.append(time.perf_counter())  # noqa: E731
+    """Frames per second that the preview shows; generator, whose last value is the number."""
+    count, shown = [], []
+
+    def drawn():
+        # Blender may go to another frame without drawing it, and draw one twice.
+        if shown != [edit.frame_current]:
+            shown[:] = [edit.frame_current]
+            count.append(time.perf_counter())
+
     with bpy.context.temp_override(**timeline()):
         bpy.ops.screen.animation_play()
     yield 1.0
-    bpy.app.handlers.frame_change_post.append(handler)
+    handler = bpy.types.SpaceSequenceEditor.draw_handler_add(drawn, (), "PREVIEW", "POST_PIXEL")
     yield seconds
-    bpy.app.handlers.frame_change_post.remove(handler)
+    bpy.types.SpaceSequenceEditor.draw_handler_remove(handler, "PREVIEW")
     with bpy.context.temp_override(**timeline()):
         bpy.ops.screen.animation_cancel(restore_frame=False)
     yield (len(count) - 1) / (count[-1] - count[0])
