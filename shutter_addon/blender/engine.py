@@ -18,9 +18,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
 
     def render(self, depsgraph):
         try:
-            picture = pictures.picture(
-                depsgraph.scene, depsgraph.scene.frame_current, self._say, self._shrink(depsgraph)
-            )
+            picture = pictures.picture(depsgraph.scene, depsgraph.scene.frame_current, self._say)
         except pictures.FAULTS as error:
             fail(self, str(error))
             return
@@ -33,12 +31,6 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         # Blender's rows go up; composed pictures lie so in memory, and this copies nothing.
         result.layers[0].passes["Combined"].rect.foreach_set(np.ascontiguousarray(picture[::-1]).ravel())
         self.end_result(result)
-
-    def _shrink(self, depsgraph) -> int:
-        """Previews are asked for at the sequencer's preview size; a render is composed whole, whatever its size."""
-        if not pictures.in_window() or bpy.app.is_job_running("RENDER"):
-            return 1
-        return pictures.shrink(depsgraph.scene.render.resolution_x, self.resolution_x)
 
     def _say(self, message: str) -> None:
         if bpy.app.background:

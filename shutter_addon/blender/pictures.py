@@ -67,19 +67,19 @@ class Studio:
             self._executor = ThreadPoolExecutor(1, "Virtual Shutter")
         return self._executor.submit(function, *arguments).result()
 
-    def renderer(self, scene, source_strip, say, shrink: int) -> Renderer:
+    def renderer(self, scene, source_strip, say) -> Renderer:
         """The renderer of an effect scene; say: called with a sentence when the device is a lesser one. One of FAULTS:
-        no device, no source. shrink: pictures are that many times smaller."""
+        no device, no source."""
         if self._compositor is None:
             self._compositor, message = self.run(self._open)
             if message:
                 say(message)
-        place, key = (scene.session_uid, shrink), sources.media_key(source_strip)
+        place, key = scene.session_uid, sources.media_key(source_strip)
         old_key, renderer = self._renderers.pop(place, (None, None))
         if old_key != key:
             if renderer is not None:
                 self.run(renderer.close)
-            renderer = Renderer(self._compositor, Ahead(sources.open_media(source_strip), shrink))
+            renderer = Renderer(self._compositor, Ahead(sources.open_media(source_strip)))
         self._renderers[place] = key, renderer
         while len(self._renderers) > _KEPT:
             self.run(self._renderers.pop(next(iter(self._renderers)))[1].close)
@@ -87,7 +87,7 @@ class Studio:
 
     def keep(self, scenes: set[int]) -> None:
         """Closes what belongs to other scenes than those of these session_uids."""
-        for place in [place for place in self._renderers if place[0] not in scenes]:
+        for place in [place for place in self._renderers if place not in scenes]:
             self.run(self._renderers.pop(place)[1].close)
 
     def forget(self) -> None:
@@ -109,24 +109,18 @@ _apart = Studio(lambda: open_compositor(device), threaded=True)
 _window = Studio(lambda: (GPUCompositor(BlenderDevice()), None))
 
 
-def shrink(full: int, shown: int) -> int:
-    """How many times smaller pictures may be that are shown so wide instead of their full width: 1, 2 or 4."""
-    return next(factor for factor in (4, 2, 1) if factor == 1 or full >= factor * shown)
-
-
 def in_window() -> bool:
     """Whether Blender's own GPU may be used: on the main thread of a Blender with a window."""
     return not bpy.app.background and threading.current_thread() is threading.main_thread()
 
 
-def picture(scene, scene_frame: float, say=print, shrink: int = 1) -> np.ndarray:
+def picture(scene, scene_frame: float, say=print) -> np.ndarray:
     """The picture (H, W, 4) float32 of an effect scene at one of its frames: scene-linear, premultiplied, top row
     first. One of FAULTS: there is none, in one sentence. say: called with a sentence when the device is a lesser one.
-    shrink: the picture is that many times smaller.
     """
     edit, effect, strip = strips.find_edit(scene)
     frame = strips.timeline_frame(strip, scene_frame)
-    found = moment(edit, effect, strip, frame, say, shrink)
+    found = moment(edit, effect, strip, frame, say)
     if weights_folder is not None:
         values = _studio().run(found.renderer.coefficients, found.instant)
         _write_weights(values, [s.name for s in effect.shutters], frame - strip.left_handle + 1)
@@ -136,10 +130,10 @@ def picture(scene, scene_frame: float, say=print, shrink: int = 1) -> np.ndarray
     return result
 
 
-def moment(edit, effect, strip, frame: float, say=print, shrink: int = 1) -> Moment:
+def moment(edit, effect, strip, frame: float, say=print) -> Moment:
     """What an effect strip shows at a timeline frame. One of FAULTS: it cannot be shown."""
     source = strips.source_of(edit, effect, strip)
-    renderer = _studio().renderer(effect.scene, source, say, shrink)
+    renderer = _studio().renderer(effect.scene, source, say)
     index = timing.source_frame(source, frame, renderer.source, edit.render.fps / edit.render.fps_base)
     instant = effects.instant(edit, effect, strip, frame)
     return Moment(renderer, index, instant, -1 if source.use_reverse_frames else 1)

@@ -22,8 +22,6 @@ VIEWS = (
 )
 # Pictures whose frames are decoded in advance.
 _AHEAD = 4
-# What a share of the sequencer's preview size leaves of the picture's width.
-_PROXY_SHRINK = {"PROXY_50": 2, "PROXY_25": 4}
 
 
 def redraw(_settings, _context) -> None:
@@ -140,8 +138,7 @@ def _draw() -> None:
 
 
 def _show(context, found: Shown, settings, say) -> None:
-    shrink = _PROXY_SHRINK.get(context.space_data.proxy_render_size, 1)
-    moment = pictures.moment(found.edit, found.effect, found.strip, found.edit.frame_current, shrink=shrink)
+    moment = pictures.moment(found.edit, found.effect, found.strip, found.edit.frame_current)
     quad = Quad(context.region, found.strip, effects.picture_size(found.effect))
     has_result = settings.view in ("RESULT", "SPLIT")
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0

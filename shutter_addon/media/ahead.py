@@ -1,12 +1,10 @@
-"""Frames of a source before they are asked for, decoded by a thread of their own; smaller ones for previews."""
+"""Frames of a source before they are asked for, decoded by a thread of their own."""
 
 import threading
 
 import numpy as np
 
 from .errors import MediaError
-
-_SUMS = {np.uint8: np.uint16, np.uint16: np.uint32}
 
 
 class Ahead:
@@ -15,10 +13,8 @@ class Ahead:
     What is wanted is kept until other frames are wanted: the last `want` bounds the memory. Its frames are read-only.
     """
 
-    def __init__(self, source, shrink: int = 1):
-        """shrink: 1 … 16; above 1 a frame's pixels are the means of so many × so many of the source's pixels."""
-        self._source, self._shrink = source, shrink
-        self.width, self.height = -(-source.width // shrink), -(-source.height // shrink)
+    def __init__(self, source):
+        self._source = source
         self._wanted: list[int] = []  # in the order of decoding
         self._asked: list[int] = []  # by reads that wait
         self._done: dict[int, np.ndarray | Exception] = {}
@@ -98,8 +94,6 @@ class Ahead:
     def _frame(self, index: int) -> np.ndarray | Exception:
         try:
             frame = self._source.read(index)
-            if self._shrink > 1:
-                frame = shrunk(frame, self._shrink, self._source.alpha == "straight")
             frame.flags.writeable = False
             return frame
         except Exception as error:  # whoever reads the frame learns of it
@@ -110,35 +104,3 @@ class Ahead:
 
     def __exit__(self, *_):
         self.close()
-
-
-def shrunk(frame: np.ndarray, factor: int, straight: bool) -> np.ndarray:
-    """Means of each factor × factor pixels (H, W, 4), of fewer at the right and lower edges, in the frame's type.
-
-    straight: colours count by their alpha, which they are not multiplied with."""
-    if not straight:
-        return _means(frame, factor)
-    values = frame.astype(np.float32)
-    values[..., :3] *= values[..., 3:]
-    values = _means(values, factor)
-    values[..., :3] /= np.where(values[..., 3:] > 0, values[..., 3:], 1)
-    return (np.rint(values) if frame.dtype.kind == "u" else values).astype(frame.dtype)
-
-
-def _means(values: np.ndarray, factor: int) -> np.ndarray:
-    height, width = values.shape[:2]
-    sums = _SUMS.get(values.dtype.type, np.float32)
-    # Whole rows first, then pixels of the sums: five times faster than by blocks.
-    total = _strided_sum(_strided_sum(values, factor, sums).swapaxes(0, 1), factor, sums).swapaxes(0, 1)
-    rows, columns = (np.minimum(factor, n - np.arange(0, n, factor)) for n in (height, width))
-    means = total * (1 / np.outer(rows, columns)[..., None]).astype(np.float32)
-    return (np.rint(means) if values.dtype.kind == "u" else means).astype(values.dtype)
-
-
-def _strided_sum(values: np.ndarray, factor: int, sums) -> np.ndarray:
-    """Sums, of that type, of each `factor` entries along the first axis, of fewer at its end."""
-    total = values[::factor].astype(sums)  # in memory as `values`, even where its axes are swapped
-    for start in range(1, factor):
-        part = values[start::factor]
-        total[: len(part)] += part
-    return total

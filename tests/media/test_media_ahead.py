@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from shutter_addon.media import Ahead, MediaError, open_source
-from shutter_addon.media.ahead import shrunk
 
 
 class Footage:
@@ -147,53 +146,3 @@ def test_it_is_a_source_of_the_same_kind(bunny):
         ahead.want(range(30, 34))
         for index in (33, 30, 3):
             assert np.array_equal(ahead.read(index), plain.read(index))
-
-
-def means(frame, factor, weights):
-    """In float64, block by block."""
-    height, width = frame.shape[:2]
-    return np.array(
-        [
-            [
-                np.average(
-                    frame[y : y + factor, x : x + factor].reshape(-1, 4).astype(np.float64),
-                    axis=0,
-                    weights=weights[y : y + factor, x : x + factor].ravel(),
-                )
-                for x in range(0, width, factor)
-            ]
-            for y in range(0, height, factor)
-        ]
-    )
-
-
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16, np.float32])
-@pytest.mark.parametrize(("size", "factor"), [((8, 6), 2), ((17, 11), 3), ((40, 33), 16), ((3, 2), 4)])
-def test_smaller_frames_are_means(dtype, size, factor):
-    rng = np.random.default_rng(3)
-    most = np.iinfo(dtype).max if np.dtype(dtype).kind == "u" else 1
-    frame = (rng.random((size[1], size[0], 4)) * most).astype(dtype)
-    tolerance = 0.5001 if np.dtype(dtype).kind == "u" else 1e-3
-    got = shrunk(frame, factor, straight=False)
-    assert got.dtype == dtype
-    assert got.flags.c_contiguous
-    np.testing.assert_allclose(got, means(frame, factor, np.ones(frame.shape[:2])), atol=tolerance, rtol=0)
-    got = shrunk(frame, factor, straight=True)
-    expected = means(frame, factor, frame[..., 3].astype(np.float64))[..., :3]
-    np.testing.assert_allclose(got[..., :3], expected, atol=0.51 if most > 1 else 2e-3, rtol=0)
-    np.testing.assert_allclose(
-        got[..., 3], means(frame, factor, np.ones(frame.shape[:2]))[..., 3], atol=tolerance, rtol=0
-    )
-
-
-def test_extremes_stay():
-    for dtype in (np.uint8, np.uint16):
-        frame = np.full((16, 16, 4), np.iinfo(dtype).max, dtype)
-        for straight in (True, False):
-            assert np.array_equal(shrunk(frame, 16, straight), frame[:1, :1])
-
-
-def test_a_smaller_source(source):
-    with Ahead(source, shrink=4) as small:
-        assert (small.width, small.height) == (2, 2)
-        assert np.array_equal(small.read(3), shrunk(source.frames[3], 4, False))
