@@ -140,7 +140,7 @@ class SHUTTER_GT_bars(Gizmo):
         if cancel:
             editing.set_bars(effect.shutters[self.index], self.before)
             return
-        if context.scene.tool_settings.use_keyframe_insert_auto:
+        if editing.auto_key(context):
             editing.key_bars(effect, self.index)
         bpy.ops.ed.undo_push(message="Paint Bars")
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..core import presets, shutters
 from . import animation, copies, effects
+from .effects import layer_of
 
 # Told apart on footage and by colour-blind eyes (Okabe and Ito).
 COLORS = (
@@ -158,6 +159,11 @@ def set_bars(shutter, values) -> None:
             bar.weight = value
 
 
+def auto_key(context) -> bool:
+    """Whether Blender's auto keying is on."""
+    return context.scene.tool_settings.use_keyframe_insert_auto
+
+
 def paint(effect, index: int, values, key: bool = False) -> None:
     """Gives a shutter bars (L,) as an editor does at the current frame; key: and keys them there."""
     set_bars(effect.shutters[index], values)
@@ -287,11 +293,6 @@ def move_region(effect, index: int, to: int) -> None:
     """Moves a region in the list; later ones lie over earlier ones."""
     _move(effect, "regions", index, to)
     effect.active_region = to
-
-
-def layer_of(effect, region):
-    """The annotation layer of a region, or None."""
-    return effect.scene.annotation.layers.get(region.layer) if effect.scene.annotation else None
 
 
 def assign_region(effect, index: int, shutter) -> None:

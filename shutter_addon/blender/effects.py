@@ -116,7 +116,7 @@ def strokes_at(edit, effect, strip, index: int, frame: float, curves=None) -> li
     """A region's strokes (n, 2) on the picture at a frame, not moved yet; between two drawings with the ease of its
     location's keys."""
     region, (width, height) = effect.regions[index], picture_size(effect)
-    layer = effect.scene.annotation.layers.get(region.layer) if effect.scene.annotation else None
+    layer = layer_of(effect, region)
     if layer is None or not layer.frames:
         return []
     drawings = sorted(layer.frames, key=lambda drawing: drawing.frame_number)
@@ -198,6 +198,11 @@ def _add_region(edit, effect, strip, path: str, source: recipe.Region, first: fl
         animation.set_keys(edit, f"{path}.{name}", index, keys)
 
 
+def layer_of(effect, region):
+    """The annotation layer of a region, or None."""
+    return effect.scene.annotation.layers.get(region.layer) if effect.scene.annotation else None
+
+
 def annotation(effect):
     """What the effect's scribbles are drawn on; made where somebody has removed it."""
     if effect.scene.annotation is None:
@@ -209,8 +214,7 @@ def _draw(effect, strip, source: recipe.Region, color, first: float) -> str:
     """Draws a region's strokes on an annotation layer of its own, a frame per drawing; the layer's name."""
     layer = annotation(effect).layers.new(source.name or "Region", set_active=False)
     layer.color = color
-    size = effect.scene.render.resolution_x, effect.scene.render.resolution_y
-    to_image = geometry.picture_to_image(strip, size)
+    to_image = geometry.picture_to_image(strip, picture_size(effect))
     for key, strokes in source.drawings():
         drawing = layer.frames.new(int((key.frame if key else 1) + first))
         for points in strokes:

@@ -134,10 +134,8 @@ def _place(curves, path: str, source, frame: float) -> np.ndarray:
 
 def _drawings(effect, source, strip) -> dict[int, list]:
     """A region's strokes by the timeline frames they were drawn at, from the first that has any."""
-    annotation = effect.scene.annotation
-    layer = annotation.layers.get(source.layer) if annotation else None
-    size = effect.scene.render.resolution_x, effect.scene.render.resolution_y
-    to_picture = np.linalg.inv(geometry.picture_to_image(strip, size))
+    layer = effects.layer_of(effect, source)
+    to_picture = np.linalg.inv(geometry.picture_to_image(strip, effects.picture_size(effect)))
     drawings = sorted(layer.frames, key=lambda drawing: drawing.frame_number) if layer else []
     result = {}
     for drawing in drawings:

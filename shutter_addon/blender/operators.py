@@ -207,12 +207,7 @@ class SHUTTER_OT_preset(_OfShutter, Operator):
 
     def change(self, context, effect):
         values = presets.bars(self.preset, effect.window)
-        editing.paint(effect, effect.active_shutter, values, auto_key(context))
-
-
-def auto_key(context) -> bool:
-    """Whether Blender's auto keying is on."""
-    return context.scene.tool_settings.use_keyframe_insert_auto
+        editing.paint(effect, effect.active_shutter, values, editing.auto_key(context))
 
 
 class SHUTTER_OT_bars_key(_OfShutter, Operator):
@@ -268,7 +263,7 @@ class SHUTTER_OT_bar_set(_OfShutter, Operator):
             self.report({"ERROR"}, f"The shutter has {len(values)} bars")
             return {"CANCELLED"}
         values[self.bar - 1] = self.weight
-        editing.paint(effect, effect.active_shutter, values, auto_key(context))
+        editing.paint(effect, effect.active_shutter, values, editing.auto_key(context))
         return None
 
 

@@ -39,10 +39,10 @@ class Moment:
     instant: Instant
     direction: int
 
-    def prefetch(self, ahead: int) -> None:
-        """Has the frames decoded that the picture lacks, then those of the next `ahead` pictures."""
+    def prefetch(self) -> None:
+        """Has the frames decoded that the picture lacks, then those of the next pictures."""
         wanted = {}
-        for step in range(ahead + 1):
+        for step in range(_AHEAD + 1):
             index = min(max(self.index + step * self.direction, 0), self.renderer.source.count - 1)
             wanted |= dict.fromkeys(sorted(self.renderer.missing(index, self.direction, self.instant)))
         self.renderer.source.want(list(wanted)[:_DECODED])
@@ -124,9 +124,9 @@ def picture(scene, scene_frame: float, say=print) -> np.ndarray:
     if weights_folder is not None:
         values = _studio().run(found.renderer.coefficients, found.instant)
         _write_weights(values, [s.name for s in effect.shutters], frame - strip.left_handle + 1)
-    found.prefetch(_AHEAD)
+    found.prefetch()
     result = _studio().run(found.renderer.picture, found.index, found.instant, found.direction)
-    found.prefetch(_AHEAD)  # and lets go of what is on the device by now
+    found.prefetch()  # and lets go of what is on the device by now
     return result
 
 

@@ -20,8 +20,6 @@ VIEWS = (
     ("SCRIBBLES", "Scribbles", "The source, and where each shutter is scribbled"),
     ("COEFFICIENTS", "Coefficients", "How much of each shutter a pixel gets, in the shutters' colors"),
 )
-# Pictures whose frames are decoded in advance.
-_AHEAD = 4
 
 
 def redraw(_settings, _context) -> None:
@@ -150,7 +148,7 @@ def _show(context, found: Shown, settings, say) -> None:
     if left > 0:
         _show_source(quad, found, moment, left)
     if draws_result:
-        moment.prefetch(_AHEAD)
+        moment.prefetch()
         texture = moment.renderer.draw(moment.index, moment.instant, moment.direction)
         quad.draw("show_picture", {"picture": texture}, left, 1.0, opacity=found.strip.blend_alpha)
     if settings.view == "SCRIBBLES":
@@ -189,7 +187,7 @@ def _show_source(quad, found: Shown, moment, right: float) -> None:
     still = np.zeros((1, options.window))
     still[0, options.before] = 1
     plain = replace(moment, instant=Instant(options, still))
-    plain.prefetch(_AHEAD)
+    plain.prefetch()
     texture = moment.renderer.draw(plain.index, plain.instant, plain.direction)
     quad.draw("show_picture", {"picture": texture}, 0.0, right, opacity=found.strip.blend_alpha)
 

@@ -124,7 +124,7 @@ class SHUTTER_GT_region(Gizmo):
         if cancel:
             region.location, region.rotation, region.scale = self.before
             return
-        if context.scene.tool_settings.use_keyframe_insert_auto:
+        if editing.auto_key(context):
             editing.key_region(found[1], found[1].active_region)
         bpy.ops.ed.undo_push(message="Transform Region")
 
