@@ -69,6 +69,7 @@ def _signature(edit, effect, strip):
             )
     transform = strip.transform
     yield tuple(getattr(transform, name) for name in _PLACE), tuple(transform.origin)
+    yield strip.use_flip_x, strip.use_flip_y  # scribbles lie mirrored with it
     if (source := strips.nearest_source(edit, effect, strip)) is not None:
         yield from _source(source)
 
