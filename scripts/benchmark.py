@@ -29,7 +29,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from shutter_addon.compute import diffusion
 from shutter_addon.compute.gl import GLDevice
 from shutter_addon.compute.gpu import GPUCompositor
-from shutter_addon.compute.passes import Image, Pass
+from shutter_addon.compute.passes import LOCAL_ROW, Image, Pass
+from shutter_addon.compute.window import Frames
 from shutter_addon.core import compositor, light, presets, scribbles, shutters
 from shutter_addon.core.instant import Instant, Options
 
@@ -96,8 +97,11 @@ class Case:
     def __post_init__(self):
         count, block = len(self.instant.bars), self.instant.options.aggregate
         self.compositor = GPUCompositor(self.device)
-        self.window = self.compositor.window(self.source, self.instant.options.window)
-        self.window.load(self._wanted)
+        options = self.instant.options
+        self.window = self.compositor.window(self.source, options.window)
+        # What the other methods read.
+        plain = isinstance(self.window, Frames)
+        self.frames = self.window if plain else Frames(self.device, self.source, options.window)
         self.labels = scribbles.rasterise(
             self.instant.shapes, -(-self.source.width // block), -(-self.source.height // block)
         )
@@ -107,11 +111,14 @@ class Case:
         accumulations = np.stack([shutters.accumulation(b) for b in self.instant.bars])
         self.sums = self.device.texture(accumulations.shape[1], count, 1, "r32f")
         self.device.write(self.sums, np.ascontiguousarray(accumulations[..., None], dtype=np.float32))
-        self.spare = self.device.texture(self.source.width, self.source.height, 1, "rgba8")
 
     @property
-    def _wanted(self) -> range:
-        return range(self.index, self.index + self.instant.options.window)
+    def _wanted(self) -> np.ndarray:
+        return np.arange(self.index, self.index + self.instant.options.window)
+
+    def load(self, *windows) -> None:
+        for window in windows or (self.window, self.frames):
+            window.load(self._wanted, self.instant.options)
 
     def compose(self, method: str) -> None:
         if method == "ours":
@@ -120,7 +127,7 @@ class Case:
             return
         block = self.instant.options.aggregate if method == "paper" else 1
         program = _appendix_a(self.instant, self.shared) if method == "paper" else _average(self.instant)
-        for top, height, frames in self.window.bands():
+        for top, height, frames in self.frames.bands():
             extent = (-(-self.source.width // block), -(-height // block))
             textures = {"frames": frames, "coefficients": self.handle, "sums": self.sums}
             self.device.run(
@@ -131,15 +138,12 @@ class Case:
                 size=(self.source.width, height),
                 top=top,
                 height=self.source.height,
-                first_layer=self.index % self.window.capacity,
+                first_layer=self.index % self.frames.layers,
             )
 
     def accumulate(self, method: str) -> None:
-        if method == "average":
-            self.device.write(self.spare, self.source.read(self.index))
-            return
         self.index += 1
-        self.window.load(self._wanted)
+        self.load(self.window if method == "ours" else self.frames)
 
     def diffuse(self, method: str) -> None:
         self.solver.solve(self.labels, len(self.instant.bars))
@@ -148,7 +152,7 @@ class Case:
         return self.device.read(self.window.picture)
 
     def frame(self, method: str) -> None:
-        self.accumulate("ours")
+        self.accumulate(method)
         self.compose(method)
         self.readback(method)
 
@@ -156,7 +160,7 @@ class Case:
         """The largest error of what a pass just made."""
         if name == "diffuse":
             return self._diffusion_error()
-        if name == "readback" or (name, method) == ("accumulate", "average"):
+        if name == "readback":
             return None
         if name == "accumulate":
             self.compose(method)
@@ -195,9 +199,9 @@ class Case:
 
     def release(self) -> None:
         self.window.release()
+        self.frames.release()
         self.solver.release()
         self.sums.release()
-        self.spare.release()
         for texture in self.compositor._textures.values():
             texture.release()
 
@@ -209,6 +213,7 @@ def _program(name: str, samplers, instant: Instant, **defines) -> Pass:
         {"picture": Image("rgba32f")},
         {"size": "ivec2", "top": "int", "height": "int", "first_layer": "int"},
         {"LAST": instant.options.window, "DECODE": int(instant.options.light == "linear"), **defines},
+        local_size=LOCAL_ROW,
     )
 
 
@@ -257,6 +262,7 @@ def measure(case: Case, args) -> list[dict]:
 
 
 def timed(case: Case, name: str, method: str) -> float:
+    case.load()
     case.device.finish()
     start = time.perf_counter()
     getattr(case, name)(method)

@@ -45,7 +45,7 @@ float middle_time(int column, int row)
 {
   float time = 0.0;
   for (int g = 0; g < GROUPS; g++) {
-    time += dot(middle[g], texelFetch(table, ivec3(column + g, row, 0), 0));
+    time += dot(middle[g], imageLoad(table, ivec3(column + g, row, 0)));
   }
   return time;
 }
@@ -53,7 +53,7 @@ float middle_time(int column, int row)
 // dz, and the time by which the shutters differ at most: no pixel is further from the middle than `reach` times that.
 vec2 extent_of(int row)
 {
-  return texelFetch(table, ivec3(2 * GROUPS, row, 0), 0).rg;
+  return imageLoad(table, ivec3(2 * GROUPS, row, 0)).rg;
 }
 
 void add_piece(int quad, int row, float dz)

@@ -13,7 +13,7 @@ void start_piece(int quad, int row)
 {
   start[quad] = mixed(quad, 0, row);
   end[quad] = mixed(quad, GROUPS, row);
-  density[quad] = texelFetch(table, ivec3(2 * GROUPS, row, 0), 0).r / max(end[quad] - start[quad], 1e-7);
+  density[quad] = imageLoad(table, ivec3(2 * GROUPS, row, 0)).r / max(end[quad] - start[quad], 1e-7);
   vec2 low = min(start[quad].xy, start[quad].zw);
   vec2 high = max(end[quad].xy, end[quad].zw);
   from = min(from, min(low.x, low.y));

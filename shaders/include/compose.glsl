@@ -2,11 +2,15 @@
 // An invocation composes four QUADS of four pixels above one another, so that what it looks up in the table serves all of
 // them. A quad is a matrix: a column each, of coefficients or of light. EACH calls a function for every quad: a compiler
 // that did not unroll a loop over them would keep their arrays in memory.
-// frames: source frame i in layer i mod `capacity`; coefficients: four shutters per layer; table: row 0 the gains, then
-// the knots or the bars, four shutters per texel. The window's frame k is source frame `origin` + k · `direction`.
+// coefficients: four shutters per layer; table: row 0 the gains, then the knots or the bars, four shutters per texel.
+// The window's frame k is source frame `origin` + k · `direction`. frames: source frame i in layer i mod `layers`; or
+// with SUMS the running sums instead, from position `lowest` on, the clip's ends extended: position i's in that layer.
 // GROUPS of four shutters, EDGES, DECODE, PREMULTIPLIED, ENCODED: see compute/gpu.py. Software renderers run both sides
 // of every branch: what is costly stands in loops or behind these definitions.
 #include "light.glsl"
+#if SUMS
+#include "sums.glsl"
+#endif
 
 #define QUADS 4
 #define EACH(does) \
@@ -29,7 +33,7 @@ ivec2 place(int quad, int pixel)
 
 vec4 coefficients_at(ivec2 pixel, int group)
 {
-  return max(texelFetch(coefficients, ivec3((pixel + ivec2(0, top)) / aggregate, group), 0), 0.0);
+  return max(imageLoad(coefficients, ivec3((pixel + ivec2(0, top)) >> block_bits, group)), 0.0);
 }
 
 void start_quad(int quad)
@@ -65,11 +69,25 @@ vec4 mixed(int quad, int column, int row)
 {
   vec4 sum = vec4(0.0);
   for (int g = 0; g < GROUPS; g++) {
-    sum += texelFetch(table, ivec3(column + g, row, 0), 0) * c[quad * GROUPS + g];
+    sum += imageLoad(table, ivec3(column + g, row, 0)) * c[quad * GROUPS + g];
   }
   return sum;
 }
 
+#if SUMS
+vec4 frame_light(ivec2 pixel, int layer)
+{
+  int next = layer + 1 < layers ? layer + 1 : 0;
+  return vec4(unit * unpacked_light(minus(sum_at(pixel, next), sum_at(pixel, layer))), 1.0);
+}
+
+// The layer of the window's frame, or of the nearest that is there.
+int layer_of(int frame)
+{
+  int layer = clamp(origin + direction * frame - lowest, 0, held - 1) + lowest_layer;
+  return layer < layers ? layer : layer - layers;
+}
+#else
 // The frame's light as it is summed, premultiplied.
 vec4 frame_light(ivec2 pixel, int slot)
 {
@@ -99,10 +117,11 @@ int layer_of(int frame)
   index = (index + 512 * period) % period;  // of a negative number, % is undefined
   index = min(index, period - index);
 #endif
-  // Source frame i lies in layer i mod capacity; a division costs more than the fetch.
+  // Source frame i lies in layer i mod layers; a division costs more than the fetch.
   int layer = clamp(index, 0, count - 1) - lowest + lowest_layer;
-  return layer < capacity ? layer : layer - capacity;
+  return layer < layers ? layer : layer - layers;
 }
+#endif
 
 void expose(int quad, int frame, vec4 weight)
 {

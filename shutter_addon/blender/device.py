@@ -15,7 +15,7 @@ import gpu
 import numpy as np
 
 from ..compute.errors import NoDeviceError
-from ..compute.passes import LOCAL_SIZE, Image, Pass, body
+from ..compute.passes import Image, Pass, body
 
 _TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
 _AS_IT_IS, _WHOLE, _OPAQUE_BYTES, _PAIRS_OF_BYTES, _SIXTEEN_BITS = range(5)
@@ -27,6 +27,7 @@ _FORMATS = {
     "rgba32f": (np.float32, "RGBA32F", _AS_IT_IS),
     "r32f": (np.float32, "R32F", _AS_IT_IS),
     "r16ui": (np.uint16, "R32F", _WHOLE),
+    "rg32ui": (np.uint32, None, _WHOLE),  # written by passes alone: floats do not hold it
 }
 
 
@@ -81,7 +82,7 @@ class BlenderDevice:
         """As GLDevice.read; by framebuffers, for GPUTexture.read() gives a first layer alone."""
         width, height, layers = texture.size
         dtype, _, packing = _FORMATS[texture.kind]
-        components = 4 if texture.kind.startswith("rgba") else 1
+        components = 4 if texture.kind.startswith("rgba") else 2 if texture.kind.startswith("rg") else 1
         sample, kind = (np.uint32, "UINT") if packing == _WHOLE else (np.float32, "FLOAT")
         array = np.empty((layers, height, width, components), sample)
         for layer, pixels in enumerate(array):
@@ -92,7 +93,9 @@ class BlenderDevice:
             array = np.rint(array * np.float32(np.iinfo(dtype).max))
         return array.astype(dtype, copy=False)
 
-    def run(self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, **constants) -> None:
+    def run(
+        self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, blocks=None, **constants
+    ) -> None:
         shader = self._shaders.get(program)
         if shader is None:
             shader = self._shaders[program] = _compiled(program)
@@ -101,11 +104,13 @@ class BlenderDevice:
             shader.uniform_sampler(name, textures[name].gpu)
         for name in program.images:
             shader.image(name, images[name].gpu)
+        uniforms = {name: gpu.types.GPUUniformBuf(_buffer("FLOAT", blocks[name])) for name in program.blocks}
+        for name, uniform in uniforms.items():  # which must outlive the dispatch
+            shader.uniform_block(name, uniform)
         for name, kind in program.constants.items():
             set_constant = shader.uniform_float if kind == "float" else shader.uniform_int
             set_constant(name, constants[name])
-        groups = (-(-n // local) for n, local in zip((*extent, 1)[:3], LOCAL_SIZE, strict=True))
-        gpu.compute.dispatch(shader, *groups)  # which makes the next one wait for what this one stores
+        gpu.compute.dispatch(shader, *program.groups(extent))  # which makes the next one wait for what this one stores
 
     def release(self) -> None:
         self._shaders = {}
@@ -144,9 +149,12 @@ def _compiled(program: Pass) -> gpu.types.GPUShader:
         info.sampler(slot, _TYPES[kind], name)
     for slot, (name, image) in enumerate(program.images.items()):
         kind = "UINT_2D_ARRAY" if image.format.endswith("ui") else "FLOAT_2D_ARRAY"
-        info.image(slot, image.format.upper(), kind, name, qualifiers={"READ", "WRITE"} if image.reads else {"WRITE"})
+        qualifiers = {way for way, used in (("READ", image.reads), ("WRITE", image.writes)) if used}
+        info.image(slot, image.format.upper(), kind, name, qualifiers=qualifiers)
+    for slot, (name, length) in enumerate(program.blocks.items()):
+        info.uniform_buf(slot, "vec4", f"{name}[{length}]")
     for name, kind in program.constants.items():
         info.push_constant(kind.upper(), name)
-    info.local_group_size(*LOCAL_SIZE)
+    info.local_group_size(*program.local_size)
     info.compute_source(body(program.name))
     return gpu.shader.create_from_info(info)

@@ -7,7 +7,7 @@ from contextlib import nullcontext
 import numpy as np
 
 from ..core import compositor, light, shutters
-from ..core.instant import Instant
+from ..core.instant import Instant, Options
 from .diffusion import diffuse
 
 # Pixels that are composed together: what they need at a time stays within the processor's cache.
@@ -25,8 +25,8 @@ class Window:
     def held(self):
         return self.frames.keys()
 
-    def load(self, wanted) -> None:
-        wanted = set(wanted)
+    def load(self, positions: np.ndarray, options: Options) -> None:
+        wanted = set(compositor.source_frames(options, positions, self.source.count).tolist())
         for index in self.frames.keys() - wanted:
             del self.frames[index]
         for index in sorted(wanted - self.frames.keys()):

@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 
 from .errors import NoDeviceError
-from .passes import LOCAL_SIZE, Pass, source
+from .passes import Pass, source
 
 _EGL = sys.platform == "linux"
 
@@ -23,6 +23,7 @@ FORMATS = {
     "rgba32f": (4, "f4", np.float32),
     "r32f": (1, "f4", np.float32),
     "r16ui": (1, "u2", np.uint16),
+    "rg32ui": (2, "u4", np.uint32),
 }
 
 
@@ -68,6 +69,7 @@ class GLDevice:
         except Exception as error:  # moderngl raises whatever its platform raises
             raise NoDeviceError(f"no OpenGL 4.3: {error}") from None
         self._programs = {}
+        self._blocks = {}
         self.name = info["GL_RENDERER"]
         self.max_layers = info["GL_MAX_ARRAY_TEXTURE_LAYERS"]
         self.max_size = info["GL_MAX_TEXTURE_SIZE"]
@@ -106,20 +108,32 @@ class GLDevice:
         texture.read_into(array, alignment=1)
         return array
 
-    def run(self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, **constants) -> None:
-        """Runs a pass over `extent` invocations (x, y[, z]); textures and images by name, constants by keyword."""
+    def run(
+        self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, blocks=None, **constants
+    ) -> None:
+        """Runs a pass over `extent` invocations (x, y[, z]); textures, images and blocks (contiguous
+        float32 arrays (length, 4)) by name, constants by keyword."""
         if program not in self._programs:
             self._programs[program] = self._context.compute_shader(source(program))
         shader = self._programs[program]
         for unit, name in enumerate(program.samplers):
             textures[name].use(unit)
         for unit, (name, image) in enumerate(program.images.items()):
-            images[name].bind_to_image(unit, read=image.reads, write=True)
+            images[name].bind_to_image(unit, read=image.reads, write=image.writes)
+        for unit, name in enumerate(program.blocks):
+            self._block(unit, blocks[name])
         for name, value in constants.items():
             if name in shader:  # the compiler drops what a source does not use
                 shader[name] = value
-        shader.run(*(-(-n // local) for n, local in zip((*extent, 1)[:3], LOCAL_SIZE, strict=True)))
+        shader.run(*program.groups(extent))
         self._context.memory_barrier()
+
+    def _block(self, unit: int, values: np.ndarray) -> None:
+        buffer = self._blocks.get(unit)
+        if buffer is None or buffer.size < values.nbytes:
+            buffer = self._blocks[unit] = self._context.buffer(reserve=values.nbytes)
+        buffer.write(values)
+        buffer.bind_to_uniform_block(unit)
 
     def finish(self) -> None:
         """Waits until all that was run is done."""

@@ -12,30 +12,40 @@ from functools import cache
 from pathlib import Path
 
 SHADERS = Path(__file__).resolve().parents[2] / "shaders"
+# For passes that look at a pixel's neighbours, and for those that do not: rows of pixels lie one after the other.
 LOCAL_SIZE = (8, 8, 1)
+LOCAL_ROW = (64, 1, 1)
 
 
 @dataclass(frozen=True)
 class Image:
-    """An image to store in: its format (as in GLSL), and whether the pass loads from it as well."""
+    """An image: its format (as in GLSL), and whether the pass loads from it and stores in it."""
 
     format: str
     reads: bool = False
+    writes: bool = True
 
 
 @dataclass(frozen=True)
 class Pass:
     """A compute pass. samplers: name → GLSL type; images: name → Image (arrays); constants: name → GLSL type;
-    defines: name → value, for what is known before it is compiled."""
+    defines: name → value, for what is known before it is compiled; blocks: name → length of an array of vec4;
+    local_size: a workgroup."""
 
     name: str
     samplers: dict[str, str] = field(default_factory=dict)
     images: dict[str, Image] = field(default_factory=dict)
     constants: dict[str, str] = field(default_factory=dict)
     defines: dict[str, int] = field(default_factory=dict)
+    blocks: dict[str, int] = field(default_factory=dict)
+    local_size: tuple[int, int, int] = LOCAL_SIZE
 
     def __hash__(self):
         return hash((self.name, *self.defines.values()))
+
+    def groups(self, extent: tuple[int, ...]) -> tuple[int, ...]:
+        """The workgroups that cover `extent` invocations (x, y[, z])."""
+        return tuple(-(-n // local) for n, local in zip((*extent, 1)[:3], self.local_size, strict=True))
 
 
 @cache
@@ -52,14 +62,16 @@ def _included(path: Path) -> str:
 @cache
 def source(program: Pass) -> str:
     """The whole compute shader in GLSL 4.3, interface included."""
-    x, y, z = LOCAL_SIZE
+    x, y, z = program.local_size
     lines = ["#version 430", *(f"#define {name} {value}" for name, value in program.defines.items())]
     lines.append(f"layout(local_size_x = {x}, local_size_y = {y}, local_size_z = {z}) in;")
     for unit, (name, kind) in enumerate(program.samplers.items()):
         lines.append(f"layout(binding = {unit}) uniform {kind} {name};")
     for unit, (name, image) in enumerate(program.images.items()):
-        access = "" if image.reads else "writeonly "
+        access = "readonly " * (not image.writes) + "writeonly " * (not image.reads)
         kind = "uimage2DArray" if image.format.endswith("ui") else "image2DArray"
         lines.append(f"layout(binding = {unit}, {image.format}) uniform {access}{kind} {name};")
+    for unit, (name, length) in enumerate(program.blocks.items()):
+        lines.append(f"layout(std140, binding = {unit}) uniform {name}_block {{ vec4 {name}[{length}]; }};")
     lines += [f"uniform {kind} {name};" for name, kind in program.constants.items()]
     return "\n".join([*lines, "#line 1", body(program.name)])

@@ -89,13 +89,18 @@ class Renderer:
             self._labelled = key, scribbles.rasterise(instant.shapes, *key[0], border=key[1])
         return self._labelled[1]
 
-    def needed(self, index: int, direction: int, instant: Instant) -> set[int]:
-        """The source frames that some shutter exposes, on the picture or not; all of the window, where a shutter may
-        lose all of its own."""
-        indices = compositor.window_indices(instant.options, index, self.source.count, direction)
+    def positions(self, index: int, direction: int, instant: Instant) -> np.ndarray:
+        """Where the frames lie that some shutter exposes, on the picture or not (core.compositor.window_positions);
+        all of the window's that are there, where a shutter may lose all of its own."""
+        positions = compositor.window_positions(instant.options, index, direction)
+        frames = compositor.source_frames(instant.options, positions, self.source.count)
         low, high = shutters.open_span(instant.bars)
-        needed = indices[low:high] if (indices[low:high] >= 0).all() else indices[indices >= 0]
-        return set(needed.tolist())
+        return positions[low:high] if (frames[low:high] >= 0).all() else positions[frames >= 0]
+
+    def needed(self, index: int, direction: int, instant: Instant) -> set[int]:
+        """The source frames at those positions."""
+        positions = self.positions(index, direction, instant)
+        return set(compositor.source_frames(instant.options, positions, self.source.count).tolist())
 
     def missing(self, index: int, direction: int, instant: Instant) -> set[int]:
         """Those of the needed source frames that still must be read."""
@@ -115,7 +120,7 @@ class Renderer:
         """What the compositor needs, its window loaded."""
         handle, instant, block = self._coefficients(instant)
         window = self._window_for(instant.options.window)
-        window.load(self.needed(index, direction, instant))
+        window.load(self.positions(index, direction, instant), instant.options)
         return window, index, direction, instant, handle, block
 
     def _coefficients(self, instant: Instant):

@@ -8,21 +8,32 @@ from . import light, shutters
 from .instant import Instant, Options
 
 
-def window_indices(options: Options, index: int, count: int, direction: int = 1) -> np.ndarray:
-    """Source frames (L,) of the window around source frame `index` of a clip of `count` frames; −1: left out.
+def window_positions(options: Options, index: int, direction: int = 1) -> np.ndarray:
+    """Where the window's frames (L,) lie around source frame `index`, beyond the clip's ends as well.
 
     direction: 1, or −1 where the source plays in reverse, and the window's next frames are those before `index`.
-    Past the clip's ends "hold" repeats the last frame, "mirror" plays back from it without showing it twice.
-    "shorten" leaves frames out, but keeps the nearest when the window lies outside altogether.
     """
-    wanted = index + direction * (np.arange(options.window) - options.before)
-    held = np.clip(wanted, 0, count - 1)
+    return index + direction * (np.arange(options.window) - options.before)
+
+
+def source_frames(options: Options, positions: np.ndarray, count: int) -> np.ndarray:
+    """The frames of a clip of `count` frames that are seen at `positions`; −1: none.
+
+    Past the clip's ends "hold" repeats the last frame, "mirror" plays back from it without showing it twice.
+    "shorten" leaves frames out, but keeps the nearest when all lie outside.
+    """
+    held = np.clip(positions, 0, count - 1)
     if options.edges == "mirror" and count > 1:
-        folded = np.mod(wanted, 2 * (count - 1))
+        folded = np.mod(positions, 2 * (count - 1))
         return np.where(folded < count, folded, 2 * (count - 1) - folded)
-    if options.edges == "shorten" and (wanted == held).any():
-        return np.where(wanted == held, held, -1)
+    if options.edges == "shorten" and (positions == held).any():
+        return np.where(positions == held, held, -1)
     return held
+
+
+def window_indices(options: Options, index: int, count: int, direction: int = 1) -> np.ndarray:
+    """Source frames (L,) of the window around source frame `index`; −1: left out. Arguments as above."""
+    return source_frames(options, window_positions(options, index, direction), count)
 
 
 def compose(instant: Instant, frames, present, coefficients) -> np.ndarray:

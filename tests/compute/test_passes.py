@@ -4,12 +4,16 @@ import re
 
 import pytest
 
-from shutter_addon.compute import diffusion, gpu
+from shutter_addon.compute import diffusion, gpu, window
 from shutter_addon.compute.passes import SHADERS, Pass, body
-from shutter_addon.core.instant import Options
 
 PASSES = [value for value in vars(diffusion).values() if isinstance(value, Pass)]
-PASSES += [gpu._composition(Options(8), way, 3, "srgb", True) for way in ("pieces", "frames", "value")]
+PASSES += [gpu.composition(way, 3, False, 1, 2, True, False) for way in ("pieces", "frames", "value")]
+PASSES += [gpu.composition(way, 3, True, 1, 2, True, False) for way in ("frames", "value")]
+PASSES += [
+    gpu.composition_of_sums(4, 2, True, False),
+    *(window.accumulation(1, again, False) for again in (True, False)),
+]
 # Of what is declared inside the sources, whatever it is: variables, parameters, functions.
 DECLARED = re.compile(r"\b(?:bool|u?int|float|[biu]?vec[234])\s+(\w+)")
 BYTES = {"int": 4, "float": 4, "ivec2": 8}
@@ -20,7 +24,7 @@ def test_constants_and_textures_share_no_name_with_a_variable(program):
     """On Vulkan they are macros."""
     declared = set(DECLARED.findall(body(program.name)))
     assert declared
-    assert not declared & {*program.constants, *program.samplers, *program.images}
+    assert not declared & {*program.constants, *program.samplers, *program.images, *program.blocks}
 
 
 @pytest.mark.parametrize("program", PASSES, ids=lambda program: program.name)

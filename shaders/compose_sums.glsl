@@ -1,0 +1,108 @@
+// A pixel's own shutter by displacement interpolation, exact (paper §3.4.1): its quantile is Σ cᵢ Sᵢ⁻¹, linear
+// between the knots of the table; what a piece exposes is the difference of the running sums at its ends, evenly
+// spread. So an exposure of any length costs four look-ups a piece.
+// table: a row of 2 · GROUPS + 1 vectors for the gains, then one a piece, as in include/compose.glsl; ROWS pieces, in a
+// loop that a compiler unrolls. The window's time 0 lies `origin` positions from the first of the sums, and time runs
+// backwards with BACK. (Of time nothing but whole frames depends on where the sums begin: pictures must not.)
+#include "light.glsl"
+#include "sums.glsl"
+#define COLUMNS (2 * GROUPS + 1)
+
+// Above one another in an invocation: to a software renderer the table is as dear as the sums, but four pixels are
+// slower than one.
+#define PIXELS 2
+#define EACH(does) \
+  does(0); \
+  does(1)
+
+vec4 c[PIXELS * GROUPS];
+vec3 total[PIXELS];
+vec4 starts[GROUPS];
+vec4 ends[GROUPS];
+float exposure;
+ivec2 corner;
+
+// Beyond the picture's edge the last pixel inside.
+ivec2 place(int k)
+{
+  return ivec2(corner.x, min(corner.y + k, size.y - 1));
+}
+
+void start_pixel(int k)
+{
+  float sum = 0.0;
+  for (int g = 0; g < GROUPS; g++) {
+    vec4 loaded = imageLoad(coefficients, ivec3((place(k) + ivec2(0, top)) >> block_bits, g));
+    c[k * GROUPS + g] = max(loaded, 0.0);
+    sum += dot(c[k * GROUPS + g], vec4(1.0));
+  }
+  for (int g = 0; g < GROUPS; g++) {
+    c[k * GROUPS + g] *= 1.0 / sum;
+  }
+  total[k] = vec3(0.0);
+}
+
+uvec2 sum_until(ivec2 pixel, int time)
+{
+  int layer = clamp(BACK != 0 ? origin - time : origin + time, 0, held) + first_layer;
+  return sum_at(pixel, layer < layers ? layer : layer - layers);
+}
+
+vec3 light_between(uvec2 early, uvec2 late)
+{
+  return unpacked_light(BACK != 0 ? minus(early, late) : minus(late, early));
+}
+
+void add_piece(int k)
+{
+  float start = 0.0;
+  float end = 0.0;
+  for (int g = 0; g < GROUPS; g++) {
+    start += dot(starts[g], c[k * GROUPS + g]);
+    end += dot(ends[g], c[k * GROUPS + g]);
+  }
+  ivec2 pixel = place(k);
+  int first = int(start);
+  int last = int(end);
+  uvec2 early = sum_until(pixel, first);
+  uvec2 late = sum_until(pixel, last);
+  vec3 light = light_between(early, late) + (end - float(last)) * light_between(late, sum_until(pixel, last + 1)) -
+               (start - float(first)) * light_between(early, sum_until(pixel, first + 1));
+  total[k] += light * (exposure / max(end - start, 1e-7));
+}
+
+void finish_pixel(int k)
+{
+  ivec2 pixel = place(k);
+  vec3 light = total[k] * unit;
+#if ENCODED
+  light = to_linear_exact(light);
+#endif
+  float gain = 0.0;
+  for (int g = 0; g < GROUPS; g++) {
+    gain += dot(starts[g], c[k * GROUPS + g]);
+  }
+  // Bottom row first: Blender's order, and GL's.
+  imageStore(picture, ivec3(pixel.x, height - 1 - top - pixel.y, 0), vec4(light * gain, 1.0));
+}
+
+void main()
+{
+  corner = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, PIXELS);
+  if (any(greaterThanEqual(corner, size))) {
+    return;
+  }
+  EACH(start_pixel);
+  for (int row = 1; row <= ROWS; row++) {
+    for (int g = 0; g < GROUPS; g++) {
+      starts[g] = table[row * COLUMNS + g];
+      ends[g] = table[row * COLUMNS + GROUPS + g];
+    }
+    exposure = table[row * COLUMNS + 2 * GROUPS].x;
+    EACH(add_piece);
+  }
+  for (int g = 0; g < GROUPS; g++) {
+    starts[g] = table[g];  // the gains
+  }
+  EACH(finish_pixel);
+}

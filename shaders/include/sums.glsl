@@ -1,0 +1,32 @@
+// Running sums along time: a pixel's sum at position p is the light of all frames before p, three fields of 21 bits in
+// one word of 64. Only differences are taken, which are exact however often the sums have wrapped around.
+const uint FIELD = 0x1FFFFFu;
+
+uvec2 minus(uvec2 a, uvec2 b)
+{
+  return uvec2(a.x - b.x, a.y - b.y - (a.x < b.x ? 1u : 0u));
+}
+
+uvec2 plus(uvec2 a, uvec2 b)
+{
+  uint low = a.x + b.x;
+  return uvec2(low, a.y + b.y + (low < a.x ? 1u : 0u));
+}
+
+uvec2 packed_light(uvec3 light)
+{
+  return uvec2(light.r | (light.g << 21), (light.g >> 11) | (light.b << 10));
+}
+
+// As signed integers, which convert to floats in one instruction.
+vec3 unpacked_light(uvec2 difference)
+{
+  uint green = (difference.x >> 21) | (difference.y << 11);
+  return vec3(ivec3(difference.x & FIELD, green & FIELD, difference.y >> 10));
+}
+
+// imageLoad: a software renderer's texelFetch of whole numbers takes three times as long.
+uvec2 sum_at(ivec2 pixel, int layer)
+{
+  return imageLoad(sums, ivec3(pixel, layer)).rg;
+}

@@ -1,0 +1,238 @@
+"""The window on a device: the source frames around the one that is shown, each read once while it stays there."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from ..core import compositor, light
+from ..core.instant import Options
+from .errors import NoDeviceError
+from .passes import LOCAL_ROW, Image, Pass
+
+# A layered texture over 2 GiB reads wrongly on Mesa's software renderer, without any error.
+BAND_BYTES = 1 << 30
+# A window above this stays on the host, and its bands take turns on the device.
+RESIDENT_BYTES = 6 << 30
+
+_STORED = {np.uint8: "rgba8", np.uint16: "rgba16", np.float16: "rgba16f", np.float32: "rgba32f"}
+
+
+def open_window(device, source, capacity: int) -> Window:
+    """The window of `capacity` frames that composes fastest: running sums where 8 bits are summed and the device has
+    room for them."""
+    if np.dtype(source.dtype) == np.uint8 and source.alpha == "opaque":
+        try:
+            return Sums(device, source, capacity)
+        except NoDeviceError:
+            pass
+    return Frames(device, source, capacity)
+
+
+class Window:
+    """What both windows share: texture arrays of `layers` layers in bands of rows, each array below BAND_BYTES, and
+    `picture`, what is composed of them."""
+
+    def __init__(self, device, source, capacity: int):
+        self.device, self.source, self.capacity = device, source, capacity
+        self.textures: list = []
+        self.picture = None
+
+    def _allocate(self, kind: str, pixel_bytes: int) -> None:
+        """NoDeviceError: no room, and nothing is kept."""
+        source, row_bytes = self.source, self.source.width * pixel_bytes * self.layers
+        self.rows = max(1, min(source.height, BAND_BYTES // row_bytes))
+        self.tops = range(0, source.height, self.rows)
+        try:
+            if row_bytes * source.height > RESIDENT_BYTES:
+                raise NoDeviceError("over the budget")
+            for top in self.tops:
+                self.textures.append(self.device.texture(source.width, self._height(top), self.layers, kind))
+            self.picture = self.device.texture(source.width, source.height, 1, "rgba32f")
+        except NoDeviceError:
+            self.release()
+            raise
+
+    def _height(self, top: int) -> int:
+        return min(self.rows, self.source.height - top)
+
+    def bands(self):
+        """Each band as (top row, height, texture array)."""
+        for top, texture in zip(self.tops, self.textures, strict=True):
+            yield top, self._height(top), texture
+
+    def release(self) -> None:
+        for texture in (*self.textures, *filter(None, [self.picture])):
+            texture.release()
+        self.textures, self.picture = [], None
+
+
+class Frames(Window):
+    """The frames themselves: source frame i in layer i mod `layers`.
+
+    Where the device has no room for all bands, the frames stay on the host and every picture sends them band by band.
+    """
+
+    def __init__(self, device, source, capacity: int):
+        super().__init__(device, source, capacity)
+        self.layers = capacity
+        self._held: dict[int, int] = {}  # layer: source frame
+        self._host: dict[int, np.ndarray] | None = None
+        # Encoded floats may be above 1, beyond the shaders' curve.
+        self._linearises = source.transfer == "srgb" and np.dtype(source.dtype).kind == "f"
+        self.transfer = "linear" if self._linearises else source.transfer
+        kind, pixel_bytes = _STORED[np.dtype(source.dtype).type], 4 * np.dtype(source.dtype).itemsize
+        try:
+            self._allocate(kind, pixel_bytes)
+        except NoDeviceError:
+            self._host = {}
+            self.textures = [device.texture(source.width, self.rows, capacity, kind)]
+            self.picture = device.texture(source.width, source.height, 1, "rgba32f")
+
+    @property
+    def held(self):
+        """The source frames that are loaded."""
+        return self._held.values()
+
+    def load(self, positions: np.ndarray, options: Options) -> None:
+        """Reads what is missing at positions (of core.compositor.window_positions) within `capacity` of one another."""
+        for index in sorted(set(compositor.source_frames(options, positions, self.source.count).tolist())):
+            layer = index % self.capacity
+            if self._held.get(layer) == index:
+                continue
+            frame = self._read(index)
+            if self._host is None:
+                for top, height, texture in super().bands():
+                    self._send(texture, frame[top : top + height], layer)
+            else:
+                self._host[layer] = frame
+            self._held[layer] = index
+
+    def bands(self):
+        if self._host is None:
+            yield from super().bands()
+            return
+        for top in self.tops:
+            height = self._height(top)
+            for layer, frame in self._host.items():
+                self._send(self.textures[0], frame[top : top + height], layer)
+            yield top, height, self.textures[0]
+
+    def _read(self, index: int) -> np.ndarray:
+        frame = self.source.read(index)
+        if self._linearises:
+            rgb = light.straight(frame)[..., :3] if self.source.alpha == "premultiplied" else frame[..., :3]
+            scale = frame[..., 3:] if self.source.alpha == "premultiplied" else 1
+            frame = np.concatenate([light.to_linear(rgb) * scale, frame[..., 3:]], axis=-1)
+        return frame
+
+    def _send(self, texture, rows: np.ndarray, layer: int) -> None:
+        self.device.write(texture, rows, layer, opaque=self.source.alpha == "opaque")
+
+    def release(self) -> None:
+        super().release()
+        self._held, self._host = {}, None
+
+
+def decoding(stored: str, options: Options) -> int:
+    """How the shaders turn frames stored as "srgb" or "linear" into the light that is summed: 0 not at all, 1 to
+    linear, 2 to encoded."""
+    summed = "srgb" if options.light == "encoded" else "linear"
+    return 0 if stored == summed else 1 if summed == "linear" else 2
+
+
+@cache
+def accumulation(decode: int, again: bool, back: bool) -> Pass:
+    """The pass that adds a frame to the sums, or takes it away (back); again: one that they hold already."""
+    return Pass(
+        "accumulate",
+        samplers={} if again else {"frame": "sampler2DArray"},
+        images={"sums": Image("rg32ui", reads=True)},
+        constants={"size": "ivec2", "known": "int", "next": "int"}
+        | ({"before": "int", "after": "int"} if again else {"top": "int", "whole": "float"}),
+        defines={"DECODE": decode, "AGAIN": int(again), "BACK": int(back)},
+        local_size=LOCAL_ROW,
+    )
+
+
+class Sums(Window):
+    """Running sums of opaque 8-bit frames along time, in the light that is summed (Options.light).
+
+    The layer of position p, p mod `layers`, holds the sum of the frames before p: positions `start` to `stop`, both
+    included. Positions beyond the clip's ends count as well, with the frames that its edges show there. A window that
+    moves on, or back, adds one layer a frame.
+    """
+
+    def __init__(self, device, source, capacity: int):
+        super().__init__(device, source, capacity)
+        self.layers = capacity + 1
+        # Three fields of 21 bits: as many of them for white as leave room for the sum of a whole window.
+        self.whole = (1 << min(16, 21 - (capacity - 1).bit_length())) - 1
+        self.start = self.stop = 0
+        self._frames: dict[int, int] = {}  # position: source frame
+        self._options = self._sent = None
+        self._allocate("rg32ui", 8)
+        try:
+            self._sent = device.texture(source.width, source.height, 1, "rgba8")
+        except NoDeviceError:
+            self.release()
+            raise
+
+    @property
+    def held(self):
+        """The source frames that are summed."""
+        return self._frames.values()
+
+    def load(self, positions: np.ndarray, options: Options) -> None:
+        """As Frames.load."""
+        first, last = int(positions.min()), int(positions.max()) + 1
+        frames = compositor.source_frames(options, np.arange(first, last), self.source.count).tolist()
+        if not self._continues(first, frames, options):
+            self._options, self._frames = options, {}
+            self.start = self.stop = first
+        while self.stop < last:
+            self._keep(max(self.start, self.stop + 1 - self.capacity), self.stop)
+            self._add(frames[self.stop - first], self.stop, self.stop + 1)
+            self.stop += 1
+        while self.start > first:
+            self._keep(self.start, min(self.stop, self.start - 1 + self.capacity))
+            self._add(frames[self.start - 1 - first], self.start, self.start - 1)
+            self.start -= 1
+
+    def _continues(self, first: int, frames: list[int], options: Options) -> bool:
+        """Whether what is held touches the wanted frames, and agrees with them."""
+        last = first + len(frames)
+        overlap = range(max(first, self.start), min(last, self.stop))
+        return (
+            self._options is not None
+            and self._options.light == options.light
+            and first <= self.stop
+            and self.start <= last
+            and all(self._frames[position] == frames[position - first] for position in overlap)
+        )
+
+    def _keep(self, start: int, stop: int) -> None:
+        self.start, self.stop = start, stop
+        self._frames = {position: frame for position, frame in self._frames.items() if start <= position < stop}
+
+    def _add(self, frame: int, known: int, next_: int) -> None:
+        """The sum at position next_ from the one at `known`, its neighbour, and the frame between them."""
+        same = next((position for position, held in self._frames.items() if held == frame), None)
+        program = accumulation(decoding(self.source.transfer, self._options), same is not None, next_ < known)
+        given = {"known": known % self.layers, "next": next_ % self.layers}
+        if same is None:
+            self.device.write(self._sent, self.source.read(frame), opaque=True)
+            given |= {"textures": {"frame": self._sent}, "whole": float(self.whole)}
+        else:
+            given |= {"before": same % self.layers, "after": (same + 1) % self.layers}
+        for top, height, sums in self.bands():
+            size = self.source.width, height
+            self.device.run(program, size, images={"sums": sums}, size=size, top=top, **given)
+        self._frames[min(known, next_)] = frame
+
+    def release(self) -> None:
+        super().release()
+        if self._sent is not None:
+            self._sent.release()
+        self._frames = {}
