@@ -4,7 +4,8 @@
 
 Needs Python 3.11, NumPy and moderngl alone. Passes:
 compose: a picture from a window on the device; accumulate: the next frame into the window (average: its upload alone);
-diffuse: coefficients from new labels; readback: the picture to the host; frame: accumulate, compose and readback.
+diffuse: coefficients from new labels; readback: the picture to the host; frame: accumulate, compose and readback;
+copy: a gigabyte moved from one buffer of the device to another, read and written counting as half of it each.
 Methods: ours; paper: its Appendix A with search bounds (scripts/benchmark/appendix_a.glsl); average: the plain mean of
 the window's frames in the same light. Times are medians in milliseconds.
 Frames are random noise. Errors are the largest over random pixels of the picture (--pixels) in 8-bit levels against
@@ -26,10 +27,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from shutter_addon.compute import diffusion
+from shutter_addon.compute import diffusion, gpu
 from shutter_addon.compute.gl import GLDevice
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.passes import LOCAL_ROW, Image, Pass
+from shutter_addon.compute.tables import table as table_of
 from shutter_addon.compute.window import Frames
 from shutter_addon.core import compositor, light, presets, scribbles, shutters
 from shutter_addon.core.instant import Instant, Options
@@ -37,6 +39,7 @@ from shutter_addon.core.instant import Instant, Options
 HERE = Path(__file__).resolve().with_suffix("")
 METHODS = ("ours", "paper", "average")
 PASSES = ("compose", "accumulate", "diffuse", "readback", "frame")
+COPIED = 1 << 28  # bytes, beyond any cache
 BARS = {
     # Bars that are constant over spans, and bars that change from frame to frame.
     "preset": ("ANGLE_360", "STILL", "TWO_CUTS", "ANGLE_180", "LAST", "CUTS", "ANGLE_90", "ANGLE_45"),
@@ -156,6 +159,23 @@ class Case:
         self.compose(method)
         self.readback(method)
 
+    def moved(self, name: str, method: str) -> int | None:
+        """Bytes that a pass must move: all it has to read or write, once each. None: what counts is computing."""
+        options, pixels = self.instant.options, self.source.width * self.source.height
+        if name == "accumulate":
+            return pixels * (8 if isinstance(self.window, Frames) or method == "average" else 28)
+        if name == "compose" and method == "average":
+            return pixels * (4 * options.window + 16)
+        if name != "compose" or method != "ours":
+            return None
+        rows = len(table_of(self.instant)) - 1
+        open_frames = np.ptp(shutters.open_span(self.instant.bars))
+        way = gpu.way_of(self.window, options, rows, open_frames, False)
+        read = {"sums": 32 * rows, "pieces": 4 * open_frames}.get(way, 8 * (open_frames + 1))
+        if isinstance(self.window, Frames):
+            read = 4 * open_frames
+        return int(pixels * (read + 16 + 16 * -(-len(self.instant.bars) // 4) / options.aggregate**2))
+
     def error(self, name: str, method: str, pixels: int) -> float | None:
         """The largest error of what a pass just made."""
         if name == "diffuse":
@@ -206,6 +226,25 @@ class Case:
             texture.release()
 
 
+def copied(device: GLDevice) -> dict:
+    """The row of the copy."""
+    context = device._context
+    data = np.random.default_rng(0).bytes(COPIED)
+    source, target, times = context.buffer(data), context.buffer(reserve=COPIED), []
+    for _ in range(7):
+        device.finish()
+        start = time.perf_counter()
+        context.copy_buffer(target, source)
+        device.finish()
+        times.append(time.perf_counter() - start)
+    error = float(target.read() != data)
+    source.release()
+    target.release()
+    nothing = dict.fromkeys(("width", "height", "shutters", "window", "aggregate"), 0)
+    ms = statistics.median(times[1:]) * 1e9 / (2 * COPIED) * 1000
+    return {"pass": "copy", "method": "ours", "bars": "", **nothing, "device": device.name, "ms": ms, "error": error}
+
+
 def _program(name: str, samplers, instant: Instant, **defines) -> Pass:
     return Pass(
         str(HERE / name),
@@ -234,8 +273,8 @@ def jobs(case: Case, passes, methods):
             yield name, method
 
 
-def measure(case: Case, args) -> list[dict]:
-    """The rows of a case. What took `patience` seconds is not repeated."""
+def measure(case: Case, args) -> list[tuple[dict, int | None]]:
+    """The rows of a case, each with the bytes that must move. What took `patience` seconds is not repeated."""
     todo, errors, times = list(jobs(case, args.passes, args.methods)), {}, {}
     for name, method in todo:
         first = timed(case, name, method)
@@ -255,10 +294,11 @@ def measure(case: Case, args) -> list[dict]:
         "aggregate": options.aggregate,
         "device": case.device.name,
     }
-    return [
+    made = [
         {"pass": name, "method": method, **common, "ms": statistics.median(times[name, method]) * 1000, "error": error}
         for (name, method), error in errors.items()
     ]
+    return [(row, case.moved(row["pass"], row["method"])) for row in made]
 
 
 def timed(case: Case, name: str, method: str) -> float:
@@ -271,8 +311,10 @@ def timed(case: Case, name: str, method: str) -> float:
 
 
 def run(args) -> list[dict]:
-    device, rows = GLDevice(), []
+    device = GLDevice()
     with device.current():
+        rows = [copied(device)]
+        print(f"copy: {1e3 / rows[0]['ms']:.1f} GB/s", flush=True)
         for width, height in args.sizes:
             source = Noise(width, height)
             for window, count, kind, block in itertools.product(
@@ -283,22 +325,24 @@ def run(args) -> list[dict]:
                 case = Case(device, source, instant, kind, shared=args.sums == "shared")
                 made = measure(case, args)
                 case.release()
-                for row in made:
-                    print(_line(row), flush=True)
-                rows += made
+                for row, moved in made:
+                    print(_line(row, moved and moved / 1e9 * rows[0]["ms"]), flush=True)
+                rows += [row for row, _ in made]
     return rows
 
 
-def _line(row: dict) -> str:
+def _line(row: dict, floor: float | None) -> str:
+    """floor: milliseconds that a copy of what must move would take."""
+    share = "" if floor is None else f"  floor {100 * floor / row['ms']:.0f} %"
     error = "" if row["error"] is None else f"  error {row['error']:.3f}"
     place = f"{row['width']}×{row['height']} N={row['shutters']} L={row['window']} {row['bars']} {row['aggregate']}×"
-    return f"{place:34s} {row['pass']:10s} {row['method']:8s} {row['ms']:10.2f} ms{error}"
+    return f"{place:34s} {row['pass']:10s} {row['method']:8s} {row['ms']:10.2f} ms{error}{share}"
 
 
 def table(rows: list[dict]) -> str:
     """The paper's Table 1: a column group per method and aggregation, N down and T (the window) across."""
     lines = []
-    for width, height, kind in dict.fromkeys((r["width"], r["height"], r["bars"]) for r in rows):
+    for width, height, kind in dict.fromkeys((r["width"], r["height"], r["bars"]) for r in rows if r["width"]):
         mine = [r for r in rows if (r["width"], r["height"], r["bars"]) == (width, height, kind)]
         columns = dict.fromkeys((r["method"], r["aggregate"]) for r in mine if r["pass"] == "compose")
         windows = sorted({r["window"] for r in mine})

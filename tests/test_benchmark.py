@@ -35,7 +35,7 @@ def ran(tmp_path_factory):
 def test_rows(ran):
     rows, _ = ran
     assert all(set(row) == KEYS and row["ms"] > 0 for row in rows)
-    assert {row["pass"] for row in rows} == {"compose", "accumulate", "diffuse", "readback", "frame"}
+    assert {row["pass"] for row in rows} == {"copy", "compose", "accumulate", "diffuse", "readback", "frame"}
     composed = [row for row in rows if row["pass"] == "compose"]
     # For each of the cases: ours and the paper's at either aggregation, and the average.
     assert len(composed) == 2 * 3 * 5
@@ -44,7 +44,9 @@ def test_rows(ran):
 def test_errors(ran):
     rows, _ = ran
     for row in rows:
-        if row["pass"] in ("compose", "frame", "diffuse"):
+        if row["pass"] == "copy":
+            assert row["error"] == 0
+        if row["pass"] in ("compose", "frame", "diffuse", "accumulate"):
             assert row["error"] <= ALLOWED[row["method"]], row
 
 

@@ -15,7 +15,7 @@ import gpu
 import numpy as np
 
 from ..compute.errors import NoDeviceError
-from ..compute.passes import Image, Pass, body
+from ..compute.passes import LOCAL_ROW, Image, Pass, body
 
 _TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
 _AS_IT_IS, _WHOLE, _OPAQUE_BYTES, _PAIRS_OF_BYTES, _SIXTEEN_BITS = range(5)
@@ -124,6 +124,7 @@ def _unpack(kind: str, packing: int) -> Pass:
         {"stored": Image(kind)},
         {"size": "ivec2", "layer": "int"},
         {"PACKING": packing},
+        local_size=LOCAL_ROW,
     )
 
 

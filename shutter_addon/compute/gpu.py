@@ -31,7 +31,7 @@ _ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 
 @cache
 def composition(way: str, groups: int, summed: bool, decode: int, edges: int, premultiplied: bool, encoded: bool):
-    """The pass that composes in a way of `_way`, shutters in groups of four, from frames or (summed) their sums."""
+    """The pass that composes in a way of `way_of`, shutters in groups of four, from frames or (summed) their sums."""
     return Pass(
         f"compose_{way}",
         samplers={} if summed else {"frames": "sampler2DArray"},
@@ -66,7 +66,7 @@ def composition_of_sums(rows: int, groups: int, back: bool, encoded: bool) -> Pa
     )
 
 
-def _way(window, options: Options, rows: int, frames: int, shortened: bool) -> str:
+def way_of(window, options: Options, rows: int, frames: int, shortened: bool) -> str:
     """The quickest pass for so many pieces, and frames that any shutter exposes.
 
     Measured at 1080p for 2 to 8 shutters over 16 to 64 frames, in times of the plain average of 16 frames: from the
@@ -169,7 +169,7 @@ class GPUCompositor:
         origin = index - direction * options.before
         reach = sorted((origin + direction * first, origin + direction * (last - 1)))
         shortened = options.edges == "shorten" and (reach[0] < 0 or reach[1] >= window.source.count)
-        way = _way(window, options, len(values) - 1, last - first, shortened)
+        way = way_of(window, options, len(values) - 1, last - first, shortened)
         if way == "sums":
             program, given = _from_sums(window, instant, values, origin, direction)
         else:
