@@ -102,7 +102,7 @@ class BlenderDevice:
         for name in program.images:
             shader.image(name, images[name].gpu)
         for name, kind in program.constants.items():
-            set_constant = shader.uniform_float if kind == "float" else shader.uniform_int
+            set_constant = shader.uniform_float if kind in ("float", "vec2") else shader.uniform_int
             set_constant(name, constants[name])
         groups = (-(-n // local) for n, local in zip((*extent, 1)[:3], LOCAL_SIZE, strict=True))
         gpu.compute.dispatch(shader, *groups)  # which makes the next one wait for what this one stores

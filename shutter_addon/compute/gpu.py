@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core import compositor, light, shutters
 from ..core.instant import Instant, Options
-from .diffusion import Diffusion
+from .diffusion_gpu import Diffusion
 from .errors import NoDeviceError
 from .passes import Image, Pass
 from .tables import padded, table

@@ -4,15 +4,15 @@ import re
 
 import pytest
 
-from shutter_addon.compute import diffusion, gpu
+from shutter_addon.compute import diffusion_gpu, gpu
 from shutter_addon.compute.passes import SHADERS, Pass, body
 from shutter_addon.core.instant import Options
 
-PASSES = [value for value in vars(diffusion).values() if isinstance(value, Pass)]
+PASSES = [value for value in vars(diffusion_gpu).values() if isinstance(value, Pass)]
 PASSES += [gpu._composition(Options(8), way, 3, "srgb", True) for way in ("pieces", "frames", "value")]
 # Of what is declared inside the sources, whatever it is: variables, parameters, functions.
 DECLARED = re.compile(r"\b(?:bool|u?int|float|[biu]?vec[234])\s+(\w+)")
-BYTES = {"int": 4, "float": 4, "ivec2": 8}
+BYTES = {"int": 4, "float": 4, "ivec2": 8, "vec2": 8}
 
 
 @pytest.mark.parametrize("program", PASSES, ids=lambda program: program.name)
