@@ -2,7 +2,7 @@
 // misses, with its cell number `at` of the 25 near 2p.
 void main()
 {
-  ivec3 p = ivec3(corner(coarse) + in_eights(), gl_GlobalInvocationID.z);
+  ivec3 p = ivec3(corner(coarse) + in_fours(), gl_GlobalInvocationID.z);
   if (!inside(p.xy, coarse)) {
     return;
   }

@@ -159,7 +159,7 @@ class Diffusion:
         while len(self._grids) == 1 or max(self._grids[-1].size) > 4:
             width, height = (width + 1) // 2, (height + 1) // 2
             self._grids.append(_Grid(self._device, width, height, layers, False))
-        tiles = sum(3 * grid.reached.size + grid.touched.size for grid in self._grids)
+        tiles = sum(4 * grid.reached.size + grid.touched.size for grid in self._grids)
         self._tiles = self._device.texture(256, -(-tiles // 256), 1, "r32f")
         return False
 
@@ -167,7 +167,7 @@ class Diffusion:
         """For every grid: what tiles have cells of their own, and whose operator and values are to be made anew."""
         fixed = labels != 0
         held, free = _in_fours(fixed), _in_fours(~fixed)
-        fed, listed, end = False, [], 0
+        listed, end = [], 0
         for grid in self._grids:
             touched = _grown(held)
             solid = ~_grown(free, 1 if grid.finest else 2)
@@ -178,28 +178,28 @@ class Diffusion:
             reached = _grown(held, BAND) if max(grid.size) > WHOLE else np.ones_like(held)
             near = reached & live
             around = _grown(near) & live
-            ranks = np.where(near, np.where(fed, 0, 1), np.where(around, 2, np.where(live, 3, 4)))
+            ranks = np.where(near, 0, np.where(around, 1, np.where(live, 2, 3)))
             stale = (reached | grid.reached) & _grown(live)
             rim = ~near & live & _last_ones(grid)
             eights, fours = grid.codes
-            lists = [eights[ranks == rank] for rank in range(5)]
-            lists += [eights[rim], eights[stale], fours[changed]]
+            lists = [eights[ranks == rank] for rank in range(4)]
+            # A tile is four cells wide on the next grid.
+            lists += [eights[rim], eights[stale], eights[_grown(near)] / 2, fours[changed]]
             ends = (end + np.cumsum([len(tiles) for tiles in lists])).tolist()
             grid.ranges = {
-                "fed": (end, ends[0]),
-                "near": (end, ends[1]),
-                "around": (ends[1], ends[2]),
-                "reached": (end, ends[2]),
-                "far": (ends[1], ends[3]),
-                "full": (ends[3], ends[4]),
-                "rim": (ends[4], ends[5]),
-                "stale": (ends[5], ends[6]),
+                "near": (end, ends[0]),
+                "around": (ends[0], ends[1]),
+                "reached": (end, ends[1]),
+                "far": (ends[0], ends[2]),
+                "full": (ends[2], ends[3]),
+                "rim": (ends[3], ends[4]),
+                "stale": (ends[4], ends[5]),
+                "feeding": (ends[5], ends[6]),
                 "changed": (ends[6], ends[7]),
             }
             listed += lists
             end = ends[-1]
             grid.touched, grid.solid, grid.reached = touched, solid, reached
-            fed = _halved(_grown(near))
         rows = np.zeros((-(-end // 256), 256, 1), np.float32)
         rows.reshape(-1)[:end] = np.concatenate(listed)
         self._device.write(self._tiles, rows)
@@ -218,7 +218,8 @@ class Diffusion:
         for fine, coarse in pairwise(self._grids):
             self._run(_WEIGHTS_FINEST if fine.finest else _WEIGHTS, fine, "changed", 8, hold=HOLD)
             coarsen = _COARSEN_FINEST if fine.finest else _COARSEN
-            self._run(coarsen, coarse, "changed", 16, **_into(fine, coarse, "stencil"))
+            to = {"size": fine.size, "coarse": coarse.size, "next": coarse.textures["stencil"]}
+            self._run(coarsen, coarse, "changed", 16, **fine.textures, **to)
 
     def _cycle(self, index: int) -> None:
         """A V-cycle from a grid on down."""
@@ -237,7 +238,7 @@ class Diffusion:
         prolong = {"coarse": coarse.size, "coarser": coarse.textures["solution"]}
         self._run(_PROLONG, grid, "near", 16, grid.layers, **prolong, **{"from": values}, to=own, amount=-1.0)
         restrict = _RESTRICT_FINEST if grid.finest else _RESTRICT
-        self._run(restrict, coarse, "fed", 64, grid.layers, **_into(grid, coarse, "right"))
+        self._run(restrict, grid, "feeding", 16, grid.layers, coarse=coarse.size, next=coarse.textures["right"])
         first_whole = max(coarse.size) <= WHOLE and (grid.finest or max(grid.size) > WHOLE)
         for _ in range(2 if first_whole else 1):
             self._cycle(index + 1)
@@ -286,11 +287,6 @@ class Diffusion:
             images={name: given[name] for name in program.images},
             **{name: given[name] for name in program.constants},
         )
-
-
-def _into(fine: _Grid, coarse: _Grid, name: str) -> dict:
-    """What a pass over a coarse grid's tiles binds to fill a texture of it from the finer grid."""
-    return {**fine.textures, "size": fine.size, "coarse": coarse.size, "next": coarse.textures[name]}
 
 
 def _in_fours(cells: np.ndarray) -> np.ndarray:
