@@ -4,12 +4,14 @@
 
 Needs Python 3.11, NumPy and moderngl alone. Passes:
 compose: a picture from a window on the device; accumulate: the next frame into the window (average: its upload alone);
-diffuse: coefficients from new labels; readback: the picture to the host; frame: accumulate, compose and readback;
+diffuse: coefficients from new labels; diffuse_moved: the same, from the solution for scribbles a few pixels away;
+readback: the picture to the host; frame: accumulate, compose and readback;
 copy: a gigabyte moved from one buffer of the device to another, read and written counting as half of it each.
 Methods: ours; paper: its Appendix A with search bounds (scripts/benchmark/appendix_a.glsl); average: the plain mean of
 the window's frames in the same light. Times are medians in milliseconds.
 Frames are random noise. Errors are the largest over random pixels of the picture (--pixels) in 8-bit levels against
-the float64 reference; those of diffusion over all coefficients, times 255, against twelve cycles instead of its own.
+the float64 reference; those of diffusion over all coefficients, times 255, against twelve cycles with cells
+everywhere on all grids.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from shutter_addon.compute import diffusion, gpu
+from shutter_addon.compute import diffusion_gpu, gpu
 from shutter_addon.compute.gl import GLDevice
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.passes import LOCAL_ROW, Image, Pass
@@ -38,7 +40,7 @@ from shutter_addon.core.instant import Instant, Options
 
 HERE = Path(__file__).resolve().with_suffix("")
 METHODS = ("ours", "paper", "average")
-PASSES = ("compose", "accumulate", "diffuse", "readback", "frame")
+PASSES = ("compose", "accumulate", "diffuse", "diffuse_moved", "readback", "frame")
 COPIED = 1 << 28  # bytes, beyond any cache
 BARS = {
     # Bars that are constant over spans, and bars that change from frame to frame.
@@ -105,12 +107,11 @@ class Case:
         # What the other methods read.
         plain = isinstance(self.window, Frames)
         self.frames = self.window if plain else Frames(self.device, self.source, options.window)
-        self.labels = scribbles.rasterise(
-            self.instant.shapes, -(-self.source.width // block), -(-self.source.height // block)
-        )
+        width, height = -(-self.source.width // block), -(-self.source.height // block)
+        self.labels = scribbles.rasterise(self.instant.shapes, width, height)
+        self.moved = np.roll(self.labels, max(1, width // 640), axis=(0, 1))  # three pixels of 1920
         self.solver = self.compositor.solver()
         self.handle = self.solver.solve(self.labels, count)
-        self.coefficients = self.compositor.coefficients(self.handle, count)
         accumulations = np.stack([shutters.accumulation(b) for b in self.instant.bars])
         self.sums = self.device.texture(accumulations.shape[1], count, 1, "r32f")
         self.device.write(self.sums, np.ascontiguousarray(accumulations[..., None], dtype=np.float32))
@@ -151,6 +152,10 @@ class Case:
     def diffuse(self, method: str) -> None:
         self.solver.solve(self.labels, len(self.instant.bars))
 
+    def diffuse_moved(self, method: str) -> None:
+        self.labels, self.moved = self.moved, self.labels
+        self.solver.solve(self.labels, len(self.instant.bars), warm=True)
+
     def readback(self, method: str) -> np.ndarray:
         return self.device.read(self.window.picture)
 
@@ -159,7 +164,7 @@ class Case:
         self.compose(method)
         self.readback(method)
 
-    def moved(self, name: str, method: str) -> int | None:
+    def must_move(self, name: str, method: str) -> int | None:
         """Bytes that a pass must move: all it has to read or write, once each. None: what counts is computing."""
         options, pixels = self.instant.options, self.source.width * self.source.height
         if name == "accumulate":
@@ -178,7 +183,7 @@ class Case:
 
     def error(self, name: str, method: str, pixels: int) -> float | None:
         """The largest error of what a pass just made."""
-        if name == "diffuse":
+        if name in ("diffuse", "diffuse_moved"):
             return self._diffusion_error()
         if name == "readback":
             return None
@@ -199,7 +204,9 @@ class Case:
             codes = codes if options.light == "encoded" else frames[:, 0]
             mean = codes[..., :3].mean(axis=0)
             return light.to_linear(mean) if options.light == "encoded" else mean
-        c = self.coefficients[:, y // block, x // block][:, None].astype(np.float64)
+        c = self.compositor.coefficients(self.handle, len(self.instant.bars))[:, y // block, x // block][
+            :, None
+        ].astype(np.float64)
         present, step = np.ones(len(frames), dtype=bool), max(1, (1 << 21) // self.instant.bars.size // len(frames))
         parts = (slice(start, start + step) for start in range(0, len(y), step))
         return np.concatenate(
@@ -207,15 +214,16 @@ class Case:
         )
 
     def _diffusion_error(self) -> float:
-        usual, count = diffusion.CYCLES, len(self.instant.bars)
-        solved = self.compositor.coefficients(self.solver.solve(self.labels, count), count)
+        """Of what was solved last."""
+        count, exact = len(self.instant.bars), self.compositor.solver()
+        usual = diffusion_gpu.CYCLES, diffusion_gpu.WHOLE
         try:
-            diffusion.CYCLES = 12
-            exact = self.compositor.coefficients(self.solver.solve(self.labels, count), count)
+            diffusion_gpu.CYCLES, diffusion_gpu.WHOLE = 12, max(self.labels.shape)
+            expected = self.compositor.coefficients(exact.solve(self.labels, count), count)
         finally:
-            diffusion.CYCLES = usual
-        self.solver.solve(self.labels, count)
-        return float(np.abs(solved - exact).max() * 255)
+            diffusion_gpu.CYCLES, diffusion_gpu.WHOLE = usual
+            exact.release()
+        return float(np.abs(self.compositor.coefficients(self.handle, count) - expected).max() * 255)
 
     def release(self) -> None:
         self.window.release()
@@ -298,7 +306,7 @@ def measure(case: Case, args) -> list[tuple[dict, int | None]]:
         {"pass": name, "method": method, **common, "ms": statistics.median(times[name, method]) * 1000, "error": error}
         for (name, method), error in errors.items()
     ]
-    return [(row, case.moved(row["pass"], row["method"])) for row in made]
+    return [(row, case.must_move(row["pass"], row["method"])) for row in made]
 
 
 def timed(case: Case, name: str, method: str) -> float:
@@ -336,7 +344,7 @@ def _line(row: dict, floor: float | None) -> str:
     share = "" if floor is None else f"  floor {100 * floor / row['ms']:.0f} %"
     error = "" if row["error"] is None else f"  error {row['error']:.3f}"
     place = f"{row['width']}×{row['height']} N={row['shutters']} L={row['window']} {row['bars']} {row['aggregate']}×"
-    return f"{place:34s} {row['pass']:10s} {row['method']:8s} {row['ms']:10.2f} ms{error}{share}"
+    return f"{place:34s} {row['pass']:13s} {row['method']:8s} {row['ms']:10.2f} ms{error}{share}"
 
 
 def table(rows: list[dict]) -> str:
@@ -347,7 +355,7 @@ def table(rows: list[dict]) -> str:
         columns = dict.fromkeys((r["method"], r["aggregate"]) for r in mine if r["pass"] == "compose")
         windows = sorted({r["window"] for r in mine})
         lines += [f"\n{width}×{height}, {kind} bars, {mine[0]['device']}; milliseconds"]
-        for name in ("diffuse", "accumulate", "readback"):
+        for name in ("diffuse", "diffuse_moved", "accumulate", "readback"):
             times = [r["ms"] for r in mine if r["pass"] == name and r["method"] == "ours" and r["aggregate"] == 1]
             lines += [f"{name}: {statistics.median(times):.2f}"] if times else []
         heads = [f"{method} {a}×{a}" if a > 1 else method for method, a in columns]

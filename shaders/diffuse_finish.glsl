@@ -1,4 +1,6 @@
 // Coefficients of sum 1; shares that stand for nothing are dropped, so that an enclosed region gets one shutter alone.
+#include "diffuse.glsl"
+
 vec4 kept(ivec3 p)
 {
   vec4 value = imageLoad(solution, p);
@@ -7,8 +9,8 @@ vec4 kept(ivec3 p)
 
 void main()
 {
-  ivec2 p = ivec2(gl_GlobalInvocationID);
-  if (any(greaterThanEqual(p, size))) {
+  ivec2 p = corner(size) + in_eights();
+  if (!inside(p, size)) {
     return;
   }
   float sum = 0.0;
@@ -16,7 +18,7 @@ void main()
     sum += dot(kept(ivec3(p, layer)), vec4(1.0));
   }
   for (int layer = 0; layer < layers; layer++) {
-    vec4 first = vec4(layer == 0 ? 1.0 : 0.0, 0.0, 0.0, 0.0);
-    imageStore(solution, ivec3(p, layer), sum > 0.0 ? kept(ivec3(p, layer)) / sum : first);
+    vec4 first_one = vec4(layer == 0 ? 1.0 : 0.0, 0.0, 0.0, 0.0);
+    imageStore(solution, ivec3(p, layer), sum > 0.0 ? kept(ivec3(p, layer)) / sum : first_one);
   }
 }

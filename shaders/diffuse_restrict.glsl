@@ -1,19 +1,15 @@
-// The residual of a grid becomes the right side of the next one, whose correction starts from nothing.
+// From a coarser grid to the next.
 #include "diffuse.glsl"
 
-void main()
+vec4 missing(ivec3 i, inout vec4 near[25], int at)
 {
-  ivec3 p = ivec3(gl_GlobalInvocationID);
-  if (!inside(p.xy, coarse)) {
-    return;
+  vec4 before = texelFetch(stencil, ivec3(i.xy, 0), 0);
+  vec4 after = texelFetch(stencil, ivec3(i.xy, 1), 0);
+  vec4 total = texelFetch(right, i, 0) - before.w * near[at - 1] - after.x * near[at + 1];
+  for (int k = 0; k < 3; k++) {
+    total -= before[k] * near[at - 6 + k] + after[k + 1] * near[at + 4 + k];
   }
-  vec4 total = vec4(0.0);
-  for (int k = 0; k < 9; k += step) {
-    ivec2 i = 2 * p.xy + OFFSET(k);
-    if (inside(i, size)) {
-      total += share(i, p.xy, coarse) * texelFetch(residual, ivec3(i, p.z), 0);
-    }
-  }
-  imageStore(right, p, total);
-  imageStore(correction, p, vec4(0.0));
+  return total - texelFetch(stencil, ivec3(i.xy, 2), 0).y * near[at];
 }
+
+#include "diffuse_restrict.glsl"

@@ -1,16 +1,17 @@
 // A quarter of a Gauss-Seidel sweep on a coarser grid. Invocations run over the cells of one of four colours.
 #include "diffuse.glsl"
-#include "diffuse_stencil.glsl"
-#define LOAD(p) imageLoad(solution, p)
+#define NEAR(x, y) imageLoad(solution, ivec3(clamp(p.xy + ivec2(x, y), ivec2(0), size - 1), p.z))
 
 void main()
 {
-  ivec3 p = ivec3(2 * ivec2(gl_GlobalInvocationID) + colour, gl_GlobalInvocationID.z);
+  ivec3 p = ivec3(corner(size) + 2 * in_fours() + colour, gl_GlobalInvocationID.z);
   if (!inside(p.xy, size)) {
     return;
   }
+  // Entries of cells beyond the edge are zero.
   vec4 before = texelFetch(stencil, ivec3(p.xy, 0), 0);
   vec4 after = texelFetch(stencil, ivec3(p.xy, 1), 0);
-  float inverse = texelFetch(stencil, ivec3(p.xy, 2), 0).x;
-  imageStore(solution, p, (texelFetch(right, p, 0) - AROUND(before, after)) * inverse);
+  vec4 total = before.x * NEAR(-1, -1) + before.y * NEAR(0, -1) + before.z * NEAR(1, -1) + before.w * NEAR(-1, 0);
+  total += after.x * NEAR(1, 0) + after.y * NEAR(-1, 1) + after.z * NEAR(0, 1) + after.w * NEAR(1, 1);
+  imageStore(solution, p, (texelFetch(right, p, 0) - total) * texelFetch(stencil, ivec3(p.xy, 2), 0).x);
 }

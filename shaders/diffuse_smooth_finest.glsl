@@ -1,18 +1,18 @@
 // Half a red-black Gauss-Seidel sweep at full size. Invocations run over the pixels of one colour.
 #include "diffuse.glsl"
-#include "diffuse_finest.glsl"
 
 void main()
 {
-  ivec3 p = ivec3(gl_GlobalInvocationID);
-  p.x = 2 * p.x + ((p.y + colour) & 1);
-  if (!inside(p.xy, size) || scale(p.xy) == 0.0) {
+  ivec3 p = ivec3(corner(size) + in_fours() * ivec2(2, 1), gl_GlobalInvocationID.z);
+  p.x += (p.y + colour) & 1;
+  if (!inside(p.xy, size) || texelFetch(labels, ivec3(p.xy, 0), 0).r > 0u) {
     return;
   }
+  // Beyond the frame's edge there is nothing: weight 0.
   vec4 total = vec4(0.0);
   float count = 0.0;
-  for (int k = 0; k < 4; k++) {
-    ivec2 j = p.xy + CROSS[k];
+  for (int k = 1; k < 9; k += 2) {
+    ivec2 j = p.xy + OFFSET(k);
     if (inside(j, size)) {
       total += imageLoad(solution, ivec3(j, p.z));
       count += 1.0;

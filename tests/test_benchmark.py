@@ -35,7 +35,8 @@ def ran(tmp_path_factory):
 def test_rows(ran):
     rows, _ = ran
     assert all(set(row) == KEYS and row["ms"] > 0 for row in rows)
-    assert {row["pass"] for row in rows} == {"copy", "compose", "accumulate", "diffuse", "readback", "frame"}
+    passes = {"copy", "compose", "accumulate", "diffuse", "diffuse_moved", "readback", "frame"}
+    assert {row["pass"] for row in rows} == passes
     composed = [row for row in rows if row["pass"] == "compose"]
     # For each of the cases: ours and the paper's at either aggregation, and the average.
     assert len(composed) == 2 * 3 * 5
@@ -48,6 +49,8 @@ def test_errors(ran):
             assert row["error"] == 0
         if row["pass"] in ("compose", "frame", "diffuse", "accumulate"):
             assert row["error"] <= ALLOWED[row["method"]], row
+        if row["pass"] == "diffuse_moved":  # a pixel of so few is far to go
+            assert row["error"] <= 8, row
 
 
 def test_table(ran):

@@ -1,4 +1,6 @@
 // What the passes of a multigrid share. Coarse cells lie on the even cells of the finer grid.
+// Work is done tile by tile, of 8 × 8 cells or 4 × 4: `tiles` lists a grid's, 256 to a row, each as x + 4096 · y of its
+// first cell, in fours.
 // Cells around one: k = 0 … 8, row by row, itself 4.
 #define OFFSET(k) (ivec2((k) % 3, (k) / 3) - 1)
 
@@ -7,9 +9,34 @@ bool inside(ivec2 i, ivec2 grid)
   return all(greaterThanEqual(i, ivec2(0))) && all(lessThan(i, grid));
 }
 
-// How much the fine cell i takes of the coarse cell I, before its scale. A last odd cell has no other one to take from.
-float share(ivec2 i, ivec2 I, ivec2 grid)
+// The first cell of entry n of the list, or one beyond the grid where the list has ended.
+ivec2 corner(int n, ivec2 grid)
 {
-  vec2 weight = 0.5 * (vec2(equal(i / 2, I)) + vec2(equal(min((i + 1) / 2, grid - 1), I)));
-  return weight.x * weight.y;
+  if (n >= last) {
+    return grid;
+  }
+  int tile = int(texelFetch(tiles, ivec3(n & 255, n >> 8, 0), 0).r);
+  return 4 * ivec2(tile & 4095, tile >> 12);
 }
+
+// Of the tile of invocations (·, y).
+ivec2 corner(ivec2 grid)
+{
+  return corner(first + int(gl_GlobalInvocationID.y), grid);
+}
+
+// The place of invocation (x, ·) in rows of eight, or of four.
+ivec2 in_eights()
+{
+  int x = int(gl_GlobalInvocationID.x);
+  return ivec2(x & 7, x >> 3);
+}
+
+ivec2 in_fours()
+{
+  int x = int(gl_GlobalInvocationID.x);
+  return ivec2(x & 3, x >> 2);
+}
+
+// Which of a cell's four weights is for the coarse cell p, where the cell is OFFSET(k) from 2p.
+#define TAKES(k) (((k) % 3 == 0 ? 1 : 0) + ((k) / 3 == 0 ? 2 : 0))

@@ -108,7 +108,7 @@ class BlenderDevice:
         for name, uniform in uniforms.items():  # which must outlive the dispatch
             shader.uniform_block(name, uniform)
         for name, kind in program.constants.items():
-            set_constant = shader.uniform_float if kind == "float" else shader.uniform_int
+            set_constant = shader.uniform_float if kind in ("float", "vec2") else shader.uniform_int
             set_constant(name, constants[name])
         gpu.compute.dispatch(shader, *program.groups(extent))  # which makes the next one wait for what this one stores
 

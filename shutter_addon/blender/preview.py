@@ -149,7 +149,7 @@ def _show(context, found: Shown, settings, say) -> None:
         _show_source(quad, found, moment, left)
     if draws_result:
         moment.prefetch()
-        texture = moment.renderer.draw(moment.index, moment.instant, moment.direction)
+        texture = moment.renderer.draw(moment.index, moment.instant, moment.direction, quick=True)
         quad.draw("show_picture", {"picture": texture}, left, 1.0, opacity=found.strip.blend_alpha)
     if settings.view == "SCRIBBLES":
         _show_scribbles(quad, found.effect, moment)

@@ -37,9 +37,9 @@ class Window:
 
 
 class Solver:
-    """compute.diffusion on NumPy, as its class Diffusion."""
+    """compute.diffusion as compute.diffusion_gpu's class Diffusion; it never starts from the last solution."""
 
-    def solve(self, labels: np.ndarray, count: int) -> np.ndarray:
+    def solve(self, labels: np.ndarray, count: int, *, warm: bool = False) -> np.ndarray:
         return diffuse(labels, count)
 
     def release(self) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core import compositor, shutters
 from ..core.instant import Instant, Options
-from .diffusion import Diffusion
+from .diffusion_gpu import Diffusion
 from .passes import LOCAL_ROW, Image, Pass
 from .tables import padded, table
 from .window import Frames, Sums, decoding, open_window

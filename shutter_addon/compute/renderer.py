@@ -44,16 +44,18 @@ class Renderer:
         with self.compositor.current():
             return self.compositor.read(self.draw(index, instant, direction))
 
-    def draw(self, index: int, instant: Instant, direction: int = 1):
+    def draw(self, index: int, instant: Instant, direction: int = 1, *, quick: bool = False):
         """The same on the device: a texture array rgba32f of one layer, bottom row first (with NumPy: as `picture`).
 
-        It stays until the next one of this renderer; the same picture is not composed twice.
+        It stays until the next one of this renderer; the same picture is not composed twice. quick: coefficients may
+        start from the last ones, where scribbles moved; the picture then depends a little on what was drawn before.
         """
         key = index, direction, instant.key
-        if self._drawn is None or self._drawn[0] != key:
+        if self._drawn is None or self._drawn[0] != key or not (quick or self._drawn[1]):
             with self.compositor.current():
-                self._drawn = key, self.compositor.draw(*self._parts(index, instant, direction))
-        return self._drawn[1]
+                picture = self.compositor.draw(*self._parts(index, instant, direction, quick))
+            self._drawn = key, not quick, picture
+        return self._drawn[2]
 
     def coefficients(self, instant: Instant) -> np.ndarray:
         """Coefficients (N, h, w) float32 at an instant, one per pixel or per block that shares a shutter."""
@@ -66,7 +68,7 @@ class Renderer:
 
     def drawn_coefficients(self, instant: Instant):
         """Coefficients on the device, which must be a GPU: (texture array rgba32f of four shutters a layer, top row
-        first; the pixels along each side of a texel; the number of shutters).
+        first; the pixels along each side of a texel; the number of shutters). They are those of a quick `draw`.
 
         The texture is one texel where they are the same everywhere. It stays until the next call of any method.
         """
@@ -74,7 +76,7 @@ class Renderer:
         with self.compositor.current():
             if (values := _uniform(labels, count)) is not None:
                 return self.compositor.constant(values), self._everywhere, count
-            return self._diffused(labels, count), instant.options.aggregate, count
+            return self._diffused(labels, count, quick=True), instant.options.aggregate, count
 
     def drawn_labels(self, instant: Instant):
         """Labels on the device, which must be a GPU: (texture array r16ui, top row first; the pixels along each side of
@@ -116,14 +118,14 @@ class Renderer:
         block = instant.options.aggregate
         return -(-self.source.width // block), -(-self.source.height // block)
 
-    def _parts(self, index: int, instant: Instant, direction: int):
+    def _parts(self, index: int, instant: Instant, direction: int, quick: bool):
         """What the compositor needs, its window loaded."""
-        handle, instant, block = self._coefficients(instant)
+        handle, instant, block = self._coefficients(instant, quick)
         window = self._window_for(instant.options.window)
         window.load(self.positions(index, direction, instant), instant.options)
         return window, index, direction, instant, handle, block
 
-    def _coefficients(self, instant: Instant):
+    def _coefficients(self, instant: Instant, quick: bool):
         """The coefficients on the device, the instant to compose with them, and the block that shares one.
 
         Where one mix of shutters holds for the whole picture, that mix is the only shutter.
@@ -131,15 +133,16 @@ class Renderer:
         labels = self.labels(instant)
         values = _uniform(labels, len(instant.bars))
         if values is None:
-            return self._diffused(labels, len(instant.bars)), instant, instant.options.aggregate
+            return self._diffused(labels, len(instant.bars), quick), instant, instant.options.aggregate
         chosen = int(values.argmax())
         return self.compositor.constant(np.ones(1)), instant.alone(chosen), self._everywhere
 
-    def _diffused(self, labels: np.ndarray, count: int):
-        """Solves anew only when a scribble moved."""
-        if self._solved is None or self._solved[0] != count or not np.array_equal(self._solved[1], labels):
-            self._solved = count, labels, self._solver.solve(labels, count)
-        return self._solved[2]
+    def _diffused(self, labels: np.ndarray, count: int, quick: bool = False):
+        """Solves anew only when a scribble moved, or where a quick solution stands and is not enough."""
+        same = self._solved and self._solved[0] == count and np.array_equal(self._solved[1], labels)
+        if not same or not (quick or self._solved[2]):
+            self._solved = count, labels, not quick, self._solver.solve(labels, count, warm=quick)
+        return self._solved[3]
 
     def _window_for(self, length: int):
         if self._window is None or self._window.capacity != length:

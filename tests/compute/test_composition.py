@@ -281,7 +281,7 @@ def test_no_new_solve_when_nothing_moved(device, monkeypatch):
     solves = []
     solver = type(device.solver())
     solve = solver.solve
-    monkeypatch.setattr(solver, "solve", lambda self, *a: solves.append(1) or solve(self, *a))
+    monkeypatch.setattr(solver, "solve", lambda self, *a, **k: solves.append(1) or solve(self, *a, **k))
     renderer, moment = Renderer(device, footage(rng)), instant(rng)
     first = renderer.picture(0, moment)
     assert np.array_equal(first, renderer.picture(0, moment))
@@ -418,6 +418,19 @@ def test_a_frame_that_cannot_be_read_spoils_no_other(device):
                 renderer.picture(index, moment)
     source.read = read
     assert np.array_equal(renderer.picture(7, moment), expected[7])
+
+
+def test_quick_pictures_leave_no_trace_in_others(device):
+    rng = np.random.default_rng(17)
+    source, moment, moved = footage(rng), instant(rng), instant(rng, shapes=SHAPES[1:])
+    renderer = Renderer(device, source)
+    expected = Renderer(device, source).picture(0, moment)
+    for other in (moved, moment, moved):
+        renderer.draw(0, other, quick=True)
+    with device.current():
+        quick = device.read(renderer.draw(0, moment, quick=True))
+    np.testing.assert_allclose(quick, expected, atol=0.1)
+    assert np.array_equal(renderer.picture(0, moment), expected)
 
 
 def test_two_effects_share_a_device(device):

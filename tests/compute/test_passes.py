@@ -4,10 +4,10 @@ import re
 
 import pytest
 
-from shutter_addon.compute import diffusion, gpu, window
+from shutter_addon.compute import diffusion_gpu, gpu, window
 from shutter_addon.compute.passes import SHADERS, Pass, body
 
-PASSES = [value for value in vars(diffusion).values() if isinstance(value, Pass)]
+PASSES = [value for value in vars(diffusion_gpu).values() if isinstance(value, Pass)]
 PASSES += [gpu.composition(way, 3, False, 1, 2, True, False) for way in ("pieces", "frames", "value")]
 PASSES += [gpu.composition(way, 3, True, 1, 2, True, False) for way in ("frames", "value")]
 PASSES += [
@@ -16,7 +16,7 @@ PASSES += [
 ]
 # Of what is declared inside the sources, whatever it is: variables, parameters, functions.
 DECLARED = re.compile(r"\b(?:bool|u?int|float|[biu]?vec[234])\s+(\w+)")
-BYTES = {"int": 4, "float": 4, "ivec2": 8}
+BYTES = {"int": 4, "float": 4, "ivec2": 8, "vec2": 8}
 
 
 @pytest.mark.parametrize("program", PASSES, ids=lambda program: program.name)
