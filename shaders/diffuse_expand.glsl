@@ -17,10 +17,10 @@ void main()
   }
   ivec2 a = p.xy / 2;
   ivec2 b = min(a + 1, coarse - 1);
-  vec4 value = texelFetch(coarser, ivec3(a, p.z), 0);
-  vec4 beside = texelFetch(coarser, ivec3(b.x, a.y, p.z), 0);
-  vec4 below = texelFetch(coarser, ivec3(a.x, b.y, p.z), 0);
-  vec4 across = texelFetch(coarser, ivec3(b, p.z), 0);
+  vec4 value = imageLoad(coarser, ivec3(a, p.z));
+  vec4 beside = imageLoad(coarser, ivec3(b.x, a.y, p.z));
+  vec4 below = imageLoad(coarser, ivec3(a.x, b.y, p.z));
+  vec4 across = imageLoad(coarser, ivec3(b, p.z));
   store(p, value);
   store(p + ivec3(1, 0, 0), 0.5 * (value + beside));
   store(p + ivec3(0, 1, 0), 0.5 * (value + below));

@@ -5,10 +5,10 @@
 // The four cells' values.
 mat4 values(ivec2 a, ivec2 b, vec2 bend, int layer)
 {
-  vec4 value = texelFetch(coarser, ivec3(a, layer), 0);
-  vec4 beside = mix(value, texelFetch(coarser, ivec3(b.x, a.y, layer), 0), bend.x);
-  vec4 below = texelFetch(coarser, ivec3(a.x, b.y, layer), 0);
-  vec4 across = mix(below, texelFetch(coarser, ivec3(b, layer), 0), bend.x);
+  vec4 value = imageLoad(coarser, ivec3(a, layer));
+  vec4 beside = mix(value, imageLoad(coarser, ivec3(b.x, a.y, layer)), bend.x);
+  vec4 below = imageLoad(coarser, ivec3(a.x, b.y, layer));
+  vec4 across = mix(below, imageLoad(coarser, ivec3(b, layer)), bend.x);
   return mat4(value, beside, mix(value, below, bend.y), mix(beside, across, bend.y));
 }
 

@@ -9,12 +9,12 @@ void main()
   }
   ivec2 a = p.xy / 2;
   ivec2 b = min(a + 1, coarse - 1);
-  mat4 around = amount * mat4(texelFetch(coarser, ivec3(a, p.z), 0), texelFetch(coarser, ivec3(b.x, a.y, p.z), 0),
-                            texelFetch(coarser, ivec3(a.x, b.y, p.z), 0), texelFetch(coarser, ivec3(b, p.z), 0));
+  mat4 around = amount * mat4(imageLoad(coarser, ivec3(a, p.z)), imageLoad(coarser, ivec3(b.x, a.y, p.z)),
+                            imageLoad(coarser, ivec3(a.x, b.y, p.z)), imageLoad(coarser, ivec3(b, p.z)));
   for (int k = 0; k < 4; k++) {
     ivec3 q = p + ivec3(k % 2, k / 2, 0);
     if (inside(q.xy, size)) {
-      imageStore(to, q, texelFetch(from, q, 0) + around * texelFetch(weights, ivec3(q.xy, 0), 0));
+      imageStore(to, q, imageLoad(from, q) + around * imageLoad(weights, ivec3(q.xy, 0)));
     }
   }
 }

@@ -9,9 +9,9 @@ void main()
     return;
   }
   // Entries of cells beyond the edge are zero.
-  vec4 before = texelFetch(stencil, ivec3(p.xy, 0), 0);
-  vec4 after = texelFetch(stencil, ivec3(p.xy, 1), 0);
+  vec4 before = imageLoad(stencil, ivec3(p.xy, 0));
+  vec4 after = imageLoad(stencil, ivec3(p.xy, 1));
   vec4 total = before.x * NEAR(-1, -1) + before.y * NEAR(0, -1) + before.z * NEAR(1, -1) + before.w * NEAR(-1, 0);
   total += after.x * NEAR(1, 0) + after.y * NEAR(-1, 1) + after.z * NEAR(0, 1) + after.w * NEAR(1, 1);
-  imageStore(solution, p, (texelFetch(right, p, 0) - total) * texelFetch(stencil, ivec3(p.xy, 2), 0).x);
+  imageStore(solution, p, (imageLoad(right, p) - total) * imageLoad(stencil, ivec3(p.xy, 2)).x);
 }

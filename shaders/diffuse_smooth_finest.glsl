@@ -5,7 +5,7 @@ void main()
 {
   ivec3 p = ivec3(corner(size) + in_fours() * ivec2(2, 1), gl_GlobalInvocationID.z);
   p.x += (p.y + colour) & 1;
-  if (!inside(p.xy, size) || texelFetch(labels, ivec3(p.xy, 0), 0).r > 0u) {
+  if (!inside(p.xy, size) || imageLoad(labels, ivec3(p.xy, 0)).r > 0u) {
     return;
   }
   // Beyond the frame's edge there is nothing: weight 0.

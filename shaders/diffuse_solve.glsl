@@ -13,8 +13,8 @@ void main()
       a[16 * i + j] = 0.0;
     }
     ivec2 p = ivec2(i % size.x, i / size.x);
-    vec4 before = texelFetch(stencil, ivec3(p, 0), 0);
-    vec4 after = texelFetch(stencil, ivec3(p, 1), 0);
+    vec4 before = imageLoad(stencil, ivec3(p, 0));
+    vec4 after = imageLoad(stencil, ivec3(p, 1));
     // Entries of cells beyond the edge are zero: added to the cell itself they change nothing.
     for (int k = 0; k < 4; k++) {
       ivec2 q = clamp(p + ivec2(k % 3, k / 3) - 1, ivec2(0), size - 1);
@@ -22,8 +22,8 @@ void main()
       q = clamp(p + ivec2((k + 5) % 3, (k + 5) / 3) - 1, ivec2(0), size - 1);
       a[16 * i + q.y * size.x + q.x] += after[k];
     }
-    a[17 * i] += texelFetch(stencil, ivec3(p, 2), 0).y;
-    x[i] = texelFetch(right, ivec3(p, layer), 0);
+    a[17 * i] += imageLoad(stencil, ivec3(p, 2)).y;
+    x[i] = imageLoad(right, ivec3(p, layer));
   }
   for (int k = 0; k < count; k++) {
     for (int i = k + 1; i < count; i++) {

@@ -7,7 +7,7 @@ void main()
   if (!inside(p.xy, size)) {
     return;
   }
-  int label = int(texelFetch(labels, ivec3(p.xy, 0), 0).r);
+  int label = int(imageLoad(labels, ivec3(p.xy, 0)).r);
   vec4 value = vec4(equal(ivec4(label - 1 - 4 * p.z), ivec4(0, 1, 2, 3)));
   imageStore(own, p, value);
   if (label > 0 || warm == 0) {

@@ -8,9 +8,9 @@ void couplings(ivec2 i, out float c[9], out float diagonal)
     c[k] = 0.0;
   }
   if (inside(i, size)) {
-    vec4 before = texelFetch(stencil, ivec3(i, 0), 0);
-    vec4 after = texelFetch(stencil, ivec3(i, 1), 0);
-    diagonal = texelFetch(stencil, ivec3(i, 2), 0).y;
+    vec4 before = imageLoad(stencil, ivec3(i, 0));
+    vec4 after = imageLoad(stencil, ivec3(i, 1));
+    diagonal = imageLoad(stencil, ivec3(i, 2)).y;
     for (int k = 0; k < 4; k++) {
       c[k] = -before[k];
       c[k + 5] = -after[k];

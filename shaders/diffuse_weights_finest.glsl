@@ -3,7 +3,7 @@
 
 bool is_free(ivec2 i)
 {
-  return inside(i, size) && texelFetch(labels, ivec3(i, 0), 0).r == 0u;
+  return inside(i, size) && imageLoad(labels, ivec3(i, 0)).r == 0u;
 }
 
 void couplings(ivec2 i, out float c[9], out float diagonal)

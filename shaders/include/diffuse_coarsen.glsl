@@ -17,13 +17,13 @@ void main()
   for (int k = 0; k < 9; k++) {
     ivec2 i = 2 * p + OFFSET(k);
     if (inside(i, size)) {
-      add_row(i, 5 * (k / 3 + 1) + k % 3 + 1, texelFetch(weights, ivec3(i, 0), 0)[TAKES(k)], product);
+      add_row(i, 5 * (k / 3 + 1) + k % 3 + 1, imageLoad(weights, ivec3(i, 0))[TAKES(k)], product);
     }
   }
   for (int n = 0; n < 25; n++) {
     ivec2 j = 2 * p + ivec2(n % 5, n / 5) - 2;
     if (inside(j, size)) {
-      vec4 value = product[n] * texelFetch(weights, ivec3(j, 0), 0);
+      vec4 value = product[n] * imageLoad(weights, ivec3(j, 0));
       int a = n % 5 / 2;
       int b = (n % 5 + 1) / 2;
       int above = 3 * (n / 5 / 2);

@@ -8,13 +8,13 @@ void main()
   }
   vec4 near[25];
   for (int n = 0; n < 25; n++) {
-    near[n] = texelFetch(own, ivec3(clamp(2 * p.xy + ivec2(n % 5, n / 5) - 2, ivec2(0), size - 1), p.z), 0);
+    near[n] = imageLoad(own, ivec3(clamp(2 * p.xy + ivec2(n % 5, n / 5) - 2, ivec2(0), size - 1), p.z));
   }
   vec4 total = vec4(0.0);
   for (int k = 0; k < 9; k++) {
     ivec3 i = ivec3(2 * p.xy + OFFSET(k), p.z);
     if (inside(i.xy, size)) {
-      total += texelFetch(weights, ivec3(i.xy, 0), 0)[TAKES(k)] * missing(i, near, 5 * (k / 3 + 1) + k % 3 + 1);
+      total += imageLoad(weights, ivec3(i.xy, 0))[TAKES(k)] * missing(i, near, 5 * (k / 3 + 1) + k % 3 + 1);
     }
   }
   imageStore(next, p, total);

@@ -40,52 +40,37 @@ HOLD = 0.3
 NOTHING = 1 / 4096
 _COLOURS = ((0, 0), (1, 1), (0, 1), (1, 0))
 
-_SAMPLER = "sampler2DArray"
-_TILES = {"tiles": _SAMPLER}
-_LABELS = {"tiles": _SAMPLER, "labels": "usampler2DArray"}
-_STENCIL = {"tiles": _SAMPLER, "stencil": _SAMPLER}
+_READ = Image("rgba32f", reads=True, writes=False)
 _STORED = Image("rgba32f")
 _CHANGED = Image("rgba32f", reads=True)
+_TILES = {"tiles": Image("r32f", reads=True, writes=False)}
+_LABELS = {"labels": Image("r16ui", reads=True, writes=False)}
 _GRID = {"first": "int", "last": "int", "size": "ivec2"}
 _GRIDS = {**_GRID, "coarse": "ivec2"}
 
-_START = Pass("diffuse_start", _LABELS, {"solution": _STORED, "own": _STORED}, {**_GRID, "warm": "int"})
-_CLEAR = Pass(
-    "diffuse_clear",
-    {**_TILES, "finer": _SAMPLER},
-    {"solution": _STORED, "own": _STORED, "right": _STORED},
-    {**_GRID, "warm": "int"},
+
+def _pass(name: str, reads: tuple[str, ...], images: dict[str, Image], constants: dict[str, str]) -> Pass:
+    """A pass over tiles. All textures are images: a software renderer's texelFetch takes far longer."""
+    return Pass(f"diffuse_{name}", images={**_TILES, **dict.fromkeys(reads, _READ), **images}, constants=constants)
+
+
+_START = _pass("start", (), {**_LABELS, "solution": _STORED, "own": _STORED}, {**_GRID, "warm": "int"})
+_CLEAR = _pass("clear", ("finer",), dict.fromkeys(("solution", "own", "right"), _STORED), {**_GRID, "warm": "int"})
+_WEIGHTS_FINEST = _pass("weights_finest", (), {**_LABELS, "weights": _STORED}, {**_GRID, "hold": "float"})
+_WEIGHTS = _pass("weights", ("stencil",), {"weights": _STORED}, {**_GRID, "hold": "float"})
+_COARSEN_FINEST = _pass("coarsen_finest", ("weights",), {"next": _STORED}, _GRIDS)
+_COARSEN = _pass("coarsen", ("stencil", "weights"), {"next": _STORED}, _GRIDS)
+_SMOOTH_FINEST = _pass("smooth_finest", (), {**_LABELS, "solution": _CHANGED}, {**_GRID, "colour": "int"})
+_SMOOTH = _pass("smooth", ("stencil", "right"), {"solution": _CHANGED}, {**_GRID, "colour": "ivec2"})
+_PROLONG = _pass("prolong", ("from", "coarser", "weights"), {"to": _STORED}, {**_GRIDS, "amount": "float"})
+_RESTRICT_FINEST = _pass("restrict_finest", ("own", "weights"), {"next": _STORED}, _GRIDS)
+_RESTRICT = _pass("restrict", ("stencil", "own", "weights", "right"), {"next": _STORED}, _GRIDS)
+_SOLVE = Pass(
+    "diffuse_solve", images={"stencil": _READ, "right": _READ, "solution": _STORED}, constants={"size": "ivec2"}
 )
-_WEIGHTS_FINEST = Pass("diffuse_weights_finest", _LABELS, {"weights": _STORED}, {**_GRID, "hold": "float"})
-_WEIGHTS = Pass("diffuse_weights", _STENCIL, {"weights": _STORED}, {**_GRID, "hold": "float"})
-_COARSEN_FINEST = Pass("diffuse_coarsen_finest", {**_TILES, "weights": _SAMPLER}, {"next": _STORED}, _GRIDS)
-_COARSEN = Pass("diffuse_coarsen", {**_STENCIL, "weights": _SAMPLER}, {"next": _STORED}, _GRIDS)
-_SMOOTH_FINEST = Pass("diffuse_smooth_finest", _LABELS, {"solution": _CHANGED}, {**_GRID, "colour": "int"})
-_SMOOTH = Pass("diffuse_smooth", {**_STENCIL, "right": _SAMPLER}, {"solution": _CHANGED}, {**_GRID, "colour": "ivec2"})
-_PROLONG = Pass(
-    "diffuse_prolong",
-    {**_TILES, "from": _SAMPLER, "coarser": _SAMPLER, "weights": _SAMPLER},
-    {"to": _STORED},
-    {**_GRIDS, "amount": "float"},
-)
-_RESTRICT_FINEST = Pass(
-    "diffuse_restrict_finest", {**_TILES, "own": _SAMPLER, "weights": _SAMPLER}, {"next": _STORED}, _GRIDS
-)
-_RESTRICT = Pass(
-    "diffuse_restrict",
-    {**_STENCIL, "own": _SAMPLER, "weights": _SAMPLER, "right": _SAMPLER},
-    {"next": _STORED},
-    _GRIDS,
-)
-_SOLVE = Pass("diffuse_solve", {"stencil": _SAMPLER, "right": _SAMPLER}, {"solution": _STORED}, {"size": "ivec2"})
-_FINISH = Pass("diffuse_finish", _TILES, {"solution": _CHANGED}, {**_GRID, "layers": "int", "nothing": "float"})
-_EXPAND = Pass("diffuse_expand", {**_TILES, "coarser": _SAMPLER}, {"solution": _STORED}, _GRIDS)
-_EXPAND_RIM = Pass(
-    "diffuse_expand_rim",
-    {**_TILES, "coarser": _SAMPLER},
-    {"solution": _STORED},
-    {**_GRIDS, "layers": "int", "beyond": "vec2"},
-)
+_FINISH = _pass("finish", (), {"solution": _CHANGED}, {**_GRID, "layers": "int", "nothing": "float"})
+_EXPAND = _pass("expand", ("coarser",), {"solution": _STORED}, _GRIDS)
+_EXPAND_RIM = _pass("expand_rim", ("coarser",), {"solution": _STORED}, {**_GRIDS, "layers": "int", "beyond": "vec2"})
 
 
 class _Grid:
@@ -165,8 +150,7 @@ class Diffusion:
 
     def _list_tiles(self, labels: np.ndarray) -> None:
         """For every grid: what tiles have cells of their own, and whose operator and values are to be made anew."""
-        fixed = labels != 0
-        held, free = _in_fours(fixed), _in_fours(~fixed)
+        held, free = _in_fours(labels != 0)
         listed, end = [], 0
         for grid in self._grids:
             touched = _grown(held)
@@ -279,23 +263,24 @@ class Diffusion:
         own = {"size": grid.size, "layers": grid.layers, "first": first, "last": last, "tiles": self._tiles}
         given = {**own, **grid.textures, **extra}
         # Tiles of four invocations go two to a row.
-        rows = -(-(last - first) // 2) if "weights" in program.images else last - first
+        rows = -(-(last - first) // 2) if program in (_WEIGHTS, _WEIGHTS_FINEST) else last - first
         self._device.run(
             program,
             (cells, rows, layers),
-            textures={name: given[name] for name in program.samplers},
             images={name: given[name] for name in program.images},
             **{name: given[name] for name in program.constants},
         )
 
 
-def _in_fours(cells: np.ndarray) -> np.ndarray:
-    """Which tiles (rows, columns) of 4 × 4 have any of the cells (H, W) bool."""
-    height, width = cells.shape
-    padded = np.zeros((-(-height // 4) * 4, -(-width // 4) * 4), bool)
-    padded[:height, :width] = cells
-    fours = padded.view(np.uint32)  # a row of a tile at once
-    return (fours[0::4] | fours[1::4] | fours[2::4] | fours[3::4]) != 0
+def _in_fours(fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which tiles (rows, columns) of 4 × 4 have any fixed cells of (H, W) bool, and which have any free ones."""
+    height, width = fixed.shape
+    if height % 4 or width % 4:
+        fixed = np.pad(fixed, ((0, -height % 4), (0, -width % 4)), mode="edge")
+    fours = np.ascontiguousarray(fixed).view(np.uint32)  # a row of a tile at once
+    any_of = fours[0::4] | fours[1::4] | fours[2::4] | fours[3::4]
+    all_of = fours[0::4] & fours[1::4] & fours[2::4] & fours[3::4]
+    return any_of != 0, all_of != 0x01010101
 
 
 def _codes(rows: int, columns: int, fours: int) -> np.ndarray:
@@ -315,15 +300,19 @@ def _last_ones(grid: _Grid) -> np.ndarray:
 def _grown(tiles: np.ndarray, times: int = 1) -> np.ndarray:
     """Tiles (rows, columns) bool and those around them."""
     for _ in range(times):
-        padded = np.pad(tiles, 1)
-        rows = padded[:-2] | padded[1:-1] | padded[2:]
-        tiles = rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:]
+        rows = tiles.copy()
+        rows[1:] |= tiles[:-1]
+        rows[:-1] |= tiles[1:]
+        tiles = rows.copy()
+        tiles[:, 1:] |= rows[:, :-1]
+        tiles[:, :-1] |= rows[:, 1:]
     return tiles
 
 
 def _halved(tiles: np.ndarray) -> np.ndarray:
     """The tiles of the coarser grid that any of these lie in."""
     height, width = tiles.shape
-    padded = np.pad(tiles, ((0, height % 2), (0, width % 2)))
-    rows = padded[::2] | padded[1::2]
+    if height % 2 or width % 2:
+        tiles = np.pad(tiles, ((0, height % 2), (0, width % 2)))
+    rows = tiles[::2] | tiles[1::2]
     return rows[:, ::2] | rows[:, 1::2]

@@ -114,8 +114,9 @@ class GLDevice:
         """Runs a pass over `extent` invocations (x, y[, z]); textures, images and blocks (contiguous
         float32 arrays (length, 4)) by name, constants by keyword."""
         if program not in self._programs:
-            self._programs[program] = self._context.compute_shader(source(program))
-        shader = self._programs[program]
+            shader = self._context.compute_shader(source(program))
+            self._programs[program] = shader, {name: shader[name] for name in shader}
+        shader, used = self._programs[program]
         for unit, name in enumerate(program.samplers):
             textures[name].use(unit)
         for unit, (name, image) in enumerate(program.images.items()):
@@ -123,8 +124,8 @@ class GLDevice:
         for unit, name in enumerate(program.blocks):
             self._block(unit, blocks[name])
         for name, value in constants.items():
-            if name in shader:  # the compiler drops what a source does not use
-                shader[name] = value
+            if name in used:  # the compiler drops what a source does not use
+                used[name].value = value
         shader.run(*program.groups(extent))
         self._context.memory_barrier()
 
