@@ -2,7 +2,7 @@
 
     python scripts/benchmark.py --json FILE [--sizes 1920x1080,3840x2160] [--shutters 2,3,4] … [--table]
 
-Needs Python 3.11, NumPy and moderngl alone. Passes:
+Needs Python 3.11, NumPy and moderngl alone; --device cpu measures what NumPy composes, beside the average. Passes:
 compose: a picture from a window on the device; accumulate: the next frame into the window (average: its upload alone);
 diffuse: coefficients from new labels; readback: the picture to the host; frame: accumulate, compose and readback.
 Methods: ours; paper: its Appendix A with search bounds (scripts/benchmark/appendix_a.glsl); average: the plain mean of
@@ -19,6 +19,7 @@ import json
 import statistics
 import sys
 import time
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,7 +27,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from shutter_addon.compute import diffusion
+from shutter_addon.compute import cpu, diffusion
 from shutter_addon.compute.gl import GLDevice
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.passes import LOCAL_ROW, Image, Pass
@@ -96,20 +97,22 @@ class Case:
 
     def __post_init__(self):
         count, block = len(self.instant.bars), self.instant.options.aggregate
-        self.compositor = GPUCompositor(self.device)
-        options = self.instant.options
-        self.window = self.compositor.window(self.source, options.window)
-        # What the other methods read.
-        plain = isinstance(self.window, Frames)
-        self.frames = self.window if plain else Frames(self.device, self.source, options.window)
+        self._open(self.instant.options.window)
         self.labels = scribbles.rasterise(
             self.instant.shapes, -(-self.source.width // block), -(-self.source.height // block)
         )
         self.solver = self.compositor.solver()
         self.handle = self.solver.solve(self.labels, count)
         self.coefficients = self.compositor.coefficients(self.handle, count)
+
+    def _open(self, window: int) -> None:
+        self.compositor = GPUCompositor(self.device)
+        self.window = self.compositor.window(self.source, window)
+        # What the other methods read.
+        plain = isinstance(self.window, Frames)
+        self.frames = self.window if plain else Frames(self.device, self.source, window)
         accumulations = np.stack([shutters.accumulation(b) for b in self.instant.bars])
-        self.sums = self.device.texture(accumulations.shape[1], count, 1, "r32f")
+        self.sums = self.device.texture(accumulations.shape[1], len(accumulations), 1, "r32f")
         self.device.write(self.sums, np.ascontiguousarray(accumulations[..., None], dtype=np.float32))
 
     @property
@@ -149,7 +152,7 @@ class Case:
         self.solver.solve(self.labels, len(self.instant.bars))
 
     def readback(self, method: str) -> np.ndarray:
-        return self.device.read(self.window.picture)
+        return self.compositor.read(self.window.picture)
 
     def frame(self, method: str) -> None:
         self.accumulate(method)
@@ -166,7 +169,7 @@ class Case:
             self.compose(method)
         rng = np.random.default_rng(self.index)
         y, x = rng.integers(0, self.source.height, pixels), rng.integers(0, self.source.width, pixels)
-        picture = self.compositor.read(self.window.picture)[y, x, :3].astype(np.float64)
+        picture = self.readback(method)[y, x, :3].astype(np.float64)
         expected = self._reference(y, x, method)
         return float(np.abs(light.to_encoded(picture) - light.to_encoded(expected)).max() * 255)
 
@@ -206,6 +209,46 @@ class Case:
             texture.release()
 
 
+class Host:
+    """NumPy in place of a device."""
+
+    name = "NumPy"
+    current = staticmethod(nullcontext)
+
+    def finish(self) -> None:
+        pass
+
+
+class HostCase(Case):
+    """The same with NumPy."""
+
+    def _open(self, window: int) -> None:
+        self.compositor = cpu.CPUCompositor()
+        self.window = self.compositor.window(self.source, window)
+        self.frames = cpu.Frames(self.source, window)
+
+    def compose(self, method: str) -> None:
+        if method == "ours":
+            block = self.instant.options.aggregate
+            self.picture = self.compositor.draw(self.window, self.index, 1, self.instant, self.handle, block)
+            return
+        encoded = self.instant.options.light == "encoded"
+        values = np.arange(256, dtype=np.float32) / np.float32(255)
+        curve = values if encoded else light.to_linear(values)
+        total = np.zeros((self.source.height, self.source.width, 3), dtype=np.float32)
+        for frame in self.frames.frames.values():
+            total += curve.take(frame[..., :3])
+        total /= len(self._wanted)
+        self.picture = light.to_linear(total) if encoded else total
+
+    def readback(self, method: str) -> np.ndarray:
+        return self.picture
+
+    def release(self) -> None:
+        self.window.release()
+        self.frames.release()
+
+
 def _program(name: str, samplers, instant: Instant, **defines) -> Pass:
     return Pass(
         str(HERE / name),
@@ -230,6 +273,8 @@ def jobs(case: Case, passes, methods):
     """(pass, method) of what is measured in a case."""
     for name, method in itertools.product(passes, methods):
         has = {"ours": PASSES, "paper": ("compose",), "average": ("compose", "accumulate", "frame")}
+        if isinstance(case, HostCase):
+            has |= {"ours": [p for p in PASSES if p != "readback"], "paper": ()}
         if name in has[method] and (method != "average" or case.instant.options.aggregate == 1):
             yield name, method
 
@@ -271,7 +316,8 @@ def timed(case: Case, name: str, method: str) -> float:
 
 
 def run(args) -> list[dict]:
-    device, rows = GLDevice(), []
+    device, made_for = (Host(), HostCase) if args.device == "cpu" else (GLDevice(), Case)
+    rows = []
     with device.current():
         for width, height in args.sizes:
             source = Noise(width, height)
@@ -280,7 +326,7 @@ def run(args) -> list[dict]:
             ):
                 options = Options(window, light=args.light, aggregate=block)
                 instant = Instant(options, bars(kind, count, window), shapes(count))
-                case = Case(device, source, instant, kind, shared=args.sums == "shared")
+                case = made_for(device, source, instant, kind, shared=args.sums == "shared")
                 made = measure(case, args)
                 case.release()
                 for row in made:
@@ -340,6 +386,7 @@ def parse(arguments=None):
     add("--methods", type=listed(str, METHODS), default=",".join(METHODS))
     add("--passes", type=listed(str, PASSES), default=",".join(PASSES))
     add("--aggregates", type=listed(int, (1, 2, 4)), default="1,2")
+    add("--device", choices=("gpu", "cpu"), default="gpu")
     add("--light", choices=("linear", "encoded"), default="linear")
     add("--sums", choices=("shared", "texture"), default="shared", help="where Appendix A has its S")
     add("--repeats", type=int, default=5)
