@@ -2,7 +2,7 @@
 
     python scripts/benchmark.py --json FILE [--sizes 1920x1080,3840x2160] [--shutters 2,3,4] … [--table]
 
-Needs Python 3.11, NumPy and moderngl alone. Passes:
+Needs Python 3.11, NumPy and moderngl alone; --device cpu measures what NumPy composes, beside the average. Passes:
 compose: a picture from a window on the device; accumulate: the next frame into the window (average: its upload alone);
 diffuse: coefficients from new labels; diffuse_moved: the same, from the solution for scribbles a few pixels away;
 readback: the picture to the host; frame: accumulate, compose and readback;
@@ -22,6 +22,7 @@ import json
 import statistics
 import sys
 import time
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,7 +30,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from shutter_addon.compute import diffusion_gpu, gpu
+from shutter_addon.compute import cpu, diffusion, diffusion_gpu, gpu
 from shutter_addon.compute.gl import GLDevice
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.passes import LOCAL_ROW, Image, Pass
@@ -92,7 +93,7 @@ def shapes(count: int) -> tuple:
 class Case:
     """One configuration on the device. `index`: the source frame that is composed; what slides the window moves it."""
 
-    device: GLDevice
+    device: Device
     source: Noise
     instant: Instant
     kind: str
@@ -101,19 +102,21 @@ class Case:
 
     def __post_init__(self):
         count, block = len(self.instant.bars), self.instant.options.aggregate
-        self.compositor = GPUCompositor(self.device)
-        options = self.instant.options
-        self.window = self.compositor.window(self.source, options.window)
-        # What the other methods read.
-        plain = isinstance(self.window, Frames)
-        self.frames = self.window if plain else Frames(self.device, self.source, options.window)
+        self._open(self.instant.options.window)
         width, height = -(-self.source.width // block), -(-self.source.height // block)
         self.labels = scribbles.rasterise(self.instant.shapes, width, height)
         self.moved = np.roll(self.labels, max(1, width // 640), axis=(0, 1))  # three pixels of 1920
         self.solver = self.compositor.solver()
         self.handle = self.solver.solve(self.labels, count)
+
+    def _open(self, window: int) -> None:
+        self.compositor = GPUCompositor(self.device)
+        self.window = self.compositor.window(self.source, window)
+        # What the other methods read.
+        plain = isinstance(self.window, Frames)
+        self.frames = self.window if plain else Frames(self.device, self.source, window)
         accumulations = np.stack([shutters.accumulation(b) for b in self.instant.bars])
-        self.sums = self.device.texture(accumulations.shape[1], count, 1, "r32f")
+        self.sums = self.device.texture(accumulations.shape[1], len(accumulations), 1, "r32f")
         self.device.write(self.sums, np.ascontiguousarray(accumulations[..., None], dtype=np.float32))
 
     @property
@@ -150,14 +153,14 @@ class Case:
         self.load(self.window if method == "ours" else self.frames)
 
     def diffuse(self, method: str) -> None:
-        self.solver.solve(self.labels, len(self.instant.bars))
+        self.handle = self.solver.solve(self.labels, len(self.instant.bars))
 
     def diffuse_moved(self, method: str) -> None:
         self.labels, self.moved = self.moved, self.labels
         self.solver.solve(self.labels, len(self.instant.bars), warm=True)
 
     def readback(self, method: str) -> np.ndarray:
-        return self.device.read(self.window.picture)
+        return self.compositor.read(self.window.picture)
 
     def frame(self, method: str) -> None:
         self.accumulate(method)
@@ -191,7 +194,7 @@ class Case:
             self.compose(method)
         rng = np.random.default_rng(self.index)
         y, x = rng.integers(0, self.source.height, pixels), rng.integers(0, self.source.width, pixels)
-        picture = self.compositor.read(self.window.picture)[y, x, :3].astype(np.float64)
+        picture = self.readback(method)[y, x, :3].astype(np.float64)
         expected = self._reference(y, x, method)
         return float(np.abs(light.to_encoded(picture) - light.to_encoded(expected)).max() * 255)
 
@@ -234,20 +237,83 @@ class Case:
             texture.release()
 
 
-def copied(device: GLDevice) -> dict:
+class Device(GLDevice):
+    """A device that copies as well."""
+
+    def copier(self, data: bytes):
+        """What copies `data` on the device, and what reads the copy."""
+        source, target = self._context.buffer(data), self._context.buffer(reserve=len(data))
+        return lambda: self._context.copy_buffer(target, source), target.read
+
+
+class Host:
+    """NumPy in place of a device."""
+
+    name = "NumPy"
+    current = staticmethod(nullcontext)
+
+    def finish(self) -> None:
+        pass
+
+    def copier(self, data: bytes):
+        source, target = np.frombuffer(data, np.uint8), np.empty(len(data), np.uint8)
+        return lambda: np.copyto(target, source), lambda: target
+
+
+class HostCase(Case):
+    """The same with NumPy."""
+
+    def _open(self, window: int) -> None:
+        self.compositor = cpu.CPUCompositor()
+        self.window = self.compositor.window(self.source, window)
+        self.frames = cpu.Frames(self.source, window)
+
+    def compose(self, method: str) -> None:
+        if method == "ours":
+            block = self.instant.options.aggregate
+            self.picture = self.compositor.draw(self.window, self.index, 1, self.instant, self.handle, block)
+            return
+        encoded = self.instant.options.light == "encoded"
+        values = np.arange(256, dtype=np.float32) / np.float32(255)
+        curve = values if encoded else light.to_linear(values)
+        total = np.zeros((self.source.height, self.source.width, 3), dtype=np.float32)
+        for frame in self.frames.frames.values():
+            total += curve.take(frame[..., :3])
+        total /= len(self._wanted)
+        self.picture = light.to_linear(total) if encoded else total
+
+    def readback(self, method: str) -> np.ndarray:
+        return self.picture
+
+    def must_move(self, name: str, method: str) -> None:
+        return None
+
+    def _diffusion_error(self) -> float:
+        usual, count = diffusion.CYCLES, len(self.instant.bars)
+        try:
+            diffusion.CYCLES = 12
+            expected = self.solver.solve(self.labels, count)
+        finally:
+            diffusion.CYCLES = usual
+        return float(np.abs(self.handle - expected).max() * 255)
+
+    def release(self) -> None:
+        self.window.release()
+        self.frames.release()
+
+
+def copied(device) -> dict:
     """The row of the copy."""
-    context = device._context
     data = np.random.default_rng(0).bytes(COPIED)
-    source, target, times = context.buffer(data), context.buffer(reserve=COPIED), []
+    copy, result = device.copier(data)
+    times = []
     for _ in range(7):
         device.finish()
         start = time.perf_counter()
-        context.copy_buffer(target, source)
+        copy()
         device.finish()
         times.append(time.perf_counter() - start)
-    error = float(target.read() != data)
-    source.release()
-    target.release()
+    error = float(bytes(result()) != data)
     nothing = dict.fromkeys(("width", "height", "shutters", "window", "aggregate"), 0)
     ms = statistics.median(times[1:]) * 1e9 / (2 * COPIED) * 1000
     return {"pass": "copy", "method": "ours", "bars": "", **nothing, "device": device.name, "ms": ms, "error": error}
@@ -277,6 +343,8 @@ def jobs(case: Case, passes, methods):
     """(pass, method) of what is measured in a case."""
     for name, method in itertools.product(passes, methods):
         has = {"ours": PASSES, "paper": ("compose",), "average": ("compose", "accumulate", "frame")}
+        if isinstance(case, HostCase):
+            has |= {"ours": [p for p in PASSES if p not in ("diffuse_moved", "readback")], "paper": ()}
         if name in has[method] and (method != "average" or case.instant.options.aggregate == 1):
             yield name, method
 
@@ -319,7 +387,7 @@ def timed(case: Case, name: str, method: str) -> float:
 
 
 def run(args) -> list[dict]:
-    device = GLDevice()
+    device, made_for = (Host(), HostCase) if args.device == "cpu" else (Device(), Case)
     with device.current():
         rows = [copied(device)]
         print(f"copy: {1e3 / rows[0]['ms']:.1f} GB/s", flush=True)
@@ -330,7 +398,7 @@ def run(args) -> list[dict]:
             ):
                 options = Options(window, light=args.light, aggregate=block)
                 instant = Instant(options, bars(kind, count, window), shapes(count))
-                case = Case(device, source, instant, kind, shared=args.sums == "shared")
+                case = made_for(device, source, instant, kind, shared=args.sums == "shared")
                 made = measure(case, args)
                 case.release()
                 for row, moved in made:
@@ -392,6 +460,7 @@ def parse(arguments=None):
     add("--methods", type=listed(str, METHODS), default=",".join(METHODS))
     add("--passes", type=listed(str, PASSES), default=",".join(PASSES))
     add("--aggregates", type=listed(int, (1, 2, 4)), default="1,2")
+    add("--device", choices=("gpu", "cpu"), default="gpu")
     add("--light", choices=("linear", "encoded"), default="linear")
     add("--sums", choices=("shared", "texture"), default="shared", help="where Appendix A has its S")
     add("--repeats", type=int, default=5)

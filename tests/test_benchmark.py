@@ -57,3 +57,18 @@ def test_table(ran):
     _, printed = ran
     assert "45×27, random bars" in printed
     assert "| N\\T | ours T=8 | paper T=8 | average T=8 | ours 2×2 T=8 | paper 2×2 T=8 |" in printed
+
+
+def test_numpy(tmp_path):
+    file = tmp_path / "rows.json"
+    options = "--device cpu --sizes 45x27 --shutters 3 --windows 8 --repeats 1 --pixels 300"
+    subprocess.run(
+        [sys.executable, "-c", ALONE, "scripts/benchmark.py", "--json", str(file), *options.split()], cwd=ROOT
+    )
+    rows = json.loads(file.read_text())
+    assert {row["device"] for row in rows} == {"NumPy"}
+    assert {(row["pass"], row["method"]) for row in rows} == {
+        *((name, "ours") for name in ("copy", "compose", "accumulate", "diffuse", "frame")),
+        *((name, "average") for name in ("compose", "accumulate", "frame")),
+    }
+    assert all(row["error"] <= ALLOWED[row["method"]] for row in rows)

@@ -10,6 +10,7 @@ from ..core import compositor, light
 from ..core.instant import Options
 from .errors import NoDeviceError
 from .passes import LOCAL_ROW, Image, Pass
+from .running import Running
 
 # A layered texture over 2 GiB reads wrongly on Mesa's software renderer, without any error.
 BAND_BYTES = 1 << 30
@@ -156,22 +157,15 @@ def accumulation(decode: int, again: bool, back: bool) -> Pass:
     )
 
 
-class Sums(Window):
-    """Running sums of opaque 8-bit frames along time, in the light that is summed (Options.light).
-
-    The layer of position p, p mod `layers`, holds the sum of the frames before p: positions `start` to `stop`, both
-    included. Positions beyond the clip's ends count as well, with the frames that its edges show there. A window that
-    moves on, or back, adds one layer a frame.
-    """
+class Sums(Running, Window):
+    """Running sums of opaque 8-bit frames."""
 
     def __init__(self, device, source, capacity: int):
-        super().__init__(device, source, capacity)
-        self.layers = capacity + 1
+        Window.__init__(self, device, source, capacity)
+        Running.__init__(self, source, capacity)
         # Three fields of 21 bits: as many of them for white as leave room for the sum of a whole window.
         self.whole = (1 << min(16, 21 - (capacity - 1).bit_length())) - 1
-        self.start = self.stop = 0
-        self._frames: dict[int, int] = {}  # position: source frame
-        self._options = self._sent = None
+        self._sent = None
         self._allocate("rg32ui", 8)
         try:
             self._sent = device.texture(source.width, source.height, 1, "rgba8")
@@ -179,46 +173,7 @@ class Sums(Window):
             self.release()
             raise
 
-    @property
-    def held(self):
-        """The source frames that are summed."""
-        return self._frames.values()
-
-    def load(self, positions: np.ndarray, options: Options) -> None:
-        """As Frames.load."""
-        first, last = int(positions.min()), int(positions.max()) + 1
-        frames = compositor.source_frames(options, np.arange(first, last), self.source.count).tolist()
-        if not self._continues(first, frames, options):
-            self._options, self._frames = options, {}
-            self.start = self.stop = first
-        while self.stop < last:
-            self._keep(max(self.start, self.stop + 1 - self.capacity), self.stop)
-            self._add(frames[self.stop - first], self.stop, self.stop + 1)
-            self.stop += 1
-        while self.start > first:
-            self._keep(self.start, min(self.stop, self.start - 1 + self.capacity))
-            self._add(frames[self.start - 1 - first], self.start, self.start - 1)
-            self.start -= 1
-
-    def _continues(self, first: int, frames: list[int], options: Options) -> bool:
-        """Whether what is held touches the wanted frames, and agrees with them."""
-        last = first + len(frames)
-        overlap = range(max(first, self.start), min(last, self.stop))
-        return (
-            self._options is not None
-            and self._options.light == options.light
-            and first <= self.stop
-            and self.start <= last
-            and all(self._frames[position] == frames[position - first] for position in overlap)
-        )
-
-    def _keep(self, start: int, stop: int) -> None:
-        self.start, self.stop = start, stop
-        self._frames = {position: frame for position, frame in self._frames.items() if start <= position < stop}
-
-    def _add(self, frame: int, known: int, next_: int) -> None:
-        """The sum at position next_ from the one at `known`, its neighbour, and the frame between them."""
-        same = next((position for position, held in self._frames.items() if held == frame), None)
+    def _add(self, frame: int, same: int | None, known: int, next_: int) -> None:
         program = accumulation(decoding(self.source.transfer, self._options), same is not None, next_ < known)
         given = {"known": known % self.layers, "next": next_ % self.layers}
         if same is None:
@@ -229,10 +184,9 @@ class Sums(Window):
         for top, height, sums in self.bands():
             size = self.source.width, height
             self.device.run(program, size, images={"sums": sums}, size=size, top=top, **given)
-        self._frames[min(known, next_)] = frame
 
     def release(self) -> None:
-        super().release()
+        Running.release(self)
+        Window.release(self)
         if self._sent is not None:
             self._sent.release()
-        self._frames = {}

@@ -1,0 +1,96 @@
+"""How close pictures come whose blocks of pixels share a shutter to those whose pixels each have their own.
+
+    python scripts/quality.py [FILM …] [--aggregate 2] [--bars preset,random] [--windows 16] [--frames 12] [--json FILE]
+
+The measure is the structural similarity (Wang et al. 2004, Gaussian weights) of the 8-bit pictures, the mean over
+their colours: 1 for equal ones. Scribbles and shutters are those of scripts/benchmark.py, on frames spread over the
+film. Composes on a GPU where there is one. Needs no Blender.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+from skimage.metrics import structural_similarity
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmark import BARS, bars, shapes
+
+from shutter_addon.compute.renderer import DEVICES, Renderer, open_compositor
+from shutter_addon.core import light
+from shutter_addon.core.instant import Instant, Options
+from shutter_addon.media import open_source
+
+ASSETS = Path(__file__).resolve().parents[1] / "assets"
+FILMS = [ASSETS / name for name in ("bigbuckbunny.mp4", "pedestrians.avi")]
+
+
+def similarity(picture: np.ndarray, other: np.ndarray) -> float:
+    """Structural similarity of two 8-bit pictures (H, W, 3)."""
+    how = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
+    return float(structural_similarity(picture, other, channel_axis=2, data_range=255, **how))
+
+
+def similarities(compositor, film, kind: str, count: int, window: int, block: int, frames: int) -> list[float]:
+    """Of pictures spread over the film: whose blocks share a shutter beside full resolution."""
+    source = open_source(film)
+    # Full resolution, then blocks.
+    renderers = [Renderer(compositor, source) for _ in range(2)]
+    moments = [Instant(Options(window, aggregate=b), bars(kind, count, window), shapes(count)) for b in (1, block)]
+    result = []
+    for index in np.linspace(0, source.count - window, frames).astype(int).tolist():
+        pictures = [_codes(r.picture(index, moment)) for r, moment in zip(renderers, moments, strict=True)]
+        result.append(similarity(*pictures))
+    for renderer in renderers:
+        renderer.close()
+    return result
+
+
+def _codes(picture: np.ndarray) -> np.ndarray:
+    return np.rint(np.clip(light.to_encoded(picture[..., :3]), 0, 1) * 255).astype(np.uint8)
+
+
+def run(args) -> list[dict]:
+    compositor, _ = open_compositor(args.device)
+    rows = []
+    for film, kind, window in itertools.product(args.films, args.bars, args.windows):
+        values = similarities(compositor, film, kind, args.shutters, window, args.aggregate, args.frames)
+        common = {"film": film.name, "bars": kind, "shutters": args.shutters, "window": window}
+        rows.append(common | {"aggregate": args.aggregate, "mean": float(np.mean(values)), "worst": min(values)})
+        print("| {film} | {bars} | {shutters} | {window} | {mean:.5f} | {worst:.5f} |".format(**rows[-1]), flush=True)
+    return rows
+
+
+def parse(arguments=None):
+    def listed(of):
+        return lambda text: [of(part) for part in text.split(",")]
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    add = parser.add_argument
+    add("films", type=Path, nargs="*", default=FILMS)
+    add("--json", type=Path, help="where the rows are written")
+    add("--aggregate", type=int, choices=(2, 4), default=2)
+    add("--bars", type=listed(str), default="preset,random", help=f"of {', '.join((*BARS, 'random'))}")
+    add("--windows", type=listed(int), default="16")
+    add("--shutters", type=int, choices=range(2, 9), default=4)
+    add("--frames", type=int, default=12, help="pictures of each film")
+    add("--device", choices=DEVICES, default="auto")
+    return parser.parse_args(arguments)
+
+
+def main(arguments=None) -> None:
+    args = parse(arguments)
+    print("| film | bars | shutters | window | mean | worst |\n|---|---|---|---|---|---|")
+    rows = run(args)
+    if args.json:
+        args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
