@@ -51,6 +51,14 @@ def _egl():
     return egl
 
 
+@cache
+def _gl(name: str):
+    """A function of GL that returns nothing. Called through ctypes, it lets Python's other threads run meanwhile."""
+    find = _egl().eglGetProcAddress
+    find.restype, find.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
+    return ctypes.CFUNCTYPE(None)(find(name.encode()))
+
+
 class GLDevice:
     """Textures and compute passes. Calls belong inside `with device.current():`, on whatever thread renders.
 
@@ -103,6 +111,7 @@ class GLDevice:
         components, _, dtype = FORMATS[texture.extra]
         width, height, layers = texture.size
         array = np.empty((layers, height, width, components), dtype=dtype)
+        self.finish()
         texture.read_into(array, alignment=1)
         return array
 
@@ -118,12 +127,20 @@ class GLDevice:
         for name, value in constants.items():
             if name in shader:  # the compiler drops what a source does not use
                 shader[name] = value
-        shader.run(*(-(-n // local) for n, local in zip((*extent, 1)[:3], LOCAL_SIZE, strict=True)))
+        self._dispatch(shader, *(-(-n // local) for n, local in zip((*extent, 1)[:3], LOCAL_SIZE, strict=True)))
         self._context.memory_barrier()
 
+    def _dispatch(self, shader, *groups: int) -> None:
+        """Software renderers are not back before the pass is done: Python's other threads run meanwhile."""
+        if _EGL:
+            _gl("glUseProgram")(ctypes.c_uint(shader.glo))
+            _gl("glDispatchCompute")(*map(ctypes.c_uint, groups))
+        else:
+            shader.run(*groups)
+
     def finish(self) -> None:
-        """Waits until all that was run is done."""
-        self._context.finish()
+        """Waits until all that was run is done; Python's other threads run meanwhile."""
+        _gl("glFinish")() if _EGL else self._context.finish()
 
     def release(self) -> None:
         self._context.release()
