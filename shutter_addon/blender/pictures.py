@@ -27,8 +27,9 @@ weights_folder: Path | None = None
 
 # Renderers whose frames are kept: more effects than these in one frame decode their windows again for every frame.
 _KEPT = 4
-# Pictures whose frames are decoded in advance, and how many frames at most lie decoded, besides those on the device.
-_AHEAD, _DECODED = 4, 8
+# Pictures whose frames are decoded in advance, and how many frames or bytes of them lie decoded at most, besides those
+# on the device: enough for a long window, whose frames are decoded while its first picture is diffused and compiled.
+_AHEAD, _DECODED, _DECODED_BYTES = 4, 8, 256 << 20
 
 
 @dataclass(frozen=True)
@@ -54,11 +55,12 @@ class Moment:
 
     def prefetch(self) -> None:
         """Has the frames decoded that the picture lacks, then those of the next pictures."""
-        wanted = {}
+        wanted, source = {}, self.renderer.source
         for step in range(_AHEAD + 1):
-            index = min(max(self.index + step * self.direction, 0), self.renderer.source.count - 1)
+            index = min(max(self.index + step * self.direction, 0), source.count - 1)
             wanted |= dict.fromkeys(sorted(self.renderer.missing(index, self.direction, self.instant)))
-        self.renderer.source.want(list(wanted)[:_DECODED])
+        room = _DECODED_BYTES // (source.width * source.height * 4 * np.dtype(source.dtype).itemsize)
+        source.want(list(wanted)[: max(_DECODED, room)])
 
 
 class Studio:
