@@ -46,7 +46,7 @@ def test_rows(clip, tmp_path):
         assert (row["width"], row["height"], row["window"], row["frames"]) == (96, 64, 4, 12)
         assert len(row["all"]) == 2
         assert row["fps"] > 0
-    assert rows["ours"]["error"] < 3
+    assert rows["ours"]["error"] < 1.5
     assert "ours is 1.00 of it" in done.stdout
 
 
