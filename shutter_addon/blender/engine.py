@@ -31,6 +31,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         # Blender's rows go up; composed pictures lie so in memory, and this copies nothing.
         result.layers[0].passes["Combined"].rect.foreach_set(np.ascontiguousarray(picture[::-1]).ravel())
         self.end_result(result)
+        pictures.begin_next(depsgraph.scene, depsgraph.scene.frame_current)
 
     def _say(self, message: str) -> None:
         if bpy.app.background:

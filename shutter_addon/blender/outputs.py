@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 
 from ..media.written import frames_in_movie, is_whole_picture
-from . import engine
+from . import engine, strips
 
 INTERRUPTED = 130
 
@@ -71,8 +71,8 @@ def set_output(edit, path: Path, file_format: str, *, alpha: bool) -> None:
 
 
 def film(edit, output: Path) -> None:
-    """Renders the edit to a movie or a folder. Blender writes into a folder beside the output, and what is finished
-    moves out of it. OutputError: it cannot be written; finished pictures stay."""
+    """Renders an edit of edits.make_edit to a movie or a folder. Blender writes into a folder beside the output, and
+    what is finished moves out of it. OutputError: it cannot be written; finished pictures stay."""
     folder = output.parent if is_movie(output) else output
     folder.mkdir(parents=True, exist_ok=True)
     part = Path(tempfile.mkdtemp(prefix=".part-", dir=folder))
@@ -84,7 +84,7 @@ def film(edit, output: Path) -> None:
         shutil.rmtree(part, ignore_errors=True)
 
     try:
-        with _leaving(clean_up), _quiet(), _uncached(edit.sequence_editor), _frames_moved(part, folder, count):
+        with _leaving(clean_up), _quiet(), _lean(edit), _frames_moved(part, folder, count):
             bpy.ops.render.render(animation=True, scene=edit.name)
         if is_movie(output):
             if frames_in_movie(part / output.name) < count:
@@ -153,14 +153,24 @@ def _leaving(clean_up):
 
 
 @contextmanager
-def _uncached(editor):
-    """Keeps no finished frames: each is rendered once, and Blender would fill gigabytes with them."""
+def _lean(edit):
+    """Spares Blender what no frame shows.
+
+    Each frame is rendered once: finished ones would fill gigabytes. And the source lies wholly below its effect, but
+    Blender takes any Scene strip for transparent: it would decode the source and blend the two, 2/5 of all its work.
+    """
+    editor = edit.sequence_editor
     kept = editor.use_cache_raw, editor.use_cache_final
+    shown = [strip for name in strips.shown_sources(edit) if not (strip := editor.strips_all[name]).mute]
     editor.use_cache_raw = editor.use_cache_final = False
+    for strip in shown:
+        strip.mute = True
     try:
         yield
     finally:
         editor.use_cache_raw, editor.use_cache_final = kept
+        for strip in shown:
+            strip.mute = False
 
 
 @contextmanager

@@ -1,7 +1,8 @@
 """Pictures of effect scenes: renderers that keep their frames, on a device of Blender's own or one without a window."""
 
 import threading
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,8 +27,9 @@ weights_folder: Path | None = None
 
 # Renderers whose frames are kept: more effects than these in one frame decode their windows again for every frame.
 _KEPT = 4
-# Pictures whose frames are decoded in advance, and how many frames at most lie decoded, besides those on the device.
-_AHEAD, _DECODED = 4, 8
+# Pictures whose frames are decoded in advance, and how many frames or bytes of them lie decoded at most, besides those
+# on the device: enough for a long window, whose frames are decoded while its first picture is diffused and compiled.
+_AHEAD, _DECODED, _DECODED_BYTES = 4, 8, 256 << 20
 
 
 @dataclass(frozen=True)
@@ -39,13 +41,26 @@ class Moment:
     instant: Instant
     direction: int
 
+    @property
+    def key(self) -> tuple:
+        """Equal for moments of the same picture."""
+        return self.renderer, self.index, self.direction, self.instant.key
+
+    def picture(self) -> np.ndarray:
+        """The picture, made on the renderer's device; and the frames of the next ones are decoded."""
+        self.prefetch()
+        result = self.renderer.picture(self.index, self.instant, self.direction)
+        self.prefetch()  # and lets go of what is on the device by now
+        return result
+
     def prefetch(self) -> None:
         """Has the frames decoded that the picture lacks, then those of the next pictures."""
-        wanted = {}
+        wanted, source = {}, self.renderer.source
         for step in range(_AHEAD + 1):
-            index = min(max(self.index + step * self.direction, 0), self.renderer.source.count - 1)
+            index = min(max(self.index + step * self.direction, 0), source.count - 1)
             wanted |= dict.fromkeys(sorted(self.renderer.missing(index, self.direction, self.instant)))
-        self.renderer.source.want(list(wanted)[:_DECODED])
+        room = _DECODED_BYTES // (source.width * source.height * 4 * np.dtype(source.dtype).itemsize)
+        source.want(list(wanted)[: max(_DECODED, room)])
 
 
 class Studio:
@@ -54,18 +69,33 @@ class Studio:
     def __init__(self, open_device, threaded: bool = False):
         """threaded: the device belongs to a thread of its own; otherwise to whichever calls."""
         self._open = open_device
-        self._threaded = threaded
+        self.threaded = threaded
         self._executor: ThreadPoolExecutor | None = None
         self._compositor = None
         self._renderers: dict = {}
+        self.shown: dict[int, float] = {}  # by scene: the frame that was shown last
+        self._begun: dict[int, tuple[tuple, Future]] = {}  # by scene: the key of a moment, its picture
 
     def run(self, function, *arguments):
         """The result of a function that uses the device."""
-        if not self._threaded:
+        if not self.threaded:
             return function(*arguments)
         if self._executor is None:
             self._executor = ThreadPoolExecutor(1, "Virtual Shutter")
         return self._executor.submit(function, *arguments).result()
+
+    def picture(self, scene, moment: Moment) -> np.ndarray:
+        """The moment's picture, if need be the one that was begun for it."""
+        key, begun = self._begun.pop(scene.session_uid, (None, None))
+        if begun is not None:
+            if key == moment.key:
+                return begun.result()
+            begun.cancel()
+        return self.run(moment.picture)
+
+    def begin(self, scene, moment: Moment) -> None:
+        """Begins a picture that is likely to be asked for next, while Blender does other work."""
+        self._begun[scene.session_uid] = moment.key, self._executor.submit(moment.picture)
 
     def renderer(self, scene, source_strip, say) -> Renderer:
         """The renderer of an effect scene; say: called with a sentence when the device is a lesser one. One of FAULTS:
@@ -88,10 +118,12 @@ class Studio:
     def keep(self, scenes: set[int]) -> None:
         """Closes what belongs to other scenes than those of these session_uids."""
         for place in [place for place in self._renderers if place not in scenes]:
+            self._begun.pop(place, None)
             self.run(self._renderers.pop(place)[1].close)
 
     def forget(self) -> None:
         """Closes all sources and frees the device."""
+        self._begun.clear()
         for _key, renderer in self._renderers.values():
             self.run(renderer.close)
         self._renderers.clear()
@@ -124,10 +156,22 @@ def picture(scene, scene_frame: float, say=print) -> np.ndarray:
     if weights_folder is not None:
         values = _studio().run(found.renderer.coefficients, found.instant)
         _write_weights(values, [s.name for s in effect.shutters], frame - strip.left_handle + 1)
-    found.prefetch()
-    result = _studio().run(found.renderer.picture, found.index, found.instant, found.direction)
-    found.prefetch()  # and lets go of what is on the device by now
-    return result
+    return _studio().picture(scene, found)
+
+
+def begin_next(scene, scene_frame: float) -> None:
+    """Begins the picture after the one at that frame, where a film is rendered: if the last two were neighbours.
+
+    It is shown only if it proves to be what is asked for, whatever changes meanwhile."""
+    studio = _studio()
+    if studio.threaded:
+        step = scene_frame - studio.shown.get(scene.session_uid, scene_frame)
+        studio.shown[scene.session_uid] = scene_frame
+        with suppress(*FAULTS):  # it is met again when the picture is asked for
+            edit, effect, strip = strips.find_edit(scene)
+            frame = strips.timeline_frame(strip, scene_frame) + step
+            if step == edit.frame_step and frame <= edit.frame_end:
+                studio.begin(scene, moment(edit, effect, strip, frame))
 
 
 def moment(edit, effect, strip, frame: float, say=print) -> Moment:

@@ -52,6 +52,14 @@ def _egl():
     return egl
 
 
+@cache
+def _gl(name: str):
+    """A function of GL that returns nothing. Called through ctypes, it lets Python's other threads run meanwhile."""
+    find = _egl().eglGetProcAddress
+    find.restype, find.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
+    return ctypes.CFUNCTYPE(None)(find(name.encode()))
+
+
 class GLDevice:
     """Textures and compute passes. Calls belong inside `with device.current():`, on whatever thread renders.
 
@@ -105,6 +113,7 @@ class GLDevice:
         components, _, dtype = FORMATS[texture.extra]
         width, height, layers = texture.size
         array = np.empty((layers, height, width, components), dtype=dtype)
+        self.finish()
         texture.read_into(array, alignment=1)
         return array
 
@@ -126,8 +135,16 @@ class GLDevice:
         for name, value in constants.items():
             if name in used:  # the compiler drops what a source does not use
                 used[name].value = value
-        shader.run(*program.groups(extent))
+        self._dispatch(shader, *program.groups(extent))
         self._context.memory_barrier()
+
+    def _dispatch(self, shader, *groups: int) -> None:
+        """Software renderers are not back before the pass is done: Python's other threads run meanwhile."""
+        if _EGL:
+            _gl("glUseProgram")(ctypes.c_uint(shader.glo))
+            _gl("glDispatchCompute")(*map(ctypes.c_uint, groups))
+        else:
+            shader.run(*groups)
 
     def _block(self, unit: int, values: np.ndarray) -> None:
         buffer = self._blocks.get(unit)
@@ -137,8 +154,8 @@ class GLDevice:
         buffer.bind_to_uniform_block(unit)
 
     def finish(self) -> None:
-        """Waits until all that was run is done."""
-        self._context.finish()
+        """Waits until all that was run is done; Python's other threads run meanwhile."""
+        _gl("glFinish")() if _EGL else self._context.finish()
 
     def release(self) -> None:
         self._context.release()

@@ -1,0 +1,105 @@
+"""Pictures that are begun before Blender asks for them: used where they are right, and never where they are not."""
+
+import json
+
+import numpy as np
+import pytest
+from support import recipe, write_frames
+
+from shutter_addon.core import recipe as recipes
+
+
+@pytest.fixture
+def film(bpy, edit, tmp_path):
+    """An edit of twelve frames of noise under an effect of two shutters and a line; its source, effect and strip."""
+    from shutter_addon.blender import effects, pictures, strips
+
+    pictures.forget()
+    noise = np.random.default_rng(0).integers(0, 256, (12, 24, 40, 3), dtype=np.uint8)
+    source = edit.sequence_editor.strips.new_image("images", str(write_frames(tmp_path / "in", noise[:1])), 1, 1)
+    write_frames(tmp_path / "in", noise)
+    for i in range(2, 13):
+        source.elements.append(f"f{i:04d}.png")
+    edit.render.resolution_x, edit.render.resolution_y = 40, 24
+    edit.frame_start, edit.frame_end = 1, 12
+    edit.sequence_editor.use_cache_raw = edit.sequence_editor.use_cache_final = False
+    strip, effect = strips.add_effect(edit, source)
+    line = {"shutter": "S1", "kind": "line", "width": 0.1, "strokes": [[[0.2, 0.2], [0.3, 0.8]]]}
+    data = recipe(4, [1, 1, 1, 1], [0, 0, 1, 0], regions=[line], border=True)
+    effects.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
+    return edit, source, effect, strip
+
+
+@pytest.fixture
+def composed(monkeypatch):
+    """The source frames of which pictures were made, in order."""
+    from shutter_addon.compute.renderer import Renderer
+
+    made, picture = [], Renderer.picture
+
+    def noted(self, index, *arguments):
+        made.append(index)
+        return picture(self, index, *arguments)
+
+    monkeypatch.setattr(Renderer, "picture", noted)
+    return made
+
+
+def test_each_picture_of_a_film_is_made_once(film, render, composed):
+    edit, *_ = film
+    render(edit, range(1, 13))
+    assert composed == list(range(12))
+
+
+def test_nothing_is_begun_for_single_pictures(film, render, composed):
+    from shutter_addon.blender import pictures
+
+    edit, *_ = film
+    render(edit, [5, 2, 9])
+    pictures.forget()  # which waits for what was begun
+    assert composed == [4, 1, 8]
+
+
+def weigh(edit, source, effect, strip):
+    effect.shutters[0].bars[3].weight = 0.1
+
+
+def move(edit, source, effect, strip):
+    effect.regions[0].location = (0.4, 0.0)
+
+
+def slip(edit, source, effect, strip):
+    source.content_start -= 2
+
+
+def widen(edit, source, effect, strip):
+    effect.window = 6
+
+
+def replace(edit, source, effect, strip):
+    source.elements[0].filename = "f0007.png"
+
+
+@pytest.mark.parametrize("change", [weigh, move, slip, widen, replace])
+def test_a_change_leaves_no_trace(film, render, change):
+    """Frame 4 is begun when 2 and 3 are rendered; what is shown after a change is what a fresh start shows."""
+    from shutter_addon.blender import pictures
+
+    edit = film[0]
+    before = render(edit, [2, 3, 4], "16")[4]
+    render(edit, [2, 3], "16")
+    change(*film)
+    shown = render(edit, [4], "16")[4]
+    pictures.forget()
+    # Blender keeps the frame that it made last, whatever its settings: another one comes first.
+    assert np.array_equal(shown, render(edit, [9, 4], "16")[4])
+    assert change is replace or not np.array_equal(shown, before)
+
+
+def test_a_frame_that_cannot_be_read_fails_only_when_it_is_shown(film, render, tmp_path):
+    edit = film[0]
+    bad = tmp_path / "in" / "f0008.png"
+    bad.write_bytes(bad.read_bytes()[:60])
+    render(edit, [3, 4])  # begins 5, whose window holds the eighth
+    with pytest.raises(AssertionError):  # of the fixture, that there was no fault
+        render(edit, [5])
