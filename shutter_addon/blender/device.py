@@ -7,10 +7,12 @@ exactly; a pass unpacks them into the layer. (Bit patterns would be simpler, but
 
 from __future__ import annotations
 
+import subprocess
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from functools import cache
 
+import bpy
 import gpu
 import numpy as np
 
@@ -114,6 +116,20 @@ class BlenderDevice:
 
     def release(self) -> None:
         self._shaders = {}
+
+
+@cache
+def opens_in_background() -> bool:
+    """Whether Blender's GPU can be used without a window; it is from then on, on the main thread.
+
+    Another Blender tries first: where OpenGL is missing, 5.2's gpu.init() does not raise, it crashes."""
+    trial = ["--background", "--factory-startup", "--python-exit-code", "1", "--python-expr", "import gpu; gpu.init()"]
+    try:
+        subprocess.run([bpy.app.binary_path, *trial], check=True, capture_output=True, timeout=60)
+        gpu.init()
+    except (OSError, SystemError, subprocess.SubprocessError):
+        return False
+    return True
 
 
 @cache

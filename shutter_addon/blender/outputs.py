@@ -10,7 +10,7 @@ from pathlib import Path
 
 import bpy
 
-from ..media.written import frames_in_movie, is_whole_picture
+from ..media.written import is_whole_movie, is_whole_picture
 from . import engine, strips
 
 INTERRUPTED = 130
@@ -87,7 +87,7 @@ def film(edit, output: Path) -> None:
         with _leaving(clean_up), _quiet(), _lean(edit), _frames_moved(part, folder, count):
             bpy.ops.render.render(animation=True, scene=edit.name)
         if is_movie(output):
-            if frames_in_movie(part / output.name) < count:
+            if not is_whole_movie(part / output.name, count):
                 raise OutputError(f"{output}: could not be written whole; is the disk full?")
             (part / output.name).replace(output)
     except RuntimeError as error:

@@ -4,6 +4,7 @@ import threading
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import bpy
@@ -18,7 +19,7 @@ from ..media import MediaError
 from ..media.ahead import Ahead
 from ..media.exr import write_exr
 from . import effects, sources, strips, timing
-from .device import BlenderDevice
+from .device import BlenderDevice, opens_in_background
 
 FAULTS = (effects.EffectError, MediaError, NoDeviceError, MemoryError)
 
@@ -136,7 +137,8 @@ class Studio:
 
 
 # Blender's own GPU belongs to its main thread. Renders on another one, and without a window, have a context apart, and
-# a thread for it: beside Blender's own another one cannot always be current (see GLDevice).
+# a thread for it: beside Blender's own another one cannot always be current (see GLDevice). Without moderngl there is
+# no such context, and in the background Blender's own does.
 _apart = Studio(lambda: open_compositor(device), threaded=True)
 _window = Studio(lambda: (GPUCompositor(BlenderDevice()), None))
 
@@ -144,6 +146,22 @@ _window = Studio(lambda: (GPUCompositor(BlenderDevice()), None))
 def in_window() -> bool:
     """Whether Blender's own GPU may be used: on the main thread of a Blender with a window."""
     return not bpy.app.background and threading.current_thread() is threading.main_thread()
+
+
+def _borrows() -> bool:
+    """Whether a background render is on Blender's own GPU, as it can have none apart."""
+    on_main = threading.current_thread() is threading.main_thread()
+    return bpy.app.background and on_main and device != "cpu" and _lacks_moderngl() and opens_in_background()
+
+
+@cache
+def _lacks_moderngl() -> bool:
+    """Whether moderngl is missing, as in a package without wheels, or made for another Python."""
+    try:
+        from ..compute import gl  # noqa: F401
+    except ImportError:
+        return True
+    return False
 
 
 def picture(scene, scene_frame: float, say=print) -> np.ndarray:
@@ -184,7 +202,7 @@ def moment(edit, effect, strip, frame: float, say=print) -> Moment:
 
 
 def _studio() -> Studio:
-    return _window if in_window() else _apart
+    return _window if in_window() or _borrows() else _apart
 
 
 def drop_removed() -> None:

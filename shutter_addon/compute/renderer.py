@@ -21,10 +21,13 @@ def open_compositor(device: str = "auto"):
         from .gpu import GPUCompositor
 
         return GPUCompositor(GLDevice()), None
-    except (ImportError, NoDeviceError) as error:
-        if device == "gpu":
-            raise NoDeviceError(str(error)) from None
-        return CPUCompositor(), f"{error}; composing with NumPy, which is slow"
+    except ImportError as error:  # a package without wheels, or one for another Python
+        reason = f"the Python package moderngl cannot be loaded ({error})"
+    except NoDeviceError as error:
+        reason = str(error)
+    if device == "gpu":
+        raise NoDeviceError(reason)
+    return CPUCompositor(), f"{reason}; composing with NumPy, which is slow"
 
 
 class Renderer:

@@ -9,16 +9,12 @@ import json
 import math
 import re
 from dataclasses import dataclass, field, is_dataclass
-from functools import partial
+from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal, get_args, get_origin
 
-import cattrs
 import numpy as np
-from cattrs.cols import list_structure_factory
-from cattrs.errors import ForbiddenExtraKeysError
-from cattrs.gen import make_dict_structure_fn
 
 from . import keyframes, scribbles, shutters
 from .instant import Edges, Exposure, Instant, Interpolation, Light, Options, Position
@@ -154,8 +150,9 @@ def parse(text: str) -> Recipe:
         data = json.loads(text)
     except (json.JSONDecodeError, RecursionError) as error:
         raise RecipeError(f"not JSON: {error}") from None
+    converter = _converter()
     try:
-        recipe = _converter.structure(data, Recipe)
+        recipe = converter.structure(data, Recipe)
     except Exception as error:
         raise RecipeError(_first_fault(error)) from None
     _check(recipe)
@@ -164,7 +161,7 @@ def parse(text: str) -> Recipe:
 
 def dump(recipe: Recipe) -> str:
     """The recipe as JSON text; `parse(dump(r)) == r`. Fields that carry nothing are left out."""
-    text = json.dumps(_compact(_converter.unstructure(recipe)), indent=1, ensure_ascii=False)
+    text = json.dumps(_compact(_converter().unstructure(recipe)), indent=1, ensure_ascii=False)
     # People read and edit these files: a list of numbers stays on one line.
     return (
         re.sub(
@@ -249,7 +246,18 @@ def _after_check(factory, wanted: type, name: str):
     return make
 
 
-def _make_converter() -> cattrs.Converter:
+@cache
+def _converter():
+    """RecipeError: cattrs is missing. Blender brings it; a Linux distribution's Blender may not, and effects render
+    without it."""
+    try:
+        import cattrs
+        from cattrs.cols import list_structure_factory
+        from cattrs.gen import make_dict_structure_fn
+    except ImportError as error:
+        raise RecipeError(
+            f"recipes need the Python package cattrs ({error}); install it for Blender's Python"
+        ) from None
     converter = cattrs.Converter()
     converter.register_structure_hook(float, _number)
     converter.register_structure_hook(int, _exactly(int, "a whole number"))
@@ -265,9 +273,6 @@ def _make_converter() -> cattrs.Converter:
     return converter
 
 
-_converter = _make_converter()
-
-
 def _shown(value) -> str:
     text = json.dumps(value, ensure_ascii=False)
     return text if len(text) <= 40 else text[:37] + "…"
@@ -275,6 +280,8 @@ def _shown(value) -> str:
 
 def _first_fault(error: Exception) -> str:
     """`place: what is wrong`, of the first fault."""
+    import cattrs
+    from cattrs.errors import ForbiddenExtraKeysError
 
     def sentence(error, kind):
         if isinstance(error, KeyError):

@@ -2,8 +2,7 @@
 
 from .ahead import Ahead
 from .errors import MediaError
-from .movie import MovieSource
 from .sequence import SequenceSource
 from .source import Source, open_source
 
-__all__ = ["Ahead", "MediaError", "MovieSource", "SequenceSource", "Source", "open_source"]
+__all__ = ["Ahead", "MediaError", "SequenceSource", "Source", "open_source"]

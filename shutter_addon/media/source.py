@@ -8,7 +8,7 @@ import numpy as np
 
 from .color import in_colorspace
 from .errors import MediaError
-from .movie import MovieSource
+from .files import check_file
 from .sequence import IMAGE_SUFFIXES, SequenceSource
 
 
@@ -57,7 +57,7 @@ def open_source(
     Raises MediaError when there is nothing to be read."""
     path = Path(path)
     if files is None and path.suffix.lower() not in IMAGE_SUFFIXES:
-        source = MovieSource(path, stream=stream, deinterlace=deinterlace)
+        source = _open_movie(path, stream=stream, deinterlace=deinterlace)
     else:
         source = SequenceSource(path, files=files, fps=fps, alpha=alpha)
     try:
@@ -65,3 +65,15 @@ def open_source(
     except MediaError:
         source.close()
         raise
+
+
+def _open_movie(path, **options):
+    try:
+        from .movie import MovieSource
+    except ImportError as error:  # a package without wheels, or one for another system
+        check_file(path)
+        raise MediaError(
+            f"{path.name}: movies need the Python package PyAV ({error}); "
+            "install the zip of Virtual Shutter that is made for your system, or use an image sequence"
+        ) from None
+    return MovieSource(path, **options)

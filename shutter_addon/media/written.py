@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import av
 import OpenImageIO
 
 _PNG_END = b"IEND\xaeB`\x82"
@@ -23,10 +22,14 @@ def is_whole_picture(path: Path) -> bool:
     return last is not None
 
 
-def frames_in_movie(path: Path) -> int:
-    """How many pictures a movie holds, without decoding them; 0 if it cannot be read at all."""
+def is_whole_movie(path: Path, count: int) -> bool:
+    """Whether a movie holds that many pictures, without decoding them; without PyAV, whether there is anything."""
+    try:
+        import av
+    except ImportError:
+        return path.is_file() and path.stat().st_size > 0
     try:
         with av.open(str(path)) as container:
-            return sum(packet.size > 0 for packet in container.demux(video=0))
+            return sum(packet.size > 0 for packet in container.demux(video=0)) >= count
     except (av.error.FFmpegError, IndexError):
-        return 0
+        return False

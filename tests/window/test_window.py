@@ -83,6 +83,16 @@ def test_bars_between_keys_and_the_extension_disabled(tmp_path):
     assert "Traceback" not in console
 
 
+def test_without_wheels(tmp_path):
+    """Blender's own GPU in the preview; a render's thread may not use it, takes NumPy and says so."""
+    ((seen,), console) = tell("without_wheels.py", "opengl", tmp_path)
+    (said,) = seen["said"]
+    assert "moderngl" in said
+    assert "composing with NumPy, which is slow" in said
+    assert said in console
+    assert "Traceback" not in console
+
+
 def test_no_exception_reaches_the_console(told):
     _folder, _seen, console = told
     assert "Traceback" not in console

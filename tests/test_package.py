@@ -1,0 +1,304 @@
+"""The zips, as users get them: what is in them, installed in a Blender of their own, updated and removed."""
+
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO
+import pytest
+
+ROOT = Path(__file__).parents[1]
+NAME = "bl_ext.user_default.virtual_shutter"
+MAKE_EDIT = ROOT / "tests" / "blender" / "installed.py"
+SYSTEM = {"linux": "linux-x64", "win32": "windows-x64", "darwin": "macos-arm64"}[sys.platform]
+WHEELS = {"av", "glcontext", "moderngl", "tqdm"}
+RECIPE = {
+    "version": 1,
+    "window": 4,
+    "shutters": [{"name": "Long", "bars": [1, 1, 1, 1]}, {"name": "Sharp", "bars": [1, 0, 0, 0]}],
+    "regions": [
+        {"shutter": "Long", "strokes": [[[0.1, 0.1], [0.1, 0.9]]]},
+        {"shutter": "Sharp", "kind": "lasso", "strokes": [[[0.4, 0.3], [0.6, 0.3], [0.5, 0.7]]]},
+    ],
+}
+# What Blender says by itself, on the real one's screenless machine.
+BLENDERS_OWN = ("EGL Error", "system.path")
+NO_OPENGL = {"LIBGL_DRIVERS_PATH": "/nowhere", "__EGL_VENDOR_LIBRARY_DIRS": "/nowhere"}
+
+
+def build(*arguments, root=ROOT):
+    done = subprocess.run(
+        [sys.executable, root / "scripts" / "build.py", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def dist(tmp_path_factory):
+    """All zips for official builds of Blender, and what was said of them."""
+    folder = tmp_path_factory.mktemp("dist")
+    return folder, build("--output", folder)
+
+
+def members(path):
+    with zipfile.ZipFile(path) as packed:
+        return set(packed.namelist()), tomllib.loads(packed.read("blender_manifest.toml").decode())
+
+
+def sources():
+    """What every zip has to hold: the extension's own files, and no other."""
+    code = [*(ROOT / "shutter_addon").rglob("*.py"), *(ROOT / "shaders").rglob("*.glsl")]
+    return {"blender_manifest.toml", "__init__.py", "LICENSE", *(path.relative_to(ROOT).as_posix() for path in code)}
+
+
+def test_a_zip_for_each_system_and_one_without_wheels(dist):
+    folder, said = dist
+    version = tomllib.loads((ROOT / "blender_manifest.toml").read_text())["version"]
+    suffixes = ("linux_x64", "macos_arm64", "no_wheels", "windows_x64")
+    names = [f"virtual_shutter-{version}-{suffix}.zip" for suffix in suffixes]
+    assert sorted(path.name for path in folder.iterdir()) == names
+    for name in names:
+        assert f"{(folder / name).stat().st_size / 1e6:.1f} MB" in said
+
+
+def test_the_zip_without_wheels_holds_the_extension_alone(dist):
+    (path,) = dist[0].glob("*-no_wheels.zip")
+    names, manifest = members(path)
+    assert names == sources()
+    assert "wheels" not in manifest
+    assert "platforms" not in manifest
+
+
+@pytest.mark.parametrize(
+    ("system", "tag"), [("linux_x64", "x86_64"), ("windows_x64", "win_amd64"), ("macos_arm64", "arm64")]
+)
+def test_a_zip_with_wheels_holds_those_of_its_system(dist, system, tag):
+    (path,) = dist[0].glob(f"*-{system}.zip")
+    names, manifest = members(path)
+    wheels = {name for name in names if name.startswith("wheels/")}
+    assert names - wheels == sources()
+    assert {name.split("/")[1].split("-")[0] for name in wheels} == WHEELS
+    for name in wheels:
+        python, abi, platform = name.removesuffix(".whl").split("-")[-3:]
+        assert platform == "any" or platform.endswith(tag)
+        assert (python, abi) in {("cp313", "cp313"), ("cp312", "abi3"), ("py3", "none")}
+    generated = manifest["build"]["generated"]
+    assert generated["platforms"] == [system.replace("_", "-")]
+    assert {wheel.removeprefix("./") for wheel in generated["wheels"]} == wheels
+
+
+def test_the_wheels_are_what_the_code_needs_and_blender_lacks():
+    """Of the requirements, all but what Blender brings."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    needed = {requirement.split(">")[0] for requirement in project["dependencies"]}
+    assert needed - {"numpy", "OpenImageIO", "cattrs"} == WHEELS - {"glcontext"}  # moderngl's own requirement
+
+
+def without(packages, code):
+    """Runs code in plain Python that lacks some packages; what it prints."""
+    hidden = "".join(f"sys.modules[{package!r}] = None\n" for package in packages)
+    return subprocess.run(
+        [sys.executable, "-c", f"import sys\n{hidden}{code}"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
+
+
+def test_a_movie_without_pyav_is_one_sentence(bunny):
+    code = f"""
+from shutter_addon.media import MediaError, open_source
+for path in ({str(bunny)!r}, "none.mp4"):
+    try:
+        open_source(path)
+    except MediaError as error:
+        print(error)
+"""
+    movie, none = without(["av"], code).splitlines()
+    assert movie.startswith("bigbuckbunny.mp4: movies need the Python package PyAV")
+    assert none.startswith("none.mp4: no such file")
+
+
+def test_a_recipe_without_cattrs_is_one_sentence():
+    code = """
+from shutter_addon.core import recipe
+try:
+    recipe.parse('{"version": 1, "window": 1, "shutters": [{"name": "S", "bars": [1]}]}')
+except recipe.RecipeError as error:
+    print(error)
+"""
+    assert "recipes need the Python package cattrs" in without(["cattrs"], code)
+
+
+def test_without_moderngl_numpy_composes():
+    code = """
+from shutter_addon.compute.errors import NoDeviceError
+from shutter_addon.compute.renderer import open_compositor
+print(open_compositor()[1])
+try:
+    open_compositor("gpu")
+except NoDeviceError as error:
+    print(error)
+"""
+    auto, forced = without(["moderngl"], code).splitlines()
+    assert forced.startswith("the Python package moderngl cannot be loaded")
+    assert auto == f"{forced}; composing with NumPy, which is slow"
+
+
+class Installation:
+    """A real Blender with user folders of its own."""
+
+    def __init__(self, folder):
+        self.user = folder / "Größe und Maß" / "ユーザー"
+        self.user.mkdir(parents=True)
+        self.extension = self.user / "extensions" / "user_default" / "virtual_shutter"
+
+    def run(self, *arguments, code=0, says="", environment=()):
+        """Runs Blender; what it printed. Nothing may stand on stderr but the one sentence that is expected."""
+        done = subprocess.run(
+            [*shlex.split(os.environ["BLENDER"]), *map(str, arguments)],
+            env=os.environ | {"BLENDER_USER_RESOURCES": str(self.user)} | dict(environment),
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=ROOT,
+        )
+        assert done.returncode == code, done.stdout + done.stderr
+        said = [line for line in done.stderr.splitlines() if line and not any(own in line for own in BLENDERS_OWN)]
+        assert len(said) == bool(says), done.stderr
+        assert says in done.stderr
+        assert "Traceback" not in done.stdout
+        return done.stdout
+
+    def python(self):
+        """The version of its Python."""
+        code = "import sys; print('PYTHON', '%d.%d' % sys.version_info[:2])"
+        return re.search(r"PYTHON (.+)", self.run("-b", "--factory-startup", "--python-expr", code))[1]
+
+    def install(self, path):
+        self.run("--command", "extension", "install-file", "-r", "user_default", "-e", path)
+        assert self.files() == {*members(path)[0]}
+
+    def files(self):
+        """The extension's files as they lie there, without Python's cache."""
+        found = (path for path in self.extension.rglob("*") if path.is_file() and path.suffix != ".pyc")
+        return {path.relative_to(self.extension).as_posix() for path in found}
+
+    def lock(self, mode):
+        """Makes the extension's folders read-only or not; to root they are always open."""
+        for folder in (self.extension, *(path for path in self.extension.rglob("*") if path.is_dir())):
+            folder.chmod(mode)
+
+    def remove(self):
+        """Disables the extension, then takes it away."""
+        disable = f"import addon_utils; addon_utils.disable('{NAME}', default_set=True)"
+        self.run("-b", "--python-exit-code", "1", "--python-expr", disable)
+        self.run("--command", "extension", "remove", "virtual_shutter")
+        assert not self.extension.exists()
+        left = {path.name for path in self.user.glob("extensions/.local/lib/*/site-packages/*")}
+        assert left <= {"__pycache__"}  # which Blender leaves
+
+
+@pytest.fixture
+def blender(tmp_path):
+    if not os.environ.get("BLENDER"):
+        pytest.skip("NO REAL BLENDER: set BLENDER to the command that runs one")
+    return Installation(tmp_path)
+
+
+@pytest.fixture
+def recipe(tmp_path):
+    path = tmp_path / "a recipe.json"
+    path.write_text(json.dumps(RECIPE))
+    return path
+
+
+def checkout_renders(footage, recipe, output, frames):
+    options = ["--recipe", recipe, "--output", output, "--frames", frames]
+    command = [sys.executable, "-m", "shutter_addon", "render", footage, *options]
+    subprocess.run(list(map(str, command)), cwd=ROOT, check=True, capture_output=True)
+
+
+def assert_alike(folder, expected, count):
+    """The same frames, within a level of 8 bits: another FFmpeg, another driver."""
+    names = sorted(path.name for path in expected.glob("*.png"))
+    assert sorted(path.name for path in folder.glob("*.png")) == names
+    assert len(names) == count
+    for name in names:
+        ours, real = (OpenImageIO.ImageBuf(str(place / name)).get_pixels()[..., :3] for place in (expected, folder))
+        assert np.abs(ours - real).max() <= 1.001 / 255, name
+
+
+def test_installed_with_wheels(blender, bunny, recipe, tmp_path):
+    """A movie, from the zip to rendered frames, and gone again."""
+    folder = tmp_path / "dist"
+    build("--output", folder, "--python", blender.python(), "--system", SYSTEM)
+    (path,) = folder.glob(f"*-{SYSTEM.replace('-', '_')}.zip")
+    blender.run("--command", "extension", "validate", path)
+    blender.install(path)
+    files = blender.files()
+    blender.lock(0o555)
+    edit, wheels = tmp_path / "edit.blend", ["av", "moderngl", "glcontext", "tqdm"]
+    blender.run("-b", "--python-exit-code", 1, "--python", MAKE_EDIT, "--", bunny, recipe, edit, NAME, *wheels)
+    blender.run("-b", edit, "-o", tmp_path / "real" / "####", "-s", 3, "-e", 5, "-a")
+    checkout_renders(bunny, recipe, tmp_path / "ours", "3:5")
+    assert_alike(tmp_path / "real", tmp_path / "ours", 3)
+    assert blender.files() == files
+    blender.lock(0o755)
+    blender.remove()
+
+
+def test_installed_without_wheels(blender, dist, bunny, recipe, tmp_path):
+    """Pictures on Blender's own GPU or with NumPy, and a sentence where a movie needs more."""
+    hidden = blender.user / "scripts" / "startup" / "hidden.py"
+    hidden.parent.mkdir(parents=True)
+    hidden.write_text(f"import sys\nsys.modules |= dict.fromkeys({WHEELS})\ndef register(): pass\n")
+    (path,) = dist[0].glob("*-no_wheels.zip")
+    blender.run("--command", "extension", "validate", path)
+    blender.install(path)
+    frames = tmp_path / "frames"
+    checkout_renders(bunny, recipe, frames, "1:5")
+    edit, first = tmp_path / "edit.blend", frames / "0001.png"
+    blender.run("-b", "--python-exit-code", 1, "--python", MAKE_EDIT, "--", first, recipe, edit, NAME)
+    blender.run("-b", edit, "-o", tmp_path / "real" / "####", "-s", 1, "-e", 2, "-a")
+    command, options = ("--command", "shutter", "render"), ("--recipe", recipe, "--output", tmp_path / "real")
+    blender.run(*command, first, *options, "--frames", 3, "--device", "gpu")
+    numpy = "composing with NumPy, which is slow"
+    blender.run(*command, first, *options, "--frames", 4, says=numpy, environment=NO_OPENGL)
+    checkout_renders(first, recipe, tmp_path / "ours", "1:4")
+    assert_alike(tmp_path / "real", tmp_path / "ours", 4)
+    sentence = "Virtual Shutter: bigbuckbunny.mp4: movies need the Python package PyAV"
+    blender.run(*command, bunny, *options, code=2, says=sentence)
+    blender.remove()
+
+
+def test_a_repository_updates(blender, tmp_path):
+    """Blender subscribes to a folder, installs from it, and gets the next version."""
+    repository, next_root = tmp_path / "repository", tmp_path / "next"
+    options = ("--python", blender.python(), "--system", SYSTEM, "--repository", repository)
+    build("--output", tmp_path / "dist", *options)
+    extension = ("--command", "extension")
+    blender.run(*extension, "repo-add", "--url", f"{(repository / 'index.json').as_uri()}", "ours")
+    blender.run("--online-mode", *extension, "sync")
+    blender.run("--online-mode", *extension, "install", "-e", "virtual_shutter")
+    shutil.copytree(ROOT, next_root, ignore=shutil.ignore_patterns(".*", "assets", "docs", "tests", "__pycache__"))
+    manifest = next_root / "blender_manifest.toml"
+    manifest.write_text(manifest.read_text().replace('version = "0.1.0"', 'version = "9.9.9"'))
+    build("--output", tmp_path / "dist", *options, root=next_root)
+    assert len(list(repository.glob("*.zip"))) == 1
+    blender.run("--online-mode", *extension, "sync")
+    blender.run("--online-mode", *extension, "update")
+    installed = blender.user / "extensions" / "ours" / "virtual_shutter" / "blender_manifest.toml"
+    assert 'version = "9.9.9"' in installed.read_text()
+    assert "WHEELS" in blender.run(
+        "-b", "--python-expr", "import av; print('WHEELS' if '.local' in av.__file__ else 0)"
+    )

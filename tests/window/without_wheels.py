@@ -1,0 +1,84 @@
+"""The extension without any wheel, on pictures: Blender's GPU shows them, NumPy renders them on a thread, and says so.
+
+Run in a Blender with a window, the checkout linked as an extension."""
+
+# ruff: noqa: E402 (Blender finds the helpers once it knows their folders)
+import sys
+from pathlib import Path
+
+sys.modules |= dict.fromkeys(("av", "glcontext", "moderngl", "tqdm"))  # None: there is no such module
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
+
+import bpy
+import numpy as np
+import support
+from driver import OUT, area_of, enable, play, region_of, saw, shot, until
+
+NAME = "bl_ext.user_default.virtual_shutter"
+
+
+def edit_now():
+    return bpy.context.window_manager.windows[0].workspace.sequencer_scene
+
+
+def part(name):
+    return sys.modules[f"{NAME}.shutter_addon.blender.{name}"]
+
+
+def add_effect():
+    frames = np.random.default_rng(1).integers(0, 256, (12, 36, 64, 3), dtype=np.uint8)
+    first = support.write_frames(OUT / "frames", frames)
+    strips = edit_now().sequence_editor_create().strips
+    strip = strips.new_image("Noise", str(first), 1, 1)
+    for path in sorted(first.parent.iterdir())[1:]:
+        strip.elements.append(path.name)
+    edit_now().sequence_editor.active_strip = strip
+    area = area_of("SEQUENCE_EDITOR", "SEQUENCER")
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window, area=area, region=region_of(area)):
+        assert bpy.ops.shutter.add_effect("INVOKE_DEFAULT") == {"FINISHED"}
+    bpy.context.window_manager.virtual_shutter.view = "COEFFICIENTS"
+
+
+def rendered():
+    """The current frame, by a job of the window."""
+    edit, ended = edit_now(), []
+    edit.render.image_settings.media_type = "IMAGE"
+    edit.render.image_settings.file_format = "PNG"
+    edit.render.filepath = str(OUT / "job.png")
+    bpy.app.handlers.render_complete.append(lambda *_: ended.append(True))
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], scene=edit):
+        bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
+    yield from until(lambda: ended, "the render ends", 30)
+
+
+def story():
+    enable()
+    bpy.ops.wm.read_homefile(app_template="Video_Editing")
+    yield 1.0
+    enable()
+    edit = edit_now()
+    edit.render.resolution_x, edit.render.resolution_y, edit.render.dither_intensity = 64, 36, 0
+    edit.view_settings.view_transform = "Standard"
+    add_effect()
+    yield 1.0
+    shot("preview")
+    engine = part("engine").VirtualShutterEngine
+    say, said = engine._say, []
+    engine._say = lambda self, message: (said.append(message), say(self, message))
+    edit.frame_set(3)
+    yield 1.0
+    assert part("pictures")._window._compositor.device.name, "the preview is on Blender's GPU"
+    assert not said, said
+    effect = edit.virtual_shutter.effects[0]
+    shown = part("pictures").picture(effect.scene, 3)
+    for strip in part("strips").effect_strips(edit):
+        strip.invalidate_cache("RAW")
+    yield from rendered()
+    job = support.read_picture(OUT / "job.png")[..., :3] / 255
+    light = np.where(job <= 0.04045, job / 12.92, ((job + 0.055) / 1.055) ** 2.4)
+    assert np.abs(light - shown[..., :3]).max() < 0.01, np.abs(light - shown[..., :3]).max()
+    saw(said=said)
+
+
+play(story)
