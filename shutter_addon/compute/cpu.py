@@ -14,7 +14,7 @@ import numpy as np
 from ..core import compositor, light, shutters
 from ..core.instant import Instant, Options
 from .diffusion import diffuse
-from .running import Running
+from .running import Running, summable
 
 # A tile's rows and columns, multiples of every block: its arrays stay within the processor's cache, and coefficients
 # differ little across it.
@@ -106,8 +106,7 @@ class Sums(Running):
     @staticmethod
     def fit(source, capacity: int) -> bool:
         """Whether they can be made of a source, and are within the budget."""
-        size = 12 * source.width * source.height * (capacity + 1)
-        return np.dtype(source.dtype) == np.uint8 and source.alpha == "opaque" and size <= SUMS_BYTES
+        return summable(source) and 12 * source.width * source.height * (capacity + 1) <= SUMS_BYTES
 
     def _add(self, frame: int, same: int | None, known: int, next_: int) -> None:
         picture = self.source.read(frame) if same is None else None

@@ -84,6 +84,11 @@ def _filled_rows(rows: int) -> float:
     return next((filled for filled in _ROWS if filled >= rows), np.inf)
 
 
+def _extent(window: Sums) -> dict:
+    """What shaders are told of running sums, wherever they begin."""
+    return {"layers": window.layers, "held": window.stop - window.start, "unit": 1 / window.whole}
+
+
 def _from_sums(window: Sums, instant: Instant, values: np.ndarray, origin: int, direction: int):
     """The pass that composes the pieces of a table from running sums, and what it is given besides its place."""
     rows = _filled_rows(len(values) - 1)
@@ -93,9 +98,7 @@ def _from_sums(window: Sums, instant: Instant, values: np.ndarray, origin: int, 
     return composition_of_sums(rows, -(-len(instant.bars) // 4), back, encoded), {
         "images": {},
         "blocks": {"table": filled.reshape(-1, 4)},
-        "unit": 1 / window.whole,
-        "layers": window.layers,
-        "held": window.stop - window.start,
+        **_extent(window),
         "first_layer": window.start % window.layers,
         "origin": origin + back - window.start,
     }
@@ -108,7 +111,7 @@ def _from_frames(way: str, window, instant: Instant, rows: int, origin: int, dir
     given["first"], given["last"] = shutters.open_span(instant.bars)
     if summed:
         lowest, decode, edges = window.start, 0, 2 if shortened else 0
-        given |= {"held": window.stop - window.start, "unit": 1 / window.whole}
+        given |= _extent(window)
     else:
         indices = compositor.source_frames(options, origin + direction * np.arange(options.window), source.count)
         lowest, decode, edges = (

@@ -10,6 +10,11 @@ from ..core import compositor
 from ..core.instant import Options
 
 
+def summable(source) -> bool:
+    """Whether running sums are made of a source: of opaque 8-bit frames."""
+    return np.dtype(source.dtype) == np.uint8 and source.alpha == "opaque"
+
+
 class Running(ABC):
     """A window of running sums of a source's frames, in the light that is summed (Options.light).
 

@@ -10,7 +10,7 @@ from ..core import compositor, light
 from ..core.instant import Options
 from .errors import NoDeviceError
 from .passes import LOCAL_ROW, Image, Pass
-from .running import Running
+from .running import Running, summable
 
 # A layered texture over 2 GiB reads wrongly on Mesa's software renderer, without any error.
 BAND_BYTES = 1 << 30
@@ -23,7 +23,7 @@ _STORED = {np.uint8: "rgba8", np.uint16: "rgba16", np.float16: "rgba16f", np.flo
 def open_window(device, source, capacity: int) -> Window:
     """The window of `capacity` frames that composes fastest: running sums where 8 bits are summed and the device has
     room for them."""
-    if np.dtype(source.dtype) == np.uint8 and source.alpha == "opaque":
+    if summable(source):
         try:
             return Sums(device, source, capacity)
         except NoDeviceError:
