@@ -1,8 +1,32 @@
 """Everything that touches bpy: properties, engine, strips, commands."""
 
-from . import bar_editor, engine, handlers, icons, operators, panels, preview, properties, region_gizmo, split_gizmo
+from . import (
+    bar_editor,
+    engine,
+    handlers,
+    icons,
+    operators,
+    panels,
+    preview,
+    properties,
+    region_gizmo,
+    split_gizmo,
+    translations,
+)
 
-_modules = (properties, engine, icons, preview, operators, panels, bar_editor, region_gizmo, split_gizmo, handlers)
+_modules = (
+    translations,
+    properties,
+    engine,
+    icons,
+    preview,
+    operators,
+    panels,
+    bar_editor,
+    region_gizmo,
+    split_gizmo,
+    handlers,
+)
 _commands = []
 
 

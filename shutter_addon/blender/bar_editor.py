@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from bpy.app.translations import contexts
+from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Gizmo, GizmoGroup
 
 from . import drawing, editing, keymaps, strips
@@ -142,7 +144,7 @@ class SHUTTER_GT_bars(Gizmo):
             return
         if editing.auto_key(context):
             editing.key_bars(effect, self.index)
-        bpy.ops.ed.undo_push(message="Paint Bars")
+        bpy.ops.ed.undo_push(message=iface_("Paint Bars", contexts.operator_default))
 
 
 def _draw(place: Layout, shutter, values, states) -> None:

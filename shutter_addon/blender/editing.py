@@ -4,6 +4,8 @@ Shutters and regions are items of collections: where one goes or moves, its F-cu
 """
 
 import numpy as np
+from bpy.app.translations import pgettext_data as data_
+from bpy.app.translations import pgettext_iface as iface_
 
 from ..core import presets, shutters
 from . import animation, copies, effects
@@ -76,15 +78,15 @@ def start(effect) -> None:
     With the border, the first scribble is sharp around itself; without, it would be the only one, and hold everywhere.
     """
     effect.border = True
-    add_shutter(effect, "Long", presets.bars("ANGLE_360", effect.window))
-    add_shutter(effect, "Sharp", presets.bars("STILL", effect.window))
+    add_shutter(effect, data_("Long"), presets.bars("ANGLE_360", effect.window))
+    add_shutter(effect, data_("Sharp"), presets.bars("STILL", effect.window))
 
 
-def add_shutter(effect, name: str = "Shutter", bars=None):
+def add_shutter(effect, name: str = "", bars=None):
     """Appends a shutter, fully open unless bars (window,) are given, and makes it the active one."""
     color = COLORS[len(effect.shutters) % len(COLORS)]
     shutter = effect.shutters.add()
-    shutter.name, shutter.color = name, color
+    shutter.name, shutter.color = name or data_("Shutter"), color
     for weight in np.ones(effect.window) if bars is None else bars:
         shutter.bars.add().weight = weight
     effect.active_shutter = len(effect.shutters) - 1
@@ -147,9 +149,11 @@ def summary(values) -> str:
     """A shutter's bars (L,) in words: its angle, and how many frames' light it gathers."""
     light = shutters.exposure(values)
     if not light:
-        return "All bars are zero: the shutter never opens"
-    frames = f"{light:.3g}"
-    return f"{shutters.open_angle(values):.0f}°, {frames} {'frame' if frames == '1' else 'frames'} of light"
+        return iface_("All bars are zero: the shutter never opens")
+    angle, frames = f"{shutters.open_angle(values):.0f}", f"{light:.3g}"
+    if frames == "1":
+        return iface_("{angle}°, 1 frame of light").format(angle=angle)
+    return iface_("{angle}°, {frames} frames of light").format(angle=angle, frames=frames)
 
 
 def set_bars(shutter, values) -> None:

@@ -2,6 +2,8 @@
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_data as data_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import keyframes, recipe, scribbles, shutters
 from . import animation, geometry
@@ -17,7 +19,7 @@ def instant(edit, effect, strip, frame: float) -> recipe.Instant:
     """The effect at a timeline frame of its edit; strip: the effect strip that shows it. EffectError: no shutter
     at all, or one that never opens."""
     if not effect.shutters:
-        raise EffectError(f'"{effect.name}" has no shutter')
+        raise EffectError(rpt_('"{effect}" has no shutter').format(effect=effect.name))
     curves, path = animation.Curves(edit), effect.path_from_id()
     chosen = options(effect, curves, frame)
     bars = [
@@ -32,7 +34,8 @@ def checked(name: str, bars: np.ndarray, frame: float) -> np.ndarray:
     try:
         shutters.check_bars(bars)
     except shutters.ShutterError as error:
-        raise EffectError(f'shutter "{name}" at frame {frame:g}: {error}') from None
+        sentence = rpt_('shutter "{name}" at frame {frame}: {fault}')
+        raise EffectError(sentence.format(name=name, frame=f"{frame:g}", fault=rpt_(str(error)))) from None
     return bars
 
 
@@ -206,13 +209,13 @@ def layer_of(effect, region):
 def annotation(effect):
     """What the effect's scribbles are drawn on; made where somebody has removed it."""
     if effect.scene.annotation is None:
-        effect.scene.annotation = bpy.data.annotations.new(f"Scribbles {effect.name}")
+        effect.scene.annotation = bpy.data.annotations.new(data_("Scribbles {effect}").format(effect=effect.name))
     return effect.scene.annotation
 
 
 def _draw(effect, strip, source: recipe.Region, color, first: float) -> str:
     """Draws a region's strokes on an annotation layer of its own, a frame per drawing; the layer's name."""
-    layer = annotation(effect).layers.new(source.name or "Region", set_active=False)
+    layer = annotation(effect).layers.new(source.name or data_("Region"), set_active=False)
     layer.color = color
     to_image = geometry.picture_to_image(strip, picture_size(effect))
     for key, strokes in source.drawings():

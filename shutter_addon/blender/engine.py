@@ -35,9 +35,14 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
 
     def _say(self, message: str) -> None:
         if bpy.app.background:
-            print(f"Virtual Shutter: {message}", file=sys.stderr, flush=True)
+            print(_signed(message), file=sys.stderr, flush=True)
         else:
-            self.report({"WARNING"}, f"Virtual Shutter: {message}")
+            self.report({"WARNING"}, _signed(message))
+
+
+def _signed(sentence: str) -> str:
+    """Says whose sentence it is: it stands among Blender's own."""
+    return f"Virtual Shutter: {sentence}"
 
 
 def fail(engine, sentence: str) -> None:
@@ -47,12 +52,12 @@ def fail(engine, sentence: str) -> None:
     """
     if bpy.app.background:
         refuse(sentence)
-    engine.report({"ERROR"}, f"Virtual Shutter: {sentence}")
+    engine.report({"ERROR"}, _signed(sentence))
 
 
 def refuse(sentence: str) -> None:
     """Ends the process from inside a render: the sentence on stderr, exit code 2."""
-    print(f"Virtual Shutter: {sentence}", file=sys.stderr, flush=True)
+    print(_signed(sentence), file=sys.stderr, flush=True)
     leave(2)
 
 

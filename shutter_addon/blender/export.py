@@ -13,6 +13,7 @@ from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import keyframes, recipe
 from . import animation, effects, geometry
@@ -28,7 +29,7 @@ def recipe_of(edit, effect, strip) -> recipe.Recipe:
     Left out are regions without strokes or shutter, drawings before the first that has strokes, and keys of widths and
     of options, which are as at the strip's first frame."""
     if not effect.shutters:
-        raise effects.EffectError(f'"{effect.name}" has no shutter')
+        raise effects.EffectError(rpt_('"{effect}" has no shutter').format(effect=effect.name))
     curves, path = animation.Curves(edit), effect.path_from_id()
     chosen = effects.options(effect, curves, strip.left_handle)
     names = _different([shutter.name for shutter in effect.shutters])

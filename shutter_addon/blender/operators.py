@@ -1,6 +1,9 @@
 """Operators: what the user can do, as thin calls of plain functions."""
 
 import bpy
+from bpy.app.translations import contexts
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 from bpy.types import Operator
 from bpy_extras.io_utils import ExportHelper, ImportHelper
@@ -9,6 +12,7 @@ from ..core import presets, recipe
 from . import editing, effects, export, icons, strips
 from .pictures import FAULTS
 from .properties import KINDS
+from .translations import CONTEXT
 
 UNDOABLE = {"REGISTER", "UNDO"}
 
@@ -36,9 +40,9 @@ class _OfEffect:
     def poll(cls, context):
         found = strips.active(context)
         if found is None:
-            return refused(cls, "Select a Shutter strip, or its source strip")
+            return refused(cls, rpt_("Select a Shutter strip or its source strip"))
         if not found[0].is_editable:
-            return refused(cls, "The edit is linked from another file")
+            return refused(cls, rpt_("The edit is linked from another file"))
         return cls.possible(found[1])
 
     @classmethod
@@ -56,7 +60,7 @@ class _OfShutter(_OfEffect):
 
     @classmethod
     def possible(cls, effect):
-        return editing.active_shutter(effect) is not None or refused(cls, "The effect has no shutter: add one")
+        return editing.active_shutter(effect) is not None or refused(cls, rpt_("The effect has no shutter: add one"))
 
 
 class _OfRegion(_OfEffect):
@@ -64,25 +68,25 @@ class _OfRegion(_OfEffect):
 
     @classmethod
     def possible(cls, effect):
-        return editing.active_region(effect) is not None or refused(cls, "The shutter has no region: draw one")
+        return editing.active_region(effect) is not None or refused(cls, rpt_("The shutter has no region: draw one"))
 
 
 class SHUTTER_OT_add_effect(Operator):
-    """Add a Shutter strip above the active strip: every pixel gets an exposure of its own"""
+    """Add a Shutter strip above the active strip, which gives every pixel an exposure of its own"""
 
     bl_idname = "shutter.add_effect"
-    bl_label = "Add Shutter"
+    bl_label = "Add Shutter Strip"
     bl_options = UNDOABLE
 
     @classmethod
     def poll(cls, context):
         edit, source = strips.edit_of(context), strips.active_strip(context)
         if edit is None or source is None:
-            return refused(cls, "Select a movie, image or clip strip")
+            return refused(cls, rpt_("Select a movie, image or clip strip"))
         if not edit.is_editable:
-            return refused(cls, "The edit is linked from another file")
+            return refused(cls, rpt_("The edit is linked from another file"))
         if source.type not in strips.SOURCES:
-            return refused(cls, "The active strip is no movie, image or clip strip")
+            return refused(cls, rpt_("The active strip is not a movie, image or clip strip"))
         return True
 
     def execute(self, context):
@@ -126,7 +130,7 @@ def _choose_tab() -> float | None:
 
 
 class SHUTTER_OT_shutter_add(_OfEffect, Operator):
-    """Add a shutter"""
+    """Add a shutter that is fully open"""
 
     bl_idname = "shutter.shutter_add"
     bl_label = "Add Shutter"
@@ -136,7 +140,7 @@ class SHUTTER_OT_shutter_add(_OfEffect, Operator):
 
 
 class SHUTTER_OT_shutter_duplicate(_OfShutter, Operator):
-    """Add a copy of the active shutter, with its keys"""
+    """Add a copy of the active shutter, keyframes included"""
 
     bl_idname = "shutter.shutter_duplicate"
     bl_label = "Duplicate Shutter"
@@ -154,7 +158,7 @@ class SHUTTER_OT_shutter_remove(_OfShutter, Operator):
     @classmethod
     def possible(cls, effect):
         if len(effect.shutters) == 1:
-            return refused(cls, "An effect needs a shutter: this is its last one")
+            return refused(cls, rpt_("The last shutter of an effect cannot be removed"))
         return super().possible(effect)
 
     def change(self, _context, effect):
@@ -171,7 +175,7 @@ class _Move:
 
 
 class SHUTTER_OT_shutter_move(_Move, _OfShutter, Operator):
-    """Move the active shutter in the list. The first one holds wherever nothing is scribbled"""
+    """Move the active shutter in the list (the first one is the default, which holds where nothing is scribbled)"""
 
     bl_idname = "shutter.shutter_move"
     bl_label = "Move Shutter"
@@ -191,8 +195,8 @@ _preset_items = []
 def _presets(_self, _context):
     """With icons, which exist only once the extension is registered; Blender needs the list kept."""
     _preset_items[:] = [
-        (name, label, f"Give the active shutter these bars: {label}", icons.of(name), i)
-        for i, (name, (label, _make, _defaults)) in enumerate(presets.PRESETS.items())
+        (name, label, description, icons.of(name), i)
+        for i, (name, (label, description, _make, _defaults)) in enumerate(presets.PRESETS.items())
     ]
     return _preset_items
 
@@ -201,9 +205,9 @@ class SHUTTER_OT_preset(_OfShutter, Operator):
     """Give the active shutter the bars of a preset"""
 
     bl_idname = "shutter.preset"
-    bl_label = "Shutter Preset"
+    bl_label = "Apply Shutter Preset"
 
-    preset: EnumProperty(name="Preset", items=_presets)
+    preset: EnumProperty(name="Preset", items=_presets, translation_context=CONTEXT)
 
     def change(self, context, effect):
         values = presets.bars(self.preset, effect.window)
@@ -211,36 +215,36 @@ class SHUTTER_OT_preset(_OfShutter, Operator):
 
 
 class SHUTTER_OT_bars_key(_OfShutter, Operator):
-    """Insert a key on all bars of the active shutter"""
+    """Insert keyframes for all bars of the active shutter at the current frame"""
 
     bl_idname = "shutter.bars_key"
-    bl_label = "Key Bars"
+    bl_label = "Insert Bar Keyframes"
 
     def change(self, _context, effect):
         editing.key_bars(effect, effect.active_shutter)
 
 
 class SHUTTER_OT_bars_unkey(_OfShutter, Operator):
-    """Delete the keys of the active shutter's bars at the current frame"""
+    """Delete the keyframes of all bars of the active shutter at the current frame"""
 
     bl_idname = "shutter.bars_unkey"
-    bl_label = "Delete Keys of Bars"
+    bl_label = "Delete Bar Keyframes"
 
     def change(self, _context, effect):
         if not editing.unkey_bars(effect, effect.active_shutter):
-            self.report({"WARNING"}, "No bar has a key at this frame")
+            self.report({"WARNING"}, "No bar has a keyframe at the current frame")
             return {"CANCELLED"}
         return None
 
 
 class SHUTTER_OT_bar_set(_OfShutter, Operator):
-    """Type the weight of a bar"""
+    """Set the weight of a bar as a number"""
 
     bl_idname = "shutter.bar_set"
-    bl_label = "Bar"
+    bl_label = "Set Bar Weight"
 
-    bar: IntProperty(name="Bar", description="Which bar, from 1", default=1, min=1)
-    weight: FloatProperty(name="Weight", description="How much this frame contributes", min=0.0, soft_max=1.0)
+    bar: IntProperty(name="Bar", description="Number of the bar, from 1", default=1, min=1)
+    weight: FloatProperty(name="Weight", description="How much the bar's frame contributes", min=0.0, soft_max=1.0)
 
     def invoke(self, context, event):
         from .bar_editor import bar_under
@@ -251,7 +255,8 @@ class SHUTTER_OT_bar_set(_OfShutter, Operator):
             self.bar = place + 1
         bars = editing.bars_now(effect, effect.active_shutter)
         self.weight = bars[min(self.bar, len(bars)) - 1]
-        return context.window_manager.invoke_props_dialog(self, width=200, title=f"Bar {self.bar}")
+        title = iface_("Bar {number}").format(number=self.bar)
+        return context.window_manager.invoke_props_dialog(self, width=200, title=title)
 
     def draw(self, _context):
         self.layout.activate_init = True
@@ -260,7 +265,7 @@ class SHUTTER_OT_bar_set(_OfShutter, Operator):
     def change(self, context, effect):
         values = editing.bars_now(effect, effect.active_shutter)
         if self.bar > len(values):
-            self.report({"ERROR"}, f"The shutter has {len(values)} bars")
+            self.report({"ERROR"}, rpt_("The shutter has {count} bars").format(count=len(values)))
             return {"CANCELLED"}
         values[self.bar - 1] = self.weight
         editing.paint(effect, effect.active_shutter, values, editing.auto_key(context))
@@ -268,7 +273,7 @@ class SHUTTER_OT_bar_set(_OfShutter, Operator):
 
 
 class SHUTTER_OT_draw(_OfShutter, Operator):
-    """Scribble in the preview where the active shutter holds. Drawn at another frame, a scribble is redrawn there"""
+    """Scribble in the preview where the active shutter holds (at another frame, this redraws the active region)"""
 
     bl_idname = "shutter.draw"
     bl_label = "Draw"
@@ -276,10 +281,10 @@ class SHUTTER_OT_draw(_OfShutter, Operator):
     # Blender would use again what a button was pressed with before.
     new: BoolProperty(
         name="New Region",
-        description="Draw a region of its own, not one more stroke of the active one",
+        description="Start a new region instead of adding strokes to the active one",
         options={"SKIP_SAVE"},
     )
-    kind: EnumProperty(name="Kind", items=KINDS, options={"SKIP_SAVE"})
+    kind: EnumProperty(name="Type", description="How the strokes cover the picture", items=KINDS, options={"SKIP_SAVE"})
 
     def change(self, context, effect):
         region = editing.active_region(effect)
@@ -332,19 +337,19 @@ def annotation_of(context):
 
 
 class SHUTTER_OT_region_take(_OfShutter, Operator):
-    """Make an existing annotation layer a region of the active shutter"""
+    """Make an annotation layer of the preview a region of the active shutter"""
 
     bl_idname = "shutter.region_take"
-    bl_label = "From Annotation Layer"
+    bl_label = "Add Region from Annotation Layer"
 
-    layer: EnumProperty(name="Layer", items=_layers)
+    layer: EnumProperty(name="Layer", items=_layers, translation_context=contexts.no_translation)
 
     @classmethod
     def poll(cls, context):
         if not super().poll(context):
             return False
         if not editing.free_layers(strips.active(context)[1], annotation_of(context)):
-            return refused(cls, "The preview shows no annotation layer that is not a region yet")
+            return refused(cls, rpt_("The preview shows no annotation layer that is not a region yet"))
         return True
 
     def change(self, context, effect):
@@ -365,12 +370,12 @@ def _shutters(_self, context):
 
 
 class SHUTTER_OT_region_assign(_OfRegion, Operator):
-    """Give the active region to another shutter"""
+    """Assign the active region to another shutter"""
 
     bl_idname = "shutter.region_assign"
-    bl_label = "Region's Shutter"
+    bl_label = "Assign Region to Shutter"
 
-    shutter: EnumProperty(name="Shutter", items=_shutters)
+    shutter: EnumProperty(name="Shutter", items=_shutters, translation_context=contexts.no_translation)
 
     def change(self, _context, effect):
         editing.assign_region(effect, effect.active_region, effect.shutters[int(self.shutter)])
@@ -387,7 +392,7 @@ class SHUTTER_OT_region_remove(_OfRegion, Operator):
 
 
 class SHUTTER_OT_region_move(_Move, _OfRegion, Operator):
-    """Move the active region in the list. Later ones lie over earlier ones"""
+    """Move the active region in the list (later ones lie over earlier ones)"""
 
     bl_idname = "shutter.region_move"
     bl_label = "Move Region"
@@ -402,10 +407,10 @@ class SHUTTER_OT_region_move(_Move, _OfRegion, Operator):
 
 
 class SHUTTER_OT_region_key(_OfRegion, Operator):
-    """Insert keys on location, rotation and scale of the active region"""
+    """Insert keyframes for location, rotation and scale of the active region at the current frame"""
 
     bl_idname = "shutter.region_key"
-    bl_label = "Key Region"
+    bl_label = "Insert Region Keyframes"
 
     def change(self, _context, effect):
         editing.key_region(effect, effect.active_region)
@@ -414,12 +419,12 @@ class SHUTTER_OT_region_key(_OfRegion, Operator):
 def chosen_file(operator) -> str:
     """The path that an operator got. RecipeError: it got none."""
     if not operator.filepath:
-        raise recipe.RecipeError("Choose a file")
+        raise recipe.RecipeError(rpt_("Choose a file"))
     return operator.filepath
 
 
 class SHUTTER_OT_recipe_import(_OfEffect, ImportHelper, Operator):
-    """Replace the effect by a recipe: shutters, scribbles, keys and options"""
+    """Replace the shutters, regions, keyframes and options of the effect with those of a recipe file"""
 
     bl_idname = "shutter.recipe_import"
     bl_label = "Import Recipe"
@@ -438,7 +443,7 @@ class SHUTTER_OT_recipe_import(_OfEffect, ImportHelper, Operator):
 
 
 class SHUTTER_OT_recipe_export(_OfEffect, ExportHelper, Operator):
-    """Write the effect to a recipe: shutters, scribbles, keys and options"""
+    """Save the shutters, regions, keyframes and options of the effect as a recipe file"""
 
     bl_idname = "shutter.recipe_export"
     bl_label = "Export Recipe"
@@ -455,9 +460,10 @@ class SHUTTER_OT_recipe_export(_OfEffect, ExportHelper, Operator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         except OSError as error:
-            self.report({"ERROR"}, f"{self.filepath}: {error.strerror or error}")
+            sentence = f"{self.filepath}: {error.strerror or error}"
+            self.report({"ERROR"}, sentence)
             return {"CANCELLED"}
-        self.report({"INFO"}, f"Wrote {path}")
+        self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
         return None
 
 

@@ -1,10 +1,10 @@
 """Panels, lists and menus: in the Properties editor's Strip tab, and as a tab in the sequencer's sidebar."""
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Menu, Panel, UIList
 
-from ..core import presets
-from . import editing, icons, strips
+from . import editing, strips
 
 # Beyond this a column of numbers helps nobody: the bar editor and the Graph Editor do.
 _MOST_NUMBERS = 64
@@ -45,8 +45,7 @@ class SHUTTER_MT_presets(Menu):
     bl_label = "Presets"
 
     def draw(self, _context):
-        for name, (label, _make, _defaults) in presets.PRESETS.items():
-            self.layout.operator("shutter.preset", text=label, icon_value=icons.of(name)).preset = name
+        self.layout.operator_enum("shutter.preset", "preset")
 
 
 class SHUTTER_MT_shutters(Menu):
@@ -101,7 +100,7 @@ class _Shutters:
         values = editing.bars_now(effect, effect.active_shutter)
         row = layout.row()
         row.active = not values.any()
-        row.label(text=editing.summary(values), icon="NONE" if values.any() else "ERROR")
+        row.label(text=editing.summary(values), icon="NONE" if values.any() else "ERROR", translate=False)
 
 
 def _draw_live(layout, context):
@@ -141,7 +140,7 @@ class _Regions(_WithEffect):
         row = layout.split(factor=0.4)
         row.alignment = "RIGHT"
         row.label(text="Shutter")
-        row.operator_menu_enum("shutter.region_assign", "shutter", text=region.shutter)
+        row.operator_menu_enum("shutter.region_assign", "shutter", text=region.shutter, translate=False)
         layout.prop(region, "kind")
         if region.kind == "LINE":
             layout.prop(region, "width")
@@ -164,10 +163,12 @@ class _Bars(_WithEffect):
         layout = self.layout
         layout.use_property_split = True
         column = layout.column(align=True)
+        label = iface_("Frame {number}")
         for k, bar in enumerate(shutter.bars[:_MOST_NUMBERS]):
-            column.prop(bar, "weight", text=f"Frame {k + 1}", slider=True)
+            column.prop(bar, "weight", text=label.format(number=k + 1), translate=False, slider=True)
         if len(shutter.bars) > _MOST_NUMBERS:
-            column.label(text=f"and {len(shutter.bars) - _MOST_NUMBERS} more, in the bar editor")
+            more = iface_("and {count} more, in the bar editor").format(count=len(shutter.bars) - _MOST_NUMBERS)
+            column.label(text=more, translate=False)
 
 
 class _Options(_WithEffect):

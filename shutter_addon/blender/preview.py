@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import bpy
 import gpu
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
 from bpy.types import PropertyGroup
 from gpu_extras.batch import batch_for_shader
@@ -13,6 +14,7 @@ from ..compute.passes import body
 from ..core.recipe import Instant
 from . import cache, drawing, editing, effects, geometry, pictures, strips
 from .device import Texture
+from .translations import CONTEXT
 
 VIEWS = (
     ("RESULT", "Result", "The finished picture"),
@@ -55,10 +57,17 @@ class ShutterPreview(PropertyGroup):
     live: BoolProperty(
         name="Live", description="Show scribbles and views of the effect in the preview", default=True, update=redraw
     )
-    view: EnumProperty(name="View", description="What the live preview shows", items=VIEWS, update=redraw)
+    view: EnumProperty(
+        name="View",
+        description="What the live preview shows",
+        items=VIEWS,
+        update=redraw,
+        translation_context=CONTEXT,
+    )
     split: FloatProperty(
         name="Split",
-        description="Where the source ends and the result begins",
+        description="Where the source ends and the result begins, as a fraction of the picture's width",
+        subtype="FACTOR",
         default=0.5,
         min=0.0,
         max=1.0,
@@ -131,7 +140,7 @@ def _draw() -> None:
         try:
             _show(context, found, settings, say)
         except pictures.FAULTS as error:
-            say(f"Shutter: {error}")
+            say(rpt_("Shutter: {fault}").format(fault=error))
         say.draw()
 
 
@@ -162,9 +171,9 @@ def _show(context, found: Shown, settings, say) -> None:
 def _warn(found: Shown, say) -> None:
     """Says what a picture that is drawn over the sequencer's cannot show."""
     if found.strips_above:
-        say("The strips above are hidden in this view")
+        say(rpt_("The strips above are hidden in this view"))
     if found.edit.view_settings.view_transform != "Standard":
-        say("This view shows view transform Standard")
+        say(rpt_("This view has the view transform Standard"))
 
 
 def _show_strokes(context, quad, effect, moment) -> None:

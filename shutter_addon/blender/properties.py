@@ -19,6 +19,7 @@ from bpy.types import PropertyGroup
 
 from ..core.shutters import MAX_WINDOW
 from . import cache, editing
+from .translations import CONTEXT
 
 # Enum identifiers are the recipe's words in capitals.
 POSITIONS = (
@@ -27,20 +28,20 @@ POSITIONS = (
     ("END", "End", "The window ends at the frame"),
 )
 INTERPOLATIONS = (
-    ("DISPLACEMENT", "Displacement", "Between shutters and between keys, times move"),
-    ("VALUE", "Value", "Between shutters, pictures cross-fade, and between keys every bar fades by itself"),
+    ("DISPLACEMENT", "Displacement", "Move times between shutters and between keyframes"),
+    ("VALUE", "Value", "Cross-fade pictures between shutters, and fade every bar by itself between keyframes"),
 )
 LIGHTS = (
-    ("LINEAR", "Linear", "Sum light, as a camera does: bright streaks stay bright"),
-    ("ENCODED", "Encoded", "Sum code values"),
+    ("LINEAR", "Linear", "Sum light as a camera does, so that bright streaks stay bright"),
+    ("ENCODED", "Encoded", "Sum the values that the footage is encoded with, which dims bright streaks"),
 )
 EXPOSURES = (
-    ("NORMALIZED", "Normalized", "Every shutter gives full brightness"),
+    ("NORMALIZED", "Normalized", "Every shutter gives the same brightness"),
     ("WEIGHTED", "Weighted", "A shutter that is open for less time than the default is darker"),
 )
 EDGES = (
-    ("HOLD", "Hold", "Beyond the clip's ends, repeat its first or last frame"),
-    ("MIRROR", "Mirror", "Beyond the clip's ends, play back from there"),
+    ("HOLD", "Hold", "Repeat the first or last frame beyond the clip's ends"),
+    ("MIRROR", "Mirror", "Play the clip backward beyond its ends"),
     ("SHORTEN", "Shorten", "Leave out what lies beyond the clip's ends"),
 )
 AGGREGATES = (
@@ -49,8 +50,8 @@ AGGREGATES = (
     ("4", "4×4", "Blocks of 4×4 pixels share a shutter"),
 )
 KINDS = (
-    ("LINE", "Line", "The strokes, as wide as the region's width"),
-    ("LASSO", "Lasso", "What the strokes enclose"),
+    ("LINE", "Line", "The strokes themselves, as wide as the region's width"),
+    ("LASSO", "Lasso", "All that the strokes enclose"),
 )
 
 # The renderer asks the F-curves itself: keys on these would show, and not render.
@@ -87,7 +88,7 @@ def _aimed(effect, _context):
 class ShutterBar(PropertyGroup):
     weight: FloatProperty(
         name="Weight",
-        description="How much this frame contributes",
+        description="How much the bar's frame contributes",
         default=1.0,
         min=0.0,
         soft_max=1.0,
@@ -96,10 +97,10 @@ class ShutterBar(PropertyGroup):
 
 
 class Shutter(PropertyGroup):
-    name: StringProperty(name="Name", default="Shutter", set_transform=_renamed)
+    name: StringProperty(name="Name", description="Name of the shutter", default="Shutter", set_transform=_renamed)
     color: FloatVectorProperty(
         name="Color",
-        description="Of its bars, its scribbles and its share in the coefficients",
+        description="Color of the shutter's bars, scribbles and coefficients",
         subtype="COLOR_GAMMA",
         size=3,
         min=0.0,
@@ -112,46 +113,85 @@ class Shutter(PropertyGroup):
 
 
 class ShutterRegion(PropertyGroup):
-    name: StringProperty(name="Name", default="Region")
-    shutter: StringProperty(name="Shutter", description="Name of the shutter that holds here", update=_changed)
+    name: StringProperty(name="Name", description="Name of the region", default="Region")
+    shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=_changed)
     layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=_changed)
-    kind: EnumProperty(name="Kind", items=KINDS, update=_changed, options=_UNKEYED)
+    kind: EnumProperty(
+        name="Type",
+        description="How the strokes cover the picture",
+        items=KINDS,
+        update=_changed,
+        options=_UNKEYED,
+    )
     width: FloatProperty(
         name="Width",
-        description="Width of lines, as a part of the picture's height",
+        description="Width of the lines as a fraction of the picture's height",
         default=0.02,
         min=0.0,
         soft_max=0.5,
         update=_changed,
     )
-    location: FloatVectorProperty(name="Location", description="In parts of the picture", size=2, update=_changed)
-    rotation: FloatProperty(name="Rotation", description="About the shape's center", subtype="ANGLE", update=_changed)
-    scale: FloatProperty(name="Scale", description="About the shape's center", default=1.0, update=_changed)
+    location: FloatVectorProperty(
+        name="Location",
+        description="Distance from where the region was drawn, as a fraction of the picture",
+        subtype="XYZ",
+        size=2,
+        update=_changed,
+    )
+    rotation: FloatProperty(
+        name="Rotation", description="Rotation about the region's center", subtype="ANGLE", update=_changed
+    )
+    scale: FloatProperty(name="Scale", description="Scale about the region's center", default=1.0, update=_changed)
 
 
 class ShutterEffect(PropertyGroup):
-    name: StringProperty(name="Name", default="Shutter")
+    name: StringProperty(name="Name", description="Name of the effect", default="Shutter")
     scene: PointerProperty(name="Scene", description="Scene that the effect's strips show", type=bpy.types.Scene)
     source: StringProperty(name="Source", description="Identity of the source strip")
     start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts", options=_UNKEYED)
     window: IntProperty(
         name="Window",
-        description="Source frames that a shutter can expose",
+        description="Number of source frames that a shutter can expose",
         default=8,
         min=1,
         max=MAX_WINDOW,
         update=_lengthened,
         options=_UNKEYED,
+        translation_context=CONTEXT,
     )
-    position: EnumProperty(name="Position", items=POSITIONS, update=_changed)
-    interpolation: EnumProperty(name="Interpolation", items=INTERPOLATIONS, update=_changed)
-    light: EnumProperty(name="Light", items=LIGHTS, update=_changed)
-    exposure: EnumProperty(name="Exposure", items=EXPOSURES, update=_changed)
-    edges: EnumProperty(name="Edges", items=EDGES, update=_changed)
-    aggregate: EnumProperty(name="Aggregate", items=AGGREGATES, update=_changed)
+    position: EnumProperty(
+        name="Position", description="Where the window lies around the frame", items=POSITIONS, update=_changed
+    )
+    interpolation: EnumProperty(
+        name="Interpolation",
+        description="How shutters blend, in the picture and between keyframes",
+        items=INTERPOLATIONS,
+        update=_changed,
+    )
+    light: EnumProperty(name="Light", description="How the window's frames are summed", items=LIGHTS, update=_changed)
+    exposure: EnumProperty(
+        name="Exposure",
+        description="How bright shutters are that are open for different times",
+        items=EXPOSURES,
+        update=_changed,
+        translation_context=CONTEXT,
+    )
+    edges: EnumProperty(
+        name="Clip Ends",
+        description="What a window gets that reaches beyond the clip's ends",
+        items=EDGES,
+        update=_changed,
+        translation_context=CONTEXT,
+    )
+    aggregate: EnumProperty(
+        name="Aggregate",
+        description="Pixels that share a shutter (larger blocks are quicker)",
+        items=AGGREGATES,
+        update=_changed,
+    )
     border: BoolProperty(
         name="Border",
-        description="The frame's edge is a scribble of the default shutter",
+        description="Make the picture's edge a scribble of the default shutter",
         update=_changed,
     )
     shutters: CollectionProperty(type=Shutter)

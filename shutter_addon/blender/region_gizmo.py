@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from bpy.app.translations import contexts
+from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Gizmo, GizmoGroup
 
 from ..core import scribbles
@@ -126,7 +128,7 @@ class SHUTTER_GT_region(Gizmo):
             return
         if editing.auto_key(context):
             editing.key_region(found[1], found[1].active_region)
-        bpy.ops.ed.undo_push(message="Transform Region")
+        bpy.ops.ed.undo_push(message=iface_("Transform Region", contexts.operator_default))
 
 
 class SHUTTER_GGT_region(GizmoGroup):

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..media import MediaError, open_source
 
@@ -75,7 +76,7 @@ def _files(strip):
         return 1, lambda _i: movie
     folder, elements = Path(bpy.path.abspath(strip.directory, library=library)), strip.elements
     if not elements:
-        raise MediaError(f'strip "{strip.name}" has no files')
+        raise MediaError(rpt_('strip "{strip}" has no files').format(strip=strip.name))
     return len(elements), lambda i: folder / elements[i].filename
 
 
@@ -83,9 +84,10 @@ def _clip_files(strip):
     """A clip's movie, or its images by their numbers, without a gap."""
     clip = strip.clip
     if clip is None:
-        raise MediaError(f'strip "{strip.name}" has no clip')
+        raise MediaError(rpt_('strip "{strip}" has no clip').format(strip=strip.name))
     if strip.undistort or strip.stabilize2d:
-        raise MediaError(f'strip "{strip.name}": undistorted or stabilized clips are not supported')
+        sentence = rpt_('strip "{strip}": undistorted or stabilized clips are not supported')
+        raise MediaError(sentence.format(strip=strip.name))
     path = Path(bpy.path.abspath(clip.filepath, library=clip.library))
     number = re.search(r"(\d+)(\D*)$", path.stem)
     if clip.source == "MOVIE" or number is None:

@@ -3,6 +3,8 @@
 import uuid
 
 import bpy
+from bpy.app.translations import pgettext_data as data_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from . import effects, sources
 
@@ -37,7 +39,7 @@ def find_edit(scene):
             for strip in effect_strips(edit):
                 if strip.scene == scene:
                     return edit, effect, strip
-    raise effects.EffectError(f'scene "{scene.name}" belongs to no Shutter strip')
+    raise effects.EffectError(rpt_('scene "{scene}" belongs to no Shutter strip').format(scene=scene.name))
 
 
 def edit_of(context):
@@ -105,7 +107,7 @@ def source_of(edit, effect, strip):
     """The effect's source strip: of those with its identity (parts of a cut strip, copies) the nearest in time, then
     the nearest below. EffectError: there is none any more."""
     if (source := nearest_source(edit, effect, strip)) is None:
-        raise effects.EffectError(f'the source strip of "{strip.name}" was deleted')
+        raise effects.EffectError(rpt_('the source strip of "{strip}" was deleted').format(strip=strip.name))
     return source
 
 
@@ -136,12 +138,13 @@ def add_effect(edit, source):
     if not source.virtual_shutter_source:
         source.virtual_shutter_source = uuid.uuid4().hex
     length = max(source.content_end, source.right_handle) - source.content_start
-    scene = new_scene(edit, f"Shutter {source.name}", (medium.width, medium.height), int(length) + _SPARE)
+    name = data_("Shutter {source}").format(source=source.name)
+    scene = new_scene(edit, name, (medium.width, medium.height), int(length) + _SPARE)
     scene.virtual_shutter.identity = uuid.uuid4().hex
     level = (source.parent_meta() or edit.sequence_editor).strips
     taken = {s.channel for s in level if _overlap(s, source)}
     channel = next(c for c in range(source.channel + 1, source.channel + len(taken) + 2) if c not in taken)
-    strip = level.new_scene("Shutter", scene, channel, int(source.content_start))
+    strip = level.new_scene(data_("Shutter"), scene, channel, int(source.content_start))
     strip.left_handle, strip.right_handle = source.left_handle, source.right_handle
     strip.blend_type = source.blend_type
     copy_look(source, strip)

@@ -71,28 +71,28 @@ def rolling_pair(window: int) -> np.ndarray:
     return np.stack([first(window), last(window)])
 
 
-# name: (label, function, parameters). "Custom" is no preset: it is whatever the bars are.
+# name: (label, description, function, parameters). "Custom" is no preset: it is whatever the bars are.
 PRESETS = {
-    "STILL": ("Still Frame", still, {}),
-    "ANGLE_45": ("45°", angle, {"degrees": 45.0}),
-    "ANGLE_90": ("90°", angle, {"degrees": 90.0}),
-    "ANGLE_180": ("180°", angle, {"degrees": 180.0}),
-    "ANGLE_270": ("270°", angle, {"degrees": 270.0}),
-    "ANGLE_360": ("360°", angle, {"degrees": 360.0}),
-    "TWO_CUTS": ("Two Cuts", cuts, {"count": 2}),
-    "CUTS": ("Cuts", cuts, {"count": 4}),
-    "RAMP_UP": ("Ramp Up", ramp_up, {}),
-    "RAMP_DOWN": ("Ramp Down", ramp_down, {}),
-    "TRIANGLE": ("Triangle", triangle, {}),
-    "GAUSSIAN": ("Gaussian", gaussian, {}),
-    "TRAIL": ("Exponential Trail", trail, {}),
-    "STUTTER": ("Stutter", stutter, {"every": 4}),
-    "FIRST": ("First Frame", first, {}),
-    "LAST": ("Last Frame", last, {}),
+    "STILL": ("Still Frame", "One sharp frame", still, {}),
+    "ANGLE_45": ("45°", "Open for an eighth of the window", angle, {"degrees": 45.0}),
+    "ANGLE_90": ("90°", "Open for a quarter of the window", angle, {"degrees": 90.0}),
+    "ANGLE_180": ("180°", "Open for half of the window, as film cameras are", angle, {"degrees": 180.0}),
+    "ANGLE_270": ("270°", "Open for three quarters of the window", angle, {"degrees": 270.0}),
+    "ANGLE_360": ("360°", "Open for the whole window", angle, {"degrees": 360.0}),
+    "TWO_CUTS": ("Two Cuts", "Two frames on top of each other", cuts, {"count": 2}),
+    "CUTS": ("Four Cuts", "Four frames on top of each other", cuts, {"count": 4}),
+    "RAMP_UP": ("Ramp Up", "Opens over the window: a trail with a sharp end", ramp_up, {}),
+    "RAMP_DOWN": ("Ramp Down", "Closes over the window: a trail with a sharp start", ramp_down, {}),
+    "TRIANGLE": ("Triangle", "Opens to the middle of the window and closes again", triangle, {}),
+    "GAUSSIAN": ("Gaussian", "A bell curve around the middle of the window", gaussian, {}),
+    "TRAIL": ("Exponential Trail", "Fades quickly at first and slowly later on", trail, {}),
+    "STUTTER": ("Stutter", "Every fourth frame, as a strobe lights them", stutter, {"every": 4}),
+    "FIRST": ("First Frame", "The first frame of the window alone", first, {}),
+    "LAST": ("Last Frame", "The last frame of the window alone", last, {}),
 }
 
 
 def bars(name: str, window: int, **parameters) -> np.ndarray:
     """Bars (L,) of the preset `name`, its own parameters overridden by `parameters`. KeyError: no such preset."""
-    _label, make, defaults = PRESETS[name]
+    *_words, make, defaults = PRESETS[name]
     return make(window, **(defaults | parameters))

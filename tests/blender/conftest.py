@@ -2,13 +2,14 @@
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support import read_picture, write_frames
+from support import EXTENSION, read_picture, write_frames
 
 ROOT = Path(__file__).parents[2]
 
@@ -97,5 +98,34 @@ def command(tmp_path):
         if check:
             assert done.returncode == 0, done.stderr
         return done
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def user_folder(tmp_path_factory):
+    """A Blender user folder with the checkout as an installed extension."""
+    folder = tmp_path_factory.mktemp("user") / "resources"
+    (folder / "extensions" / "user_default").mkdir(parents=True)
+    (folder / "extensions" / "user_default" / "virtual_shutter").symlink_to(ROOT)
+    return folder
+
+
+@pytest.fixture
+def blender(user_folder):
+    """Runs the real Blender that the environment names, with the extension enabled."""
+    if not os.environ.get("BLENDER"):
+        pytest.skip("NO REAL BLENDER: set BLENDER to the command that runs one")
+
+    def run(*arguments):
+        command = [*shlex.split(os.environ["BLENDER"]), "-b", "--factory-startup", "--addons", EXTENSION]
+        return subprocess.run(
+            [*command, *map(str, arguments)],
+            env=os.environ | {"BLENDER_USER_RESOURCES": str(user_folder)},
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=ROOT,
+        )
 
     return run

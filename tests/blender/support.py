@@ -5,6 +5,8 @@ from contextlib import contextmanager
 import numpy as np
 import OpenImageIO
 
+EXTENSION = "bl_ext.user_default.virtual_shutter"  # its id where the checkout is linked
+
 
 def read_picture(path):
     """A picture file's samples as float64; whole-number formats in 8-bit levels, straight alpha."""

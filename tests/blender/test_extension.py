@@ -2,18 +2,15 @@
 
 import json
 import os
-import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
-import pytest
-from support import read_picture, recipe
+from support import EXTENSION, read_picture, recipe
 
 ROOT = Path(__file__).parents[2]
 TRACES = Path(__file__).parent / "traces.py"
-NAME = "bl_ext.user_default.virtual_shutter"
 LONG_AND_SHARP = recipe(
     8,
     np.ones(8),
@@ -34,15 +31,6 @@ LONG_AND_SHARP = recipe(
 )
 
 
-@pytest.fixture(scope="module")
-def user_folder(tmp_path_factory):
-    """A Blender user folder with the checkout as an installed extension."""
-    folder = tmp_path_factory.mktemp("user") / "resources"
-    (folder / "extensions" / "user_default").mkdir(parents=True)
-    (folder / "extensions" / "user_default" / "virtual_shutter").symlink_to(ROOT)
-    return folder
-
-
 def wheel(user_folder, code, *arguments):
     """Runs code in the bpy wheel, with the extension installed."""
     return subprocess.run(
@@ -52,26 +40,6 @@ def wheel(user_folder, code, *arguments):
         text=True,
         check=False,
     )
-
-
-@pytest.fixture
-def blender(user_folder):
-    """Runs the real Blender that the environment names, with the extension enabled."""
-    if not os.environ.get("BLENDER"):
-        pytest.skip("NO REAL BLENDER: set BLENDER to the command that runs one")
-
-    def run(*arguments):
-        command = [*shlex.split(os.environ["BLENDER"]), "-b", "--factory-startup", "--addons", NAME]
-        return subprocess.run(
-            [*command, *map(str, arguments)],
-            env=os.environ | {"BLENDER_USER_RESOURCES": str(user_folder)},
-            capture_output=True,
-            text=True,
-            check=False,
-            cwd=ROOT,
-        )
-
-    return run
 
 
 def test_enable_and_disable_leave_nothing_behind(user_folder):
@@ -86,7 +54,9 @@ def test_a_real_blender_keeps_nothing_of_a_disabled_extension(blender):
     assert done.returncode == 0, done.stderr
     assert "NOTHING LEFT" in done.stdout
     assert "Traceback" not in done.stderr
-    gone = blender("--python-expr", f"import addon_utils; addon_utils.disable('{NAME}')", "-c", "shutter", "--help")
+    gone = blender(
+        "--python-expr", f"import addon_utils; addon_utils.disable('{EXTENSION}')", "-c", "shutter", "--help"
+    )
     assert gone.returncode != 0, "the command is still there"
 
 

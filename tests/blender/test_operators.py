@@ -166,7 +166,7 @@ def test_bars_are_keyed_unkeyed_and_typed(bpy, effect, editing, does):
 
 def test_no_key_to_delete(bpy, effect, capfd):
     assert call(bpy, "bars_unkey") == {"CANCELLED"}
-    assert "No bar has a key at this frame" in capfd.readouterr().out
+    assert "No bar has a keyframe at the current frame" in capfd.readouterr().out
 
 
 def test_a_typed_bar_between_keys_leaves_the_others_as_they_show(bpy, effect, editing):
@@ -341,8 +341,8 @@ def test_an_effect_that_cannot_be_rendered_is_not_exported(bpy, effect, editing,
 
 # Where nothing can be done
 
-NO_SOURCE = "The active strip is no movie, image or clip strip"
-SELECT = "Select a Shutter strip, or its source strip"
+NO_SOURCE = "The active strip is not a movie, image or clip strip"
+SELECT = "Select a Shutter strip or its source strip"
 NO_SHUTTER = "The effect has no shutter: add one"
 NO_REGION = "The shutter has no region: draw one"
 NO_LAYER = "The preview shows no annotation layer that is not a region yet"
@@ -423,6 +423,6 @@ def test_what_cannot_be_used_says_why(bpy, operators, edit, effect, tmp_path, si
 
 def test_the_last_shutter_stays(bpy, effect):
     assert call(bpy, "shutter_remove") == {"FINISHED"}
-    with pytest.raises(RuntimeError, match="An effect needs a shutter: this is its last one"):
+    with pytest.raises(RuntimeError, match="The last shutter of an effect cannot be removed"):
         call(bpy, "shutter_remove")
     assert len(effect.shutters) == 1

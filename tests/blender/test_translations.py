@@ -1,0 +1,66 @@
+"""Translations: complete, not stale, and shown."""
+
+import ast
+import string
+from pathlib import Path
+
+import pytest
+
+TOLD = Path(__file__).parent / "told.py"
+
+
+@pytest.fixture(scope="module")
+def german(bpy):
+    from shutter_addon.blender.translations import LANGUAGES
+
+    return LANGUAGES["de_DE"]
+
+
+def test_everything_that_is_said_has_a_german_text_and_nothing_else_has(bpy, german):
+    import messages
+
+    said = messages.of_classes() | messages.of_presets() | messages.of_sources() | messages.of_core()
+    said = {message for message in said if message[0] != bpy.app.translations.contexts.no_translation}
+    assert said - german.keys() == set(), "not translated"
+    assert german.keys() - said == set(), "no longer said"
+
+
+def test_no_text_is_empty_and_placeholders_agree(german):
+    for (_context, message), text in german.items():
+        assert text.strip() == text != "", message
+        assert _placeholders(text) == _placeholders(message), message
+
+
+def _placeholders(text: str) -> list:
+    return sorted(name for _literal, name, _format, _conversion in string.Formatter().parse(text) if name is not None)
+
+
+def test_no_message_is_put_together_before_it_is_looked_up():
+    """An f-string is another message each time; `text.format(…)` of a translated template is what can be shown."""
+    import messages
+
+    for path in messages.SOURCES:
+        for call in (node for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Call)):
+            name = getattr(call.func, "id", getattr(call.func, "attr", ""))
+            if name in {"iface_", "rpt_", "data_", "report", "refused", "say", "poll_message_set"}:
+                assert not any(isinstance(word, ast.JoinedStr) for word in call.args), f"{path.name}:{call.lineno}"
+
+
+def test_texts_are_in_blenders_style(bpy):
+    """Title case and no full stop, as Blender's guidelines have it."""
+    import messages
+
+    for context, message in messages.of_classes() | messages.of_presets():
+        assert not message.endswith("."), message
+        assert message[0] == message[0].upper(), message
+        if context in {"Operator", messages.translations.CONTEXT}:
+            words = message.split()
+            assert all(word[0] == word[0].upper() or word in {"to", "from"} for word in words), message
+
+
+def test_a_german_blender_shows_them(blender, tmp_path):
+    """The bpy wheel has no languages."""
+    done = blender("--python-exit-code", 1, "--python", TOLD)
+    assert done.returncode == 0, done.stderr + done.stdout
+    assert "ALL IN GERMAN" in done.stdout
+    assert "Traceback" not in done.stderr
