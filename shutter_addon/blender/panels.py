@@ -148,7 +148,7 @@ class _Regions(_WithEffect):
         column.prop(region, "location")
         column.prop(region, "rotation")
         column.prop(region, "scale")
-        layout.operator("shutter.region_key", icon="KEY_HLT")
+        layout.operator("shutter.region_key", text="Insert Keyframes", icon="KEY_HLT")
 
 
 class _Bars(_WithEffect):

@@ -16,6 +16,7 @@ MESSAGES = {
     ("*", "Shutter Region"): "Verschlussregion",
     ("*", "Split View"): "Geteilte Ansicht",
     ("Operator", "Shutter"): "Verschluss",
+    ("Operator", "Insert Keyframes"): "Schlüsselbilder einfügen",
     ("*", "default"): "Standard",
     ("*", "Frame {number}"): "Bild {number}",
     ("*", "and {count} more, in the bar editor"): "und {count} weitere, im Balkeneditor",
@@ -144,12 +145,12 @@ MESSAGES = {
     ("Virtual Shutter", "Last Frame"): "Letztes Bild",
     ("*", "The last frame of the window alone"): "Nur das letzte Bild des Zeitfensters",
     # Bars
-    ("Operator", "Insert Bar Keyframes"): "Balken-Schlüsselbilder einfügen",
+    ("Operator", "Insert Bar Keyframes"): "Schlüsselbilder der Balken einfügen",
     (
         "*",
         "Insert keyframes for all bars of the active shutter at the current frame",
     ): "Schlüsselbilder für alle Balken des aktiven Verschlusses beim aktuellen Bild einfügen",
-    ("Operator", "Delete Bar Keyframes"): "Balken-Schlüsselbilder löschen",
+    ("Operator", "Delete Bar Keyframes"): "Schlüsselbilder der Balken löschen",
     (
         "*",
         "Delete the keyframes of all bars of the active shutter at the current frame",
@@ -201,7 +202,7 @@ MESSAGES = {
         "*",
         "Move the active region in the list (later ones lie over earlier ones)",
     ): "Die aktive Region in der Liste verschieben (spätere liegen über früheren)",
-    ("Operator", "Insert Region Keyframes"): "Region-Schlüsselbilder einfügen",
+    ("Operator", "Insert Region Keyframes"): "Schlüsselbilder der Region einfügen",
     (
         "*",
         "Insert keyframes for location, rotation and scale of the active region at the current frame",
@@ -299,7 +300,7 @@ MESSAGES = {
     ("*", "Play the clip backward beyond its ends"): "Den Clip jenseits seiner Enden rückwärts abspielen",
     ("Virtual Shutter", "Shorten"): "Kürzen",
     ("*", "Leave out what lies beyond the clip's ends"): "Weglassen, was jenseits der Enden des Clips liegt",
-    ("*", "Aggregate"): "Zusammenfassen",
+    ("*", "Aggregate"): "Blöcke",
     (
         "*",
         "Pixels that share a shutter (larger blocks are quicker)",
