@@ -1,29 +1,13 @@
-"""The extension in a real window: an editor's first minutes, by mouse and keyboard, on both of Blender's backends.
-
-BLENDER_WINDOW is the command that opens a Blender on a screen and runs a script in it (its argument); BACKEND, opengl
-or vulkan, is set for it, and SCREEN. It needs xdotool and ImageMagick's `import` beside that Blender.
-"""
-
-import json
-import os
-import shlex
-import subprocess
-from pathlib import Path
+"""The extension in a real window: an editor's first minutes, by mouse and keyboard, on both of Blender's backends."""
 
 import numpy as np
 import OpenImageIO
 import pytest
+from telling import linked, needs_window, tell
 
-ROOT = Path(__file__).parents[2]
-FOOTAGE = ROOT / "assets" / "bigbuckbunny.mp4"
-WINDOW = os.environ.get("BLENDER_WINDOW", "")
-# Even numbers of pixels around the picture, so that its pixels fall on the screen's.
-SCREEN = "1600x1001x24"
 TOLERANCE = 2
 
-pytestmark = pytest.mark.skipif(
-    not WINDOW, reason="NO WINDOW: set BLENDER_WINDOW to the command that runs a script in a Blender with a window"
-)
+pytestmark = needs_window
 
 
 def pixels(path, box=None):
@@ -44,48 +28,21 @@ def assert_alike(picture, expected, keep):
     assert apart.max() <= TOLERANCE, f"{apart.max()} levels apart, {(apart > TOLERANCE).mean():.2%}; see {keep}"
 
 
-def tell(story, backend, folder):
-    """Runs a story in Blender's window; what it noted, and what Blender said on the console."""
-    extension = folder / "user" / "extensions" / "user_default" / "virtual_shutter"
-    extension.parent.mkdir(parents=True)
-    extension.symlink_to(ROOT)
-    environment = {
-        "BACKEND": backend,
-        "SCREEN": SCREEN,
-        "SHUTTER_PICTURES": str(folder),
-        "SHUTTER_FOOTAGE": str(FOOTAGE),
-        "BLENDER_USER_RESOURCES": str(folder / "user"),
-    }
-    done = subprocess.run(
-        [*shlex.split(WINDOW), str(Path(__file__).with_name(story))],
-        env=os.environ | environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    console = done.stdout + done.stderr
-    (folder / "console.txt").write_text(console)
-    assert (folder / "result.json").exists(), console[-4000:]
-    result = json.loads((folder / "result.json").read_text())
-    assert not result["fault"], f"{result['fault']}\nPictures: {folder}"
-    return result["seen"], console
-
-
 @pytest.fixture(scope="session", params=["opengl", "vulkan"])
 def told(request, tmp_path_factory):
     """The first minutes, on a backend: the folder of the pictures, what was noted, and the console."""
     folder = tmp_path_factory.mktemp(request.param)
-    return folder, *tell("story.py", request.param, folder)
+    return folder, *tell("story.py", request.param, linked(folder))
 
 
 def test_bars_between_keys_and_the_extension_disabled(tmp_path):
-    _seen, console = tell("bars_and_disable.py", "opengl", tmp_path)
+    _seen, console = tell("bars_and_disable.py", "opengl", linked(tmp_path))
     assert "Traceback" not in console
 
 
 def test_without_wheels(tmp_path):
     """Blender's own GPU in the preview; a render's thread may not use it, takes NumPy and says so."""
-    ((seen,), console) = tell("without_wheels.py", "opengl", tmp_path)
+    ((seen,), console) = tell("without_wheels.py", "opengl", linked(tmp_path))
     (said,) = seen["said"]
     assert "moderngl" in said
     assert "composing with NumPy, which is slow" in said

@@ -1,0 +1,55 @@
+"""How tests run a story in a Blender with a window.
+
+BLENDER_WINDOW is the command that opens a Blender on a screen and runs a script in it (its argument); BACKEND, opengl
+or vulkan, is set for it, and SCREEN. It needs xdotool and ImageMagick's `import` beside that Blender.
+"""
+
+import json
+import os
+import shlex
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+WINDOW = os.environ.get("BLENDER_WINDOW", "")
+# Even numbers of pixels around the picture, so that its pixels fall on the screen's.
+SCREEN = "1600x1001x24"
+
+needs_window = pytest.mark.skipif(
+    not WINDOW, reason="NO WINDOW: set BLENDER_WINDOW to the command that runs a script in a Blender with a window"
+)
+
+
+def linked(folder):
+    """The folder, whose Blender has the checkout for an extension."""
+    extension = folder / "user" / "extensions" / "user_default" / "virtual_shutter"
+    extension.parent.mkdir(parents=True)
+    extension.symlink_to(ROOT)
+    return folder
+
+
+def tell(story, backend, folder, **given):
+    """Runs a story in Blender's window, with user folders of its own in `folder`; what it noted, and what Blender said
+    on the console. given: what the story finds in its environment as SHUTTER_NAME."""
+    environment = {
+        "BACKEND": backend,
+        "SCREEN": SCREEN,
+        "SHUTTER_PICTURES": str(folder),
+        "SHUTTER_FOOTAGE": str(ROOT / "assets" / "bigbuckbunny.mp4"),
+        "BLENDER_USER_RESOURCES": str(folder / "user"),
+    } | {f"SHUTTER_{name.upper()}": str(value) for name, value in given.items()}
+    done = subprocess.run(
+        [*shlex.split(WINDOW), str(Path(__file__).with_name(story))],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    console = done.stdout + done.stderr
+    (folder / "console.txt").write_text(console)
+    assert (folder / "result.json").exists(), console[-4000:]
+    result = json.loads((folder / "result.json").read_text())
+    assert not result["fault"], f"{result['fault']}\nPictures: {folder}"
+    return result["seen"], console

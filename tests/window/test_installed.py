@@ -1,0 +1,70 @@
+"""From the zip to a finished film: what a new user does, in a Blender that has never seen the extension."""
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from telling import ROOT, needs_window, tell
+
+from shutter_addon.media import open_source
+
+RECIPE = ROOT / "assets" / "bunny.json"
+# What Blender says by itself, of the screen and of the footage.
+BLENDERS_OWN = ("system.path", "MESA", "video.proxy", "DROP FILE", "Scene frame rate", "Video append frame")
+# Levels of 255, on average, that the codec may take means of 8 × 8 pixels away from what was given to it.
+LOSSY = 1.0
+FRAMES = 20, 43
+
+pytestmark = [
+    needs_window,
+    pytest.mark.skipif(
+        not os.environ.get("BLENDER"), reason="NO REAL BLENDER: set BLENDER to the command that runs one"
+    ),
+]
+
+
+@pytest.fixture
+def zip_file(tmp_path):
+    """The zip for the Python of the Blender that is there."""
+    code = "import sys; print('PYTHON', '%d.%d' % sys.version_info[:2])"
+    command = [*shlex.split(os.environ["BLENDER"]), "-b", "--factory-startup", "--python-expr", code]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    build = [sys.executable, ROOT / "scripts" / "build.py", "--output", tmp_path / "dist"]
+    python = re.search(r"PYTHON (.+)", said)[1]
+    subprocess.run([*build, "--python", python, "--system", "linux-x64"], check=True, capture_output=True)
+    (path,) = (tmp_path / "dist").glob("*-linux_x64.zip")
+    return path
+
+
+def means(picture):
+    """Means of 8 × 8 pixels, which a codec hardly touches."""
+    height, width = (n // 8 * 8 for n in picture.shape[:2])
+    return picture[:height, :width].reshape(height // 8, 8, width // 8, 8, 3).mean(axis=(1, 3), dtype=np.float32)
+
+
+def test_from_the_zip_to_a_finished_film(zip_file, bunny, tmp_path):
+    (noted,), console = tell(
+        "finished_film.py", "opengl", tmp_path, zip=zip_file, recipe=RECIPE, frames="{}:{}".format(*FRAMES)
+    )
+    recipe = json.loads(RECIPE.read_text())
+    assert noted["shutters"] == [shutter["name"] for shutter in recipe["shutters"]]
+    assert noted["regions"] == [region["name"] for region in recipe["regions"]]
+    said = [line for line in console.splitlines() if line and not any(own in line for own in BLENDERS_OWN)]
+    assert not said, "\n".join(said)
+    options = ["--recipe", RECIPE, "--output", tmp_path / "frames", "--frames", "{}:{}".format(*FRAMES)]
+    command = [sys.executable, "-m", "shutter_addon", "render", bunny, *options]
+    subprocess.run(list(map(str, command)), cwd=ROOT, check=True, capture_output=True)
+    with open_source(tmp_path / "film.mp4") as film, open_source(bunny) as plain:
+        first, last = FRAMES
+        assert film.count == last - first + 1
+        for index in (0, film.count // 2, film.count - 1):
+            shown = means(film.read(index)[..., :3])
+            with open_source(tmp_path / "frames" / f"{first + index:04d}.png") as frame:
+                expected = means(frame.read(0)[..., :3] / 257)
+            assert np.abs(shown - expected).mean() < LOSSY
+            assert np.abs(means(plain.read(first - 1 + index)[..., :3]) - expected).mean() > 3 * LOSSY
