@@ -43,7 +43,7 @@ POINTS = (0, 0.5, 1)
 ROW = 1 / 8
 SEEDS = (0, 1, 2)  # of the sub-frames, and of Cycles' two
 AMPLIFIED = 32
-BAR = 28  # of a label, in pixels
+BAR = 40  # of a label, in pixels
 
 
 def stage(width: int, height: int) -> bpy.types.Scene:
@@ -233,7 +233,7 @@ def amplified(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
 def labelled(picture: np.ndarray, text: str) -> np.ndarray:
     """The picture below a bar with the text."""
     image = ImageBuf(np.pad(picture, ((BAR, 2), (0, 2), (0, 0))))
-    ImageBufAlgo.render_text(image, 6, BAR - 7, text, BAR - 8)
+    ImageBufAlgo.render_text(image, 6, BAR - 10, text, BAR - 12)
     return image.get_pixels(OpenImageIO.UINT8)
 
 
