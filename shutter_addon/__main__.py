@@ -16,7 +16,10 @@ def main() -> int:
     from .blender.commands import main as command
 
     blender.register()
-    return command(sys.argv[1:])
+    try:
+        return command(sys.argv[1:])
+    finally:
+        blender.unregister()  # what sources still hold then, OpenImageIO reports as leaked
 
 
 if __name__ == "__main__":
