@@ -1,0 +1,143 @@
+"""Stills: rows of labelled panels on a dark sheet. Pictures are (height, width, 3) float32, code values of 0 to 1."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from OpenImageIO import FLOAT, UINT8, ImageBuf, ImageBufAlgo, ImageSpec
+
+WIDTH = 1600
+GAP = 16
+TEXT = 26
+SHEET = (0.07, 0.07, 0.075)
+INK = (0.93, 0.93, 0.93)
+FAINT = (0.62, 0.62, 0.62)
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A picture, and words below it."""
+
+    picture: np.ndarray
+    words: str = ""
+
+
+def sheet(*rows: np.ndarray, credit: str = "") -> np.ndarray:
+    """Rows of the same width below each other, with a margin; the credit in small type."""
+    rows = [*rows, lettering(credit, rows[0].shape[1], 18, FAINT)] if credit else rows
+    return np.pad(
+        np.concatenate([_padded(row, below=GAP if i < len(rows) - 1 else 0) for i, row in enumerate(rows)]),
+        ((GAP, GAP), (GAP, GAP), (0, 0)),
+        constant_values=SHEET[0],
+    )
+
+
+def row(*panels: Panel, width: int = WIDTH) -> np.ndarray:
+    """Panels beside each other, all as high, together `width` pixels wide; below each its words."""
+    shares = np.array([panel.picture.shape[1] / panel.picture.shape[0] for panel in panels])
+    height = round((width - GAP * (len(panels) - 1)) / shares.sum())
+    edges = np.round(np.cumsum([0, *(shares * height + GAP)])).astype(int)
+    edges[-1] = width + GAP
+    return beside(
+        *(
+            labelled(scaled(panel.picture, right - left - GAP, height), panel.words if _any_words(panels) else None)
+            for panel, left, right in zip(panels, edges, edges[1:], strict=False)
+        )
+    )
+
+
+def beside(*pictures: np.ndarray) -> np.ndarray:
+    """Pictures from left to right with gaps, the sheet below shorter ones."""
+    height = max(picture.shape[0] for picture in pictures)
+    padded = [_padded(picture, below=height - picture.shape[0], right=GAP) for picture in pictures]
+    return np.concatenate(padded, axis=1)[:, :-GAP]
+
+
+def below(*pictures: np.ndarray) -> np.ndarray:
+    """Pictures of the same width from top to bottom with gaps."""
+    return np.concatenate([_padded(picture, below=GAP) for picture in pictures])[:-GAP]
+
+
+def labelled(picture: np.ndarray, words: str | None) -> np.ndarray:
+    """The picture with words below it (None: no room for them)."""
+    return picture if words is None else np.concatenate([picture, lettering(words, picture.shape[1])])
+
+
+def lettering(words: str, width: int, size: int = TEXT, color=INK) -> np.ndarray:
+    """A line of text on the sheet, (about 1.6 · size, width, 3), its start at the left."""
+    line = ImageBuf(_plain(round(1.6 * size), width))
+    ImageBufAlgo.render_text(line, 0, round(1.18 * size), words, size, "DroidSans", color)
+    return line.get_pixels(FLOAT)
+
+
+def graph(bars, color, width: int, height: int, ground=(0.16, 0.16, 0.17)) -> np.ndarray:
+    """A shutter's bars (L,) as a bar graph in its colour; the highest one fills the height."""
+    bars = np.asarray(bars) / np.max(bars)
+    picture = _plain(height, width, ground)
+    edges = np.linspace(6, width - 6, len(bars) + 1)
+    gap = 2 if (width - 12) / len(bars) >= 6 else 0
+    for bar, left, right in zip(bars, edges, edges[1:], strict=False):
+        top = height - 4 - max(2, round(bar * (height - 12)))
+        picture[top : height - 4, round(left) : max(round(left) + 1, round(right) - gap)] = (
+            color if bar > 0 else np.multiply(color, 0.35) + np.multiply(ground, 0.4)
+        )
+    return picture
+
+
+def inset(picture: np.ndarray, small: np.ndarray, corner: str = "bottom right", margin: int = 14) -> np.ndarray:
+    """The picture with a small one in a corner, framed by a thin line."""
+    small = np.pad(small, ((2, 2), (2, 2), (0, 0)), constant_values=0.93)
+    result, (height, width) = picture.copy(), small.shape[:2]
+    top = margin if "top" in corner else picture.shape[0] - margin - height
+    left = margin if "left" in corner else picture.shape[1] - margin - width
+    result[top : top + height, left : left + width] = small
+    return result
+
+
+def framed(picture: np.ndarray, box, color=INK, line: int = 3) -> np.ndarray:
+    """The picture with a rectangle drawn on it; box: left, top, right, bottom in pixels."""
+    result, (left, top, right, bottom) = picture.copy(), box
+    result[top:bottom, left:right] = color
+    inner = slice(top + line, bottom - line), slice(left + line, right - line)
+    result[inner] = picture[inner]
+    return result
+
+
+def scaled(picture: np.ndarray, width: int, height: int | None = None) -> np.ndarray:
+    """The picture at another size; by default its sides keep their ratio."""
+    height = height or round(picture.shape[0] * width / picture.shape[1])
+    if picture.shape[:2] == (height, width):
+        return picture
+    wanted = ImageBuf(ImageSpec(width, height, 3, FLOAT))
+    ImageBufAlgo.resize(wanted, ImageBuf(np.ascontiguousarray(picture, dtype=np.float32)))
+    return np.clip(wanted.get_pixels(FLOAT), 0, 1)
+
+
+def save(picture: np.ndarray, path: Path) -> None:
+    """Writes a picture as 8-bit PNG or JPEG, whole or not at all. OSError: it cannot be written."""
+    part = path.with_name(f".part-{path.name}")
+    image = ImageBuf(np.ascontiguousarray((np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8)))
+    image.specmod().attribute("Compression", "jpeg:85" if path.suffix == ".jpg" else "zip")
+    try:
+        if not image.write(str(part), UINT8):
+            raise OSError(f"{path}: {image.geterror()}")
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _any_words(panels) -> bool:
+    return any(panel.words for panel in panels)
+
+
+def _plain(height: int, width: int, color=SHEET) -> np.ndarray:
+    return np.full((height, width, 3), color, dtype=np.float32)
+
+
+def _padded(picture: np.ndarray, below: int = 0, right: int = 0) -> np.ndarray:
+    height, width = picture.shape[:2]
+    result = _plain(height + below, width + right)
+    result[:height, :width] = picture
+    return result
