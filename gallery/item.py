@@ -67,12 +67,12 @@ class Shot:
         picture = self._renderer.picture(frame - 1, self._at(frame).alone(index))
         return np.clip(light.to_encoded(picture[..., :3]), 0, 1)
 
-    def scribbles(self, frame: int, dim: float = 0.5) -> np.ndarray:
-        """The scribbles in their shutters' colours, over the darkened footage."""
+    def scribbles(self, frame: int, dim: float = 0.6) -> np.ndarray:
+        """The scribbles in their shutters' colours, a little transparent, over the darkened footage."""
         moment, picture = self._at(frame), self.source(frame) * np.float32(dim)
         height, width = picture.shape[:2]
         labels = scribbles.rasterise(moment.shapes, width, height)
-        picture[labels > 0] = self._colors[labels[labels > 0] - 1]
+        picture[labels > 0] = 0.25 * picture[labels > 0] + 0.75 * self._colors[labels[labels > 0] - 1]
         return picture
 
     def coefficients(self, frame: int) -> np.ndarray:

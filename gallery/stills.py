@@ -12,6 +12,7 @@ WIDTH = 1600
 GAP = 16
 TEXT = 26
 SHEET = (0.07, 0.07, 0.075)
+GROUND = (0.16, 0.16, 0.17)
 INK = (0.93, 0.93, 0.93)
 FAINT = (0.62, 0.62, 0.62)
 
@@ -67,23 +68,28 @@ def labelled(picture: np.ndarray, words: str | None) -> np.ndarray:
 
 def lettering(words: str, width: int, size: int = TEXT, color=INK) -> np.ndarray:
     """A line of text on the sheet, (about 1.6 · size, width, 3), its start at the left."""
-    line = ImageBuf(_plain(round(1.6 * size), width))
-    ImageBufAlgo.render_text(line, 0, round(1.18 * size), words, size, "DroidSans", color)
-    return line.get_pixels(FLOAT)
+    return written(_plain(round(1.6 * size), width), words, (0, round(1.18 * size)), size, color)
 
 
-def graph(bars, color, width: int, height: int, ground=(0.16, 0.16, 0.17)) -> np.ndarray:
-    """A shutter's bars (L,) as a bar graph in its colour; the highest one fills the height."""
-    bars = np.asarray(bars) / np.max(bars)
-    picture = _plain(height, width, ground)
-    edges = np.linspace(6, width - 6, len(bars) + 1)
-    gap = 2 if (width - 12) / len(bars) >= 6 else 0
+def graph(bars, color, width: int, height: int, words: str = "") -> np.ndarray:
+    """A shutter's bars (L,) as a bar graph in its colour, the highest one fills it; words stand above the bars."""
+    bars, head = np.asarray(bars) / np.max(bars), 32 if words else 0
+    picture = _plain(height, width, GROUND)
+    room = height - head - 14
+    edges = np.linspace(8, width - 8, len(bars) + 1)
+    gap = 2 if edges[1] - edges[0] >= 6 else 0
     for bar, left, right in zip(bars, edges, edges[1:], strict=False):
-        top = height - 4 - max(2, round(bar * (height - 12)))
-        picture[top : height - 4, round(left) : max(round(left) + 1, round(right) - gap)] = (
-            color if bar > 0 else np.multiply(color, 0.35) + np.multiply(ground, 0.4)
-        )
-    return picture
+        span = slice(round(left), max(round(left) + 1, round(right) - gap))
+        picture[-10:-8, span] = np.multiply(color, 0.5)
+        picture[height - 8 - round(bar * room) : height - 8, span] = color
+    return written(picture, words, (10, 25), 24)
+
+
+def written(picture: np.ndarray, words: str, place, size: int = TEXT, color=INK) -> np.ndarray:
+    """The picture with words in it; place: x and y of the first letter's lower left corner, from the top left."""
+    image = ImageBuf(np.ascontiguousarray(picture, dtype=np.float32))
+    ImageBufAlgo.render_text(image, *place, words, size, "DroidSans", color)
+    return image.get_pixels(FLOAT)
 
 
 def inset(picture: np.ndarray, small: np.ndarray, corner: str = "bottom right", margin: int = 14) -> np.ndarray:
