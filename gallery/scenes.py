@@ -75,7 +75,7 @@ def linear(color: str) -> tuple[float, float, float, float]:
 
 
 def shade(owner, node: str, **inputs) -> None:
-    """Makes one shader node, its inputs set by their names (`Base_Color` is *Base Color*), all of a material or world."""
+    """Makes one shader node all of a material or world; inputs by name (`Base_Color` is *Base Color*)."""
     owner.use_nodes = True
     nodes = owner.node_tree.nodes
     nodes.clear()
@@ -167,7 +167,7 @@ def text(words: str, size: float, location, material, parent=None):
 
 
 def limbs(bones, material, voxel: float, parent=None):
-    """Bones melted into one soft body; a bone: start, end, radius there and here. Details smaller than a voxel vanish."""
+    """Bones melted into one soft body; a bone: its start, its end and the radius at each."""
     parts = []
     for start, end, radius, end_radius in bones:
         parts += [tube(start, end, radius, material, end_radius), ball(radius, start, material)]
@@ -200,7 +200,7 @@ def camera(location, target, lens: float) -> None:
 
 
 def lamp(kind: str, energy: float, location, target=(0, 0, 0), color: str = "#ffffff", size: float = 0.0, parent=None):
-    """A light: AREA and POINT in watts, SUN in W/m²; size: an edge or radius in units, of a sun its angle in radians."""
+    """A light: AREA and POINT in watts, SUN in W/m²; size: an edge or radius, of a sun its angle in radians."""
     data = bpy.data.lights.new(kind.title(), kind)
     data.energy, data.color = energy, linear(color)[:3]
     setattr(data, {"AREA": "size", "SUN": "angle"}.get(kind, "shadow_soft_size"), size)
