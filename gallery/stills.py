@@ -11,7 +11,7 @@ from OpenImageIO import FLOAT, UINT8, ImageBuf, ImageBufAlgo, ImageSpec
 WIDTH = 1600
 GAP = 16
 TEXT = 26
-SHEET = (0.07, 0.07, 0.075)
+SHEET = (0.07, 0.07, 0.07)
 GROUND = (0.16, 0.16, 0.17)
 INK = (0.93, 0.93, 0.93)
 FAINT = (0.62, 0.62, 0.62)
@@ -49,16 +49,16 @@ def row(*panels: Panel, width: int = WIDTH) -> np.ndarray:
     )
 
 
-def beside(*pictures: np.ndarray) -> np.ndarray:
+def beside(*pictures: np.ndarray, gap: int = GAP) -> np.ndarray:
     """Pictures from left to right with gaps, the sheet below shorter ones."""
     height = max(picture.shape[0] for picture in pictures)
-    padded = [_padded(picture, below=height - picture.shape[0], right=GAP) for picture in pictures]
-    return np.concatenate(padded, axis=1)[:, :-GAP]
+    padded = [_padded(picture, below=height - picture.shape[0], right=gap) for picture in pictures]
+    return np.concatenate(padded, axis=1)[:, :-gap]
 
 
-def below(*pictures: np.ndarray) -> np.ndarray:
+def below(*pictures: np.ndarray, gap: int = GAP) -> np.ndarray:
     """Pictures of the same width from top to bottom with gaps."""
-    return np.concatenate([_padded(picture, below=GAP) for picture in pictures])[:-GAP]
+    return np.concatenate([_padded(picture, below=gap) for picture in pictures])[:-gap]
 
 
 def labelled(picture: np.ndarray, words: str | None) -> np.ndarray:
@@ -71,18 +71,18 @@ def lettering(words: str, width: int, size: int = TEXT, color=INK) -> np.ndarray
     return written(_plain(round(1.6 * size), width), words, (0, round(1.18 * size)), size, color)
 
 
-def graph(bars, color, width: int, height: int, words: str = "") -> np.ndarray:
+def graph(bars, color, width: int, height: int, words: str = "", size: int = 24) -> np.ndarray:
     """A shutter's bars (L,) as a bar graph in its colour, the highest one fills it; words stand above the bars."""
-    bars, head = np.asarray(bars) / np.max(bars), 32 if words else 0
+    bars = np.asarray(bars) / np.max(bars)
     picture = _plain(height, width, GROUND)
-    room = height - head - 14
+    room = height - 14 - (round(1.3 * size) if words else 0)
     edges = np.linspace(8, width - 8, len(bars) + 1)
     gap = 2 if edges[1] - edges[0] >= 6 else 0
     for bar, left, right in zip(bars, edges, edges[1:], strict=False):
         span = slice(round(left), max(round(left) + 1, round(right) - gap))
         picture[-10:-8, span] = np.multiply(color, 0.5)
         picture[height - 8 - round(bar * room) : height - 8, span] = color
-    return written(picture, words, (10, 25), 24)
+    return written(picture, words, (8, round(1.05 * size)), size)
 
 
 def written(picture: np.ndarray, words: str, place, size: int = TEXT, color=INK) -> np.ndarray:

@@ -49,6 +49,7 @@ def make(item: Item, folder: Path, docs: bool) -> int:
         film, edit = recipe.with_suffix(".mp4"), recipe.with_suffix(".blend")
         if code := render(footage, recipe, film, item.frames, edit):
             return code
+        edit.with_suffix(".blend1").unlink(missing_ok=True)  # Blender keeps the one before
         shots.append(Shot(footage, recipe, film, item.frames[0]))
     still = item.still(shots)
     stills.save(still, folder / f"{item.name}.png")
