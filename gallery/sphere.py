@@ -9,7 +9,7 @@ from . import stills
 from .item import Item
 
 COUNT = 96
-FRAME = 22
+FRAME = 28
 SPEED = 0.14  # units a frame; the picture is 16 wide
 RADIUS = 0.78
 SHELF = 2.2667  # from one to the next: a fourth of the picture's height
@@ -76,8 +76,8 @@ def repeated(first, folder):
 def still(shots):
     (shot,) = shots
     picture = stills.scaled(shot.result(FRAME), 1240)
-    height, width = picture.shape[0] // 4, stills.WIDTH - 1240 - stills.GAP
-    graphs = [stills.graph(*shot.bars(FRAME, name), width, height - 8, name) for name in SHUTTERS]
+    height, width = (picture.shape[0] - 3 * 8) // 4, stills.WIDTH - 1240 - stills.GAP
+    graphs = [stills.graph(*shot.bars(FRAME, name), width, height, name) for name in SHUTTERS]
     return stills.sheet(stills.beside(stills.below(*graphs, gap=8), picture), credit=ITEM.caption)
 
 

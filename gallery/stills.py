@@ -88,7 +88,8 @@ def graph(bars, color, width: int, height: int, words: str = "", size: int = 24)
 def written(picture: np.ndarray, words: str, place, size: int = TEXT, color=INK) -> np.ndarray:
     """The picture with words in it; place: x and y of the first letter's lower left corner, from the top left."""
     image = ImageBuf(np.ascontiguousarray(picture, dtype=np.float32))
-    ImageBufAlgo.render_text(image, *place, words, size, "DroidSans", color)
+    if words and not ImageBufAlgo.render_text(image, *place, words, size, "DroidSans", color):
+        raise RuntimeError(f"OpenImageIO cannot write words: {image.geterror()}")
     return image.get_pixels(FLOAT)
 
 
@@ -99,15 +100,6 @@ def inset(picture: np.ndarray, small: np.ndarray, corner: str = "bottom right", 
     top = margin if "top" in corner else picture.shape[0] - margin - height
     left = margin if "left" in corner else picture.shape[1] - margin - width
     result[top : top + height, left : left + width] = small
-    return result
-
-
-def framed(picture: np.ndarray, box, color=INK, line: int = 3) -> np.ndarray:
-    """The picture with a rectangle drawn on it; box: left, top, right, bottom in pixels."""
-    result, (left, top, right, bottom) = picture.copy(), box
-    result[top:bottom, left:right] = color
-    inner = slice(top + line, bottom - line), slice(left + line, right - line)
-    result[inner] = picture[inner]
     return result
 
 
@@ -125,7 +117,7 @@ def save(picture: np.ndarray, path: Path) -> None:
     """Writes a picture as 8-bit PNG or JPEG, whole or not at all. OSError: it cannot be written."""
     part = path.with_name(f".part-{path.name}")
     image = ImageBuf(np.ascontiguousarray((np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8)))
-    image.specmod().attribute("Compression", "jpeg:85" if path.suffix == ".jpg" else "zip")
+    image.specmod().attribute("Compression", "jpeg:78" if path.suffix == ".jpg" else "zip")
     try:
         if not image.write(str(part), UINT8):
             raise OSError(f"{path}: {image.geterror()}")
