@@ -11,8 +11,7 @@ from OpenImageIO import FLOAT, UINT8, ImageBuf, ImageBufAlgo, ImageSpec
 WIDTH = 1600
 GAP = 16
 TEXT = 26
-SHEET = (0.07, 0.07, 0.07)
-GROUND = (0.16, 0.16, 0.17)
+SHEET, GROUND = 0.07, 0.16  # greys of the sheet, and behind bars
 INK = (0.93, 0.93, 0.93)
 FAINT = (0.62, 0.62, 0.62)
 
@@ -22,28 +21,24 @@ class Panel:
     """A picture, and words below it."""
 
     picture: np.ndarray
-    words: str = ""
+    words: str
 
 
 def sheet(*rows: np.ndarray, credit: str = "") -> np.ndarray:
     """Rows of the same width below each other, with a margin; the credit in small type."""
     rows = [*rows, lettering(credit, rows[0].shape[1], 18, FAINT)] if credit else rows
-    return np.pad(
-        np.concatenate([_padded(row, below=GAP if i < len(rows) - 1 else 0) for i, row in enumerate(rows)]),
-        ((GAP, GAP), (GAP, GAP), (0, 0)),
-        constant_values=SHEET[0],
-    )
+    return np.pad(below(*rows), ((GAP, GAP), (GAP, GAP), (0, 0)), constant_values=SHEET)
 
 
-def row(*panels: Panel, width: int = WIDTH) -> np.ndarray:
-    """Panels beside each other, all as high, together `width` pixels wide; below each its words."""
+def row(*panels: Panel) -> np.ndarray:
+    """Panels beside each other, all as high, together WIDTH pixels wide."""
     shares = np.array([panel.picture.shape[1] / panel.picture.shape[0] for panel in panels])
-    height = round((width - GAP * (len(panels) - 1)) / shares.sum())
+    height = round((WIDTH - GAP * (len(panels) - 1)) / shares.sum())
     edges = np.round(np.cumsum([0, *(shares * height + GAP)])).astype(int)
-    edges[-1] = width + GAP
+    edges[-1] = WIDTH + GAP  # whatever rounding has left
     return beside(
         *(
-            labelled(scaled(panel.picture, right - left - GAP, height), panel.words if _any_words(panels) else None)
+            labelled(scaled(panel.picture, right - left - GAP, height), panel.words)
             for panel, left, right in zip(panels, edges, edges[1:], strict=False)
         )
     )
@@ -61,9 +56,9 @@ def below(*pictures: np.ndarray, gap: int = GAP) -> np.ndarray:
     return np.concatenate([_padded(picture, below=gap) for picture in pictures])[:-gap]
 
 
-def labelled(picture: np.ndarray, words: str | None) -> np.ndarray:
-    """The picture with words below it (None: no room for them)."""
-    return picture if words is None else np.concatenate([picture, lettering(words, picture.shape[1])])
+def labelled(picture: np.ndarray, words: str) -> np.ndarray:
+    """The picture with words below it."""
+    return np.concatenate([picture, lettering(words, picture.shape[1])])
 
 
 def lettering(words: str, width: int, size: int = TEXT, color=INK) -> np.ndarray:
@@ -124,10 +119,6 @@ def save(picture: np.ndarray, path: Path) -> None:
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
-
-
-def _any_words(panels) -> bool:
-    return any(panel.words for panel in panels)
 
 
 def _plain(height: int, width: int, color=SHEET) -> np.ndarray:
