@@ -73,7 +73,7 @@ def still(shots):
     frame, side, middle = 40, 366, 836
     scribbles = stills.scaled(shot.scribbles(frame), side)
     for name, corner in (("Long", "bottom left"), ("Sharp", "bottom right")):
-        scribbles = stills.inset(scribbles, stills.graph(*shot.bars(frame, name), 120, 46), corner, 8)
+        scribbles = stills.inset(scribbles, stills.graph(*shot.bars(frame, name), 120, 58, name, 17), corner, 8)
 
     def small(picture, words):
         return stills.labelled(stills.scaled(picture, side), words)
