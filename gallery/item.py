@@ -11,6 +11,7 @@ import numpy as np
 
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.core import light, recipe, scribbles
+from shutter_addon.core.instant import Instant
 from shutter_addon.media import open_source
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -22,6 +23,7 @@ ASSETS = ROOT / "assets"
 class Item:
     """A figure of the paper.
 
+    caption: a line in small type below the still
     footage: gets a folder for what it renders, returns the source: a movie, or the first file of a sequence
     recipes: names of files beside the module; each becomes a film and a .blend of the same name
     frames: the film's first and last timeline frame
@@ -48,7 +50,7 @@ class Shot:
     footage: Path
     recipe: Path
     film: Path
-    first: int = 1
+    first: int
 
     def source(self, frame: int) -> np.ndarray:
         """A frame of the footage."""
@@ -63,8 +65,7 @@ class Shot:
 
     def everywhere(self, frame: int, shutter: str) -> np.ndarray:
         """The picture if one shutter held everywhere, as in a camera."""
-        index = [each.name for each in self.effect.shutters].index(shutter)
-        picture = self._renderer.picture(frame - 1, self._at(frame).alone(index))
+        picture = self._renderer.picture(frame - 1, self._at(frame).alone(self._index(shutter)))
         return np.clip(light.to_encoded(picture[..., :3]), 0, 1)
 
     def scribbles(self, frame: int, dim: float = 0.6) -> np.ndarray:
@@ -84,7 +85,7 @@ class Shot:
 
     def bars(self, frame: int, shutter: str) -> tuple[np.ndarray, np.ndarray]:
         """A shutter's bars (L,) at a frame, and its colour (3,)."""
-        index = [each.name for each in self.effect.shutters].index(shutter)
+        index = self._index(shutter)
         return self._at(frame).bars[index], self._colors[index]
 
     @cached_property
@@ -107,5 +108,8 @@ class Shot:
     def _colors(self) -> np.ndarray:
         return np.array([shutter.color for shutter in self.effect.shutters], dtype=np.float32)
 
-    def _at(self, frame: int):
+    def _index(self, shutter: str) -> int:
+        return [each.name for each in self.effect.shutters].index(shutter)
+
+    def _at(self, frame: int) -> Instant:
         return self.effect.at(frame, self._source.width / self._source.height)
