@@ -52,11 +52,11 @@ def boat(lane: float, shirt: str) -> None:
 
 
 def oar(hull, side: int) -> None:
-    """An oar, its stroke of 30 frames."""
+    """An oar, its stroke of 60 frames."""
     from . import scenes
 
     pivot = scenes.empty((0.05, side * 0.12, 0.22), parent=hull)
-    scenes.animate(pivot, COUNT, rotation_euler=lambda frame: (0, 0, side * radians(35) * sin(2 * pi * frame / 30)))
+    scenes.animate(pivot, COUNT, rotation_euler=lambda frame: (0, 0, side * radians(35) * sin(2 * pi * frame / 60)))
     scenes.tube((0, 0, 0), (0, side * 0.5, -0.1), 0.022, scenes.paint("#e9d9b5"), parent=pivot)
     scenes.box((0.1, 0.2, 0.02), (0, side * 0.52, -0.1), scenes.paint("#f2f2ee"), parent=pivot)
 
