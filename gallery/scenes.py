@@ -5,7 +5,6 @@ Colours are written as `#rrggbb` of sRGB. Frames count from 1.
 
 from __future__ import annotations
 
-import os
 from math import atan2, hypot
 from pathlib import Path
 
@@ -53,12 +52,12 @@ def render_frames(folder: Path, count: int, file_format: str = "PNG") -> Path:
     ending = scene.render.file_extension
     paths = [folder / f"{frame:04}{ending}" for frame in range(1, count + 1)]
     part = folder / f".part{ending}"
-    scene.render.filepath = str(part)
     for frame, path in enumerate(tqdm(paths, desc="footage", unit="frame"), start=1):
         if not path.exists():
             scene.frame_set(frame)
-            bpy.ops.render.render(write_still=True)
-            os.replace(part, path)
+            bpy.ops.render.render()
+            bpy.data.images["Render Result"].save_render(str(part), scene=scene)
+            part.replace(path)
     return paths[0]
 
 
