@@ -1,0 +1,3 @@
+"""The figures of the paper made again: footage, recipes and stills; `scripts/gallery NAME` makes one."""
+
+NAMES = ("pendulum", "sphere", "displacement", "bunny", "hands", "crowd", "rolling_shutter", "light_trails")

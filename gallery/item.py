@@ -1,0 +1,115 @@
+"""What an item of the gallery is, and the pictures that its still is made of. No bpy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from shutter_addon.compute.renderer import Renderer, open_compositor
+from shutter_addon.core import light, recipe, scribbles
+from shutter_addon.core.instant import Instant
+from shutter_addon.media import open_source
+
+ROOT = Path(__file__).resolve().parents[1]
+HERE = ROOT / "gallery"
+ASSETS = ROOT / "assets"
+
+
+@dataclass(frozen=True)
+class Item:
+    """A figure of the paper.
+
+    caption: a line in small type below the still
+    footage: gets a folder for what it renders, returns the source: a movie, or the first file of a sequence
+    recipes: names of files beside the module; each becomes a film and a .blend of the same name
+    frames: the film's first and last timeline frame
+    still: makes the still, a picture (h, w, 3) of 0 to 1, from the shots, one per recipe
+    """
+
+    name: str
+    figure: int
+    title: str
+    caption: str
+    footage: Callable[[Path], Path]
+    recipes: tuple[str, ...]
+    frames: tuple[int, int]
+    still: Callable[[list[Shot]], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Shot:
+    """Footage, a recipe, and the film that was rendered with them from the frame `first` on.
+
+    Frames are timeline frames, 1 = the clip's first. Pictures are (height, width, 3) float32, code values of 0 to 1.
+    """
+
+    footage: Path
+    recipe: Path
+    film: Path
+    first: int
+
+    def source(self, frame: int) -> np.ndarray:
+        """A frame of the footage."""
+        picture = self._source.read(frame - 1)
+        if self._source.transfer == "linear":
+            return np.clip(light.to_encoded(picture[..., :3].astype(np.float32)), 0, 1)
+        return picture[..., :3] / np.float32(np.iinfo(picture.dtype).max)
+
+    def result(self, frame: int) -> np.ndarray:
+        """A frame of the film."""
+        return self._film.read(frame - self.first)[..., :3] / np.float32(255)
+
+    def everywhere(self, frame: int, shutter: str) -> np.ndarray:
+        """The picture if one shutter held everywhere, as in a camera."""
+        picture = self._renderer.picture(frame - 1, self._at(frame).alone(self._index(shutter)))
+        return np.clip(light.to_encoded(picture[..., :3]), 0, 1)
+
+    def scribbles(self, frame: int, dim: float = 0.6) -> np.ndarray:
+        """The scribbles in their shutters' colours, a little transparent, over the darkened footage."""
+        moment, picture = self._at(frame), self.source(frame) * np.float32(dim)
+        height, width = picture.shape[:2]
+        labels = scribbles.rasterise(moment.shapes, width, height)
+        picture[labels > 0] = 0.25 * picture[labels > 0] + 0.75 * self._colors[labels[labels > 0] - 1]
+        return picture
+
+    def coefficients(self, frame: int) -> np.ndarray:
+        """How much of each shutter a pixel gets, in the shutters' colours."""
+        moment = self._at(frame)
+        mixed = np.tensordot(self._renderer.coefficients(moment), self._colors, axes=(0, 0))
+        block = moment.options.aggregate
+        return mixed.repeat(block, 0).repeat(block, 1)[: self._source.height, : self._source.width]
+
+    def bars(self, frame: int, shutter: str) -> tuple[np.ndarray, np.ndarray]:
+        """A shutter's bars (L,) at a frame, and its colour (3,)."""
+        index = self._index(shutter)
+        return self._at(frame).bars[index], self._colors[index]
+
+    @cached_property
+    def effect(self) -> recipe.Recipe:
+        return recipe.load(self.recipe)
+
+    @cached_property
+    def _source(self):
+        return open_source(self.footage)
+
+    @cached_property
+    def _film(self):
+        return open_source(self.film)
+
+    @cached_property
+    def _renderer(self) -> Renderer:
+        return Renderer(open_compositor()[0], self._source)
+
+    @property
+    def _colors(self) -> np.ndarray:
+        return np.array([shutter.color for shutter in self.effect.shutters], dtype=np.float32)
+
+    def _index(self, shutter: str) -> int:
+        return [each.name for each in self.effect.shutters].index(shutter)
+
+    def _at(self, frame: int) -> Instant:
+        return self.effect.at(frame, self._source.width / self._source.height)
