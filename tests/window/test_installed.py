@@ -13,12 +13,12 @@ from telling import ROOT, needs_window, tell
 
 from shutter_addon.media import open_source
 
-RECIPE = ROOT / "assets" / "bunny.json"
+RECIPE = ROOT / "gallery" / "bunny.json"
 # What Blender says by itself, of the screen and of the footage.
 BLENDERS_OWN = ("system.path", "MESA", "video.proxy", "DROP FILE", "Scene frame rate", "Video append frame")
-# Levels of 255, on average, that the codec may take means of 8 × 8 pixels away from what was given to it.
-LOSSY = 1.0
-FRAMES = 20, 43
+# Levels of 255 that the codec may take means of 8 × 8 pixels away from what was given to it; the effect takes more.
+LOSSY = 10
+FRAMES = 40, 55
 
 pytestmark = [
     needs_window,
@@ -66,5 +66,5 @@ def test_from_the_zip_to_a_finished_film(zip_file, bunny, tmp_path):
             shown = means(film.read(index)[..., :3])
             with open_source(tmp_path / "frames" / f"{first + index:04d}.png") as frame:
                 expected = means(frame.read(0)[..., :3] / 257)
-            assert np.abs(shown - expected).mean() < LOSSY
-            assert np.abs(means(plain.read(first - 1 + index)[..., :3]) - expected).mean() > 3 * LOSSY
+            assert np.abs(shown - expected).max() < LOSSY
+            assert np.abs(means(plain.read(first - 1 + index)[..., :3]) - expected).max() > 4 * LOSSY
