@@ -83,7 +83,11 @@ class Studio:
             return function(*arguments)
         if self._executor is None:
             self._executor = ThreadPoolExecutor(1, "Virtual Shutter")
-        return self._executor.submit(function, *arguments).result()
+        try:
+            future = self._executor.submit(function, *arguments)
+        except RuntimeError:  # Python ends, and its threads take no more work
+            return function(*arguments)
+        return future.result()
 
     def picture(self, scene, moment: Moment) -> np.ndarray:
         """The moment's picture, if need be the one that was begun for it."""

@@ -117,3 +117,18 @@ def test_missing_footage_stops_a_farm(blender, command, bunny, tmp_path):
     assert done.returncode == 2
     assert "Virtual Shutter: bunny.mp4: no such file" in done.stderr
     assert not list(tmp_path.glob("out/*"))
+
+
+def test_python_ends_while_an_effect_is_shown(user_folder, bunny, tmp_path):
+    """Blender disables the extension when Python's threads take no more work."""
+    code = f"""
+import sys, bpy, addon_utils
+from importlib import import_module
+addon_utils.enable({EXTENSION!r}, default_set=True)
+sys.exit(import_module({EXTENSION!r} + ".shutter_addon.blender.commands").main(sys.argv[1:]))
+"""
+    (tmp_path / "recipe.json").write_text(json.dumps(LONG_AND_SHARP))
+    options = ("--recipe", tmp_path / "recipe.json", "--output", tmp_path / "out", "--frames", 1)
+    done = wheel(user_folder, code, "render", bunny, *options)
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
