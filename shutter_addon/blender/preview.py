@@ -65,7 +65,7 @@ class ShutterPreview(PropertyGroup):
         translation_context=CONTEXT,
     )
     split: FloatProperty(
-        name="Split",
+        name="Split Position",
         description="Where the source ends and the result begins, as a fraction of the picture's width",
         subtype="FACTOR",
         default=0.5,

@@ -16,7 +16,7 @@ MESSAGES = {
     ("*", "Shutter Region"): "Verschlussregion",
     ("*", "Split View"): "Geteilte Ansicht",
     ("Operator", "Shutter"): "Verschluss",
-    ("Operator", "Insert Keyframes"): "Schlüsselbilder einfügen",
+    ("Operator", "Insert Keyframes"): "Schlüsselbilder hinzufügen",
     ("*", "default"): "Standard",
     ("*", "Frame {number}"): "Bild {number}",
     ("*", "and {count} more, in the bar editor"): "und {count} weitere, im Balkeneditor",
@@ -341,7 +341,7 @@ MESSAGES = {
         "*",
         "How much of each shutter a pixel gets, in the shutters' colors",
     ): "Wie viel jedes Verschlusses ein Pixel erhält, in den Farben der Verschlüsse",
-    ("*", "Split"): "Teilung",
+    ("*", "Split Position"): "Teilung",
     (
         "*",
         "Where the source ends and the result begins, as a fraction of the picture's width",
