@@ -94,7 +94,7 @@ class _Paths:
         return _look(vectors, fine, cv2.INTER_LINEAR), _look(shown, fine, cv2.INTER_LINEAR)
 
     def _carry(self, places, vectors, costs, t):
-        """What is on every STEPth pixel at time t: vectors (h, w, 2) and costs (h, w), infinite where nothing arrives."""
+        """On every STEPth pixel at time t: vectors (h, w, 2) and costs (h, w), infinite where nothing arrives."""
         h, w = (-(-n // STEP) for n in self._shape)
         cells = np.floor((places + np.float32(t) * vectors) / STEP).astype(np.int32)
         # A margin of two takes what leaves the picture.
