@@ -261,7 +261,7 @@ def test_installed_without_wheels(blender, dist, bunny, recipe, tmp_path):
     """Pictures on Blender's own GPU or with NumPy, and a sentence where a movie needs more."""
     hidden = blender.user / "scripts" / "startup" / "hidden.py"
     hidden.parent.mkdir(parents=True)
-    hidden.write_text(f"import sys\nsys.modules |= dict.fromkeys({WHEELS | {"cv2"}})\ndef register(): pass\n")
+    hidden.write_text(f"import sys\nsys.modules |= dict.fromkeys({WHEELS | {'cv2'}})\ndef register(): pass\n")
     (path,) = dist[0].glob("*-no_wheels.zip")
     blender.run("--command", "extension", "validate", path)
     blender.install(path)
