@@ -124,8 +124,9 @@ def psnr(picture, other) -> float:
     return float(10 * np.log10(255**2 / max(error, 1e-6)))
 
 
-def compare(name, truth, factor) -> list[dict]:
-    """A row for each way to rebuild the frames of `truth` between every factor-th; the same frames for all."""
+def compare(name, truth, factor) -> tuple[list[dict], dict]:
+    """A row for each way to rebuild the frames of `truth` between every factor-th, the same frames for all; and what
+    each way has rebuilt."""
     kept = truth[::factor]
     rows, rebuilt = [], {}
     for way, make in WAYS.items():
@@ -141,7 +142,7 @@ def compare(name, truth, factor) -> list[dict]:
         row |= {"frames": len(pairs), "psnr": float(np.mean(noise)), "worst psnr": min(noise)}
         row |= {"ssim": float(np.mean(alike)), "worst ssim": min(alike)}
         print(line(row), flush=True)
-    return rows
+    return rows, rebuilt
 
 
 def line(row) -> str:
@@ -154,7 +155,7 @@ def films(args) -> list[dict]:
     for film in args.films:
         with open_source(film) as source:
             truth = [source.read(index)[..., :3] for index in range(min(args.frames, source.count))]
-        rows += compare(film.name, truth, 2)
+        rows += compare(film.name, truth, 2)[0]
     return rows
 
 
@@ -171,14 +172,13 @@ def scenes(args) -> list[dict]:
 
 def scene(name, args) -> list[dict]:
     truth = footage(name)[args.start * FACTOR : (args.start + BOX) * FACTOR + 1]
-    rows = compare(name, truth, FACTOR)
+    rows, rebuilt = compare(name, truth, FACTOR)
     kept = truth[::FACTOR]
     exposed = [exposure(truth[:-1])]
     for way in ("30 fps", "quick", "good", "blend"):
         frames = kept[:-1]
         if way != "30 fps":
-            made = WAYS[way](kept, FACTOR)
-            frames = [frame for first, rest in zip(kept, made, strict=False) for frame in (first, *rest)]
+            frames = [frame for first, rest in zip(kept, rebuilt[way], strict=False) for frame in (first, *rest)]
         picture = exposure(frames)
         row = {"footage": name, "box": way, "frames": len(frames)}
         rows.append(row | {"psnr": psnr(picture, exposed[0]), "ssim": similarity(picture, exposed[0])})
