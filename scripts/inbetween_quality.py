@@ -76,13 +76,12 @@ def repeat(kept, factor):
 
 
 def minterpolate(kept, factor):
-    """It ends early: there is less than for the last gap."""
-    made = through_ffmpeg(kept, factor)[0]
-    for index, frame in enumerate(kept[: len(made) // factor]):
+    # It ends a few frames early: the last is given again.
+    made = through_ffmpeg([*kept, kept[-1], kept[-1]], factor)[0]
+    for index, frame in enumerate(kept):
         if psnr(made[index * factor], frame) < 40:
             sys.exit(f"minterpolate: its frame {index * factor} is not the frame {index} that it was given")
-    gaps = [made[i + 1 : i + factor] for i in range(0, len(made), factor)]
-    return [list(gap) for gap in gaps if len(gap) == factor - 1]
+    return [list(made[i * factor + 1 : (i + 1) * factor]) for i in range(len(kept) - 1)]
 
 
 WAYS = {"quick": by_flow("quick"), "good": by_flow("good"), "blend": blend, "repeat": repeat}
@@ -125,8 +124,7 @@ def psnr(picture, other) -> float:
 
 
 def compare(name, truth, factor) -> tuple[list[dict], dict]:
-    """A row for each way to rebuild the frames of `truth` between every factor-th, the same frames for all; and what
-    each way has rebuilt."""
+    """A row for each way to rebuild the frames of `truth` between every factor-th; and what each way has rebuilt."""
     kept = truth[::factor]
     rows, rebuilt = [], {}
     for way, make in WAYS.items():
@@ -134,8 +132,7 @@ def compare(name, truth, factor) -> tuple[list[dict], dict]:
         rebuilt[way] = make(kept, factor)
         seconds = (time.perf_counter() - start) / sum(map(len, rebuilt[way]))
         rows.append({"footage": name, "way": way, "factor": factor, "seconds": seconds})
-    gaps = min(map(len, rebuilt.values()))
-    places = [(gap, k) for gap in range(gaps) for k in range(1, factor)]
+    places = [(gap, k) for gap in range(len(kept) - 1) for k in range(1, factor)]
     for row in rows:
         pairs = [(rebuilt[row["way"]][gap][k - 1], truth[gap * factor + k]) for gap, k in places]
         noise, alike = [psnr(*pair) for pair in pairs], [similarity(*pair) for pair in pairs]
