@@ -7,6 +7,7 @@ import re
 import secrets
 import time
 import zlib
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -27,8 +28,8 @@ LEFT_BEHIND = 3600  # seconds; a picture takes less to be written, whatever the 
 
 _PICTURE = re.compile(r"([0-9a-f]{64})  (\d{8})\.(?:png|exr)")
 _PAIR = re.compile(r"# (\d+) (same|cut) ([0-9a-f]{8})")
-_PART = re.compile(r"\.\d{8}-[0-9a-f]{8}\.part\.(?:png|exr)")
-_OURS = re.compile(rf"\d{{8}}\.(?:png|exr)|{_PART.pattern}|manifest\.json")
+_PART = re.compile(r"\.(?:\d{8}|manifest)-[0-9a-f]{8}\.part\.(?:png|exr|json)")
+_OURS = re.compile(rf"\d{{8}}\.(?:png|exr)|{_PART.pattern}|{re.escape(MANIFEST)}")
 _finished: dict[Path, tuple] = {}  # (stamp, count of pairs) of folders that were asked for
 
 
@@ -119,12 +120,10 @@ class Cache:
         try:
             (self.folder / "checks").mkdir(parents=True, exist_ok=True)
             if not manifest.exists() or manifest.read_bytes() != text.encode():
-                part = manifest.with_name(f".{MANIFEST}-{self._token}.part")
-                part.write_text(text, "utf-8")
+                part = self._part(manifest)
+                part.write_bytes(text.encode())
                 part.replace(manifest)
-            for entry in os.scandir(self.folder):
-                if _PART.fullmatch(entry.name) and time.time() - entry.stat().st_mtime > LEFT_BEHIND:
-                    os.unlink(entry)
+            _clear(self.folder)
         except OSError as error:
             raise _unwritable(self.folder, error) from None
 
@@ -133,7 +132,7 @@ class Cache:
 
         MediaError: it cannot be written."""
         path = self.picture(frame)
-        part = path.with_name(f".{path.stem}-{self._token}.part{path.suffix}")
+        part = self._part(path)
         try:
             write_picture(part, picture, self.source.alpha)
             digest = _sha256(part)
@@ -143,6 +142,9 @@ class Cache:
         finally:
             part.unlink(missing_ok=True)
         return f"{digest}  {path.name}"
+
+    def _part(self, path):
+        return path.with_name(f".{path.stem}-{self._token}.part{path.suffix}")
 
     def note(self, lines: list[str]) -> None:
         """Takes down what is finished. MediaError: it cannot be written."""
@@ -240,24 +242,32 @@ def _stamp(folder: Path):
         return None
 
 
-def _caches(folder):
+def _caches(folder) -> list[tuple[Path, dict]]:
     """(folder, manifest) of every cache under `folder`."""
+    found = []
     for path in sorted(Path(folder).glob(f"*/{MANIFEST}")):
-        try:
+        with suppress(OSError, ValueError, TypeError, KeyError):  # another program's, or damaged
             manifest = json.loads(path.read_bytes())
             if manifest["maker"] == MAKER:
-                yield path.parent, manifest
-        except (OSError, ValueError, KeyError, TypeError):
-            continue  # another program's
+                found.append((path.parent, {key: manifest[key] for key in ("path", "source", "settings")}))
+    return found
+
+
+def _clear(folder: Path) -> None:
+    """Removes what was left half-written; others may write here at the same time."""
+    for entry in os.scandir(folder):
+        with suppress(FileNotFoundError):
+            if _PART.fullmatch(entry.name) and time.time() - entry.stat().st_mtime > LEFT_BEHIND:
+                os.unlink(entry)
 
 
 def _remove(folder: Path) -> int:
-    ours = [path for path in folder.iterdir() if _OURS.fullmatch(path.name)]
-    ours += (folder / "checks").glob("*.sha256")
-    freed = sum(path.stat().st_size for path in ours)
+    freed = 0
     try:
-        for path in ours:
-            path.unlink(missing_ok=True)
+        for path in (*folder.iterdir(), *folder.glob("checks/*.sha256")):
+            if _OURS.fullmatch(path.name) or path.parent != folder:
+                freed += path.stat().st_size
+                path.unlink()
         for empty in (folder / "checks", folder):
             if empty.is_dir() and not any(empty.iterdir()):
                 empty.rmdir()

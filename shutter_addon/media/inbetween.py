@@ -7,10 +7,12 @@ import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, as_completed, wait
 from functools import partial
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
 
+from . import cuts
 from .cache import Cache, State, pair_line, write_picture
 from .errors import MediaError
 from .files import check_index
@@ -142,11 +144,11 @@ def _tasks(cache, pairs, between, cancelled) -> Iterator[Callable[[], bool]]:
         if cache.is_sound(pair):
             yield lambda: True
             continue
-        near.move(pair)
-        if kind := near.kind(pair):
+        first, second, kind = near.pair(pair)
+        if kind:
             yield partial(_note_kind, cache, pair, kind)
         else:
-            yield partial(_make, cache, pair, near.frame(pair), near.frame(pair + 1), between, cancelled)
+            yield partial(_make, cache, pair, first, second, between, cancelled)
 
 
 class _Near:
@@ -155,21 +157,43 @@ class _Near:
     def __init__(self, source):
         self._source = source
         self._frames: dict[int, np.ndarray] = {}
+        self._signatures: dict[int, cuts.Signature | None] = {}
 
-    def move(self, pair: int) -> None:
-        """Lets go of what lies behind that pair."""
-        self._frames = {index: frame for index, frame in self._frames.items() if index >= pair}
+    def pair(self, index: int) -> tuple[np.ndarray, np.ndarray, str | None]:
+        """Frames `index` and `index` + 1; and "same" if they are equal, "cut" if they are of two shots, else None."""
+        start, stop = max(index + 1 - cuts.NEIGHBOURS, 0), min(index + 1 + cuts.NEIGHBOURS, self._source.count)
+        self._signatures = {i: self._signature(i) for i in range(start, stop)}
+        first, second = self._frame(index), self._frame(index + 1)
+        self._frames = {i: frame for i, frame in self._frames.items() if i > index}
+        return first, second, self._kind(first, second, index)
 
-    def frame(self, index: int) -> np.ndarray:
+    def _kind(self, first, second, index):
+        if np.array_equal(first, second):
+            return "same"
+        before = self._run(range(index, -1, -1))[::-1]
+        after = self._run(range(index + 1, self._source.count))
+        if cuts.is_cut(before, after):
+            return "cut"
+        return "same" if cuts.is_duplicate(before, after) else None
+
+    def _run(self, indices):
+        """The signatures of these frames, up to one that has none."""
+        return list(takewhile(lambda found: found is not None, map(self._signatures.get, indices)))
+
+    def _frame(self, index):
         if index not in self._frames:
             self._frames[index] = self._source.read(index)
         return self._frames[index]
 
-    def kind(self, pair: int) -> str | None:
-        """Of two equal frames "same", of two shots "cut", else None."""
-        if np.array_equal(self.frame(pair), self.frame(pair + 1)):
-            return "same"
-        return None
+    def _signature(self, index):
+        """None for a frame that cannot be read: only who needs the frame itself has to know."""
+        if index not in self._signatures:
+            try:
+                frame = self._frame(index)
+            except MediaError:
+                return None
+            return cuts.signature(frame, self._source.transfer, self._source.alpha)
+        return self._signatures[index]
 
 
 def _make(cache, pair, first, second, between, cancelled) -> bool:

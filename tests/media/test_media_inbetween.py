@@ -89,6 +89,17 @@ def test_frames_come_back_as_they_were_built(tmp_path, folder, samples, suffix, 
                 assert np.array_equal(found, frame), index
 
 
+@pytest.mark.parametrize("name", ["a.png", "a.exr"])
+def test_equal_pictures_are_equal_files(tmp_path, name):
+    frame = see_through(3) if name == "a.png" else see_through(3).astype(np.float16)
+    path, written = tmp_path / name, []
+    for _ in range(2):
+        cache.write_picture(path, frame, "straight")
+        written.append(path.read_bytes())
+        time.sleep(1.01)  # time stamps in EXR files are seconds
+    assert written[0] == written[1]
+
+
 def test_is_a_source_of_a_higher_rate(source, folder):
     build(source, folder)
     between = opened(source, folder)
@@ -142,6 +153,14 @@ def test_cancelled_keeps_what_is_finished(source, folder):
     assert 2 <= result.done == state(source, folder).done < COUNT - 1
 
 
+def test_cancelled_within_a_pair(source, folder):
+    assert build(source, folder, cancelled=lambda: bool(pictures(folder))) == ("partial", 0, COUNT - 1)
+    assert state(source, folder).done == 0
+    build(source, folder)
+    build(source, folder.with_name("whole"))
+    assert kept(folder) == kept(folder.with_name("whole"))
+
+
 def test_every_damaged_file_is_found_and_built_again(source, folder):
     build(source, folder)
     whole, between = kept(folder), opened(source, folder)
@@ -171,6 +190,9 @@ def test_damaged_checks_and_manifest_are_built_again(source, folder):
             assert not between.has(2 * FACTOR - 1) or np.array_equal(between.read(2 * FACTOR - 1), source.read(1))
         assert build(source, folder).name == "ready"
         assert kept(folder) == whole
+    checks.write_bytes(text.replace(b"# 1 same", b"# 3 same"))
+    with opened(source, folder) as between:
+        assert not np.array_equal(between.read(3 * FACTOR + 1), source.read(3))
     next(folder.glob("*/manifest.json")).write_text("{")
     build(source, folder)
     assert kept(folder) == whole
@@ -185,6 +207,31 @@ def test_equal_frames_need_no_pictures(source, folder):
         assert np.array_equal(between.read(2 * FACTOR + step), source.read(2))
 
 
+def test_a_repeated_frame_needs_no_pictures_though_a_codec_saw_it(source, folder):
+    noise = np.random.default_rng(1).integers(0, 2, picture(2).shape)
+    save_image(source.files[3], (picture(2) | noise).astype(np.uint8))
+    build(source, folder)
+    assert np.array_equal(opened(source, folder).read(2 * FACTOR + 3), source.read(2))
+
+
+def test_nothing_is_made_up_across_a_cut(tmp_path, folder):
+    (tmp_path / "shot").mkdir()
+    random = np.random.default_rng(7)
+    for number in range(12):
+        if number % 6 == 0:
+            texture = random.integers(0, 256, (8, 16, 3)).astype(np.uint8).repeat(8, 0).repeat(8, 1)
+        save_image(tmp_path / "shot" / f"{number}.png", np.roll(texture, number, 1))
+    with open_source(tmp_path / "shot" / "0.png") as source:
+        build(source, folder)
+        assert len(pictures(folder)) == 10 * (FACTOR - 1)
+        between = opened(source, folder)
+        shown = [between.read(5 * FACTOR + step) for step in range(FACTOR)]
+        for frame, expected in zip(shown, (5, 5, 5, 6), strict=True):
+            assert np.array_equal(frame, source.read(expected))
+        build(source, folder.with_name("chunk"), frames=(5, 5))
+        assert not pictures(folder.with_name("chunk"))
+
+
 def test_found_again_where_all_has_moved(source, folder, tmp_path):
     build(source, folder)
     moved = tmp_path / "elsewhere"
@@ -193,6 +240,9 @@ def test_found_again_where_all_has_moved(source, folder, tmp_path):
     shutil.copytree(source.path.parent, moved / "shot")
     with open_source(moved / "shot" / source.path.name) as other:
         assert state(other, moved / "cache").name == "ready"
+    save_image(moved / "shot" / source.files[3].name, picture(99))
+    with open_source(moved / "shot" / source.path.name) as changed:
+        assert state(changed, moved / "cache").name == "stale"
 
 
 @pytest.mark.parametrize("resized", [True, False])
@@ -214,6 +264,8 @@ def test_another_factor_or_reading_is_another_cache(source, folder):
     assert cache.state(source, folder, 8, "quick").name == "missing"
     assert cache.state(source, folder, FACTOR, "good").name == "missing"
     source.transfer = "linear"
+    assert state(source, folder).name == "stale"
+    source.transfer, source.options = "srgb", {"deinterlace": True}
     assert state(source, folder).name == "stale"
 
 
