@@ -220,6 +220,7 @@ def write_picture(path: Path, picture: np.ndarray, alpha: str) -> None:
     spec["oiio:UnassociatedAlpha"] = 1
     spec["DateTime"] = "1970:01:01 00:00:00"  # of an EXR, else the time of writing
     spec["png:compressionLevel"] = 1
+    spec["png:filter"] = 0x20  # "up" alone takes half the time of a choice for each row, and no more room
     spec["compression"] = "piz"
     output = ImageOutput.create(str(path))
     written = output.open(str(path), spec) and output.write_image(np.ascontiguousarray(picture))
