@@ -66,12 +66,17 @@ class Cache:
         self.manifest = {**made_of, "path": _relative(source.path, folder)}
         self._suffix = ".png" if source.dtype.kind == "u" else ".exr"
         self._token = secrets.token_hex(4)
+        self._loaded: tuple | None = None
         self.digests: dict[int, set[str]] = {}
         self.kinds: dict[int, str] = {}
 
     def load(self) -> None:
-        """Reads what is finished: digests {frame: those of its picture}, kinds {pair: "same" or "cut"}."""
-        self.digests, self.kinds = {}, {}
+        """Reads what is finished, if that has changed: digests {frame: those of its picture}, kinds {pair: "same" or
+        "cut"}."""
+        stamp = _stamp(self.folder)
+        if stamp == self._loaded:
+            return
+        self._loaded, self.digests, self.kinds = stamp, {}, {}
         for file in (self.folder / "checks").glob("*.sha256"):
             for line in file.read_text("ascii", "replace").splitlines():
                 if match := _PICTURE.fullmatch(line):  # processes whose libraries differ may write other bytes
@@ -234,7 +239,7 @@ def pair_line(pair: int, kind: str) -> str:
     return f"# {text} {zlib.crc32(text.encode()):08x}"
 
 
-def _stamp(folder: Path):
+def _stamp(folder: Path) -> tuple | None:
     """Changes with the folder's list of files and with its checks; None without a folder."""
     try:
         checks = [(entry.name, entry.stat()) for entry in os.scandir(folder / "checks")]

@@ -39,8 +39,10 @@ class Inbetween:
         return getattr(self._source, name)
 
     def has(self, index: int) -> bool:
-        """Whether the frame is there; its file is not opened."""
-        return self._real(index) is not None or self._is_built(index)
+        """Whether the frame is there, built meanwhile perhaps; its file is not opened."""
+        if not self._is_there(index):
+            self._cache.load()
+        return self._is_there(index)
 
     def read(self, index: int) -> np.ndarray:
         """The frame as a new array (height, width, 4), RGBA, top row first.
@@ -48,23 +50,20 @@ class Inbetween:
         Raises MediaError for one that is not built, or damaged, and what the source raises."""
         check_index(self, index)
         if not self.has(index):
-            self._cache.load()  # built meanwhile?
-        real = self._real(index)
-        if real is not None:
-            return self._source.read(real)
-        if not self._is_built(index):
             raise MediaError(
                 f"{self.path.name}: in-between frames of frame {index // self.factor} are missing "
                 f"in {self._cache.folder}; build in-between frames first"
             )
-        return self._cache.read(index)
+        real = self._real(index)
+        return self._cache.read(index) if real is None else self._source.read(real)
 
     def close(self) -> None:
         """Lets go of the source's file; a later read opens it again."""
         self._source.close()
 
-    def _is_built(self, index):
-        return index in self._cache.digests and self._cache.picture(index).is_file()
+    def _is_there(self, index):
+        built = index in self._cache.digests and self._cache.picture(index).is_file()
+        return built or self._real(index) is not None
 
     def _real(self, index):
         """The source frame that is shown, None where an in-between frame is."""
@@ -101,7 +100,7 @@ def build(
 
     Killed, it goes on where it was; several may build in the same folder, and none harms another. Files come out the
     same, whatever the chunks and however often it was interrupted. The source must be used by nobody else meanwhile.
-    Gives how far the chunk is. MediaError: a frame cannot be read or written; what is finished is kept."""
+    Gives how far it came. MediaError: a frame cannot be read or written; what is finished is kept."""
     if between is None:
         from .flow import between
     cache, pairs = Cache(source, folder, factor, method), _pairs(source, frames)
