@@ -51,7 +51,9 @@ def options(effect, curves=None, frame: float = 0.0) -> recipe.Options:
         return value >= 0.5 if prop.type == "BOOLEAN" else prop.enum_items[round(value)].identifier
 
     words = {name: at(name).lower() for name in OPTIONS}
-    return recipe.Options(effect.window, **words, aggregate=int(at("aggregate")), border=at("border"))
+    return recipe.Options(
+        effect.window, **words, aggregate=int(at("aggregate")), border=at("border"), stop_at_cuts=at("stop_at_cuts")
+    )
 
 
 def bars_at(curves, path: str, shutter, chosen: recipe.Options, frame: float) -> np.ndarray:
@@ -151,6 +153,7 @@ def apply(edit, effect, strip, source: recipe.Recipe) -> None:
     for name in OPTIONS:
         setattr(effect, name, getattr(source, name).upper())
     effect.aggregate, effect.border = str(source.aggregate), source.border
+    effect.stop_at_cuts = source.stop_at_cuts
     path = effect.path_from_id()
     for i, shutter in enumerate(source.shutters):
         _add_shutter(edit, effect, f"{path}.shutters[{i}]", shutter, first)

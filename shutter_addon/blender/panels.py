@@ -179,7 +179,7 @@ class _Options(_WithEffect):
         layout = self.layout
         effect = strips.active(context)[1]
         layout.use_property_split = True
-        for name in ("position", "interpolation", "light", "exposure", "edges", "aggregate", "border"):
+        for name in ("position", "interpolation", "light", "exposure", "edges", "stop_at_cuts", "aggregate", "border"):
             layout.prop(effect, name)
 
 

@@ -17,6 +17,7 @@ from ..compute.renderer import Renderer, open_compositor
 from ..core.instant import Instant
 from ..media import MediaError
 from ..media.ahead import Ahead
+from ..media.cuts import Shots
 from ..media.exr import write_exr
 from . import effects, sources, strips, timing
 from .device import BlenderDevice, opens_in_background
@@ -110,7 +111,7 @@ class Studio:
         if old_key != key:
             if renderer is not None:
                 self.run(renderer.close)
-            renderer = Renderer(self._compositor, Ahead(sources.open_media(source_strip)))
+            renderer = Renderer(self._compositor, Shots(Ahead(sources.open_media(source_strip))))
         self._renderers[place] = key, renderer
         while len(self._renderers) > _KEPT:
             self.run(self._renderers.pop(next(iter(self._renderers)))[1].close)

@@ -178,7 +178,7 @@ class ShutterEffect(PropertyGroup):
     )
     edges: EnumProperty(
         name="Clip Ends",
-        description="What a window gets that reaches beyond the clip's ends",
+        description="What a window gets that reaches beyond the ends of the clip, or of the shot",
         items=EDGES,
         update=_changed,
         translation_context=CONTEXT,
@@ -187,6 +187,12 @@ class ShutterEffect(PropertyGroup):
         name="Aggregate",
         description="Pixels that share a shutter (larger blocks are quicker)",
         items=AGGREGATES,
+        update=_changed,
+    )
+    stop_at_cuts: BoolProperty(
+        name="Stop at Cuts",
+        description="Windows end at the source's cuts as they do at the clip's ends",
+        default=True,
         update=_changed,
     )
     border: BoolProperty(

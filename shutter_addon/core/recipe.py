@@ -114,6 +114,7 @@ class Recipe:
     edges: Edges = "hold"
     aggregate: Literal[1, 2, 4] = 1
     border: bool = False
+    stop_at_cuts: bool = True
 
     @property
     def options(self) -> Options:

@@ -18,6 +18,7 @@ EXAMPLE = {
     "edges": "hold",
     "aggregate": 1,
     "border": False,
+    "stop_at_cuts": True,
     "shutters": [
         {"name": "Long", "color": [0.2, 0.5, 1.0], "bars": [1, 1, 1, 1, 1, 1, 1, 1]},
         {

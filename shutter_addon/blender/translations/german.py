@@ -289,8 +289,8 @@ MESSAGES = {
     ("Virtual Shutter", "Clip Ends"): "Clip-Enden",
     (
         "*",
-        "What a window gets that reaches beyond the clip's ends",
-    ): "Was ein Zeitfenster erhält, das über die Enden des Clips hinausreicht",
+        "What a window gets that reaches beyond the ends of the clip, or of the shot",
+    ): "Was ein Zeitfenster erhält, das über die Enden des Clips oder der Einstellung hinausreicht",
     ("Virtual Shutter", "Hold"): "Halten",
     (
         "*",
@@ -311,6 +311,11 @@ MESSAGES = {
     ("*", "Blocks of 2×2 pixels share a shutter"): "Blöcke von 2×2 Pixeln teilen sich einen Verschluss",
     ("*", "4×4"): "4×4",
     ("*", "Blocks of 4×4 pixels share a shutter"): "Blöcke von 4×4 Pixeln teilen sich einen Verschluss",
+    ("*", "Stop at Cuts"): "An Schnitten enden",
+    (
+        "*",
+        "Windows end at the source's cuts as they do at the clip's ends",
+    ): "Zeitfenster enden an den Schnitten der Quelle wie an den Enden des Clips",
     ("*", "Border"): "Rand",
     (
         "*",
