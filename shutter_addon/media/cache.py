@@ -248,6 +248,11 @@ def _stamp(folder: Path) -> tuple | None:
         return None
 
 
+def stamp(folder) -> tuple:
+    """Changes with every in-between frame that is built in a folder, or removed."""
+    return tuple((path.parent.name, _stamp(path.parent)) for path in sorted(Path(folder).glob(f"*/{MANIFEST}")))
+
+
 def _caches(folder) -> list[tuple[Path, dict]]:
     """(folder, manifest) of every cache under `folder`."""
     found = []

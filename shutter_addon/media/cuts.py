@@ -102,14 +102,17 @@ def _most(a: Signature, b: Signature) -> float:
 class Shots:
     """A source that knows where its shots end: a source itself.
 
-    Frames get their signatures when a cut is first looked for, and wait for the next `read` then, as far as there is
-    room for them, so that none is decoded twice. Cuts are remembered, and depend on the frames alone.
+    step: every step-th frame is one that was filmed. Cuts are looked for in these alone; those between two of them
+    belong to the nearer, the middle one to the first, as Inbetween has it.
+    Filmed frames get their signatures when a cut is first looked for, and wait for the next `read` then, as far as
+    there is room for them, so that none is decoded twice. Cuts are remembered, and depend on the frames alone.
     """
 
-    def __init__(self, source):
-        self._source = source
-        self._cuts: dict[int, bool] = {}  # whether there is one before the frame
-        self._signatures: dict[int, Signature | None] = {}
+    def __init__(self, source, step: int = 1):
+        self._source, self.step = source, step
+        self.filmed = (source.count - 1) // step + 1  # how many frames are
+        self._cuts: dict[int, bool] = {}  # by filmed frame: whether there is a cut before it
+        self._signatures: dict[int, Signature | None] = {}  # likewise
         self._handed: dict[int, np.ndarray] = {}
 
     def __getattr__(self, name):
@@ -129,18 +132,18 @@ class Shots:
         """
         first = 0
         is_cut = self._cuts.get if known else self._is_cut
-        for i in range(max(low, 0) + 1, min(high, self.count - 1) + 1):
+        for i in self._after(low, high):
             if is_cut(i):
-                if i > index:
-                    return range(first, i)
-                first = i
+                if self._start(i) > index:
+                    return range(first, self._start(i))
+                first = self._start(i)
         return range(first, self.count)
 
     def lacking(self, index: int, low: int, high: int) -> set[int]:
         """The frames that `around` will read, unless what it reads shows more cuts."""
         stop = min(high + 1, self.around(index, low, high, known=True).stop)
-        unknown = [i for i in range(max(low, 0) + 1, stop) if i not in self._cuts]
-        return {j for i in unknown for j in (i - 1, i)} - self._signatures.keys()
+        unknown = [i for i in self._after(low, stop - 1) if i not in self._cuts]
+        return {j * self.step for i in unknown for j in (i - 1, i) if j not in self._signatures}
 
     def handed(self) -> set[int]:
         """The frames that wait for `read`."""
@@ -155,6 +158,19 @@ class Shots:
         self.release()
         self._source.close()
 
+    def _after(self, low: int, high: int) -> range:
+        """The filmed frames that begin between the frames from `low` to `high`."""
+        first, last = (self._filmed(min(max(i, 0), self.count - 1)) for i in (low, high))
+        return range(first + 1, last + 1)
+
+    def _filmed(self, index: int) -> int:
+        """The filmed frame that is nearest."""
+        return (index + (self.step - 1) // 2) // self.step
+
+    def _start(self, filmed: int) -> int:
+        """The first frame that is nearest to that filmed one."""
+        return filmed * self.step - (self.step - 1) // 2
+
     def _is_cut(self, index: int) -> bool:
         if index not in self._cuts:
             self._cuts[index] = self._decide(index)
@@ -164,7 +180,7 @@ class Shots:
         last, next_ = self._signature(index - 1), self._signature(index)
         if last is None or next_ is None or not may_be_cut(last, next_):
             return False
-        start, stop = max(index - NEIGHBOURS, 0), min(index + NEIGHBOURS, self.count)
+        start, stop = max(index - NEIGHBOURS, 0), min(index + NEIGHBOURS, self.filmed)
         around = {i: self._signature(i) for i in range(start, stop)}
         return is_cut(_run(around, index - 1, -1)[::-1], _run(around, index, 1))
 
@@ -172,12 +188,12 @@ class Shots:
         """None: the frame cannot be read. Whoever needs the frame itself will hear why."""
         if index not in self._signatures:
             try:
-                frame = self.read(index)
+                frame = self.read(index * self.step)
             except MediaError:
                 found = None
             else:
                 found = signature(frame, self.transfer, self.alpha)
-                self._hand_over(index, frame)
+                self._hand_over(index * self.step, frame)
             self._signatures[index] = found
             while len(self._signatures) > _KEPT:
                 del self._signatures[next(iter(self._signatures))]
