@@ -37,9 +37,8 @@ def main(argv: list[str]) -> int:
     except FAULTS as error:
         return _refuse(str(error))
     except OSError as error:
-        return _refuse(
-            f"{error.filename or getattr(arguments, 'output', None) or arguments.cache}: {error.strerror or error}"
-        )
+        place = error.filename or getattr(arguments, "output", None) or arguments.cache
+        return _refuse(f"{place}: {error.strerror or error}")
     except KeyboardInterrupt:  # while in-between frames are built; those that are finished stay
         return outputs.INTERRUPTED
     return 0

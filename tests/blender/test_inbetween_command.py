@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,7 @@ def film(tmp_path_factory):
     with open_source(first) as source:
         frames = [source.read(k) for k in range(COUNT)]
     every = []
-    for k, (a, b) in enumerate(zip(frames, frames[1:], strict=False)):
+    for k, (a, b) in enumerate(pairwise(frames)):
         every += [a, *([a, a, b] if k == CUT - 1 else between(a, b, 4))]
     return first, light.to_linear(np.stack([*every, frames[-1]])[..., :3] / 255)
 
@@ -137,7 +138,7 @@ def test_a_saved_edit_finds_them_beside_itself(run, film, tmp_path, blender, sam
     first, frames = film
     data = recipe(6, np.ones(6), inbetween=4)
     run("render", first, "--save", tmp_path / "edit" / "e.blend", "--frames", "2:2", recipe=data)
-    assert numbers(tmp_path / "edit" / "inbetween") == [5, 6, 7, 9]
+    assert numbers(tmp_path / "edit" / "inbetween") == [5, 6, 7, 9, 10, 11]
     (tmp_path / "edit").rename(tmp_path / "moved")
     done = blender(tmp_path / "moved" / "e.blend", "-o", f"{tmp_path}/out/", "-a")
     assert done.returncode == 0, done.stderr
