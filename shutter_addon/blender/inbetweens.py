@@ -7,22 +7,28 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from . import effects
 
-FOLDER = "inbetween"
+FOLDER = "virtual_shutter_inbetween"
 METHODS = {"QUICK": "quick", "GOOD": "good"}
 
 given: Path | None = None  # the command's: a folder for whatever effect
 
 
 def folder(effect) -> Path:
-    """The folder of the effect's in-between frames. EffectError: there is none beside a file that is not saved."""
+    """The folder of the effect's in-between frames. EffectError: there is none, beside a file that is not saved,
+    or of an extension that is not installed."""
     if given is not None:
         return given
     if effect.inbetween_place == "USER":
         package = __package__.rpartition(".shutter_addon")[0]
-        return Path(bpy.utils.extension_path_user(package, path=FOLDER))
-    if not bpy.data.filepath:
+        try:
+            return Path(bpy.utils.extension_path_user(package, path=FOLDER))
+        except ValueError:
+            raise effects.EffectError(rpt_("only an installed extension has a folder of its own")) from None
+    library = effect.id_data.library
+    file = bpy.path.abspath(library.filepath) if library else bpy.data.filepath
+    if not file:
         raise effects.EffectError(rpt_("in-between frames lie beside the .blend file: save it first"))
-    return Path(bpy.path.abspath(f"//{FOLDER}"))
+    return Path(file).parent / FOLDER
 
 
 def factor(effect) -> int:

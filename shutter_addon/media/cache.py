@@ -31,6 +31,7 @@ _PAIR = re.compile(r"# (\d+) (same|cut) ([0-9a-f]{8})")
 _PART = re.compile(r"\.(?:\d{8}|manifest)-[0-9a-f]{8}\.part\.(?:png|exr|json)")
 _OURS = re.compile(rf"\d{{8}}\.(?:png|exr)|{_PART.pattern}|{re.escape(MANIFEST)}")
 _finished: dict[Path, tuple] = {}  # (stamp, count of pairs) of folders that were asked for
+_sizes: dict[Path, tuple] = {}  # (stamp, bytes), likewise
 
 
 class State(NamedTuple):
@@ -197,21 +198,21 @@ def state(source, folder, factor, method) -> State:
     if done or not total:
         return State("ready" if done == total else "partial", done, total)
     wanted = cache.manifest["path"], cache.manifest["settings"]
-    stale = any((manifest["path"], manifest["settings"]) == wanted for _, manifest in _caches(folder))
+    others = [manifest for path, manifest in _caches(folder) if path != cache.folder]
+    stale = any((manifest["path"], manifest["settings"]) == wanted for manifest in others)
     return State("stale" if stale else "missing", 0, total)
+
+
+def size(folder, source=None) -> int:
+    """The bytes that `purge` would free. Quick while nothing changes. MediaError: a file of the source is gone."""
+    return sum(map(_size, _chosen(folder, source)))
 
 
 def purge(folder, source=None) -> int:
     """Removes the in-between frames in `folder`, all or one source's, stale ones as well. Gives the bytes freed.
 
     Nothing else is removed, wherever it lies. MediaError: something cannot be removed."""
-    path, made_of = (None, None) if source is None else (_relative(source.path, folder), identity(source))
-    chosen = [
-        cache
-        for cache, manifest in _caches(folder)
-        if source is None or manifest["path"] == path or manifest["source"] == made_of
-    ]
-    return sum(map(_remove, chosen))
+    return sum(map(_remove, _chosen(folder, source)))
 
 
 def write_picture(path: Path, picture: np.ndarray, alpha: str) -> None:
@@ -264,6 +265,33 @@ def _caches(folder) -> list[tuple[Path, dict]]:
     return found
 
 
+def _chosen(folder, source) -> list[Path]:
+    """The caches under `folder`, all or one source's."""
+    path, made_of = (None, None) if source is None else (_relative(source.path, folder), identity(source))
+    return [
+        cache
+        for cache, manifest in _caches(folder)
+        if source is None or manifest["path"] == path or manifest["source"] == made_of
+    ]
+
+
+def _size(folder: Path) -> int:
+    now = _stamp(folder)
+    if _sizes.get(folder, ((),))[0] != now:
+        with suppress(FileNotFoundError):  # removed meanwhile
+            _sizes[folder] = now, sum(path.stat().st_size for path in _files(folder))
+    return _sizes.get(folder, (now, 0))[1]
+
+
+def _files(folder: Path) -> list[Path]:
+    """What was made in a cache's folder."""
+    return [
+        path
+        for path in (*folder.iterdir(), *folder.glob("checks/*.sha256"))
+        if _OURS.fullmatch(path.name) or path.parent != folder
+    ]
+
+
 def _clear(folder: Path) -> None:
     """Removes what was left half-written; others may write here at the same time."""
     for entry in os.scandir(folder):
@@ -275,10 +303,9 @@ def _clear(folder: Path) -> None:
 def _remove(folder: Path) -> int:
     freed = 0
     try:
-        for path in (*folder.iterdir(), *folder.glob("checks/*.sha256")):
-            if _OURS.fullmatch(path.name) or path.parent != folder:
-                freed += path.stat().st_size
-                path.unlink()
+        for path in _files(folder):
+            freed += path.stat().st_size
+            path.unlink()
         for empty in (folder / "checks", folder):
             if empty.is_dir() and not any(empty.iterdir()):
                 empty.rmdir()

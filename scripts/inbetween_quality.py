@@ -1,0 +1,284 @@
+"""How close in-between frames come to frames that were left out, beside other ways, measured in one run.
+
+    python scripts/inbetween_quality.py [--films A.mp4,B.avi] [--frames 121] [--scene NAME] [--parts films,scene,speed]
+                                        [--table FILE] [--json FILE] [--picture FILE]
+
+films: every second frame is dropped and rebuilt. PSNR and SSIM are of 8-bit pictures; the SSIM is scripts/quality.py's.
+scene: of footage of the gallery, rendered at 240 fps, every eighth frame is kept, the others are rebuilt; and a box
+    shutter over four of the kept frames is compared with the same over all 32.
+speed: frames per second and peak memory at 1920×1080, between frames of the first film, eight to one.
+
+Ways: "quick" and "good" are shutter_addon.media.flow's, "blend" mixes both neighbours in linear light, "repeat" shows
+the earlier one, "minterpolate" is `ffmpeg -vf minterpolate=mi_mode=mci`, taken from PATH. Its frames are matched by
+those that it was given and returns. Footage that is not there yet is rendered, which needs Blender as a library (bpy).
+Peak memory is read from /proc, hence on Linux alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import multiprocessing
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from itertools import pairwise
+from pathlib import Path
+from statistics import median
+
+import cv2
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from quality import similarity
+
+from shutter_addon.core import light
+from shutter_addon.media import flow, open_source
+
+ROOT = Path(__file__).resolve().parents[1]
+FILMS = [ROOT / "assets" / name for name in ("bigbuckbunny.mp4", "pedestrians.avi")]
+FACTOR = 8  # 240 fps from 30
+BOX = 4  # kept frames that the box exposes
+HD = 1920, 1080
+
+
+def linear(picture: np.ndarray) -> np.ndarray:
+    return light.to_linear(picture.astype(np.float32) / 255)
+
+
+def codes(picture: np.ndarray) -> np.ndarray:
+    return np.rint(255 * light.to_encoded(np.clip(picture, 0, 1))).astype(np.uint8)
+
+
+def by_flow(method):
+    def rebuilt(kept, factor):
+        opaque = [np.dstack([frame, np.full(frame.shape[:2], 255, np.uint8)]) for frame in kept]
+        return [[new[..., :3] for new in flow.between(*pair, factor, method)] for pair in pairwise(opaque)]
+
+    return rebuilt
+
+
+def blend(kept, factor):
+    def mixed(first, second):
+        first, second = linear(first), linear(second)
+        return [codes(first + np.float32(k / factor) * (second - first)) for k in range(1, factor)]
+
+    return [mixed(*pair) for pair in pairwise(kept)]
+
+
+def repeat(kept, factor):
+    return [[first] * (factor - 1) for first in kept[:-1]]
+
+
+def minterpolate(kept, factor):
+    """It ends early: there is less than for the last gap."""
+    made = through_ffmpeg(kept, factor)[0]
+    for index, frame in enumerate(kept[: len(made) // factor]):
+        if psnr(made[index * factor], frame) < 40:
+            sys.exit(f"minterpolate: its frame {index * factor} is not the frame {index} that it was given")
+    gaps = [made[i + 1 : i + factor] for i in range(0, len(made), factor)]
+    return [list(gap) for gap in gaps if len(gap) == factor - 1]
+
+
+WAYS = {"quick": by_flow("quick"), "good": by_flow("good"), "blend": blend, "repeat": repeat}
+WAYS["minterpolate"] = minterpolate
+
+
+def through_ffmpeg(kept, factor):
+    """What minterpolate makes of frames, its seconds and its peak memory in bytes."""
+    height, width = kept[0].shape[:2]
+    raw = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height}".split()
+    command = ["ffmpeg", "-v", "error", *raw, "-r", "10"]
+    options = ["-vf", f"minterpolate=fps={10 * factor}:mi_mode=mci"]
+    with tempfile.TemporaryDirectory() as folder:
+        given, made = Path(folder, "given"), Path(folder, "made")
+        np.stack(kept).tofile(given)
+        start, peak = time.perf_counter(), 0
+        with subprocess.Popen([*command, "-i", given, *options, *raw, made]) as ffmpeg:
+            while ffmpeg.poll() is None:
+                peak = max(peak, peak_memory(ffmpeg.pid))
+                time.sleep(0.02)
+        seconds = time.perf_counter() - start
+        if ffmpeg.returncode:
+            sys.exit("minterpolate: ffmpeg failed")
+        return np.fromfile(made, np.uint8).reshape(-1, height, width, 3), seconds, peak
+
+
+def peak_memory(process) -> int:
+    """The most bytes of a process that were resident so far; without those of its parent, which rusage includes."""
+    try:
+        status = Path(f"/proc/{process}/status").read_text(encoding="utf-8")
+    except OSError:  # it has ended
+        return 0
+    found = re.search(r"VmHWM:\s+(\d+) kB", status)
+    return 1024 * int(found[1]) if found else 0
+
+
+def psnr(picture, other) -> float:
+    error = np.mean((picture.astype(np.float32) - other) ** 2)
+    return float(10 * np.log10(255**2 / max(error, 1e-6)))
+
+
+def compare(name, truth, factor) -> list[dict]:
+    """A row for each way to rebuild the frames of `truth` between every factor-th; the same frames for all."""
+    kept = truth[::factor]
+    rows, rebuilt = [], {}
+    for way, make in WAYS.items():
+        start = time.perf_counter()
+        rebuilt[way] = make(kept, factor)
+        seconds = (time.perf_counter() - start) / sum(map(len, rebuilt[way]))
+        rows.append({"footage": name, "way": way, "factor": factor, "seconds": seconds})
+    gaps = min(map(len, rebuilt.values()))
+    places = [(gap, k) for gap in range(gaps) for k in range(1, factor)]
+    for row in rows:
+        pairs = [(rebuilt[row["way"]][gap][k - 1], truth[gap * factor + k]) for gap, k in places]
+        noise, alike = [psnr(*pair) for pair in pairs], [similarity(*pair) for pair in pairs]
+        row |= {"frames": len(pairs), "psnr": float(np.mean(noise)), "worst psnr": min(noise)}
+        row |= {"ssim": float(np.mean(alike)), "worst ssim": min(alike)}
+        print(line(row), flush=True)
+    return rows
+
+
+def line(row) -> str:
+    numbers = "{psnr:.2f} | {worst psnr:.2f} | {ssim:.4f} | {worst ssim:.4f} | {seconds:.2f}".format(**row)
+    return f"| {row['footage']} | {row['way']} | {numbers} |"
+
+
+def films(args) -> list[dict]:
+    rows = []
+    for film in args.films:
+        with open_source(film) as source:
+            truth = [source.read(index)[..., :3] for index in range(min(args.frames, source.count))]
+        rows += compare(film.name, truth, 2)
+    return rows
+
+
+def footage(name) -> list[np.ndarray]:
+    """The gallery's, at 240 fps."""
+    first = importlib.import_module(f"gallery.{name}").ITEM.footage(ROOT / "out" / "gallery" / name / "footage")
+    with open_source(first) as source:
+        return [source.read(index)[..., :3] for index in range(source.count)]
+
+
+def scene(args) -> list[dict]:
+    truth = footage(args.scene)
+    gaps = args.start + np.arange(BOX + 1)
+    truth = truth[gaps[0] * FACTOR : gaps[-1] * FACTOR + 1]
+    rows = compare(args.scene, truth, FACTOR)
+    kept = truth[::FACTOR]
+    exposed = [exposure(truth[:-1])]
+    for way in ("30 fps", "quick", "good", "blend"):
+        frames = kept[:-1]
+        if way != "30 fps":
+            made = WAYS[way](kept, FACTOR)
+            frames = [frame for first, rest in zip(kept, made, strict=False) for frame in (first, *rest)]
+        picture = exposure(frames)
+        row = {"footage": args.scene, "box": way, "frames": len(frames)}
+        rows.append(row | {"psnr": psnr(picture, exposed[0]), "ssim": similarity(picture, exposed[0])})
+        print("| {footage}, box | {box} | {psnr:.2f} | | {ssim:.4f} | | |".format(**rows[-1]), flush=True)
+        exposed.append(picture)
+    if args.picture:
+        save(
+            args.picture, [(exposed[1], f"{BOX} frames at 30 fps"), (exposed[2], f"{FACTOR}x in-betweens")], exposed[0]
+        )
+    return rows
+
+
+def exposure(frames) -> np.ndarray:
+    """A 360° shutter over all of the frames."""
+    total = 0
+    for frame in frames:
+        total = total + linear(frame).astype(np.float64)
+    return codes((total / len(frames)).astype(np.float32))
+
+
+def save(path, labelled) -> None:
+    """The pictures side by side, each with its words below."""
+    columns = []
+    for picture, words in labelled:
+        shown = cv2.resize(picture, (640, 640 * picture.shape[0] // picture.shape[1]), interpolation=cv2.INTER_AREA)
+        shown = cv2.copyMakeBorder(shown, 0, 40, 0, 8, cv2.BORDER_CONSTANT, value=(24, 24, 24))
+        place = (8, shown.shape[0] - 13)
+        cv2.putText(shown, words, place, cv2.FONT_HERSHEY_SIMPLEX, 0.7, (230, 230, 230), 1, cv2.LINE_AA)
+        columns.append(shown)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    cv2.imwrite(str(path), np.hstack(columns)[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 85])
+
+
+def speed(args) -> list[dict]:
+    """In processes of their own, which tell their peak memory; by turns."""
+    ways = ("quick", "good", "minterpolate")
+    results = {way: [] for way in ways}
+    spawn = multiprocessing.get_context("spawn")
+    for _ in range(args.rounds):
+        for way in ways:
+            with spawn.Pool(1) as pool:
+                results[way].append(pool.apply(one_speed, (way, args.films[0], args.gaps)))
+    rows = []
+    for way, found in results.items():
+        rates, peaks = zip(*found, strict=True)
+        rows.append({"speed": way, "size": "1920x1080", "factor": FACTOR, "fps": median(rates), "memory": max(peaks)})
+        rows[-1]["all"] = rates
+        print(f"| {way} | {rows[-1]['fps']:.2f} | {rows[-1]['memory'] / 1e6:.0f} |", flush=True)
+    return rows
+
+
+def one_speed(way, film, gaps):
+    """New frames per second, and the peak of resident memory in bytes."""
+    with open_source(film) as source:
+        kept = [cv2.resize(source.read(20 + i)[..., :3], HD, interpolation=cv2.INTER_CUBIC) for i in range(gaps + 1)]
+    if way == "minterpolate":
+        made, seconds, peak = through_ffmpeg(kept, FACTOR)
+        return len(made) * (FACTOR - 1) / FACTOR / seconds, peak
+    start = time.perf_counter()
+    # One gap at a time, as they are built: no more than that is kept.
+    count = sum(len(WAYS[way](list(pair), FACTOR)[0]) for pair in pairwise(kept))
+    seconds = time.perf_counter() - start
+    return count / seconds, peak_memory(os.getpid())
+
+
+PARTS = {"films": films, "scene": scene, "speed": speed}
+
+
+def parse(arguments=None):
+    def listed(of):
+        return lambda text: [of(part) for part in text.split(",")]
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    add = parser.add_argument
+    add("--parts", type=listed(str), default=list(PARTS), help=",".join(PARTS))
+    add("--films", type=listed(Path), default=FILMS, help="separated by commas; the first also for the speed")
+    add("--frames", type=int, default=121, help="of each film, from the first on")
+    add("--scene", default="hands", help="whose footage, of gallery/ (%(default)s)")
+    add("--start", type=int, default=1, help="first frame at 30 fps (%(default)s)")
+    add("--rounds", type=int, default=3, help="of the speed")
+    add("--gaps", type=int, default=3, help="pairs of frames of a round of the speed")
+    add("--picture", type=Path, help="where the box shutter's pictures are written, side by side")
+    add("--json", type=Path, help="where the rows are written")
+    add("--table", type=Path, help="where the films' and the scene's table is written, as Markdown")
+    return parser.parse_args(arguments)
+
+
+def main(arguments=None) -> None:
+    args = parse(arguments)
+    rows = [row for part in args.parts for row in PARTS[part](args)]
+    if args.json:
+        write(args.json, json.dumps(rows, indent=1) + "\n")
+    if args.table:
+        head = "| footage | way | PSNR | worst | SSIM | worst | s/frame |\n|---|---|---|---|---|---|---|\n"
+        write(args.table, head + "".join(line(row) + "\n" for row in rows if "way" in row))
+
+
+def write(path, text) -> None:
+    part = path.with_name(f".{path.name}.part")
+    part.write_text(text, encoding="utf-8")
+    os.replace(part, path)
+
+
+if __name__ == "__main__":
+    main()

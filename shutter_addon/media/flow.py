@@ -1,0 +1,222 @@
+"""Frames between two frames, by optical flow (appendix B).
+
+The flow comes from OpenCV, in both directions. Each of its vectors carries a pixel to where it is at the time of the
+new frame; where several arrive, the one whose two ends look alike wins (Baker et al. 2011, "A database and evaluation
+methodology for optical flow"). Along what has arrived, both frames are looked up and mixed.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from ..core import light
+from .errors import MediaError
+
+try:
+    import cv2
+except ImportError:  # a package without wheels; the extension registers without it
+    cv2 = None
+
+STEP = 2  # pixels between the vectors that are carried; all pixels gain nothing and take four times as long
+SMALLEST = 16  # pixels; OpenCV's flows need about as many, smaller pictures are cross-faded
+ALIKE = 8  # levels of 255 by which the ends of a vector may differ before another flow is believed more
+
+
+def between(first, second, factor: int, method="quick", transfer="srgb", alpha="opaque") -> list[np.ndarray]:
+    """The frames at the times 1/factor … (factor-1)/factor between two frames: a function of the two alone, the same
+    bits whatever the number of cores.
+
+    first, second: arrays (height, width, 4) of a Source's dtype; no cut may lie between them
+    method: of METHODS
+    transfer, alpha: how samples are encoded, as Source says; the new frames are encoded alike
+
+    What only one of the frames shows is taken from it, all else is mixed in linear light.
+    Raises MediaError where OpenCV is missing."""
+    if cv2 is None:
+        raise MediaError(
+            "in-between frames need the Python package opencv-contrib-python-headless; "
+            "install the zip of Virtual Shutter that is made for your system"
+        )
+    # DIS gives other vectors for another number of threads.
+    cv2.setNumThreads(1)
+    ends = [_encoded(frame, transfer, alpha) for frame in (first, second)]
+    luma = [_luma(end) for end in ends]
+    paths = [_Paths(luma, flow) for flow in METHODS[method]]
+    frames = (_mixed(ends, [path.at(k / factor) for path in paths], k / factor) for k in range(1, factor))
+    return [_decoded(frame, first.dtype, transfer, alpha) for frame in frames]
+
+
+def _dis(first, second, finest: int) -> np.ndarray:
+    """Vectors (H, W, 2) from the first picture's pixels to the second's; finest: how often pictures are halved."""
+    # A new one each time: it keeps buffers, which threads must not share.
+    dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    dis.setFinestScale(finest)
+    dis.setPatchStride(3 + (finest == 0))
+    return dis.calc(first, second, None)
+
+
+def _quick(first, second):
+    return _dis(first, second, 1)
+
+
+def _fine(first, second):
+    return _dis(first, second, 0)
+
+
+def _deep(first, second):
+    half = [cv2.resize(luma, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for luma in (first, second)]
+    vectors = cv2.optflow.createOptFlow_DeepFlow().calc(*half, None)
+    return 2 * cv2.resize(vectors, first.shape[::-1], interpolation=cv2.INTER_LINEAR)
+
+
+# The flows of a method, from a picture (H, W) uint8 to another. What several say is weighed pixel by pixel.
+METHODS = {"quick": (_quick,), "good": (_fine, _deep)}
+
+
+class _Paths:
+    """Where the pixels of two pictures go from one to the other."""
+
+    def __init__(self, luma, flow):
+        self._shape = luma[0].shape
+        self._sides = [_carriers(a, b, flow) for a, b in (luma, luma[::-1])]
+
+    def at(self, t: float):
+        """At a time in 0 … 1, for each pixel: the vector (H, W, 2) from the first picture to the second that passes
+        there, and how surely the first and the second show what it carries (H, W, 2), 0 to 1."""
+        (forth, cost), (back, other) = (self._carry(*side, s) for side, s in zip(self._sides, (t, 1 - t), strict=True))
+        vectors = np.where((cost <= other)[..., None], forth, -back)
+        arrived = np.dstack([cost, other]) < np.inf
+        vectors = _filled(vectors.astype(np.float32), arrived.any(axis=2))
+        shown = cv2.blur(arrived.astype(np.float32), (5, 5)) + np.float32(0.05)
+        fine = _grid(*self._shape) / STEP
+        return _look(vectors, fine, cv2.INTER_LINEAR), _look(shown, fine, cv2.INTER_LINEAR)
+
+    def _carry(self, places, vectors, costs, t):
+        """On every STEPth pixel at time t: vectors (h, w, 2) and costs (h, w), infinite where nothing arrives."""
+        h, w = (-(-n // STEP) for n in self._shape)
+        cells = np.floor((places + np.float32(t) * vectors) / STEP).astype(np.int32)
+        # A margin of two takes what leaves the picture.
+        np.clip(cells, -2, (w, h), out=cells)
+        corners = (cells[:, 1] + 2) * (w + 4) + cells[:, 0] + 2
+        arrived = np.full(((h + 4) * (w + 4), 3), (0, 0, np.inf), np.float32)
+        around = corners[:, None] + np.array([0, 1, w + 4, w + 5])
+        # Of several that arrive the last stays, the cheapest.
+        arrived[around.ravel()] = np.repeat(np.column_stack([vectors, costs]), 4, axis=0)
+        arrived = arrived.reshape(h + 4, w + 4, 3)[2:-2, 2:-2]
+        return arrived[..., :2], arrived[..., 2]
+
+
+def _carriers(first, second, flow):
+    """Places (n, 2) on every STEPth pixel, vectors (n, 2) and costs (n,), the dearest first: how much, in levels, the
+    two ends differ."""
+    grid = _grid(*first.shape)
+    vectors = np.zeros_like(grid) if min(first.shape) < SMALLEST else flow(first, second)
+    vectors = np.nan_to_num(vectors, posinf=0, neginf=0)  # of pictures without any structure
+    cost = cv2.blur(cv2.absdiff(first, _look(second, grid + vectors, cv2.INTER_LINEAR)).astype(np.float32), (5, 5))
+    cost = cost[::STEP, ::STEP].ravel()
+    order = np.argsort(-cost, kind="stable")
+    return *(each[::STEP, ::STEP].reshape(-1, 2)[order] for each in (grid, vectors)), cost[order]
+
+
+def _filled(vectors, known):
+    """Vectors (h, w, 2) whose unknown ones are the mean of what is known around, from the coarser picture."""
+    if known.all() or not known.any():
+        return vectors
+    weight = known.astype(np.float32)
+    size = tuple(-(-n // 2) for n in known.shape[::-1])
+    half = cv2.resize(weight, size, interpolation=cv2.INTER_AREA)
+    coarse = cv2.resize(vectors * weight[..., None], size, interpolation=cv2.INTER_AREA)
+    coarse = _filled(coarse / np.maximum(half, np.float32(1e-6))[..., None], half > 0)
+    return np.where(known[..., None], vectors, cv2.resize(coarse, known.shape[::-1], interpolation=cv2.INTER_LINEAR))
+
+
+def _mixed(ends, paths, t: float) -> np.ndarray:
+    """Linear light (H, W, 3 or 4) at time t: both frames looked up along each flow's paths."""
+    total = weights = 0
+    for vectors, shown in paths:
+        grid = _grid(*vectors.shape[:2])
+        seen = _look(ends[0], grid - np.float32(t) * vectors), _look(ends[1], grid + np.float32(1 - t) * vectors)
+        late = np.float32(t) * shown[..., 1]
+        late = (late / (late + np.float32(1 - t) * shown[..., 0]))[..., None]
+        first, second = map(_light, seen)
+        frame = first + late * (second - first)
+        if len(paths) == 1:
+            return frame
+        weight = np.exp(_difference(*seen) / -ALIKE)[..., None] + np.float32(1e-6)
+        total, weights = total + weight * frame, weights + weight
+    return total / weights
+
+
+def _difference(picture, other) -> np.ndarray:
+    """How much two pictures differ around each pixel, (H, W) in levels of 255."""
+    level = 255 / np.iinfo(picture.dtype).max if picture.dtype.kind == "u" else 255
+    each = cv2.absdiff(picture, other)[..., :3].mean(axis=2, dtype=np.float32)
+    return cv2.blur(each, (9, 9)) * np.float32(level)
+
+
+def _look(picture, places, how=None) -> np.ndarray:
+    """The picture (H, W, …) at places (h, w, 2), x and y in pixels; its edge goes on beyond it."""
+    return cv2.remap(picture, places, None, cv2.INTER_CUBIC if how is None else how, borderMode=cv2.BORDER_REPLICATE)
+
+
+@cache
+def _grid(height: int, width: int) -> np.ndarray:
+    """The places (H, W, 2) of all pixels."""
+    return np.dstack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in (width, height))))
+
+
+# Frames are looked up as display values, premultiplied: in those, cubic interpolation hardly rings around lights.
+
+
+def _encoded(frame, transfer, alpha) -> np.ndarray:
+    """A Source's frame as that: (H, W, 3) where it is opaque, in its own whole numbers or as float32."""
+    if alpha == "opaque" and transfer == "srgb" and frame.dtype.kind == "u":
+        return np.ascontiguousarray(frame[..., :3])
+    white = np.iinfo(frame.dtype).max if frame.dtype.kind == "u" else 1
+    rgba = frame.astype(np.float32) / np.float32(white)
+    convert = light.to_encoded if transfer == "linear" else None
+    if alpha == "opaque":
+        return np.ascontiguousarray(rgba[..., :3] if convert is None else convert(rgba[..., :3]))
+    return light.premultiplied(light.straight(rgba) if alpha == "premultiplied" else rgba, convert)
+
+
+def _luma(samples) -> np.ndarray:
+    """(H, W) uint8, which DIS needs."""
+    if samples.dtype == np.uint16:
+        samples = (samples >> 8).astype(np.uint8)
+    elif samples.dtype != np.uint8:
+        samples = np.rint(255 * np.clip(np.nan_to_num(samples), 0, 1)).astype(np.uint8)
+    return cv2.cvtColor(np.ascontiguousarray(samples[..., :3]), cv2.COLOR_RGB2GRAY)
+
+
+def _light(samples) -> np.ndarray:
+    if samples.dtype.kind == "u":
+        return _table(samples.dtype)[samples]
+    if samples.shape[2] == 3:
+        return light.to_linear(samples)
+    samples[..., 3] = np.clip(samples[..., 3], 0, 1)
+    return light.premultiplied(light.straight(samples), light.to_linear)
+
+
+@cache
+def _table(dtype) -> np.ndarray:
+    """Light of all display values of a whole-number type."""
+    white = np.iinfo(dtype).max
+    return light.to_linear(np.arange(white + 1) / white).astype(np.float32)
+
+
+def _decoded(frame, dtype, transfer, alpha) -> np.ndarray:
+    """Linear, premultiplied light as a Source's frame."""
+    convert = light.to_encoded if transfer == "srgb" else np.asarray
+    if alpha == "opaque":
+        frame = np.dstack([convert(frame), np.ones(frame.shape[:2], np.float32)])
+    else:
+        frame = light.straight(frame)
+        frame[..., :3] = convert(frame[..., :3])
+        frame = light.premultiplied(frame) if alpha == "premultiplied" else frame
+    if dtype.kind == "u":
+        white = np.iinfo(dtype).max
+        frame = np.rint(np.clip(frame, 0, 1) * np.float32(white))
+    return frame.astype(dtype)
