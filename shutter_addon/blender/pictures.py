@@ -57,6 +57,12 @@ class Moment:
         self.prefetch()  # and lets go of what is on the device by now
         return result
 
+    def check(self) -> None:
+        """MediaError: an in-between frame that the picture needs is missing. No frame is read."""
+        if self.renderer.source.step > 1:
+            for index in sorted(self.renderer.needed(self.index, self.direction, self.instant)):
+                self.renderer.source.check(index)
+
     def prefetch(self) -> None:
         """Has the frames decoded that the picture lacks, then those of the next pictures."""
         wanted, source = {}, self.renderer.source
