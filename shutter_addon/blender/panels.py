@@ -183,6 +183,12 @@ class _Options(_WithEffect):
         layout.use_property_split = True
         for name in ("position", "interpolation", "light", "exposure", "edges", "stop_at_cuts", "aggregate", "border"):
             layout.prop(effect, name)
+        layout.prop(effect, "use_source_time")
+        column = layout.column()
+        column.active = effect.use_source_time
+        column.prop(effect, "source_time")
+        if effect.use_source_time and effect.inbetween == "1":
+            column.label(text="No in-between frames: the nearest source frame is shown", icon="INFO")
 
 
 class _Inbetween(_WithEffect):

@@ -199,9 +199,25 @@ def moment(edit, effect, strip, frame: float, say=print) -> Moment:
     """What an effect strip shows at a timeline frame. One of FAULTS: it cannot be shown."""
     source = strips.source_of(edit, effect, strip)
     renderer = _studio().renderer(effect, source, say)
-    index = timing.source_frame(source, frame, renderer.source, edit.render.fps / edit.render.fps_base)
     instant = effects.instant(edit, effect, strip, frame)
-    return Moment(renderer, index, instant, -1 if source.use_reverse_frames else 1)
+    if effect.use_source_time:
+        time, backward = effects.source_time(edit, effect, frame)
+        index = timing.nearest(time - 1, renderer.source)
+    else:
+        index = timing.source_frame(source, frame, renderer.source, edit.render.fps / edit.render.fps_base)
+        backward = source.use_reverse_frames
+    return Moment(renderer, index, instant, -1 if backward else 1)
+
+
+def pairs(edit, effect, strip, frames) -> set[int]:
+    """The pairs of neighbouring source frames whose in-betweens are needed to show an effect strip at these timeline
+    frames, each by its first. It reads what it must to find cuts. One of FAULTS: they cannot be shown."""
+    factor, found = inbetweens.factor(effect), set()
+    for frame in frames:
+        shown = moment(edit, effect, strip, frame)
+        needed = shown.renderer.needed(shown.index, shown.direction, shown.instant, known=False)
+        found |= {index // factor for index in needed if index % factor}
+    return found
 
 
 def _open(effect, source_strip) -> Shots:

@@ -250,6 +250,19 @@ class ShutterEffect(PropertyGroup):
     inbetween_place: EnumProperty(
         name="Place", description="Where in-between frames lie", items=PLACES, update=_changed, options=_UNKEYED
     )
+    use_source_time: BoolProperty(
+        name="Use Source Time",
+        description="Show the source at the time that is set here, in place of the strip's own timing",
+        update=_changed,
+        options=_UNKEYED,
+    )
+    source_time: FloatProperty(
+        name="Source Time",
+        description="Source frame that is shown, 1 is the source's first; keyed, it is a speed ramp",
+        default=1.0,
+        soft_min=1.0,
+        update=_changed,
+    )
     shutters: CollectionProperty(type=Shutter)
     regions: CollectionProperty(type=ShutterRegion)
     active_shutter: IntProperty(name="Active Shutter", min=0, update=_chosen, options=_UNKEYED)

@@ -121,9 +121,9 @@ class Renderer:
         low, high = shutters.open_span(instant.bars)
         return positions[low:high] if (frames[low:high] >= 0).all() else positions[frames >= 0]
 
-    def needed(self, index: int, direction: int, instant: Instant) -> set[int]:
-        """The source frames at those positions, as far as cuts are known."""
-        shot = self.shot(index, direction, instant, known=True)
+    def needed(self, index: int, direction: int, instant: Instant, *, known: bool = True) -> set[int]:
+        """The source frames at those positions, as far as cuts are known; known as for `shot`."""
+        shot = self.shot(index, direction, instant, known=known)
         positions = self.positions(index, direction, instant, shot)
         return set(compositor.source_frames(instant.options, positions, shot).tolist())
 

@@ -245,7 +245,7 @@ def _stamp(folder: Path) -> tuple | None:
     try:
         checks = [(entry.name, entry.stat()) for entry in os.scandir(folder / "checks")]
         return folder.stat().st_mtime_ns, *sorted((name, info.st_size, info.st_mtime_ns) for name, info in checks)
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return None
 
 

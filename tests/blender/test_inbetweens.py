@@ -6,21 +6,13 @@ from functools import partial
 
 import numpy as np
 import pytest
+from standin import between
 from support import write_frames
 
 from shutter_addon.core import light, shutters
 from shutter_addon.media import inbetween, open_source
 
 FACTOR, COUNT, CUT = 4, 12, 6
-
-
-def standin(first, second, factor, *_):
-    """Frames that no blend or flow would give, and that follow from the two alone."""
-    rng = np.random.default_rng([int(first.sum()), int(second.sum())])
-    for _ in range(factor - 1):
-        frame = rng.integers(0, 256, first.shape, dtype=np.uint8)
-        frame[..., 3] = 255
-        yield frame
 
 
 def cut_film():
@@ -45,7 +37,7 @@ def film(tmp_path, monkeypatch):
 
 
 def build(source, folder, **more):
-    return inbetween.build(source, folder, FACTOR, "quick", between=standin, **more)
+    return inbetween.build(source, folder, FACTOR, "quick", between=between, **more)
 
 
 @pytest.fixture
