@@ -57,6 +57,11 @@ class Moment:
         self.prefetch()  # and lets go of what is on the device by now
         return result
 
+    def check(self) -> None:
+        """MediaError: an in-between frame that the picture needs is not built."""
+        if self.renderer.source.step > 1:
+            self.renderer.source.demand(sorted(self.renderer.missing(self.index, self.direction, self.instant)))
+
     def prefetch(self) -> None:
         """Has the frames decoded that the picture lacks, then those of the next pictures."""
         wanted, source = {}, self.renderer.source

@@ -166,6 +166,8 @@ def _show(context, found: Shown, settings, say) -> None:
         _show_coefficients(quad, found.effect, moment)
     else:
         _show_strokes(context, quad, found.effect, moment)
+    if has_result:  # what the engine reports is soon gone, and the sequencer shows the plain source
+        moment.check()
 
 
 def _warn(found: Shown, say) -> None:

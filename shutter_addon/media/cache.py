@@ -77,13 +77,15 @@ class Cache:
         stamp = _stamp(self.folder)
         if stamp == self._loaded:
             return
-        self._loaded, self.digests, self.kinds = stamp, {}, {}
+        digests, kinds = {}, {}
         for file in (self.folder / "checks").glob("*.sha256"):
             for line in file.read_text("ascii", "replace").splitlines():
                 if match := _PICTURE.fullmatch(line):  # processes whose libraries differ may write other bytes
-                    self.digests.setdefault(int(match[2]), set()).add(match[1])
+                    digests.setdefault(int(match[2]), set()).add(match[1])
                 elif (match := _PAIR.fullmatch(line)) and line == pair_line(int(match[1]), match[2]):
-                    self.kinds[int(match[1])] = match[2]
+                    kinds[int(match[1])] = match[2]
+        # As a whole: another thread may be reading.
+        self._loaded, self.digests, self.kinds = stamp, digests, kinds
 
     def picture(self, frame: int) -> Path:
         """The file of that frame."""
