@@ -94,6 +94,8 @@ def shown(name):
     """A picture of what the panel says; and what it is, noted."""
     region = story.preview()
     driver.move(region, region.width / 2, region.height / 2)
+    for area in bpy.context.window_manager.windows[0].screen.areas:  # nobody told Blender of the files
+        area.tag_redraw()
     yield 1.5
     driver.shot(name)
     state = look().state
