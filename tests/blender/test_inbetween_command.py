@@ -79,7 +79,7 @@ def test_a_render_builds_what_its_frames_need(run, film, tmp_path, same_pixels):
         picture = read_picture(tmp_path / "out" / f"{frame:04d}.png")
         same_pixels(picture, shown(frames, range(start, start + 12)), 1)
     # frames 2 and 3 see those from 4 to 19: pairs 1 to 4
-    assert numbers(tmp_path / "inbetween") == [i for i in range(5, 20) if i % 4]
+    assert numbers(tmp_path / "virtual_shutter_inbetween") == [i for i in range(5, 20) if i % 4]
 
 
 def test_chunks_are_the_whole(run, film, tmp_path):
@@ -95,7 +95,9 @@ def test_chunks_are_the_whole(run, film, tmp_path):
         window = np.arange((frame - 1) * 4, (frame - 1) * 4 + 8)
         window = np.minimum(window, 22 if frame <= CUT else 36)
         assert np.abs(whole - shown(frames, window)).max() <= 1
-    assert built(tmp_path / "whole" / "inbetween") == built(tmp_path / "parts" / "inbetween")
+    assert built(tmp_path / "whole" / "virtual_shutter_inbetween") == built(
+        tmp_path / "parts" / "virtual_shutter_inbetween"
+    )
 
 
 def test_built_alone_by_a_farm_they_are_those_that_a_render_takes(run, film, tmp_path):
@@ -107,7 +109,7 @@ def test_built_alone_by_a_farm_they_are_those_that_a_render_takes(run, film, tmp
     data = recipe(8, np.ones(8), inbetween=4)
     run("render", first, "--output", tmp_path / "out", "--cache", tmp_path / "cache", recipe=data)
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").glob("*/*.png")} == before
-    assert not (tmp_path / "inbetween").exists()
+    assert not (tmp_path / "virtual_shutter_inbetween").exists()
 
 
 def test_a_movie_s_in_betweens_are_found_as_well(run, bunny, tmp_path):
@@ -138,7 +140,7 @@ def test_a_saved_edit_finds_them_beside_itself(run, film, tmp_path, blender, sam
     first, frames = film
     data = recipe(6, np.ones(6), inbetween=4)
     run("render", first, "--save", tmp_path / "edit" / "e.blend", "--frames", "2:2", recipe=data)
-    assert numbers(tmp_path / "edit" / "inbetween") == [5, 6, 7, 9, 10, 11]
+    assert numbers(tmp_path / "edit" / "virtual_shutter_inbetween") == [5, 6, 7, 9, 10, 11]
     (tmp_path / "edit").rename(tmp_path / "moved")
     done = blender(tmp_path / "moved" / "e.blend", "-o", f"{tmp_path}/out/", "-a")
     assert done.returncode == 0, done.stderr

@@ -449,4 +449,19 @@ MESSAGES = {
     ): "Verschlüsse, Regionen, Schlüsselbilder und Optionen des Effekts als Rezeptdatei speichern",
     ("*", "Choose a file"): "Eine Datei wählen",
     ("*", 'Saved "{path}"'): "„{path}“ gespeichert",
+    # Source time
+    ("*", "Use Source Time"): "Quellzeit verwenden",
+    (
+        "*",
+        "Show the source at the time that is set here, in place of the strip's own timing",
+    ): "Die Quelle zu der Zeit zeigen, die hier eingestellt ist, anstelle der Zeit des Streifens",
+    ("*", "Source Time"): "Quellzeit",
+    (
+        "*",
+        "Source frame that is shown, 1 is the source's first; keyed, it is a speed ramp",
+    ): "Bild der Quelle, das gezeigt wird, 1 ist ihr erstes; mit Schlüsselbildern eine Geschwindigkeitsrampe",
+    (
+        "*",
+        "No in-between frames: the nearest source frame is shown",
+    ): "Keine Zwischenbilder: Das nächste Bild der Quelle wird gezeigt",
 }
