@@ -39,13 +39,12 @@ def between(first, second, factor: int, method="quick", transfer="srgb", alpha="
             "in-between frames need the Python package opencv-contrib-python-headless; "
             "install the zip of Virtual Shutter that is made for your system"
         )
-    # DIS gives other vectors for another number of threads.
-    cv2.setNumThreads(1)
     ends = [_encoded(frame, transfer, alpha) for frame in (first, second)]
     luma = [_luma(end) for end in ends]
     paths = [_Paths(luma, flow) for flow in METHODS[method]]
-    frames = (_mixed(ends, [path.at(k / factor) for path in paths], k / factor) for k in range(1, factor))
-    return [_decoded(frame, first.dtype, transfer, alpha) for frame in frames]
+    with np.errstate(invalid="ignore"):  # infinite light stays so
+        frames = (_mixed(ends, [path.at(k / factor) for path in paths], k / factor) for k in range(1, factor))
+        return [_decoded(frame, first.dtype, transfer, alpha) for frame in frames]
 
 
 def _dis(first, second, finest: int) -> np.ndarray:
