@@ -49,8 +49,8 @@ class Inbetween:
         for index in indices:
             if not self.has(index):
                 raise MediaError(
-                    f"{self.path.name}: in-between frames of frame {index // self.factor} are missing; build them first "
-                    f"(in {self._cache.folder})"
+                    f"{self.path.name}: in-between frames of frame {index // self.factor} are missing; "
+                    f"build them first (in {self._cache.folder})"
                 )
 
     def read(self, index: int) -> np.ndarray:
