@@ -31,10 +31,10 @@ def instant(edit, effect, strip, frame: float) -> recipe.Instant:
 
 def source_time(edit, effect, frame: float) -> tuple[float, bool]:
     """The source frame that an effect's source time tells for a timeline frame, 1 is the first; and whether it runs
-    backward there."""
+    backward from there."""
     curves, path = animation.Curves(edit), effect.path_from_id()
-    before, time, after = (curves.value(effect, path, "source_time", frame + apart) for apart in (-0.5, 0, 0.5))
-    return time, after < before
+    time, later = (curves.value(effect, path, "source_time", frame + apart) for apart in (0, 0.5))
+    return time, later < time
 
 
 def checked(name: str, bars: np.ndarray, frame: float) -> np.ndarray:

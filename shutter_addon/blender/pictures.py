@@ -58,9 +58,10 @@ class Moment:
         return result
 
     def check(self) -> None:
-        """MediaError: an in-between frame that the picture needs is not built."""
+        """MediaError: an in-between frame that the picture needs is missing. No frame is read."""
         if self.renderer.source.step > 1:
-            self.renderer.source.demand(sorted(self.renderer.missing(self.index, self.direction, self.instant)))
+            for index in sorted(self.renderer.needed(self.index, self.direction, self.instant)):
+                self.renderer.source.check(index)
 
     def prefetch(self) -> None:
         """Has the frames decoded that the picture lacks, then those of the next pictures."""

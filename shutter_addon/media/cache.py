@@ -77,15 +77,15 @@ class Cache:
         stamp = _stamp(self.folder)
         if stamp == self._loaded:
             return
-        digests, kinds = {}, {}
+        digests: dict[int, set[str]] = {}
+        kinds: dict[int, str] = {}
         for file in (self.folder / "checks").glob("*.sha256"):
             for line in file.read_text("ascii", "replace").splitlines():
                 if match := _PICTURE.fullmatch(line):  # processes whose libraries differ may write other bytes
                     digests.setdefault(int(match[2]), set()).add(match[1])
                 elif (match := _PAIR.fullmatch(line)) and line == pair_line(int(match[1]), match[2]):
                     kinds[int(match[1])] = match[2]
-        # As a whole: another thread may be reading.
-        self._loaded, self.digests, self.kinds = stamp, digests, kinds
+        self.digests, self.kinds, self._loaded = digests, kinds, stamp  # at once: others may ask from their threads
 
     def picture(self, frame: int) -> Path:
         """The file of that frame."""

@@ -44,21 +44,20 @@ class Inbetween:
             self._cache.load()
         return self._is_there(index)
 
-    def demand(self, indices) -> None:
-        """MediaError: one of these frames is not built."""
-        for index in indices:
-            if not self.has(index):
-                raise MediaError(
-                    f"{self.path.name}: in-between frames of frame {index // self.factor} are missing; "
-                    f"build them first (in {self._cache.folder})"
-                )
+    def check(self, index: int) -> None:
+        """MediaError: the frame is not built."""
+        if not self.has(index):
+            raise MediaError(
+                f"{self.path.name}: in-between frames of frame {index // self.factor} are missing; "
+                f"build them first (in {self._cache.folder})"
+            )
 
     def read(self, index: int) -> np.ndarray:
         """The frame as a new array (height, width, 4), RGBA, top row first.
 
         Raises MediaError for one that is not built, or damaged, and what the source raises."""
         check_index(self, index)
-        self.demand([index])
+        self.check(index)
         real = self._real(index)
         return self._cache.read(index) if real is None else self._source.read(real)
 

@@ -121,8 +121,9 @@ def test_what_is_missing_is_said_and_what_is_built_is_shown(film, add, edit, ren
     picture = partial(pictures.picture, effect.scene, 2)
     picture()
     cache.purge(inbetweens.given)
-    with pytest.raises(MediaError, match=r"in-between frames of frame 1 are missing"):
-        picture()
+    for way in (picture, pictures.moment(*pictures.strips.find_edit(effect.scene), 2).check):
+        with pytest.raises(MediaError, match=r"in-between frames of frame 1 are missing"):
+            way()
     with open_source(first) as source:
         build(source, inbetweens.given, frames=(1, 2))
     same_pixels(light.to_encoded(picture()[..., :3]) * 255, shown(frames, range(4, 10)), 1)
