@@ -69,7 +69,7 @@ def build_with_wheels(without: Path, output: Path, systems: list[str], python: s
 def download(system: str, python: str) -> list[Path]:
     """The wheels for one of pip's systems, unmodified from PyPI; kept in build/wheels."""
     folder = ROOT / "build" / "wheels" / f"{system}-{python}"
-    found = [list(folder.glob(f"{wheel.replace('-', '_').replace('==', '-')}-*.whl")) for wheel in WHEELS]
+    found = [list(folder.glob(f"{_file(wheel)}-*.whl")) for wheel in WHEELS]
     if all(found):
         return [wheel for (wheel,) in found]
     shutil.rmtree(folder, ignore_errors=True)
@@ -77,6 +77,12 @@ def download(system: str, python: str) -> list[Path]:
     pip = [sys.executable, "-m", "pip", "download", "-qq", "--disable-pip-version-check"]
     subprocess.run([*pip, *options, f"--platform={system}", f"--dest={folder}", *WHEELS], check=True)
     return sorted(folder.glob("*.whl"))
+
+
+def _file(wheel: str) -> str:
+    """How a wheel's file name begins."""
+    name, version = wheel.split("==")
+    return f"{name.replace('-', '_')}-{version}"
 
 
 def list_wheels(stage: Path, systems: list[str]) -> None:

@@ -76,13 +76,12 @@ def repeat(kept, factor):
 
 
 def minterpolate(kept, factor):
-    """It ends early: there is less than for the last gap."""
-    made = through_ffmpeg(kept, factor)[0]
-    for index, frame in enumerate(kept[: len(made) // factor]):
+    # It ends a few frames early: the last is given again.
+    made = through_ffmpeg([*kept, kept[-1], kept[-1]], factor)[0]
+    for index, frame in enumerate(kept):
         if psnr(made[index * factor], frame) < 40:
             sys.exit(f"minterpolate: its frame {index * factor} is not the frame {index} that it was given")
-    gaps = [made[i + 1 : i + factor] for i in range(0, len(made), factor)]
-    return [list(gap) for gap in gaps if len(gap) == factor - 1]
+    return [list(made[i * factor + 1 : (i + 1) * factor]) for i in range(len(kept) - 1)]
 
 
 WAYS = {"quick": by_flow("quick"), "good": by_flow("good"), "blend": blend, "repeat": repeat}
@@ -124,8 +123,8 @@ def psnr(picture, other) -> float:
     return float(10 * np.log10(255**2 / max(error, 1e-6)))
 
 
-def compare(name, truth, factor) -> list[dict]:
-    """A row for each way to rebuild the frames of `truth` between every factor-th; the same frames for all."""
+def compare(name, truth, factor) -> tuple[list[dict], dict]:
+    """A row for each way to rebuild the frames of `truth` between every factor-th; and what each way has rebuilt."""
     kept = truth[::factor]
     rows, rebuilt = [], {}
     for way, make in WAYS.items():
@@ -133,15 +132,14 @@ def compare(name, truth, factor) -> list[dict]:
         rebuilt[way] = make(kept, factor)
         seconds = (time.perf_counter() - start) / sum(map(len, rebuilt[way]))
         rows.append({"footage": name, "way": way, "factor": factor, "seconds": seconds})
-    gaps = min(map(len, rebuilt.values()))
-    places = [(gap, k) for gap in range(gaps) for k in range(1, factor)]
+    places = [(gap, k) for gap in range(len(kept) - 1) for k in range(1, factor)]
     for row in rows:
         pairs = [(rebuilt[row["way"]][gap][k - 1], truth[gap * factor + k]) for gap, k in places]
         noise, alike = [psnr(*pair) for pair in pairs], [similarity(*pair) for pair in pairs]
         row |= {"frames": len(pairs), "psnr": float(np.mean(noise)), "worst psnr": min(noise)}
         row |= {"ssim": float(np.mean(alike)), "worst ssim": min(alike)}
         print(line(row), flush=True)
-    return rows
+    return rows, rebuilt
 
 
 def line(row) -> str:
@@ -154,7 +152,7 @@ def films(args) -> list[dict]:
     for film in args.films:
         with open_source(film) as source:
             truth = [source.read(index)[..., :3] for index in range(min(args.frames, source.count))]
-        rows += compare(film.name, truth, 2)
+        rows += compare(film.name, truth, 2)[0]
     return rows
 
 
@@ -171,14 +169,13 @@ def scenes(args) -> list[dict]:
 
 def scene(name, args) -> list[dict]:
     truth = footage(name)[args.start * FACTOR : (args.start + BOX) * FACTOR + 1]
-    rows = compare(name, truth, FACTOR)
+    rows, rebuilt = compare(name, truth, FACTOR)
     kept = truth[::FACTOR]
     exposed = [exposure(truth[:-1])]
     for way in ("30 fps", "quick", "good", "blend"):
         frames = kept[:-1]
         if way != "30 fps":
-            made = WAYS[way](kept, FACTOR)
-            frames = [frame for first, rest in zip(kept, made, strict=False) for frame in (first, *rest)]
+            frames = [frame for first, rest in zip(kept, rebuilt[way], strict=False) for frame in (first, *rest)]
         picture = exposure(frames)
         row = {"footage": name, "box": way, "frames": len(frames)}
         rows.append(row | {"psnr": psnr(picture, exposed[0]), "ssim": similarity(picture, exposed[0])})
