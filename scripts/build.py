@@ -18,7 +18,13 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 # What Blender 5.2 lacks; it brings NumPy, OpenImageIO and cattrs with attrs and typing_extensions. Nothing that it
 # brings may be in here: an extension's wheels come before Blender's own modules, for all of Blender.
-WHEELS = ("av==19.0.2", "glcontext==3.1.0", "moderngl==5.13.0", "tqdm==4.70.1")
+WHEELS = (
+    "av==19.0.2",
+    "glcontext==3.1.0",
+    "moderngl==5.13.0",
+    "opencv-contrib-python-headless==5.0.0.93",
+    "tqdm==4.70.1",
+)
 # By Blender's name of a system, the one that pip looks for: as old as PyAV's wheels allow.
 SYSTEMS = {"linux-x64": "manylinux_2_28_x86_64", "windows-x64": "win_amd64", "macos-arm64": "macosx_14_0_arm64"}
 BLENDERS_PYTHON = "3.13"  # of official builds of 5.2
@@ -63,7 +69,7 @@ def build_with_wheels(without: Path, output: Path, systems: list[str], python: s
 def download(system: str, python: str) -> list[Path]:
     """The wheels for one of pip's systems, unmodified from PyPI; kept in build/wheels."""
     folder = ROOT / "build" / "wheels" / f"{system}-{python}"
-    found = [list(folder.glob(f"{wheel.replace('==', '-')}-*.whl")) for wheel in WHEELS]
+    found = [list(folder.glob(f"{_file(wheel)}-*.whl")) for wheel in WHEELS]
     if all(found):
         return [wheel for (wheel,) in found]
     shutil.rmtree(folder, ignore_errors=True)
@@ -71,6 +77,12 @@ def download(system: str, python: str) -> list[Path]:
     pip = [sys.executable, "-m", "pip", "download", "-qq", "--disable-pip-version-check"]
     subprocess.run([*pip, *options, f"--platform={system}", f"--dest={folder}", *WHEELS], check=True)
     return sorted(folder.glob("*.whl"))
+
+
+def _file(wheel: str) -> str:
+    """How a wheel's file name begins."""
+    name, version = wheel.split("==")
+    return f"{name.replace('-', '_')}-{version}"
 
 
 def list_wheels(stage: Path, systems: list[str]) -> None:

@@ -1,10 +1,10 @@
 """How close in-between frames come to frames that were left out, beside other ways, measured in one run.
 
-    python scripts/inbetween_quality.py [--films A.mp4,B.avi] [--frames 121] [--scene NAME] [--parts films,scene,speed]
+    python scripts/inbetween_quality.py [--films A.mp4,B.avi] [--frames 121] [--scenes A,B] [--parts films,scenes,speed]
                                         [--table FILE] [--json FILE] [--picture FILE]
 
 films: every second frame is dropped and rebuilt. PSNR and SSIM are of 8-bit pictures; the SSIM is scripts/quality.py's.
-scene: of footage of the gallery, rendered at 240 fps, every eighth frame is kept, the others are rebuilt; and a box
+scenes: of footage of the gallery, rendered at 240 fps, every eighth frame is kept, the others are rebuilt; and a box
     shutter over four of the kept frames is compared with the same over all 32.
 speed: frames per second and peak memory at 1920×1080, between frames of the first film, eight to one.
 
@@ -76,13 +76,12 @@ def repeat(kept, factor):
 
 
 def minterpolate(kept, factor):
-    """It ends early: there is less than for the last gap."""
-    made = through_ffmpeg(kept, factor)[0]
-    for index, frame in enumerate(kept[: len(made) // factor]):
+    # It ends a few frames early: the last is given again.
+    made = through_ffmpeg([*kept, kept[-1], kept[-1]], factor)[0]
+    for index, frame in enumerate(kept):
         if psnr(made[index * factor], frame) < 40:
             sys.exit(f"minterpolate: its frame {index * factor} is not the frame {index} that it was given")
-    gaps = [made[i + 1 : i + factor] for i in range(0, len(made), factor)]
-    return [list(gap) for gap in gaps if len(gap) == factor - 1]
+    return [list(made[i * factor + 1 : (i + 1) * factor]) for i in range(len(kept) - 1)]
 
 
 WAYS = {"quick": by_flow("quick"), "good": by_flow("good"), "blend": blend, "repeat": repeat}
@@ -124,8 +123,8 @@ def psnr(picture, other) -> float:
     return float(10 * np.log10(255**2 / max(error, 1e-6)))
 
 
-def compare(name, truth, factor) -> list[dict]:
-    """A row for each way to rebuild the frames of `truth` between every factor-th; the same frames for all."""
+def compare(name, truth, factor) -> tuple[list[dict], dict]:
+    """A row for each way to rebuild the frames of `truth` between every factor-th; and what each way has rebuilt."""
     kept = truth[::factor]
     rows, rebuilt = [], {}
     for way, make in WAYS.items():
@@ -133,15 +132,14 @@ def compare(name, truth, factor) -> list[dict]:
         rebuilt[way] = make(kept, factor)
         seconds = (time.perf_counter() - start) / sum(map(len, rebuilt[way]))
         rows.append({"footage": name, "way": way, "factor": factor, "seconds": seconds})
-    gaps = min(map(len, rebuilt.values()))
-    places = [(gap, k) for gap in range(gaps) for k in range(1, factor)]
+    places = [(gap, k) for gap in range(len(kept) - 1) for k in range(1, factor)]
     for row in rows:
         pairs = [(rebuilt[row["way"]][gap][k - 1], truth[gap * factor + k]) for gap, k in places]
         noise, alike = [psnr(*pair) for pair in pairs], [similarity(*pair) for pair in pairs]
         row |= {"frames": len(pairs), "psnr": float(np.mean(noise)), "worst psnr": min(noise)}
         row |= {"ssim": float(np.mean(alike)), "worst ssim": min(alike)}
         print(line(row), flush=True)
-    return rows
+    return rows, rebuilt
 
 
 def line(row) -> str:
@@ -154,7 +152,7 @@ def films(args) -> list[dict]:
     for film in args.films:
         with open_source(film) as source:
             truth = [source.read(index)[..., :3] for index in range(min(args.frames, source.count))]
-        rows += compare(film.name, truth, 2)
+        rows += compare(film.name, truth, 2)[0]
     return rows
 
 
@@ -165,27 +163,27 @@ def footage(name) -> list[np.ndarray]:
         return [source.read(index)[..., :3] for index in range(source.count)]
 
 
-def scene(args) -> list[dict]:
-    truth = footage(args.scene)
-    gaps = args.start + np.arange(BOX + 1)
-    truth = truth[gaps[0] * FACTOR : gaps[-1] * FACTOR + 1]
-    rows = compare(args.scene, truth, FACTOR)
+def scenes(args) -> list[dict]:
+    return [row for name in args.scenes for row in scene(name, args)]
+
+
+def scene(name, args) -> list[dict]:
+    truth = footage(name)[args.start * FACTOR : (args.start + BOX) * FACTOR + 1]
+    rows, rebuilt = compare(name, truth, FACTOR)
     kept = truth[::FACTOR]
     exposed = [exposure(truth[:-1])]
     for way in ("30 fps", "quick", "good", "blend"):
         frames = kept[:-1]
         if way != "30 fps":
-            made = WAYS[way](kept, FACTOR)
-            frames = [frame for first, rest in zip(kept, made, strict=False) for frame in (first, *rest)]
+            frames = [frame for first, rest in zip(kept, rebuilt[way], strict=False) for frame in (first, *rest)]
         picture = exposure(frames)
-        row = {"footage": args.scene, "box": way, "frames": len(frames)}
+        row = {"footage": name, "box": way, "frames": len(frames)}
         rows.append(row | {"psnr": psnr(picture, exposed[0]), "ssim": similarity(picture, exposed[0])})
         print("| {footage}, box | {box} | {psnr:.2f} | | {ssim:.4f} | | |".format(**rows[-1]), flush=True)
         exposed.append(picture)
-    if args.picture:
-        save(
-            args.picture, [(exposed[1], f"{BOX} frames at 30 fps"), (exposed[2], f"{FACTOR}x in-betweens")], exposed[0]
-        )
+    if args.picture and name == args.scenes[0]:
+        few, many = f"{BOX} frames at 30 fps", f"30 fps, {FACTOR}x in-betweens"
+        save(args.picture, [(exposed[1], few), (exposed[2], many), (exposed[0], "240 fps")])
     return rows
 
 
@@ -242,7 +240,7 @@ def one_speed(way, film, gaps):
     return count / seconds, peak_memory(os.getpid())
 
 
-PARTS = {"films": films, "scene": scene, "speed": speed}
+PARTS = {"films": films, "scenes": scenes, "speed": speed}
 
 
 def parse(arguments=None):
@@ -254,13 +252,13 @@ def parse(arguments=None):
     add("--parts", type=listed(str), default=list(PARTS), help=",".join(PARTS))
     add("--films", type=listed(Path), default=FILMS, help="separated by commas; the first also for the speed")
     add("--frames", type=int, default=121, help="of each film, from the first on")
-    add("--scene", default="hands", help="whose footage, of gallery/ (%(default)s)")
+    add("--scenes", type=listed(str), default="rolling_shutter,pendulum", help="of gallery/ (%(default)s)")
     add("--start", type=int, default=1, help="first frame at 30 fps (%(default)s)")
     add("--rounds", type=int, default=3, help="of the speed")
     add("--gaps", type=int, default=3, help="pairs of frames of a round of the speed")
-    add("--picture", type=Path, help="where the box shutter's pictures are written, side by side")
+    add("--picture", type=Path, help="where the first scene's box shutters are written, side by side")
     add("--json", type=Path, help="where the rows are written")
-    add("--table", type=Path, help="where the films' and the scene's table is written, as Markdown")
+    add("--table", type=Path, help="where the films' and scenes' table is written, as Markdown")
     return parser.parse_args(arguments)
 
 

@@ -11,7 +11,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Operator
 
-from ..media import cache
+from ..media import MediaError, cache
 from ..media.inbetween import build, estimate
 from . import effects, inbetweens, sources, strips
 from .operators import _OfEffect, redraw, refused
@@ -27,7 +27,7 @@ class Look(NamedTuple):
 
     state: how far they are built
     size: bytes that the source's take, of all factors and methods
-    estimate: bytes that they will take about; None while that is being found out, or cannot be"""
+    estimate: bytes that they will take about; None while that is being found out, 0 if it cannot be"""
 
     state: cache.State
     size: int
@@ -50,8 +50,7 @@ def look(edit, effect, strip) -> Look:
     if not when or time.monotonic() - when > _FRESH:
         found = cache.state(medium, *settings), cache.size(settings[0], medium)
         _looks[key] = time.monotonic(), *found
-    failed = doubled.done() and doubled.exception()
-    return Look(*found, doubled.result() * (settings[1] - 1) if doubled.done() and not failed else None)
+    return Look(*found, doubled.result() * (settings[1] - 1) if doubled.done() else None)
 
 
 def _settings(effect) -> tuple:
@@ -72,8 +71,9 @@ def _known(source) -> tuple:
 
 
 def _estimated(medium) -> int:
-    with medium:
+    with medium, suppress(MediaError):  # a build says what is wrong
         return estimate(medium, 2)
+    return 0
 
 
 def _in_thread(function, *arguments) -> Future:

@@ -239,11 +239,11 @@ def _draw_look(layout, look) -> None:
         size = building.size_in_words(look.size)
         column.label(text=iface_("{size} on disk").format(size=size), icon="DISK_DRIVE", translate=False)
     if look.state.name != "ready":
-        if look.estimate is None:
+        if look.estimate:
+            size = building.size_in_words(look.estimate)
+            column.label(text=iface_("About {size} when built").format(size=size), icon="BLANK1", translate=False)
+        elif look.estimate is None:
             _redraw_later()
-            return
-        size = building.size_in_words(look.estimate)
-        column.label(text=iface_("About {size} when built").format(size=size), icon="BLANK1", translate=False)
 
 
 def _redraw_later() -> None:

@@ -7,7 +7,7 @@ methodology for optical flow"). Along what has arrived, both frames are looked u
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
@@ -39,40 +39,34 @@ def between(first, second, factor: int, method="quick", transfer="srgb", alpha="
             "in-between frames need the Python package opencv-contrib-python-headless; "
             "install the zip of Virtual Shutter that is made for your system"
         )
-    # DIS gives other vectors for another number of threads.
-    cv2.setNumThreads(1)
     ends = [_encoded(frame, transfer, alpha) for frame in (first, second)]
     luma = [_luma(end) for end in ends]
     paths = [_Paths(luma, flow) for flow in METHODS[method]]
-    frames = (_mixed(ends, [path.at(k / factor) for path in paths], k / factor) for k in range(1, factor))
-    return [_decoded(frame, first.dtype, transfer, alpha) for frame in frames]
+    with np.errstate(invalid="ignore"):  # infinite light stays so
+        frames = (_mixed(ends, [path.at(k / factor) for path in paths], k / factor) for k in range(1, factor))
+        return [_decoded(frame, first.dtype, transfer, alpha) for frame in frames]
 
 
-def _dis(first, second, finest: int) -> np.ndarray:
-    """Vectors (H, W, 2) from the first picture's pixels to the second's; finest: how often pictures are halved."""
+def _dis(first, second, finest: int, stride: int) -> np.ndarray:
+    """Vectors (H, W, 2) from the first picture's pixels to the second's.
+
+    finest: how often the pictures are halved at least; stride: from a patch to the next, in pixels of these"""
     # A new one each time: it keeps buffers, which threads must not share.
     dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     dis.setFinestScale(finest)
-    dis.setPatchStride(3 + (finest == 0))
+    dis.setPatchStride(stride)
     return dis.calc(first, second, None)
 
 
-def _quick(first, second):
-    return _dis(first, second, 1)
-
-
-def _fine(first, second):
-    return _dis(first, second, 0)
-
-
-def _deep(first, second):
+def _deep(first, second) -> np.ndarray:
+    """Likewise, at half size: at full size it takes four times as long and is no better."""
     half = [cv2.resize(luma, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for luma in (first, second)]
     vectors = cv2.optflow.createOptFlow_DeepFlow().calc(*half, None)
     return 2 * cv2.resize(vectors, first.shape[::-1], interpolation=cv2.INTER_LINEAR)
 
 
 # The flows of a method, from a picture (H, W) uint8 to another. What several say is weighed pixel by pixel.
-METHODS = {"quick": (_quick,), "good": (_fine, _deep)}
+METHODS = {"quick": (partial(_dis, finest=1, stride=3),), "good": (partial(_dis, finest=0, stride=4), _deep)}
 
 
 class _Paths:

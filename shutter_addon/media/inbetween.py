@@ -48,8 +48,8 @@ class Inbetween:
         """MediaError: the frame is not built."""
         if not self.has(index):
             raise MediaError(
-                f"{self.path.name}: in-between frames of frame {index // self.factor} are missing "
-                f"in {self._cache.folder}; build in-between frames first"
+                f"{self.path.name}: in-between frames of frame {index // self.factor} are missing; "
+                f"build them first (in {self._cache.folder})"
             )
 
     def read(self, index: int) -> np.ndarray:

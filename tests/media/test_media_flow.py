@@ -92,25 +92,30 @@ def test_alpha_and_transfer_stay_as_they_are(alpha, transfer):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_what_one_frame_alone_shows_comes_from_it(method):
-    """A square goes over ground that stands still: neither ghosts of it nor holes, at any of the times."""
-    ground, thing = noise(7), noise(8)[:40, :40] * 0.5 + 0.5
+def test_what_moves_over_ground_leaves_no_ghosts(method):
+    ground, thing = (np.kron(noise(seed, 96, 160), np.ones((2, 2, 1))) for seed in (7, 8))
 
     def at(x):
         rgb = ground.copy()
-        rgb[28:68, x : x + 40] = thing
+        rgb[48:144, x : x + 96] = thing[:96, :96] * 0.5 + 0.5
         return frame(rgb)
 
-    first, second = at(40), at(64)
-    mixed = codes((light.to_linear(first / 255) + light.to_linear(second / 255)) / 2)
+    first, second = at(80), at(96)
     made = flow.between(first, second, 4, method)
     for k, picture in enumerate(made, start=1):
-        assert off(picture, at(40 + 6 * k)) < 3
-    assert off(made[1], at(52)) < off(mixed, at(52)) / 3
+        assert off(picture, at(80 + 4 * k)) < 0.7
+    mixed = (light.to_linear(first / 255) + light.to_linear(second / 255)) / 2
+    mixed = np.rint(255 * light.to_encoded(mixed)).astype(np.uint8)
+    assert off(made[1], at(88)) < off(mixed, at(88)) / 3
 
 
-def codes(linear):
-    return np.rint(light.to_encoded(linear) * 255)
+@pytest.mark.parametrize("method", METHODS)
+def test_what_leaves_or_enters_the_picture_comes_from_the_frame_that_shows_it(method):
+    wide = np.kron(noise(1), np.ones((2, 2, 1)))
+    first, middle, second = (frame(wide[:, x : x + 256]) for x in (0, 8, 16))
+    (made,) = flow.between(first, second, 2, method)
+    for side in (np.s_[12:-12, :8], np.s_[12:-12, -8:]):
+        assert np.abs(made[side].astype(float) - middle[side]).mean() < 5  # 7 where both are mixed
 
 
 @pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan, 1e4])
