@@ -98,8 +98,9 @@ def _time(curves, path: str, effect, strip) -> list[recipe.TimeKey]:
         return curves.value(effect, path, "source_time", frame)
 
     def fits(first, second, frame, share):
-        expected = (1 - share) * at(first) + share * at(second)
-        return abs(expected - at(frame)) <= max(TOLERANCE, 1e-6 * abs(expected))  # of large numbers, float32's steps
+        ends = np.array([at(first), at(second)])
+        apart = abs((1 - share) * ends[0] + share * ends[1] - at(frame))
+        return bool(apart <= max(TOLERANCE, 2e-6 * np.abs(ends).max()))  # of large numbers: Blender counts in float32
 
     keys = [(strip.left_handle, "linear")]
     if curve is not None:
