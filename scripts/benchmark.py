@@ -125,7 +125,7 @@ class Case:
 
     def load(self, *windows) -> None:
         for window in windows or (self.window, self.frames):
-            window.load(self._wanted, self.instant.options)
+            window.load(self._wanted, self.instant.options, range(self.source.count))
 
     def compose(self, method: str) -> None:
         if method == "ours":

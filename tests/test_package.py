@@ -247,7 +247,7 @@ def test_installed_with_wheels(blender, bunny, recipe, tmp_path):
     blender.install(path)
     files = blender.files()
     blender.lock(0o555)
-    edit, wheels = tmp_path / "edit.blend", ["av", "moderngl", "glcontext", "tqdm"]
+    edit, wheels = tmp_path / "edit.blend", ["av", "moderngl", "glcontext", "tqdm", "cv2"]
     blender.run("-b", "--python-exit-code", 1, "--python", MAKE_EDIT, "--", bunny, recipe, edit, NAME, *wheels)
     blender.run("-b", edit, "-o", tmp_path / "real" / "####", "-s", 3, "-e", 5, "-a")
     checkout_renders(bunny, recipe, tmp_path / "ours", "3:5")

@@ -3,8 +3,9 @@
 // them. A quad is a matrix: a column each, of coefficients or of light. EACH calls a function for every quad: a compiler
 // that did not unroll a loop over them would keep their arrays in memory.
 // coefficients: four shutters per layer; table: row 0 the gains, then the knots or the bars, four shutters per texel.
-// The window's frame k is source frame `origin` + k · `direction`. frames: source frame i in layer i mod `layers`; or
-// with SUMS the running sums instead, from position `lowest` on, the clip's ends extended: position i's in that layer.
+// The window's frame k is frame `origin` + k · `direction` of the shot, which has `count`. frames: source frame i in layer
+// i mod `layers`; or with SUMS the running sums instead, from position `lowest` on, the shot's ends extended: position
+// i's in that layer.
 // GROUPS of four shutters, EDGES, DECODE, PREMULTIPLIED, ENCODED: see compute/gpu.py. Software renderers run both sides
 // of every branch: what is costly stands in loops or behind these definitions.
 #include "light.glsl"
@@ -84,7 +85,11 @@ vec4 frame_light(ivec2 pixel, int layer)
 // The layer of the window's frame, or of the nearest that is there.
 int layer_of(int frame)
 {
-  int layer = clamp(origin + direction * frame - lowest, 0, held - 1) + lowest_layer;
+  int index = origin + direction * frame;
+#if EDGES == 2  // what is held may reach beyond the shot's ends
+  index = clamp(index, 0, count - 1);
+#endif
+  int layer = clamp(index - lowest, 0, held - 1) + lowest_layer;
   return layer < layers ? layer : layer - layers;
 }
 #else
@@ -108,7 +113,7 @@ vec4 frame_light(ivec2 pixel, int slot)
   return color;
 }
 
-// The layer of the window's frame, or of the clip's end beyond which it lies.
+// The layer of the window's frame, or of the shot's end beyond which it lies.
 int layer_of(int frame)
 {
   int index = origin + direction * frame;

@@ -2,6 +2,7 @@
 
 from . import (
     bar_editor,
+    building,
     engine,
     handlers,
     icons,
@@ -21,6 +22,7 @@ _modules = (
     icons,
     preview,
     operators,
+    building,
     panels,
     bar_editor,
     region_gizmo,

@@ -57,9 +57,9 @@ def ease_at(curve, frame: float) -> str:
     return "linear"
 
 
-def set_keys(scene, path: str, index: int, keys) -> None:
+def set_keys(scene, path: str, index: int, keys, group: str = "") -> None:
     """Replaces a property's F-curve by keys (frame, value, ease of the span that follows)."""
-    points = new_curve(scene, path, index).keyframe_points
+    points = new_curve(scene, path, index, group).keyframe_points
     points.add(len(keys))
     points.foreach_set("co", [number for frame, value, _ in keys for number in (frame, value)])
     for point, (_, _, ease) in zip(points, keys, strict=True):
@@ -72,12 +72,12 @@ def set_keys(scene, path: str, index: int, keys) -> None:
         point.handle_right = point.co[0] + after, point.co[1]
 
 
-def new_curve(scene, path: str, index: int = 0):
-    """An empty F-curve for a property, in place of the one it may have."""
+def new_curve(scene, path: str, index: int = 0, group: str = ""):
+    """An empty F-curve for a property, in place of the one it may have, and in a group of that name."""
     bag = _channelbag(scene)
     if (old := bag.fcurves.find(path, index=index)) is not None:
         bag.fcurves.remove(old)
-    return bag.fcurves.new(path, index=index)
+    return bag.fcurves.new(path, index=index, group_name=group)
 
 
 def _channelbag(scene):

@@ -7,7 +7,8 @@ strokes and the source are compared with what they were, as no callback tells of
 import numpy as np
 
 from ..media import MediaError
-from . import animation, sources, strips
+from ..media import cache as files
+from . import animation, effects, inbetweens, sources, strips
 
 _signatures: dict = {}
 
@@ -18,6 +19,17 @@ _TIMING = (
     *("content_start", "content_end", "content_trim_start", "content_trim_end", "left_handle", "right_handle"),
     *("use_reverse_frames", "strobe"),
 )
+
+
+def built_key(effect) -> tuple:
+    """Which in-between frames an effect has; equal keys: the same, and none was built or removed meanwhile."""
+    if inbetweens.factor(effect) == 1:
+        return ()
+    try:
+        folder = inbetweens.folder(effect)
+    except effects.EffectError as error:
+        return (str(error),)
+    return effect.inbetween, effect.inbetween_method, str(folder), files.stamp(folder)
 
 
 def forget() -> None:
@@ -70,6 +82,7 @@ def _signature(edit, effect, strip):
     transform = strip.transform
     yield tuple(getattr(transform, name) for name in _PLACE), tuple(transform.origin)
     yield strip.use_flip_x, strip.use_flip_y  # scribbles lie mirrored with it
+    yield built_key(effect)
     if (source := strips.nearest_source(edit, effect, strip)) is not None:
         yield from _source(source)
 

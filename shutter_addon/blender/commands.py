@@ -1,12 +1,15 @@
 """The command: from a source and a recipe to a finished film, through Blender's sequencer.
 
-`python -m shutter_addon render …`, and `blender -c shutter render …` in an installed Blender.
+`python -m shutter_addon render …`, and `blender -c shutter render …` in an installed Blender. `inbetween` in place of
+`render` builds in-between frames alone.
 """
 
 import argparse
 import os
 import re
 import sys
+from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 
 import bpy
@@ -15,9 +18,11 @@ from ..compute.errors import NoDeviceError
 from ..compute.renderer import DEVICES
 from ..core import recipe
 from ..media import MediaError, open_source
-from . import edits, effects, outputs, pictures
+from . import edits, effects, inbetweens, outputs, pictures, sources, strips
 
 BAD_INPUT = 2
+FACTORS = (2, 4, 8, 16)
+METHODS = tuple(inbetweens.METHODS.values())
 FAULTS = (recipe.RecipeError, MediaError, outputs.OutputError, effects.EffectError, NoDeviceError)
 
 
@@ -26,13 +31,16 @@ def main(argv: list[str]) -> int:
     parser = _parser()
     try:
         arguments = parser.parse_args(argv)
-        _render(arguments)
+        (_render if arguments.command == "render" else _build_alone)(arguments)
     except SystemExit as stop:  # argparse: --help, or what it has said on stderr
         return stop.code
     except FAULTS as error:
         return _refuse(str(error))
     except OSError as error:
-        return _refuse(f"{error.filename or arguments.output}: {error.strerror or error}")
+        place = error.filename or getattr(arguments, "output", None) or arguments.cache
+        return _refuse(f"{place}: {error.strerror or error}")
+    except KeyboardInterrupt:  # while in-between frames are built; those that are finished stay
+        return outputs.INTERRUPTED
     return 0
 
 
@@ -43,9 +51,8 @@ def _refuse(sentence: str) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("shutter", description="Every pixel its own exposure.")
-    render = parser.add_subparsers(dest="command", required=True).add_parser(
-        "render", help="render a source through a recipe"
-    )
+    commands = parser.add_subparsers(dest="command", required=True)
+    render = commands.add_parser("render", help="render a source through a recipe")
     render.add_argument("source", type=Path, help="a movie, or the first file of an image sequence")
     render.add_argument("--recipe", type=Path, required=True, help="the effect, a JSON file")
     render.add_argument("--output", type=Path, help=f"a folder, or a movie ({', '.join(outputs.MOVIES)})")
@@ -56,30 +63,92 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--device", choices=DEVICES, default="auto", help="gpu: OpenGL 4.3; cpu: NumPy")
     render.add_argument("--weights", type=Path, metavar="DIR", help="also write the coefficients, as float EXR")
     render.add_argument("--save", type=Path, metavar="FILE.blend", help="keep the edit")
+    render.add_argument(
+        "--inbetween", type=int, choices=(1, *FACTORS), help="in-between frames, in place of the recipe's factor"
+    )
+    render.add_argument("--inbetween-method", choices=METHODS, help="in place of the recipe's")
+    render.add_argument(
+        "--cache",
+        type=Path,
+        metavar="DIR",
+        help=f'where in-between frames lie (default: "{inbetweens.FOLDER}" beside the output, or beside FILE.blend)',
+    )
+    build = commands.add_parser("inbetween", help="build a source's in-between frames")
+    build.add_argument("source", type=Path, help="a movie, or the first file of an image sequence")
+    build.add_argument("--factor", type=int, choices=FACTORS, required=True, help="how many times the source's rate")
+    build.add_argument("--method", choices=METHODS, default="quick", help="of optical flow")
+    build.add_argument("--frames", metavar="A:B", help="source frames A to B, and up to the one behind; 1 is the first")
+    build.add_argument("--cache", type=Path, metavar="DIR", required=True, help="where in-between frames shall lie")
     return parser
 
 
 def _render(arguments) -> None:
     if arguments.output is None and arguments.save is None:
         raise outputs.OutputError("nothing to do: give --output, --save or both")
-    source_recipe = recipe.load(arguments.recipe)
+    source_recipe = _recipe(arguments)
     path = Path(os.path.abspath(arguments.source))
     with open_source(path) as medium:
         output = Path(os.path.abspath(arguments.output)) if arguments.output else None
         if output:
             outputs.check(output, arguments.format, (medium.width, medium.height))
-        frames = _frames(arguments.frames, medium.count)
+        frames = _frames(arguments.frames, edits.length(medium, source_recipe))
         edit = edits.make_edit(path, medium, source_recipe)
     edit.frame_start, edit.frame_end = frames
     if output:
         outputs.set_output(edit, output, arguments.format or "png", alpha=medium.alpha != "opaque")
     if arguments.save:
         _save(edit, Path(os.path.abspath(arguments.save)))
+    pictures.device = arguments.device
+    if source_recipe.inbetween > 1:
+        inbetweens.given = _cache(arguments)
+        _build_lacking(edit)
     if output:
-        pictures.device, pictures.weights_folder = arguments.device, arguments.weights
+        pictures.weights_folder = arguments.weights
         if arguments.weights:
             arguments.weights.mkdir(parents=True, exist_ok=True)
         outputs.film(edit, output)
+
+
+def _recipe(arguments) -> recipe.Recipe:
+    """The recipe, with the in-between frames that were asked for."""
+    found = recipe.load(arguments.recipe)
+    if arguments.inbetween is not None:
+        found = recipe.with_inbetween(found, arguments.inbetween)
+    return replace(found, inbetween_method=arguments.inbetween_method or found.inbetween_method)
+
+
+def _cache(arguments) -> Path:
+    """The folder of in-between frames: where a saved edit will look for them, if it is to be saved."""
+    beside = Path(os.path.abspath(arguments.save or arguments.output)).parent
+    return Path(os.path.abspath(arguments.cache)) if arguments.cache else beside / inbetweens.FOLDER
+
+
+def _build_lacking(edit) -> None:
+    """Builds the in-between frames that the edit's frames need."""
+    strip = strips.effect_strips(edit)[0]
+    effect = strips.effect_of(edit, strip.scene)
+    pairs = pictures.pairs(edit, effect, strip, range(edit.frame_start, edit.frame_end + 1))
+    with sources.open_media(strips.source_of(edit, effect, strip)) as medium:
+        method = inbetweens.METHODS[effect.inbetween_method]
+        _build(medium, inbetweens.given, inbetweens.factor(effect), method, sorted(pairs))
+
+
+def _build_alone(arguments) -> None:
+    with open_source(Path(os.path.abspath(arguments.source))) as medium:
+        first, last = _frames(arguments.frames, medium.count)
+        pairs = range(first - 1, min(last, medium.count - 1))
+        _build(medium, Path(os.path.abspath(arguments.cache)), arguments.factor, arguments.method, pairs)
+
+
+def _build(medium, folder: Path, factor: int, method: str, pairs) -> None:
+    """Builds the in-betweens of these pairs of source frames, each given by its first, in ascending order."""
+    from ..media.inbetween import build
+
+    with outputs.progress(len(pairs), "pair") as moved:
+        # pairs that follow one another, whose difference from their place among all is the same
+        for _, chunk in groupby(enumerate(pairs), lambda item: item[1] - item[0]):
+            numbers = [pair for _, pair in chunk]
+            build(medium, folder, factor, method, (numbers[0], numbers[-1]), update=lambda *_: moved())
 
 
 def _frames(text: str | None, count: int) -> tuple[int, int]:

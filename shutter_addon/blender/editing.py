@@ -6,6 +6,7 @@ Shutters and regions are items of collections: where one goes or moves, its F-cu
 import numpy as np
 from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import presets, shutters
 from . import animation, copies, effects
@@ -179,29 +180,54 @@ def fit_bars(effect) -> None:
     """After a change of the window's length: all shutters, their keys as well, keep their shape and share of light."""
     for index, shutter in enumerate(effect.shutters):
         if len(shutter.bars) not in (0, effect.window):
-            _fit(effect, index, shutter)
+            _change_bars(effect, index, lambda old: shutters.resample(old, effect.window))
 
 
-def _fit(effect, index: int, shutter) -> None:
+def fit_factor(effect) -> None:
+    """After a change of the factor of in-between frames: the bars, keyed ones as well, stand for the same times.
+
+    EffectError: it would take too many bars; the factor is put back, and nothing has changed."""
+    factor, position = int(effect.inbetween), effect.position.lower()
+    if factor == effect.bars_per_frame:
+        return
+
+    def multiplied(old):
+        return shutters.multiplied(old, effect.bars_per_frame, factor, position)
+
+    try:
+        window = len(multiplied(np.ones(effect.window)))
+    except shutters.ShutterError:
+        effect.inbetween = str(effect.bars_per_frame)
+        count = effect.window * factor // effect.bars_per_frame
+        sentence = rpt_("{factor}× in-between frames take {count} bars; a shutter has {most} at most")
+        raise effects.EffectError(sentence.format(factor=factor, count=count, most=shutters.MAX_WINDOW)) from None
+    for index in range(len(effect.shutters)):
+        _change_bars(effect, index, multiplied)
+    effect.bars_per_frame, effect.window = factor, window
+
+
+def _change_bars(effect, index: int, change) -> None:
+    """Gives a shutter other bars, and as many, at all its keys: those that `change` makes of the old ones."""
+    shutter = effect.shutters[index]
     edit, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
     curves = animation.Curves(edit)
     old = bars(shutter)
     keyed = {k: curve for k in range(len(old)) if (curve := curves.find(f"{path}[{k}].weight"))}
-    keys = [_resampled_key(old, keyed, frame, effect.window) for frame in animation.key_frames(keyed.values())]
+    keys = [_changed_key(old, keyed, frame, change) for frame in animation.key_frames(keyed.values())]
     animation.remove_curves(edit, f"{path}[")
     shutter.bars.clear()
-    for k, weight in enumerate(shutters.resample(old, effect.window)):
+    for k, weight in enumerate(change(old)):
         shutter.bars.add().weight = weight
         if keys:
             animation.set_keys(edit, f"{path}[{k}].weight", 0, [(frame, bar[k], ease) for frame, bar, ease in keys])
 
 
-def _resampled_key(old, keyed, frame: float, window: int):
-    """Frame, bars of the new length, and ease of the key at a frame."""
+def _changed_key(old, keyed, frame: float, change):
+    """Frame, changed bars, and ease of the key at a frame."""
     values = old.copy()
     values[list(keyed)] = [max(curve.evaluate(frame), 0.0) for curve in keyed.values()]
     own = next(c for c in keyed.values() if any(key.co[0] == frame for key in c.keyframe_points))
-    return frame, shutters.resample(values, window), animation.ease_at(own, frame)
+    return frame, change(values), animation.ease_at(own, frame)
 
 
 def key_bars(effect, index: int) -> None:

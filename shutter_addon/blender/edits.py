@@ -1,5 +1,6 @@
 """Whole edits made from nothing: a source strip, its effect, and where the film goes."""
 
+import math
 import os
 from pathlib import Path
 
@@ -25,9 +26,15 @@ def make_edit(path: Path, medium, source_recipe):
     source = _add_source(edit.sequence_editor_create(), path, medium)
     strip, effect = strips.add_effect(edit, source)
     effects.apply(edit, effect, strip, source_recipe)
+    strip.right_handle = length(medium, source_recipe) + 1
     edit.frame_start, edit.frame_end = strip.left_handle, strip.right_handle - 1
     edit.frame_current = edit.frame_start
     return edit
+
+
+def length(medium, source_recipe) -> int:
+    """How many timeline frames the edit has: the source's, and more where its time is keyed beyond them."""
+    return max([medium.count, *(math.ceil(key.frame) for key in source_recipe.time)])
 
 
 def _add_source(editor, path: Path, medium):

@@ -29,6 +29,14 @@ def instant(edit, effect, strip, frame: float) -> recipe.Instant:
     return recipe.Instant(chosen, np.stack(bars), tuple(_shapes_at(edit, effect, strip, curves, frame)))
 
 
+def source_time(edit, effect, frame: float) -> tuple[float, bool]:
+    """The source frame that an effect's source time tells for a timeline frame, 1 is the first; and whether it runs
+    backward from there."""
+    curves, path = animation.Curves(edit), effect.path_from_id()
+    time, later = (curves.value(effect, path, "source_time", frame + apart) for apart in (0, 0.5))
+    return time, later < time
+
+
 def checked(name: str, bars: np.ndarray, frame: float) -> np.ndarray:
     """The bars of a shutter at a frame. EffectError: no picture can be made of them."""
     try:
@@ -51,7 +59,9 @@ def options(effect, curves=None, frame: float = 0.0) -> recipe.Options:
         return value >= 0.5 if prop.type == "BOOLEAN" else prop.enum_items[round(value)].identifier
 
     words = {name: at(name).lower() for name in OPTIONS}
-    return recipe.Options(effect.window, **words, aggregate=int(at("aggregate")), border=at("border"))
+    return recipe.Options(
+        effect.window, **words, aggregate=int(at("aggregate")), border=at("border"), stop_at_cuts=at("stop_at_cuts")
+    )
 
 
 def bars_at(curves, path: str, shutter, chosen: recipe.Options, frame: float) -> np.ndarray:
@@ -147,11 +157,20 @@ def apply(edit, effect, strip, source: recipe.Recipe) -> None:
     """Replaces the effect's data and keys by a recipe, whose frame 1 is the strip's first."""
     clear(edit, effect)
     first = strip.left_handle - 1
+    # Bars per frame before the factor, which else would change the window.
+    effect.bars_per_frame, effect.inbetween = source.inbetween, str(source.inbetween)
+    effect.inbetween_method = source.inbetween_method.upper()
     effect.window = source.window
     for name in OPTIONS:
         setattr(effect, name, getattr(source, name).upper())
     effect.aggregate, effect.border = str(source.aggregate), source.border
+    effect.stop_at_cuts = source.stop_at_cuts
     path = effect.path_from_id()
+    effect.use_source_time = bool(source.time)
+    if source.time:
+        keys = [(key.frame + first, key.value, key.ease) for key in source.time]
+        effect.source_time = source.time[0].value
+        animation.set_keys(edit, f"{path}.source_time", 0, keys, group=effect.name)
     for i, shutter in enumerate(source.shutters):
         _add_shutter(edit, effect, f"{path}.shutters[{i}]", shutter, first)
     for i, region in enumerate(source.regions):

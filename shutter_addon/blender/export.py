@@ -16,7 +16,7 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import keyframes, recipe
-from . import animation, effects, geometry
+from . import animation, effects, geometry, inbetweens
 
 # Of the largest bar, of fractions of the picture, of degrees; of the larger key's value where that is above 1.
 TOLERANCE = 1e-4
@@ -42,7 +42,15 @@ def recipe_of(edit, effect, strip) -> recipe.Recipe:
         for i, region in enumerate(effect.regions)
         if region.shutter in names
     ]
-    found = recipe.Recipe(1, shutters=shutters, regions=[region for region in regions if region], **asdict(chosen))
+    found = recipe.Recipe(
+        1,
+        shutters=shutters,
+        regions=[region for region in regions if region],
+        inbetween=inbetweens.factor(effect),
+        inbetween_method=effect.inbetween_method.lower(),
+        time=_time(curves, path, effect, strip) if effect.use_source_time else [],
+        **asdict(chosen),
+    )
     return recipe.parse(recipe.dump(found))
 
 
@@ -81,6 +89,24 @@ def _shutter(curves, path: str, chosen, source, name: str, strip) -> recipe.Shut
         color,
         keys=[recipe.ShutterKey(_frame(frame, strip), [_short(v) for v in bars(frame)], ease) for frame, ease in keys],
     )
+
+
+def _time(curves, path: str, effect, strip) -> list[recipe.TimeKey]:
+    curve = curves.find(f"{path}.source_time")
+
+    def at(frame):
+        return curves.value(effect, path, "source_time", frame)
+
+    def fits(first, second, frame, share):
+        ends = np.array([at(first), at(second)])
+        apart = abs((1 - share) * ends[0] + share * ends[1] - at(frame))
+        return bool(apart <= max(TOLERANCE, 2e-6 * np.abs(ends).max()))  # of large numbers: Blender counts in float32
+
+    keys = [(strip.left_handle, "linear")]
+    if curve is not None:
+        frames = animation.key_frames([curve])
+        keys = _keys(fits, lambda frame, held: fits(held, held, frame, 0), [curve], frames, {}, strip)
+    return [recipe.TimeKey(_frame(frame, strip), _short(at(frame)), ease) for frame, ease in keys]
 
 
 def _region(curves, path: str, source, effect, strip) -> recipe.Region | None:

@@ -3,11 +3,12 @@
 import bpy
 from bpy.app.handlers import persistent
 
-from . import cache, copies, lifecycle, pictures, strips
+from . import building, cache, copies, lifecycle, pictures, strips
 
 
 @persistent
 def _before_load(*_):
+    building.stop()
     pictures.forget()
     cache.forget()
 

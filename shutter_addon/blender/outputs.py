@@ -105,7 +105,7 @@ def message(error: RuntimeError) -> str:
 @contextmanager
 def _frames_moved(part: Path, folder: Path, count: int):
     """Moves each finished picture from `part` to `folder`, and a progress bar on."""
-    with _progress(count) as update:
+    with progress(count, "frame") as update:
 
         def moved(*_):
             update()
@@ -124,14 +124,14 @@ def _frames_moved(part: Path, folder: Path, count: int):
 
 
 @contextmanager
-def _progress(count: int):
-    """A progress bar on a terminal; gives what moves it on by a frame."""
+def progress(count: int, unit: str):
+    """A progress bar on a terminal; gives what moves it on by one."""
     try:
         from tqdm import tqdm
     except ImportError:  # a Blender that the extension was copied into without its wheels
         yield lambda: None
         return
-    with tqdm(total=count, unit="frame", disable=None) as bar:
+    with tqdm(total=count, unit=unit, disable=None) as bar:
         yield bar.update
 
 

@@ -2,9 +2,11 @@
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
 from bpy.types import Menu, Panel, UIList
 
-from . import editing, strips
+from . import building, editing, inbetweens, strips
+from .pictures import FAULTS
 
 # Beyond this a column of numbers helps nobody: the bar editor and the Graph Editor do.
 _MOST_NUMBERS = 64
@@ -179,8 +181,78 @@ class _Options(_WithEffect):
         layout = self.layout
         effect = strips.active(context)[1]
         layout.use_property_split = True
-        for name in ("position", "interpolation", "light", "exposure", "edges", "aggregate", "border"):
+        for name in ("position", "interpolation", "light", "exposure", "edges", "stop_at_cuts", "aggregate", "border"):
             layout.prop(effect, name)
+        layout.prop(effect, "use_source_time")
+        column = layout.column()
+        column.active = effect.use_source_time
+        column.prop(effect, "source_time")
+        if effect.use_source_time and effect.inbetween == "1":
+            column.label(text="No in-between frames: the nearest source frame is shown", icon="INFO")
+
+
+class _Inbetween(_WithEffect):
+    bl_label = "In-Between Frames"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        edit, effect, strip = strips.active(context)
+        build = building.running()
+        is_built = build is not None and build.scene == effect.scene.session_uid
+        column = layout.column()
+        column.use_property_split = True
+        column.enabled = not is_built
+        column.prop(effect, "inbetween", text="Factor")
+        column = column.column()
+        column.active = inbetweens.factor(effect) > 1
+        column.prop(effect, "inbetween_method")
+        column.prop(effect, "inbetween_place")
+        if is_built:
+            progress = iface_("{done} of {total}").format(done=build.done, total=build.total)
+            layout.progress(factor=build.done / max(build.total, 1), text=progress, translate=False)
+        elif inbetweens.factor(effect) > 1:
+            try:
+                _draw_look(layout, building.look(edit, effect, strip))
+            except FAULTS as error:
+                layout.label(text=str(error), icon="ERROR", translate=False)
+        row = layout.row(align=True)
+        row.operator("shutter.inbetween_build", text="Build")
+        row.operator("shutter.inbetween_purge", text="Remove")
+
+
+# How a state of in-between frames is called, and its icon.
+_STATES = {
+    "missing": (n_("Missing"), "ERROR"),
+    "partial": (n_("Partial: {done} of {total}"), "ERROR"),
+    "stale": (n_("Stale: the source has changed"), "ERROR"),
+    "ready": (n_("Ready"), "CHECKMARK"),
+}
+
+
+def _draw_look(layout, look) -> None:
+    words, icon = _STATES[look.state.name]
+    words = iface_(words).format(done=look.state.done, total=look.state.total)
+    column = layout.column(align=True)
+    column.label(text=words, icon=icon, translate=False)
+    if look.size:
+        size = building.size_in_words(look.size)
+        column.label(text=iface_("{size} on disk").format(size=size), icon="DISK_DRIVE", translate=False)
+    if look.state.name != "ready":
+        if look.estimate:
+            size = building.size_in_words(look.estimate)
+            column.label(text=iface_("About {size} when built").format(size=size), icon="BLANK1", translate=False)
+        elif look.estimate is None:
+            _redraw_later()
+
+
+def _redraw_later() -> None:
+    if not bpy.app.timers.is_registered(_redraw):
+        bpy.app.timers.register(_redraw, first_interval=building.TICK)
+
+
+def _redraw() -> None:
+    building.redraw_panels(bpy.context)
 
 
 class _InProperties:
@@ -220,6 +292,10 @@ class STRIP_PT_shutter_options(_Options, _InProperties, Panel):
     bl_parent_id = "STRIP_PT_shutter"
 
 
+class STRIP_PT_shutter_inbetween(_Inbetween, _InProperties, Panel):
+    bl_parent_id = "STRIP_PT_shutter"
+
+
 class SEQUENCER_PT_shutter(_Shutters, _InSidebar, Panel):
     pass
 
@@ -233,6 +309,10 @@ class SEQUENCER_PT_shutter_bars(_Bars, _InSidebar, Panel):
 
 
 class SEQUENCER_PT_shutter_options(_Options, _InSidebar, Panel):
+    bl_parent_id = "SEQUENCER_PT_shutter"
+
+
+class SEQUENCER_PT_shutter_inbetween(_Inbetween, _InSidebar, Panel):
     bl_parent_id = "SEQUENCER_PT_shutter"
 
 
@@ -263,10 +343,12 @@ classes = (
     STRIP_PT_shutter_regions,
     STRIP_PT_shutter_bars,
     STRIP_PT_shutter_options,
+    STRIP_PT_shutter_inbetween,
     SEQUENCER_PT_shutter,
     SEQUENCER_PT_shutter_regions,
     SEQUENCER_PT_shutter_bars,
     SEQUENCER_PT_shutter_options,
+    SEQUENCER_PT_shutter_inbetween,
 )
 
 
@@ -280,5 +362,7 @@ def register():
 def unregister():
     for menu, entry in MENUS.items():
         getattr(bpy.types, menu).remove(entry)
+    if bpy.app.timers.is_registered(_redraw):
+        bpy.app.timers.unregister(_redraw)
     for cls in reversed(classes):
         bpy.utils.unregister_class(cls)

@@ -4,7 +4,7 @@ import threading
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 
 import bpy
@@ -17,8 +17,9 @@ from ..compute.renderer import Renderer, open_compositor
 from ..core.instant import Instant
 from ..media import MediaError
 from ..media.ahead import Ahead
+from ..media.cuts import Shots
 from ..media.exr import write_exr
-from . import effects, sources, strips, timing
+from . import cache, effects, inbetweens, sources, strips, timing
 from .device import BlenderDevice, opens_in_background
 
 FAULTS = (effects.EffectError, MediaError, NoDeviceError, MemoryError)
@@ -35,7 +36,9 @@ _AHEAD, _DECODED, _DECODED_BYTES = 4, 8, 256 << 20
 
 @dataclass(frozen=True)
 class Moment:
-    """All that a picture depends on; index, direction: as Renderer.picture has them."""
+    """All that a picture depends on; index, direction: as Renderer.picture has them.
+
+    Where there are in-between frames the index counts them as well."""
 
     renderer: Renderer
     index: int
@@ -54,11 +57,17 @@ class Moment:
         self.prefetch()  # and lets go of what is on the device by now
         return result
 
+    def check(self) -> None:
+        """MediaError: an in-between frame that the picture needs is missing. No frame is read."""
+        if self.renderer.source.step > 1:
+            for index in sorted(self.renderer.needed(self.index, self.direction, self.instant)):
+                self.renderer.source.check(index)
+
     def prefetch(self) -> None:
         """Has the frames decoded that the picture lacks, then those of the next pictures."""
         wanted, source = {}, self.renderer.source
         for step in range(_AHEAD + 1):
-            index = min(max(self.index + step * self.direction, 0), source.count - 1)
+            index = min(max(self.index + step * self.direction * source.step, 0), source.count - 1)
             wanted |= dict.fromkeys(sorted(self.renderer.missing(index, self.direction, self.instant)))
         room = _DECODED_BYTES // (source.width * source.height * 4 * np.dtype(source.dtype).itemsize)
         source.want(list(wanted)[: max(_DECODED, room)])
@@ -102,19 +111,19 @@ class Studio:
         """Begins a picture that is likely to be asked for next, while Blender does other work."""
         self._begun[scene.session_uid] = moment.key, self._executor.submit(moment.picture)
 
-    def renderer(self, scene, source_strip, say) -> Renderer:
-        """The renderer of an effect scene; say: called with a sentence when the device is a lesser one. One of FAULTS:
+    def renderer(self, effect, source_strip, say) -> Renderer:
+        """The renderer of an effect; say: called with a sentence when the device is a lesser one. One of FAULTS:
         no device, no source."""
         if self._compositor is None:
             self._compositor, message = self.run(self._open)
             if message:
                 say(message)
-        place, key = scene.session_uid, sources.media_key(source_strip)
+        place, key = effect.scene.session_uid, (sources.media_key(source_strip), cache.built_key(effect))
         old_key, renderer = self._renderers.pop(place, (None, None))
         if old_key != key:
             if renderer is not None:
                 self.run(renderer.close)
-            renderer = Renderer(self._compositor, Ahead(sources.open_media(source_strip)))
+            renderer = Renderer(self._compositor, _open(effect, source_strip))
         self._renderers[place] = key, renderer
         while len(self._renderers) > _KEPT:
             self.run(self._renderers.pop(next(iter(self._renderers)))[1].close)
@@ -158,7 +167,7 @@ def _borrows() -> bool:
     return bpy.app.background and on_main and device != "cpu" and _lacks_moderngl() and opens_in_background()
 
 
-@cache
+@lru_cache
 def _lacks_moderngl() -> bool:
     """Whether moderngl is missing, as in a package without wheels, or made for another Python."""
     try:
@@ -199,10 +208,36 @@ def begin_next(scene, scene_frame: float) -> None:
 def moment(edit, effect, strip, frame: float, say=print) -> Moment:
     """What an effect strip shows at a timeline frame. One of FAULTS: it cannot be shown."""
     source = strips.source_of(edit, effect, strip)
-    renderer = _studio().renderer(effect.scene, source, say)
-    index = timing.source_frame(source, frame, renderer.source, edit.render.fps / edit.render.fps_base)
+    renderer = _studio().renderer(effect, source, say)
     instant = effects.instant(edit, effect, strip, frame)
-    return Moment(renderer, index, instant, -1 if source.use_reverse_frames else 1)
+    if effect.use_source_time:
+        time, backward = effects.source_time(edit, effect, frame)
+        index = timing.nearest(time - 1, renderer.source)
+    else:
+        index = timing.source_frame(source, frame, renderer.source, edit.render.fps / edit.render.fps_base)
+        backward = source.use_reverse_frames
+    return Moment(renderer, index, instant, -1 if backward else 1)
+
+
+def pairs(edit, effect, strip, frames) -> set[int]:
+    """The pairs of neighbouring source frames whose in-betweens are needed to show an effect strip at these timeline
+    frames, each by its first. It reads what it must to find cuts. One of FAULTS: they cannot be shown."""
+    factor, found = inbetweens.factor(effect), set()
+    for frame in frames:
+        shown = moment(edit, effect, strip, frame)
+        needed = shown.renderer.needed(shown.index, shown.direction, shown.instant, known=False)
+        found |= {index // factor for index in needed if index % factor}
+    return found
+
+
+def _open(effect, source_strip) -> Shots:
+    """An effect's source, in-between frames included. EffectError, MediaError: there is none."""
+    medium = sources.open_media(source_strip)
+    try:
+        return Shots(Ahead(inbetweens.source(medium, effect)), inbetweens.factor(effect))
+    except FAULTS:
+        medium.close()
+        raise
 
 
 def _studio() -> Studio:

@@ -12,6 +12,7 @@ from gpu_extras.batch import batch_for_shader
 
 from ..compute.passes import body
 from ..core.recipe import Instant
+from ..media import MediaError
 from . import cache, drawing, editing, effects, geometry, pictures, strips
 from .device import Texture
 from .translations import CONTEXT
@@ -140,7 +141,7 @@ def _draw() -> None:
         try:
             _show(context, found, settings, say)
         except pictures.FAULTS as error:
-            say(rpt_("Shutter: {fault}").format(fault=error))
+            say(_fault(error))
         say.draw()
 
 
@@ -156,6 +157,8 @@ def _show(context, found: Shown, settings, say) -> None:
         _warn(found, say)
     if left > 0:
         _show_source(quad, found, moment, left)
+    if has_result and not draws_result:
+        _tell_missing(moment, say)
     if draws_result:
         moment.prefetch()
         texture = moment.renderer.draw(moment.index, moment.instant, moment.direction, quick=True)
@@ -174,6 +177,18 @@ def _warn(found: Shown, say) -> None:
         say(rpt_("The strips above are hidden in this view"))
     if found.edit.view_settings.view_transform != "Standard":
         say(rpt_("This view has the view transform Standard"))
+
+
+def _tell_missing(moment, say) -> None:
+    """Says in the preview what the engine can only report."""
+    try:
+        moment.check()
+    except MediaError as error:
+        say(_fault(error))
+
+
+def _fault(error: Exception) -> str:
+    return rpt_("Shutter: {fault}").format(fault=error)
 
 
 def _show_strokes(context, quad, effect, moment) -> None:

@@ -4,6 +4,8 @@
 are the effect's strips. Frames are timeline frames of the edit, as everywhere in Blender.
 """
 
+import sys
+
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -18,7 +20,7 @@ from bpy.props import (
 from bpy.types import PropertyGroup
 
 from ..core.shutters import MAX_WINDOW
-from . import cache, editing
+from . import cache, editing, effects
 from .translations import CONTEXT
 
 # Enum identifiers are the recipe's words in capitals.
@@ -49,6 +51,21 @@ AGGREGATES = (
     ("2", "2×2", "Blocks of 2×2 pixels share a shutter"),
     ("4", "4×4", "Blocks of 4×4 pixels share a shutter"),
 )
+INBETWEENS = (
+    ("1", "Off", "The source's own frames alone"),
+    ("2", "2×", "One frame between two of the source"),
+    ("4", "4×", "Three frames between two of the source"),
+    ("8", "8×", "Seven frames between two of the source"),
+    ("16", "16×", "Fifteen frames between two of the source"),
+)
+METHODS = (
+    ("QUICK", "Quick", "Optical flow by DIS"),
+    ("GOOD", "Good", "Optical flow that takes longer, and is better"),
+)
+PLACES = (
+    ("FILE", "Beside the File", "A folder beside the .blend file"),
+    ("USER", "Extension", "The extension's own folder"),
+)
 KINDS = (
     ("LINE", "Line", "The strokes themselves, as wide as the region's width"),
     ("LASSO", "Lasso", "All that the strokes enclose"),
@@ -73,6 +90,19 @@ def _recolored(shutter, _context):
 
 def _lengthened(effect, context):
     editing.fit_bars(effect)
+    _changed(effect, context)
+
+
+def _multiplied(effect, context):
+    try:
+        editing.fit_factor(effect)
+    except effects.EffectError as error:  # from here it would only be printed
+        sentence = str(error)
+        if bpy.app.background:
+            print(sentence, file=sys.stderr)
+        else:
+            show = context.window_manager.popup_menu
+            show(lambda menu, _context: menu.layout.label(text=sentence, translate=False), icon="ERROR")
     _changed(effect, context)
 
 
@@ -178,7 +208,7 @@ class ShutterEffect(PropertyGroup):
     )
     edges: EnumProperty(
         name="Clip Ends",
-        description="What a window gets that reaches beyond the clip's ends",
+        description="What a window gets that reaches beyond the ends of the clip, or of the shot",
         items=EDGES,
         update=_changed,
         translation_context=CONTEXT,
@@ -189,9 +219,48 @@ class ShutterEffect(PropertyGroup):
         items=AGGREGATES,
         update=_changed,
     )
+    stop_at_cuts: BoolProperty(
+        name="Stop at Cuts",
+        description="Windows end at the source's cuts as they do at the clip's ends",
+        default=True,
+        update=_changed,
+    )
     border: BoolProperty(
         name="Border",
         description="Make the picture's edge a scribble of the default shutter",
+        update=_changed,
+    )
+    bars_per_frame: IntProperty(
+        name="Bars per Frame",
+        description="How many bars of the window stand for a source frame",
+        default=1,
+        options={"HIDDEN"},
+    )
+    inbetween: EnumProperty(
+        name="In-Between Frames",
+        description="Frames between those of the source, by optical flow: bars count them all, "
+        "and a still frame becomes as many equal bars",
+        items=INBETWEENS,
+        update=_multiplied,
+        options=_UNKEYED,
+    )
+    inbetween_method: EnumProperty(
+        name="Method", description="How in-between frames are made", items=METHODS, update=_changed, options=_UNKEYED
+    )
+    inbetween_place: EnumProperty(
+        name="Place", description="Where in-between frames lie", items=PLACES, update=_changed, options=_UNKEYED
+    )
+    use_source_time: BoolProperty(
+        name="Use Source Time",
+        description="Show the source at the time that is set here, in place of the strip's own timing",
+        update=_changed,
+        options=_UNKEYED,
+    )
+    source_time: FloatProperty(
+        name="Source Time",
+        description="Source frame that is shown, 1 is the source's first; keyed, it is a speed ramp",
+        default=1.0,
+        soft_min=1.0,
         update=_changed,
     )
     shutters: CollectionProperty(type=Shutter)

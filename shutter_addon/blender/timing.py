@@ -22,26 +22,35 @@ class RetimingKey:
 
 
 def source_frame(strip, frame: float, medium, scene_fps: float) -> int:
-    """Source frame that a source strip shows at a timeline frame; medium: its opened medium.
+    """Frame of the medium that a source strip shows at a timeline frame; medium: its opened medium, as Shots has it.
 
-    Trims, cuts, playback rate, retiming keys, reversed frames and strobe as Blender's sequencer applies them.
+    Trims, cuts, playback rate, retiming keys, reversed frames and strobe as Blender's sequencer applies them. Where
+    there are frames between filmed ones, it is the nearest of all, which Blender knows nothing of.
     """
-    length = max(1, medium.count - strip.content_trim_start - strip.content_trim_end)
+    length = max(1, medium.filmed - strip.content_trim_start - strip.content_trim_end)
     keys = _retiming_keys(strip)
-    rate = _playback_rate(strip, keys, length, float(medium.fps or 0) / scene_fps)
+    rate = _playback_rate(strip, keys, length, float(medium.fps or 0) / medium.step / scene_fps)
 
     def position(time):
         return _position(strip, keys, rate, length, time)
 
+    first = strip.content_trim_start + (sources.first_frame(strip) if strip.type == "MOVIECLIP" else 0)
+    if medium.step > 1:
+        return nearest(first + float(position(frame)), medium)
     if strip.type == "MOVIECLIP":  # Blender takes the whole part
-        return int(position(frame)) + strip.content_trim_start + sources.first_frame(strip)
+        return first + int(position(frame))
     # Blender decodes the nearest frame, but keeps it for every position with the same whole part: of a slow strip that
     # plays forward, the first of those positions decides.
     whole = int(position(frame))
     while frame - 1 >= strip.left_handle and int(position(frame - 1)) == whole:
         frame -= 1
     index = math.floor(position(frame) + np.float32(0.5))
-    return min(index, length - 1) + strip.content_trim_start
+    return first + min(index, length - 1)
+
+
+def nearest(filmed: float, medium) -> int:
+    """The frame of the medium that is nearest to a time, which counts filmed frames from 0 on."""
+    return min(max(math.floor(filmed * medium.step + 0.5), 0), medium.count - 1)
 
 
 def _position(strip, keys, rate: float, length: int, frame: float) -> np.float32:

@@ -65,6 +65,7 @@ class Frames:
 
     def __init__(self, source, capacity: int):
         self.source, self.capacity = source, capacity
+        self.shot = range(source.count)
         self.tiles = _tiles(source)
         self.frames: dict[int, np.ndarray] = {}
         self._at: dict[int, int] = {}  # position: source frame
@@ -74,9 +75,10 @@ class Frames:
     def held(self):
         return self.frames.keys()
 
-    def load(self, positions: np.ndarray, options: Options) -> None:
+    def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
         """As Running.load."""
-        frames = compositor.source_frames(options, positions, self.source.count).tolist()
+        self.shot = shot
+        frames = compositor.source_frames(options, positions, shot).tolist()
         self._at, wanted = dict(zip(positions.tolist(), frames, strict=True)), set(frames)
         for index in self.frames.keys() - wanted:
             del self.frames[index]
@@ -196,7 +198,7 @@ class CPUCompositor:
         # Backwards in time is forwards with the shutters reversed.
         bars = instant.bars[:, ::direction]
         origin = int(compositor.window_positions(options, index, direction).min())
-        present = compositor.source_frames(options, origin + np.arange(options.window), source.count) >= 0
+        present = compositor.source_frames(options, origin + np.arange(options.window), window.shot) >= 0
         expose = _way(window, options, bars, origin, present)
         for tile in window.tiles:
             c = tile.coefficients(handle, block)

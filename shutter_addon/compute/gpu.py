@@ -107,19 +107,21 @@ def _from_sums(window: Sums, instant: Instant, values: np.ndarray, origin: int, 
 def _from_frames(way: str, window, instant: Instant, rows: int, origin: int, direction: int, shortened: bool):
     """As _from_sums: the pass that goes through the frames."""
     options, source, summed = instant.options, window.source, isinstance(window, Sums)
-    given = {"images": {}, "textures": {}, "rows": rows, "origin": origin, "direction": direction}
+    given = {"images": {}, "textures": {}, "rows": rows, "direction": direction}
     given["first"], given["last"] = shutters.open_span(instant.bars)
     if summed:
         lowest, decode, edges = window.start, 0, 2 if shortened else 0
         given |= _extent(window)
     else:
-        indices = compositor.source_frames(options, origin + direction * np.arange(options.window), source.count)
+        indices = compositor.source_frames(options, origin + direction * np.arange(options.window), window.shot)
         lowest, decode, edges = (
             int(indices[indices >= 0].min()),
             decoding(window.transfer, options),
             _EDGES[options.edges],
         )
-    given |= {"count": source.count, "layers": window.layers, "lowest": lowest, "lowest_layer": lowest % window.layers}
+    given |= {"layers": window.layers, "lowest_layer": lowest % window.layers}
+    # Shaders count from the shot's first frame.
+    given |= {"count": len(window.shot), "origin": origin - window.shot.start, "lowest": lowest - window.shot.start}
     groups, premultiplied = -(-len(instant.bars) // 4), source.alpha == "premultiplied"
     return composition(way, groups, summed, decode, edges, premultiplied, options.light == "encoded"), given
 
@@ -171,7 +173,7 @@ class GPUCompositor:
         first, last = shutters.open_span(instant.bars)
         origin = index - direction * options.before
         reach = sorted((origin + direction * first, origin + direction * (last - 1)))
-        shortened = options.edges == "shorten" and (reach[0] < 0 or reach[1] >= window.source.count)
+        shortened = options.edges == "shorten" and (reach[0] < window.shot.start or reach[1] >= window.shot.stop)
         way = way_of(window, options, len(values) - 1, last - first, shortened)
         if way == "sums":
             program, given = _from_sums(window, instant, values, origin, direction)

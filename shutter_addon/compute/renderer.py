@@ -31,10 +31,14 @@ def open_compositor(device: str = "auto"):
 
 
 class Renderer:
-    """Pictures of one source; keeps the window's frames and the last coefficients."""
+    """Pictures of one source; keeps the window's frames and the last coefficients.
+
+    Windows end at cuts (Options.stop_at_cuts) of a source that knows its shots: a media.cuts.Shots.
+    """
 
     def __init__(self, compositor, source):
         self.compositor, self.source = compositor, source
+        self._knows_shots = hasattr(source, "around")
         self._solver = compositor.solver()
         self._window = None
         self._labelled = self._solved = self._drawn = None
@@ -94,23 +98,53 @@ class Renderer:
             self._labelled = key, scribbles.rasterise(instant.shapes, *key[0], border=key[1])
         return self._labelled[1]
 
-    def positions(self, index: int, direction: int, instant: Instant) -> np.ndarray:
+    def shot(self, index: int, direction: int, instant: Instant, *, known: bool = False) -> range:
+        """The source frames that the window may show: those of the shot around `index`, as far as the window tells.
+
+        It reads what it must to find cuts; known: nothing, and where it does not know there is no cut."""
+        if not self._stops(instant):
+            return range(self.source.count)
+        low, high = self._reach(index, direction, instant)
+        shot = self.source.around(index, low, high, known=known)
+        last = shot.stop - 1
+        if instant.options.edges == "mirror" and (last < high) != (shot.start > low):
+            # What is mirrored at one end may reach beyond the other.
+            low, high = (min(low, 2 * last - high), high) if last < high else (low, max(high, 2 * shot.start - low))
+            shot = self.source.around(index, low, high, known=known)
+        return shot
+
+    def positions(self, index: int, direction: int, instant: Instant, shot: range) -> np.ndarray:
         """Where the frames lie that some shutter exposes, on the picture or not (core.compositor.window_positions);
         all of the window's that are there, where a shutter may lose all of its own."""
         positions = compositor.window_positions(instant.options, index, direction)
-        frames = compositor.source_frames(instant.options, positions, self.source.count)
+        frames = compositor.source_frames(instant.options, positions, shot)
         low, high = shutters.open_span(instant.bars)
         return positions[low:high] if (frames[low:high] >= 0).all() else positions[frames >= 0]
 
-    def needed(self, index: int, direction: int, instant: Instant) -> set[int]:
-        """The source frames at those positions."""
-        positions = self.positions(index, direction, instant)
-        return set(compositor.source_frames(instant.options, positions, self.source.count).tolist())
+    def needed(self, index: int, direction: int, instant: Instant, *, known: bool = True) -> set[int]:
+        """The source frames at those positions, as far as cuts are known; known as for `shot`."""
+        shot = self.shot(index, direction, instant, known=known)
+        positions = self.positions(index, direction, instant, shot)
+        return set(compositor.source_frames(instant.options, positions, shot).tolist())
 
     def missing(self, index: int, direction: int, instant: Instant) -> set[int]:
-        """Those of the needed source frames that still must be read."""
+        """Those of the needed source frames that still must be read, and those that cuts are looked for in."""
         held = self._window.held if self._window and self._window.capacity == instant.options.window else ()
-        return self.needed(index, direction, instant).difference(held)
+        missing = self.needed(index, direction, instant).difference(held)
+        if self._stops(instant):
+            missing |= self.source.lacking(index, *self._reach(index, direction, instant))
+            missing -= self.source.handed()
+        return missing
+
+    def _stops(self, instant: Instant) -> bool:
+        return instant.options.stop_at_cuts and self._knows_shots
+
+    @staticmethod
+    def _reach(index: int, direction: int, instant: Instant) -> tuple[int, int]:
+        """The first and the last position from the frame that is shown to all that some shutter exposes."""
+        positions = compositor.window_positions(instant.options, index, direction)
+        reach = [index, *positions[slice(*shutters.open_span(instant.bars))].tolist()]
+        return min(reach), max(reach)
 
     @property
     def _everywhere(self) -> int:
@@ -125,7 +159,8 @@ class Renderer:
         """What the compositor needs, its window loaded."""
         handle, instant, block = self._coefficients(instant, quick)
         window = self._window_for(instant.options.window)
-        window.load(self.positions(index, direction, instant), instant.options)
+        shot = self.shot(index, direction, instant)
+        window.load(self.positions(index, direction, instant, shot), instant.options, shot)
         return window, index, direction, instant, handle, block
 
     def _coefficients(self, instant: Instant, quick: bool):
@@ -158,6 +193,8 @@ class Renderer:
         if self._window is not None:
             self._window.release()
             self._window = self._drawn = None
+        if self._knows_shots:
+            self.source.release()
 
     def close(self) -> None:
         """Frees everything on the device and closes the source."""

@@ -19,7 +19,7 @@ class Running(ABC):
     """A window of running sums of a source's frames, in the light that is summed (Options.light).
 
     The layer of position p, p mod `layers`, holds the sum of the frames before p: positions `start` to `stop`, both
-    included. Positions beyond the clip's ends count as well, with the frames that its edges show there. A window that
+    included. Positions beyond the shot's ends count as well, with the frames that its edges show there. A window that
     moves on, or back, adds one layer a frame. A device's sums wrap around, so that differences are exact: what was
     held before leaves no trace.
     """
@@ -27,6 +27,7 @@ class Running(ABC):
     def __init__(self, source, capacity: int):
         self.source, self.capacity, self.layers = source, capacity, capacity + 1
         self.start = self.stop = 0
+        self.shot = range(source.count)
         self._frames: dict[int, int] = {}  # position: source frame
         self._options: Options | None = None
 
@@ -35,10 +36,13 @@ class Running(ABC):
         """The source frames that are summed."""
         return self._frames.values()
 
-    def load(self, positions: np.ndarray, options: Options) -> None:
-        """Reads what is missing at positions (of core.compositor.window_positions) within `capacity` of one another."""
+    def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
+        """Reads what is missing at positions (of core.compositor.window_positions) within `capacity` of one another.
+
+        shot: the frames that the window may show (core.compositor.source_frames)."""
+        self.shot = shot
         first, last = int(positions.min()), int(positions.max()) + 1
-        frames = compositor.source_frames(options, np.arange(first, last), self.source.count).tolist()
+        frames = compositor.source_frames(options, np.arange(first, last), shot).tolist()
         if not self._continues(first, frames, options):
             self._options, self._frames = options, {}
             self.start = self.stop = first

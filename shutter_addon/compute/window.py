@@ -37,6 +37,7 @@ class Window:
 
     def __init__(self, device, source, capacity: int):
         self.device, self.source, self.capacity = device, source, capacity
+        self.shot = range(source.count)
         self.textures: list = []
         self.picture = None
 
@@ -96,9 +97,10 @@ class Frames(Window):
         """The source frames that are loaded."""
         return self._held.values()
 
-    def load(self, positions: np.ndarray, options: Options) -> None:
-        """Reads what is missing at positions (of core.compositor.window_positions) within `capacity` of one another."""
-        for index in sorted(set(compositor.source_frames(options, positions, self.source.count).tolist())):
+    def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
+        """As Running.load."""
+        self.shot = shot
+        for index in sorted(set(compositor.source_frames(options, positions, shot).tolist())):
             layer = index % self.capacity
             if self._held.get(layer) == index:
                 continue

@@ -16,24 +16,26 @@ def window_positions(options: Options, index: int, direction: int = 1) -> np.nda
     return index + direction * (np.arange(options.window) - options.before)
 
 
-def source_frames(options: Options, positions: np.ndarray, count: int) -> np.ndarray:
-    """The frames of a clip of `count` frames that are seen at `positions`; −1: none.
+def source_frames(options: Options, positions: np.ndarray, shot: range) -> np.ndarray:
+    """The frames that are seen at `positions` by a window that shows those of `shot` alone; −1: none.
 
-    Past the clip's ends "hold" repeats the last frame, "mirror" plays back from it without showing it twice.
+    shot: range(count) for a whole clip, or the frames between two of its cuts.
+    Past its ends "hold" repeats the last frame, "mirror" plays back from it without showing it twice.
     "shorten" leaves frames out, but keeps the nearest when all lie outside.
     """
-    held = np.clip(positions, 0, count - 1)
+    first, count = shot.start, len(shot)
+    held = np.clip(positions, first, shot.stop - 1)
     if options.edges == "mirror" and count > 1:
-        folded = np.mod(positions, 2 * (count - 1))
-        return np.where(folded < count, folded, 2 * (count - 1) - folded)
+        folded = np.mod(positions - first, 2 * (count - 1))
+        return first + np.where(folded < count, folded, 2 * (count - 1) - folded)
     if options.edges == "shorten" and (positions == held).any():
         return np.where(positions == held, held, -1)
     return held
 
 
-def window_indices(options: Options, index: int, count: int, direction: int = 1) -> np.ndarray:
+def window_indices(options: Options, index: int, shot: range, direction: int = 1) -> np.ndarray:
     """Source frames (L,) of the window around source frame `index`; −1: left out. Arguments as above."""
-    return source_frames(options, window_positions(options, index, direction), count)
+    return source_frames(options, window_positions(options, index, direction), shot)
 
 
 def compose(instant: Instant, frames, present, coefficients) -> np.ndarray:

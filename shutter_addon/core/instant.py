@@ -28,6 +28,7 @@ class Options:
     edges: Edges = "hold"
     aggregate: Literal[1, 2, 4] = 1
     border: bool = False
+    stop_at_cuts: bool = True
 
     @property
     def before(self) -> int:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from dataclasses import dataclass, field, is_dataclass
+from dataclasses import dataclass, field, is_dataclass, replace
 from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
@@ -102,6 +102,15 @@ class Region:
 
 
 @dataclass(frozen=True)
+class TimeKey:
+    """Which source frame is shown at a frame; 1 is the source's first."""
+
+    frame: float
+    value: float
+    ease: Ease = "linear"
+
+
+@dataclass(frozen=True)
 class Recipe:
     version: Literal[1]
     window: int
@@ -114,6 +123,10 @@ class Recipe:
     edges: Edges = "hold"
     aggregate: Literal[1, 2, 4] = 1
     border: bool = False
+    stop_at_cuts: bool = True
+    inbetween: Literal[1, 2, 4, 8, 16] = 1
+    inbetween_method: Literal["quick", "good"] = "quick"
+    time: list[TimeKey] = field(default_factory=list)
 
     @property
     def options(self) -> Options:
@@ -130,6 +143,36 @@ class Recipe:
                 for region in self.regions
             ),
         )
+
+    def time_at(self, frame: float) -> float | None:
+        """The source frame that is shown at a timeline frame, 1 is the first; None: the strip's timing says that."""
+        if not self.time:
+            return None
+        a, b, u = keyframes.span([key.frame for key in self.time], frame)
+        u = keyframes.eased(u, self.time[a].ease)
+        return (1 - u) * self.time[a].value + u * self.time[b].value
+
+
+def with_inbetween(source: Recipe, factor: int) -> Recipe:
+    """The same effect over another number of in-between frames: its bars stand for the same times.
+
+    RecipeError: they would be too many."""
+
+    def changed(bars):
+        return bars and shutters.multiplied(bars, source.inbetween, factor, source.position).tolist()
+
+    try:
+        found = [
+            replace(shutter, bars=changed(shutter.bars), keys=[replace(k, bars=changed(k.bars)) for k in shutter.keys])
+            for shutter in source.shutters
+        ]
+    except shutters.ShutterError:
+        window = source.window * factor // source.inbetween
+        raise RecipeError(
+            f"window: {window} bars for {factor}× in-between frames, the most are {shutters.MAX_WINDOW}"
+        ) from None
+    window = -(-source.window * factor // source.inbetween)
+    return replace(source, window=window, shutters=found, inbetween=factor)
 
 
 def load(path: str | Path) -> Recipe:
@@ -186,7 +229,7 @@ def save(recipe: Recipe, path: str | Path) -> None:
 
 def _compact(value):
     if isinstance(value, dict):
-        return {k: _compact(v) for k, v in value.items() if v is not None and not (k == "keys" and not v)}
+        return {k: _compact(v) for k, v in value.items() if v is not None and (v or k not in ("keys", "time"))}
     return [_compact(v) for v in value] if isinstance(value, (list, tuple)) else value
 
 
@@ -315,7 +358,7 @@ def _check(recipe: Recipe) -> None:
         )
         require((shutter.bars is None) != (not shutter.keys), place, "either bars or keys, one of the two")
         require(all(0 <= c <= 1 for c in shutter.color), f"{place}.color", "not three numbers from 0 to 1")
-        _check_frames(shutter.keys, place, require)
+        _check_frames(shutter.keys, f"{place}.keys", require)
         for where, bars in (
             [(f"{place}.bars", shutter.bars)]
             if shutter.bars is not None
@@ -326,12 +369,13 @@ def _check(recipe: Recipe) -> None:
                 shutters.check_bars(bars)
             except shutters.ShutterError as error:
                 raise RecipeError(f"{where}: {error}") from None
+    _check_frames(recipe.time, "time", require)
     for i, region in enumerate(recipe.regions):
         place = f"regions[{i}]"
         require(region.shutter in names, f"{place}.shutter", f'there is no shutter "{region.shutter}"')
         require(region.width >= 0, f"{place}.width", f"{region.width} is negative")
         require(region.drawings()[0][1], f"{place}.strokes", "empty: nothing is drawn")
-        _check_frames(region.keys, place, require)
+        _check_frames(region.keys, f"{place}.keys", require)
         redrawn = any(key.strokes is not None for key in region.keys)
         for k, key in enumerate(region.keys):
             whole = not (redrawn if k == 0 else key.strokes is not None) or key.frame == int(key.frame)
@@ -347,6 +391,6 @@ def _check_frames(keys, place, require) -> None:
     for k, (first, second) in enumerate(pairwise(keys)):
         require(
             first.frame < second.frame,
-            f"{place}.keys[{k + 1}].frame",
+            f"{place}[{k + 1}].frame",
             f"{second.frame:g} does not follow {first.frame:g}",
         )

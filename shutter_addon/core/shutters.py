@@ -159,6 +159,20 @@ def resample(bars, window: int) -> np.ndarray:
     return np.diff(np.interp(at, np.arange(len(bars) + 1), total)) * window / len(bars)
 
 
+def multiplied(bars, old: int, new: int, position: str = "start") -> np.ndarray:
+    """Bars of the same shutter, in time, where each source frame has `new` frames in place of `old`, both powers of 2.
+
+    A window that ends within a source frame gets closed bars up to that frame's end: at its far side, which `position`
+    tells. ShutterError: it would have more than 256 bars."""
+    bars = np.asarray(bars, dtype=np.float64)
+    window = -(-len(bars) * new // old)
+    if window > MAX_WINDOW:
+        raise ShutterError(f"a shutter has 1 to {MAX_WINDOW} bars, not {window}")
+    lacking = max(window * old // new - len(bars), 0)
+    before = {"start": 0, "center": lacking // 2, "end": lacking}[position]
+    return resample(np.pad(bars, (before, lacking - before)), window)
+
+
 def open_angle(bars) -> float:
     """The shutter angle in degrees: 360 for a window that is open throughout, however bright its brightest bar is."""
     bars = np.asarray(bars, dtype=np.float64)

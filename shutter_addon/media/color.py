@@ -28,6 +28,7 @@ class ColorSource:
         if config is None or name not in ColorConfig(str(config)).getColorSpaceNames():
             raise MediaError(f"{source.path.name}: unknown colour space {name}")
         self._source, self._name, self._config = source, name, str(config)
+        self.options = {**source.options, "colorspace": name}
 
     def __getattr__(self, name):
         return getattr(self._source, name)

@@ -28,6 +28,7 @@ class MovieSource:
     def __init__(self, path, *, stream=0, deinterlace=False):
         self.path = check_file(path)
         self._deinterlace = deinterlace
+        self.options = {"stream": stream, "deinterlace": bool(deinterlace)}
         self._graph = self._graph_key = None
         self._reader = FrameReader(self.path, stream)
         try:

@@ -46,6 +46,7 @@ class SequenceSource:
         self.dtype = _dtype(spec)
         self.transfer = "linear" if self.path.suffix.lower() in LINEAR_SUFFIXES else "srgb"
         self.alpha = "opaque" if len(layer) in (1, 3) else alpha or self._usual_alpha()
+        self.options = {}
 
     @property
     def files(self):

@@ -21,6 +21,7 @@ class Source(Protocol):
     dtype: uint8, uint16, float16 or float32, the samples' type; whole numbers stand for 0 … 1
     transfer: "srgb" (sRGB display values) or "linear" (scene linear, Rec.709 primaries)
     alpha: "opaque", "straight" or "premultiplied"
+    options: what else its samples depend on but its files, by name; plain values
     """
 
     path: Path
@@ -31,6 +32,7 @@ class Source(Protocol):
     dtype: np.dtype
     transfer: str
     alpha: str
+    options: dict
 
     def read(self, index: int) -> np.ndarray:
         """The frame as a new array (height, width, 4), RGBA, top row first, in any order; onwards is fastest.

@@ -72,6 +72,25 @@ def test_two_edges_are_a_slit_scan(command, bunny, tmp_path):
     assert difference.max() <= 8
 
 
+def test_a_window_stops_at_a_cut(command, tmp_path, same_pixels):
+    """In chunks as in one go, and not where the recipe says so."""
+    rng = np.random.default_rng(3)
+    shots = [rng.integers(0, 256, (6, 8, 3), dtype=np.uint8).repeat(8, 0).repeat(8, 1) for _ in range(2)]
+    frames = np.stack([np.roll(shots[k // 6], k, axis=1) for k in range(12)])
+    first = write_frames(tmp_path / "film", frames)
+    data = recipe(4, np.ones(4))
+    command(first, "--output", tmp_path / "whole", recipe=data)
+    for chunk in ("1:4", "5:5", "6:12"):
+        command(first, "--output", tmp_path / "chunks", "--frames", chunk, recipe=data)
+    for k in range(12):
+        window = np.minimum(np.arange(k, k + 4), 5 if k < 6 else 11)
+        whole, part = (read_picture(tmp_path / way / f"{k + 1:04d}.png") for way in ("whole", "chunks"))
+        same_pixels(whole, levels(linear(frames[window]).mean(axis=0)), 1)
+        assert np.array_equal(whole, part)
+    command(first, "--output", tmp_path / "off", "--frames", "5", recipe=data | {"stop_at_cuts": False})
+    same_pixels(read_picture(tmp_path / "off" / "0005.png"), levels(linear(frames[4:8]).mean(axis=0)), 1)
+
+
 def test_a_keyed_delta_stays_one_sharp_frame(command, noise, tmp_path, same_pixels):
     first, frames = noise
     data = recipe(9, {1: still(9), 9: still(9, 8)})

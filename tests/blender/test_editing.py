@@ -513,7 +513,7 @@ def test_only_what_renders_by_its_keys_can_be_keyed(effect, editing):
         ("ShutterBar", "weight"),
         *(("ShutterRegion", name) for name in ("width", "location", "rotation", "scale")),
         *(("ShutterEffect", name) for name in ("position", "interpolation", "light", "exposure", "edges")),
-        *(("ShutterEffect", name) for name in ("aggregate", "border")),
+        *(("ShutterEffect", name) for name in ("aggregate", "border", "stop_at_cuts", "source_time")),
     }
 
 
@@ -523,11 +523,13 @@ def test_keyed_options_hold_from_their_key_on(effect, editing):
     edit = effect.id_data
     for frame, border, edges, aggregate in ((1, False, "HOLD", "1"), (20, True, "SHORTEN", "4")):
         effect.border, effect.edges, effect.aggregate = border, edges, aggregate
-        for name in ("border", "edges", "aggregate"):
+        effect.stop_at_cuts = not border
+        for name in ("border", "edges", "aggregate", "stop_at_cuts"):
             effect.keyframe_insert(name, frame=frame)
     curves = animation.Curves(edit)
     found = [effects.options(effect, curves, frame) for frame in (1, 19, 20, 40)]
     assert [(o.border, o.edges, o.aggregate) for o in found] == [(False, "hold", 1)] * 2 + [(True, "shorten", 4)] * 2
+    assert [o.stop_at_cuts for o in found] == [True, True, False, False]
 
 
 def keyable(group, prop) -> bool:

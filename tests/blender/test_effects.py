@@ -32,6 +32,7 @@ def keyed_recipe(window=8):
         "edges": "mirror",
         "aggregate": 2,
         "border": True,
+        "stop_at_cuts": False,
         "interpolation": "value",
         "shutters": [
             {"name": "Plain", "color": [0.1, 0.2, 0.3], "bars": bars(window)},

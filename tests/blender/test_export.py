@@ -71,6 +71,10 @@ def valid_recipes(draw):
         draw(st.sampled_from(["hold", "mirror", "shorten"])),
         draw(st.sampled_from([1, 2, 4])),
         draw(st.booleans()),
+        draw(st.booleans()),
+        draw(st.sampled_from([1, 2, 4, 8, 16])),
+        draw(st.sampled_from(["quick", "good"])),
+        [recipes.TimeKey(frame, draw(numbers(-10, 10000)), draw(eases)) for frame in draw(st.just([]) | frames)],
     )
 
 
@@ -138,6 +142,8 @@ def test_numbers_that_float32_cannot_hold(effect_on, weight, degrees, width):
 BASE = {
     "version": 1,
     "window": 4,
+    "inbetween": 2,
+    "time": [{"frame": 2, "value": 1}, {"frame": 20, "value": 9.5, "ease": "bezier"}, {"frame": 31, "value": 3}],
     "shutters": [
         {"name": "Plain", "bars": [1, 1, 1, 1]},
         {
@@ -172,7 +178,7 @@ def curve(edit, name, index=0):
 
 
 def blenders_own_handles(edit, effect):
-    for name in ("location", "rotation", "scale", "shutters[1].bars[2].weight"):
+    for name in ("location", "rotation", "scale", "shutters[1].bars[2].weight", "source_time"):
         for key in curve(edit, name).keyframe_points:
             key.interpolation, key.handle_left_type, key.handle_right_type = "BEZIER", "AUTO_CLAMPED", "AUTO_CLAMPED"
         curve(edit, name).update()
@@ -206,14 +212,16 @@ def elastic(edit, effect):
 def modifiers(edit, effect):
     curve(edit, "location").modifiers.new("CYCLES")
     curve(edit, "rotation").modifiers.new("NOISE")
+    curve(edit, "source_time").modifiers.new("NOISE")
 
 
 def extrapolated(edit, effect):
-    curve(edit, "location").extrapolation = "LINEAR"
+    for name in ("location", "source_time"):
+        curve(edit, name).extrapolation = "LINEAR"
 
 
 def muted(edit, effect):
-    curve(edit, "location", 1).mute = True
+    curve(edit, "location", 1).mute = curve(edit, "source_time").mute = True
     curve(edit, "shutters[1].bars[3].weight").mute = True
 
 
@@ -262,6 +270,8 @@ def test_what_blender_made_agrees_at_every_frame(effect_on, change):
     wanted = {frame: effects.instant(*effect_on, frame) for frame in range(FIRST, LAST + 1)}
     for frame, instant in wanted.items():
         check(found.at(frame - FIRST + 1, ASPECT), instant)
+        time, _ = effects.source_time(effect_on[0], effect_on[1], frame)
+        assert found.time_at(frame - FIRST + 1) == pytest.approx(time, abs=1e-3)
     apply(effect_on, found)
     assert export(effect_on) == found
 
@@ -281,6 +291,24 @@ def test_a_plain_ease_stays_a_key_and_no_more(effect_on):
     assert [key.frame for key in found.shutters[1].keys] == [3, 17, 30]
     assert [key.ease for key in found.regions[0].keys] == ["linear", "bezier", "linear"]
     assert found == recipes.parse(json.dumps(BASE))
+
+
+def test_keys_of_the_source_time_lie_in_a_group_of_the_effect(effect_on):
+    apply(effect_on, BASE)
+    assert curve(effect_on[0], "source_time").group.name == effect_on[1].name
+
+
+def test_a_source_time_without_keys_holds_a_frame(effect_on):
+    plain = {"version": 1, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
+    apply(effect_on, plain)
+    effect_on[1].use_source_time, effect_on[1].source_time = True, 3.5
+    assert export(effect_on).time == [recipes.TimeKey(1, 3.5)]
+    effect_on[1].use_source_time = False
+    assert export(effect_on).time == []
+    apply(effect_on, plain | {"time": [{"frame": 1, "value": 3.5}]})
+    assert effect_on[1].use_source_time
+    apply(effect_on, plain)
+    assert not effect_on[1].use_source_time
 
 
 def test_what_no_recipe_can_hold(effect_on):

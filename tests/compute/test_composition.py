@@ -73,14 +73,14 @@ def device(request):
     return open_compositor(request.param)[0]
 
 
-def check(device, source, moment, index, direction=1):
+def check(device, source, moment, index, direction=1, shot=None):
     renderer = Renderer(device, source)
     picture = renderer.picture(index, moment, direction)
     c = renderer.coefficients(moment)
     block = moment.options.aggregate
     c = c.repeat(block, 1).repeat(block, 2)[:, : source.height, : source.width].astype(np.float64)
     c /= c.sum(axis=0)
-    indices = compositor.window_indices(moment.options, index, source.count, direction)
+    indices = compositor.window_indices(moment.options, index, shot or range(source.count), direction)
     expected = compositor.compose(moment, source.linear()[np.maximum(indices, 0)], indices >= 0, c)
     assert picture.shape == expected.shape
     # Light above white differs in proportion: compare it relatively.

@@ -35,23 +35,23 @@ def everywhere(c, size=(3, 4)):
     ],
 )
 def test_edges(edges, index, expected):
-    assert compositor.window_indices(Options(5, edges=edges), index, 10).tolist() == expected
+    assert compositor.window_indices(Options(5, edges=edges), index, range(10)).tolist() == expected
 
 
 def test_positions():
     for position, expected in [("start", [5, 6, 7, 8]), ("center", [4, 5, 6, 7]), ("end", [2, 3, 4, 5])]:
-        assert compositor.window_indices(Options(4, position=position), 5, 10).tolist() == expected
+        assert compositor.window_indices(Options(4, position=position), 5, range(10)).tolist() == expected
 
 
 def test_backward():
-    assert compositor.window_indices(Options(4), 5, 10, -1).tolist() == [5, 4, 3, 2]
-    assert compositor.window_indices(Options(4, edges="mirror"), 1, 10, -1).tolist() == [1, 0, 1, 2]
-    assert compositor.window_indices(Options(4, position="end"), 5, 10, -1).tolist() == [8, 7, 6, 5]
+    assert compositor.window_indices(Options(4), 5, range(10), -1).tolist() == [5, 4, 3, 2]
+    assert compositor.window_indices(Options(4, edges="mirror"), 1, range(10), -1).tolist() == [1, 0, 1, 2]
+    assert compositor.window_indices(Options(4, position="end"), 5, range(10), -1).tolist() == [8, 7, 6, 5]
 
 
 def test_a_clip_of_one_frame():
     for edges in ("hold", "mirror", "shorten"):
-        indices = compositor.window_indices(Options(3, edges=edges), 0, 1)
+        indices = compositor.window_indices(Options(3, edges=edges), 0, range(1))
         assert set(indices.tolist()) <= {0, -1}
 
 

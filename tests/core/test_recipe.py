@@ -18,6 +18,7 @@ EXAMPLE = {
     "edges": "hold",
     "aggregate": 1,
     "border": False,
+    "stop_at_cuts": True,
     "shutters": [
         {"name": "Long", "color": [0.2, 0.5, 1.0], "bars": [1, 1, 1, 1, 1, 1, 1, 1]},
         {
@@ -180,3 +181,38 @@ def test_any_frame_gives_an_instant(frame):
 def test_position():
     assert [recipe.Options(8, position=p).before for p in ("start", "center", "end")] == [0, 3, 7]
     assert [recipe.Options(5, position=p).before for p in ("start", "center", "end")] == [0, 2, 4]
+
+
+def test_another_factor_of_in_betweens_keeps_times():
+    source = recipe.parse(
+        json.dumps(
+            {
+                "version": 1,
+                "window": 3,
+                "inbetween": 2,
+                "position": "end",
+                "shutters": [
+                    {"name": "A", "bars": [0, 1, 2]},
+                    {"name": "B", "keys": [{"frame": 2, "bars": [1, 0, 1]}, {"frame": 5, "bars": [0, 0, 1]}]},
+                ],
+            }
+        )
+    )
+    more = recipe.with_inbetween(source, 4)
+    assert (more.window, more.inbetween) == (6, 4)
+    assert more.shutters[0].bars == [0, 0, 1, 1, 2, 2]
+    assert [key.bars for key in more.shutters[1].keys] == [[1, 1, 0, 0, 1, 1], [0, 0, 0, 0, 1, 1]]
+    assert recipe.with_inbetween(more, 2) == source
+    less = recipe.with_inbetween(source, 1)  # a frame and a half, which ends with the shown one
+    assert less.shutters[0].bars == [0, 1.5]
+    with pytest.raises(recipe.RecipeError, match="window: 384 bars for 256× in-between frames"):
+        recipe.with_inbetween(source, 256)
+
+
+def test_time_between_its_keys():
+    keys = [{"frame": 1, "value": 5}, {"frame": 5, "value": 9, "ease": "constant"}, {"frame": 9, "value": 1}]
+    source = {"version": 1, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
+    assert recipe.parse(json.dumps(source)).time_at(3) is None
+    found = recipe.parse(json.dumps(source | {"time": keys}))
+    assert [found.time_at(frame) for frame in (-3, 2, 5, 8.9, 9, 40)] == [5, 6, 9, 9, 1, 1]
+    assert recipe.parse(recipe.dump(found)) == found

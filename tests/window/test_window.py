@@ -50,6 +50,20 @@ def test_without_wheels(tmp_path):
     assert "Traceback" not in console
 
 
+def test_in_between_frames_are_built_and_removed(tmp_path):
+    seen, console = tell("inbetween_story.py", "opengl", linked(tmp_path))
+    states = [(entry["shown"], entry["state"]) for entry in seen if "shown" in entry]
+    assert states == [
+        ("missing", "missing"),
+        ("partial", "partial"),
+        ("ready", "ready"),
+        ("stale", "stale"),
+        ("again", "ready"),
+        ("removed", "missing"),
+    ]
+    assert "Traceback" not in console
+
+
 def test_no_exception_reaches_the_console(told):
     _folder, _seen, console = told
     assert "Traceback" not in console

@@ -289,8 +289,8 @@ MESSAGES = {
     ("Virtual Shutter", "Clip Ends"): "Clip-Enden",
     (
         "*",
-        "What a window gets that reaches beyond the clip's ends",
-    ): "Was ein Zeitfenster erhält, das über die Enden des Clips hinausreicht",
+        "What a window gets that reaches beyond the ends of the clip, or of the shot",
+    ): "Was ein Zeitfenster erhält, das über die Enden des Clips oder der Einstellung hinausreicht",
     ("Virtual Shutter", "Hold"): "Halten",
     (
         "*",
@@ -311,11 +311,98 @@ MESSAGES = {
     ("*", "Blocks of 2×2 pixels share a shutter"): "Blöcke von 2×2 Pixeln teilen sich einen Verschluss",
     ("*", "4×4"): "4×4",
     ("*", "Blocks of 4×4 pixels share a shutter"): "Blöcke von 4×4 Pixeln teilen sich einen Verschluss",
+    ("*", "Stop at Cuts"): "An Schnitten enden",
+    (
+        "*",
+        "Windows end at the source's cuts as they do at the clip's ends",
+    ): "Zeitfenster enden an den Schnitten der Quelle wie an den Enden des Clips",
     ("*", "Border"): "Rand",
     (
         "*",
         "Make the picture's edge a scribble of the default shutter",
     ): "Den Bildrand zu einer Markierung des Standardverschlusses machen",
+    # In-between frames
+    ("*", "In-Between Frames"): "Zwischenbilder",
+    (
+        "*",
+        "Frames between those of the source, by optical flow: bars count them all, "
+        "and a still frame becomes as many equal bars",
+    ): "Bilder zwischen denen der Quelle, durch optischen Fluss: Balken zählen alle, "
+    "und ein Standbild wird zu ebenso vielen gleichen Balken",
+    ("*", "Off"): "Aus",
+    ("*", "The source's own frames alone"): "Nur die eigenen Bilder der Quelle",
+    ("*", "2×"): "2×",
+    ("*", "One frame between two of the source"): "Ein Bild zwischen zweien der Quelle",
+    ("*", "4×"): "4×",
+    ("*", "Three frames between two of the source"): "Drei Bilder zwischen zweien der Quelle",
+    ("*", "8×"): "8×",
+    ("*", "Seven frames between two of the source"): "Sieben Bilder zwischen zweien der Quelle",
+    ("*", "16×"): "16×",
+    ("*", "Fifteen frames between two of the source"): "Fünfzehn Bilder zwischen zweien der Quelle",
+    ("*", "Bars per Frame"): "Balken pro Bild",
+    (
+        "*",
+        "How many bars of the window stand for a source frame",
+    ): "Wie viele Balken des Zeitfensters für ein Bild der Quelle stehen",
+    (
+        "*",
+        "{factor}× in-between frames take {count} bars; a shutter has {most} at most",
+    ): "Zwischenbilder {factor}× brauchen {count} Balken; ein Verschluss hat höchstens {most}",
+    ("*", "Factor"): "Faktor",
+    ("*", "Method"): "Methode",
+    ("*", "How in-between frames are made"): "Wie Zwischenbilder entstehen",
+    ("*", "Quick"): "Schnell",
+    ("*", "Optical flow by DIS"): "Optischer Fluss nach DIS",
+    ("*", "Good"): "Gut",
+    ("*", "Optical flow that takes longer, and is better"): "Optischer Fluss, der länger dauert und besser ist",
+    ("*", "Place"): "Ort",
+    ("*", "Where in-between frames lie"): "Wo Zwischenbilder liegen",
+    ("*", "Beside the File"): "Neben der Datei",
+    ("*", "A folder beside the .blend file"): "Ein Ordner neben der .blend-Datei",
+    ("*", "Extension"): "Erweiterung",
+    ("*", "The extension's own folder"): "Der eigene Ordner der Erweiterung",
+    (
+        "*",
+        "in-between frames lie beside the .blend file: save it first",
+    ): "Zwischenbilder liegen neben der .blend-Datei: zuerst speichern",
+    (
+        "*",
+        "only an installed extension has a folder of its own",
+    ): "nur eine installierte Erweiterung hat einen eigenen Ordner",
+    ("*", "Missing"): "Fehlen",
+    ("*", "Partial: {done} of {total}"): "Teilweise: {done} von {total}",
+    ("*", "Ready"): "Bereit",
+    ("*", "Stale: the source has changed"): "Veraltet: Die Quelle hat sich geändert",
+    ("*", "{size} on disk"): "{size} auf der Platte",
+    ("*", "About {size} when built"): "Etwa {size}, wenn erstellt",
+    ("*", "{done} of {total}"): "{done} von {total}",
+    ("Operator", "Build"): "Erstellen",
+    ("Operator", "Build In-Between Frames"): "Zwischenbilder erstellen",
+    (
+        "*",
+        "Build the in-between frames that are missing, as files that are kept (Esc stops, and keeps what is built)",
+    ): "Die fehlenden Zwischenbilder erstellen, als Dateien, die bleiben (Esc hält an und behält, was erstellt ist)",
+    ("*", "Choose a factor first"): "Zuerst einen Faktor wählen",
+    (
+        "*",
+        "In-between frames are being built; Esc stops that",
+    ): "Zwischenbilder werden gerade erstellt; Esc hält das an",
+    (
+        "*",
+        "Building in-between frames: {done} of {total}, Esc to stop",
+    ): "Zwischenbilder werden erstellt: {done} von {total}, Esc hält an",
+    ("*", "In-between frames are built"): "Die Zwischenbilder sind erstellt",
+    ("*", "Stopped: {done} of {total} are built"): "Angehalten: {done} von {total} sind erstellt",
+    ("Operator", "Remove"): "Entfernen",
+    ("*", "Remove"): "Entfernen",
+    ("Operator", "Remove In-Between Frames"): "Zwischenbilder entfernen",
+    (
+        "*",
+        "Remove the files of all in-between frames of the effect's source, of every factor and method",
+    ): "Die Dateien aller Zwischenbilder der Quelle des Effekts entfernen, jedes Faktors und jeder Methode",
+    ("*", "Remove In-Between Frames?"): "Zwischenbilder entfernen?",
+    ("*", "They can be built again"): "Sie können wieder erstellt werden",
+    ("*", "Removed {size}"): "{size} entfernt",
     # The live preview
     ("*", "Live"): "Live",
     (
@@ -362,4 +449,19 @@ MESSAGES = {
     ): "Verschlüsse, Regionen, Schlüsselbilder und Optionen des Effekts als Rezeptdatei speichern",
     ("*", "Choose a file"): "Eine Datei wählen",
     ("*", 'Saved "{path}"'): "„{path}“ gespeichert",
+    # Source time
+    ("*", "Use Source Time"): "Quellzeit verwenden",
+    (
+        "*",
+        "Show the source at the time that is set here, in place of the strip's own timing",
+    ): "Die Quelle zu der Zeit zeigen, die hier eingestellt ist, anstelle der Zeit des Streifens",
+    ("*", "Source Time"): "Quellzeit",
+    (
+        "*",
+        "Source frame that is shown, 1 is the source's first; keyed, it is a speed ramp",
+    ): "Bild der Quelle, das gezeigt wird, 1 ist ihr erstes; mit Schlüsselbildern eine Geschwindigkeitsrampe",
+    (
+        "*",
+        "No in-between frames: the nearest source frame is shown",
+    ): "Keine Zwischenbilder: Das nächste Bild der Quelle wird gezeigt",
 }

@@ -1,0 +1,233 @@
+"""In-between frames of a source, built once and kept in files: full exposure from ordinary footage (appendix B).
+
+Between two source frames lie factor-1 frames, by optical flow. The pair i of frames i and i+1 is built as a whole."""
+
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, as_completed, wait
+from functools import partial
+from itertools import takewhile
+from pathlib import Path
+
+import numpy as np
+
+from . import cuts
+from .cache import Cache, State, pair_line, write_picture
+from .errors import MediaError
+from .files import check_index
+
+MEMORY = 4 << 30  # bytes that pairs at work may take together
+LAYERS = 24  # of a frame as float32, for a pair at work: more than DIS or DeepFlow and warps in float32 take, 13 to 16
+
+
+class Inbetween:
+    """A source with its in-between frames: a source itself, with `factor` times its rate.
+
+    Frame i·factor is the source's frame i, those in between come from the cache in `folder`. Across a cut the nearer
+    source frame takes their place, and between two equal frames the first."""
+
+    def __init__(self, source, folder, factor, method):
+        self._source, self.factor = source, factor
+        self._cache = Cache(source, folder, factor, method)
+        self._cache.load()
+        self.count = (source.count - 1) * factor + 1
+        self.fps = None if source.fps is None else source.fps * factor
+        self.options = {**source.options, "inbetween": [factor, method]}
+
+    def __getattr__(self, name):
+        return getattr(self._source, name)
+
+    def has(self, index: int) -> bool:
+        """Whether the frame is there, built meanwhile perhaps; its file is not opened."""
+        if not self._is_there(index):
+            self._cache.load()
+        return self._is_there(index)
+
+    def check(self, index: int) -> None:
+        """MediaError: the frame is not built."""
+        if not self.has(index):
+            raise MediaError(
+                f"{self.path.name}: in-between frames of frame {index // self.factor} are missing; "
+                f"build them first (in {self._cache.folder})"
+            )
+
+    def read(self, index: int) -> np.ndarray:
+        """The frame as a new array (height, width, 4), RGBA, top row first.
+
+        Raises MediaError for one that is not built, or damaged, and what the source raises."""
+        check_index(self, index)
+        self.check(index)
+        real = self._real(index)
+        return self._cache.read(index) if real is None else self._source.read(real)
+
+    def close(self) -> None:
+        """Lets go of the source's file; a later read opens it again."""
+        self._source.close()
+
+    def _is_there(self, index):
+        built = index in self._cache.digests and self._cache.picture(index).is_file()
+        return built or self._real(index) is not None
+
+    def _real(self, index):
+        """The source frame that is shown, None where an in-between frame is."""
+        pair, step = divmod(index, self.factor)
+        kind = "same" if step == 0 else self._cache.kinds.get(pair)
+        if kind is None:
+            return None
+        return pair + (kind == "cut" and 2 * step > self.factor)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+
+def build(
+    source,
+    folder,
+    factor: int,
+    method: str,
+    frames: tuple[int, int] | None = None,
+    update: Callable[[int, int], None] = lambda done, total: None,
+    cancelled: Callable[[], bool] = lambda: False,
+    between=None,
+) -> State:
+    """Builds in-between frames in `folder`; what is there is checked, and built again if it is damaged.
+
+    factor: 2 or more; method: one of flow.METHODS
+    frames: first and last source frame of a chunk (default: all); the last one's in-betweens lead out of the chunk
+    update: is called with pairs done and pairs in all
+    cancelled: is asked often, from any thread; what is finished then is kept
+    between: what makes a pair's frames, in place of flow.between
+
+    Killed, it goes on where it was; several may build in the same folder, and none harms another. Files come out the
+    same, whatever the chunks and however often it was interrupted. The source must be used by nobody else meanwhile.
+    Gives how far it came. MediaError: a frame cannot be read or written; what is finished is kept."""
+    if between is None:
+        from .flow import between
+    cache, pairs = Cache(source, folder, factor, method), _pairs(source, frames)
+    cache.prepare()
+    cache.load()
+    done = 0
+    for finished in _in_parallel(_tasks(cache, pairs, between, cancelled), _workers(source)):
+        done += finished
+        update(done, len(pairs))
+    return State("ready" if done == len(pairs) else "partial", done, len(pairs))
+
+
+def estimate(source, factor: int) -> int:
+    """About how many bytes all in-between frames of a source will take: as if they were as large, in files, as three
+    of the source's own frames are on average. MediaError: these cannot be read."""
+    samples = {source.count * part // 6 for part in (1, 3, 5)}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "picture.png" if source.dtype.kind == "u" else "picture.exr")
+        sizes = []
+        for index in samples:
+            write_picture(path, source.read(index), source.alpha)
+            sizes.append(path.stat().st_size)
+    return (source.count - 1) * (factor - 1) * sum(sizes) // len(sizes)
+
+
+def _pairs(source, frames) -> range:
+    """The pairs that begin in the chunk of frames."""
+    first, last = frames or (0, source.count - 1)
+    if not 0 <= first <= last < source.count:
+        raise MediaError(f"{source.path.name}: has frames 0 to {source.count - 1}, not {first} to {last}")
+    return range(first, min(last + 1, source.count - 1))
+
+
+def _tasks(cache, pairs, between, cancelled) -> Iterator[Callable[[], bool]]:
+    """What is to be done for each pair; it gives whether the pair is finished. Frames are read here, by one thread."""
+    near = _Near(cache.source)
+    for pair in pairs:
+        if cancelled():
+            return
+        if cache.is_sound(pair):
+            yield lambda: True
+            continue
+        first, second, kind = near.pair(pair)
+        if kind:
+            yield partial(_note_kind, cache, pair, kind)
+        else:
+            yield partial(_make, cache, pair, first, second, between, cancelled)
+
+
+class _Near:
+    """A source's frames around a pair that moves onwards, and their signatures."""
+
+    def __init__(self, source):
+        self._source = source
+        self._frames: dict[int, np.ndarray] = {}
+        self._signatures: dict[int, cuts.Signature | None] = {}
+
+    def pair(self, index: int) -> tuple[np.ndarray, np.ndarray, str | None]:
+        """Frames `index` and `index` + 1; and "same" if they are equal, "cut" if they are of two shots, else None."""
+        start, stop = max(index + 1 - cuts.NEIGHBOURS, 0), min(index + 1 + cuts.NEIGHBOURS, self._source.count)
+        self._signatures = {i: self._signature(i) for i in range(start, stop)}
+        first, second = self._frame(index), self._frame(index + 1)
+        self._frames = {i: frame for i, frame in self._frames.items() if i > index}
+        return first, second, self._kind(first, second, index)
+
+    def _kind(self, first, second, index):
+        if np.array_equal(first, second):
+            return "same"
+        before = self._run(range(index, -1, -1))[::-1]
+        after = self._run(range(index + 1, self._source.count))
+        if cuts.is_cut(before, after):
+            return "cut"
+        return "same" if cuts.is_duplicate(before, after) else None
+
+    def _run(self, indices):
+        """The signatures of these frames, up to one that has none."""
+        return list(takewhile(lambda found: found is not None, map(self._signatures.get, indices)))
+
+    def _frame(self, index):
+        if index not in self._frames:
+            self._frames[index] = self._source.read(index)
+        return self._frames[index]
+
+    def _signature(self, index):
+        """None for a frame that cannot be read: only who needs the frame itself has to know."""
+        if index not in self._signatures:
+            try:
+                frame = self._frame(index)
+            except MediaError:
+                return None
+            return cuts.signature(frame, self._source.transfer, self._source.alpha)
+        return self._signatures[index]
+
+
+def _make(cache, pair, first, second, between, cancelled) -> bool:
+    source, lines = cache.source, []
+    pictures = between(first, second, cache.factor, cache.method, source.transfer, source.alpha)
+    for index, picture in zip(cache.steps(pair), pictures, strict=True):
+        if cancelled():
+            return False
+        lines.append(cache.write(index, picture))
+    cache.note(lines)
+    return True
+
+
+def _note_kind(cache, pair, kind) -> bool:
+    cache.note([pair_line(pair, kind)])
+    return True
+
+
+def _in_parallel(tasks, workers) -> Iterator[bool]:
+    """Results of tasks, run in threads; a task is asked for when there is a thread for it, which bounds the memory."""
+    with ThreadPoolExecutor(workers) as pool:
+        running = set()
+        for task in tasks:
+            running.add(pool.submit(task))
+            if len(running) == workers:
+                ended, running = wait(running, return_when=FIRST_COMPLETED)
+                yield from (future.result() for future in ended)
+        yield from (future.result() for future in as_completed(running))
+
+
+def _workers(source) -> int:
+    pair = source.width * source.height * 16 * LAYERS
+    processors = getattr(os, "process_cpu_count", os.cpu_count)() or 1
+    return max(1, min(processors, MEMORY // pair))

@@ -1,0 +1,227 @@
+"""In-between frames are built, stopped, found again and removed, by the operators of the panel."""
+
+import shutil
+import sys
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from support import write_frames
+
+FACTOR, COUNT = 4, 6
+
+
+@pytest.fixture
+def building(bpy):
+    from shutter_addon.blender import building
+
+    yield building
+    building.stop()
+
+
+@pytest.fixture
+def flow(monkeypatch):
+    """In place of optical flow: a plain blend, and a list of what is called for each pair."""
+    calls = []
+
+    def between(first, second, factor, *_):
+        for call in calls:
+            call()
+        weights = np.arange(1, factor) / factor
+        return [(first * (1 - weight) + second * weight).astype(first.dtype) for weight in weights]
+
+    monkeypatch.setitem(sys.modules, "shutter_addon.media.flow", SimpleNamespace(between=between))
+    return calls
+
+
+def ramp(number):
+    """A picture that drifts, so that no two are equal and none is cut off from the next."""
+    y, x = np.mgrid[:24, :40]
+    return np.stack([x * 4 + number * 3, y * 6, x + y + number], axis=-1).astype(np.uint8)
+
+
+@pytest.fixture
+def effect(bpy, edit, tmp_path, flow):
+    """An effect with a factor, in a saved file beside its footage."""
+    effect = made(edit, tmp_path / "film")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "film" / "film.blend"))
+    return effect
+
+
+def made(edit, folder):
+    from shutter_addon.blender import editing, strips
+
+    first = write_frames(folder / "in", [ramp(number) for number in range(COUNT)])
+    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
+    for path in sorted(first.parent.iterdir())[1:]:
+        source.elements.append(path.name)
+    strip, effect = strips.add_effect(edit, source)
+    editing.start(effect)
+    strips.choose(edit, strip)
+    effect.inbetween = str(FACTOR)
+    return effect
+
+
+def look(bpy, building):
+    """What the panel finds, now."""
+    from shutter_addon.blender import strips
+
+    building._looks.clear()
+    return building.look(*strips.active(bpy.context))
+
+
+def shown(bpy, building):
+    found = look(bpy, building).state
+    return found.name, found.done, found.total
+
+
+def pictures(folder):
+    return sorted(path.name for path in folder.rglob("*.png") if path.parent.name != "in")
+
+
+def test_built_shown_and_removed(bpy, building, effect, tmp_path, capfd):
+    assert shown(bpy, building) == ("missing", 0, COUNT - 1)
+    assert bpy.ops.shutter.inbetween_build() == {"FINISHED"}
+    assert "In-between frames are built" in capfd.readouterr().out
+    assert shown(bpy, building) == ("ready", COUNT - 1, COUNT - 1)
+    assert len(pictures(tmp_path)) == (COUNT - 1) * (FACTOR - 1)
+    (cache,) = (tmp_path / "film" / "virtual_shutter_inbetween").iterdir()
+    size = sum(path.stat().st_size for path in cache.rglob("*") if path.is_file())
+    assert look(bpy, building).size == size
+    (cache / "notes.txt").write_text("the user's")
+    assert bpy.ops.shutter.inbetween_purge() == {"FINISHED"}
+    assert "Removed" in capfd.readouterr().out
+    assert [path.name for path in cache.iterdir()] == ["notes.txt"]
+    assert shown(bpy, building) == ("missing", 0, COUNT - 1)
+    assert look(bpy, building).size == 0
+
+
+def test_nothing_is_left_of_an_empty_folder(bpy, effect, tmp_path):
+    bpy.ops.shutter.inbetween_build()
+    bpy.ops.shutter.inbetween_purge()
+    assert sorted(path.name for path in (tmp_path / "film").iterdir()) == ["film.blend", "in"]
+
+
+def test_a_stopped_build_keeps_what_it_has_and_goes_on(bpy, building, effect, flow, tmp_path, capfd):
+    pairs = []
+    flow += [lambda: pairs.append(1), lambda: len(pairs) == 4 and building.running().stop()]
+    assert bpy.ops.shutter.inbetween_build() == {"CANCELLED"}
+    assert "Stopped: " in capfd.readouterr().out
+    name, done, total = shown(bpy, building)
+    assert (name, total) == ("partial", COUNT - 1)
+    assert 0 < done < total
+    flow[:] = [lambda: pairs.append(2)]
+    assert bpy.ops.shutter.inbetween_build() == {"FINISHED"}
+    assert shown(bpy, building) == ("ready", total, total)
+    assert pairs.count(2) == total - done
+
+
+def test_a_build_that_is_stopped_at_once_has_built_nothing(bpy, building, effect, flow):
+    flow.append(lambda: building.running().stop())
+    assert bpy.ops.shutter.inbetween_build() == {"CANCELLED"}
+    assert shown(bpy, building) == ("missing", 0, COUNT - 1)
+
+
+def test_a_second_build_is_refused_and_nothing_is_removed_meanwhile(bpy, building, effect, monkeypatch):
+    monkeypatch.setattr(building, "_running", SimpleNamespace(scene=0))
+    for operator in ("inbetween_build", "inbetween_purge"):
+        with pytest.raises(RuntimeError, match="In-between frames are being built; Esc stops that"):
+            getattr(bpy.ops.shutter, operator)()
+    monkeypatch.undo()
+
+
+def test_a_changed_source_makes_them_stale(bpy, building, effect, tmp_path):
+    bpy.ops.shutter.inbetween_build()
+    write_frames(tmp_path / "film" / "in", [ramp(number + 9) for number in range(COUNT)])
+    assert shown(bpy, building) == ("stale", 0, COUNT - 1)
+    assert look(bpy, building).size > 0
+    bpy.ops.shutter.inbetween_purge()
+    assert pictures(tmp_path) == []
+
+
+def test_another_method_has_frames_of_its_own(bpy, building, effect):
+    bpy.ops.shutter.inbetween_build()
+    effect.inbetween_method = "GOOD"
+    assert shown(bpy, building) == ("missing", 0, COUNT - 1)
+
+
+def test_the_estimate_comes_when_it_is_known(bpy, building, effect):
+    wait_until = time.monotonic() + 20
+    while (found := look(bpy, building)).estimate is None and time.monotonic() < wait_until:
+        time.sleep(0.05)
+    bpy.ops.shutter.inbetween_build()
+    assert found.estimate == pytest.approx(look(bpy, building).size, rel=0.5)
+
+
+@pytest.mark.usefixtures("effect")  # which is no more once the file is closed
+def test_a_moved_file_finds_its_frames(bpy, building, tmp_path):
+    bpy.ops.file.make_paths_relative()
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.shutter.inbetween_build()
+    shutil.move(tmp_path / "film", tmp_path / "elsewhere")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "elsewhere" / "film.blend"))
+    assert shown(bpy, building) == ("ready", COUNT - 1, COUNT - 1)
+
+
+def test_an_unsaved_file_has_no_place_for_them(bpy, building, edit, tmp_path, flow):
+    from shutter_addon.blender import effects
+
+    made(edit, tmp_path)
+    with pytest.raises(effects.EffectError, match="save it first"):
+        look(bpy, building)
+    for operator in ("inbetween_build", "inbetween_purge"):
+        with pytest.raises(RuntimeError, match="save it first"):
+            getattr(bpy.ops.shutter, operator)()
+
+
+def test_a_checkout_that_is_not_installed_has_no_folder_of_its_own(bpy, building, effect):
+    effect.inbetween_place = "USER"
+    with pytest.raises(RuntimeError, match="only an installed extension has a folder of its own"):
+        bpy.ops.shutter.inbetween_build()
+
+
+def test_without_a_factor_there_is_nothing_to_build(bpy, effect):
+    effect.inbetween = "1"
+    with pytest.raises(RuntimeError, match="Choose a factor first"):
+        bpy.ops.shutter.inbetween_build()
+
+
+def test_a_folder_that_cannot_be_written_is_one_sentence(bpy, building, effect, tmp_path):
+    (tmp_path / "film" / "virtual_shutter_inbetween").write_text("a file in the way")
+    with pytest.raises(RuntimeError, match="in-between frames cannot be written there") as raised:
+        bpy.ops.shutter.inbetween_build()
+    assert "Traceback" not in str(raised.value)
+    assert building.running() is None
+
+
+def test_footage_that_is_gone_is_one_sentence(bpy, effect, tmp_path):
+    shutil.rmtree(tmp_path / "film" / "in")
+    with pytest.raises(RuntimeError, match="no such file"):
+        bpy.ops.shutter.inbetween_build()
+
+
+@pytest.mark.usefixtures("effect")
+def test_a_file_is_closed_in_the_midst_of_a_build(bpy, building, flow):
+    """What a window does: the build runs on while Blender handles events."""
+    from shutter_addon.blender import strips
+
+    flow.append(lambda: time.sleep(0.05))
+    build = building.Build(*strips.active(bpy.context))
+    building._started(bpy.context, build)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    assert building.running() is None
+    assert build.future.done()
+    assert build.future.result().name == "partial"
+
+
+def test_a_look_costs_a_redraw_next_to_nothing(bpy, building, effect):
+    from shutter_addon.blender import strips
+
+    bpy.ops.shutter.inbetween_build()
+    found = strips.active(bpy.context)
+    building.look(*found)
+    start = time.perf_counter()
+    for _ in range(100):
+        building.look(*found)
+    assert (time.perf_counter() - start) / 100 < 2e-3

@@ -1,0 +1,181 @@
+"""Windows end at the cuts of a source as at a clip's ends, on every device, against the float64 reference."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from test_composition import Footage, check, few_pieces, instant
+
+from shutter_addon.compute.renderer import Renderer, open_compositor
+from shutter_addon.core import presets
+from shutter_addon.core.instant import Instant, Options
+from shutter_addon.media.cuts import Shots
+
+LENGTHS = 7, 6, 9
+ENDS = np.cumsum((0, *LENGTHS))
+SHOTS = {i: range(first, last) for first, last in pairwise(ENDS.tolist()) for i in range(first, last)}
+
+
+@pytest.fixture(params=["gpu", "cpu", "blender"], scope="module")
+def device(request):
+    if request.param == "blender":
+        from shutter_addon.compute.gpu import GPUCompositor
+
+        return GPUCompositor(request.getfixturevalue("blender_device"))
+    return open_compositor(request.param)[0]
+
+
+def film(dtype=np.uint8, size=(37, 23)) -> Footage:
+    """Three shots, each a texture that moves by a pixel a frame."""
+    rng, width, height = np.random.default_rng(40), *size
+    frames = []
+    for length in LENGTHS:
+        coarse = rng.random((height // 4 + 1, width // 4 + 1, 4)).repeat(4, 0).repeat(4, 1)[:height, :width]
+        frames += [np.roll(coarse, k, axis=1) for k in range(length)]
+    frames = np.stack(frames)
+    frames[..., 3] = 1
+    return Footage((frames * 255).astype(np.uint8) if dtype == np.uint8 else frames.astype(dtype))
+
+
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_a_window_shows_its_own_shot_alone(device, edges, position, direction, dtype):
+    rng = np.random.default_rng(41)
+    for index in (0, 6, 7, 9, 21):
+        for moment in (
+            instant(rng, edges=edges, position=position),
+            few_pieces(rng, 8, edges=edges, position=position, light="encoded"),
+        ):
+            check(device, Shots(film(dtype)), moment, index, direction, SHOTS[index])
+
+
+@pytest.mark.parametrize("preset", sorted(presets.PRESETS))
+def test_presets(device, preset):
+    bars = np.stack([presets.bars(preset, 12), presets.bars("STILL", 12)])
+    moment = Instant(Options(12, edges="shorten"), bars, instant(np.random.default_rng(42)).shapes[:1])
+    check(device, Shots(film()), moment, 4, 1, SHOTS[4])
+
+
+def test_off_the_whole_clip_is_seen_and_nothing_looked_at(device):
+    moment = instant(np.random.default_rng(43), stop_at_cuts=False)
+    plain, source = film(), film()
+    one, other = Renderer(device, plain), Renderer(device, Shots(source))
+    for index in (2, 3, 9, 5):
+        assert np.array_equal(one.picture(index, moment), other.picture(index, moment))
+    assert source.reads == plain.reads
+
+
+def test_what_was_shown_before_leaves_no_trace(device):
+    """Windows that go on, go back, jump, grow and turn around, with the option on and off."""
+    rng = np.random.default_rng(44)
+    renderer = Renderer(device, Shots(film(size=(17, 9))))
+    index = 4
+    for _ in range(60):
+        index = int(np.clip(index + rng.choice([1, 1, 1, -1, -2, 6, -9]), 0, 21))
+        edges, position = rng.choice(["hold", "mirror", "shorten"]), rng.choice(["start", "center", "end"])
+        moment = few_pieces(rng, edges=edges, position=position, stop_at_cuts=bool(rng.random() < 0.8))
+        moment.bars[:, rng.integers(4, 16) :] = 0
+        direction = 1 if rng.random() > 0.3 else -1
+        fresh = Renderer(device, Shots(film(size=(17, 9))))
+        assert np.array_equal(renderer.picture(index, moment, direction), fresh.picture(index, moment, direction))
+        fresh.release_window()
+
+
+def test_within_a_shot_every_frame_is_decoded_once(device):
+    """And a still frame needs no other."""
+    rng, source = np.random.default_rng(45), film()
+    source.frames = np.stack([np.roll(source.frames[0], k, axis=1) for k in range(22)])
+    renderer, moment = Renderer(device, Shots(source)), few_pieces(rng, 6)
+    for index in range(12):
+        renderer.picture(index, moment)
+    assert sorted(source.reads) == list(range(max(source.reads) + 1))
+    assert max(source.reads) <= 11 + 5 + 4  # and those that have a say in a cut
+    still = Instant(Options(6), presets.bars("STILL", 6)[None])
+    source.reads.clear()
+    Renderer(device, Shots(source)).picture(9, still)
+    assert source.reads == [9]
+
+
+def test_around_a_cut_no_frame_is_decoded_more_than_twice(device):
+    source = film()
+    renderer, moment = Renderer(device, Shots(source)), few_pieces(np.random.default_rng(46), 5)
+    for index in range(22):
+        renderer.picture(index, moment)
+    counts = np.bincount(source.reads, minlength=22)
+    assert counts.max() <= 2
+    assert counts.sum() <= 22 + 2 * 4
+
+
+STEP = 4
+BETWEEN = [0, 27, 51, 85]  # the middle one of a cut's pair of filmed frames, as 6 and 7, is the first one's
+
+
+def with_between(dtype=np.uint8) -> Footage:
+    """The film with random frames between its own."""
+    filmed = film(dtype).frames
+    rng = np.random.default_rng(48)
+    noise = rng.random((len(filmed) * STEP - STEP + 1, *filmed.shape[1:]))
+    every = (noise * 255).astype(np.uint8) if dtype == np.uint8 else noise.astype(dtype)
+    every[..., 3] = filmed[0, 0, 0, 3]
+    every[::STEP] = filmed
+    return Footage(every)
+
+
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_in_betweens_are_of_the_shot_of_the_nearer_filmed_frame(device, edges, position, dtype):
+    rng = np.random.default_rng(49)
+    for first, stop in pairwise(BETWEEN):
+        for index, direction in ((first, 1), (first + 9, -1), (stop - 1, 1)):
+            moment = instant(rng, edges=edges, position=position)
+            check(device, Shots(with_between(dtype), STEP), moment, index, direction, range(first, stop))
+
+
+def test_cuts_are_looked_for_in_filmed_frames_alone():
+    source = with_between()
+    shots = Shots(source, STEP)
+    assert shots.lacking(20, 20, 40) == {20, 24, 28, 32, 36, 40}
+    assert shots.around(20, 20, 40) == range(27)
+    assert shots.around(20, 20, 26, known=True) == range(85)
+    assert shots.around(40, 3, 60) == range(27, 51)
+    assert {index % STEP for index in source.reads} == {0}
+    assert len(source.reads) == len(set(source.reads))
+
+
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+def test_what_is_missing_is_what_is_read(device, edges):
+    """Once cuts are known: as prefetching has it."""
+    source, rng = Shots(film()), np.random.default_rng(47)
+    moment = instant(rng, 5, edges=edges, position="center")
+    renderer = Renderer(device, source)
+    for index in range(22):
+        renderer.picture(index, moment)
+    renderer.release_window()
+    for index in (5, 9, 20):
+        source.reads.clear()
+        missing = renderer.missing(index, 1, moment)
+        renderer.picture(index, moment)
+        assert set(source.reads) == missing
+        renderer.release_window()
+
+
+def test_a_frame_that_cannot_be_read_is_missed_only_where_it_is_shown(device):
+    from shutter_addon.media import MediaError
+
+    source = film()
+    read = source.read
+
+    def fail(index):
+        if index == 5:
+            raise MediaError("broken")
+        return read(index)
+
+    source.read = fail
+    last = Instant(Options(5), np.eye(5)[4:])
+    renderer = Renderer(device, Shots(source))
+    renderer.picture(2, last)
+    with pytest.raises(MediaError, match="broken"):
+        renderer.picture(1, last)

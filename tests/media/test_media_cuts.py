@@ -1,0 +1,157 @@
+"""Cuts and repeated frames: films, pieces of them joined at known places, and what looks like a cut and is none."""
+
+import numpy as np
+import pytest
+
+from shutter_addon.media import MediaError, open_source
+from shutter_addon.media.cuts import NEIGHBOURS, Shots, is_cut, is_duplicate, signature
+
+
+@pytest.fixture(scope="module")
+def film(bunny):
+    """Every frame of the bunny, a quarter as wide and high: (132, 180, 320, 4) uint8."""
+    with open_source(bunny) as source:
+        return np.stack([source.read(i)[2::4, 2::4] for i in range(source.count)])
+
+
+def noise(count: int, seed: int, pace: int = 1) -> np.ndarray:
+    """A texture that moves sideways."""
+    coarse = np.random.default_rng(seed).integers(20, 230, (23, 80, 4))
+    fine = coarse.repeat(8, 0).repeat(8, 1)[:180].astype(np.uint8)
+    return np.stack([fine[:, k * pace : k * pace + 320] for k in range(count)])
+
+
+def decided(decide, frames, transfer="srgb") -> list[int]:
+    pictures = [signature(frame, transfer) for frame in frames]
+    return [
+        i for i in range(1, len(pictures)) if decide(pictures[max(i - NEIGHBOURS, 0) : i], pictures[i : i + NEIGHBOURS])
+    ]
+
+
+def cuts(*parts, **kind) -> list[int]:
+    return decided(is_cut, np.concatenate(parts), **kind)
+
+
+def lit(frames, gain=1.0, more=0.0):
+    return np.clip(frames * gain + more, 0, 255).astype(np.uint8)
+
+
+def test_films_without_cuts_have_none(film, bunny):
+    assert cuts(film) == []
+    with open_source(bunny.with_name("pedestrians.avi")) as source:
+        frames = (source.read(i) for i in range(source.count))
+        assert decided(is_cut, frames) == []
+
+
+def test_its_frames_that_repeat_are_found(film):
+    """Made at 24 frames per second, it has one more in each second."""
+    assert decided(is_duplicate, film) == [7, 32, 57, 82, 107]
+
+
+def test_a_still_scene_has_no_duplicates(film):
+    assert decided(is_duplicate, film[[0] * 12]) == []
+
+
+def test_shots_that_are_joined(film):
+    left, right = film[10:20, 40:140, :178], film[90:100, 20:120, 140:318]
+    assert cuts(left, right) == [10]
+    assert cuts(film[:10], noise(10, 1), noise(10, 2, 3), film[120:130]) == [10, 20, 30]
+    assert cuts(film[1:11], film[120:130]) == [10]  # the same camera, the rabbit elsewhere
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 4, 5])
+def test_short_shots(film, length):
+    assert cuts(film[:10], noise(length, 3), noise(10, 4)) == [10, 10 + length]
+
+
+@pytest.mark.parametrize("gain", [0.06, 0.15])
+def test_dark_scenes(film, gain):
+    rng = np.random.default_rng(5)
+    frames = np.concatenate([film[:10], film[60:70, :, ::-1]])
+    assert cuts(lit(frames, gain, rng.normal(0, 2, frames.shape))) == [10]
+
+
+def test_any_type_of_samples_and_light(film):
+    frames = np.concatenate([film[:8], noise(8, 6)])
+    assert cuts(frames.astype(np.uint16) * 257) == [8]
+    scene = (frames.astype(np.float32) / 255) ** 2.2 * 4
+    scene[3, :8, :8], scene[4, 0, 0] = 1e5, np.nan
+    assert cuts(scene, transfer="linear") == [8]
+
+
+@pytest.mark.parametrize("pace", [4, 16, 40])
+def test_pans_are_no_cuts(pace):
+    wide = np.random.default_rng(7).integers(0, 256, (23, 400, 4)).repeat(8, 0).repeat(8, 1)[:180].astype(np.uint8)
+    assert cuts(np.stack([wide[:, k * pace : k * pace + 320] for k in range(24)])) == []
+
+
+@pytest.mark.parametrize("length", [1, 2, 3])
+def test_flashes_are_no_cuts(film, length):
+    for more in (80, 200):
+        frames = film[20:44].copy()
+        frames[12 : 12 + length] = lit(frames[12 : 12 + length].astype(int), more=more)
+        assert cuts(frames) == []
+
+
+@pytest.mark.parametrize("length", [3, 12, 24])
+def test_fades_and_dissolves_are_no_cuts(film, length):
+    share = np.clip((np.arange(length + 16) - 8) / length, 0, 1)[:, None, None, None]
+    one, other = film[: length + 16], noise(length + 16, 8)
+    for end in (0, 255, other):
+        assert cuts(lit(one * (1 - share) + end * share)) == []
+        assert cuts(lit(one * share + end * (1 - share))) == []
+
+
+@pytest.mark.parametrize("times", [2, 3])
+def test_motion_on_twos_and_threes_is_no_cut(times):
+    assert cuts(noise(12, 9, 24).repeat(times, 0)) == []
+
+
+def test_small_frames():
+    assert signature(np.zeros((4, 4, 4), np.uint8), "srgb").shape == (4, 4, 3)
+    assert signature(np.zeros((2160, 16, 4), np.float16), "linear").shape == (18, 16, 3)
+
+
+class Frames:
+    transfer, alpha = "srgb", "opaque"
+
+    def __init__(self, frames):
+        self.frames, self.count, self.reads = frames, len(frames), []
+
+    def read(self, index):
+        self.reads.append(index)
+        if self.frames[index] is None:
+            raise MediaError("broken")
+        return self.frames[index].copy()
+
+
+def test_shots_end_at_cuts_and_at_the_clips_ends(film):
+    frames = [*film[:10], *noise(8, 10), *film[90:100, :, ::-1]]
+    shots = Shots(Frames(frames))
+    for index, shot in ((0, range(10)), (9, range(10)), (10, range(10, 18)), (17, range(10, 18)), (27, range(18, 28))):
+        assert shots.around(index, -5, 40) == shot
+        assert Shots(Frames(frames)).around(index, index - 11, index + 11) == shot
+        assert shots.around(index, index, index) == range(28)
+
+
+def test_a_read_frame_is_handed_over(film):
+    source = Frames(film[:20])
+    shots = Shots(source)
+    assert shots.lacking(3, 3, 8) == set(range(3, 9))
+    assert shots.around(3, 3, 8) == range(20)
+    assert source.reads == list(range(3, 9))
+    assert shots.handed() == set(source.reads)
+    assert np.array_equal(shots.read(4), film[4])
+    assert source.reads == list(range(3, 9))
+    assert 4 not in shots.handed()
+    assert shots.lacking(3, 3, 8) == set()
+    shots.read(4)
+    assert source.reads[-1] == 4
+
+
+def test_where_a_frame_cannot_be_read_there_is_no_cut(film):
+    frames = [*film[:10], *noise(8, 11)]
+    frames[4] = None
+    assert Shots(Frames(frames)).around(2, 0, 17) == range(10)
+    frames[9] = None
+    assert Shots(Frames(frames)).around(2, 0, 17) == range(18)

@@ -1,0 +1,397 @@
+"""In-between frames in files: what is built, kept, found damaged, and given back."""
+
+import hashlib
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from footage import picture, save_image, see_through
+
+from shutter_addon.media import MediaError, cache, inbetween, open_source
+
+ROOT = Path(__file__).parents[2]
+FACTOR, COUNT = 4, 6
+STRAIGHT = {"oiio__UnassociatedAlpha": 1}
+
+
+def blend(first, second, factor, *_):
+    """A plain blend, in place of optical flow."""
+    for step in range(1, factor):
+        weight = step / factor
+        yield (first * (1.0 - weight) + second * weight).astype(first.dtype)
+
+
+def build(source, folder, **more):
+    return inbetween.build(source, folder, FACTOR, "quick", **{"between": blend, **more})
+
+
+def state(source, folder):
+    return cache.state(source, folder, FACTOR, "quick")
+
+
+def opened(source, folder):
+    return inbetween.Inbetween(source, folder, FACTOR, "quick")
+
+
+def kept(folder):
+    """{path in the folder: hash} of all pictures; how the checks are spread over files is left to the builds."""
+    paths = [path for path in folder.rglob("*") if path.is_file() and path.parent.name != "checks"]
+    return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in paths}
+
+
+def pictures(folder):
+    return sorted(path for path in folder.glob("*/*") if path.suffix in (".png", ".exr"))
+
+
+def footage(folder, count=COUNT, *, samples="uint8", suffix=".png", alpha=False):
+    """Numbered pictures, so that any two differ."""
+    folder.mkdir(exist_ok=True)
+    for number in range(count):
+        stored = (see_through if alpha else picture)(number)
+        stored = stored if samples == "uint8" else stored / np.float32(255)
+        save_image(folder / f"f{number:03d}{suffix}", stored, samples, **STRAIGHT)
+    return folder / f"f000{suffix}"
+
+
+@pytest.fixture
+def source(tmp_path):
+    with open_source(footage(tmp_path / "shot"), fps=24) as source:
+        yield source
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return tmp_path / "cache"
+
+
+@pytest.mark.parametrize("alpha", [False, True])
+@pytest.mark.parametrize(
+    ("samples", "suffix"),
+    [("uint8", ".png"), ("uint16", ".png"), ("uint16", ".tif"), ("half", ".exr"), ("float", ".exr"), ("float", ".tif")],
+)
+def test_frames_come_back_as_they_were_built(tmp_path, folder, samples, suffix, alpha):
+    first = footage(tmp_path / "shot", 3, samples=samples, suffix=suffix, alpha=alpha)
+    with open_source(first) as source:
+        assert build(source, folder) == ("ready", 2, 2)
+        frames = [source.read(index) for index in range(3)]
+        expected = [frames[0], *blend(*frames[:2], FACTOR), frames[1], *blend(*frames[1:], FACTOR), frames[2]]
+        with opened(source, folder) as between:
+            assert between.count == len(expected)
+            for index, frame in enumerate(expected):
+                found = between.read(index)
+                assert found.dtype == source.dtype
+                assert np.array_equal(found, frame), index
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.exr"])
+def test_equal_pictures_are_equal_files(tmp_path, name):
+    frame = see_through(3) if name == "a.png" else see_through(3).astype(np.float16)
+    path, written = tmp_path / name, []
+    for _ in range(2):
+        cache.write_picture(path, frame, "straight")
+        written.append(path.read_bytes())
+        time.sleep(1.01)  # time stamps in EXR files are seconds
+    assert written[0] == written[1]
+
+
+def test_is_a_source_of_a_higher_rate(source, folder):
+    build(source, folder)
+    between = opened(source, folder)
+    assert (between.count, between.fps) == ((COUNT - 1) * FACTOR + 1, 24 * FACTOR)
+    assert (between.width, between.alpha, between.path) == (source.width, source.alpha, source.path)
+    with pytest.raises(IndexError):
+        between.read(between.count)
+
+
+def test_a_missing_frame_is_never_made_up(source, folder):
+    build(source, folder, frames=(0, 1))
+    between = opened(source, folder)
+    assert [between.has(index) for index in range(between.count)] == [
+        index < 2 * FACTOR or index % FACTOR == 0 for index in range(between.count)
+    ]
+    with pytest.raises(MediaError, match=r"in-between frames of frame 2 are missing"):
+        between.read(2 * FACTOR + 1)
+    build(source, folder)
+    assert between.read(2 * FACTOR + 1).shape == (source.height, source.width, 4)
+
+
+def test_state_and_chunks(source, folder):
+    assert state(source, folder) == ("missing", 0, COUNT - 1)
+    assert build(source, folder, frames=(0, 2)) == ("ready", 3, 3)
+    assert state(source, folder) == ("partial", 3, COUNT - 1)
+    assert build(source, folder, frames=(3, COUNT - 1)) == ("ready", 2, 2)
+    assert state(source, folder) == ("ready", COUNT - 1, COUNT - 1)
+    chunks = kept(folder)
+    build(source, folder.with_name("whole"))
+    assert kept(folder.with_name("whole")) == chunks
+    pictures(folder)[-1].unlink()
+    assert state(source, folder).name == "partial"
+    with pytest.raises(MediaError, match="has frames 0 to 5, not 3 to 6"):
+        build(source, folder, frames=(3, 6))
+
+
+def test_nothing_is_built_twice(source, folder):
+    def never(*_):
+        raise AssertionError
+
+    build(source, folder)
+    seen = []
+    assert build(source, folder, between=never, update=lambda *at: seen.append(at)).name == "ready"
+    assert seen == [(done, COUNT - 1) for done in range(1, COUNT)]
+
+
+def test_cancelled_keeps_what_is_finished(source, folder):
+    done = []
+    result = build(source, folder, update=lambda *at: done.append(at), cancelled=lambda: len(done) >= 2)
+    assert result.name == "partial"
+    assert 2 <= result.done == state(source, folder).done < COUNT - 1
+
+
+def test_cancelled_within_a_pair(source, folder):
+    assert build(source, folder, cancelled=lambda: bool(pictures(folder))) == ("partial", 0, COUNT - 1)
+    assert state(source, folder).done == 0
+    build(source, folder)
+    build(source, folder.with_name("whole"))
+    assert kept(folder) == kept(folder.with_name("whole"))
+
+
+def test_every_damaged_file_is_found_and_built_again(source, folder):
+    build(source, folder)
+    whole, between = kept(folder), opened(source, folder)
+    for file in pictures(folder):
+        for damage in (lambda data: data[: len(data) // 2], lambda data: b"", flipped):
+            file.write_bytes(damage(file.read_bytes()))
+            with pytest.raises(MediaError, match=f"{file.name}: this in-between frame is damaged or gone"):
+                between.read(int(file.stem))
+            build(source, folder)
+            assert kept(folder) == whole
+
+
+def flipped(data):
+    place = random.Random(len(data)).randrange(len(data))
+    return data[:place] + bytes([data[place] ^ 16]) + data[place + 1 :]
+
+
+def test_damaged_checks_and_manifest_are_built_again(source, folder):
+    save_image(source.files[2], picture(1))  # two equal frames
+    build(source, folder)
+    whole = kept(folder)
+    checks = next(folder.glob("*/checks/*"))
+    text = checks.read_bytes()
+    for place in range(0, len(text), 41):
+        checks.write_bytes(text[:place] + bytes([text[place] ^ 1]) + text[place + 1 :])
+        with opened(source, folder) as between:
+            assert not between.has(2 * FACTOR - 1) or np.array_equal(between.read(2 * FACTOR - 1), source.read(1))
+        assert build(source, folder).name == "ready"
+        assert kept(folder) == whole
+    checks.write_bytes(text.replace(b"# 1 same", b"# 3 same"))
+    with opened(source, folder) as between:
+        assert not np.array_equal(between.read(3 * FACTOR + 1), source.read(3))
+    next(folder.glob("*/manifest.json")).write_text("{")
+    build(source, folder)
+    assert kept(folder) == whole
+
+
+def test_equal_frames_need_no_pictures(source, folder):
+    save_image(source.files[3], picture(2))
+    build(source, folder)
+    assert len(pictures(folder)) == (COUNT - 2) * (FACTOR - 1)
+    between = opened(source, folder)
+    for step in range(FACTOR):
+        assert np.array_equal(between.read(2 * FACTOR + step), source.read(2))
+
+
+def test_a_repeated_frame_needs_no_pictures_though_a_codec_saw_it(source, folder):
+    noise = np.random.default_rng(1).integers(0, 2, picture(2).shape)
+    save_image(source.files[3], (picture(2) | noise).astype(np.uint8))
+    build(source, folder)
+    assert np.array_equal(opened(source, folder).read(2 * FACTOR + 3), source.read(2))
+
+
+def test_nothing_is_made_up_across_a_cut(tmp_path, folder):
+    (tmp_path / "shot").mkdir()
+    random = np.random.default_rng(7)
+    for number in range(12):
+        if number % 6 == 0:
+            texture = random.integers(0, 256, (8, 16, 3)).astype(np.uint8).repeat(8, 0).repeat(8, 1)
+        save_image(tmp_path / "shot" / f"{number}.png", np.roll(texture, number, 1))
+    with open_source(tmp_path / "shot" / "0.png") as source:
+        build(source, folder)
+        assert len(pictures(folder)) == 10 * (FACTOR - 1)
+        between = opened(source, folder)
+        shown = [between.read(5 * FACTOR + step) for step in range(FACTOR)]
+        for frame, expected in zip(shown, (5, 5, 5, 6), strict=True):
+            assert np.array_equal(frame, source.read(expected))
+        build(source, folder.with_name("chunk"), frames=(5, 5))
+        assert not pictures(folder.with_name("chunk"))
+
+
+def test_found_again_where_all_has_moved(source, folder, tmp_path):
+    build(source, folder)
+    moved = tmp_path / "elsewhere"
+    moved.mkdir()
+    shutil.copytree(folder, moved / "cache")  # copies have other time stamps
+    shutil.copytree(source.path.parent, moved / "shot")
+    with open_source(moved / "shot" / source.path.name) as other:
+        assert state(other, moved / "cache").name == "ready"
+    save_image(moved / "shot" / source.files[3].name, picture(99))
+    with open_source(moved / "shot" / source.path.name) as changed:
+        assert state(changed, moved / "cache").name == "stale"
+
+
+@pytest.mark.parametrize("resized", [True, False])
+def test_stale_when_the_source_changed(source, folder, resized):
+    build(source, folder)
+    if resized:
+        source.files[-1].unlink()
+    else:
+        save_image(source.files[2], picture(99))
+    with open_source(source.path) as changed:
+        assert state(changed, folder).name == "stale"
+        assert not opened(changed, folder).has(1)
+        build(changed, folder)
+        assert state(changed, folder).name == "ready"
+
+
+def test_another_factor_or_reading_is_another_cache(source, folder):
+    build(source, folder)
+    assert cache.state(source, folder, 8, "quick").name == "missing"
+    assert cache.state(source, folder, FACTOR, "good").name == "missing"
+    source.transfer = "linear"
+    assert state(source, folder).name == "stale"
+    source.transfer, source.options = "srgb", {"deinterlace": True}
+    assert state(source, folder).name == "stale"
+
+
+def test_purge_takes_only_what_was_built(source, folder, tmp_path):
+    build(source, folder)
+    own = [folder / "notes.txt", next(folder.iterdir()) / "mine.png", folder / "other" / "manifest.json"]
+    for path in own:
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("{}")
+    with open_source(footage(tmp_path / "second", 2)) as second:
+        build(second, folder)
+        size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file() and path not in own)
+        freed = cache.purge(folder, source)
+        assert state(second, folder).name == "ready"
+    assert state(source, folder).name == "missing"
+    freed += cache.purge(folder)
+    assert freed == size
+    assert sorted(path for path in folder.rglob("*") if path.is_file()) == sorted(own)
+
+
+def test_checks_are_read_by_sha256sum(source, folder):
+    build(source, folder)
+    if shutil.which("sha256sum") is None:
+        pytest.skip("no sha256sum")
+    place = next(folder.iterdir())
+    checks = [str(path.relative_to(place)) for path in place.glob("checks/*")]
+    subprocess.run(["sha256sum", "--quiet", "-c", *checks], cwd=place, check=True)
+
+
+def test_what_cannot_be_written_is_one_sentence(source, folder):
+    folder.write_text("in the way")
+    with pytest.raises(MediaError, match=r"in-between frames cannot be written there \(Not a directory\)"):
+        build(source, folder)
+
+
+def test_a_broken_source_frame_leaves_what_is_built(source, folder):
+    data = source.files[4].read_bytes()
+    source.files[4].write_bytes(data[: len(data) // 2])
+    with pytest.raises(MediaError, match=r"f004.png"):
+        build(source, folder)
+    assert state(source, folder) == ("partial", 3, COUNT - 1)
+
+
+def test_a_full_disk_leaves_what_is_built(source, folder):
+    resource = pytest.importorskip("resource")
+    build(source, folder.with_name("whole"))
+    build(source, folder, frames=(0, 1))
+    sizes = sorted(path.stat().st_size for path in pictures(folder.with_name("whole")))
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (sizes[len(sizes) // 2], hard))
+        with pytest.raises(MediaError, match="could not be written whole; is the disk full"):
+            build(source, folder)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, handler)
+    assert kept(folder).items() <= kept(folder.with_name("whole")).items()
+    assert 2 <= state(source, folder).done < COUNT - 1
+    assert not list(folder.rglob(".*"))
+
+
+BUILDER = """
+import sys, time
+sys.path.insert(0, "tests/media")
+from test_media_inbetween import blend, build
+from shutter_addon.media import open_source
+
+def slow(*frames):
+    for picture in blend(*frames):
+        time.sleep(0.01)
+        yield picture
+
+print("ready", flush=True)
+sys.stdin.readline()
+build(open_source(sys.argv[1]), sys.argv[2], between=slow)
+"""
+
+
+def builder(source, folder):
+    """A process that builds as soon as its input ends."""
+    command = [sys.executable, "-c", BUILDER, str(source.path), str(folder)]
+    process = subprocess.Popen(command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    process.stdout.readline()
+    return process
+
+
+def test_killed_anywhere_it_goes_on_to_the_same_files(tmp_path, folder, monkeypatch):
+    with open_source(footage(tmp_path / "shot", 40)) as source:
+        build(source, folder.with_name("whole"))
+        pauses, killed = random.Random(5), []
+        for _ in range(10):
+            with builder(source, folder) as process:
+                process.stdin.close()
+                time.sleep(pauses.uniform(0.0, 0.1))
+                process.kill()
+            killed.append(process.returncode)
+        assert killed == [-signal.SIGKILL] * 10
+        assert 0 < state(source, folder).done < 39
+        monkeypatch.setattr(cache, "LEFT_BEHIND", 0)
+        build(source, folder)
+        assert kept(folder) == kept(folder.with_name("whole"))
+
+
+def test_two_processes_at_once_do_no_damage(tmp_path, folder):
+    with open_source(footage(tmp_path / "shot", 30)) as source:
+        with builder(source, folder) as one, builder(source, folder) as two:
+            one.stdin.close()
+            two.stdin.close()
+        assert (one.returncode, two.returncode) == (0, 0)
+        assert len(list(folder.glob("*/checks/*"))) == 2
+        build(source, folder.with_name("whole"))
+        assert kept(folder) == kept(folder.with_name("whole"))
+        assert all(opened(source, folder).read(index) is not None for index in range(29 * FACTOR))
+
+
+def test_estimate_is_near_what_is_built(bunny, folder):
+    class Short:  # a movie's first frames
+        def __init__(self, source):
+            self._source, self.count = source, 4
+
+        def __getattr__(self, name):
+            return getattr(self._source, name)
+
+    with open_source(bunny) as movie:
+        source = Short(movie)
+        build(source, folder)
+        size = sum(path.stat().st_size for path in pictures(folder))
+        assert 0.7 * size < inbetween.estimate(source, FACTOR) < 1.5 * size
