@@ -513,7 +513,7 @@ def test_only_what_renders_by_its_keys_can_be_keyed(effect, editing):
         ("ShutterBar", "weight"),
         *(("ShutterRegion", name) for name in ("width", "location", "rotation", "scale")),
         *(("ShutterEffect", name) for name in ("position", "interpolation", "light", "exposure", "edges")),
-        *(("ShutterEffect", name) for name in ("aggregate", "border", "stop_at_cuts")),
+        *(("ShutterEffect", name) for name in ("aggregate", "border", "stop_at_cuts", "source_time")),
     }
 
 

@@ -293,6 +293,24 @@ def test_a_plain_ease_stays_a_key_and_no_more(effect_on):
     assert found == recipes.parse(json.dumps(BASE))
 
 
+def test_keys_of_the_source_time_lie_in_a_group_of_the_effect(effect_on):
+    apply(effect_on, BASE)
+    assert curve(effect_on[0], "source_time").group.name == effect_on[1].name
+
+
+def test_a_source_time_without_keys_holds_a_frame(effect_on):
+    plain = {"version": 1, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
+    apply(effect_on, plain)
+    effect_on[1].use_source_time, effect_on[1].source_time = True, 3.5
+    assert export(effect_on).time == [recipes.TimeKey(1, 3.5)]
+    effect_on[1].use_source_time = False
+    assert export(effect_on).time == []
+    apply(effect_on, plain | {"time": [{"frame": 1, "value": 3.5}]})
+    assert effect_on[1].use_source_time
+    apply(effect_on, plain)
+    assert not effect_on[1].use_source_time
+
+
 def test_what_no_recipe_can_hold(effect_on):
     from shutter_addon.blender.effects import EffectError
 

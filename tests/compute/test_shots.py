@@ -108,6 +108,43 @@ def test_around_a_cut_no_frame_is_decoded_more_than_twice(device):
     assert counts.sum() <= 22 + 2 * 4
 
 
+STEP = 4
+BETWEEN = [0, 27, 51, 85]  # the middle one of a cut's pair of filmed frames, as 6 and 7, is the first one's
+
+
+def with_between(dtype=np.uint8) -> Footage:
+    """The film with random frames between its own."""
+    filmed = film(dtype).frames
+    rng = np.random.default_rng(48)
+    noise = rng.random((len(filmed) * STEP - STEP + 1, *filmed.shape[1:]))
+    every = (noise * 255).astype(np.uint8) if dtype == np.uint8 else noise.astype(dtype)
+    every[..., 3] = filmed[0, 0, 0, 3]
+    every[::STEP] = filmed
+    return Footage(every)
+
+
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_in_betweens_are_of_the_shot_of_the_nearer_filmed_frame(device, edges, position, dtype):
+    rng = np.random.default_rng(49)
+    for first, stop in pairwise(BETWEEN):
+        for index, direction in ((first, 1), (first + 9, -1), (stop - 1, 1)):
+            moment = instant(rng, edges=edges, position=position)
+            check(device, Shots(with_between(dtype), STEP), moment, index, direction, range(first, stop))
+
+
+def test_cuts_are_looked_for_in_filmed_frames_alone():
+    source = with_between()
+    shots = Shots(source, STEP)
+    assert shots.lacking(20, 20, 40) == {20, 24, 28, 32, 36, 40}
+    assert shots.around(20, 20, 40) == range(27)
+    assert shots.around(20, 20, 26, known=True) == range(85)
+    assert shots.around(40, 3, 60) == range(27, 51)
+    assert {index % STEP for index in source.reads} == {0}
+    assert len(source.reads) == len(set(source.reads))
+
+
 @pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
 def test_what_is_missing_is_what_is_read(device, edges):
     """Once cuts are known: as prefetching has it."""
