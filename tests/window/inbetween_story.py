@@ -5,6 +5,7 @@ test_window.py.
 A slow blend stands in for optical flow, as OpenCV need not be there."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
+import os
 import shutil
 import sys
 import time
@@ -121,9 +122,20 @@ def built():
     driver.key("Escape")
     yield from ended()
     yield from shown("partial")
-    yield from building_begun()
+    yield from undone_meanwhile()
     yield from ended()
     yield from shown("ready")
+
+
+def undone_meanwhile():
+    """The build is no step of undo, and goes on."""
+    bpy.ops.ed.undo_push(message="Factor")
+    story.effect().border = False
+    bpy.ops.ed.undo_push(message="Border")
+    yield from building_begun()
+    driver.key("ctrl+z")
+    yield from driver.until(lambda: story.effect().border, "the border is back")
+    assert part("blender.building").running() is not None
 
 
 def gone_stale_and_built_again():
@@ -144,6 +156,22 @@ def removed():
     yield 1.0
     yield from shown("removed")
     assert not (FILM / "virtual_shutter_inbetween").exists()
+
+
+def put_elsewhere():
+    """The extension's own folder lies among the user's."""
+    story.effect().inbetween_place = "USER"
+    folder = part("blender.inbetweens").folder(story.effect())
+    assert Path(os.environ["BLENDER_USER_RESOURCES"]) in folder.parents, folder
+    yield from building_begun()
+    driver.key("Escape")
+    yield from ended()
+    assert list(folder.rglob("0*.png"))
+    with story.override("PREVIEW"):
+        bpy.ops.shutter.inbetween_purge("EXEC_DEFAULT", True)
+    assert not folder.exists()
+    story.effect().inbetween_place = "FILE"
+    yield
 
 
 def deleted_meanwhile():
@@ -197,6 +225,7 @@ def told():
     yield from built()
     yield from gone_stale_and_built_again()
     yield from removed()
+    yield from put_elsewhere()
     yield from deleted_meanwhile()
     yield from closed_meanwhile()
     yield from disabled_meanwhile()
