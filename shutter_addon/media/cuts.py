@@ -120,6 +120,12 @@ class Shots:
         frame = self._handed.pop(index, None)
         return self._source.read(index) if frame is None else frame
 
+    def cut_before(self, index: int) -> bool:
+        """Whether there is a cut between frame `index` ≥ 1 and the one before it; it reads what it must."""
+        if index not in self._cuts:
+            self._cuts[index] = self._decide(index)
+        return self._cuts[index]
+
     def around(self, index: int, low: int, high: int, *, known: bool = False) -> range:
         """The frames of the shot around frame `index`, for a window of the frames from `low` to `high`.
 
@@ -128,7 +134,7 @@ class Shots:
         cut up to NEIGHBOURS frames on each side. known: it reads nothing, and where it does not know there is no cut.
         """
         first = 0
-        is_cut = self._cuts.get if known else self._is_cut
+        is_cut = self._cuts.get if known else self.cut_before
         for i in range(max(low, 0) + 1, min(high, self.count - 1) + 1):
             if is_cut(i):
                 if i > index:
@@ -154,11 +160,6 @@ class Shots:
         """Lets go of the file; a later read opens it again."""
         self.release()
         self._source.close()
-
-    def _is_cut(self, index: int) -> bool:
-        if index not in self._cuts:
-            self._cuts[index] = self._decide(index)
-        return self._cuts[index]
 
     def _decide(self, index: int) -> bool:
         last, next_ = self._signature(index - 1), self._signature(index)
