@@ -58,7 +58,8 @@ def is_cut(before: list[Signature], after: list[Signature]) -> bool:
     in structure (brightness and contrast apart), and by more than neighbours on one side do. So a flash that passes, a
     fade, a dissolve, a pan or a shake is none. A change of side in the neighbourhood (the end of a very short shot) is
     allowed. Not found are cuts between much the same pictures, or into the midst of a fast pan; taken for one is what
-    covers most of the picture at once, for NEIGHBOURS frames or longer."""
+    covers most of the picture at once, for NEIGHBOURS frames or longer, and fast motion that stands still for so long.
+    """
     before, after = [_levelled(s) for s in before], [_levelled(s) for s in after]
     if min(_change(a, b) for a in before for b in after) < CHANGE:
         return False
