@@ -36,6 +36,7 @@ from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.core import light, presets, recipe
 from shutter_addon.media import open_source
+from shutter_addon.media.cuts import Shots
 
 ROOT = Path(__file__).resolve().parents[1]
 WAYS = ("ours", "constant", "average")
@@ -122,7 +123,7 @@ def _composed(edit, source, indices) -> dict[int, np.ndarray]:
     """What the effect shows of source frames, in levels; composed by NumPy."""
     strip = strips.effect_strips(edit)[0]
     effect = strips.effect_of(edit, strip.scene)
-    renderer = Renderer(CPUCompositor(), source)
+    renderer = Renderer(CPUCompositor(), Shots(source))
     return {
         index: 255 * light.to_encoded(renderer.picture(index, effects.instant(edit, effect, strip, index + 1)))[..., :3]
         for index in indices
