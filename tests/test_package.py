@@ -34,13 +34,13 @@ BLENDERS_OWN = ("EGL Error", "system.path")
 NO_OPENGL = {"LIBGL_DRIVERS_PATH": "/nowhere", "__EGL_VENDOR_LIBRARY_DIRS": "/nowhere"}
 
 
+def built(*arguments, root=ROOT):
+    command = [sys.executable, root / "scripts" / "build.py", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
 def build(*arguments, root=ROOT):
-    done = subprocess.run(
-        [sys.executable, root / "scripts" / "build.py", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = built(*arguments, root=root)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -97,6 +97,30 @@ def test_a_zip_with_wheels_holds_those_of_its_system(dist, system, tag):
     generated = manifest["build"]["generated"]
     assert generated["platforms"] == [system.replace("_", "-")]
     assert {wheel.removeprefix("./") for wheel in generated["wheels"]} == wheels
+
+
+def test_wheels_that_are_not_to_be_had_are_one_sentence(tmp_path):
+    done = built("--output", tmp_path, "--python", "3.x", "--system", SYSTEM)
+    assert done.returncode == 2
+    assert done.stderr == f"build: no wheels for Python 3.x on {SYSTEM}, or PyPI is not reached\n"
+
+
+def test_a_repository_is_no_output_folder(tmp_path):
+    done = built("--output", tmp_path, "--repository", tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.endswith("--repository: it needs a folder of its own\n")
+    assert not list(tmp_path.iterdir())
+
+
+def test_help_says_where_a_relative_folder_lies():
+    assert "takes a relative DIR from the project's folder" in " ".join(build("--help").split())
+
+
+def test_the_version_is_the_same_everywhere():
+    version = tomllib.loads((ROOT / "blender_manifest.toml").read_text())["version"]
+    assert tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"] == version
+    assert re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)[1] == version
+    assert set(re.findall(r"virtual_shutter-([\d.]+)-", (ROOT / "README.md").read_text())) == {version}
 
 
 def test_the_wheels_are_what_the_code_needs_and_blender_lacks():
@@ -290,9 +314,11 @@ def test_a_repository_updates(blender, tmp_path):
     blender.run(*extension, "repo-add", "--url", f"{(repository / 'index.json').as_uri()}", "ours")
     blender.run("--online-mode", *extension, "sync")
     blender.run("--online-mode", *extension, "install", "-e", "virtual_shutter")
-    shutil.copytree(ROOT, next_root, ignore=shutil.ignore_patterns(".*", "assets", "docs", "tests", "__pycache__"))
+    needless = shutil.ignore_patterns(".*", "assets", "dist", "docs", "out", "tests", "__pycache__")
+    shutil.copytree(ROOT, next_root, ignore=needless)
     manifest = next_root / "blender_manifest.toml"
-    manifest.write_text(manifest.read_text().replace('version = "0.1.0"', 'version = "9.9.9"'))
+    manifest.write_text(re.sub(r'(?m)^version = ".*"', 'version = "9.9.9"', manifest.read_text()))
+    shutil.copy(next(repository.glob("*.zip")), repository / "virtual_shutter-9.9.9-python3.12-linux_x64.zip")
     build("--output", tmp_path / "dist", *options, root=next_root)
     assert len(list(repository.glob("*.zip"))) == 1
     blender.run("--online-mode", *extension, "sync")
