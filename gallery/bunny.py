@@ -23,7 +23,7 @@ def still(shots):
             Panel(shot.coefficients(FRAME), "Coefficients"),
             Panel(shot.everywhere(FRAME, "Long"), "The long exposure alone"),
         ),
-        credit=ITEM.caption,
+        caption=ITEM.caption,
     )
 
 
@@ -37,9 +37,9 @@ ITEM = Item(
     name="bunny",
     figure=5,
     title="scribbles and bar graphs",
-    caption="Big Buck Bunny, © 2008 Blender Foundation, www.bigbuckbunny.org, CC BY 3.0",
     footage=footage,
     recipes=("bunny.json",),
     frames=(33, 64),
     still=still,
+    caption="Big Buck Bunny, © 2008 Blender Foundation, www.bigbuckbunny.org, CC BY 3.0",
 )

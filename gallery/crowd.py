@@ -29,7 +29,7 @@ def still(shots):
             Panel(dissolved.result(14)[ROAD], "one dissolves"),
             Panel(dissolved.result(26)[ROAD], "in a long exposure"),
         ),
-        credit=ITEM.caption,
+        caption=ITEM.caption,
     )
 
 
@@ -43,9 +43,9 @@ ITEM = Item(
     name="crowd",
     figure=10,
     title="one sharp in a blurred crowd, and the reverse",
-    caption="Footage: vtest.avi of OpenCV's samples, Apache-2.0",
     footage=footage,
     recipes=("crowd.json", "crowd-reverse.json"),
     frames=(1, 95),
     still=still,
+    caption="Footage: vtest.avi of OpenCV's samples, Apache-2.0",
 )

@@ -74,24 +74,24 @@ def still(shots):
             panel(displaced.source(FRAME + LATER), second, "Frame t + 15, the shutter of the bottom lane"),
         ),
         stills.row(
-            panel(displaced.result(FRAME), mixed[0], "Displacement: the lanes between show times between"),
-            panel(valued.result(FRAME), mixed[1], "Value: the lanes between show both times"),
+            panel(displaced.result(FRAME), mixed[0], "Displacement: the lanes between show times between", "halfway"),
+            panel(valued.result(FRAME), mixed[1], "Value: the lanes between show both times", "halfway"),
         ),
-        credit=ITEM.caption,
+        caption=ITEM.caption,
     )
 
 
-def panel(picture, shutter, words):
-    return Panel(stills.inset(picture, stills.graph(*shutter, 220, 90)), words)
+def panel(picture, shutter, words, which=""):
+    return Panel(stills.inset(picture, stills.graph(*shutter, 220, 90, which, 20)), words)
 
 
 ITEM = Item(
     name="displacement",
     figure=4,
     title="displacement against value",
-    caption="Scribbled are the outer lanes alone; the four between get mixtures of the two shutters",
     footage=footage,
     recipes=("displacement.json", "displacement-value.json"),
     frames=(1, COUNT - LATER),
     still=still,
+    caption="Scribbled are the outer lanes alone; the four between get mixtures of the two shutters",
 )

@@ -102,7 +102,6 @@ ITEM = Item(
     name="hands",
     figure=9,
     title="one hand calm, one sharp",
-    caption="",
     footage=footage,
     recipes=("hands.json",),
     frames=(6, COUNT - 6),

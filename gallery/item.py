@@ -23,21 +23,21 @@ ASSETS = ROOT / "assets"
 class Item:
     """A figure of the paper.
 
-    caption: a line in small type below the still
     footage: gets a folder for what it renders, returns the source: a movie, or the first file of a sequence
     recipes: names of files beside the module; each becomes a film and a .blend of the same name
     frames: the film's first and last timeline frame
     still: makes the still, a picture (h, w, 3) of 0 to 1, from the shots, one per recipe
+    caption: a line in small type below the still
     """
 
     name: str
     figure: int
     title: str
-    caption: str
     footage: Callable[[Path], Path]
     recipes: tuple[str, ...]
     frames: tuple[int, int]
     still: Callable[[list[Shot]], np.ndarray]
+    caption: str = ""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Shot:
         """The scribbles in their shutters' colours, a little transparent, over the darkened footage."""
         moment, picture = self._at(frame), self.source(frame) * np.float32(dim)
         height, width = picture.shape[:2]
-        labels = scribbles.rasterise(moment.shapes, width, height)
+        labels = scribbles.rasterise(moment.shapes, width, height, border=moment.options.border)
         picture[labels > 0] = 0.25 * picture[labels > 0] + 0.75 * self._colors[labels[labels > 0] - 1]
         return picture
 

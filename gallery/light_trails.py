@@ -29,7 +29,7 @@ def footage(folder: Path) -> Path:
 def _night(scenes) -> None:
     """Ground, the lights of a town far away, and trees before them."""
     scenes.box((80, 80, 0.2), (0, 30, -0.1), scenes.paint("#6b5f52", 0.95))
-    amber, white = scenes.glow("#ffb066", 0.8, lights=False), scenes.glow("#dfe8ff", 0.6, lights=False)
+    amber, white = scenes.glow("#ffb066", 0.8), scenes.glow("#dfe8ff", 0.6)
     for i in range(90):
         place = (i * 7.31) % 36 - 18, 24, 0.9 + 1.3 * ((i * i * 0.37) % 1) ** 2
         scenes.ball(0.03 + 0.015 * (i % 3), place, (amber, amber, white)[i % 3])
@@ -67,7 +67,7 @@ def _pole(scenes, root) -> None:
     """A pole with a flame at each end, which turns in a plane that itself leans and turns."""
     pole = scenes.empty((0, -0.45, CHEST), root)
     scenes.tube((-1.15, 0, 0), (1.15, 0, 0), 0.018, scenes.paint("#4a4038", 0.5), parent=pole)
-    flame = scenes.glow("#ff8a33", 260, lights=False)
+    flame = scenes.glow("#ff8a33", 260)
     for side in (-1, 1):
         for i, radius in enumerate((0.045, 0.055, 0.035)):
             scenes.ball(radius, (side * (1.12 + 0.05 * i), 0, 0), flame, pole)
@@ -98,7 +98,6 @@ ITEM = Item(
     name="light_trails",
     figure=12,
     title="light trails over 120 frames",
-    caption="",
     footage=footage,
     recipes=("light_trails.json",),
     frames=(60, COUNT - 60),

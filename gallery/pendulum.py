@@ -89,7 +89,6 @@ ITEM = Item(
     name="pendulum",
     figure=1,
     title="the writing on a pendulum is sharp, all around it is blurred",
-    caption="",
     footage=footage,
     recipes=("pendulum.json",),
     frames=(12, 60),

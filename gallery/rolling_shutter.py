@@ -102,7 +102,6 @@ ITEM = Item(
     name="rolling_shutter",
     figure=11,
     title="a rolling shutter that flips midway",
-    caption="",
     footage=footage,
     recipes=("rolling_shutter.json",),
     frames=(1, COUNT - 63),

@@ -8,9 +8,14 @@ from __future__ import annotations
 from math import atan2, hypot
 from pathlib import Path
 
-import bpy
+import bpy  # which brings the next two
+
+# isort: split
+import bmesh
 from mathutils import Matrix
 from tqdm import tqdm
+
+from shutter_addon.core import light
 
 SIZE = 960, 540
 
@@ -69,13 +74,11 @@ def complete(folder: Path, count: int, ending: str = ".png") -> Path | None:
 
 def linear(color: str) -> tuple[float, float, float, float]:
     """`#rrggbb` as scene-linear RGBA."""
-    encoded = [int(color[i : i + 2], 16) / 255 for i in (1, 3, 5)]
-    return *(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in encoded), 1.0
+    return *light.to_linear([int(color[i : i + 2], 16) / 255 for i in (1, 3, 5)]), 1.0
 
 
 def shade(owner, node: str, **inputs) -> None:
     """Makes one shader node all of a material or world; inputs by name (`Base_Color` is *Base Color*)."""
-    owner.use_nodes = True
     nodes = owner.node_tree.nodes
     nodes.clear()
     shader = nodes.new(f"ShaderNode{node}")
@@ -92,11 +95,11 @@ def paint(color: str, roughness: float = 0.6, metallic: float = 0.0):
     return material
 
 
-def glow(color: str, strength: float, lights: bool = True):
-    """A material that emits light; lights: it also lights the scene (small ones do so with much noise)."""
+def glow(color: str, strength: float):
+    """A material that emits light but lights nothing: small ones do so with much noise."""
     material = bpy.data.materials.new(color)
     shade(material, "Emission", Color=linear(color), Strength=strength)
-    material.cycles.emission_sampling = "AUTO" if lights else "NONE"
+    material.cycles.emission_sampling = "NONE"
     return material
 
 
@@ -113,9 +116,15 @@ def box(size, location, material, bevel: float = 0.0, parent=None):
 
 def ball(radius, location, material, parent=None):
     """A sphere, or with three radii an ellipsoid."""
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=1, segments=32, ring_count=16)
-    made = bpy.context.object
-    made.data.transform(_scaling(radius if isinstance(radius, tuple) else (radius,) * 3))
+    size = _scaling(radius if isinstance(radius, tuple) else (radius,) * 3)
+    # An operator would update the scene, which takes its time in one of two hundred buoys.
+    sphere = bmesh.new()
+    bmesh.ops.create_uvsphere(sphere, u_segments=32, v_segments=16, radius=1, matrix=size)
+    data = bpy.data.meshes.new("Ball")
+    sphere.to_mesh(data)
+    sphere.free()
+    made = bpy.data.objects.new("Ball", data)
+    bpy.context.collection.objects.link(made)
     return _placed(made, location, material, parent, smooth=True)
 
 

@@ -78,16 +78,16 @@ def still(shots):
     picture = stills.scaled(shot.result(FRAME), 1240)
     height, width = (picture.shape[0] - 3 * 8) // 4, stills.WIDTH - 1240 - stills.GAP
     graphs = [stills.graph(*shot.bars(FRAME, name), width, height, name) for name in SHUTTERS]
-    return stills.sheet(stills.beside(stills.below(*graphs, gap=8), picture), credit=ITEM.caption)
+    return stills.sheet(stills.beside(stills.below(*graphs, gap=8), picture), caption=ITEM.caption)
 
 
 ITEM = Item(
     name="sphere",
     figure=3,
     title="four shutters, one sphere",
-    caption="One frame of one film: each shelf is a region with a shutter of its own, over the same 32 frames",
     footage=footage,
     recipes=("sphere.json",),
     frames=(1, COUNT - 31),
     still=still,
+    caption="One frame of one film: each shelf is a region with a shutter of its own, over the same 32 frames",
 )

@@ -24,9 +24,9 @@ class Panel:
     words: str
 
 
-def sheet(*rows: np.ndarray, credit: str = "") -> np.ndarray:
-    """Rows of the same width below each other, with a margin; the credit in small type."""
-    rows = [*rows, lettering(credit, rows[0].shape[1], 18, FAINT)] if credit else rows
+def sheet(*rows: np.ndarray, caption: str = "") -> np.ndarray:
+    """Rows of the same width below each other, with a margin; the caption in small type."""
+    rows = [*rows, lettering(caption, rows[0].shape[1], 18, FAINT)] if caption else rows
     return np.pad(below(*rows), ((GAP, GAP), (GAP, GAP), (0, 0)), constant_values=SHEET)
 
 

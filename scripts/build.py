@@ -56,7 +56,7 @@ def build_with_wheels(without: Path, output: Path, systems: list[str], python: s
             packed.extractall(stage)
         (stage / "wheels").mkdir()
         for system in systems:
-            for wheel in download(SYSTEMS[system], python):
+            for wheel in download(system, python):
                 shutil.copy(wheel, stage / "wheels")
         list_wheels(stage, systems)
         extension("build", "--source-dir", stage, "--output-filepath", path, "--split-platforms")
@@ -67,15 +67,17 @@ def build_with_wheels(without: Path, output: Path, systems: list[str], python: s
 
 
 def download(system: str, python: str) -> list[Path]:
-    """The wheels for one of pip's systems, unmodified from PyPI; kept in build/wheels."""
-    folder = ROOT / "build" / "wheels" / f"{system}-{python}"
+    """The wheels for a system, unmodified from PyPI; kept in build/wheels."""
+    folder = ROOT / "build" / "wheels" / f"{SYSTEMS[system]}-{python}"
     found = [list(folder.glob(f"{_file(wheel)}-*.whl")) for wheel in WHEELS]
     if all(found):
         return [wheel for (wheel,) in found]
     shutil.rmtree(folder, ignore_errors=True)
     options = ["--only-binary=:all:", "--no-deps", "--implementation=cp", f"--python-version={python}"]
     pip = [sys.executable, "-m", "pip", "download", "-qq", "--disable-pip-version-check"]
-    subprocess.run([*pip, *options, f"--platform={system}", f"--dest={folder}", *WHEELS], check=True)
+    pip += [*options, f"--platform={SYSTEMS[system]}", f"--dest={folder}", *WHEELS]
+    if subprocess.run(pip, capture_output=True, check=False).returncode:
+        fail(f"no wheels for Python {python} on {system}, or PyPI is not reached")
     return sorted(folder.glob("*.whl"))
 
 
@@ -98,8 +100,7 @@ def make_repository(folder: Path, zips: list[Path]) -> None:
     """Puts zips into a repository: a folder that Blender subscribes to, as it is or on any web server."""
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob(f"{manifest()['id']}-*.zip"):
-        if not old.name.startswith(name("")[: -len(".zip")]):
-            old.unlink()  # a repository offers one version
+        old.unlink()  # a repository offers one version, for one Python
     for path in zips:
         shutil.copy(path, folder)
     extension("server-generate", "--repo-dir", folder, "--html")
@@ -111,11 +112,17 @@ def extension(*arguments) -> None:
     (command,) = Path(blender).glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py")
     done = subprocess.run([sys.executable, command, *map(str, arguments)], capture_output=True, text=True, check=False)
     if done.returncode:
-        sys.exit(f"build: extension {arguments[0]} failed\n{done.stdout}{done.stderr}")
+        fail(f"extension {arguments[0]} failed\n{done.stdout}{done.stderr}")
+
+
+def fail(sentence: str) -> None:
+    print(f"build: {sentence}", file=sys.stderr)
+    sys.exit(2)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser("scripts/build", description="Makes the extension's zips.")
+    about = "Makes the extension's zips. scripts/build takes a relative DIR from the project's folder."
+    parser = argparse.ArgumentParser("scripts/build", description=about)
     parser.add_argument("--output", type=Path, default=ROOT / "dist", metavar="DIR", help="default: dist")
     parser.add_argument("--python", default=BLENDERS_PYTHON, metavar="X.Y", help="Blender's Python (%(default)s)")
     parser.add_argument("--system", action="append", choices=SYSTEMS, help="these systems only; may be given again")
@@ -123,6 +130,8 @@ def main() -> None:
         "--repository", type=Path, metavar="DIR", help="also put the zips with wheels into a repository"
     )
     options = parser.parse_args()
+    if options.repository and options.repository.resolve() == options.output.resolve():
+        parser.error("--repository: it needs a folder of its own")
     options.output.mkdir(parents=True, exist_ok=True)
     without = build_without_wheels(options.output.resolve())
     zips = build_with_wheels(without, options.output.resolve(), options.system or list(SYSTEMS), options.python)

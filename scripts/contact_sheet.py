@@ -1,56 +1,46 @@
-"""A contact sheet of a film made with a recipe: a column each for source, scribbles, coefficients and result.
+"""A contact sheet of a film made with a recipe: source, scribbles, coefficients and result of some of its frames.
 
-python scripts/contact_sheet.py SOURCE RECIPE RESULT SHEET.png [FRAME ...]
+python scripts/contact_sheet.py SOURCE RECIPE RESULT SHEET.png FRAME …
 """
 
+import argparse
 import sys
 from pathlib import Path
 
-import numpy as np
-import OpenImageIO
-
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from shutter_addon.compute.renderer import Renderer, open_compositor
-from shutter_addon.core import recipe, scribbles
-from shutter_addon.media import open_source
-
-SMALLER = 2
-GAP = 8
-
-
-def main(source_path, recipe_path, result_path, sheet_path, *frames):
-    source, result, effect = open_source(source_path), open_source(result_path), recipe.load(recipe_path)
-    colors = np.array([shutter.color for shutter in effect.shutters])
-    compositor, _ = open_compositor()
-    renderer = Renderer(compositor, source)
-    frames = [int(frame) for frame in frames] or np.linspace(1, result.count, 5).astype(int)
-    rows = []
-    for frame in frames:
-        moment = effect.at(frame, source.width / source.height)
-        picture = source.read(frame - 1)[..., :3] / 255
-        labels = scribbles.rasterise(moment.shapes, source.width, source.height, border=moment.options.border)
-        drawn = picture * 0.4
-        drawn[labels > 0] = colors[labels[labels > 0] - 1]
-        block = moment.options.aggregate
-        mixed = np.tensordot(renderer.coefficients(moment), colors, axes=(0, 0)).repeat(block, 0).repeat(block, 1)
-        mixed = mixed[: source.height, : source.width]
-        rows.append(row(picture, drawn, mixed, result.read(frame - 1)[..., :3] / 255))
-    sheet = np.concatenate(rows)
-    OpenImageIO.ImageBuf(np.ascontiguousarray((sheet * 255 + 0.5).astype(np.uint8))).write(str(sheet_path))
+from gallery import stills
+from gallery.item import Shot
+from gallery.stills import Panel
+from shutter_addon.core.recipe import RecipeError
+from shutter_addon.media import MediaError
 
 
-def row(*pictures):
-    """The pictures side by side, smaller, with a gap to the right and below."""
-    return np.concatenate(
-        [np.pad(smaller(p), ((0, GAP), (0, GAP), (0, 0)), constant_values=1) for p in pictures], axis=1
+def row(shot: Shot, frame: int):
+    return stills.row(
+        Panel(shot.source(frame), f"Source, frame {frame}"),
+        Panel(shot.scribbles(frame, 0.4), "Scribbles"),
+        Panel(shot.coefficients(frame), "Coefficients"),
+        Panel(shot.result(frame), "Result"),
     )
 
 
-def smaller(picture):
-    height, width = (n // SMALLER * SMALLER for n in picture.shape[:2])
-    return picture[:height, :width].reshape(height // SMALLER, SMALLER, width // SMALLER, SMALLER, 3).mean(axis=(1, 3))
+def main() -> int:
+    parser = argparse.ArgumentParser("contact_sheet", description="A contact sheet of a film made with a recipe.")
+    parser.add_argument("source", type=Path, metavar="SOURCE")
+    parser.add_argument("recipe", type=Path, metavar="RECIPE")
+    parser.add_argument("result", type=Path, metavar="RESULT", help="the film, from the source's first frame on")
+    parser.add_argument("sheet", type=Path, metavar="SHEET", help="what is made: PNG or JPEG, by its ending")
+    parser.add_argument("frames", type=int, nargs="+", metavar="FRAME", help="timeline frames; 1 is the first")
+    arguments = parser.parse_args()
+    shot = Shot(arguments.source, arguments.recipe, arguments.result, first=1)
+    try:
+        stills.save(stills.sheet(*(row(shot, frame) for frame in arguments.frames)), arguments.sheet)
+    except (RecipeError, MediaError, OSError) as error:
+        print(f"contact_sheet: {error}", file=sys.stderr)
+        return 2
+    return 0
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    sys.exit(main())

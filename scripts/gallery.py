@@ -19,7 +19,8 @@ from gallery.item import HERE, ROOT, Item, Shot
 def main() -> int:
     parser = argparse.ArgumentParser("gallery", description="The paper's figures, made again.")
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(NAMES)}; or all")
-    parser.add_argument("--output", type=Path, default=ROOT / "out" / "gallery", help="instead of out/gallery")
+    where = "instead of out/gallery; scripts/gallery takes it from the project's folder"
+    parser.add_argument("--output", type=Path, default=ROOT / "out" / "gallery", metavar="DIR", help=where)
     parser.add_argument("--docs", action="store_true", help="renew the README's pictures, docs/gallery/NAME.jpg")
     arguments = parser.parse_args()
     names = NAMES if arguments.names == ["all"] else arguments.names
@@ -30,7 +31,12 @@ def main() -> int:
         for item in map(load, NAMES):
             print(f"{item.name:16} Figure {item.figure:2}: {item.title}")
     for item in map(load, names):
-        if code := make(item, arguments.output / item.name, arguments.docs):
+        try:
+            code = make(item, arguments.output / item.name, arguments.docs)
+        except OSError as error:
+            print(f"gallery: {error.filename or arguments.output}: {error.strerror or error}", file=sys.stderr)
+            return 2
+        if code:
             return code
     return 0
 
@@ -41,6 +47,7 @@ def load(name: str) -> Item:
 
 def make(item: Item, folder: Path, docs: bool) -> int:
     """Makes all of an item's files; the exit code of what failed, or 0."""
+    folder = folder.resolve()  # the command runs in another
     folder.mkdir(parents=True, exist_ok=True)
     footage = item.footage(folder / "footage")
     shots = []

@@ -1,5 +1,9 @@
 """What tests of all layers share."""
 
+import os
+import re
+import shlex
+import subprocess
 from pathlib import Path
 
 import hypothesis
@@ -17,6 +21,22 @@ ROOT = Path(__file__).parents[1]
 def bunny():
     """Big Buck Bunny: 132 frames, 1280×720, 25 fps, H.264, with sound."""
     return ROOT / "assets" / "bigbuckbunny.mp4"
+
+
+@pytest.fixture(scope="session")
+def real_blender():
+    """The command that runs a real Blender, as a list."""
+    if not os.environ.get("BLENDER"):
+        pytest.skip("NO REAL BLENDER: set BLENDER to the command that runs one")
+    return shlex.split(os.environ["BLENDER"])
+
+
+@pytest.fixture(scope="session")
+def blenders_python(real_blender):
+    """The version of its Python, X.Y."""
+    code = "import sys; print('PYTHON', '%d.%d' % sys.version_info[:2])"
+    command = [*real_blender, "-b", "--factory-startup", "--python-expr", code]
+    return re.search(r"PYTHON (.+)", subprocess.run(command, capture_output=True, text=True, check=True).stdout)[1]
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ import dataclasses
 import runpy
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -41,17 +42,32 @@ def test_an_unknown_name_is_one_sentence():
     assert done.stderr.startswith("gallery: there is no nothing; there are pendulum, ")
 
 
+def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path):
+    (tmp_path / "file").touch()
+    done = listed("--output", str(tmp_path / "file"), "bunny")
+    assert done.returncode == 2
+    assert done.stderr == f"gallery: {tmp_path}/file/bunny: Not a directory\n"
+
+
+def test_help_says_where_a_relative_folder_lies():
+    assert "scripts/gallery takes it from the project's folder" in " ".join(listed("--help").stdout.split())
+
+
 @pytest.mark.parametrize("path", sorted(HERE.glob("*.json")), ids=lambda path: path.stem)
 def test_recipes_load(path):
     assert path.stem.split("-")[0] in NAMES
     assert recipe.load(path).shutters
 
 
-def test_an_item_from_end_to_end(tmp_path):
-    """Its head and the meadow are the source's, within what a movie's compression takes; its arms are not."""
+def test_an_item_from_end_to_end(tmp_path, monkeypatch):
+    """Into a folder of the caller's.
+
+    Its head and the meadow are the source's, within what a movie's compression takes; its arms are not.
+    """
     make = runpy.run_path(SCRIPT)["make"]
+    monkeypatch.chdir(tmp_path.parent)
     frames = bunny.FRAME, bunny.FRAME + 1
-    assert make(dataclasses.replace(bunny.ITEM, frames=frames), tmp_path, docs=False) == 0
+    assert make(dataclasses.replace(bunny.ITEM, frames=frames), Path(tmp_path.name), docs=False) == 0
     assert {path.name for path in tmp_path.iterdir()} == {f"bunny.{end}" for end in ("blend", "json", "mp4", "png")}
     shot = Shot(bunny.footage(tmp_path), tmp_path / "bunny.json", tmp_path / "bunny.mp4", frames[0])
     difference = np.abs(shot.result(bunny.FRAME) - shot.source(bunny.FRAME)).mean(axis=2)

@@ -1,14 +1,16 @@
-"""The gallery's rendered footage: a render that was stopped goes on where it was, and torn frames never count."""
+"""The gallery's rendered footage: every scene can be built, a render that was stopped goes on where it was, and torn
+frames never count."""
 
 import subprocess
 import sys
 
 import numpy as np
+import pytest
 from OpenImageIO import ImageBuf
 
 from gallery.item import ROOT
 
-# A process of its own: an empty scene would take the other tests' edits away.
+# Each in a process of its own: an empty scene would take the other tests' edits away.
 RENDER = """
 import sys
 from pathlib import Path
@@ -22,18 +24,38 @@ ball = scenes.ball(1, (0, 0, 0), scenes.paint("#e4572e"))
 scenes.animate(ball, 3, location=lambda frame: (frame - 2, 0, 0))
 assert scenes.render_frames(folder, 3) == scenes.complete(folder, 3) == folder / "0001.png"
 """
+FIRST_FRAME = """
+import sys
+from importlib import import_module
+from pathlib import Path
+from gallery import scenes
+scenes.SIZE = 64, 36
+render_frames = scenes.render_frames
+scenes.render_frames = lambda folder, count, *options: render_frames(folder, 1, *options)
+print(import_module(f"gallery.{sys.argv[2]}").ITEM.footage(Path(sys.argv[1])))
+"""
 
 
-def render(folder):
-    done = subprocess.run([sys.executable, "-c", RENDER, folder], cwd=ROOT, capture_output=True, text=True, check=False)
+def run(code, *arguments):
+    command = [sys.executable, "-c", code, *arguments]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 def test_a_stopped_render_goes_on(tmp_path):
     (tmp_path / "0002.png").write_bytes(b"was finished before")
     (tmp_path / ".part.png").write_bytes(b"was stopped halfway")
-    render(tmp_path)
+    run(RENDER, tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["0001.png", "0002.png", "0003.png"]
     assert (tmp_path / "0002.png").read_bytes() == b"was finished before"
     first, last = (ImageBuf(str(tmp_path / name)).get_pixels() for name in ("0001.png", "0003.png"))
     assert np.abs(first - last).max() > 0.1, "the ball has moved"
+
+
+@pytest.mark.parametrize("name", ["pendulum", "sphere", "displacement", "hands", "rolling_shutter", "light_trails"])
+def test_a_scene_is_built_and_rendered(name, tmp_path):
+    path = run(FIRST_FRAME, tmp_path, name).splitlines()[-1]
+    picture = ImageBuf(path).get_pixels()[..., :3]
+    assert picture.shape[1] == 64
+    assert picture.std() > 0.02, "there is something to be seen"

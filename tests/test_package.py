@@ -3,12 +3,12 @@
 import json
 import os
 import re
-import shlex
 import shutil
 import subprocess
 import sys
 import tomllib
 import zipfile
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -31,16 +31,18 @@ RECIPE = {
 }
 # What Blender says by itself, on the real one's screenless machine.
 BLENDERS_OWN = ("EGL Error", "system.path")
+# Runs a command (after a folder) that sees the folder read-only; nobody else does, and nothing stays mounted.
+READ_ONLY = ("unshare", "--mount", "sh", "-c", 'mount --bind "$0" "$0" && mount -o remount,bind,ro "$0" && exec "$@"')
 NO_OPENGL = {"LIBGL_DRIVERS_PATH": "/nowhere", "__EGL_VENDOR_LIBRARY_DIRS": "/nowhere"}
 
 
+def built(*arguments, root=ROOT):
+    command = [sys.executable, root / "scripts" / "build.py", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
 def build(*arguments, root=ROOT):
-    done = subprocess.run(
-        [sys.executable, root / "scripts" / "build.py", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = built(*arguments, root=root)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -97,6 +99,30 @@ def test_a_zip_with_wheels_holds_those_of_its_system(dist, system, tag):
     generated = manifest["build"]["generated"]
     assert generated["platforms"] == [system.replace("_", "-")]
     assert {wheel.removeprefix("./") for wheel in generated["wheels"]} == wheels
+
+
+def test_wheels_that_are_not_to_be_had_are_one_sentence(tmp_path):
+    done = built("--output", tmp_path, "--python", "3.x", "--system", SYSTEM)
+    assert done.returncode == 2
+    assert done.stderr == f"build: no wheels for Python 3.x on {SYSTEM}, or PyPI is not reached\n"
+
+
+def test_a_repository_is_no_output_folder(tmp_path):
+    done = built("--output", tmp_path, "--repository", tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.endswith("--repository: it needs a folder of its own\n")
+    assert not list(tmp_path.iterdir())
+
+
+def test_help_says_where_a_relative_folder_lies():
+    assert "takes a relative DIR from the project's folder" in " ".join(build("--help").split())
+
+
+def test_the_version_is_the_same_everywhere():
+    version = tomllib.loads((ROOT / "blender_manifest.toml").read_text())["version"]
+    assert tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"] == version
+    assert re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)[1] == version
+    assert set(re.findall(r"virtual_shutter-([\d.]+)-", (ROOT / "README.md").read_text())) == {version}
 
 
 def test_the_wheels_are_what_the_code_needs_and_blender_lacks():
@@ -157,7 +183,8 @@ except NoDeviceError as error:
 class Installation:
     """A real Blender with user folders of its own."""
 
-    def __init__(self, folder):
+    def __init__(self, command, folder):
+        self.command = command
         self.user = folder / "Größe und Maß" / "ユーザー"
         self.user.mkdir(parents=True)
         self.extension = self.user / "extensions" / "user_default" / "virtual_shutter"
@@ -165,7 +192,7 @@ class Installation:
     def run(self, *arguments, code=0, says="", environment=()):
         """Runs Blender; what it printed. Nothing may stand on stderr but the one sentence that is expected."""
         done = subprocess.run(
-            [*shlex.split(os.environ["BLENDER"]), *map(str, arguments)],
+            [*self.command, *map(str, arguments)],
             env=os.environ | {"BLENDER_USER_RESOURCES": str(self.user)} | dict(environment),
             capture_output=True,
             text=True,
@@ -179,11 +206,6 @@ class Installation:
         assert "Traceback" not in done.stdout
         return done.stdout
 
-    def python(self):
-        """The version of its Python."""
-        code = "import sys; print('PYTHON', '%d.%d' % sys.version_info[:2])"
-        return re.search(r"PYTHON (.+)", self.run("-b", "--factory-startup", "--python-expr", code))[1]
-
     def install(self, path):
         self.run("--command", "extension", "install-file", "-r", "user_default", "-e", path)
         assert self.files() == {*members(path)[0]}
@@ -193,10 +215,19 @@ class Installation:
         found = (path for path in self.extension.rglob("*") if path.is_file() and path.suffix != ".pyc")
         return {path.relative_to(self.extension).as_posix() for path in found}
 
-    def lock(self, mode):
-        """Makes the extension's folders read-only or not; to root they are always open."""
-        for folder in (self.extension, *(path for path in self.extension.rglob("*") if path.is_dir())):
-            folder.chmod(mode)
+    @contextmanager
+    def read_only(self):
+        """Nothing can be written to the extension's folder. Root minds no modes, but a mount of Blender's own."""
+        folders = [self.extension, *(path for path in self.extension.rglob("*") if path.is_dir())]
+        command = self.command
+        for folder in folders:
+            folder.chmod(0o555)
+        if os.geteuid() == 0:
+            self.command = [*READ_ONLY, str(self.extension), *command]
+        yield
+        self.command = command
+        for folder in folders:
+            folder.chmod(0o755)
 
     def remove(self):
         """Disables the extension, then takes it away."""
@@ -209,10 +240,8 @@ class Installation:
 
 
 @pytest.fixture
-def blender(tmp_path):
-    if not os.environ.get("BLENDER"):
-        pytest.skip("NO REAL BLENDER: set BLENDER to the command that runs one")
-    return Installation(tmp_path)
+def blender(real_blender, tmp_path):
+    return Installation(real_blender, tmp_path)
 
 
 @pytest.fixture
@@ -238,22 +267,23 @@ def assert_alike(folder, expected, count):
         assert np.abs(ours - real).max() <= 1.001 / 255, name
 
 
-def test_installed_with_wheels(blender, bunny, recipe, tmp_path):
+def test_installed_with_wheels(blender, blenders_python, bunny, recipe, tmp_path):
     """A movie, from the zip to rendered frames, and gone again."""
     folder = tmp_path / "dist"
-    build("--output", folder, "--python", blender.python(), "--system", SYSTEM)
+    build("--output", folder, "--python", blenders_python, "--system", SYSTEM)
     (path,) = folder.glob(f"*-{SYSTEM.replace('-', '_')}.zip")
     blender.run("--command", "extension", "validate", path)
     blender.install(path)
     files = blender.files()
-    blender.lock(0o555)
     edit, wheels = tmp_path / "edit.blend", ["av", "moderngl", "glcontext", "tqdm", "cv2"]
-    blender.run("-b", "--python-exit-code", 1, "--python", MAKE_EDIT, "--", bunny, recipe, edit, NAME, *wheels)
-    blender.run("-b", edit, "-o", tmp_path / "real" / "####", "-s", 3, "-e", 5, "-a")
+    write = f"try: open({str(blender.extension / 'written')!r}, 'w')\nexcept OSError: print('CANNOT BE WRITTEN')"
+    with blender.read_only():
+        assert "CANNOT BE WRITTEN" in blender.run("-b", "--python-expr", write)
+        blender.run("-b", "--python-exit-code", 1, "--python", MAKE_EDIT, "--", bunny, recipe, edit, NAME, *wheels)
+        blender.run("-b", edit, "-o", tmp_path / "real" / "####", "-s", 3, "-e", 5, "-a")
     checkout_renders(bunny, recipe, tmp_path / "ours", "3:5")
     assert_alike(tmp_path / "real", tmp_path / "ours", 3)
     assert blender.files() == files
-    blender.lock(0o755)
     blender.remove()
 
 
@@ -281,18 +311,20 @@ def test_installed_without_wheels(blender, dist, bunny, recipe, tmp_path):
     blender.remove()
 
 
-def test_a_repository_updates(blender, tmp_path):
+def test_a_repository_updates(blender, blenders_python, tmp_path):
     """Blender subscribes to a folder, installs from it, and gets the next version."""
     repository, next_root = tmp_path / "repository", tmp_path / "next"
-    options = ("--python", blender.python(), "--system", SYSTEM, "--repository", repository)
+    options = ("--python", blenders_python, "--system", SYSTEM, "--repository", repository)
     build("--output", tmp_path / "dist", *options)
     extension = ("--command", "extension")
     blender.run(*extension, "repo-add", "--url", f"{(repository / 'index.json').as_uri()}", "ours")
     blender.run("--online-mode", *extension, "sync")
     blender.run("--online-mode", *extension, "install", "-e", "virtual_shutter")
-    shutil.copytree(ROOT, next_root, ignore=shutil.ignore_patterns(".*", "assets", "docs", "tests", "__pycache__"))
+    needless = shutil.ignore_patterns(".*", "assets", "dist", "docs", "out", "tests", "__pycache__")
+    shutil.copytree(ROOT, next_root, ignore=needless)
     manifest = next_root / "blender_manifest.toml"
-    manifest.write_text(manifest.read_text().replace('version = "0.1.0"', 'version = "9.9.9"'))
+    manifest.write_text(re.sub(r'(?m)^version = ".*"', 'version = "9.9.9"', manifest.read_text()))
+    shutil.copy(next(repository.glob("*.zip")), repository / "virtual_shutter-9.9.9-python3.12-linux_x64.zip")
     build("--output", tmp_path / "dist", *options, root=next_root)
     assert len(list(repository.glob("*.zip"))) == 1
     blender.run("--online-mode", *extension, "sync")

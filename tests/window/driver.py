@@ -119,11 +119,13 @@ def drag(region, points, hold=()):
     yield
 
 
-def until(condition, what, seconds=10):
-    """Waits for a condition; generator: yield from it."""
-    for _ in range(int(seconds / STEP)):
+def until(condition, what, seconds=10, again=None):
+    """Waits for a condition; generator: yield from it. again: called now and every two seconds until it comes about."""
+    for step in range(int(seconds / STEP)):
         if condition():
             return
+        if again and step % int(2 / STEP) == 0:
+            again()
         yield STEP
     raise AssertionError(f"it did not come about that {what}")
 

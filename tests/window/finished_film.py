@@ -15,6 +15,8 @@ import driver
 FOOTAGE, ZIP, RECIPE = (os.environ[f"SHUTTER_{name}"] for name in ("FOOTAGE", "ZIP", "RECIPE"))
 FIRST, LAST = map(int, os.environ["SHUTTER_FRAMES"].split(":"))
 
+RETURN = partial(driver.key, "Return")  # a dialog that is not open yet misses it
+
 
 def edit():
     return bpy.context.window_manager.windows[0].workspace.sequencer_scene
@@ -35,9 +37,8 @@ def installed():
         bpy.ops.extensions.package_install_files("INVOKE_DEFAULT", url=ZIP)
     yield 0.7
     driver.shot("install")
-    driver.key("Return")
     name, addons = "bl_ext.user_default.virtual_shutter", bpy.context.preferences.addons
-    yield from driver.until(lambda: name in addons, "the extension is enabled", 30)
+    yield from driver.until(lambda: name in addons, "the extension is enabled", 30, RETURN)
 
 
 def video_editing_opened():
@@ -66,8 +67,8 @@ def effect_added():
     yield 0.5
     driver.text("shutter")
     yield 0.7
-    driver.key("Return")
-    yield from driver.until(lambda: len(edit().virtual_shutter.effects), "the menu adds the effect")
+    # Once there is an effect, the menu is closed: Return goes nowhere else.
+    yield from driver.until(lambda: len(edit().virtual_shutter.effects), "the menu adds the effect", 10, RETURN)
 
 
 def recipe_imported():

@@ -7,6 +7,7 @@ or vulkan, is set for it, and SCREEN. It needs xdotool and ImageMagick's `import
 import json
 import os
 import shlex
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -37,7 +38,8 @@ def tell(story, backend, folder, **given):
         "BACKEND": backend,
         "SCREEN": SCREEN,
         "SHUTTER_PICTURES": str(folder),
-        "SHUTTER_FOOTAGE": str(ROOT / "assets" / "bigbuckbunny.mp4"),
+        # A copy: Blender puts proxies beside a movie.
+        "SHUTTER_FOOTAGE": str(shutil.copy(ROOT / "assets" / "bigbuckbunny.mp4", folder)),
         "BLENDER_USER_RESOURCES": str(folder / "user"),
     } | {f"SHUTTER_{name.upper()}": str(value) for name, value in given.items()}
     done = subprocess.run(
