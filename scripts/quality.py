@@ -25,7 +25,7 @@ from benchmark import BARS, bars, shapes
 from shutter_addon.compute.renderer import DEVICES, Renderer, open_compositor
 from shutter_addon.core import light
 from shutter_addon.core.instant import Instant, Options
-from shutter_addon.media import open_source
+from shutter_addon.media import MediaError, open_source
 
 ASSETS = Path(__file__).resolve().parents[1] / "assets"
 FILMS = [ASSETS / name for name in ("bigbuckbunny.mp4", "pedestrians.avi")]
@@ -84,13 +84,18 @@ def parse(arguments=None):
     return parser.parse_args(arguments)
 
 
-def main(arguments=None) -> None:
+def main(arguments=None) -> int:
     args = parse(arguments)
     print("| film | bars | shutters | window | mean | worst |\n|---|---|---|---|---|---|")
-    rows = run(args)
+    try:
+        rows = run(args)
+    except MediaError as error:
+        print(f"quality: {error}", file=sys.stderr)
+        return 2
     if args.json:
         args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -35,7 +35,7 @@ from shutter_addon.blender.engine import VirtualShutterEngine
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.core import light, presets, recipe
-from shutter_addon.media import open_source
+from shutter_addon.media import MediaError, open_source
 from shutter_addon.media.cuts import Shots
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -166,7 +166,8 @@ def report(rows: list[dict]) -> str:
     lines = [f"{rows[0]['width']}×{rows[0]['height']}, window {rows[0]['window']}, {rows[0]['frames']} frames"]
     for row in rows:
         error = "" if row["error"] is None else f"  {row['error']:.2f} levels from what it should show"
-        lines.append(f"{row['way']:9s} {row['fps']:7.2f} fps  ours is {found['ours'] / row['fps']:.2f} of it{error}")
+        share = "" if row["way"] == "ours" else f"  ours is {found['ours'] / row['fps']:.2f} of it"
+        lines.append(f"{row['way']:9s} {row['fps']:7.2f} fps{share}{error}")
     return "\n".join(lines)
 
 
@@ -180,16 +181,21 @@ def parse(arguments=None):
     return parser.parse_args(arguments)
 
 
-def main(arguments=None) -> None:
+def main(arguments=None) -> int:
     args = parse(arguments)
     args.footage = args.footage.resolve()
     blender.register()
-    rows = measure(args)
+    try:
+        rows = measure(args)
+    except MediaError as error:
+        print(f"render_speed: {error}", file=sys.stderr)
+        return 2
     print(report(rows), flush=True)
     if args.json:
         args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    return 0
 
 
 if __name__ == "__main__":
     # Inside Blender, what comes before "--" is Blender's own.
-    main(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else None)
+    sys.exit(main(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else None))

@@ -31,3 +31,10 @@ def test_blocks_look_like_full_resolution(rows):
     for row in rows:
         assert AVERAGE <= row["mean"] < 1, row
         assert WORST <= row["worst"] < 1, row
+
+
+def test_a_film_that_is_not_there_is_one_sentence():
+    command = [sys.executable, "scripts/quality.py", "none.mp4"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("quality: none.mp4: no such file")
