@@ -1,6 +1,6 @@
 """How close a virtual shutter over sub-frames comes to the exposure that Cycles computes itself.
 
-    python scripts/truth.py [--output DIR] [--json FILE] [--cases box,triangle,rolling] [--size 640x360]
+    python scripts/truth.py [--output DIR] [--json FILE] [--size 640x360] [--samples 1024] [--docs]
 
 Cycles exposes one frame of a moving scene with a shutter curve, or with its rolling shutter. The same scene is rendered
 as 64 sub-frames without motion blur, and these are exposed through the sequencer, by `shutter render` and a recipe with
@@ -28,13 +28,12 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-import OpenImageIO
-from OpenImageIO import ImageBuf, ImageBufAlgo
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from quality import similarity
 
+from gallery import stills
 from shutter_addon.core import light
 from shutter_addon.media import open_source
 
@@ -47,7 +46,6 @@ POINTS = (0, 0.5, 1)
 ROW = 1 / 8
 SEEDS = (0, 1, 2)  # of the sub-frames, and of Cycles' two
 AMPLIFIED = 32
-BAR = 40  # of a label, in pixels
 
 
 def stage(width: int, height: int) -> bpy.types.Scene:
@@ -183,7 +181,7 @@ def compose(first: Path, effect: dict, folder: Path) -> np.ndarray:
     command += ["--output", str(folder), "--format", "exr", "--frames", "1"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     if done.returncode:
-        sys.exit(done.stderr)
+        fail(done.stderr.strip())
     return read(folder / "0001.exr")
 
 
@@ -212,7 +210,7 @@ def measure(args, folder: Path) -> tuple[list[dict], np.ndarray]:
     scene = stage(*args.size)
     first = subframes(scene, args.samples, folder)
     rows, strips = [], []
-    for case in args.cases:
+    for case in CURVES:
         halves = expose(scene, case, args.samples, folder)
         ours = compose(first, recipe(case), folder / case)
         wrong = compose(first, closed_early(recipe(case)), folder / f"{case}-wrong")
@@ -221,45 +219,34 @@ def measure(args, folder: Path) -> tuple[list[dict], np.ndarray]:
             rows.append({"case": case, "picture": name} | compare(*pair))
             print("| {case} | {picture} | {similarity:.5f} | {largest} | {mean:.3f} |".format(**rows[-1]), flush=True)
         strips.append(side_by_side(case, truth, ours, amplified(truth, ours), amplified(one, other)))
-    return rows, np.concatenate(strips)
+    return rows, stills.sheet(*strips)
 
 
 def side_by_side(case: str, *pictures: np.ndarray) -> np.ndarray:
     texts = (f"{case}: Cycles", "virtual shutter", f"difference × {AMPLIFIED}", f"noise × {AMPLIFIED}")
-    return np.concatenate([labelled(*pair) for pair in zip(pictures, texts, strict=True)], axis=1)
+    return stills.beside(*(stills.labelled(p / np.float32(255), text) for p, text in zip(pictures, texts, strict=True)))
 
 
 def amplified(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.clip(apart(picture, other) * AMPLIFIED, 0, 255).astype(np.uint8)
 
 
-def labelled(picture: np.ndarray, text: str) -> np.ndarray:
-    """The picture below a bar with the text."""
-    image = ImageBuf(np.pad(picture, ((BAR, 2), (0, 2), (0, 0))))
-    ImageBufAlgo.render_text(image, 6, BAR - 10, text, BAR - 12)
-    return image.get_pixels(OpenImageIO.UINT8)
+def write(args, rows: list[dict], sheet: np.ndarray) -> None:
+    stills.save(sheet, args.output / "truth.png")
+    if args.docs:
+        stills.save(stills.scaled(sheet, sheet.shape[1] // 2), ROOT / "docs" / "truth.jpg")
+    if args.json:
+        part = args.json.with_name(f".part-{args.json.name}")
+        part.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+        part.replace(args.json)
 
 
-def write_picture(file: Path, picture: np.ndarray) -> None:
-    image = ImageBuf(picture)
-    if not image.write(str(file)):
-        sys.exit(f"{file}: {image.geterror()}")
-
-
-def write_whole(path: Path, write) -> None:
-    """Calls write(file) for a file beside the path, which then takes its place."""
-    part = path.with_name(f".part-{path.name}")
-    write(part)
-    part.replace(path)
+def fail(sentence: str) -> None:
+    print(sentence, file=sys.stderr)
+    sys.exit(2)
 
 
 def parse(arguments=None):
-    def chosen(text):
-        names = text.split(",")
-        if wrong := [name for name in names if name not in CURVES]:
-            raise argparse.ArgumentTypeError(f"{wrong[0]!r} is none of {', '.join(CURVES)}")
-        return names
-
     def size(text):
         match = re.fullmatch(r"(\d+)x(\d+)", text)
         if not match or min(map(int, match.groups())) < 16:
@@ -270,12 +257,12 @@ def parse(arguments=None):
     add = parser.add_argument
     add("--output", type=Path, default=ROOT / "out" / "truth", metavar="DIR", help="where truth.png is written")
     add("--json", type=Path, metavar="FILE", help="where the rows are written")
-    add("--cases", type=chosen, default=list(CURVES), help=f"of {', '.join(CURVES)}")
     add("--size", type=size, default=(640, 360), metavar="WIDTHxHEIGHT")
     add("--samples", type=int, default=1024, help="for each pixel, of Cycles' picture and of all sub-frames together")
+    add("--docs", action="store_true", help="renew the README's picture, docs/truth.jpg")
     args = parser.parse_args(arguments)
-    if args.samples < SUBFRAMES:
-        parser.error(f"--samples: {args.samples} is less than one for each of {SUBFRAMES} sub-frames")
+    if args.samples < 1 or args.samples % SUBFRAMES:
+        parser.error(f"--samples: {args.samples} is not a multiple of {SUBFRAMES}: each sub-frame has as many")
     try:
         for folder in (args.output, *([args.json.parent] if args.json else [])):
             folder.mkdir(parents=True, exist_ok=True)
@@ -289,9 +276,10 @@ def main(arguments=None) -> None:
     print("| case | compared with Cycles | SSIM | largest | mean |\n|---|---|---|---|---|", flush=True)
     with tempfile.TemporaryDirectory() as folder:
         rows, sheet = measure(args, Path(folder))
-    write_whole(args.output / "truth.png", lambda file: write_picture(file, sheet))
-    if args.json:
-        write_whole(args.json, lambda file: file.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8"))
+    try:
+        write(args, rows, sheet)
+    except OSError as error:
+        fail(f"truth: {error}")
 
 
 if __name__ == "__main__":
