@@ -7,6 +7,7 @@ methodology for optical flow"). Along what has arrived, both frames are looked u
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache, partial
 
 import numpy as np
@@ -21,20 +22,21 @@ except ImportError:  # a package without wheels; the extension registers without
 
 STEP = 2  # pixels between the vectors that are carried; all pixels gain nothing and take four times as long
 SMALLEST = 16  # pixels; OpenCV's flows need about as many, smaller pictures are cross-faded
+HALF_MAX = 65504  # the largest value of a half float, which infinite samples count as
 ALIKE = 8  # levels of 255 by which the ends of a vector may differ before another flow is believed more
 
 
-def between(first, second, factor: int, method="quick", transfer="srgb", alpha="opaque") -> list[np.ndarray]:
-    """The frames at the times 1/factor … (factor-1)/factor between two frames: a function of the two alone, the same
-    bits whatever the number of cores.
+def between(first, second, factor: int, method="quick", transfer="srgb", alpha="opaque") -> Iterator[np.ndarray]:
+    """The frames at the times 1/factor … (factor-1)/factor between two frames, one by one: a function of the two alone,
+    the same bits whatever the number of cores.
 
     first, second: arrays (height, width, 4) of a Source's dtype; no cut may lie between them
     method: of METHODS
     transfer, alpha: how samples are encoded, as Source says; the new frames are encoded alike
 
     What only one of the frames shows is taken from it, all else is mixed in linear light.
-    Raises MediaError where OpenCV is missing."""
-    if cv2 is None:
+    Raises MediaError at the first frame where OpenCV is missing, or has no contributed modules."""
+    if not hasattr(cv2, "optflow"):  # another add-on may bring an OpenCV without it
         raise MediaError(
             "in-between frames need the Python package opencv-contrib-python-headless; "
             "install the zip of Virtual Shutter that is made for your system"
@@ -42,9 +44,8 @@ def between(first, second, factor: int, method="quick", transfer="srgb", alpha="
     ends = [_encoded(frame, transfer, alpha) for frame in (first, second)]
     luma = [_luma(end) for end in ends]
     paths = [_Paths(luma, flow) for flow in METHODS[method]]
-    with np.errstate(invalid="ignore"):  # infinite light stays so
-        frames = (_mixed(ends, [path.at(k / factor) for path in paths], k / factor) for k in range(1, factor))
-        return [_decoded(frame, first.dtype, transfer, alpha) for frame in frames]
+    for t in (k / factor for k in range(1, factor)):
+        yield _decoded(_mixed(ends, [path.at(t) for path in paths], t), first.dtype, transfer, alpha)
 
 
 def _dis(first, second, finest: int, stride: int) -> np.ndarray:
@@ -170,6 +171,8 @@ def _encoded(frame, transfer, alpha) -> np.ndarray:
         return np.ascontiguousarray(frame[..., :3])
     white = np.iinfo(frame.dtype).max if frame.dtype.kind == "u" else 1
     rgba = frame.astype(np.float32) / np.float32(white)
+    # One infinite sample would make NaN of all that interpolation takes it into.
+    rgba = np.nan_to_num(rgba, copy=False, nan=0, posinf=HALF_MAX, neginf=-HALF_MAX)
     convert = light.to_encoded if transfer == "linear" else None
     if alpha == "opaque":
         return np.ascontiguousarray(rgba[..., :3] if convert is None else convert(rgba[..., :3]))
@@ -181,7 +184,7 @@ def _luma(samples) -> np.ndarray:
     if samples.dtype == np.uint16:
         samples = (samples >> 8).astype(np.uint8)
     elif samples.dtype != np.uint8:
-        samples = np.rint(255 * np.clip(np.nan_to_num(samples), 0, 1)).astype(np.uint8)
+        samples = np.rint(255 * np.clip(samples, 0, 1)).astype(np.uint8)
     return cv2.cvtColor(np.ascontiguousarray(samples[..., :3]), cv2.COLOR_RGB2GRAY)
 
 
@@ -212,5 +215,6 @@ def _decoded(frame, dtype, transfer, alpha) -> np.ndarray:
         frame = light.premultiplied(frame) if alpha == "premultiplied" else frame
     if dtype.kind == "u":
         white = np.iinfo(dtype).max
-        frame = np.rint(np.clip(frame, 0, 1) * np.float32(white))
-    return frame.astype(dtype)
+        return np.rint(np.clip(frame, 0, 1) * np.float32(white)).astype(dtype)
+    limits = np.finfo(dtype)  # which interpolation may pass
+    return np.clip(frame, limits.min, limits.max).astype(dtype)

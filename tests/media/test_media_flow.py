@@ -3,6 +3,7 @@
 import hashlib
 import subprocess
 import sys
+import types
 from pathlib import Path
 
 import numpy as np
@@ -45,7 +46,7 @@ def off(picture, other):
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16, np.float32])
 def test_what_moves_is_where_it_is_at_each_time(method, dtype):
-    made = flow.between(pan(0, dtype), pan(8, dtype), 4, method)
+    made = list(flow.between(pan(0, dtype), pan(8, dtype), 4, method))
     assert [picture.dtype for picture in made] == [dtype] * 3
     for k, picture in enumerate(made, start=1):
         assert picture.shape == (HEIGHT, WIDTH, 4)
@@ -101,7 +102,7 @@ def test_what_moves_over_ground_leaves_no_ghosts(method):
         return frame(rgb)
 
     first, second = at(80), at(96)
-    made = flow.between(first, second, 4, method)
+    made = list(flow.between(first, second, 4, method))
     for k, picture in enumerate(made, start=1):
         assert off(picture, at(80 + 4 * k)) < 0.7
     mixed = (light.to_linear(first / 255) + light.to_linear(second / 255)) / 2
@@ -124,6 +125,28 @@ def test_odd_values_stay_local(value):
     samples[10, 10, :3] = value
     (made,) = flow.between(samples, samples, 2, transfer="linear")
     np.testing.assert_allclose(made[24:, 24:], samples[24:, 24:], atol=1e-4)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("dtype", [np.float16, np.float32])
+@pytest.mark.parametrize("transfer", ["srgb", "linear"])
+@pytest.mark.parametrize("alpha", ["opaque", "straight", "premultiplied"])
+def test_what_is_not_finite_becomes_finite(method, dtype, transfer, alpha):
+    first, second = pan(0, dtype), pan(8, dtype)
+    first[40, 60, 0], first[50, 70] = np.inf, np.nan
+    second[40, 60, 1], second[50, 70, 2] = np.inf, -np.inf
+    for made in flow.between(first, second, 3, method, transfer, alpha):
+        assert np.isfinite(made).all()
+
+
+def test_frames_are_made_one_by_one(monkeypatch):
+    times = []
+    monkeypatch.setattr(flow, "_mixed", lambda ends, paths, t: times.append(t) or flow._light(ends[0]))
+    frames = flow.between(pan(0), pan(8), 4)
+    assert times == []
+    next(frames)
+    assert times == [1 / 4]
 
 
 def digest(threads, method):
@@ -149,10 +172,11 @@ def test_the_same_bits_whatever_the_number_of_threads(method):
 
 
 def test_one_frame_after_the_other_has_none_between():
-    assert flow.between(pan(0), pan(8), 1) == []
+    assert list(flow.between(pan(0), pan(8), 1)) == []
 
 
 def test_without_opencv_it_is_one_sentence(monkeypatch):
-    monkeypatch.setattr(flow, "cv2", None)
-    with pytest.raises(MediaError, match="need the Python package opencv-contrib-python-headless"):
-        flow.between(pan(0), pan(8), 2)
+    for found in (None, types.ModuleType("cv2")):  # none, and one without the contributed modules
+        monkeypatch.setattr(flow, "cv2", found)
+        with pytest.raises(MediaError, match="need the Python package opencv-contrib-python-headless"):
+            next(flow.between(pan(0), pan(8), 2))
