@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -326,6 +327,47 @@ def test_a_full_disk_leaves_what_is_built(source, folder):
     assert kept(folder).items() <= kept(folder.with_name("whole")).items()
     assert 2 <= state(source, folder).done < COUNT - 1
     assert not list(folder.rglob(".*"))
+
+
+@pytest.mark.parametrize("processors", [1, 16])
+@pytest.mark.parametrize("size", [(640, 360), (1920, 1080), (4096, 2160), (16384, 8192)])
+def test_pairs_at_work_fit_into_memory(monkeypatch, processors, size):
+    monkeypatch.setattr(inbetween.os, "process_cpu_count", lambda: processors, raising=False)
+    workers = inbetween._workers(SimpleNamespace(width=size[0], height=size[1]))
+    pair = 24 * 16 * size[0] * size[1]  # layers of four float32; as measured of the dearest, "good" with alpha
+    assert 1 <= workers <= processors
+    assert workers == 1 or workers * pair <= 4 << 30
+    assert workers == processors or (workers + 1) * pair > 4 << 30
+
+
+PEAK = """
+import re, sys
+from pathlib import Path
+import cv2
+import numpy as np
+sys.path.insert(0, "tests/media")
+from test_media_flow import frame, noise
+from shutter_addon.media import flow, inbetween
+
+def resident(which):
+    return 1024 * int(re.search(which + r":\\s+(\\d+) kB", Path("/proc/self/status").read_text())[1])
+
+cv2.setNumThreads(1)
+wide = cv2.resize(noise(1), (976, 540))
+small = frame(noise(1), np.float32)
+list(flow.between(small, small, 2, "good", alpha="straight"))
+before = resident("VmRSS")
+ends = [frame(wide[:, x : x + 960], np.float32, 0.5) for x in (0, 8)]
+Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
+for picture in flow.between(*ends, 16, "good", alpha="straight"):
+    pass
+assert resident("VmHWM") - before < inbetween.LAYERS * 16 * 960 * 540, (resident("VmHWM") - before) / (16 * 960 * 540)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+def test_a_pair_takes_no_more_memory_than_is_reckoned():
+    subprocess.run([sys.executable, "-c", PEAK], cwd=ROOT, check=True)
 
 
 BUILDER = """
