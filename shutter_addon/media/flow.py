@@ -95,12 +95,12 @@ class _Paths:
         # A margin of two takes what leaves the picture.
         np.clip(cells, -2, (w, h), out=cells)
         corners = (cells[:, 1] + 2) * (w + 4) + cells[:, 0] + 2
-        arrived = np.full(((h + 4) * (w + 4), 3), (0, 0, np.inf), np.float32)
-        around = corners[:, None] + np.array([0, 1, w + 4, w + 5])
-        # Of several that arrive the last stays, the cheapest.
-        arrived[around.ravel()] = np.repeat(np.column_stack([vectors, costs]), 4, axis=0)
-        arrived = arrived.reshape(h + 4, w + 4, 3)[2:-2, 2:-2]
-        return arrived[..., :2], arrived[..., 2]
+        # Of several that arrive the cheapest stays, the last; -1, where nothing arrives, takes what is appended.
+        chosen = np.full((h + 4) * (w + 4), -1, np.int32)
+        for corner in (0, 1, w + 4, w + 5):
+            np.maximum.at(chosen, corners + corner, np.arange(len(corners), dtype=np.int32))
+        chosen = chosen.reshape(h + 4, w + 4)[2:-2, 2:-2]
+        return np.append(vectors, np.float32([[0, 0]]), axis=0)[chosen], np.append(costs, np.float32(np.inf))[chosen]
 
 
 def _carriers(first, second, flow):
