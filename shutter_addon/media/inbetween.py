@@ -18,7 +18,7 @@ from .errors import MediaError
 from .files import check_index
 
 MEMORY = 4 << 30  # bytes that pairs at work may take together
-LAYERS = 24  # of a frame as float32, for a pair at work: 9 to 17 measured for "quick", 15 to 23.6 for "good"
+LAYERS = 26  # of a frame as float32, for a pair at work: 9 to 17 measured for "quick", 15 to 24.3 for "good"
 
 
 class Inbetween:

@@ -334,7 +334,7 @@ def test_a_full_disk_leaves_what_is_built(source, folder):
 def test_pairs_at_work_fit_into_memory(monkeypatch, processors, size):
     monkeypatch.setattr(inbetween.os, "process_cpu_count", lambda: processors, raising=False)
     workers = inbetween._workers(SimpleNamespace(width=size[0], height=size[1]))
-    pair = 24 * 16 * size[0] * size[1]  # layers of four float32; as measured of the dearest, "good" with alpha
+    pair = 26 * 16 * size[0] * size[1]  # layers of four float32
     assert 1 <= workers <= processors
     assert workers == 1 or workers * pair <= 4 << 30
     assert workers == processors or (workers + 1) * pair > 4 << 30
