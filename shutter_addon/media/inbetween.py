@@ -48,7 +48,7 @@ class Inbetween:
         """MediaError: the frame is not built."""
         if not self.has(index):
             raise MediaError(
-                f"{self.path.name}: in-between frames of frame {index // self.factor} are missing; "
+                f"{self.path.name}: in-between frames of frame {index // self.factor + 1} are missing; "
                 f"build them first (in {self._cache.folder})"
             )
 

@@ -116,7 +116,7 @@ def test_a_missing_frame_is_never_made_up(source, folder):
     assert [between.has(index) for index in range(between.count)] == [
         index < 2 * FACTOR or index % FACTOR == 0 for index in range(between.count)
     ]
-    with pytest.raises(MediaError, match=r"in-between frames of frame 2 are missing"):
+    with pytest.raises(MediaError, match=r"in-between frames of frame 3 are missing"):
         between.read(2 * FACTOR + 1)
     build(source, folder)
     assert between.read(2 * FACTOR + 1).shape == (source.height, source.width, 4)
