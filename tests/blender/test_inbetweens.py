@@ -122,7 +122,7 @@ def test_what_is_missing_is_said_and_what_is_built_is_shown(film, add, edit, ren
     picture()
     cache.purge(inbetweens.given)
     for way in (picture, pictures.moment(*pictures.strips.find_edit(effect.scene), 2).check):
-        with pytest.raises(MediaError, match=r"in-between frames of frame 1 are missing"):
+        with pytest.raises(MediaError, match=r"in-between frames of frame 2 are missing"):
             way()
     with open_source(first) as source:
         build(source, inbetweens.given, frames=(1, 2))
