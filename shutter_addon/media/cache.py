@@ -80,7 +80,11 @@ class Cache:
         digests: dict[int, set[str]] = {}
         kinds: dict[int, str] = {}
         for file in (self.folder / "checks").glob("*.sha256"):
-            for line in file.read_text("ascii", "replace").splitlines():
+            try:
+                text = file.read_text("ascii", "replace")
+            except FileNotFoundError:  # removed meanwhile
+                continue
+            for line in text.splitlines():
                 if match := _PICTURE.fullmatch(line):  # processes whose libraries differ may write other bytes
                     digests.setdefault(int(match[2]), set()).add(match[1])
                 elif (match := _PAIR.fullmatch(line)) and line == pair_line(int(match[1]), match[2]):
@@ -305,7 +309,8 @@ def _clear(folder: Path) -> None:
 def _remove(folder: Path) -> int:
     freed = 0
     try:
-        for path in _files(folder):
+        # The manifest last: without it, what is left would never be found again.
+        for path in sorted(_files(folder), key=lambda path: path.name == MANIFEST):
             freed += path.stat().st_size
             path.unlink()
         for empty in (folder / "checks", folder):

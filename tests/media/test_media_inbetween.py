@@ -1,12 +1,14 @@
 """In-between frames in files: what is built, kept, found damaged, and given back."""
 
 import hashlib
+import os
 import random
 import shutil
 import signal
 import subprocess
 import sys
 import time
+from functools import partialmethod
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -285,6 +287,39 @@ def test_purge_takes_only_what_was_built(source, folder, tmp_path):
     freed += cache.purge(folder)
     assert freed == size
     assert sorted(path for path in folder.rglob("*") if path.is_file()) == sorted(own)
+
+
+def test_what_could_not_be_removed_is_found_again(source, folder, monkeypatch):
+    def refusing(path, busy):
+        if path == busy:
+            raise PermissionError(13, "Permission denied", str(path))
+        os.unlink(path)
+
+    build(source, folder)
+    for busy in pictures(folder):
+        with monkeypatch.context() as patch:
+            patch.setattr(Path, "unlink", partialmethod(refusing, busy))
+            with pytest.raises(MediaError, match=r"cannot be removed \(Permission denied\)"):
+                cache.purge(folder)
+        assert cache.size(folder) > 0
+        assert cache.purge(folder) > 0
+        assert not list(folder.iterdir())
+        build(source, folder)
+
+
+def test_checks_that_go_while_they_are_read_are_not_missed(source, folder, monkeypatch):
+    build(source, folder, frames=(0, 1))
+    build(source, folder)
+    gone, read = sorted(folder.glob("*/checks/*"))[0], Path.read_text
+
+    def late(path, *more):
+        path.unlink() if path == gone else None
+        return read(path, *more)
+
+    monkeypatch.setattr(Path, "read_text", late)
+    with opened(source, folder) as between:
+        assert 0 < sum(between.has(index) for index in range(between.count)) < between.count
+    assert not gone.exists()
 
 
 def test_checks_are_read_by_sha256sum(source, folder):
