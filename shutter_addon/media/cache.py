@@ -23,7 +23,8 @@ VERSION = 1  # raise it when the same frames give other in-betweens, or the fold
 MANIFEST = "manifest.json"
 MAKER = "Virtual Shutter: in-between frames"
 SAMPLES = {"uint8": "uint8", "uint16": "uint16", "float16": "half", "float32": "float"}
-BLOCKS, BLOCK = 16, 4096  # what is read of each file of a source to know it again
+WHOLE = 8 << 20  # bytes; a source's files up to this size, HD pictures of 8 bits without compression, are read whole
+BLOCKS, BLOCK = 16, 4096  # what is read of a larger one to know it again
 LEFT_BEHIND = 3600  # seconds; a picture takes less to be written, whatever the machine
 
 _PICTURE = re.compile(r"([0-9a-f]{64})  (\d{8})\.(?:png|exr)")
@@ -168,15 +169,15 @@ class Cache:
 
 
 def identity(source) -> dict:
-    """What tells a source from others wherever its files lie: their content as far as samples of it tell, and how they
-    are read. What keeps a file's size and changes none of its 16 blocks of 4 kB is not noticed.
+    """What tells a source from others wherever its files lie: their content, and how they are read. In files larger
+    than 8 MiB, what keeps the size and changes none of 16 blocks of 4 kB is not noticed.
 
     MediaError: a file is gone."""
     content = hashlib.sha256()
     for path in getattr(source, "files", [source.path]):
         try:
             status = path.stat()
-            content.update(_sample(path, status.st_size, status.st_mtime_ns))
+            content.update(_content(path, status.st_size, status.st_mtime_ns))
         except OSError as error:
             raise MediaError(f"{path.name}: cannot be read ({error.strerror})") from None
     return {
@@ -321,15 +322,17 @@ def _remove(folder: Path) -> int:
     return freed
 
 
-@lru_cache(maxsize=1 << 14)
-def _sample(path: Path, size: int, _mtime: int) -> bytes:
-    """A hash of the file's size and of blocks from all over it."""
-    digest = hashlib.sha256(str(size).encode())
+@lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
+def _content(path: Path, size: int, _mtime: int) -> bytes:
+    """A hash of the file, or of a large one's size and of blocks from all over it."""
     with path.open("rb") as file:
+        if size <= WHOLE:
+            return hashlib.file_digest(file, "sha256").digest()
+        digest = hashlib.sha256(str(size).encode())
         for block in range(BLOCKS):
             file.seek(max(size - BLOCK, 0) * block // (BLOCKS - 1))
             digest.update(file.read(BLOCK))
-    return digest.digest()
+        return digest.digest()
 
 
 def _sha256(path: Path) -> str:

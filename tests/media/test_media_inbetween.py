@@ -262,6 +262,22 @@ def test_stale_when_the_source_changed(source, folder, resized):
         assert state(changed, folder).name == "ready"
 
 
+def test_stale_after_a_retouch_that_keeps_the_size(tmp_path, folder):
+    (tmp_path / "shot").mkdir()
+    shots = [np.tile(picture(number, 640, 360), (2, 2, 1)) for number in range(3)]
+    files = [tmp_path / "shot" / f"{number}.tif" for number in range(3)]
+    for file, shot in zip(files, shots, strict=True):
+        save_image(file, shot, compression="none")
+    size = files[1].stat().st_size
+    with open_source(files[0]) as source:
+        build(source, folder)
+        assert state(source, folder).name == "ready"
+        shots[1][500, 700] ^= 1
+        save_image(files[1], shots[1], compression="none")
+        assert files[1].stat().st_size == size
+        assert state(source, folder).name == "stale"
+
+
 def test_another_factor_or_reading_is_another_cache(source, folder):
     build(source, folder)
     assert cache.state(source, folder, 8, "quick").name == "missing"
