@@ -38,7 +38,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from quality import similarity
 
 from shutter_addon.core import light
-from shutter_addon.media import flow, open_source
+from shutter_addon.media import MediaError, flow, open_source
 
 ROOT = Path(__file__).resolve().parents[1]
 FILMS = [ROOT / "assets" / name for name in ("bigbuckbunny.mp4", "pedestrians.avi")]
@@ -262,14 +262,19 @@ def parse(arguments=None):
     return parser.parse_args(arguments)
 
 
-def main(arguments=None) -> None:
+def main(arguments=None) -> int:
     args = parse(arguments)
-    rows = [row for part in args.parts for row in PARTS[part](args)]
+    try:
+        rows = [row for part in args.parts for row in PARTS[part](args)]
+    except MediaError as error:
+        print(f"inbetween_quality: {error}", file=sys.stderr)
+        return 2
     if args.json:
         write(args.json, json.dumps(rows, indent=1) + "\n")
     if args.table:
         head = "| footage | way | PSNR | worst | SSIM | worst | s/frame |\n|---|---|---|---|---|---|---|\n"
         write(args.table, head + "".join(line(row) + "\n" for row in rows if "way" in row))
+    return 0
 
 
 def write(path, text) -> None:
@@ -279,4 +284,4 @@ def write(path, text) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
