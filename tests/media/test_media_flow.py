@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.core import light
-from shutter_addon.media import MediaError, flow
+from shutter_addon.media import MediaError, flow, open_source
 
 HEIGHT, WIDTH = 96, 160
 METHODS = tuple(flow.METHODS)
@@ -117,6 +117,19 @@ def test_what_leaves_or_enters_the_picture_comes_from_the_frame_that_shows_it(me
     (made,) = flow.between(first, second, 2, method)
     for side in (np.s_[12:-12, :8], np.s_[12:-12, -8:]):
         assert np.abs(made[side].astype(float) - middle[side]).mean() < 5  # 7 where both are mixed
+
+
+def test_dropped_frames_of_a_film_come_closer_than_a_blend(bunny):
+    def psnr(picture, dropped):
+        return 10 * np.log10(255**2 / np.mean((picture[..., :3].astype(float) - dropped[..., :3]) ** 2))
+
+    with open_source(bunny) as film:
+        for index in (30, 60):
+            first, dropped, second = (film.read(index + step) for step in (-1, 0, 1))
+            (made,) = flow.between(first, second, 2)
+            mixed = (light.to_linear(first / 255) + light.to_linear(second / 255)) / 2
+            mixed = np.rint(255 * light.to_encoded(mixed))
+            assert psnr(made, dropped) > psnr(mixed, dropped) + 1
 
 
 @pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan, 1e4])
