@@ -60,7 +60,12 @@ def options(effect, curves=None, frame: float = 0.0) -> recipe.Options:
 
     words = {name: at(name).lower() for name in OPTIONS}
     return recipe.Options(
-        effect.window, **words, aggregate=int(at("aggregate")), border=at("border"), stop_at_cuts=at("stop_at_cuts")
+        effect.window,
+        **words,
+        aggregate=int(at("aggregate")),
+        border=at("border"),
+        stop_at_cuts=at("stop_at_cuts"),
+        step=int(effect.inbetween),
     )
 
 

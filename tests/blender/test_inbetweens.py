@@ -83,7 +83,7 @@ def test_a_window_stops_in_the_middle_of_a_cut_pair(film, add, edit, render, sam
         window = np.arange((frame - 1) * FACTOR, (frame - 1) * FACTOR + 10)
         same_pixels(picture[..., :3], shown(frames, np.minimum(window, end) if frame <= CUT else window), 1)
     effect.position = "END"
-    window = np.maximum(np.arange(CUT * FACTOR - 9, CUT * FACTOR + 1), end + 1)
+    window = np.maximum(np.arange(CUT * FACTOR - 6, CUT * FACTOR + 4), end + 1)
     same_pixels(render(edit, (7,))[7][..., :3], shown(frames, window), 1)
     effect.stop_at_cuts, effect.position = False, "START"
     same_pixels(render(edit, (6,))[6][..., :3], shown(frames, range(20, 30)), 1)
@@ -93,7 +93,7 @@ def test_reversed_frames(film, add, edit, render, same_pixels):
     first, frames = film
     source, *_ = add(first, COUNT, np.ones(5))
     source.use_reverse_frames = True
-    same_pixels(render(edit, (2,))[2][..., :3], shown(frames, range(36, 40 + 1)), 1)
+    same_pixels(render(edit, (2,))[2][..., :3], shown(frames, range(39, 43 + 1)), 1)
 
 
 def test_a_slow_strip_shows_in_betweens(film, add, edit, render, same_pixels):
@@ -190,7 +190,7 @@ def test_a_part_of_a_source_frame_becomes_a_whole_one(effect):
     effect.inbetween = "1"
     assert editing.bars(effect.shutters[0]).tolist() == [1, 0.5]
     assert shutters.multiplied(np.ones(12), 8, 1, "end").tolist() == [0.5, 1]
-    assert shutters.multiplied(np.ones(12), 8, 1, "center").tolist() == [0.75, 0.75]
+    assert shutters.multiplied(np.ones(12), 8, 1, "center").tolist() == [1, 0.5]
     assert shutters.multiplied(np.ones(12), 8, 4).tolist() == [1] * 6
 
 
