@@ -131,6 +131,24 @@ def test_what_is_missing_is_said_and_what_is_built_is_shown(film, add, edit, ren
     same_pixels(light.to_encoded(picture()[..., :3]) * 255, shown(frames, (4, 4, 8)), 1)
 
 
+def test_in_betweens_of_a_file_that_was_replaced_are_not_shown(film, add, edit, monkeypatch):
+    from shutter_addon.blender import cache, inbetweens, pictures, sources
+    from shutter_addon.media import MediaError
+
+    monkeypatch.setattr(sources, "_FRESH", 0)
+    first, _ = film
+    *_, effect = add(first, COUNT, np.ones(6))
+    before = pictures.picture(effect.scene, 2)
+    cache.invalidate_changed(edit)
+    (first.parent / "f0003.png").write_bytes((first.parent / "f0009.png").read_bytes())
+    assert cache.invalidate_changed(edit)
+    with pytest.raises(MediaError, match=r"in-between frames of frame 1 are missing"):
+        pictures.picture(effect.scene, 2)
+    with open_source(first) as source:
+        build(source, inbetweens.given)
+    assert not np.allclose(pictures.picture(effect.scene, 2), before)
+
+
 def test_finished_frames_are_dropped_when_in_betweens_come_and_go(film, add, edit):
     from shutter_addon.blender import cache, inbetweens
     from shutter_addon.media.cache import purge
