@@ -72,7 +72,7 @@ def _known(source) -> tuple:
 
 
 def _estimated(medium) -> int:
-    with medium, suppress(MediaError):  # a build says what is wrong
+    with medium, suppress(MediaError, OSError):  # a build says what is wrong
         return estimate(medium, 2)
     return 0
 
