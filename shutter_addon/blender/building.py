@@ -13,6 +13,7 @@ from bpy.types import Operator
 
 from ..media import MediaError, cache
 from ..media.inbetween import build, estimate
+from . import cache as finished
 from . import effects, inbetweens, sources, strips
 from .operators import _OfEffect, redraw, refused
 from .pictures import FAULTS
@@ -71,7 +72,7 @@ def _known(source) -> tuple:
 
 
 def _estimated(medium) -> int:
-    with medium, suppress(MediaError):  # a build says what is wrong
+    with medium, suppress(MediaError, OSError):  # a build says what is wrong
         return estimate(medium, 2)
     return 0
 
@@ -128,14 +129,14 @@ def stop() -> None:
 
 def _started(context, build: Build) -> None:
     global _running, _timer
-    _running = build
+    _running, finished.building = build, True
     if not bpy.app.background:
         _timer = context.window_manager.event_timer_add(TICK, window=context.window)
 
 
 def _ended() -> None:
     global _running, _timer
-    _running = None
+    _running, finished.building = None, False
     _looks.clear()
     _say(None)
     if _timer is not None:

@@ -11,6 +11,8 @@ from ..media import cache as files
 from . import animation, effects, inbetweens, sources, strips
 
 _signatures: dict = {}
+_built: dict[tuple, tuple] = {}  # by folder, source, factor and method: the stamp of their in-between frames
+building = False  # while in-between frames are built, those that come count when the build has ended
 
 # Keyframe.interpolation as a number: constant, linear, bezier, then the others.
 _BEZIER = 2
@@ -21,20 +23,25 @@ _TIMING = (
 )
 
 
-def built_key(effect) -> tuple:
-    """Which in-between frames an effect has; equal keys: the same, and none was built or removed meanwhile."""
+def built_key(effect, source) -> tuple:
+    """Which in-between frames an effect has; equal keys: the same, of the same files, and none was built or removed
+    meanwhile. MediaError: the source strip has no files."""
     if inbetweens.factor(effect) == 1:
         return ()
     try:
         folder = inbetweens.folder(effect)
     except effects.EffectError as error:
         return (str(error),)
-    return effect.inbetween, effect.inbetween_method, str(folder), files.stamp(folder)
+    key = folder, sources.stem(source), inbetweens.factor(effect), inbetweens.METHODS[effect.inbetween_method]
+    if not (building and key in _built):
+        _built[key] = files.stamp(*key)
+    return *key, _built[key], sources.every_file_key(source)
 
 
 def forget() -> None:
     """Forgets what the effects of a file were, before another one is loaded."""
     _signatures.clear()
+    _built.clear()
 
 
 def invalidate(edit, scene=None) -> None:
@@ -82,9 +89,8 @@ def _signature(edit, effect, strip):
     transform = strip.transform
     yield tuple(getattr(transform, name) for name in _PLACE), tuple(transform.origin)
     yield strip.use_flip_x, strip.use_flip_y  # scribbles lie mirrored with it
-    yield built_key(effect)
     if (source := strips.nearest_source(edit, effect, strip)) is not None:
-        yield from _source(source)
+        yield from _source(effect, source)
 
 
 def _keys(points):
@@ -105,12 +111,13 @@ def _strokes(annotation, layer: str):
             yield _bytes(stroke.points, "co", 3, np.float32)
 
 
-def _source(source):
+def _source(effect, source):
     yield tuple(getattr(source, name) for name in _TIMING)
     yield sources.reading(source)
     yield tuple(key.timeline_frame for key in getattr(source, "retiming_keys", ()))
     try:
         yield sources.files_key(source)  # a file that was missing may be there again
+        yield built_key(effect, source)
     except MediaError as error:
         yield str(error)
 

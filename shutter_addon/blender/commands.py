@@ -134,8 +134,12 @@ def _build_lacking(edit) -> None:
 
 
 def _build_alone(arguments) -> None:
-    with open_source(Path(os.path.abspath(arguments.source))) as medium:
+    path = Path(os.path.abspath(arguments.source))
+    with open_source(path) as medium:
         first, last = _frames(arguments.frames, medium.count)
+        strip = edits.make_source(path, medium)
+    # A strip may read the file in another way, with a colour space of Blender's own choice.
+    with sources.open_media(strip) as medium:
         pairs = range(first - 1, min(last, medium.count - 1))
         _build(medium, Path(os.path.abspath(arguments.cache)), arguments.factor, arguments.method, pairs)
 

@@ -11,6 +11,18 @@ from . import effects, strips
 
 def make_edit(path: Path, medium, source_recipe):
     """An edit of one source strip (an opened medium's) under one effect strip; its scene."""
+    source = make_source(path, medium)
+    edit = source.id_data
+    strip, effect = strips.add_effect(edit, source)
+    effects.apply(edit, effect, strip, source_recipe)
+    strip.right_handle = length(medium, source_recipe) + 1
+    edit.frame_start, edit.frame_end = strip.left_handle, strip.right_handle - 1
+    edit.frame_current = edit.frame_start
+    return edit
+
+
+def make_source(path: Path, medium):
+    """A source strip (an opened medium's), alone in an edit that fits it."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     edit = bpy.context.scene
     edit.name = "Edit"
@@ -23,13 +35,7 @@ def make_edit(path: Path, medium, source_recipe):
     # Dither would add noise to a still frame; Standard shows code values as the source has them.
     render.dither_intensity = 0
     edit.view_settings.view_transform = "Standard"
-    source = _add_source(edit.sequence_editor_create(), path, medium)
-    strip, effect = strips.add_effect(edit, source)
-    effects.apply(edit, effect, strip, source_recipe)
-    strip.right_handle = length(medium, source_recipe) + 1
-    edit.frame_start, edit.frame_end = strip.left_handle, strip.right_handle - 1
-    edit.frame_current = edit.frame_start
-    return edit
+    return _add_source(edit.sequence_editor_create(), path, medium)
 
 
 def length(medium, source_recipe) -> int:

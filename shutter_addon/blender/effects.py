@@ -31,10 +31,23 @@ def instant(edit, effect, strip, frame: float) -> recipe.Instant:
 
 def source_time(edit, effect, frame: float) -> tuple[float, bool]:
     """The source frame that an effect's source time tells for a timeline frame, 1 is the first; and whether it runs
-    backward from there."""
+    backward from there, or where it stands still, whether it came to that backward."""
     curves, path = animation.Curves(edit), effect.path_from_id()
     time, later = (curves.value(effect, path, "source_time", frame + apart) for apart in (0, 0.5))
+    if later == time and (curve := curves.find(f"{path}.source_time")):
+        return time, _came_backward(curve, frame)
     return time, later < time
+
+
+def _came_backward(curve, frame: float) -> bool:
+    """Whether a curve fell towards the last of its keys up to a frame that it did not stand still before. A jump is no
+    way."""
+    for key in reversed(animation.key_frames([curve])):
+        if key <= frame:
+            earlier, later = curve.evaluate(key - 0.5), curve.evaluate(key - 0.25)
+            if earlier != later:
+                return later < earlier
+    return False
 
 
 def checked(name: str, bars: np.ndarray, frame: float) -> np.ndarray:
@@ -60,7 +73,12 @@ def options(effect, curves=None, frame: float = 0.0) -> recipe.Options:
 
     words = {name: at(name).lower() for name in OPTIONS}
     return recipe.Options(
-        effect.window, **words, aggregate=int(at("aggregate")), border=at("border"), stop_at_cuts=at("stop_at_cuts")
+        effect.window,
+        **words,
+        aggregate=int(at("aggregate")),
+        border=at("border"),
+        stop_at_cuts=at("stop_at_cuts"),
+        step=int(effect.inbetween),
     )
 
 

@@ -49,7 +49,7 @@ def recipe_of(edit, effect, strip) -> recipe.Recipe:
         inbetween=inbetweens.factor(effect),
         inbetween_method=effect.inbetween_method.lower(),
         time=_time(curves, path, effect, strip) if effect.use_source_time else [],
-        **asdict(chosen),
+        **{name: value for name, value in asdict(chosen).items() if name != "step"},
     )
     return recipe.parse(recipe.dump(found))
 

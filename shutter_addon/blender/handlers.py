@@ -3,7 +3,7 @@
 import bpy
 from bpy.app.handlers import persistent
 
-from . import building, cache, copies, lifecycle, pictures, strips
+from . import building, cache, copies, lifecycle, pictures, sources, strips
 
 
 @persistent
@@ -41,6 +41,8 @@ def _show_scribbles():
 
 @persistent
 def _before_render(scene, *_):
+    if scene.render.engine != strips.ENGINE:
+        sources.look_again()
     # In a window the render has a thread of its own, and the last update has seen to copies.
     if bpy.app.background and scene.render.engine != strips.ENGINE:
         copies.adopt()

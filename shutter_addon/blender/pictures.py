@@ -68,7 +68,9 @@ class Moment:
         wanted, source = {}, self.renderer.source
         for step in range(_AHEAD + 1):
             index = min(max(self.index + step * self.direction * source.step, 0), source.count - 1)
-            wanted |= dict.fromkeys(sorted(self.renderer.missing(index, self.direction, self.instant)))
+            missing = sorted(self.renderer.missing(index, self.direction, self.instant))
+            # One that is not built yet would be remembered as a fault, and may come before it is needed.
+            wanted |= dict.fromkeys(i for i in missing if source.step == 1 or source.has(i))
         room = _DECODED_BYTES // (source.width * source.height * 4 * np.dtype(source.dtype).itemsize)
         source.want(list(wanted)[: max(_DECODED, room)])
 
@@ -118,7 +120,7 @@ class Studio:
             self._compositor, message = self.run(self._open)
             if message:
                 say(message)
-        place, key = effect.scene.session_uid, (sources.media_key(source_strip), cache.built_key(effect))
+        place, key = effect.scene.session_uid, (sources.media_key(source_strip), cache.built_key(effect, source_strip))
         old_key, renderer = self._renderers.pop(place, (None, None))
         if old_key != key:
             if renderer is not None:

@@ -207,7 +207,7 @@ def _show_strokes(context, quad, effect, moment) -> None:
 
 def _show_source(quad, found: Shown, moment, right: float) -> None:
     """The source's own frame, from the left edge on: that of a shutter that is open for it alone."""
-    options = moment.instant.options
+    options = replace(moment.instant.options, step=1)  # no in-between frames come first in reverse
     still = np.zeros((1, options.window))
     still[0, options.before] = 1
     plain = replace(moment, instant=Instant(options, still))

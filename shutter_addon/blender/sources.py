@@ -2,12 +2,16 @@
 
 import os
 import re
+import time
 from pathlib import Path
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..media import MediaError, open_source
+
+_FRESH = 1.0  # seconds that the files of a sequence, which may be long, are not asked again
+_every_file: dict[tuple, tuple[float, tuple]] = {}  # when they were asked, and what they were
 
 
 def media_key(strip) -> tuple:
@@ -20,6 +24,27 @@ def files_key(strip) -> tuple:
     count, path = _files(strip)
     ends = dict.fromkeys((path(0), path(count - 1)))  # an image sequence may be long
     return count, *((str(end), _stamp(end)) for end in ends)
+
+
+def every_file_key(strip) -> tuple:
+    """All of the strip's files as they are now, or were a second ago. MediaError: it has none."""
+    count, path = _files(strip)
+    key = count, path(0), path(count - 1)
+    when, stamps = _every_file.get(key, (0.0, ()))
+    if not when or time.monotonic() - when > _FRESH:
+        stamps = tuple(_stamp(path(i)) for i in range(count))
+        _every_file[key] = time.monotonic(), stamps
+    return stamps
+
+
+def look_again() -> None:
+    """Has all files asked again at once."""
+    _every_file.clear()
+
+
+def stem(strip) -> str:
+    """The name of the strip's first file, without its suffix. MediaError: it has none."""
+    return _files(strip)[1](0).stem
 
 
 def reading(strip) -> tuple:

@@ -171,7 +171,7 @@ class GPUCompositor:
         """
         options, values = instant.options, table(instant)
         first, last = shutters.open_span(instant.bars)
-        origin = index - direction * options.before
+        origin = int(compositor.window_positions(options, index, direction)[0])
         reach = sorted((origin + direction * first, origin + direction * (last - 1)))
         shortened = options.edges == "shorten" and (reach[0] < window.shot.start or reach[1] >= window.shot.stop)
         way = way_of(window, options, len(values) - 1, last - first, shortened)

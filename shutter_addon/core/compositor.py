@@ -11,9 +11,11 @@ from .instant import Instant, Options
 def window_positions(options: Options, index: int, direction: int = 1) -> np.ndarray:
     """Where the window's frames (L,) lie around source frame `index`, beyond the clip's ends as well.
 
-    direction: 1, or −1 where the source plays in reverse, and the window's next frames are those before `index`.
+    direction: 1, or −1 where the source plays in reverse, and the window's next frames are those before `index`. A
+    filmed frame lasts until the next one, so that in reverse its in-between frames come first, from the last one on.
     """
-    return index + direction * (np.arange(options.window) - options.before)
+    first = index if direction > 0 else index + options.step - 1
+    return first + direction * (np.arange(options.window) - options.before)
 
 
 def source_frames(options: Options, positions: np.ndarray, shot: range) -> np.ndarray:

@@ -18,7 +18,9 @@ Position = Literal["start", "center", "end"]
 
 @dataclass(frozen=True)
 class Options:
-    """How a window of L frames becomes a picture; the recipe's fields of the same names."""
+    """How a window of L frames becomes a picture; the recipe's fields of the same names.
+
+    step: frames of the window for each that was filmed, which are more where there are in-between frames."""
 
     window: int
     position: Position = "start"
@@ -29,11 +31,14 @@ class Options:
     aggregate: Literal[1, 2, 4] = 1
     border: bool = False
     stop_at_cuts: bool = True
+    step: int = 1
 
     @property
     def before(self) -> int:
-        """How many frames of the window lie before the frame itself."""
-        return {"start": 0, "center": (self.window - 1) // 2, "end": self.window - 1}[self.position]
+        """How many frames of the window lie before the filmed frame itself, which is `step` of them long."""
+        filmed = -(-self.window // self.step)
+        center, end = (filmed - 1) // 2 * self.step, max(self.window - self.step, 0)
+        return {"start": 0, "center": center, "end": end}[self.position]
 
 
 @dataclass(frozen=True)

@@ -130,7 +130,8 @@ class Recipe:
 
     @property
     def options(self) -> Options:
-        return Options(**{name: getattr(self, name) for name in Options.__dataclass_fields__})
+        names = Options.__dataclass_fields__.keys() - {"step"}
+        return Options(**{name: getattr(self, name) for name in names}, step=self.inbetween)
 
     def at(self, frame: float, aspect: float) -> Instant:
         """The effect at a timeline frame (1 = the strip's first), for a picture of width / height = aspect."""

@@ -162,14 +162,14 @@ def resample(bars, window: int) -> np.ndarray:
 def multiplied(bars, old: int, new: int, position: str = "start") -> np.ndarray:
     """Bars of the same shutter, in time, where each source frame has `new` frames in place of `old`, both powers of 2.
 
-    A window that ends within a source frame gets closed bars up to that frame's end: at its far side, which `position`
-    tells. ShutterError: it would have more than 256 bars."""
+    A window that ends within a source frame gets closed bars up to that frame's end; where `position` is "end" it is
+    the first frame that lacks some, otherwise the last. ShutterError: it would have more than 256 bars."""
     bars = np.asarray(bars, dtype=np.float64)
     window = -(-len(bars) * new // old)
     if window > MAX_WINDOW:
         raise ShutterError(f"a shutter has 1 to {MAX_WINDOW} bars, not {window}")
     lacking = max(window * old // new - len(bars), 0)
-    before = {"start": 0, "center": lacking // 2, "end": lacking}[position]
+    before = lacking if position == "end" else 0
     return resample(np.pad(bars, (before, lacking - before)), window)
 
 

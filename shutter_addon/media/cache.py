@@ -1,5 +1,6 @@
 """The folder that keeps a source's in-between frames: pictures, what they were made of, and a check of every one."""
 
+import glob
 import hashlib
 import json
 import os
@@ -256,9 +257,12 @@ def _stamp(folder: Path) -> tuple | None:
         return None
 
 
-def stamp(folder) -> tuple:
-    """Changes with every in-between frame that is built in a folder, or removed."""
-    return tuple((path.parent.name, _stamp(path.parent)) for path in sorted(Path(folder).glob(f"*/{MANIFEST}")))
+def stamp(folder, stem: str, factor: int, method: str) -> tuple:
+    """Changes with every in-between frame that is built in `folder`, or removed, of sources whose files have that stem.
+
+    It asks for time stamps alone, and for none of the sources'."""
+    caches = Path(folder).glob(f"{glob.escape(stem[:40])}-{factor}x-{method}-*")
+    return tuple((path.name, _stamp(path)) for path in sorted(caches))
 
 
 def _caches(folder) -> list[tuple[Path, dict]]:

@@ -2,7 +2,9 @@
 
 import shutil
 import sys
+import threading
 import time
+from concurrent.futures import wait
 from types import SimpleNamespace
 
 import numpy as np
@@ -49,12 +51,15 @@ def effect(bpy, edit, tmp_path, flow):
     return effect
 
 
-def made(edit, folder):
+def made(edit, folder, first=None):
+    """An effect on pictures that are written there; first: the file that the strip begins with."""
     from shutter_addon.blender import editing, strips
 
-    first = write_frames(folder / "in", [ramp(number) for number in range(COUNT)])
-    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
-    for path in sorted(first.parent.iterdir())[1:]:
+    written = write_frames(folder / "in", [ramp(number) for number in range(COUNT)])
+    if first is not None:
+        written = written.rename(written.with_name(first))
+    source = edit.sequence_editor.strips.new_image(folder.name, str(written), 1, 1)
+    for path in sorted(set(written.parent.iterdir()) - {written}):
         source.elements.append(path.name)
     strip, effect = strips.add_effect(edit, source)
     editing.start(effect)
@@ -95,6 +100,43 @@ def test_built_shown_and_removed(bpy, building, effect, tmp_path, capfd):
     assert [path.name for path in cache.iterdir()] == ["notes.txt"]
     assert shown(bpy, building) == ("missing", 0, COUNT - 1)
     assert look(bpy, building).size == 0
+
+
+def test_a_build_reopens_its_source_once_and_no_other(bpy, building, edit, effect, flow, tmp_path, monkeypatch):
+    """However often pictures are asked for meanwhile."""
+    from shutter_addon.blender import cache, pictures, strips
+
+    bpy.ops.shutter.inbetween_build()
+    first = strips.active(bpy.context)[2]
+    made(edit, tmp_path / "other", "f0102.png")
+    begun = strips.active(bpy.context)
+    ready = edit, strips.effect_of(edit, first.scene), first
+    opened, asked, go = [], threading.Semaphore(0), threading.Semaphore(0)
+    monkeypatch.setattr(
+        pictures, "_open", lambda _, strip, usual=pictures._open: opened.append(strip.name) or usual(_, strip)
+    )
+
+    def draw():
+        for shown in (ready, begun):
+            pictures.moment(*shown, 1)
+        return cache.invalidate_changed(edit)
+
+    draw()
+    assert len(opened) == 2
+    build = building.Build(*begun)
+    building._started(bpy.context, build)
+    flow += [asked.release, lambda: go.acquire(timeout=5)]
+    for _ in range(COUNT - 1):
+        assert asked.acquire(timeout=20)
+        assert not draw()
+        go.release()
+    wait([build.future], timeout=20)
+    assert not draw()
+    assert len(opened) == 2
+    building._ended()
+    assert draw()
+    assert not draw()
+    assert opened[2:] == [strips.source_of(*begun).name]
 
 
 def test_nothing_is_left_of_an_empty_folder(bpy, effect, tmp_path):

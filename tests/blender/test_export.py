@@ -298,6 +298,28 @@ def test_keys_of_the_source_time_lie_in_a_group_of_the_effect(effect_on):
     assert curve(effect_on[0], "source_time").group.name == effect_on[1].name
 
 
+@pytest.mark.parametrize("ease", ["linear", "bezier"])
+def test_a_source_time_that_stands_still_keeps_its_direction(effect_on, ease):
+    """At the last key of a ramp, and in a freeze behind it; a jump has none."""
+    from shutter_addon.blender import animation, effects
+
+    edit, effect, _ = effect_on
+    keys = [
+        (1, 10, ease),
+        (11, 20, ease),
+        (21, 20, ease),
+        (31, 5, "constant"),
+        (41, 5, "constant"),
+        (51, 15, "constant"),
+    ]
+    effect.use_source_time = True
+    animation.set_keys(edit, f"{effect.path_from_id()}.source_time", 0, keys)
+    backward = {frame: effects.source_time(edit, effect, frame)[1] for frame in (1, 6, 11, 16, 26, 31, 36, 41, 51, 90)}
+    assert [frame for frame, found in backward.items() if found] == [26, 31, 36, 41, 51, 90]
+    animation.set_keys(edit, f"{effect.path_from_id()}.source_time", 0, [(1, 10, "constant"), (11, 5, "constant")])
+    assert not effects.source_time(edit, effect, 11)[1]
+
+
 def test_a_source_time_without_keys_holds_a_frame(effect_on):
     plain = {"version": 1, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
     apply(effect_on, plain)

@@ -8,6 +8,7 @@ import sys
 from itertools import pairwise
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 from standin import between
@@ -122,13 +123,32 @@ def test_a_movie_s_in_betweens_are_found_as_well(run, bunny, tmp_path):
     assert len(list((tmp_path / "cache").glob("*/manifest.json"))) == 1
 
 
+def test_a_movie_that_blender_reads_with_a_colour_space_of_its_own(run, tmp_path):
+    """10 bits of PQ: what is built alone is what a render of its strip looks for."""
+    movie, cache = tmp_path / "pq.mkv", tmp_path / "cache"
+    rng = np.random.default_rng(2)
+    with av.open(str(movie), "w") as out:
+        stream = out.add_stream("ffv1", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p10le"
+        stream.codec_context.color_trc, stream.codec_context.color_primaries = 16, 9  # PQ, BT.2020
+        for _ in range(3):
+            frame = av.VideoFrame.from_ndarray(rng.integers(0, 256, (48, 64, 3), dtype=np.uint8))
+            out.mux(stream.encode(frame.reformat(format="yuv420p10le", threads=1)))
+        out.mux(stream.encode())
+    run("inbetween", movie, "--factor", 2, "--cache", cache)
+    before = [*cache.iterdir()]
+    run("render", movie, "--output", tmp_path / "out", "--cache", cache, recipe=recipe(2, [1, 1], inbetween=2))
+    assert [*cache.iterdir()] == before
+    assert len(before) == 1
+
+
 def test_source_time_ramps(run, film, tmp_path, same_pixels):
-    """A fourth of the speed, then backward; the film ends with the last key."""
+    """A fourth of the speed, then backward, from the end of the shown frame's time; the film ends with the last key."""
     first, frames = film
     time = [{"frame": 1, "value": 2}, {"frame": 9, "value": 4}, {"frame": 17, "value": 2}]
     data = recipe(4, [1, 1, 0, 0], inbetween=4, time=time)
     run("render", first, "--output", tmp_path / "out", "--frames", "1:17", recipe=data)
-    for frame, start, direction in ((1, 4, 1), (2, 5, 1), (6, 9, 1), (12, 9, -1), (16, 5, -1)):
+    for frame, start, direction in ((1, 4, 1), (2, 5, 1), (6, 9, 1), (12, 9 + 3, -1), (16, 5 + 3, -1)):
         same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), shown(frames, (start, start + direction)), 1)
     data = recipe(1, [1], time=time)
     run("render", first, "--output", tmp_path / "nearest", "--frames", "4:8", recipe=data)

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shutter_addon.core import recipe
+from shutter_addon.core.compositor import window_positions
 
 EXAMPLE = {
     "version": 1,
@@ -181,6 +182,36 @@ def test_any_frame_gives_an_instant(frame):
 def test_position():
     assert [recipe.Options(8, position=p).before for p in ("start", "center", "end")] == [0, 3, 7]
     assert [recipe.Options(5, position=p).before for p in ("start", "center", "end")] == [0, 2, 4]
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+@pytest.mark.parametrize(("window", "old", "new"), [(8, 1, 8), (8, 1, 4), (5, 1, 2), (1, 1, 16), (12, 8, 1), (6, 4, 2)])
+def test_bars_are_open_at_the_same_times_at_another_factor(window, old, new, position, direction):
+    """Shown is the filmed frame 10, and the light of each bar is spread over the time of its frame."""
+    bars = np.random.default_rng(1).random(window)
+    source = recipe.Recipe(1, window, [recipe.Shutter("A", bars=bars.tolist())], inbetween=old, position=position)
+    more = recipe.with_inbetween(source, new)
+    fine = 16
+
+    def light(found):
+        """Of each sixteenth of a filmed frame, from frame -20 to frame 40; of as many as the coarser has together."""
+        positions = window_positions(found.options, 10 * found.inbetween, direction) + 20 * found.inbetween
+        spread = np.zeros(60 * found.inbetween)
+        spread[positions] = np.asarray(found.shutters[0].bars) / found.inbetween
+        each = np.repeat(spread * found.inbetween / fine, fine // found.inbetween)
+        return each.reshape(-1, fine // min(old, new)).sum(axis=1)
+
+    np.testing.assert_allclose(light(more), light(source), atol=1e-12)
+
+
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+def test_a_still_frame_stays_where_it_is(position):
+    """In reverse as well: of the filmed frame's time the last part comes first."""
+    for direction in (1, -1):
+        options = recipe.Options(64, position=position, step=8)
+        positions = window_positions(options, 80, direction)[options.before : options.before + 8]
+        assert sorted(positions) == list(range(80, 88))
 
 
 def test_another_factor_of_in_betweens_keeps_times():
