@@ -142,7 +142,7 @@ def test_in_betweens_of_a_file_that_was_replaced_are_not_shown(film, add, edit, 
     cache.invalidate_changed(edit)
     (first.parent / "f0003.png").write_bytes((first.parent / "f0009.png").read_bytes())
     assert cache.invalidate_changed(edit)
-    with pytest.raises(MediaError, match=r"in-between frames of frame 1 are missing"):
+    with pytest.raises(MediaError, match=r"in-between frames of frame 2 are missing"):
         pictures.picture(effect.scene, 2)
     with open_source(first) as source:
         build(source, inbetweens.given)
