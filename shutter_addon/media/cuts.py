@@ -82,6 +82,17 @@ def is_duplicate(before: list[Signature], after: list[Signature]) -> bool:
     return here <= REPEATED and here * STILLER < beside
 
 
+def neighbours(index: int, count: int) -> range:
+    """The frames of a clip of `count` that have a say in whether there is a cut before frame `index`."""
+    return range(max(index - NEIGHBOURS, 0), min(index + NEIGHBOURS, count))
+
+
+def sides(signatures: dict[int, Signature | None], index: int) -> tuple[list[Signature], list[Signature]]:
+    """Of the neighbours' signatures, those before frame `index` and those from it on, as is_cut and is_duplicate take
+    them: on each side up to the first frame that has none."""
+    return _run(signatures, index - 1, -1)[::-1], _run(signatures, index, 1)
+
+
 def _levelled(picture: Signature) -> np.ndarray:
     return picture - picture.mean()
 
@@ -180,9 +191,7 @@ class Shots:
         last, next_ = self._signature(index - 1), self._signature(index)
         if last is None or next_ is None or not may_be_cut(last, next_):
             return False
-        start, stop = max(index - NEIGHBOURS, 0), min(index + NEIGHBOURS, self.filmed)
-        around = {i: self._signature(i) for i in range(start, stop)}
-        return is_cut(_run(around, index - 1, -1)[::-1], _run(around, index, 1))
+        return is_cut(*sides({i: self._signature(i) for i in neighbours(index, self.filmed)}, index))
 
     def _signature(self, index: int) -> Signature | None:
         """None: the frame cannot be read. Whoever needs the frame itself will hear why."""

@@ -7,7 +7,6 @@ import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, as_completed, wait
 from functools import partial
-from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -164,8 +163,7 @@ class _Near:
 
     def pair(self, index: int) -> tuple[np.ndarray, np.ndarray, str | None]:
         """Frames `index` and `index` + 1; and "same" if they are equal, "cut" if they are of two shots, else None."""
-        start, stop = max(index + 1 - cuts.NEIGHBOURS, 0), min(index + 1 + cuts.NEIGHBOURS, self._source.count)
-        self._signatures = {i: self._signature(i) for i in range(start, stop)}
+        self._signatures = {i: self._signature(i) for i in cuts.neighbours(index + 1, self._source.count)}
         first, second = self._frame(index), self._frame(index + 1)
         self._frames = {i: frame for i, frame in self._frames.items() if i > index}
         return first, second, self._kind(first, second, index)
@@ -173,15 +171,10 @@ class _Near:
     def _kind(self, first, second, index):
         if np.array_equal(first, second):
             return "same"
-        before = self._run(range(index, -1, -1))[::-1]
-        after = self._run(range(index + 1, self._source.count))
-        if cuts.is_cut(before, after):
+        sides = cuts.sides(self._signatures, index + 1)
+        if cuts.is_cut(*sides):
             return "cut"
-        return "same" if cuts.is_duplicate(before, after) else None
-
-    def _run(self, indices):
-        """The signatures of these frames, up to one that has none."""
-        return list(takewhile(lambda found: found is not None, map(self._signatures.get, indices)))
+        return "same" if cuts.is_duplicate(*sides) else None
 
     def _frame(self, index):
         if index not in self._frames:
