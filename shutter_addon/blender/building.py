@@ -44,7 +44,7 @@ _timer = None
 def look(edit, effect, strip) -> Look:
     """How things are, or were a second ago. MediaError, EffectError: there is no source, or no place for frames."""
     source = strips.source_of(edit, effect, strip)
-    settings = _settings(effect)
+    settings = inbetweens.settings(effect)
     medium, doubled = _known(source)
     key = sources.media_key(source), *settings
     when, *found = _looks.get(key, (0.0,))
@@ -52,11 +52,6 @@ def look(edit, effect, strip) -> Look:
         found = cache.state(medium, *settings), cache.size(settings[0], medium)
         _looks[key] = time.monotonic(), *found
     return Look(*found, doubled.result() * (settings[1] - 1) if doubled.done() else None)
-
-
-def _settings(effect) -> tuple:
-    """Folder, factor and method, as shutter_addon.media.inbetween has them. EffectError: there is no folder."""
-    return inbetweens.folder(effect), inbetweens.factor(effect), inbetweens.METHODS[effect.inbetween_method]
 
 
 def _known(source) -> tuple:
@@ -92,7 +87,7 @@ class Build:
 
     def __init__(self, edit, effect, strip):
         """EffectError, MediaError: it cannot begin."""
-        settings, medium = _settings(effect), sources.open_media(strips.source_of(edit, effect, strip))
+        settings, medium = inbetweens.settings(effect), sources.open_media(strips.source_of(edit, effect, strip))
         self.scene = effect.scene.session_uid
         self.done, self.total = 0, medium.count - 1
         self._stopped = threading.Event()

@@ -29,10 +29,10 @@ def built_key(effect, source) -> tuple:
     if inbetweens.factor(effect) == 1:
         return ()
     try:
-        folder = inbetweens.folder(effect)
+        folder, *made = inbetweens.settings(effect)
     except effects.EffectError as error:
         return (str(error),)
-    key = folder, sources.stem(source), inbetweens.factor(effect), inbetweens.METHODS[effect.inbetween_method]
+    key = folder, sources.stem(source), *made
     if not (building and key in _built):
         _built[key] = files.stamp(*key)
     return *key, _built[key], sources.every_file_key(source)

@@ -11,6 +11,7 @@ import sys
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
+from typing import get_args
 
 import bpy
 
@@ -21,7 +22,7 @@ from ..media import MediaError, open_source
 from . import edits, effects, inbetweens, outputs, pictures, sources, strips
 
 BAD_INPUT = 2
-FACTORS = (2, 4, 8, 16)
+FACTORS = get_args(recipe.Factor)  # 1: none
 METHODS = tuple(inbetweens.METHODS.values())
 FAULTS = (recipe.RecipeError, MediaError, outputs.OutputError, effects.EffectError, NoDeviceError)
 
@@ -64,7 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--weights", type=Path, metavar="DIR", help="also write the coefficients, as float EXR")
     render.add_argument("--save", type=Path, metavar="FILE.blend", help="keep the edit")
     render.add_argument(
-        "--inbetween", type=int, choices=(1, *FACTORS), help="in-between frames, in place of the recipe's factor"
+        "--inbetween", type=int, choices=FACTORS, help="in-between frames, in place of the recipe's factor"
     )
     render.add_argument("--inbetween-method", choices=METHODS, help="in place of the recipe's")
     render.add_argument(
@@ -75,7 +76,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     build = commands.add_parser("inbetween", help="build a source's in-between frames")
     build.add_argument("source", type=Path, help="a movie, or the first file of an image sequence")
-    build.add_argument("--factor", type=int, choices=FACTORS, required=True, help="how many times the source's rate")
+    build.add_argument(
+        "--factor", type=int, choices=FACTORS[1:], required=True, help="how many times the source's rate"
+    )
     build.add_argument("--method", choices=METHODS, default="quick", help="of optical flow")
     build.add_argument("--frames", metavar="A:B", help="source frames A to B, and up to the one behind; 1 is the first")
     build.add_argument("--cache", type=Path, metavar="DIR", required=True, help="where in-between frames shall lie")
@@ -129,8 +132,7 @@ def _build_lacking(edit) -> None:
     effect = strips.effect_of(edit, strip.scene)
     pairs = pictures.pairs(edit, effect, strip, range(edit.frame_start, edit.frame_end + 1))
     with sources.open_media(strips.source_of(edit, effect, strip)) as medium:
-        method = inbetweens.METHODS[effect.inbetween_method]
-        _build(medium, inbetweens.given, inbetweens.factor(effect), method, sorted(pairs))
+        _build(medium, *inbetweens.settings(effect), sorted(pairs))
 
 
 def _build_alone(arguments) -> None:

@@ -36,10 +36,20 @@ def factor(effect) -> int:
     return int(effect.inbetween)
 
 
+def method(effect) -> str:
+    """One of media.flow.METHODS."""
+    return METHODS[effect.inbetween_method]
+
+
+def settings(effect) -> tuple[Path, int, str]:
+    """Folder, factor and method, as media.inbetween takes them. EffectError: there is no folder."""
+    return folder(effect), factor(effect), method(effect)
+
+
 def source(medium, effect):
     """The medium itself, or an Inbetween over it. EffectError, MediaError: there can be none."""
     from ..media.inbetween import Inbetween
 
     if factor(effect) == 1:
         return medium
-    return Inbetween(medium, folder(effect), factor(effect), METHODS[effect.inbetween_method])
+    return Inbetween(medium, *settings(effect))

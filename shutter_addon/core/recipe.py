@@ -22,6 +22,7 @@ from .instant import Edges, Exposure, Instant, Interpolation, Light, Options, Po
 Point = tuple[float, float]
 Stroke = list[Point]
 Ease = Literal["linear", "bezier", "constant"]
+Factor = Literal[1, 2, 4, 8, 16]
 
 
 class RecipeError(ValueError):
@@ -124,7 +125,7 @@ class Recipe:
     aggregate: Literal[1, 2, 4] = 1
     border: bool = False
     stop_at_cuts: bool = True
-    inbetween: Literal[1, 2, 4, 8, 16] = 1
+    inbetween: Factor = 1
     inbetween_method: Literal["quick", "good"] = "quick"
     time: list[TimeKey] = field(default_factory=list)
 
