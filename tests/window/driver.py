@@ -86,6 +86,13 @@ def region_of(area, kind="WINDOW"):
     return next(region for region in area.regions if region.type == kind)
 
 
+def override(view):
+    """Operators run as in the sequencer's area of that view type."""
+    area = area_of("SEQUENCE_EDITOR", view)
+    region = region_of(area, "PREVIEW" if view == "PREVIEW" else "WINDOW")
+    return bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=area, region=region)
+
+
 def screen(region, x, y):
     """Screen coordinates, top row 0, of a point in a region, whose rows go up."""
     height = bpy.context.window_manager.windows[0].height
@@ -136,3 +143,17 @@ def key(*names):
 
 def text(words):
     xdotool("type", "--delay", 40, words)
+
+
+def effect_added(edit):
+    """Shutter in the timeline's Add menu, found by typing; generator: yield from it. edit: gives the edit's scene."""
+    region = region_of(area_of("SEQUENCE_EDITOR", "SEQUENCER"))
+    move(region, region.width / 2, region.height / 2)
+    yield
+    key("shift+a")
+    yield 0.5
+    text("shutter")
+    yield 0.7
+    shot("menu")
+    # A menu that is not open yet misses Return; once there is an effect, it is closed, and Return goes nowhere else.
+    yield from until(lambda: len(edit().virtual_shutter.effects), "the menu adds the effect", 10, lambda: key("Return"))

@@ -15,17 +15,9 @@ import driver
 FOOTAGE, ZIP, RECIPE = (os.environ[f"SHUTTER_{name}"] for name in ("FOOTAGE", "ZIP", "RECIPE"))
 FIRST, LAST = map(int, os.environ["SHUTTER_FRAMES"].split(":"))
 
-RETURN = partial(driver.key, "Return")  # a dialog that is not open yet misses it
-
 
 def edit():
     return bpy.context.window_manager.windows[0].workspace.sequencer_scene
-
-
-def override(area_view):
-    area = driver.area_of("SEQUENCE_EDITOR", area_view)
-    region = driver.region_of(area, "PREVIEW" if area_view == "PREVIEW" else "WINDOW")
-    return bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=area, region=region)
 
 
 def installed():
@@ -38,7 +30,8 @@ def installed():
     yield 0.7
     driver.shot("install")
     name, addons = "bl_ext.user_default.virtual_shutter", bpy.context.preferences.addons
-    yield from driver.until(lambda: name in addons, "the extension is enabled", 30, RETURN)
+    # A dialog that is not open yet misses Return.
+    yield from driver.until(lambda: name in addons, "the extension is enabled", 30, partial(driver.key, "Return"))
 
 
 def video_editing_opened():
@@ -50,7 +43,7 @@ def video_editing_opened():
 
 def movie_added():
     add = bpy.ops.sequencer.movie_strip_add
-    with override("SEQUENCER"):
+    with driver.override("SEQUENCER"):
         add("EXEC_DEFAULT", True, filepath=FOOTAGE, channel=1, frame_start=1, move_strips=False)
     yield 0.5
     kinds = sorted(strip.type for strip in edit().sequence_editor.strips_all)
@@ -58,21 +51,13 @@ def movie_added():
 
 
 def effect_added():
-    region = driver.region_of(driver.area_of("SEQUENCE_EDITOR", "SEQUENCER"))
     strips = edit().sequence_editor.strips_all
     edit().sequence_editor.active_strip = next(strip for strip in strips if strip.type == "MOVIE")
-    driver.move(region, region.width / 2, region.height / 2)
-    yield
-    driver.key("shift+a")
-    yield 0.5
-    driver.text("shutter")
-    yield 0.7
-    # Once there is an effect, the menu is closed: Return goes nowhere else.
-    yield from driver.until(lambda: len(edit().virtual_shutter.effects), "the menu adds the effect", 10, RETURN)
+    yield from driver.effect_added(edit)
 
 
 def recipe_imported():
-    with override("PREVIEW"):
+    with driver.override("PREVIEW"):
         bpy.ops.shutter.recipe_import("EXEC_DEFAULT", True, filepath=RECIPE)
     edit().frame_set((FIRST + LAST) // 2)
     yield 1.5

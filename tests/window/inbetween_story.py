@@ -75,12 +75,12 @@ def opened():
         source.elements.append(path.name)
     editor.active_strip = source
     bpy.ops.wm.save_as_mainfile(filepath=str(FILM / "film.blend"))
-    with story.override("SEQUENCER"):
+    with driver.override("SEQUENCER"):
         bpy.ops.shutter.add_effect("INVOKE_DEFAULT", True)
     yield 2.0
     edit.frame_set(3)
     story.effect().inbetween = "4"
-    with story.override("PREVIEW"):
+    with driver.override("PREVIEW"):
         bpy.ops.sequencer.view_all_preview()
     yield 1.0
 
@@ -104,7 +104,7 @@ def shown(name):
 
 
 def building_begun():
-    with story.override("PREVIEW"):
+    with driver.override("PREVIEW"):
         assert bpy.ops.shutter.inbetween_build("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
     running = part("blender.building").running()
     yield from driver.until(lambda: running.done >= 4, "pairs are built")
@@ -148,7 +148,7 @@ def gone_stale_and_built_again():
 
 
 def removed():
-    with story.override("PREVIEW"):
+    with driver.override("PREVIEW"):
         bpy.ops.shutter.inbetween_purge("INVOKE_DEFAULT", True)
     yield 1.0
     driver.shot("confirm")
@@ -167,7 +167,7 @@ def put_elsewhere():
     driver.key("Escape")
     yield from ended()
     assert list(folder.rglob("0*.png"))
-    with story.override("PREVIEW"):
+    with driver.override("PREVIEW"):
         bpy.ops.shutter.inbetween_purge("EXEC_DEFAULT", True)
     assert not folder.exists()
     story.effect().inbetween_place = "FILE"
@@ -186,7 +186,7 @@ def deleted_meanwhile():
 
 def closed_meanwhile():
     """The file was saved without its effect."""
-    with story.override("SEQUENCER"):
+    with driver.override("SEQUENCER"):
         bpy.ops.shutter.add_effect("INVOKE_DEFAULT", True)
     yield 1.0
     story.effect().inbetween = "4"

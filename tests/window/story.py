@@ -30,16 +30,6 @@ def preview():
     return driver.region_of(driver.area_of("SEQUENCE_EDITOR", "PREVIEW"), "PREVIEW")
 
 
-def timeline():
-    return driver.region_of(driver.area_of("SEQUENCE_EDITOR", "SEQUENCER"), "WINDOW")
-
-
-def override(area_view):
-    area = driver.area_of("SEQUENCE_EDITOR", area_view)
-    region = driver.region_of(area, "PREVIEW" if area_view == "PREVIEW" else "WINDOW")
-    return bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=area, region=region)
-
-
 def curves():
     data = edit().animation_data
     if not (data and data.action and data.action_slot):
@@ -97,7 +87,7 @@ def opened():
 
 
 def movie_added():
-    with override("SEQUENCER"):
+    with driver.override("SEQUENCER"):
         bpy.ops.sequencer.movie_strip_add(
             "EXEC_DEFAULT",
             True,
@@ -114,26 +104,17 @@ def movie_added():
 
 
 def effect_added():
-    region = timeline()
-    driver.move(region, region.width / 2, region.height / 2)
-    yield
-    driver.key("shift+a")
-    yield 0.5
-    driver.text("shutter")
-    yield 0.7
-    driver.shot("menu")
-    driver.key("Return")
-    yield from driver.until(lambda: len(edit().virtual_shutter.effects), "the menu adds the effect")
+    yield from driver.effect_added(edit)
     assert [shutter.name for shutter in effect().shutters] == ["Long", "Sharp"]
     sidebar = driver.region_of(driver.area_of("SEQUENCE_EDITOR", "PREVIEW"), "UI")
     yield from driver.until(lambda: sidebar.active_panel_category == "Shutter", "the Shutter tab opens")
-    with override("PREVIEW"):
+    with driver.override("PREVIEW"):
         bpy.ops.sequencer.view_all_preview()
     yield 0.5
 
 
 def scribbled():
-    with override("PREVIEW"):
+    with driver.override("PREVIEW"):
         bpy.ops.shutter.draw("INVOKE_DEFAULT", True)
     yield 0.5
     region = preview()
@@ -141,7 +122,7 @@ def scribbled():
     yield from driver.drag(region, [(w * x, h * y) for x, y in ((0.4, 0.5), (0.45, 0.6), (0.5, 0.6), (0.55, 0.5))])
     layer = effect().scene.annotation.layers[effect().regions[0].layer]
     assert [len(frame.strokes) for frame in layer.frames] == [1]
-    with override("PREVIEW"):
+    with driver.override("PREVIEW"):
         bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
     yield
 
@@ -151,7 +132,7 @@ def preset_chosen():
     region = preview()
     driver.move(region, region.width / 2, region.height / 2)
     yield
-    with override("PREVIEW"):
+    with driver.override("PREVIEW"):
         bpy.ops.wm.call_menu(name="SHUTTER_MT_presets")
     yield 0.5
     driver.shot("presets")
@@ -236,7 +217,7 @@ def saved_and_loaded():
     bpy.ops.wm.open_mainfile(filepath=str(path))
     yield 1.5
     assert facts() == before
-    with override("PREVIEW"):
+    with driver.override("PREVIEW"):
         bpy.ops.sequencer.view_all_preview()
     yield from seen("9_loaded")
 
@@ -247,12 +228,12 @@ def in_agreement():
     area = driver.area_of("SEQUENCE_EDITOR", "PREVIEW")
     space = area.spaces.active
     space.show_overlays = space.show_gizmo = space.show_region_ui = False
-    with override("PREVIEW"):
+    with driver.override("PREVIEW"):
         bpy.ops.screen.screen_full_area()
     yield 1.0
     area = driver.area_of("SEQUENCE_EDITOR", "PREVIEW")
     area.spaces.active.show_overlays = area.spaces.active.show_gizmo = False
-    with override("PREVIEW"):
+    with driver.override("PREVIEW"):
         bpy.ops.sequencer.view_all_preview()
         # A pixel of the picture to one of the screen: the operator takes the region for one pixel larger.
         bpy.ops.sequencer.view_zoom_ratio(ratio=(preview().height + 1) / preview().height)
@@ -272,7 +253,7 @@ def in_agreement():
     driver.shot("drawn")
     driver.saw(picture="drawn", box=[left, top + 1, left + 1280, top + 721])
     edit().render.sequencer_gl_preview = "RENDERED"
-    with override("PREVIEW"):
+    with driver.override("PREVIEW"):
         bpy.ops.screen.back_to_previous()
     yield 1.0
     render = edit().render
@@ -283,7 +264,7 @@ def in_agreement():
     done = []
     bpy.app.handlers.render_complete.append(lambda *_: done.append(True))
     # As with F12: a job on another thread, after the preview has filled the sequencer's cache.
-    with override("PREVIEW"):
+    with driver.override("PREVIEW"):
         bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
     yield from driver.until(lambda: done, "the render ends", 30)
     driver.saw(picture="final")
