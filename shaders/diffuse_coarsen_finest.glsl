@@ -1,7 +1,9 @@
 // From the 5-point Laplacian to the first coarser operator.
 #include "diffuse.glsl"
 
-void add_row(ivec2 i, int at, float weight, inout float product[25])
+float product[25];
+
+void add_row(ivec2 i, int at, float weight)
 {
   // A neighbour beyond the edge has no equation, a fixed one no weights: the caller leaves both out.
   product[at - 5] -= weight;

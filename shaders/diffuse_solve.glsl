@@ -1,4 +1,41 @@
-// Solves the coarsest grid, of 4 × 4 cells at most, by elimination in one invocation.
+// Solves the coarsest grid, of 8 × 8 cells at most, by elimination in one invocation. Cells are numbered along the shorter
+// side, so that those that are tied stand near one another: the matrix is a band. (Blender's Python has no memory that a
+// workgroup shares.)
+#define BAND 10
+
+float rows[64 * BAND];  // of the matrix: a cell's own entry, then those of the cells before it
+vec4 x[64];
+
+ivec2 cell(int i)
+{
+  return size.x > size.y ? ivec2(i / size.y, i % size.y) : ivec2(i % size.x, i / size.x);
+}
+
+void tie(int i, ivec2 p, float value)
+{
+  int number = size.x > size.y ? p.x * size.y + p.y : p.y * size.x + p.x;
+  if (number < i && all(greaterThanEqual(p, ivec2(0))) && all(lessThan(p, size))) {
+    rows[BAND * i + i - number] = value;
+  }
+}
+
+void load_row(int i, int layer)
+{
+  ivec2 p = cell(i);
+  for (int k = 1; k < BAND; k++) {
+    rows[BAND * i + k] = 0.0;
+  }
+  rows[BAND * i] = imageLoad(stencil, ivec3(p, 2)).y;
+  vec4 before = imageLoad(stencil, ivec3(p, 0));
+  vec4 after = imageLoad(stencil, ivec3(p, 1));
+  tie(i, p + ivec2(-1, -1), before.x);
+  tie(i, p + ivec2(0, -1), before.y);
+  tie(i, p + ivec2(1, -1), before.z);
+  tie(i, p + ivec2(-1, 0), before.w);
+  tie(i, p + ivec2(-1, 1), after.y);
+  x[i] = imageLoad(right, ivec3(p, layer));
+}
+
 void main()
 {
   int layer = int(gl_GlobalInvocationID.z);
@@ -6,40 +43,27 @@ void main()
     return;
   }
   int count = size.x * size.y;
-  float a[16 * 16];
-  vec4 x[16];
+  int reach = min(size.x, size.y) + 1;
   for (int i = 0; i < count; i++) {
-    for (int j = 0; j < count; j++) {
-      a[16 * i + j] = 0.0;
-    }
-    ivec2 p = ivec2(i % size.x, i / size.x);
-    vec4 before = imageLoad(stencil, ivec3(p, 0));
-    vec4 after = imageLoad(stencil, ivec3(p, 1));
-    // Entries of cells beyond the edge are zero: added to the cell itself they change nothing.
-    for (int k = 0; k < 4; k++) {
-      ivec2 q = clamp(p + ivec2(k % 3, k / 3) - 1, ivec2(0), size - 1);
-      a[16 * i + q.y * size.x + q.x] += before[k];
-      q = clamp(p + ivec2((k + 5) % 3, (k + 5) / 3) - 1, ivec2(0), size - 1);
-      a[16 * i + q.y * size.x + q.x] += after[k];
-    }
-    a[17 * i] += imageLoad(stencil, ivec3(p, 2)).y;
-    x[i] = imageLoad(right, ivec3(p, layer));
+    load_row(i, layer);
   }
   for (int k = 0; k < count; k++) {
-    for (int i = k + 1; i < count; i++) {
-      // Where nothing is to solve there is no pivot.
-      float factor = a[17 * k] > 1e-6 ? a[16 * i + k] / a[17 * k] : 0.0;
-      for (int j = k; j < count; j++) {
-        a[16 * i + j] -= factor * a[16 * k + j];
+    // Where nothing is to solve there is no pivot.
+    float pivot = rows[BAND * k];
+    rows[BAND * k] = pivot > 1e-6 ? 1.0 / pivot : 0.0;
+    for (int i = 1; i <= min(reach, count - 1 - k); i++) {
+      float factor = rows[BAND * k] * rows[BAND * (k + i) + i];
+      for (int j = 1; j <= i; j++) {
+        rows[BAND * (k + i) + i - j] -= factor * rows[BAND * (k + j) + j];
       }
-      x[i] -= factor * x[k];
+      x[k + i] -= factor * x[k];
     }
   }
   for (int k = count - 1; k >= 0; k--) {
-    for (int j = k + 1; j < count; j++) {
-      x[k] -= a[16 * k + j] * x[j];
+    for (int i = 1; i <= min(reach, count - 1 - k); i++) {
+      x[k] -= rows[BAND * (k + i) + i] * x[k + i];
     }
-    x[k] = a[17 * k] > 1e-6 ? x[k] / a[17 * k] : vec4(0.0);
-    imageStore(solution, ivec3(k % size.x, k / size.x, layer), x[k]);
+    x[k] *= rows[BAND * k];
+    imageStore(solution, ivec3(cell(k), layer), x[k]);
   }
 }

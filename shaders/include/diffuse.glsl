@@ -4,6 +4,37 @@
 // Cells around one: k = 0 … 8, row by row, itself 4.
 #define OFFSET(k) (ivec2((k) % 3, (k) / 3) - 1)
 
+// Calls a function for every cell of 3 × 3, or of 5 × 5: where a compiler leaves a loop, arrays that it indexes go through
+// memory, and a software renderer takes many times as long.
+#define EACH_OF_9(does) \
+  does(0); \
+  does(1); \
+  does(2); \
+  does(3); \
+  does(4); \
+  does(5); \
+  does(6); \
+  does(7); \
+  does(8)
+#define EACH_OF_25(does) \
+  EACH_OF_9(does); \
+  does(9); \
+  does(10); \
+  does(11); \
+  does(12); \
+  does(13); \
+  does(14); \
+  does(15); \
+  does(16); \
+  does(17); \
+  does(18); \
+  does(19); \
+  does(20); \
+  does(21); \
+  does(22); \
+  does(23); \
+  does(24)
+
 bool inside(ivec2 i, ivec2 grid)
 {
   return all(greaterThanEqual(i, ivec2(0))) && all(lessThan(i, grid));

@@ -18,7 +18,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from .passes import Image, Pass
+from .passes import LOCAL_SIZE, Image, Pass
 
 # Largest error × 255 over the scenes of the tests after 1, 2, 3, 4 cycles: 11, 2.0, 0.66, 0.66 (median 2.8, 0.31, 0.11,
 # 0.08): what is left then is what is linear far from scribbles.
@@ -31,6 +31,8 @@ SWEEPS = 1
 FINEST_SWEEPS = 2
 # A grid of so many cells along its longer side, or fewer, has cells everywhere; the first such one has two turns.
 WHOLE = 128
+# A grid of so many cells along its longer side, or fewer, is solved at once; the shader has room for no more.
+SOLVED = 8
 # How far from a scribble's tile a larger grid has cells of its own, in tiles. Two leave 0.19 of the 0.66, in 1.7 times
 # the time.
 BAND = 1
@@ -66,7 +68,9 @@ _PROLONG = _pass("prolong", ("from", "coarser", "weights"), {"to": _STORED}, {**
 _RESTRICT_FINEST = _pass("restrict_finest", ("own", "weights"), {"next": _STORED}, _GRIDS)
 _RESTRICT = _pass("restrict", ("stencil", "own", "weights", "right"), {"next": _STORED}, _GRIDS)
 _SOLVE = Pass(
-    "diffuse_solve", images={"stencil": _READ, "right": _READ, "solution": _STORED}, constants={"size": "ivec2"}
+    "diffuse_solve",
+    images={"stencil": _READ, "right": _READ, "solution": _STORED},
+    constants={"size": "ivec2"},
 )
 _FINISH = _pass("finish", (), {"solution": _CHANGED}, {**_GRID, "layers": "int", "nothing": "float"})
 _EXPAND = _pass("expand", ("coarser",), {"solution": _STORED}, _GRIDS)
@@ -141,7 +145,7 @@ class Diffusion:
         self._made_for = width, height, count
         layers = -(-count // 4)
         self._grids.append(_Grid(self._device, width, height, layers, True))
-        while len(self._grids) == 1 or max(self._grids[-1].size) > 4:
+        while len(self._grids) == 1 or max(self._grids[-1].size) > SOLVED:
             width, height = (width + 1) // 2, (height + 1) // 2
             self._grids.append(_Grid(self._device, width, height, layers, False))
         tiles = sum(4 * grid.reached.size + grid.touched.size for grid in self._grids)
@@ -166,18 +170,18 @@ class Diffusion:
             stale = (reached | grid.reached) & _grown(live)
             rim = ~near & live & _last_ones(grid)
             eights, fours = grid.codes
+            anew = stale | (ranks == 1) | (ranks == 3 if grid.finest else False)
             lists = [eights[ranks == rank] for rank in range(4)]
             # A tile is four cells wide on the next grid.
-            lists += [eights[rim], eights[stale], eights[_grown(near)] / 2, fours[changed]]
+            lists += [eights[rim], eights[anew], eights[_grown(near)] / 2, fours[changed]]
             ends = (end + np.cumsum([len(tiles) for tiles in lists])).tolist()
             grid.ranges = {
                 "near": (end, ends[0]),
                 "around": (ends[0], ends[1]),
                 "reached": (end, ends[1]),
                 "far": (ends[0], ends[2]),
-                "full": (ends[2], ends[3]),
                 "rim": (ends[3], ends[4]),
-                "stale": (ends[4], ends[5]),
+                "anew": (ends[4], ends[5]),
                 "feeding": (ends[5], ends[6]),
                 "changed": (ends[6], ends[7]),
             }
@@ -191,11 +195,9 @@ class Diffusion:
     def _start(self, warm: int) -> None:
         """Values to start from, and nothing of what was there for other scribbles."""
         finest = self._grids[0]
-        for tiles in ("stale", "around", "full"):
-            self._run(_START, finest, tiles, 64, finest.layers, warm=warm)
+        self._run(_START, finest, "anew", 64, finest.layers, warm=warm)
         for fine, grid in pairwise(self._grids):
-            for tiles in ("stale", "around"):
-                self._run(_CLEAR, grid, tiles, 64, grid.layers, finer=fine.textures["solution"], warm=warm)
+            self._run(_CLEAR, grid, "anew", 64, grid.layers, finer=fine.textures["solution"], warm=warm)
 
     def _coarsen(self) -> None:
         """The operators, and what cells take of the next grid's."""
@@ -209,7 +211,8 @@ class Diffusion:
         """A V-cycle from a grid on down."""
         grid, *coarser = self._grids[index : index + 2]
         if not coarser:
-            self._run(_SOLVE, grid, "near", 1, grid.layers)
+            images = {name: grid.textures[name] for name in _SOLVE.images}
+            self._device.run(_SOLVE, (*LOCAL_SIZE[:2], grid.layers), images=images, size=grid.size)
             return
         sweeps = FINEST_SWEEPS if grid.finest else SWEEPS
         self._smooth(grid, sweeps)
