@@ -10,8 +10,9 @@ void main()
   if (any(greaterThanEqual(pixel, size))) {
     return;
   }
+  ivec2 place = place_of_sums(pixel);
 #if AGAIN
-  uvec2 light = minus(sum_at(pixel, after), sum_at(pixel, before));
+  uvec2 light = minus(sum_at(place, after), sum_at(place, before));
 #else
   vec3 color = texelFetch(frame, ivec3(pixel + ivec2(0, top), 0), 0).rgb;
 #  if DECODE == 1
@@ -21,6 +22,6 @@ void main()
 #  endif
   uvec2 light = packed_light(uvec3(ivec3(color * whole + 0.5)));
 #endif
-  uvec2 sum = sum_at(pixel, known);
-  imageStore(sums, ivec3(pixel, next), uvec4(BACK != 0 ? minus(sum, light) : plus(sum, light), 0u, 0u));
+  uvec2 sum = sum_at(place, known);
+  imageStore(sums, ivec3(place, next), uvec4(BACK != 0 ? minus(sum, light) : plus(sum, light), 0u, 0u));
 }

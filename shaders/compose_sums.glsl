@@ -16,6 +16,7 @@
   does(1)
 
 vec4 c[PIXELS * GROUPS];
+ivec2 place[PIXELS];  // of a pixel's sums
 vec3 total[PIXELS];
 vec4 starts[GROUPS];
 vec4 ends[GROUPS];
@@ -23,7 +24,7 @@ float exposure;
 ivec2 corner;
 
 // Beyond the picture's edge the last pixel inside.
-ivec2 place(int k)
+ivec2 pixel_at(int k)
 {
   return ivec2(corner.x, min(corner.y + k, size.y - 1));
 }
@@ -32,20 +33,21 @@ void start_pixel(int k)
 {
   float sum = 0.0;
   for (int g = 0; g < GROUPS; g++) {
-    vec4 loaded = imageLoad(coefficients, ivec3((place(k) + ivec2(0, top)) >> block_bits, g));
+    vec4 loaded = imageLoad(coefficients, ivec3((pixel_at(k) + ivec2(0, top)) >> block_bits, g));
     c[k * GROUPS + g] = max(loaded, 0.0);
     sum += dot(c[k * GROUPS + g], vec4(1.0));
   }
   for (int g = 0; g < GROUPS; g++) {
     c[k * GROUPS + g] *= 1.0 / sum;
   }
+  place[k] = place_of_sums(pixel_at(k));
   total[k] = vec3(0.0);
 }
 
-uvec2 sum_until(ivec2 pixel, int time)
+uvec2 sum_until(int k, int time)
 {
   int layer = clamp(BACK != 0 ? origin - time : origin + time, 0, held) + first_layer;
-  return sum_at(pixel, layer < layers ? layer : layer - layers);
+  return sum_at(place[k], layer < layers ? layer : layer - layers);
 }
 
 vec3 light_between(uvec2 early, uvec2 late)
@@ -61,19 +63,18 @@ void add_piece(int k)
     start += dot(starts[g], c[k * GROUPS + g]);
     end += dot(ends[g], c[k * GROUPS + g]);
   }
-  ivec2 pixel = place(k);
   int first = int(start);
   int last = int(end);
-  uvec2 early = sum_until(pixel, first);
-  uvec2 late = sum_until(pixel, last);
-  vec3 light = light_between(early, late) + (end - float(last)) * light_between(late, sum_until(pixel, last + 1)) -
-               (start - float(first)) * light_between(early, sum_until(pixel, first + 1));
+  uvec2 early = sum_until(k, first);
+  uvec2 late = sum_until(k, last);
+  vec3 light = light_between(early, late) + (end - float(last)) * light_between(late, sum_until(k, last + 1)) -
+               (start - float(first)) * light_between(early, sum_until(k, first + 1));
   total[k] += light * (exposure / max(end - start, 1e-7));
 }
 
 void finish_pixel(int k)
 {
-  ivec2 pixel = place(k);
+  ivec2 pixel = pixel_at(k);
   vec3 light = total[k] * unit;
 #if ENCODED
   light = to_linear_exact(light);

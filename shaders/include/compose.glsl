@@ -21,15 +21,26 @@
   does(3)
 
 ivec2 corner;
+ivec2 place;  // of its sums
 mat4 c[QUADS * GROUPS];
 mat4 total[QUADS];
 vec4 share[QUADS];  // of the exposure that fell on frames that are there
 vec4 centre[QUADS];  // of the exposure in time, frames left out included
 
 // A pixel of a quad; beyond the picture's edge the last one inside.
-ivec2 place(int quad, int pixel)
+ivec2 pixel_at(int quad, int pixel)
 {
   return min(corner + ivec2(0, 4 * quad + pixel), size - 1);
+}
+
+// Where its light is read. A quad is as high as a tile of sums.
+ivec2 place_of_light(int quad, int pixel)
+{
+#if SUMS && TILED
+  return place + ivec2(8 * pixel, quad);
+#else
+  return pixel_at(quad, pixel);
+#endif
 }
 
 vec4 coefficients_at(ivec2 pixel, int group)
@@ -41,10 +52,10 @@ void start_quad(int quad)
 {
   vec4 sum = vec4(0.0);
   for (int g = 0; g < GROUPS; g++) {
-    mat4 loaded = mat4(coefficients_at(place(quad, 0), g),
-                       coefficients_at(place(quad, 1), g),
-                       coefficients_at(place(quad, 2), g),
-                       coefficients_at(place(quad, 3), g));
+    mat4 loaded = mat4(coefficients_at(pixel_at(quad, 0), g),
+                       coefficients_at(pixel_at(quad, 1), g),
+                       coefficients_at(pixel_at(quad, 2), g),
+                       coefficients_at(pixel_at(quad, 3), g));
     sum += vec4(1.0) * loaded;
     c[quad * GROUPS + g] = loaded;
   }
@@ -61,6 +72,9 @@ void start_quad(int quad)
 bool start_block()
 {
   corner = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, 4 * QUADS);
+#if SUMS
+  place = place_of_sums(corner);
+#endif
   EACH(start_quad);
   return corner.x < size.x && corner.y < size.y;
 }
@@ -76,10 +90,10 @@ vec4 mixed(int quad, int column, int row)
 }
 
 #if SUMS
-vec4 frame_light(ivec2 pixel, int layer)
+vec4 frame_light(ivec2 place, int layer)
 {
   int next = layer + 1 < layers ? layer + 1 : 0;
-  return vec4(unit * unpacked_light(minus(sum_at(pixel, next), sum_at(pixel, layer))), 1.0);
+  return vec4(unit * unpacked_light(minus(sum_at(place, next), sum_at(place, layer))), 1.0);
 }
 
 // The layer of the window's frame, or of the nearest that is there.
@@ -94,9 +108,9 @@ int layer_of(int frame)
 }
 #else
 // The frame's light as it is summed, premultiplied.
-vec4 frame_light(ivec2 pixel, int slot)
+vec4 frame_light(ivec2 place, int slot)
 {
-  vec4 color = texelFetch(frames, ivec3(pixel, slot), 0);
+  vec4 color = texelFetch(frames, ivec3(place, slot), 0);
 #if DECODE != 0
 #  if PREMULTIPLIED
   color.rgb = straight(color);
@@ -137,36 +151,36 @@ void expose(int quad, int frame, vec4 weight)
 #endif
   share[quad] += weight;
   int layer = layer_of(frame);
-  total[quad] += mat4(weight.x * frame_light(place(quad, 0), layer),
-                      weight.y * frame_light(place(quad, 1), layer),
-                      weight.z * frame_light(place(quad, 2), layer),
-                      weight.w * frame_light(place(quad, 3), layer));
+  total[quad] += mat4(weight.x * frame_light(place_of_light(quad, 0), layer),
+                      weight.y * frame_light(place_of_light(quad, 1), layer),
+                      weight.z * frame_light(place_of_light(quad, 2), layer),
+                      weight.w * frame_light(place_of_light(quad, 3), layer));
 }
 
-void store(ivec2 pixel, vec4 color, float exposed, float time, float gain)
+void store(int quad, int pixel, float gain)
 {
-  if (pixel.y >= size.y) {
+  ivec2 at = corner + ivec2(0, 4 * quad + pixel);
+  if (at.y >= size.y) {
     return;
   }
-  color /= max(exposed, 1e-6);
+  vec4 color = total[quad][pixel] / max(share[quad][pixel], 1e-6);
 #if EDGES == 2
   // Where nothing of the shutter is left, the nearest frame that there is.
-  color = exposed > 1e-6 ? color : frame_light(pixel, layer_of(int(time)));
+  color = share[quad][pixel] > 1e-6 ? color : frame_light(place_of_light(quad, pixel), layer_of(int(centre[quad][pixel])));
 #endif
 #if ENCODED
   color.rgb = to_linear_exact(straight(color)) * color.a;
 #endif
   color.rgb *= gain;
   // Bottom row first: Blender's order, and GL's.
-  imageStore(picture, ivec3(pixel.x, height - 1 - top - pixel.y, 0), color);
+  imageStore(picture, ivec3(at.x, height - 1 - top - at.y, 0), color);
 }
 
 void finish_quad(int quad)
 {
   vec4 gain = mixed(quad, 0, 0);
-  ivec2 pixel = corner + ivec2(0, 4 * quad);
-  store(pixel, total[quad][0], share[quad].x, centre[quad].x, gain.x);
-  store(pixel + ivec2(0, 1), total[quad][1], share[quad].y, centre[quad].y, gain.y);
-  store(pixel + ivec2(0, 2), total[quad][2], share[quad].z, centre[quad].z, gain.z);
-  store(pixel + ivec2(0, 3), total[quad][3], share[quad].w, centre[quad].w, gain.w);
+  store(quad, 0, gain.x);
+  store(quad, 1, gain.y);
+  store(quad, 2, gain.z);
+  store(quad, 3, gain.w);
 }

@@ -25,8 +25,18 @@ vec3 unpacked_light(uvec2 difference)
   return vec3(ivec3(difference.x & FIELD, green & FIELD, difference.y >> 10));
 }
 
-// imageLoad: a software renderer's texelFetch of whole numbers takes three times as long.
-uvec2 sum_at(ivec2 pixel, int layer)
+// Where a pixel's sums lie: TILED, a row of texels holds four rows of pixels, in tiles of 8 × 4.
+ivec2 place_of_sums(ivec2 pixel)
 {
-  return imageLoad(sums, ivec3(pixel, layer)).rg;
+#if TILED
+  return ivec2((pixel.x >> 3 << 5) + ((pixel.y & 3) << 3) + (pixel.x & 7), pixel.y >> 2);
+#else
+  return pixel;
+#endif
+}
+
+// imageLoad: a software renderer's texelFetch of whole numbers takes three times as long.
+uvec2 sum_at(ivec2 place, int layer)
+{
+  return imageLoad(sums, ivec3(place, layer)).rg;
 }

@@ -11,10 +11,10 @@ from ..core.instant import Instant, Options
 from .diffusion_gpu import Diffusion
 from .passes import LOCAL_ROW, Image, Pass
 from .tables import padded, table
-from .window import Frames, Sums, decoding, open_window
+from .window import BLOCK, Frames, Sums, decoding, open_window
 
-# Pixels above one another that one invocation composes, going through the frames or from their sums.
-BLOCK, PAIR = 16, 2
+# Pixels above one another that one invocation composes from sums.
+PAIR = 2
 
 _EDGES = {"hold": 0, "mirror": 1, "shorten": 2}
 _READ = Image("rgba32f", reads=True, writes=False)
@@ -30,8 +30,10 @@ _ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 
 
 @cache
-def composition(way: str, groups: int, summed: bool, decode: int, edges: int, premultiplied: bool, encoded: bool):
-    """The pass that composes in a way of `way_of`, shutters in groups of four, from frames or (summed) their sums."""
+def composition(way: str, groups: int, stored: str, decode: int, edges: int, premultiplied: bool, encoded: bool):
+    """The pass that composes in a way of `way_of`, shutters in groups of four, from "frames", from their "sums", or
+    from sums in "tiles"."""
+    summed = stored != "frames"
     return Pass(
         f"compose_{way}",
         samplers={} if summed else {"frames": "sampler2DArray"},
@@ -44,6 +46,7 @@ def composition(way: str, groups: int, summed: bool, decode: int, edges: int, pr
         defines={
             "GROUPS": groups,
             "SUMS": int(summed),
+            "TILED": int(stored == "tiles"),
             "EDGES": edges,
             "DECODE": decode,
             "PREMULTIPLIED": int(premultiplied),
@@ -54,15 +57,21 @@ def composition(way: str, groups: int, summed: bool, decode: int, edges: int, pr
 
 
 @cache
-def composition_of_sums(rows: int, groups: int, back: bool, encoded: bool) -> Pass:
+def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, encoded: bool) -> Pass:
     """The pass that composes so many pieces from running sums, in time that runs forwards or back."""
     return Pass(
         "compose_sums",
         images=_IMAGES | _OF_SUMS,
         constants=_PLACE | _UNIT | {"origin": "int", "layers": "int", "first_layer": "int"},
-        defines={"ROWS": rows, "GROUPS": groups, "BACK": int(back), "ENCODED": int(encoded)},
+        defines={
+            "ROWS": rows,
+            "GROUPS": groups,
+            "BACK": int(back),
+            "TILED": int(tiled),
+            "ENCODED": int(encoded),
+        },
         blocks={"table": (1 + rows) * (2 * groups + 1)},
-        local_size=LOCAL_ROW,
+        local_size=(64, 4 // PAIR, 1),
     )
 
 
@@ -95,7 +104,7 @@ def _from_sums(window: Sums, instant: Instant, values: np.ndarray, origin: int, 
     filled = np.zeros((1 + rows, *values.shape[1:]), np.float32)
     filled[: len(values)] = values
     back, encoded = direction < 0, instant.options.light == "encoded"
-    return composition_of_sums(rows, -(-len(instant.bars) // 4), back, encoded), {
+    return composition_of_sums(rows, -(-len(instant.bars) // 4), back, window.tiled, encoded), {
         "images": {},
         "blocks": {"table": filled.reshape(-1, 4)},
         **_extent(window),
@@ -123,7 +132,8 @@ def _from_frames(way: str, window, instant: Instant, rows: int, origin: int, dir
     # Shaders count from the shot's first frame.
     given |= {"count": len(window.shot), "origin": origin - window.shot.start, "lowest": lowest - window.shot.start}
     groups, premultiplied = -(-len(instant.bars) // 4), source.alpha == "premultiplied"
-    return composition(way, groups, summed, decode, edges, premultiplied, options.light == "encoded"), given
+    stored = "frames" if not summed else "tiles" if window.tiled else "sums"
+    return composition(way, groups, stored, decode, edges, premultiplied, options.light == "encoded"), given
 
 
 class GPUCompositor:

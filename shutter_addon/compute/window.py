@@ -9,13 +9,16 @@ import numpy as np
 from ..core import compositor, light
 from ..core.instant import Options
 from .errors import NoDeviceError
-from .passes import LOCAL_ROW, Image, Pass
+from .passes import Image, Pass
 from .running import Running, summable
 
 # A layered texture over 2 GiB reads wrongly on Mesa's software renderer, without any error.
 BAND_BYTES = 1 << 30
 # A window above this stays on the host, and its bands take turns on the device.
 RESIDENT_BYTES = 6 << 30
+
+# Pixels above one another that one invocation composes, going through the frames.
+BLOCK = 16
 
 _STORED = {np.uint8: "rgba8", np.uint16: "rgba16", np.float16: "rgba16f", np.float32: "rgba32f"}
 
@@ -50,11 +53,16 @@ class Window:
             if row_bytes * source.height > RESIDENT_BYTES:
                 raise NoDeviceError("over the budget")
             for top in self.tops:
-                self.textures.append(self.device.texture(source.width, self._height(top), self.layers, kind))
+                size = self._texels(source.width, self._height(top))
+                self.textures.append(self.device.texture(*size, self.layers, kind))
             self.picture = self.device.texture(source.width, source.height, 1, "rgba32f")
         except NoDeviceError:
             self.release()
             raise
+
+    def _texels(self, width: int, height: int) -> tuple[int, int]:
+        """The texels (across, down) of a band's pixels."""
+        return width, height
 
     def _height(self, top: int) -> int:
         return min(self.rows, self.source.height - top)
@@ -145,8 +153,19 @@ def decoding(stored: str, options: Options) -> int:
     return 0 if stored == summed else 1 if summed == "linear" else 2
 
 
+def stores_rows(device) -> bool:
+    """Whether textures lie in memory row by row, as Mesa's software renderer has them; a GPU has tiles of its own."""
+    return "llvmpipe" in device.name
+
+
+def _in_tiles(width: int, height: int) -> tuple[int, int]:
+    """The texels (across, down) for pixels in tiles of 8 × 4, as shaders/include/sums.glsl finds them; all that a block
+    of pixels reaches is there. Eight texels more across, lest rows above one another share the lines of a cache."""
+    return 32 * -(-width // 8) + 8, -(-height // BLOCK) * BLOCK // 4
+
+
 @cache
-def accumulation(decode: int, again: bool, back: bool) -> Pass:
+def accumulation(decode: int, again: bool, back: bool, tiled: bool) -> Pass:
     """The pass that adds a frame to the sums, or takes it away (back); again: one that they hold already."""
     return Pass(
         "accumulate",
@@ -154,8 +173,8 @@ def accumulation(decode: int, again: bool, back: bool) -> Pass:
         images={"sums": Image("rg32ui", reads=True)},
         constants={"size": "ivec2", "known": "int", "next": "int"}
         | ({"before": "int", "after": "int"} if again else {"top": "int", "whole": "float"}),
-        defines={"DECODE": decode, "AGAIN": int(again), "BACK": int(back)},
-        local_size=LOCAL_ROW,
+        defines={"DECODE": decode, "AGAIN": int(again), "BACK": int(back), "TILED": int(tiled)},
+        local_size=(64, 4, 1),
     )
 
 
@@ -167,6 +186,8 @@ class Sums(Running, Window):
         Running.__init__(self, source, capacity)
         # Three fields of 21 bits: as many of them for white as leave room for the sum of a whole window.
         self.whole = (1 << min(16, 21 - (capacity - 1).bit_length())) - 1
+        # Pixels beside one another are at other times; a processor foresees best what lies in one piece.
+        self.tiled = stores_rows(device) and _in_tiles(source.width, 1)[0] <= device.max_size
         self._sent = None
         self._allocate("rg32ui", 8)
         try:
@@ -175,8 +196,13 @@ class Sums(Running, Window):
             self.release()
             raise
 
+    def _texels(self, width: int, height: int) -> tuple[int, int]:
+        return _in_tiles(width, height) if self.tiled else (width, height)
+
     def _add(self, frame: int, same: int | None, known: int, next_: int) -> None:
-        program = accumulation(decoding(self.source.transfer, self._options), same is not None, next_ < known)
+        program = accumulation(
+            decoding(self.source.transfer, self._options), same is not None, next_ < known, self.tiled
+        )
         given = {"known": known % self.layers, "next": next_ % self.layers}
         if same is None:
             self.device.write(self._sent, self.source.read(frame), opaque=True)

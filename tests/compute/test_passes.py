@@ -8,12 +8,13 @@ from shutter_addon.compute import diffusion_gpu, gpu, window
 from shutter_addon.compute.passes import SHADERS, Pass, body
 
 PASSES = [value for value in vars(diffusion_gpu).values() if isinstance(value, Pass)]
-PASSES += [gpu.composition(way, 3, False, 1, 2, True, False) for way in ("pieces", "frames", "value")]
-PASSES += [gpu.composition(way, 3, True, 1, 2, True, False) for way in ("frames", "value")]
+PASSES += [gpu.composition(way, 3, "frames", 1, 2, True, False) for way in ("pieces", "frames", "value")]
 PASSES += [
-    gpu.composition_of_sums(4, 2, True, False),
-    *(window.accumulation(1, again, False) for again in (True, False)),
+    gpu.composition(way, 3, stored, 1, 2, True, False) for way in ("frames", "value") for stored in ("sums", "tiles")
 ]
+for tiled in (True, False):
+    PASSES += [gpu.composition_of_sums(4, 2, True, tiled, False)]
+    PASSES += [window.accumulation(1, again, False, tiled) for again in (True, False)]
 # Of what is declared inside the sources, whatever it is: variables, parameters, functions.
 DECLARED = re.compile(r"\b(?:bool|u?int|float|[biu]?vec[234])\s+(\w+)")
 BYTES = {"int": 4, "float": 4, "ivec2": 8, "vec2": 8}
