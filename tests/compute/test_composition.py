@@ -339,7 +339,8 @@ def test_sums_lie_in_tiles_only_where_textures_are_rows(monkeypatch, rows, edges
     monkeypatch.setattr(window, "BAND_BYTES", size[0] * 8 * 17 * 30)
     rng = np.random.default_rng(20)
     device, source = open_compositor("gpu")[0], footage(rng, size=size)
-    assert device.window(source, 16).tiled == rows
+    with device.current():
+        assert device.window(source, 16).tiled == rows
     for moment in (instant(rng, edges=edges), few_pieces(rng, edges=edges)):
         for index, direction in ((3, 1), (4, 1), (19, 1), (2, -1)):
             check(device, source, moment, index, direction)
@@ -348,7 +349,8 @@ def test_sums_lie_in_tiles_only_where_textures_are_rows(monkeypatch, rows, edges
 def test_a_picture_too_wide_for_tiles_has_none():
     rng = np.random.default_rng(21)
     device, source = open_compositor("gpu")[0], footage(rng, count=3, size=(4200, 2))
-    assert not device.window(source, 2).tiled
+    with device.current():
+        assert not device.window(source, 2).tiled
     check(device, source, few_pieces(rng, window=2), 1)
 
 
