@@ -1,9 +1,10 @@
-// Solves the coarsest grid, of 8 × 8 cells at most, by elimination in one invocation. Cells are numbered along the shorter
-// side, so that those that are tied stand near one another: the matrix is a band. (Blender's Python has no memory that a
-// workgroup shares.)
+// Solves the coarsest grid, of 8 × 8 cells at most, by elimination (LDLᵀ): in one invocation, for shaders of Blender's
+// Python have no memory that a workgroup shares.
+// Cells are numbered along the shorter side, so that none is tied to one more than BAND − 1 before it. The matrix is
+// symmetric, its lower half is all of it: rows[BAND · i + d] ties cell i to cell i − d; d = 0 turns into 1 / pivot.
 #define BAND 10
 
-float rows[64 * BAND];  // of the matrix: a cell's own entry, then those of the cells before it
+float rows[64 * BAND];
 vec4 x[64];
 
 ivec2 cell(int i)
@@ -39,11 +40,8 @@ void load_row(int i, int layer)
 void main()
 {
   int layer = int(gl_GlobalInvocationID.z);
-  if (any(greaterThan(gl_GlobalInvocationID.xy, uvec2(0)))) {
-    return;
-  }
   int count = size.x * size.y;
-  int reach = min(size.x, size.y) + 1;
+  int reach = min(size.x, size.y) + 1;  // of the cells that one is tied to
   for (int i = 0; i < count; i++) {
     load_row(i, layer);
   }

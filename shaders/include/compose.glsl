@@ -21,7 +21,9 @@
   does(3)
 
 ivec2 corner;
-ivec2 place;  // of its sums
+#if SUMS
+ivec2 corner_place;  // of the corner's sums
+#endif
 mat4 c[QUADS * GROUPS];
 mat4 total[QUADS];
 vec4 share[QUADS];  // of the exposure that fell on frames that are there
@@ -33,11 +35,11 @@ ivec2 pixel_at(int quad, int pixel)
   return min(corner + ivec2(0, 4 * quad + pixel), size - 1);
 }
 
-// Where its light is read. A quad is as high as a tile of sums.
+// Where a pixel's light is read. A quad is as high as a tile of sums.
 ivec2 place_of_light(int quad, int pixel)
 {
 #if SUMS && TILED
-  return place + ivec2(8 * pixel, quad);
+  return corner_place + ivec2(8 * pixel, quad);
 #else
   return pixel_at(quad, pixel);
 #endif
@@ -73,7 +75,7 @@ bool start_block()
 {
   corner = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, 4 * QUADS);
 #if SUMS
-  place = place_of_sums(corner);
+  corner_place = place_of_sums(corner);
 #endif
   EACH(start_quad);
   return corner.x < size.x && corner.y < size.y;
@@ -166,7 +168,8 @@ void store(int quad, int pixel, float gain)
   vec4 color = total[quad][pixel] / max(share[quad][pixel], 1e-6);
 #if EDGES == 2
   // Where nothing of the shutter is left, the nearest frame that there is.
-  color = share[quad][pixel] > 1e-6 ? color : frame_light(place_of_light(quad, pixel), layer_of(int(centre[quad][pixel])));
+  int nearest = layer_of(int(centre[quad][pixel]));
+  color = share[quad][pixel] > 1e-6 ? color : frame_light(place_of_light(quad, pixel), nearest);
 #endif
 #if ENCODED
   color.rgb = to_linear_exact(straight(color)) * color.a;

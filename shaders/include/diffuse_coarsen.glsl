@@ -1,5 +1,5 @@
-// The next operator PᵀAP, given add_row(i, at, weight): adds row i of A to `product`, whose cell is number `at` of the 25
-// cells 2p − 2 … 2p + 2.
+// The next operator PᵀAP. The pass has product[25] and add_row(i, at, weight): adds row i of A to the product, whose cell
+// is number `at` of the 25 cells 2p − 2 … 2p + 2.
 ivec2 p;
 float row[9];
 

@@ -1,5 +1,5 @@
-// What a grid's equations miss becomes the right side of the next one, given missing(i, at): what equation i misses, with
-// its cell number `at` of the 25 `near` 2p.
+// What a grid's equations miss becomes the right side of the next one. The pass has near[25], the cells 2p − 2 … 2p + 2,
+// and missing(i, at): what equation i misses, with its cell number `at` of them.
 ivec3 p;
 vec4 total;
 

@@ -18,7 +18,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from .passes import LOCAL_SIZE, Image, Pass
+from .passes import Image, Pass
 
 # Largest error × 255 over the scenes of the tests after 1, 2, 3, 4 cycles: 11, 2.0, 0.66, 0.66 (median 2.8, 0.31, 0.11,
 # 0.08): what is left then is what is linear far from scribbles.
@@ -71,6 +71,7 @@ _SOLVE = Pass(
     "diffuse_solve",
     images={"stencil": _READ, "right": _READ, "solution": _STORED},
     constants={"size": "ivec2"},
+    local_size=(1, 1, 1),
 )
 _FINISH = _pass("finish", (), {"solution": _CHANGED}, {**_GRID, "layers": "int", "nothing": "float"})
 _EXPAND = _pass("expand", ("coarser",), {"solution": _STORED}, _GRIDS)
@@ -165,25 +166,24 @@ class Diffusion:
             live = free if grid.finest else _grown(free)
             reached = _grown(held, BAND) if max(grid.size) > WHOLE else np.ones_like(held)
             near = reached & live
-            around = _grown(near) & live
-            ranks = np.where(near, 0, np.where(around, 1, np.where(live, 2, 3)))
+            feeding = _grown(near)
+            around = feeding & live
             stale = (reached | grid.reached) & _grown(live)
+            # What lies around is read as having nothing of its own; what is all fixed has labels, at full size alone.
+            anew = stale | around | ~live if grid.finest else stale | around
             rim = ~near & live & _last_ones(grid)
             eights, fours = grid.codes
-            anew = stale | (ranks == 1) | (ranks == 3 if grid.finest else False)
-            lists = [eights[ranks == rank] for rank in range(4)]
-            # A tile is four cells wide on the next grid.
-            lists += [eights[rim], eights[anew], eights[_grown(near)] / 2, fours[changed]]
+            lists = [eights[tiles] for tiles in (near, around & ~near, live & ~around, rim, anew)]
+            lists += [eights[feeding] / 2, fours[changed]]  # a tile is four cells wide on the next grid
             ends = (end + np.cumsum([len(tiles) for tiles in lists])).tolist()
             grid.ranges = {
                 "near": (end, ends[0]),
-                "around": (ends[0], ends[1]),
                 "reached": (end, ends[1]),
                 "far": (ends[0], ends[2]),
-                "rim": (ends[3], ends[4]),
-                "anew": (ends[4], ends[5]),
-                "feeding": (ends[5], ends[6]),
-                "changed": (ends[6], ends[7]),
+                "rim": (ends[2], ends[3]),
+                "anew": (ends[3], ends[4]),
+                "feeding": (ends[4], ends[5]),
+                "changed": (ends[5], ends[6]),
             }
             listed += lists
             end = ends[-1]
@@ -211,8 +211,7 @@ class Diffusion:
         """A V-cycle from a grid on down."""
         grid, *coarser = self._grids[index : index + 2]
         if not coarser:
-            images = {name: grid.textures[name] for name in _SOLVE.images}
-            self._device.run(_SOLVE, (*LOCAL_SIZE[:2], grid.layers), images=images, size=grid.size)
+            self._run(_SOLVE, grid, "near", 1, grid.layers)  # its one tile
             return
         sweeps = FINEST_SWEEPS if grid.finest else SWEEPS
         self._smooth(grid, sweeps)

@@ -11,7 +11,7 @@ from ..core.instant import Instant, Options
 from .diffusion_gpu import Diffusion
 from .passes import LOCAL_ROW, Image, Pass
 from .tables import padded, table
-from .window import BLOCK, Frames, Sums, decoding, open_window
+from .window import BLOCK, TILE, Frames, Sums, decoding, open_window
 
 # Pixels above one another that one invocation composes from sums.
 PAIR = 2
@@ -71,7 +71,7 @@ def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, encoded
             "ENCODED": int(encoded),
         },
         blocks={"table": (1 + rows) * (2 * groups + 1)},
-        local_size=(64, 4 // PAIR, 1),
+        local_size=(64, TILE[1] // PAIR, 1),
     )
 
 

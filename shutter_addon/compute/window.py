@@ -19,6 +19,8 @@ RESIDENT_BYTES = 6 << 30
 
 # Pixels above one another that one invocation composes, going through the frames.
 BLOCK = 16
+# Of running sums, in pixels (across, down), as in shaders/include/sums.glsl.
+TILE = 8, 4
 
 _STORED = {np.uint8: "rgba8", np.uint16: "rgba16", np.float16: "rgba16f", np.float32: "rgba32f"}
 
@@ -47,7 +49,7 @@ class Window:
     def _allocate(self, kind: str, pixel_bytes: int) -> None:
         """NoDeviceError: no room, and nothing is kept."""
         source, row_bytes = self.source, self.source.width * pixel_bytes * self.layers
-        self.rows = max(1, min(source.height, BAND_BYTES // row_bytes))
+        self.rows = min(source.height, max(1, BAND_BYTES // row_bytes // BLOCK) * BLOCK)
         self.tops = range(0, source.height, self.rows)
         try:
             if row_bytes * source.height > RESIDENT_BYTES:
@@ -159,9 +161,10 @@ def stores_rows(device) -> bool:
 
 
 def _in_tiles(width: int, height: int) -> tuple[int, int]:
-    """The texels (across, down) for pixels in tiles of 8 × 4, as shaders/include/sums.glsl finds them; all that a block
-    of pixels reaches is there. Eight texels more across, lest rows above one another share the lines of a cache."""
-    return 32 * -(-width // 8) + 8, -(-height // BLOCK) * BLOCK // 4
+    """The texels (across, down) for pixels in tiles, with all that the last block of pixels reaches. A tile's row more
+    across, lest all rows begin in the same sets of a cache."""
+    across, down = TILE
+    return across * down * -(-width // across) + across, -(-height // BLOCK) * BLOCK // down
 
 
 @cache
@@ -174,7 +177,7 @@ def accumulation(decode: int, again: bool, back: bool, tiled: bool) -> Pass:
         constants={"size": "ivec2", "known": "int", "next": "int"}
         | ({"before": "int", "after": "int"} if again else {"top": "int", "whole": "float"}),
         defines={"DECODE": decode, "AGAIN": int(again), "BACK": int(back), "TILED": int(tiled)},
-        local_size=(64, 4, 1),
+        local_size=(64, TILE[1], 1),
     )
 
 
@@ -186,7 +189,7 @@ class Sums(Running, Window):
         Running.__init__(self, source, capacity)
         # Three fields of 21 bits: as many of them for white as leave room for the sum of a whole window.
         self.whole = (1 << min(16, 21 - (capacity - 1).bit_length())) - 1
-        # Pixels beside one another are at other times; a processor foresees best what lies in one piece.
+        # Neighbours look up other layers; in tiles, what a workgroup reads of a layer lies in one run of memory.
         self.tiled = stores_rows(device) and _in_tiles(source.width, 1)[0] <= device.max_size
         self._sent = None
         self._allocate("rg32ui", 8)

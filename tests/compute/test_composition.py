@@ -321,7 +321,7 @@ def test_bands_and_streaming_change_nothing(monkeypatch, resident):
     source, moment = footage(rng), instant(rng)
     device = open_compositor("gpu")[0]
     whole = Renderer(device, source).picture(0, moment)
-    monkeypatch.setattr(window, "BAND_BYTES", source.width * 4 * 16 * 5)
+    monkeypatch.setattr(window, "BAND_BYTES", source.width * 4 * 16)
     if not resident:
         monkeypatch.setattr(window, "RESIDENT_BYTES", 0)
     renderer = Renderer(device, source)
@@ -331,27 +331,41 @@ def test_bands_and_streaming_change_nothing(monkeypatch, resident):
 
 
 @pytest.mark.parametrize("rows", [True, False])
-@pytest.mark.parametrize("edges", ["hold", "shorten"])
-@pytest.mark.parametrize("size", [(37, 23), (1, 1), (64, 16), (130, 65)])
-def test_sums_lie_in_tiles_only_where_textures_are_rows(monkeypatch, rows, edges, size):
-    """And pictures are right both ways: software renderers have the tiles, GPUs have not."""
+@pytest.mark.parametrize("size", [(37, 23), (1, 1), (130, 65)])
+def test_sums_lie_in_tiles_only_where_textures_are_rows(monkeypatch, rows, size):
+    """And pictures are right both ways, in bands as well: software renderers have the tiles, GPUs have not."""
     monkeypatch.setattr(window, "stores_rows", lambda device: rows)
-    monkeypatch.setattr(window, "BAND_BYTES", size[0] * 8 * 17 * 30)
+    monkeypatch.setattr(window, "BAND_BYTES", size[0] * 8 * 17 * 32)
     rng = np.random.default_rng(20)
     device, source = open_compositor("gpu")[0], footage(rng, size=size)
     with device.current():
         assert device.window(source, 16).tiled == rows
-    for moment in (instant(rng, edges=edges), few_pieces(rng, edges=edges)):
+    moments = [
+        instant(rng, edges=edges, light=light_) for edges in ("hold", "shorten") for light_ in ("linear", "encoded")
+    ]
+    moments += [few_pieces(rng, edges="mirror"), instant(rng, interpolation="value"), instant(rng, count=5)]
+    late = np.array([[0, 0, 1, 1], [0, 0, 0, 1.0]])  # which nothing of the shot is left for at its end
+    moments += [Instant(Options(4, edges="shorten"), late, SHAPES[:1])]
+    for moment in moments:
         for index, direction in ((3, 1), (4, 1), (19, 1), (2, -1)):
             check(device, source, moment, index, direction)
 
 
-def test_a_picture_too_wide_for_tiles_has_none():
-    rng = np.random.default_rng(21)
-    device, source = open_compositor("gpu")[0], footage(rng, count=3, size=(4200, 2))
+def test_a_picture_too_wide_for_tiles_has_none(monkeypatch):
+    monkeypatch.setattr(window, "stores_rows", lambda device: True)
+    device, source = open_compositor("gpu")[0], footage(np.random.default_rng(21), count=3)
     with device.current():
-        assert not device.window(source, 2).tiled
-    check(device, source, few_pieces(rng, window=2), 1)
+        for widest, tiled in ((168, True), (167, False)):  # four rows of 40 pixels, and a tile's row
+            monkeypatch.setattr(device.device, "max_size", widest)
+            assert device.window(source, 2).tiled == tiled
+
+
+@pytest.mark.parametrize("size", [(1, 1), (8, 4), (9, 5), (1920, 1080), (37, 23)])
+def test_tiles_have_room_for_all_that_shaders_go_through(size):
+    across, down = window._in_tiles(*size)
+    x, y = size[0] - 1, -(-size[1] // window.BLOCK) * window.BLOCK - 1  # the last pixel of the last block
+    assert (x // 8) * 32 + 8 * (y % 4) + x % 8 < across
+    assert y // 4 < down
 
 
 def test_a_texture_without_room_is_refused():
@@ -375,12 +389,12 @@ def test_a_device_too_small_for_the_window_streams_it(monkeypatch):
     texture = GLDevice.texture
 
     def small(self, width, height, layers, kind):
-        if kind == "rg32ui" or (layers >= 16 and height > 10):
+        if kind == "rg32ui" or (layers >= 16 and height > 16):
             raise NoDeviceError("no room")
         return texture(self, width, height, layers, kind)
 
     monkeypatch.setattr(GLDevice, "texture", small)
-    monkeypatch.setattr(window, "BAND_BYTES", source.width * 4 * 16 * 10)
+    monkeypatch.setattr(window, "BAND_BYTES", source.width * 4 * 16 * 16)
     assert np.abs(Renderer(device, source).picture(0, moment) - whole).max() <= 2**-15
 
 
