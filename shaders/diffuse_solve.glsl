@@ -1,11 +1,13 @@
-// Solves the coarsest grid, of 8 × 8 cells at most, by elimination (LDLᵀ): in one invocation, for shaders of Blender's
-// Python have no memory that a workgroup shares.
+// Solves the coarsest grid, of SOLVED × SOLVED cells at most, by elimination (LDLᵀ): in one invocation, for shaders of
+// Blender's Python have no memory that a workgroup shares.
 // Cells are numbered along the shorter side, so that none is tied to one more than BAND − 1 before it. The matrix is
 // symmetric, its lower half is all of it: rows[BAND · i + d] ties cell i to cell i − d; d = 0 turns into 1 / pivot.
-#define BAND 10
+#include "inside.glsl"
+#define CELLS (SOLVED * SOLVED)
+#define BAND (SOLVED + 2)
 
-float rows[64 * BAND];
-vec4 x[64];
+float rows[CELLS * BAND];
+vec4 x[CELLS];
 
 ivec2 cell(int i)
 {
@@ -15,7 +17,7 @@ ivec2 cell(int i)
 void tie(int i, ivec2 p, float value)
 {
   int number = size.x > size.y ? p.x * size.y + p.y : p.y * size.x + p.x;
-  if (number < i && all(greaterThanEqual(p, ivec2(0))) && all(lessThan(p, size))) {
+  if (number < i && inside(p, size)) {
     rows[BAND * i + i - number] = value;
   }
 }

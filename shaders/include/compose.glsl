@@ -6,8 +6,8 @@
 // The window's frame k is frame `origin` + k · `direction` of the shot, which has `count`. frames: source frame i in layer
 // i mod `layers`; or with SUMS the running sums instead, from position `lowest` on, the shot's ends extended: position
 // i's in that layer.
-// GROUPS of four shutters, EDGES, DECODE, PREMULTIPLIED, ENCODED: see compute/gpu.py. Software renderers run both sides
-// of every branch: what is costly stands in loops or behind these definitions.
+// GROUPS of four shutters, TILED, EDGES, DECODE, PREMULTIPLIED, ENCODED: see compute/gpu.py. Software renderers run both
+// sides of every branch: what is costly stands in loops or behind these definitions.
 #include "light.glsl"
 #if SUMS
 #include "sums.glsl"
@@ -21,7 +21,7 @@
   does(3)
 
 ivec2 corner;
-#if SUMS
+#if TILED
 ivec2 corner_place;  // of the corner's sums
 #endif
 mat4 c[QUADS * GROUPS];
@@ -38,7 +38,7 @@ ivec2 pixel_at(int quad, int pixel)
 // Where a pixel's light is read. A quad is as high as a tile of sums.
 ivec2 place_of_light(int quad, int pixel)
 {
-#if SUMS && TILED
+#if TILED
   return corner_place + ivec2(8 * pixel, quad);
 #else
   return pixel_at(quad, pixel);
@@ -74,7 +74,7 @@ void start_quad(int quad)
 bool start_block()
 {
   corner = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, 4 * QUADS);
-#if SUMS
+#if TILED
   corner_place = place_of_sums(corner);
 #endif
   EACH(start_quad);

@@ -1,8 +1,13 @@
 // What the passes of a multigrid share. Coarse cells lie on the even cells of the finer grid.
 // Work is done tile by tile, of 8 × 8 cells or 4 × 4: `tiles` lists a grid's, 256 to a row, each as x + 4096 · y of its
 // first cell, in fours.
+#include "inside.glsl"
+
 // Cells around one: k = 0 … 8, row by row, itself 4.
 #define OFFSET(k) (ivec2((k) % 3, (k) / 3) - 1)
+// And two cells around it: n = 0 … 24, itself 12; which of them cell k is.
+#define OFFSET_OF_25(n) (ivec2((n) % 5, (n) / 5) - 2)
+#define AMONG_25(k) (5 * ((k) / 3 + 1) + (k) % 3 + 1)
 
 // Calls a function for every cell of 3 × 3, or of 5 × 5: where a compiler leaves a loop, arrays that it indexes go through
 // memory, and a software renderer takes many times as long.
@@ -34,11 +39,6 @@
   does(22); \
   does(23); \
   does(24)
-
-bool inside(ivec2 i, ivec2 grid)
-{
-  return all(greaterThanEqual(i, ivec2(0))) && all(lessThan(i, grid));
-}
 
 // The first cell of entry n of the list, or one beyond the grid where the list has ended.
 ivec2 corner(int n, ivec2 grid)

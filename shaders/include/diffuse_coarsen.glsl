@@ -7,13 +7,13 @@ void add_equation(int k)
 {
   ivec2 i = 2 * p + OFFSET(k);
   if (inside(i, size)) {
-    add_row(i, 5 * (k / 3 + 1) + k % 3 + 1, imageLoad(weights, ivec3(i, 0))[TAKES(k)]);
+    add_row(i, AMONG_25(k), imageLoad(weights, ivec3(i, 0))[TAKES(k)]);
   }
 }
 
 void add_column(int n)
 {
-  ivec2 j = 2 * p + ivec2(n % 5, n / 5) - 2;
+  ivec2 j = 2 * p + OFFSET_OF_25(n);
   vec4 value = inside(j, size) ? product[n] * imageLoad(weights, ivec3(j, 0)) : vec4(0.0);
   int a = n % 5 / 2;
   int b = (n % 5 + 1) / 2;

@@ -5,14 +5,14 @@ vec4 total;
 
 void load_near(int n)
 {
-  near[n] = imageLoad(own, ivec3(clamp(2 * p.xy + ivec2(n % 5, n / 5) - 2, ivec2(0), size - 1), p.z));
+  near[n] = imageLoad(own, ivec3(clamp(2 * p.xy + OFFSET_OF_25(n), ivec2(0), size - 1), p.z));
 }
 
 void add_missing(int k)
 {
   ivec3 i = ivec3(2 * p.xy + OFFSET(k), p.z);
   if (inside(i.xy, size)) {
-    total += imageLoad(weights, ivec3(i.xy, 0))[TAKES(k)] * missing(i, 5 * (k / 3 + 1) + k % 3 + 1);
+    total += imageLoad(weights, ivec3(i.xy, 0))[TAKES(k)] * missing(i, AMONG_25(k));
   }
 }
 

@@ -352,7 +352,7 @@ def test_moved_scribbles_start_from_the_last_solution(on_device):
         labels = np.roll(labels, (1, -2), axis=(0, 1))
         got = on_device(labels, count, warm=True)
         assert_coefficients(got, count, labels.shape)
-    np.testing.assert_allclose(got, exact(labels, count), rtol=0, atol=LEVEL)  # with what all four left behind
+        np.testing.assert_allclose(got, exact(labels, count), rtol=0, atol=LEVEL)
 
 
 @pytest.mark.parametrize("scene", SCENES)
