@@ -18,6 +18,7 @@ import bpy
 from ..compute.errors import NoDeviceError
 from ..compute.renderer import DEVICES
 from ..core import recipe
+from ..core.messages import signed
 from ..media import MediaError, open_source
 from . import edits, effects, inbetweens, outputs, pictures, sources, strips
 
@@ -46,7 +47,7 @@ def main(argv: list[str]) -> int:
 
 
 def _refuse(sentence: str) -> int:
-    print(f"Virtual Shutter: {sentence}", file=sys.stderr)
+    print(signed(sentence), file=sys.stderr)
     return BAD_INPUT
 
 

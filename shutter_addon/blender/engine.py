@@ -7,6 +7,7 @@ import traceback
 import bpy
 import numpy as np
 
+from ..core.messages import signed
 from . import pictures
 from .strips import ENGINE
 
@@ -35,14 +36,9 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
 
     def _say(self, message: str) -> None:
         if bpy.app.background:
-            print(_signed(message), file=sys.stderr, flush=True)
+            print(signed(message), file=sys.stderr, flush=True)
         else:
-            self.report({"WARNING"}, _signed(message))
-
-
-def _signed(sentence: str) -> str:
-    """Says whose sentence it is: it stands among Blender's own."""
-    return f"Virtual Shutter: {sentence}"
+            self.report({"WARNING"}, signed(message))
 
 
 def fail(engine, sentence: str) -> None:
@@ -52,12 +48,12 @@ def fail(engine, sentence: str) -> None:
     """
     if bpy.app.background:
         refuse(sentence)
-    engine.report({"ERROR"}, _signed(sentence))
+    engine.report({"ERROR"}, signed(sentence))
 
 
 def refuse(sentence: str) -> None:
     """Ends the process from inside a render: the sentence on stderr, exit code 2."""
-    print(_signed(sentence), file=sys.stderr, flush=True)
+    print(signed(sentence), file=sys.stderr, flush=True)
     leave(2)
 
 
