@@ -37,6 +37,11 @@ def part_folder(parent: Path) -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
+def is_part(name: str) -> bool:
+    """Whether it is the name of a part folder."""
+    return _NAME.fullmatch(name) is not None
+
+
 def left_behind(parent: Path) -> list[Path]:
     """The part folders in `parent` that nobody writes into any more: those of processes that were killed.
 
@@ -44,7 +49,7 @@ def left_behind(parent: Path) -> list[Path]:
     return [
         Path(entry)
         for entry in os.scandir(parent)
-        if _NAME.fullmatch(entry.name)
+        if is_part(entry.name)
         and entry.is_dir(follow_symlinks=False)
         and time.time() - _last_written(entry.path) > LEFT_BEHIND
     ]

@@ -25,10 +25,14 @@ def test_a_file_is_there_once_it_is_whole(tmp_path):
 
 
 def test_what_fails_leaves_nothing(tmp_path):
-    with pytest.raises(KeyboardInterrupt), whole.writing(tmp_path / "a.txt") as part:
-        part.write_text("half")
-        part.with_name("more").mkdir()
-        raise KeyboardInterrupt
+    def stopped():
+        with whole.writing(tmp_path / "a.txt") as part:
+            part.write_text("half")
+            part.with_name("more").mkdir()
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped()
     assert listed(tmp_path) == []
     with pytest.raises(FileNotFoundError), whole.writing(tmp_path / "a.txt"):
         pass
