@@ -98,14 +98,14 @@ class Cache:
         with suppress(OSError), Folder(self.folder) as folder:
             checks = _read_checks(folder)
             for name, found in checks.digests.items():
-                if self._is_between(frame := int(Path(name).stem)) and name == self.picture(frame).name:
+                if self._is_between(frame := int(name[:8])) and name == self._name(frame):
                     digests[frame] = found
             kinds = {pair: kind for pair, kind in checks.kinds.items() if pair < self.source.count - 1}
         self.digests, self.kinds, self._loaded = digests, kinds, stamp  # at once: others may ask from their threads
 
     def picture(self, frame: int) -> Path:
         """The file of that frame."""
-        return self.folder / f"{frame:08d}{self._suffix}"
+        return self.folder / self._name(frame)
 
     def steps(self, pair: int) -> range:
         """The frames between source frames `pair` and `pair` + 1."""
@@ -122,7 +122,7 @@ class Cache:
         names = set()
         with suppress(OSError), Folder(self.folder) as folder:
             names = {entry.name for entry in folder.files()}
-        there = {frame for frame in self.digests if self.picture(frame).name in names}
+        there = {frame for frame in self.digests if self._name(frame) in names}
         pairs = {frame // self.factor for frame in there}
         return self.kinds.keys() | {pair for pair in pairs if there.issuperset(self.steps(pair))}
 
@@ -189,6 +189,9 @@ class Cache:
         except OSError as error:
             self._token = secrets.token_hex(4)  # half a line may end the file
             raise _unwritable(self.folder, error) from None
+
+    def _name(self, frame):
+        return f"{frame:08d}{self._suffix}"
 
     def _is_between(self, frame):
         return 0 < frame < (self.source.count - 1) * self.factor and frame % self.factor != 0

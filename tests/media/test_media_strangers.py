@@ -465,7 +465,7 @@ def test_damage_of_any_kind_is_right_or_refused(tmp_path, folder, outside):
     with open_source(footage(tmp_path / "shot", 4)) as source:
         build(source, tmp_path / "whole")
         before = listed(outside)
-        for seed in range(150):
+        for seed in range(60):
             rng = random.Random(seed)
             shutil.rmtree(folder, ignore_errors=True)
             shutil.copytree(tmp_path / "whole", folder)
