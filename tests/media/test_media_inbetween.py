@@ -459,6 +459,9 @@ def test_killed_anywhere_it_goes_on_to_the_same_files(tmp_path, folder, monkeypa
             killed.append(process.returncode)
         assert killed == [-signal.SIGKILL] * 10
         assert 0 < state(source, folder).done < 39
+        shutil.copytree(folder, folder.with_name("killed"))
+        cache.purge(folder.with_name("killed"))
+        assert not list(folder.with_name("killed").iterdir())
         monkeypatch.setattr(whole, "LEFT_BEHIND", 0)
         build(source, folder)
         assert kept(folder) == kept(folder.with_name("whole"))
