@@ -11,6 +11,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Operator
 
+from ..core import messages
 from ..media import MediaError, cache
 from ..media.inbetween import build, estimate
 from . import cache as finished
@@ -51,6 +52,7 @@ def look(edit, effect, strip) -> Look:
     if not when or time.monotonic() - when > _FRESH:
         found = cache.state(medium, *settings), cache.size(settings[0], medium)
         _looks[key] = time.monotonic(), *found
+        _trim(_looks)
     return Look(*found, doubled.result() * (settings[1] - 1) if doubled.done() else None)
 
 
@@ -61,9 +63,14 @@ def _known(source) -> tuple:
         medium = sources.open_media(source)
         medium.close()
         _media[key] = medium, _in_thread(_estimated, medium)
-    while len(_media) > _KEPT:
-        del _media[next(iter(_media))]
+    _trim(_media)
     return _media[key]
+
+
+def _trim(known: dict) -> None:
+    """Lets the oldest go."""
+    while len(known) > _KEPT:
+        del known[next(iter(known))]
 
 
 def _estimated(medium) -> int:
@@ -120,6 +127,7 @@ def stop() -> None:
     wait([doubled for _medium, doubled in _media.values()])
     _media.clear()
     _looks.clear()
+    cache.forget()
 
 
 def _started(context, build: Build) -> None:
@@ -266,9 +274,10 @@ class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
 
     def change(self, context, effect):
         edit, effect, strip = strips.active(context)
+        left = []
         try:
             folder, (medium, _) = inbetweens.folder(effect), _known(strips.source_of(edit, effect, strip))
-            freed = cache.purge(folder, medium)
+            freed = cache.purge(folder, medium, lambda *place: left.append(place))
         except FAULTS as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -276,6 +285,9 @@ class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
             folder.rmdir()
         _looks.clear()
         self.report({"INFO"}, rpt_("Removed {size}").format(size=size_in_words(freed)))
+        for place, count in left:
+            sentence = rpt_('"{folder}": other files stay there ({count})')
+            self.report({"WARNING"}, messages.sentence(sentence.format(folder=place, count=count)))
         return None
 
 

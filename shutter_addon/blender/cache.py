@@ -4,13 +4,15 @@ Blender knows of a strip's own properties only. Properties of the effect drop fr
 strokes and the source are compared with what they were, as no callback tells of them.
 """
 
+import bpy
 import numpy as np
 
 from ..media import MediaError
 from ..media import cache as files
 from . import animation, effects, inbetweens, sources, strips
 
-_signatures: dict = {}
+_signatures: dict = {}  # by effect scenes
+_KEPT = 64
 _built: dict[tuple, tuple] = {}  # by folder, source, factor and method: the stamp of their in-between frames
 building = False  # while in-between frames are built, those that come count when the build has ended
 
@@ -34,6 +36,9 @@ def built_key(effect, source) -> tuple:
         return (str(error),)
     key = folder, sources.stem(source), *made
     if not (building and key in _built):
+        _built.pop(key, None)
+        while len(_built) >= _KEPT:
+            del _built[next(iter(_built))]
         _built[key] = files.stamp(*key)
     return *key, _built[key], sources.every_file_key(source)
 
@@ -56,6 +61,8 @@ def invalidate_changed(edit) -> bool:
     whether there are any.
 
     The values of keyed properties do not count: they change with every frame that plays."""
+    for gone in _signatures.keys() - {scene.session_uid for scene in bpy.data.scenes}:
+        del _signatures[gone]
     if not edit.virtual_shutter.effects:
         return False
     changed = False

@@ -6,32 +6,42 @@ import json
 import os
 import re
 import secrets
-import time
+import stat
 import zlib
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from OpenImageIO import ImageOutput, ImageSpec
+from OpenImageIO import ImageInput, ImageOutput, ImageSpec, geterror
 
+from ..core import whole
 from .errors import MediaError
-from .sequence import SequenceSource
+from .folder import Folder
 from .written import is_whole_picture
 
 VERSION = 1  # raise it when the same frames give other in-betweens, or the folder changes: what there is gets stale
-MANIFEST = "manifest.json"
+MANIFEST, CHECKS = "manifest.json", "checks"
 MAKER = "Virtual Shutter: in-between frames"
 SAMPLES = {"uint8": "uint8", "uint16": "uint16", "float16": "half", "float32": "float"}
 WHOLE = 8 << 20  # bytes; a source's files up to this size, HD pictures of 8 bits without compression, are read whole
 BLOCKS, BLOCK = 16, 4096  # what is read of a larger one to know it again
-LEFT_BEHIND = 3600  # seconds; a picture takes less to be written, whatever the machine
+READERS = 4  # threads that look whether pictures are what they were, before they are removed
 
-_PICTURE = re.compile(r"([0-9a-f]{64})  (\d{8})\.(?:png|exr)")
-_PAIR = re.compile(r"# (\d+) (same|cut) ([0-9a-f]{8})")
-_PART = re.compile(r"\.(?:\d{8}|manifest)-[0-9a-f]{8}\.part\.(?:png|exr|json)")
-_OURS = re.compile(rf"\d{{8}}\.(?:png|exr)|{_PART.pattern}|{re.escape(MANIFEST)}")
+# What is larger, in bytes, none of our builds has made.
+LARGEST_MANIFEST = 1 << 16
+LARGEST_CHECKS = 1 << 30  # 13 million frames
+LARGEST_PICTURE = 1 << 33
+LONGEST_LINE = 128
+
+_PICTURE = re.compile(r"([0-9a-f]{64})  ([0-9]{8}\.(?:png|exr))\n?")
+_PAIR = re.compile(r"# ([0-9]{1,9}) (same|cut) [0-9a-f]{8}\n?")
+_CHECKS = re.compile(r"[0-9a-f]{8}\.sha256")
+_HALF = re.compile(r"[0-9]{8}\.(?:png|exr)|" + re.escape(MANIFEST))  # in a part folder
+_KEPT = 64
 _finished: dict[Path, tuple] = {}  # (stamp, count of pairs) of folders that were asked for
 _sizes: dict[Path, tuple] = {}  # (stamp, bytes), likewise
 
@@ -52,8 +62,12 @@ class Cache:
 
     manifest.json: what they are made of. The folder's name ends in a hash of that, so nothing in it ever gets stale.
     00000099.png or .exr: a frame, by its number among all frames, with the source's own samples.
-    checks/*.sha256: what is finished. Each build appends to a file of its own. `sha256sum -c` reads them, run in the
-    folder; comments are pairs of source frames that need no pictures, "# 12 same" or "# 12 cut", with their CRC-32.
+    checks/*.sha256: what is finished. Each build appends to a file of its own, a picture's line before it comes to its
+    place. `sha256sum -c` reads them, run in the folder; comments are pairs of source frames that need no pictures,
+    "# 12 same" or "# 12 cut", with their CRC-32.
+
+    The folder may come from a stranger: what no build makes (links, pipes, lines of other text, numbers of no frame) is
+    as if it were not there, and never followed. That lines are true, nobody can know.
     """
 
     def __init__(self, source, folder, factor, method):
@@ -64,9 +78,9 @@ class Cache:
             "source": identity(source),
             "settings": {"factor": factor, "method": method},
         }
-        key = hashlib.sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()[:12]
-        self.folder = Path(folder) / f"{source.path.stem[:40]}-{factor}x-{method}-{key}"
+        self.folder = Path(folder) / f"{source.path.stem[:40]}-{factor}x-{method}-{_key(made_of)}"
         self.manifest = {**made_of, "path": _relative(source.path, folder)}
+        self._spec = _spec(source.width, source.height, source.dtype, source.alpha)
         self._suffix = ".png" if source.dtype.kind == "u" else ".exr"
         self._token = secrets.token_hex(4)
         self._loaded: tuple | None = None
@@ -81,30 +95,34 @@ class Cache:
             return
         digests: dict[int, set[str]] = {}
         kinds: dict[int, str] = {}
-        for file in (self.folder / "checks").glob("*.sha256"):
-            try:
-                text = file.read_text("ascii", "replace")
-            except FileNotFoundError:  # removed meanwhile
-                continue
-            for line in text.splitlines():
-                if match := _PICTURE.fullmatch(line):  # processes whose libraries differ may write other bytes
-                    digests.setdefault(int(match[2]), set()).add(match[1])
-                elif (match := _PAIR.fullmatch(line)) and line == pair_line(int(match[1]), match[2]):
-                    kinds[int(match[1])] = match[2]
+        with suppress(OSError), Folder(self.folder) as folder:
+            checks = _read_checks(folder)
+            for name, found in checks.digests.items():
+                if self._is_between(frame := int(name[:8])) and name == self._name(frame):
+                    digests[frame] = found
+            kinds = {pair: kind for pair, kind in checks.kinds.items() if pair < self.source.count - 1}
         self.digests, self.kinds, self._loaded = digests, kinds, stamp  # at once: others may ask from their threads
 
     def picture(self, frame: int) -> Path:
         """The file of that frame."""
-        return self.folder / f"{frame:08d}{self._suffix}"
+        return self.folder / self._name(frame)
 
     def steps(self, pair: int) -> range:
         """The frames between source frames `pair` and `pair` + 1."""
         return range(pair * self.factor + 1, (pair + 1) * self.factor)
 
+    def has(self, frame: int) -> bool:
+        """Whether the frame's picture is finished, as far as the names of files tell."""
+        with suppress(OSError):
+            return frame in self.digests and stat.S_ISREG(self.picture(frame).lstat().st_mode)
+        return False
+
     def finished(self) -> set[int]:
         """The pairs that are finished, as far as the names of files tell."""
-        names = {entry.name for entry in os.scandir(self.folder)} if self.folder.is_dir() else set()
-        there = {frame for frame in self.digests if self.picture(frame).name in names}
+        names = set()
+        with suppress(OSError), Folder(self.folder) as folder:
+            names = {entry.name for entry in folder.files()}
+        there = {frame for frame in self.digests if self._name(frame) in names}
         pairs = {frame // self.factor for frame in there}
         return self.kinds.keys() | {pair for pair in pairs if there.issuperset(self.steps(pair))}
 
@@ -112,61 +130,97 @@ class Cache:
         """Whether the pair is finished and all its pictures are as they were written; reads them."""
         return pair in self.kinds or all(self._is_sound(frame) for frame in self.steps(pair))
 
-    def _is_sound(self, frame: int) -> bool:
-        try:
-            return _sha256(self.picture(frame)) in self.digests.get(frame, ())
-        except OSError:
-            return False
-
     def read(self, frame: int) -> np.ndarray:
         """The frame's picture (height, width, 4), as it was given. MediaError: it is damaged or gone."""
         path = self.picture(frame)
         if not self._is_sound(frame):
             raise MediaError(f"{path}: this in-between frame is damaged or gone; build in-between frames again")
-        return SequenceSource(self.folder, files=[path.name]).read(0)
+        image = self._open(path)
+        samples = image and image.read_image(0, 0, 0, self._spec.nchannels, self._spec.format)
+        if samples is None or image.has_error:
+            raise MediaError(
+                f"{path}: this in-between frame cannot be decoded; remove in-between frames, and build again"
+            )
+        image.close()
+        picture = np.empty((*samples.shape[:2], 4), samples.dtype)
+        picture[..., : samples.shape[2]] = samples
+        if samples.shape[2] == 3:
+            picture[..., 3] = np.iinfo(samples.dtype).max if samples.dtype.kind == "u" else 1
+        return picture
 
     def prepare(self) -> None:
         """Makes the folder, with its manifest, and clears away what killed builds left half-written.
 
         MediaError: it cannot be written."""
-        manifest = self.folder / MANIFEST
-        text = json.dumps(self.manifest, indent=1, sort_keys=True) + "\n"
+        text = (json.dumps(self.manifest, indent=1, sort_keys=True) + "\n").encode()
         try:
-            (self.folder / "checks").mkdir(parents=True, exist_ok=True)
-            if not manifest.exists() or manifest.read_bytes() != text.encode():
-                part = self._part(manifest)
-                part.write_bytes(text.encode())
-                part.replace(manifest)
-            _clear(self.folder)
+            self.folder.mkdir(parents=True, exist_ok=True)
+            with Folder(self.folder) as folder, folder.make(CHECKS):
+                if _content_of(folder, MANIFEST) != text:
+                    with whole.writing(self.folder / MANIFEST) as part:
+                        part.write_bytes(text)
+                for part in whole.left_behind(self.folder):
+                    with suppress(OSError):  # another user's, or cleared by others meanwhile
+                        _remove_part(folder, part.name)
         except OSError as error:
             raise _unwritable(self.folder, error) from None
 
-    def write(self, frame: int, picture: np.ndarray) -> str:
-        """Writes a frame's picture (height, width, 4), whole or not at all. Gives its line for `note`.
+    def write(self, frame: int, picture: np.ndarray) -> None:
+        """Writes a frame's picture (height, width, 4), whole or not at all, and takes it down.
 
         MediaError: it cannot be written."""
         path = self.picture(frame)
-        part = self._part(path)
         try:
-            write_picture(part, picture, self.source.alpha)
-            digest = _sha256(part)
-            part.replace(path)
+            with whole.writing(path) as part:
+                if not write_picture(part, picture, self.source.alpha):
+                    raise MediaError(
+                        f"{self.folder}: an in-between frame could not be written whole; is the disk full?"
+                    )
+                # Before it comes to its place: whatever kills us, each picture there can be told from others' files.
+                self.note(f"{_sha256(part)}  {path.name}")
         except OSError as error:
             raise _unwritable(self.folder, error) from None
-        finally:
-            part.unlink(missing_ok=True)
-        return f"{digest}  {path.name}"
 
-    def _part(self, path):
-        return path.with_name(f".{path.stem}-{self._token}.part{path.suffix}")
-
-    def note(self, lines: list[str]) -> None:
+    def note(self, line: str) -> None:
         """Takes down what is finished. MediaError: it cannot be written."""
         try:
-            with (self.folder / "checks" / f"{self._token}.sha256").open("ab") as file:
-                file.write("".join(f"{line}\n" for line in lines).encode())
+            with Folder(self.folder) as folder, folder.folder(CHECKS) as checks:
+                checks.append(f"{self._token}.sha256", f"{line}\n".encode())
         except OSError as error:
+            self._token = secrets.token_hex(4)  # half a line may end the file
             raise _unwritable(self.folder, error) from None
+
+    def _name(self, frame):
+        return f"{frame:08d}{self._suffix}"
+
+    def _is_between(self, frame):
+        return 0 < frame < (self.source.count - 1) * self.factor and frame % self.factor != 0
+
+    def _is_sound(self, frame):
+        """Whether the picture is one that was taken down, and one of this source."""
+        path, digests = self.picture(frame), self.digests.get(frame)
+        try:
+            with Folder(self.folder) as folder:
+                if not digests or folder.digest(path.name, LARGEST_PICTURE) not in digests:
+                    return False
+        except OSError:
+            return False
+        if image := self._open(path):
+            image.close()
+        return image is not None
+
+    def _open(self, path):
+        """The file of a picture as `write_picture` makes them for this source, open; None: it is another."""
+        wishes = ImageSpec()
+        wishes.attribute("oiio:UnassociatedAlpha", 1)  # no premultiplication on reading
+        image = ImageInput.open(str(path), wishes)
+        if image is None:
+            geterror()
+            return None
+        if all(getattr(image.spec(), name) == getattr(self._spec, name) for name in _SHAPE):
+            return image
+        image.close()
+        return None
 
 
 def identity(source) -> dict:
@@ -178,6 +232,8 @@ def identity(source) -> dict:
     for path in getattr(source, "files", [source.path]):
         try:
             status = path.stat()
+            if not stat.S_ISREG(status.st_mode):  # a pipe would never end
+                raise MediaError(f"{path.name}: is no file")
             content.update(_content(path, status.st_size, status.st_mtime_ns))
         except OSError as error:
             raise MediaError(f"{path.name}: cannot be read ({error.strerror})") from None
@@ -198,48 +254,78 @@ def state(source, folder, factor, method) -> State:
     Quick while nothing changes: it asks for the time stamps of the source's files and of the folder.
     MediaError: a file of the source is gone."""
     cache, total = Cache(source, folder, factor, method), source.count - 1
-    stamp = _stamp(cache.folder)
-    if _finished.get(cache.folder, ((),))[0] != stamp:
+
+    def finished():
         cache.load()
-        _finished[cache.folder] = stamp, len(cache.finished())
-    done = _finished[cache.folder][1]
+        return len(cache.finished())
+
+    done = _remembered(_finished, cache.folder, finished)
     if done or not total:
         return State("ready" if done == total else "partial", done, total)
     wanted = cache.manifest["path"], cache.manifest["settings"]
-    others = [manifest for path, manifest in _caches(folder) if path != cache.folder]
+    others = [manifest for name, manifest in _caches(os.path.realpath(folder)) if name != cache.folder.name]
     stale = any((manifest["path"], manifest["settings"]) == wanted for manifest in others)
     return State("stale" if stale else "missing", 0, total)
 
 
 def size(folder, source=None) -> int:
-    """The bytes that `purge` would free. Quick while nothing changes. MediaError: a file of the source is gone."""
-    return sum(map(_size, _chosen(folder, source)))
+    """The bytes that `purge` would free, unless pictures have changed since they were written, which it leaves.
+
+    Quick while nothing changes. MediaError: a file of the source is gone."""
+    folder = Path(folder)
+    return sum(_remembered(_sizes, folder / name, partial(_size, folder / name)) for name in _chosen(folder, source))
 
 
-def purge(folder, source=None) -> int:
+def purge(folder, source=None, left: Callable[[Path, int], None] = lambda path, count: None) -> int:
     """Removes the in-between frames in `folder`, all or one source's, stale ones as well. Gives the bytes freed.
 
-    Nothing else is removed, wherever it lies. MediaError: something cannot be removed."""
-    return sum(map(_remove, _chosen(folder, source)))
+    Nothing else is removed, wherever it lies: pictures are read, and go if they are those that were taken down.
+    left: is called with each folder that was not empty after that, and how many things lie in it
+    MediaError: something cannot be removed, or `folder` is a link."""
+    names = _chosen(folder, source)
+    try:
+        with Folder(folder) as top:
+            return sum(_remove(top, name, left) for name in names)
+    except (FileNotFoundError, NotADirectoryError):
+        return 0
+    except OSError as error:
+        raise _irremovable(folder, error) from None
 
 
-def write_picture(path: Path, picture: np.ndarray, alpha: str) -> None:
+def forget() -> None:
+    """Forgets what is known of sources and folders."""
+    _finished.clear()
+    _sizes.clear()
+    _content.cache_clear()
+
+
+def write_picture(path: Path, picture: np.ndarray, alpha: str) -> bool:
     """Writes (height, width, 4) samples without loss, as PNG or EXR by the path's ending: RGB if alpha is "opaque",
-    else RGBA as it is, premultiplied or not. Equal samples give equal bytes.
+    else RGBA as it is, premultiplied or not. Equal samples give equal bytes. Whether it is whole.
 
-    OSError, MediaError: it cannot be written whole."""
-    picture = picture[..., :3] if alpha == "opaque" else picture
-    height, width, channels = picture.shape
-    spec = ImageSpec(width, height, channels, SAMPLES[picture.dtype.name])
+    OSError: it cannot be written."""
+    height, width, _ = picture.shape
+    spec = _spec(width, height, picture.dtype, alpha)
     spec["oiio:UnassociatedAlpha"] = 1
     spec["DateTime"] = "1970:01:01 00:00:00"  # of an EXR, else the time of writing
     spec["png:compressionLevel"] = 1
     spec["png:filter"] = 0x20  # "up" alone takes half the time of a choice for each row, and no more room
     spec["compression"] = "piz"
     output = ImageOutput.create(str(path))
-    written = output.open(str(path), spec) and output.write_image(np.ascontiguousarray(picture))
-    if not (output.close() and written and is_whole_picture(path)):
-        raise MediaError(f"{path.parent}: an in-between frame could not be written whole; is the disk full?")
+    samples = np.ascontiguousarray(picture[..., : spec.nchannels])
+    written = output.open(str(path), spec) and output.write_image(samples)
+    return output.close() and written and is_whole_picture(path)
+
+
+_SHAPE = (
+    *("x", "y", "z", "width", "height", "depth", "full_x", "full_y", "full_width", "full_height"),
+    *("nchannels", "channelnames", "format", "channelformats", "deep"),
+)
+
+
+def _spec(width, height, dtype, alpha) -> ImageSpec:
+    """What `write_picture` makes."""
+    return ImageSpec(width, height, 3 if alpha == "opaque" else 4, SAMPLES[dtype.name])
 
 
 def pair_line(pair: int, kind: str) -> str:
@@ -251,9 +337,13 @@ def pair_line(pair: int, kind: str) -> str:
 def _stamp(folder: Path) -> tuple | None:
     """Changes with the folder's list of files and with its checks; None without a folder."""
     try:
-        checks = [(entry.name, entry.stat()) for entry in os.scandir(folder / "checks")]
-        return folder.stat().st_mtime_ns, *sorted((name, info.st_size, info.st_mtime_ns) for name, info in checks)
-    except (FileNotFoundError, NotADirectoryError):
+        with Folder(folder) as opened:
+            changed = opened.status(".").st_mtime_ns
+            with suppress(OSError), opened.folder(CHECKS) as checks:
+                found = [(entry.name, entry.stat(follow_symlinks=False)) for entry in checks.entries()]
+                return changed, *sorted((name, info.st_size, info.st_mtime_ns) for name, info in found)
+            return (changed,)
+    except OSError:
         return None
 
 
@@ -265,65 +355,178 @@ def stamp(folder, stem: str, factor: int, method: str) -> tuple:
     return tuple((path.name, _stamp(path)) for path in sorted(caches))
 
 
-def _caches(folder) -> list[tuple[Path, dict]]:
-    """(folder, manifest) of every cache under `folder`."""
+def _caches(folder) -> list[tuple[str, dict]]:
+    """(name, manifest) of every cache in `folder`."""
     found = []
-    for path in sorted(Path(folder).glob(f"*/{MANIFEST}")):
-        with suppress(OSError, ValueError, TypeError, KeyError):  # another program's, or damaged
-            manifest = json.loads(path.read_bytes())
-            if manifest["maker"] == MAKER:
-                found.append((path.parent, {key: manifest[key] for key in ("path", "source", "settings")}))
+    with suppress(OSError), Folder(folder) as top:
+        for entry in sorted(top.entries(), key=lambda entry: entry.name):
+            with suppress(OSError), top.folder(entry.name) as cache:
+                if (manifest := _manifest(cache)) is not None:
+                    found.append((entry.name, manifest))
     return found
 
 
-def _chosen(folder, source) -> list[Path]:
-    """The caches under `folder`, all or one source's."""
+def _manifest(cache: Folder) -> dict | None:
+    """That of a cache; None for another program's folder, or if its content does not fit the folder's name."""
+    with suppress(ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        manifest = json.loads(_content_of(cache, MANIFEST))
+        made_of = {key: value for key, value in manifest.items() if key != "path"}
+        named = cache.path.name.endswith(f"-{_key(made_of)}")
+        if named and made_of["maker"] == MAKER and manifest.keys() >= {"path", "source", "settings"}:
+            return manifest
+    return None
+
+
+def _key(made_of: dict) -> str:
+    return hashlib.sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()[:12]
+
+
+def _content_of(cache: Folder, name: str) -> bytes | None:
+    """What is in a manifest; None if it is none."""
+    with suppress(OSError):
+        return cache.read(name, LARGEST_MANIFEST)
+    return None
+
+
+def _chosen(folder, source) -> list[str]:
+    """The caches in `folder`, all or one source's."""
     path, made_of = (None, None) if source is None else (_relative(source.path, folder), identity(source))
     return [
-        cache
-        for cache, manifest in _caches(folder)
+        name
+        for name, manifest in _caches(folder)
         if source is None or manifest["path"] == path or manifest["source"] == made_of
     ]
 
 
-def _size(folder: Path) -> int:
-    now = _stamp(folder)
-    if _sizes.get(folder, ((),))[0] != now:
-        with suppress(FileNotFoundError):  # removed meanwhile
-            _sizes[folder] = now, sum(path.stat().st_size for path in _files(folder))
-    return _sizes.get(folder, (now, 0))[1]
+class _Checks(NamedTuple):
+    """What a cache's checks say.
+
+    digests: by names of pictures; kinds: by pairs; own: the files in which every line is ours
+    unreadable: why others cannot be read"""
+
+    digests: dict[str, set[str]]
+    kinds: dict[int, str]
+    own: list[str]
+    unreadable: list[OSError]
 
 
-def _files(folder: Path) -> list[Path]:
-    """What was made in a cache's folder."""
+def _read_checks(cache: Folder) -> _Checks:
+    checks = _Checks({}, {}, [], [])
+    try:
+        with cache.folder(CHECKS) as folder:
+            for name in [entry.name for entry in folder.files() if entry.name.endswith(".sha256")]:
+                try:
+                    with folder.open(name, LARGEST_CHECKS) as file:
+                        if _read_lines(file, checks) and _CHECKS.fullmatch(name):
+                            checks.own.append(name)
+                except PermissionError as error:
+                    checks.unreadable.append(error)
+                except OSError:  # removed meanwhile, or too large
+                    continue
+    except PermissionError as error:
+        checks.unreadable.append(error)
+    except OSError:  # there are none
+        pass
+    return checks
+
+
+def _read_lines(file, checks: _Checks) -> bool:
+    """Adds what a file of checks says. Whether every line is ours; on a full disk the last one may be torn."""
+    ours = others = 0
+    for line in iter(partial(file.readline, LONGEST_LINE), b""):
+        text = line.decode("ascii", "replace")
+        if match := _PICTURE.fullmatch(text):  # processes whose libraries differ may write other bytes
+            checks.digests.setdefault(match[2], set()).add(match[1])
+        elif (match := _PAIR.fullmatch(text)) and text.rstrip("\n") == pair_line(int(match[1]), match[2]):
+            checks.kinds[int(match[1])] = match[2]
+        elif text.endswith("\n"):
+            others += 1
+            continue
+        else:
+            return ours > 0 and not others and len(line) < LONGEST_LINE
+        ours += 1
+    return not others
+
+
+def _pictures(cache: Folder, checks: _Checks) -> list[os.DirEntry]:
+    """The pictures in a cache's folder that were taken down, as far as their names tell."""
     return [
-        path
-        for path in (*folder.iterdir(), *folder.glob("checks/*.sha256"))
-        if _OURS.fullmatch(path.name) or path.parent != folder
+        entry
+        for entry in cache.files()
+        if entry.name in checks.digests and entry.stat(follow_symlinks=False).st_size <= LARGEST_PICTURE
     ]
 
 
-def _clear(folder: Path) -> None:
-    """Removes what was left half-written; others may write here at the same time."""
-    for entry in os.scandir(folder):
-        with suppress(FileNotFoundError):
-            if _PART.fullmatch(entry.name) and time.time() - entry.stat().st_mtime > LEFT_BEHIND:
-                os.unlink(entry)
+def _other_files(cache: Folder, checks: _Checks) -> Iterator[tuple[Folder, str]]:
+    """What else was made in a cache's folder, as (folder, name), in the order in which it may go: the manifest last,
+    for without it what is left would never be found again."""
+    for entry in cache.entries():
+        if whole.is_part(entry.name):
+            with suppress(OSError), cache.folder(entry.name) as part:
+                yield from ((part, file.name) for file in part.files() if _HALF.fullmatch(file.name))
+    if checks.own:
+        with cache.folder(CHECKS) as folder:
+            yield from ((folder, name) for name in checks.own)
+    yield cache, MANIFEST
 
 
-def _remove(folder: Path) -> int:
-    freed = 0
+def _size(folder: Path) -> int:
+    with suppress(OSError), Folder(folder) as cache:
+        checks = _read_checks(cache)
+        if not checks.unreadable:
+            pictures = sum(entry.stat(follow_symlinks=False).st_size for entry in _pictures(cache, checks))
+            return pictures + sum(place.status(name).st_size for place, name in _other_files(cache, checks))
+    return 0
+
+
+def _remove(top: Folder, name: str, left) -> int:
     try:
-        # The manifest last: without it, what is left would never be found again.
-        for path in sorted(_files(folder), key=lambda path: path.name == MANIFEST):
-            freed += path.stat().st_size
-            path.unlink()
-        for empty in (folder / "checks", folder):
-            if empty.is_dir() and not any(empty.iterdir()):
-                empty.rmdir()
+        with top.folder(name) as cache:
+            if _manifest(cache) is None:  # another folder than a moment ago
+                return 0
+            checks = _read_checks(cache)
+            if checks.unreadable:
+                raise checks.unreadable[0]
+            with ThreadPoolExecutor(READERS) as pool:
+                names = [entry.name for entry in _pictures(cache, checks)]
+                freed = sum(pool.map(partial(_remove_picture, cache, checks), names))
+            freed += sum(place.remove(file) for place, file in _other_files(cache, checks))
+            for entry in cache.entries():
+                if entry.name == CHECKS or whole.is_part(entry.name):
+                    with suppress(OSError):  # others' things are in it
+                        cache.remove_folder(entry.name)
+            count = len(cache.entries())
+        if count:
+            left(top.path / name, count)
+        else:
+            top.remove_folder(name)
     except OSError as error:
-        raise MediaError(f"{folder}: cannot be removed ({error.strerror})") from None
+        raise _irremovable(top.path / name, error) from None
     return freed
+
+
+def _remove_picture(cache: Folder, checks: _Checks, name: str) -> int:
+    ours = cache.digest(name, LARGEST_PICTURE) in checks.digests[name]
+    return cache.remove(name) if ours else 0
+
+
+def _remove_part(cache: Folder, name: str) -> None:
+    with cache.folder(name) as part:
+        for entry in part.files():
+            if _HALF.fullmatch(entry.name):
+                part.remove(entry.name)
+    cache.remove_folder(name)
+
+
+def _remembered(known: dict[Path, tuple], folder: Path, find: Callable[[], int]) -> int:
+    """What `find` gives for a folder; found again once the folder has changed."""
+    now = _stamp(folder)
+    if known.get(folder, ((),))[0] != now:
+        known.pop(folder, None)
+        while len(known) >= _KEPT:
+            del known[next(iter(known))]
+        known[folder] = now, find()
+    return known[folder][1]
 
 
 @lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
@@ -350,6 +553,10 @@ def _relative(path: Path, folder) -> str:
         return Path(os.path.relpath(path, folder)).as_posix()
     except ValueError:  # another drive
         return path.absolute().as_posix()
+
+
+def _irremovable(folder, error: OSError) -> MediaError:
+    return MediaError(f"{folder}: cannot be removed ({error.strerror or error})")
 
 
 def _unwritable(folder: Path, error: OSError) -> MediaError:

@@ -65,8 +65,7 @@ class Inbetween:
         self._source.close()
 
     def _is_there(self, index):
-        built = index in self._cache.digests and self._cache.picture(index).is_file()
-        return built or self._real(index) is not None
+        return self._cache.has(index) or self._real(index) is not None
 
     def _real(self, index):
         """The source frame that is shown, None where an in-between frame is."""
@@ -124,7 +123,8 @@ def estimate(source, factor: int) -> int:
         path = Path(folder, "picture.png" if source.dtype.kind == "u" else "picture.exr")
         sizes = []
         for index in samples:
-            write_picture(path, source.read(index), source.alpha)
+            if not write_picture(path, source.read(index), source.alpha):
+                raise MediaError(f"{folder}: a picture could not be written whole; is the disk full?")
             sizes.append(path.stat().st_size)
     return (source.count - 1) * (factor - 1) * sum(sizes) // len(sizes)
 
@@ -193,18 +193,17 @@ class _Near:
 
 
 def _make(cache, pair, first, second, between, cancelled) -> bool:
-    source, lines = cache.source, []
+    source = cache.source
     pictures = between(first, second, cache.factor, cache.method, source.transfer, source.alpha)
     for index, picture in zip(cache.steps(pair), pictures, strict=True):
         if cancelled():
             return False
-        lines.append(cache.write(index, picture))
-    cache.note(lines)
+        cache.write(index, picture)
     return True
 
 
 def _note_kind(cache, pair, kind) -> bool:
-    cache.note([pair_line(pair, kind)])
+    cache.note(pair_line(pair, kind))
     return True
 
 

@@ -96,7 +96,9 @@ def test_built_shown_and_removed(bpy, building, effect, tmp_path, capfd):
     assert look(bpy, building).size == size
     (cache / "notes.txt").write_text("the user's")
     assert bpy.ops.shutter.inbetween_purge() == {"FINISHED"}
-    assert "Removed" in capfd.readouterr().out
+    said = capfd.readouterr().out
+    assert "Removed" in said
+    assert f'Warning: "{cache}": other files stay there (1)' in said
     assert [path.name for path in cache.iterdir()] == ["notes.txt"]
     assert shown(bpy, building) == ("missing", 0, COUNT - 1)
     assert look(bpy, building).size == 0
@@ -235,6 +237,31 @@ def test_a_folder_that_cannot_be_written_is_one_sentence(bpy, building, effect, 
         bpy.ops.shutter.inbetween_build()
     assert "Traceback" not in str(raised.value)
     assert building.running() is None
+
+
+def test_a_folder_that_is_a_link_is_one_sentence_when_it_is_to_be_emptied(bpy, building, effect, tmp_path):
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "film" / "virtual_shutter_inbetween").symlink_to(tmp_path / "disk")
+    assert bpy.ops.shutter.inbetween_build() == {"FINISHED"}
+    built = pictures(tmp_path / "disk")
+    with pytest.raises(RuntimeError, match=r"virtual_shutter_inbetween: cannot be removed \(it is a link, and"):
+        bpy.ops.shutter.inbetween_purge()
+    assert pictures(tmp_path / "disk") == built != []
+    assert shown(bpy, building) == ("ready", COUNT - 1, COUNT - 1)
+
+
+@pytest.mark.usefixtures("effect")
+def test_what_is_known_is_forgotten_with_the_file(bpy, building, edit):
+    from shutter_addon.blender import cache as finished
+    from shutter_addon.media import cache
+
+    bpy.ops.shutter.inbetween_build()
+    look(bpy, building)
+    finished.invalidate_changed(edit)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    known = [cache._finished, cache._sizes, building._looks, building._media, finished._signatures, finished._built]
+    assert not any(known)
+    assert cache._content.cache_info().currsize == 0
 
 
 def test_footage_that_is_gone_is_one_sentence(bpy, effect, tmp_path):

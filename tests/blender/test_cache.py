@@ -186,6 +186,28 @@ def test_the_cache_is_on(bpy, edit, effect, render):
     assert not np.array_equal(render(edit, [FRAME])[FRAME], before)
 
 
+def test_what_is_known_of_effects_goes_with_them(edit, effect):
+    from shutter_addon.blender import cache, lifecycle
+
+    cache.invalidate_changed(edit)
+    assert effect.scene.session_uid in cache._signatures
+    edit.sequence_editor.strips.remove(next(strip for strip in edit.sequence_editor.strips if strip.type == "SCENE"))
+    lifecycle.update()
+    cache.invalidate_changed(edit)
+    assert not cache._signatures
+
+
+def test_stamps_of_in_between_frames_are_bounded(effect, tmp_path, monkeypatch):
+    from shutter_addon.blender import cache, inbetweens, strips
+
+    effect.inbetween = "4"
+    source = strips.source_of(effect.id_data, effect, strips.effect_strips(effect.id_data)[0])
+    for number in range(2 * cache._KEPT):
+        monkeypatch.setattr(inbetweens, "given", tmp_path / f"{number}")
+        cache.built_key(effect, source)
+    assert len(cache._built) == cache._KEPT
+
+
 def test_finished_frames_are_kept_while_nothing_changes(bpy, edit, effect, render, images):
     """Frames are there even when files in between are not: playing and selecting drop none."""
     before = render(edit, [3, FRAME])

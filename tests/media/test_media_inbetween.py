@@ -1,7 +1,6 @@
 """In-between frames in files: what is built, kept, found damaged, and given back."""
 
 import hashlib
-import os
 import random
 import shutil
 import signal
@@ -16,7 +15,9 @@ import numpy as np
 import pytest
 from footage import picture, save_image, see_through
 
+from shutter_addon.core import whole
 from shutter_addon.media import MediaError, cache, inbetween, open_source
+from shutter_addon.media.folder import Folder
 
 ROOT = Path(__file__).parents[2]
 FACTOR, COUNT = 4, 6
@@ -306,15 +307,15 @@ def test_purge_takes_only_what_was_built(source, folder, tmp_path):
 
 
 def test_what_could_not_be_removed_is_found_again(source, folder, monkeypatch):
-    def refusing(path, busy):
-        if path == busy:
-            raise PermissionError(13, "Permission denied", str(path))
-        os.unlink(path)
+    def refusing(place, name, busy, remove=Folder.remove):
+        if name == busy.name:
+            raise PermissionError(13, "Permission denied", str(busy))
+        return remove(place, name)
 
     build(source, folder)
     for busy in pictures(folder):
         with monkeypatch.context() as patch:
-            patch.setattr(Path, "unlink", partialmethod(refusing, busy))
+            patch.setattr(Folder, "remove", partialmethod(refusing, busy=busy))
             with pytest.raises(MediaError, match=r"cannot be removed \(Permission denied\)"):
                 cache.purge(folder)
         assert cache.size(folder) > 0
@@ -326,13 +327,13 @@ def test_what_could_not_be_removed_is_found_again(source, folder, monkeypatch):
 def test_checks_that_go_while_they_are_read_are_not_missed(source, folder, monkeypatch):
     build(source, folder, frames=(0, 1))
     build(source, folder)
-    gone, read = sorted(folder.glob("*/checks/*"))[0], Path.read_text
+    gone, usual = sorted(folder.glob("*/checks/*"))[0], Folder.open
 
-    def late(path, *more):
-        path.unlink() if path == gone else None
-        return read(path, *more)
+    def late(place, name, most):
+        gone.unlink() if name == gone.name else None
+        return usual(place, name, most)
 
-    monkeypatch.setattr(Path, "read_text", late)
+    monkeypatch.setattr(Folder, "open", late)
     with opened(source, folder) as between:
         assert 0 < sum(between.has(index) for index in range(between.count)) < between.count
     assert not gone.exists()
@@ -458,7 +459,10 @@ def test_killed_anywhere_it_goes_on_to_the_same_files(tmp_path, folder, monkeypa
             killed.append(process.returncode)
         assert killed == [-signal.SIGKILL] * 10
         assert 0 < state(source, folder).done < 39
-        monkeypatch.setattr(cache, "LEFT_BEHIND", 0)
+        shutil.copytree(folder, folder.with_name("killed"))
+        cache.purge(folder.with_name("killed"))
+        assert not list(folder.with_name("killed").iterdir())
+        monkeypatch.setattr(whole, "LEFT_BEHIND", 0)
         build(source, folder)
         assert kept(folder) == kept(folder.with_name("whole"))
 

@@ -403,6 +403,7 @@ MESSAGES = {
     ("*", "Remove In-Between Frames?"): "Zwischenbilder entfernen?",
     ("*", "They can be built again"): "Sie können wieder erstellt werden",
     ("*", "Removed {size}"): "{size} entfernt",
+    ("*", '"{folder}": other files stay there ({count})'): "„{folder}“: andere Dateien bleiben dort ({count})",
     # The live preview
     ("*", "Live"): "Live",
     (
