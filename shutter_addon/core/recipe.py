@@ -16,7 +16,7 @@ from typing import Literal, get_args, get_origin
 
 import numpy as np
 
-from . import keyframes, scribbles, shutters
+from . import keyframes, scribbles, shutters, whole
 from .instant import Edges, Exposure, Instant, Interpolation, Light, Options, Position
 
 Point = tuple[float, float]
@@ -220,13 +220,8 @@ def dump(recipe: Recipe) -> str:
 
 def save(recipe: Recipe, path: str | Path) -> None:
     """Writes a recipe whole or not at all. OSError: it cannot be written."""
-    path = Path(path)
-    part = path.with_name(path.name + ".part")
-    try:
+    with whole.writing(Path(path)) as part:
         part.write_text(dump(recipe), encoding="utf-8")
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _compact(value):

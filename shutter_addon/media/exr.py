@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO
 
+from ..core import whole
 from .errors import MediaError
 
 
@@ -16,10 +17,11 @@ def write_exr(path: Path, values: np.ndarray, names: list[str]) -> None:
     spec = OpenImageIO.ImageSpec(width, height, channels, OpenImageIO.FLOAT)
     spec.channelnames = tuple(names)
     spec["compression"] = "zip"
-    part = path.with_name(f".{path.stem}.part.exr")
-    output = OpenImageIO.ImageOutput.create(str(part))
-    written = output.open(str(part), spec) and output.write_image(np.ascontiguousarray(values, dtype=np.float32))
-    if not (output.close() and written):
-        part.unlink(missing_ok=True)
-        raise MediaError(f"{path}: {output.geterror() or 'cannot be written'}")
-    part.replace(path)
+    try:
+        with whole.writing(path) as part:
+            output = OpenImageIO.ImageOutput.create(str(part))
+            written = output.open(str(part), spec) and output.write_image(np.ascontiguousarray(values, np.float32))
+            if not (output.close() and written):
+                raise MediaError(f"{path}: {output.geterror() or 'cannot be written'}")
+    except OSError as error:
+        raise MediaError(f"{path}: cannot be written ({error.strerror or error})") from None

@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import wave
 
 import numpy as np
@@ -323,13 +324,20 @@ def test_a_folder_that_cannot_be_written(bpy, effect, tmp_path):
 
 
 def test_a_full_disk_leaves_the_old_recipe(bpy, effect, tmp_path):
-    """/dev/full takes no byte: as the place of the new file's first half, it is a disk without room."""
+    """No file may grow beyond some bytes: a disk without room."""
+    resource = pytest.importorskip("resource")
     path = tmp_path / "out.json"
     path.write_text("old")
-    (tmp_path / "out.json.part").symlink_to("/dev/full")
-    assert "No space left" in refusal(bpy, "recipe_export", filepath=str(path))
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+        assert f"{path}: File too large" in refusal(bpy, "recipe_export", filepath=str(path))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, handler)
     assert path.read_text() == "old"
-    assert [file.name for file in tmp_path.glob("out*")] == ["out.json"]
+    assert [file.name for file in tmp_path.iterdir() if file.name != "in"] == ["out.json"]
 
 
 def test_an_effect_that_cannot_be_rendered_is_not_exported(bpy, effect, editing, tmp_path):

@@ -147,6 +147,15 @@ def test_files(tmp_path):
             recipe.load(path)
 
 
+def test_nothing_is_saved_through_a_link(tmp_path):
+    (tmp_path / "others").write_text("others'")
+    for name in ("r.json", "r.json.part"):
+        (tmp_path / name).symlink_to("others")
+    recipe.save(recipe.parse(json.dumps(EXAMPLE)), tmp_path / "r.json")
+    assert (tmp_path / "others").read_text() == "others'"
+    assert recipe.load(tmp_path / "r.json") == recipe.parse(json.dumps(EXAMPLE))
+
+
 def region(**fields):
     return recipe.Region("A", strokes=[[(0.0, 0.0), (0.2, 0.0)]], **fields)
 
