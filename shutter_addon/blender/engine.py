@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from ..core.messages import signed
-from . import pictures, rendering
+from . import cache, pictures, rendering
 from .strips import ENGINE
 
 
@@ -22,16 +22,12 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             return
         try:
             self._render(depsgraph)
-        except pictures.StoppedError:
-            if not self.test_break():
-                rendering.cancel(self.test_break)
-        except pictures.FAULTS as error:
-            fail(self, str(error) or "not enough memory")
-        except KeyboardInterrupt:
-            fail(self, "the render was stopped")
         except BaseException as error:  # Blender would print it, and render the frame without the effect
-            traceback.print_exc()
-            fail(self, f"internal error: {error!r}")
+            cache.spoilt.add(depsgraph.scene.session_uid)
+            if not isinstance(error, pictures.StoppedError):
+                fail(self, _in_words(error))
+            elif not self.test_break():
+                rendering.cancel(self.test_break)
 
     def _render(self, depsgraph):
         scene, width, height = depsgraph.scene, self.resolution_x, self.resolution_y
@@ -51,6 +47,15 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             print(signed(message), file=sys.stderr, flush=True)
         else:
             self.report({"WARNING"}, signed(message))
+
+
+def _in_words(error: BaseException) -> str:
+    if isinstance(error, pictures.FAULTS):
+        return str(error) or "not enough memory"
+    if isinstance(error, KeyboardInterrupt):
+        return "the render was stopped"
+    traceback.print_exception(error)
+    return f"internal error: {error!r}"
 
 
 def fail(engine, sentence: str) -> None:

@@ -47,6 +47,7 @@ def _show_scribbles():
 @persistent
 def _before_render(scene, *_):
     rendering.begin(scene)
+    cache.drop_spoilt()
     if scene.render.engine != strips.ENGINE:
         sources.look_again()
     # In a window the render has a thread of its own, and the last update has seen to copies.
@@ -68,6 +69,8 @@ def _before_frame(scene, *_):
 
 @persistent
 def _after_render(scene, *_):
+    if rendering.is_film(scene):
+        cache.drop_spoilt()
     rendering.end(scene, alone=sys._getframe().f_back is None)
 
 

@@ -5,7 +5,7 @@ import os
 import shutil
 import signal
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import bpy
@@ -285,7 +285,8 @@ def _lean(edit):
 def quiet():
     """Keeps Blender's log of every saved frame off the terminal; what goes wrong comes as an exception."""
     if sys.stdout is not None:
-        sys.stdout.flush()
+        with suppress(OSError):  # nobody reads it
+            sys.stdout.flush()
     terminal, nothing = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nothing, 1)
     try:

@@ -21,7 +21,8 @@ _LONG = 10.0  # seconds
 
 
 def _to_stderr(text: str) -> None:
-    print(signed(text), file=sys.stderr, flush=True)
+    with suppress(OSError, AttributeError):  # nobody reads it, or there is no stderr
+        print(signed(text), file=sys.stderr, flush=True)
 
 
 tell = _to_stderr  # what is done with the sentence that ends a render in the background
@@ -148,5 +149,6 @@ def _show() -> None:
 
 def leave(code: int) -> None:
     """Ends the process from inside Blender; after sys.exit it would complain about its memory."""
-    sys.stdout.flush()
+    with suppress(OSError, AttributeError):
+        sys.stdout.flush()
     os._exit(code)

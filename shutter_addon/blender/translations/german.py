@@ -56,6 +56,12 @@ MESSAGES = {
     ("*", '"{effect}" has no shutter'): "„{effect}“ hat keinen Verschluss",
     ("*", 'scene "{scene}" belongs to no Shutter strip'): "Szene „{scene}“ gehört zu keinem Verschlussstreifen",
     ("*", 'the source strip of "{strip}" was deleted'): "der Quellstreifen von „{strip}“ wurde gelöscht",
+    ("*", 'the scene of "{strip}" was deleted'): "die Szene von „{strip}“ wurde gelöscht",
+    ("*", 'the scene of "{strip}" has no camera'): "die Szene von „{strip}“ hat keine Kamera",
+    (
+        "*",
+        'the setting "{setting}" hides "{strip}", or a part of it',
+    ): "die Einstellung „{setting}“ verbirgt „{strip}“ oder einen Teil davon",
     ("*", 'strip "{strip}" has no files'): "Streifen „{strip}“ hat keine Dateien",
     ("*", 'strip "{strip}" has no clip'): "Streifen „{strip}“ hat keinen Clip",
     (
