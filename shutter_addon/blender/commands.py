@@ -118,7 +118,7 @@ def _render(arguments) -> None:
             if arguments.save and outputs.is_movie(output) and "#" in output.name:
                 raise outputs.OutputError(f"{output}: in a saved edit, Blender takes # for the frames' numbers")
         frames = _frames(arguments.frames, edits.length(medium, source_recipe))
-        outputs.spare(_written(arguments, file_format, frames), [path, *getattr(medium, "files", ()), arguments.recipe])
+        outputs.spare(_written(arguments, file_format, frames), [path, *_files(medium), arguments.recipe])
         edit = edits.make_edit(path, medium, source_recipe)
     edit.frame_start, edit.frame_end = frames
     if output:
@@ -146,6 +146,17 @@ def _written(arguments, file_format: str, frames: tuple[int, int]) -> list[Path]
         if arguments.weights:
             found += outputs.pictures_of(arguments.weights, "exr", frames)
     return found
+
+
+def _files(medium) -> list[Path]:
+    """The files of an image sequence, also those that are missing in it: it would show them, were they there."""
+    files = getattr(medium, "files", [])
+    numbered = re.fullmatch(r"(.*?)(\d+)(\D*)", files[0].name) if files else None
+    if numbered is None:
+        return list(files)
+    before, number, behind = numbered.groups()
+    names = (f"{before}{int(number) + i:0{len(number)}d}{behind}" for i in range(len(files)))
+    return [*files, *(files[0].with_name(name) for name in names)]
 
 
 def _recipe(arguments) -> recipe.Recipe:

@@ -46,6 +46,8 @@ def _show_scribbles():
 
 @persistent
 def _before_render(scene, *_):
+    if rendering.cancelling():
+        return
     rendering.begin(scene)
     cache.drop_spoilt()
     if scene.render.engine != strips.ENGINE:

@@ -66,15 +66,16 @@ def check(path: Path, file_format: str | None, size) -> None:
 
 def spare(written, read) -> None:
     """OutputError: a file that would be written is one that is read, whatever link leads to it, or is written twice."""
-    taken = {found: path for path in read if (found := _identity(path)) is not None}
+    taken = {os.path.realpath(path): path for path in read}
+    taken |= {found: path for path in read if (found := _identity(path)) is not None}
     places = set()
     for path in written:
         place = os.path.realpath(path)
         if place in places:
             raise OutputError(f"{path}: two files cannot have the same place")
         places.add(place)
-        if (found := _identity(path)) in taken:
-            raise OutputError(f"{path}: would be written over {taken[found]}, which is read; choose another place")
+        if (other := taken.get(place) or taken.get(_identity(path))) is not None:
+            raise OutputError(f"{path}: would be written over {other}, which is read; choose another place")
 
 
 def _identity(path):
