@@ -18,7 +18,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
 
     def render(self, depsgraph):
         if rendering.cancelling():
-            self.report({"ERROR"}, "Virtual Shutter: the render ends")
+            self.report({"ERROR"}, self.bl_label)  # whatever it says, it ends the other render
             return
         try:
             self._render(depsgraph)

@@ -58,10 +58,7 @@ MESSAGES = {
     ("*", 'the source strip of "{strip}" was deleted'): "der Quellstreifen von „{strip}“ wurde gelöscht",
     ("*", 'the scene of "{strip}" was deleted'): "die Szene von „{strip}“ wurde gelöscht",
     ("*", 'the scene of "{strip}" has no camera'): "die Szene von „{strip}“ hat keine Kamera",
-    (
-        "*",
-        'the setting "{setting}" hides "{strip}", or a part of it',
-    ): "die Einstellung „{setting}“ verbirgt „{strip}“ oder einen Teil davon",
+    ("*", 'the setting "{setting}" leaves "{strip}" out'): "die Einstellung „{setting}“ lässt „{strip}“ weg",
     ("*", 'strip "{strip}" has no files'): "Streifen „{strip}“ hat keine Dateien",
     ("*", 'strip "{strip}" has no clip'): "Streifen „{strip}“ hat keinen Clip",
     (
