@@ -14,6 +14,7 @@ from . import animation, effects, inbetweens, sources, strips
 _signatures: dict = {}  # by effect scenes
 _KEPT = 64
 _built: dict[tuple, tuple] = {}  # by folder, source, factor and method: the stamp of their in-between frames
+spoilt: set[int] = set()  # session_uids of scenes of whose frames the sequencer may keep one that failed
 building = False  # while in-between frames are built, those that come count when the build has ended
 
 # Keyframe.interpolation as a number: constant, linear, bezier, then the others.
@@ -54,6 +55,15 @@ def invalidate(edit, scene=None) -> None:
     for strip in strips.effect_strips(edit):
         if scene is None or strip.scene == scene:
             strip.invalidate_cache("RAW")  # and with them all that was composed of them
+
+
+def drop_spoilt() -> None:
+    """Drops what the sequencer keeps of pictures that failed: it would show them again without asking."""
+    for edit in bpy.data.scenes if spoilt else ():
+        for strip in strips.effect_strips(edit):
+            if strip.scene.session_uid in spoilt:
+                strip.invalidate_cache("RAW")
+    spoilt.clear()
 
 
 def invalidate_changed(edit) -> bool:

@@ -8,6 +8,8 @@ import argparse
 import os
 import re
 import sys
+import traceback
+from contextlib import suppress
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
@@ -17,9 +19,10 @@ import bpy
 
 from ..compute.errors import NoDeviceError
 from ..compute.renderer import DEVICES
-from ..core import recipe
+from ..core import recipe, whole
 from ..core.messages import signed
 from ..media import MediaError, open_source
+from ..media.written import is_whole_blend, why_short
 from . import edits, effects, inbetweens, outputs, pictures, sources, strips
 
 BAD_INPUT = 2
@@ -29,26 +32,43 @@ FAULTS = (recipe.RecipeError, MediaError, outputs.OutputError, effects.EffectErr
 
 
 def main(argv: list[str]) -> int:
-    """Runs the command; its exit code: 0, or 2 after one sentence on stderr."""
-    parser = _parser()
+    """Runs the command; its exit code: 0, or 2 after one sentence on stderr; 130 where it was stopped."""
+    parser, arguments = _parser(), None
     try:
         arguments = parser.parse_args(argv)
         (_render if arguments.command == "render" else _build_alone)(arguments)
     except SystemExit as stop:  # argparse: --help, or what it has said on stderr
         return stop.code
-    except FAULTS as error:
-        return _refuse(str(error))
-    except OSError as error:
-        place = error.filename or getattr(arguments, "output", None) or arguments.cache
-        return _refuse(f"{place}: {error.strerror or error}")
     except KeyboardInterrupt:  # while in-between frames are built; those that are finished stay
         return outputs.INTERRUPTED
+    except outputs.InterruptedRenderError as stopped:
+        return _refuse(str(stopped), outputs.INTERRUPTED)
+    except FAULTS as error:
+        return _refuse(str(error))
+    except MemoryError as error:
+        return _refuse(str(error) or "not enough memory")
+    except OSError as error:
+        place = getattr(arguments, "output", None) or getattr(arguments, "save", None) or arguments.cache
+        return _refuse(outputs.in_words(error, place))
+    except RuntimeError as error:  # from Blender
+        return _refuse(outputs.message(error))
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        return _refuse(f"internal error: {error!r} in {Path(place.filename).name}, line {place.lineno}")
     return 0
 
 
-def _refuse(sentence: str) -> int:
-    print(signed(sentence), file=sys.stderr)
-    return BAD_INPUT
+def _refuse(sentence: str, code: int = BAD_INPUT) -> int:
+    with suppress(OSError):  # nobody reads it
+        print(signed(sentence), file=sys.stderr)
+    return code
+
+
+def _place(text: str) -> Path:
+    """A path as it is named; two slashes at its beginning, which Blender takes for the .blend's folder, are one."""
+    if not text:
+        raise argparse.ArgumentTypeError("a name is missing")
+    return Path(re.sub("^//+", "/", os.path.abspath(text)))
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -57,21 +77,21 @@ def _parser() -> argparse.ArgumentParser:
     render = commands.add_parser("render", help="render a source through a recipe")
     render.add_argument("source", type=Path, help="a movie, or the first file of an image sequence")
     render.add_argument("--recipe", type=Path, required=True, help="the effect, a JSON file")
-    render.add_argument("--output", type=Path, help=f"a folder, or a movie ({', '.join(outputs.MOVIES)})")
+    render.add_argument("--output", type=_place, help=f"a folder, or a movie ({', '.join(outputs.MOVIES)})")
     render.add_argument(
         "--format", choices=tuple(outputs.FORMATS), help="of the pictures in a folder: 16-bit png, float exr"
     )
     render.add_argument("--frames", metavar="A:B", help="timeline frames A to B; 1 is the strip's first")
     render.add_argument("--device", choices=DEVICES, default="auto", help="gpu: OpenGL 4.3; cpu: NumPy")
-    render.add_argument("--weights", type=Path, metavar="DIR", help="also write the coefficients, as float EXR")
-    render.add_argument("--save", type=Path, metavar="FILE.blend", help="keep the edit")
+    render.add_argument("--weights", type=_place, metavar="DIR", help="also write the coefficients, as float EXR")
+    render.add_argument("--save", type=_place, metavar="FILE.blend", help="keep the edit")
     render.add_argument(
         "--inbetween", type=int, choices=FACTORS, help="in-between frames, in place of the recipe's factor"
     )
     render.add_argument("--inbetween-method", choices=METHODS, help="in place of the recipe's")
     render.add_argument(
         "--cache",
-        type=Path,
+        type=_place,
         metavar="DIR",
         help=f'where in-between frames lie (default: "{inbetweens.FOLDER}" beside the output, or beside FILE.blend)',
     )
@@ -82,7 +102,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     build.add_argument("--method", choices=METHODS, default="quick", help="of optical flow")
     build.add_argument("--frames", metavar="A:B", help="source frames A to B, and up to the one behind; 1 is the first")
-    build.add_argument("--cache", type=Path, metavar="DIR", required=True, help="where in-between frames shall lie")
+    build.add_argument("--cache", type=_place, metavar="DIR", required=True, help="where in-between frames shall lie")
     return parser
 
 
@@ -92,16 +112,19 @@ def _render(arguments) -> None:
     source_recipe = _recipe(arguments)
     path = Path(os.path.abspath(arguments.source))
     with open_source(path) as medium:
-        output = Path(os.path.abspath(arguments.output)) if arguments.output else None
+        output, file_format = arguments.output, arguments.format or "png"
         if output:
             outputs.check(output, arguments.format, (medium.width, medium.height))
+            if arguments.save and outputs.is_movie(output) and "#" in output.name:
+                raise outputs.OutputError(f"{output}: in a saved edit, Blender takes # for the frames' numbers")
         frames = _frames(arguments.frames, edits.length(medium, source_recipe))
+        outputs.spare(_written(arguments, file_format, frames), [path, *_files(medium), arguments.recipe])
         edit = edits.make_edit(path, medium, source_recipe)
     edit.frame_start, edit.frame_end = frames
     if output:
-        outputs.set_output(edit, output, arguments.format or "png", alpha=medium.alpha != "opaque")
+        outputs.set_output(edit, output, file_format, alpha=medium.alpha != "opaque")
     if arguments.save:
-        _save(edit, Path(os.path.abspath(arguments.save)))
+        _save(edit, arguments.save)
     pictures.device = arguments.device
     if source_recipe.inbetween > 1:
         inbetweens.given = _cache(arguments)
@@ -111,6 +134,29 @@ def _render(arguments) -> None:
         if arguments.weights:
             arguments.weights.mkdir(parents=True, exist_ok=True)
         outputs.film(edit, output)
+
+
+def _written(arguments, file_format: str, frames: tuple[int, int]) -> list[Path]:
+    """All files that a render writes, but for in-between frames."""
+    found = [arguments.save] if arguments.save else []
+    if arguments.output and outputs.is_movie(arguments.output):
+        found.append(arguments.output)
+    elif arguments.output:
+        found += outputs.pictures_of(arguments.output, file_format, frames)
+        if arguments.weights:
+            found += outputs.pictures_of(arguments.weights, "exr", frames)
+    return found
+
+
+def _files(medium) -> list[Path]:
+    """The files of an image sequence, also those that are missing in it: it would show them, were they there."""
+    files = getattr(medium, "files", [])
+    numbered = re.fullmatch(r"(.*?)(\d+)(\D*)", files[0].name) if files else None
+    if numbered is None:
+        return list(files)
+    before, number, behind = numbered.groups()
+    names = (f"{before}{int(number) + i:0{len(number)}d}{behind}" for i in range(len(files)))
+    return [*files, *(files[0].with_name(name) for name in names)]
 
 
 def _recipe(arguments) -> recipe.Recipe:
@@ -123,8 +169,7 @@ def _recipe(arguments) -> recipe.Recipe:
 
 def _cache(arguments) -> Path:
     """The folder of in-between frames: where a saved edit will look for them, if it is to be saved."""
-    beside = Path(os.path.abspath(arguments.save or arguments.output)).parent
-    return Path(os.path.abspath(arguments.cache)) if arguments.cache else beside / inbetweens.FOLDER
+    return arguments.cache or (arguments.save or arguments.output).parent / inbetweens.FOLDER
 
 
 def _build_lacking(edit) -> None:
@@ -144,7 +189,7 @@ def _build_alone(arguments) -> None:
     # A strip may read the file in another way, with a colour space of Blender's own choice.
     with sources.open_media(strip) as medium:
         pairs = range(first - 1, min(last, medium.count - 1))
-        _build(medium, Path(os.path.abspath(arguments.cache)), arguments.factor, arguments.method, pairs)
+        _build(medium, arguments.cache, arguments.factor, arguments.method, pairs)
 
 
 def _build(medium, folder: Path, factor: int, method: str, pairs) -> None:
@@ -172,10 +217,29 @@ def _frames(text: str | None, count: int) -> tuple[int, int]:
 
 
 def _save(edit, path: Path) -> None:
-    """Saves the edit, its paths relative to the file: it may be opened on another machine."""
+    """Saves the edit, its paths relative to the file: it may be opened on another machine. OutputError: it cannot be
+    saved whole; what stood there stays."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    edits.make_paths_relative(edit, path.parent)
+    with whole.part_folder(path.parent) as folder:
+        part = folder / "edit.blend"
+        try:
+            with outputs.quiet(), edits.paths_relative(edit, path.parent):
+                bpy.ops.wm.save_as_mainfile(filepath=str(part), compress=True, copy=True, relative_remap=False)
+        except RuntimeError as error:
+            raise outputs.OutputError(f"{path}: {outputs.message(error)}") from None
+        if not _is_whole(part, edit.name):
+            raise outputs.OutputError(f"{path}: could not be saved whole; {why_short(folder)}")
+        if path.is_file() and bpy.context.preferences.filepaths.save_version:
+            path.replace(f"{path}1")  # as Blender itself keeps what stood there
+        part.replace(path)
+
+
+def _is_whole(path: Path, scene: str) -> bool:
+    """Whether a .blend file was written to its end, and Blender finds the scene in it."""
+    if not is_whole_blend(path):
+        return False
     try:
-        bpy.ops.wm.save_as_mainfile(filepath=str(path), check_existing=False, compress=True)
-    except RuntimeError as error:
-        raise outputs.OutputError(f"{path}: {outputs.message(error)}") from None
+        with bpy.data.libraries.load(str(path)) as (found, _):
+            return scene in found.scenes
+    except OSError:
+        return False

@@ -2,11 +2,14 @@
 
 import math
 import os
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import bpy
 
 from . import effects, strips
+
+_PATHS = {"MOVIE": "filepath", "IMAGE": "directory", "SOUND": "filepath"}  # the property of a strip of that type
 
 
 def make_edit(path: Path, medium, source_recipe):
@@ -55,22 +58,21 @@ def _add_source(editor, path: Path, medium):
     return strip
 
 
-def make_paths_relative(edit, folder: Path) -> None:
-    """Makes the edit's paths relative to the folder that it will be saved in, as far as there is such a path."""
-
-    def relative(path):
-        try:
-            return bpy.path.relpath(path, start=str(folder))
-        except ValueError:  # another drive
-            return path
-
+@contextmanager
+def paths_relative(edit, folder: Path):
+    """Inside, the edit's paths are relative to the folder that it is saved in, as far as there is such a path."""
+    owners = [(edit.render, "filepath")]
     for strip in edit.sequence_editor.strips_all:
-        if strip.type == "MOVIE":
-            strip.filepath = relative(strip.filepath)
-        elif strip.type == "IMAGE":
-            strip.directory = relative(strip.directory)
-        elif strip.type == "SOUND":
-            strip.sound.filepath = relative(strip.sound.filepath)
-    if edit.render.filepath:
-        is_folder = edit.render.filepath.endswith(os.sep)
-        edit.render.filepath = relative(edit.render.filepath) + ("/" if is_folder else "")
+        if strip.type in _PATHS:
+            owners.append((strip.sound if strip.type == "SOUND" else strip, _PATHS[strip.type]))
+    before = [(owner, name, getattr(owner, name)) for owner, name in owners]
+    for owner, name, path in before:
+        if path:
+            with suppress(ValueError):  # another drive
+                # relpath leaves out the slash behind a folder
+                setattr(owner, name, bpy.path.relpath(path, start=str(folder)) + ("/" if path.endswith(os.sep) else ""))
+    try:
+        yield
+    finally:
+        for owner, name, path in before:
+            setattr(owner, name, path)

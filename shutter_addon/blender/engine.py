@@ -1,6 +1,5 @@
 """The render engine of effect scenes: Blender's sequencer calls it for every frame it needs of an effect strip."""
 
-import os
 import sys
 import traceback
 
@@ -8,7 +7,7 @@ import bpy
 import numpy as np
 
 from ..core.messages import signed
-from . import pictures
+from . import cache, pictures, rendering
 from .strips import ENGINE
 
 
@@ -18,21 +17,30 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
     bl_use_preview = False
 
     def render(self, depsgraph):
+        if rendering.cancelling():
+            self.report({"ERROR"}, self.bl_label)  # whatever it says, it ends the other render
+            return
         try:
-            picture = pictures.picture(depsgraph.scene, depsgraph.scene.frame_current, self._say)
-        except pictures.FAULTS as error:
-            fail(self, str(error))
-            return
-        except Exception as error:  # Blender would print it, and render the frame without the effect
-            traceback.print_exc()
-            fail(self, f"internal error: {error!r}")
-            return
-        picture = pictures.resized(picture, self.resolution_x, self.resolution_y)
-        result = self.begin_result(0, 0, self.resolution_x, self.resolution_y)
+            self._render(depsgraph)
+        except BaseException as error:  # Blender would print it, and render the frame without the effect
+            cache.spoilt.add(depsgraph.scene.session_uid)
+            if not isinstance(error, pictures.StoppedError):
+                fail(self, _in_words(error))
+            elif not self.test_break():
+                rendering.cancel(self.test_break)
+
+    def _render(self, depsgraph):
+        scene, width, height = depsgraph.scene, self.resolution_x, self.resolution_y
+        picture = pictures.picture(scene, scene.frame_current, self._say, self._stopped)
+        picture = pictures.resized(picture, width, height)
+        result = self.begin_result(0, 0, width, height)
         # Blender's rows go up; composed pictures lie so in memory, and this copies nothing.
         result.layers[0].passes["Combined"].rect.foreach_set(np.ascontiguousarray(picture[::-1]).ravel())
         self.end_result(result)
-        pictures.begin_next(depsgraph.scene, depsgraph.scene.frame_current)
+        pictures.begin_next(scene, scene.frame_current)
+
+    def _stopped(self) -> bool:
+        return self.test_break() or rendering.stopping()
 
     def _say(self, message: str) -> None:
         if bpy.app.background:
@@ -41,31 +49,25 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             self.report({"WARNING"}, signed(message))
 
 
+def _in_words(error: BaseException) -> str:
+    if isinstance(error, pictures.FAULTS):
+        return str(error) or "not enough memory"
+    if isinstance(error, KeyboardInterrupt):
+        return "the render was stopped"
+    traceback.print_exception(error)
+    return f"internal error: {error!r}"
+
+
 def fail(engine, sentence: str) -> None:
-    """Says why there is no picture: a report in the window; without one, the process ends.
+    """Says why there is no picture, and ends the render: Blender would go on and write the frame without the effect.
 
-    Blender goes on after an engine's error and writes the frame without it: a farm would deliver a plain film.
-    """
-    if bpy.app.background:
-        refuse(sentence)
-    engine.report({"ERROR"}, signed(sentence))
+    A preview has its own way to say it, and nothing to end."""
+    if rendering.ends_films():
+        rendering.fail(sentence)
+        rendering.cancel(engine.test_break)
+    else:
+        engine.report({"ERROR"}, signed(sentence))
 
-
-def refuse(sentence: str) -> None:
-    """Ends the process from inside a render: the sentence on stderr, exit code 2."""
-    print(signed(sentence), file=sys.stderr, flush=True)
-    leave(2)
-
-
-def leave(code: int) -> None:
-    """Ends the process from inside a render; after sys.exit Blender would complain about its memory."""
-    for clean_up in before_leaving:
-        clean_up()
-    sys.stdout.flush()
-    os._exit(code)
-
-
-before_leaving = []
 
 classes = (VirtualShutterEngine,)
 

@@ -1,9 +1,12 @@
-"""What happens by itself: effects follow their strips, and an old file's sources are closed."""
+"""What happens by itself: effects follow their strips, an old file's sources are closed, and a render that cannot show
+an effect ends."""
+
+import sys
 
 import bpy
 from bpy.app.handlers import persistent
 
-from . import building, cache, copies, lifecycle, pictures, sources, strips
+from . import building, cache, copies, lifecycle, pictures, rendering, sources, strips
 
 
 @persistent
@@ -16,11 +19,13 @@ def _before_load(*_):
 @persistent
 def _after_load(*_):
     copies.adopt()
+    lifecycle.mend()
 
 
 @persistent
 def _update(scene=None, *_):
-    lifecycle.update(scene)
+    if not rendering.cancelling():
+        lifecycle.update(scene)
 
 
 @persistent
@@ -41,13 +46,34 @@ def _show_scribbles():
 
 @persistent
 def _before_render(scene, *_):
+    if rendering.cancelling():
+        return
+    rendering.begin(scene)
+    cache.drop_spoilt()
     if scene.render.engine != strips.ENGINE:
         sources.look_again()
     # In a window the render has a thread of its own, and the last update has seen to copies.
     if bpy.app.background and scene.render.engine != strips.ENGINE:
+        lifecycle.mend()
         copies.adopt()
         for edit in bpy.data.scenes:
             cache.invalidate_changed(edit)
+
+
+@persistent
+def _before_frame(scene, *_):
+    if rendering.is_film(scene):
+        if (sentence := strips.left_out(scene)) is not None:
+            rendering.fail(sentence)
+        if rendering.stopping():
+            rendering.cancel()
+
+
+@persistent
+def _after_render(scene, *_):
+    if rendering.is_film(scene):
+        cache.drop_spoilt()
+    rendering.end(scene, alone=sys._getframe().f_back is None)
 
 
 HANDLERS = {
@@ -57,6 +83,9 @@ HANDLERS = {
     "undo_post": _after_undo,
     "redo_post": _after_undo,
     "render_init": _before_render,
+    "render_pre": _before_frame,
+    "render_cancel": _after_render,
+    "render_complete": _after_render,
 }
 
 

@@ -20,6 +20,7 @@ def update(updated=None) -> None:
     edits = _edits()
     for edit in edits:
         _reconnect(edit)
+    mend()
     _separate_actions(edits)
     copies.adopt()
     for edit in edits:
@@ -30,6 +31,14 @@ def update(updated=None) -> None:
     _identify()
     for edit in _edits():
         cache.invalidate_changed(edit)
+
+
+def mend() -> None:
+    """Undoes what would leave effects out of the picture: their camera deleted, another engine, and the like."""
+    for edit in _edits():
+        for strip in strips.own_strips(edit):
+            if strip.scene is not None and strip.scene.library is None:
+                strips.mend(strip)
 
 
 def _edits() -> list:

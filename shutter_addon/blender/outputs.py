@@ -1,17 +1,18 @@
 """Where a film goes: a movie, or a folder of pictures; each file whole or not at all."""
 
+import itertools
 import os
 import shutil
 import signal
 import sys
-import tempfile
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import bpy
 
-from ..media.written import is_whole_movie, is_whole_picture
-from . import engine, strips
+from ..core import whole
+from ..media.written import is_whole_movie, is_whole_picture, whole_pictures, why_short
+from . import rendering, strips
 
 INTERRUPTED = 130
 
@@ -27,8 +28,20 @@ MOVIES = {
 FORMATS = {"png": ("PNG", "16"), "exr": ("OPEN_EXR", "32")}
 
 
+# What Blender would write into a picture about its making.
+_STAMPS = (
+    *("use_stamp_date", "use_stamp_time", "use_stamp_render_time", "use_stamp_memory", "use_stamp_hostname"),
+    *("use_stamp_filename", "use_stamp_sequencer_strip"),
+)
+_LONGEST = 1000  # bytes of a path, a frame's number included: Blender has room for 1023 and cuts off the rest
+
+
 class OutputError(ValueError):
     """This cannot be written; the message is one sentence for the user."""
+
+
+class InterruptedRenderError(OutputError):
+    """Stopped by the user or a farm; the message says what is left."""
 
 
 def is_movie(path: Path) -> bool:
@@ -41,20 +54,63 @@ def check(path: Path, file_format: str | None, size) -> None:
     if width < 4 or height < 4:
         raise OutputError(f"the source has {width}×{height} pixels; Blender renders no picture smaller than 4×4")
     if is_movie(path):
+        if path.is_dir():
+            raise OutputError(f"{path}: is a folder, not a movie")
         if file_format is not None:
             raise OutputError(f"{path}: --format is for a folder of pictures, not for a movie")
         if width % 2 or height % 2:
             raise OutputError(f"{path}: a movie has even sizes, not {width}×{height}; render to a folder of pictures")
-    elif path.suffix and not path.is_dir() and file_format is None:
+    elif path.suffix.strip(".") and not path.is_dir() and file_format is None:
         raise OutputError(f"{path}: neither a folder nor one of {', '.join(MOVIES)}")
+
+
+def spare(written, read) -> None:
+    """OutputError: a file that would be written is one that is read, whatever link leads to it, or is written twice."""
+    taken = {os.path.realpath(path): path for path in read}
+    taken |= {found: path for path in read if (found := _identity(path)) is not None}
+    places = set()
+    for path in written:
+        place = os.path.realpath(path)
+        if place in places:
+            raise OutputError(f"{path}: two files cannot have the same place")
+        places.add(place)
+        if (other := taken.get(place) or taken.get(_identity(path))) is not None:
+            raise OutputError(f"{path}: would be written over {other}, which is read; choose another place")
+
+
+def _identity(path):
+    """Equal for all paths of a file; None: there is none."""
+    try:
+        status = os.stat(path)
+    except OSError:
+        return None
+    return status.st_dev, status.st_ino
+
+
+def pictures_of(folder: Path, ending: str, frames: tuple[int, int]) -> list[Path]:
+    """The files of these frames, first and last, in a folder."""
+    return [folder / f"{frame:04d}.{ending}" for frame in range(frames[0], frames[1] + 1)]
+
+
+def for_blender(path: str) -> str:
+    """The path as Blender takes it for a name: it has templates in braces. OutputError: no name of Blender's."""
+    for sign in "\\" if os.sep == "/" else "":
+        if sign in path:
+            raise OutputError(f"{path}: Blender cannot write to a path with {sign}")
+    if len(os.fsencode(path)) > _LONGEST:
+        raise OutputError(f"{path}: Blender cannot write to a path of more than {_LONGEST} bytes")
+    return path.replace("{", "{{").replace("}", "}}")
 
 
 def set_output(edit, path: Path, file_format: str, *, alpha: bool) -> None:
     """Where and how the edit's render goes: a movie by its ending, else a folder of pictures named by frame.
 
-    alpha: pictures keep the source's transparency."""
+    alpha: pictures keep the source's transparency. OutputError: Blender cannot write there."""
     settings, render = edit.render.image_settings, edit.render
     render.use_file_extension = not is_movie(path)
+    for name in _STAMPS:  # no time or place of the render: equal pixels are equal files
+        setattr(render, name, False)
+    render.filepath = for_blender(str(path) if is_movie(path) else f"{path}{os.sep}")
     if is_movie(path):
         container, codec, audio = MOVIES[path.suffix.lower()]
         settings.media_type = "VIDEO"
@@ -63,38 +119,63 @@ def set_output(edit, path: Path, file_format: str, *, alpha: bool) -> None:
         has_sound = any(strip.type == "SOUND" for strip in edit.sequence_editor.strips_all)
         render.ffmpeg.audio_codec = audio if has_sound else "NONE"
         render.ffmpeg.constant_rate_factor = "HIGH"
-        render.filepath = str(path)
         return
     settings.file_format, settings.color_depth = FORMATS[file_format]
     settings.color_mode = "RGBA" if alpha else "RGB"
-    render.filepath = f"{path}{os.sep}"
 
 
 def film(edit, output: Path) -> None:
     """Renders an edit of edits.make_edit to a movie or a folder. Blender writes into a folder beside the output, and
-    what is finished moves out of it. OutputError: it cannot be written; finished pictures stay."""
+    what is finished moves out of it.
+
+    OutputError: it cannot be rendered or written; finished pictures stay, and of a movie what was finished, under a
+    name of its own. InterruptedRenderError: the same, by Ctrl-C or a farm's TERM."""
     folder = output.parent if is_movie(output) else output
     folder.mkdir(parents=True, exist_ok=True)
-    part = Path(tempfile.mkdtemp(prefix=".part-", dir=folder))
+    for left in whole.left_behind(folder):
+        shutil.rmtree(left, ignore_errors=True)
     kept = edit.render.filepath
-    edit.render.filepath = str(part / output.name) if is_movie(output) else f"{part}{os.sep}"
-    count = edit.frame_end - edit.frame_start + 1
+    faults: list[str] = []
+    with whole.part_folder(folder) as part:
+        part_film = part / f"film{output.suffix}"
+        try:
+            edit.render.filepath = for_blender(str(part_film) if is_movie(output) else f"{part}{os.sep}")
+            with _told(faults), _stoppable() as stopped, quiet(), _lean(edit), _moved(part, output, edit) as missing:
+                bpy.ops.render.render(animation=True, scene=edit.name)
+            if is_movie(output) and not faults and not stopped:
+                _finish(part_film, output, edit.frame_end - edit.frame_start + 1)
+            elif missing and not faults and not stopped:
+                raise OutputError(f"{output}: {len(missing)} frames were not written; {why_short(part)}")
+        except RuntimeError as error:
+            raise OutputError(f"{output}: {message(error)}") from None
+        finally:
+            edit.render.filepath = kept
+        if faults or stopped:
+            rescued = _rescued(part_film, output) if is_movie(output) else ""
+            if faults:
+                raise OutputError(faults[0] + rescued)
+            raise InterruptedRenderError(f"{output}: stopped{rescued}")
 
-    def clean_up():
-        shutil.rmtree(part, ignore_errors=True)
 
+def _finish(part: Path, output: Path, count: int) -> None:
+    if not is_whole_movie(part, count):
+        raise OutputError(f"{output}: could not be written whole; {why_short(part.parent)}")
+    part.replace(output)
+
+
+def _rescued(part: Path, output: Path) -> str:
+    """Keeps what was finished of a movie, beside its output; how a sentence ends that says so."""
+    count = whole_pictures(part)
+    if count == 0:
+        return ""
+    numbers = (f"-{number}" if number > 1 else "" for number in itertools.count(1))
+    names = (output.with_name(f"{output.stem}.part{number}{output.suffix}") for number in numbers)
+    kept = next(path for path in names if not os.path.lexists(path))
     try:
-        with _leaving(clean_up), _quiet(), _lean(edit), _frames_moved(part, folder, count):
-            bpy.ops.render.render(animation=True, scene=edit.name)
-        if is_movie(output):
-            if not is_whole_movie(part / output.name, count):
-                raise OutputError(f"{output}: could not be written whole; is the disk full?")
-            (part / output.name).replace(output)
-    except RuntimeError as error:
-        raise OutputError(f"{output}: {message(error)}") from None
-    finally:
-        edit.render.filepath = kept
-        clean_up()
+        part.replace(kept)
+    except OSError:  # the sentence is about something else
+        return ""
+    return f"; its first {count} frames are in {kept.name}"
 
 
 def message(error: RuntimeError) -> str:
@@ -103,24 +184,37 @@ def message(error: RuntimeError) -> str:
 
 
 @contextmanager
-def _frames_moved(part: Path, folder: Path, count: int):
-    """Moves each finished picture from `part` to `folder`, and a progress bar on."""
-    with progress(count, "frame") as update:
+def _moved(part: Path, output: Path, edit):
+    """Moves each finished picture from `part` to `output`, and a progress bar on. Gives the pictures that are missing
+    so far, by name; none of a movie's."""
+    frames = edit.frame_start, edit.frame_end
+    ending = next((name for name, kind in FORMATS.items() if edit.render.image_settings.file_format == kind[0]), "")
+    missing = {path.name: path for path in pictures_of(output, ending, frames)} if ending else {}
+    with progress(frames[1] - frames[0] + 1, "frame") as update:
 
         def moved(*_):
             update()
-            for path in part.iterdir():
-                if is_movie(path):
-                    continue
-                if not is_whole_picture(path):
-                    engine.refuse(f"{folder / path.name}: could not be written whole; is the disk full?")
-                path.replace(folder / path.name)
+            try:
+                os.utime(part)  # a movie's encoder may not write for long: nobody shall take it for left behind
+                for name in [name for name in missing if (part / name).exists()]:
+                    if not is_whole_picture(part / name):
+                        raise OutputError(f"{output / name}: could not be written whole; {why_short(part)}")
+                    (part / name).replace(missing.pop(name))
+            except (OutputError, OSError) as error:
+                rendering.fail(in_words(error, output))
 
         bpy.app.handlers.render_write.append(moved)
         try:
-            yield
+            yield missing
         finally:
             bpy.app.handlers.render_write.remove(moved)
+
+
+def in_words(error: Exception, place) -> str:
+    """A fault as a sentence, the place first. place: where there is none in an OSError."""
+    if isinstance(error, OSError):
+        return f"{os.fsdecode(error.filename or place)}: {error.strerror or error}"
+    return str(error)
 
 
 @contextmanager
@@ -136,20 +230,35 @@ def progress(count: int, unit: str):
 
 
 @contextmanager
-def _leaving(clean_up):
-    """Whatever ends the process inside Blender's render cleans up: no picture, Ctrl-C, a farm's TERM.
-
-    No exception gets through Blender: it prints it and renders on."""
-    stops = {signal.SIGINT: None, signal.SIGTERM: None}
-    for number in stops:
-        stops[number] = signal.signal(number, lambda *_: engine.leave(INTERRUPTED))
-    engine.before_leaving.append(clean_up)
+def _told(faults: list[str]):
+    """Collects the sentence that ends a render, in place of stderr."""
+    rendering.tell, before = faults.append, rendering.tell
     try:
         yield
     finally:
-        engine.before_leaving.remove(clean_up)
-        for number, before in stops.items():
-            signal.signal(number, before or signal.SIG_DFL)  # None: Blender's own, which Python cannot put back
+        rendering.tell = before
+
+
+@contextmanager
+def _stoppable():
+    """Ctrl-C and a farm's TERM end the render after its frame, so that an open movie is finished; a second time, at
+    once. Gives a list with the signal that came, if any.
+
+    No exception gets through Blender: it prints it and renders on."""
+    came: list[int] = []
+
+    def stop(number, _frame):
+        if came:
+            rendering.leave(INTERRUPTED)
+        came.append(number)
+        rendering.stop()
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield came
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler or signal.SIG_DFL)  # None: Blender's own, which Python cannot put back
 
 
 @contextmanager
@@ -174,9 +283,11 @@ def _lean(edit):
 
 
 @contextmanager
-def _quiet():
+def quiet():
     """Keeps Blender's log of every saved frame off the terminal; what goes wrong comes as an exception."""
-    sys.stdout.flush()
+    if sys.stdout is not None:
+        with suppress(OSError):  # nobody reads it
+            sys.stdout.flush()
     terminal, nothing = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nothing, 1)
     try:

@@ -1,7 +1,7 @@
 """Pictures of effect scenes: renderers that keep their frames, on a device of Blender's own or one without a window."""
 
 import threading
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
@@ -27,11 +27,29 @@ FAULTS = (effects.EffectError, MediaError, NoDeviceError, MemoryError)
 device = "auto"
 weights_folder: Path | None = None
 
+
+class StoppedError(Exception):
+    """A picture was not waited for, as its render ends."""
+
+
+def _never() -> bool:
+    return False
+
+
+def _result(future: Future, stopped):
+    """The future's result. StoppedError: it is not waited for any longer."""
+    while not wait([future], _PATIENCE).done:
+        if stopped():
+            raise StoppedError
+    return future.result()
+
+
 # Renderers whose frames are kept: more effects than these in one frame decode their windows again for every frame.
 _KEPT = 4
 # Pictures whose frames are decoded in advance, and how many frames or bytes of them lie decoded at most, besides those
 # on the device: enough for a long window, whose frames are decoded while its first picture is diffused and compiled.
 _AHEAD, _DECODED, _DECODED_BYTES = 4, 8, 256 << 20
+_PATIENCE = 0.1  # seconds between two looks at whether a picture is still wanted
 
 
 @dataclass(frozen=True)
@@ -88,8 +106,8 @@ class Studio:
         self.shown: dict[int, float] = {}  # by scene: the frame that was shown last
         self._begun: dict[int, tuple[tuple, Future]] = {}  # by scene: the key of a moment, its picture
 
-    def run(self, function, *arguments):
-        """The result of a function that uses the device."""
+    def run(self, function, *arguments, stopped=_never):
+        """The result of a function that uses the device. StoppedError: it is not waited for any longer."""
         if not self.threaded:
             return function(*arguments)
         if self._executor is None:
@@ -98,16 +116,16 @@ class Studio:
             future = self._executor.submit(function, *arguments)
         except RuntimeError:  # Python ends, and its threads take no more work
             return function(*arguments)
-        return future.result()
+        return _result(future, stopped)
 
-    def picture(self, scene, moment: Moment) -> np.ndarray:
-        """The moment's picture, if need be the one that was begun for it."""
+    def picture(self, scene, moment: Moment, stopped=_never) -> np.ndarray:
+        """The moment's picture, if need be the one that was begun for it. StoppedError: it is not waited for."""
         key, begun = self._begun.pop(scene.session_uid, (None, None))
         if begun is not None:
             if key == moment.key:
-                return begun.result()
+                return _result(begun, stopped)
             begun.cancel()
-        return self.run(moment.picture)
+        return self.run(moment.picture, stopped=stopped)
 
     def begin(self, scene, moment: Moment) -> None:
         """Begins a picture that is likely to be asked for next, while Blender does other work."""
@@ -179,17 +197,20 @@ def _lacks_moderngl() -> bool:
     return False
 
 
-def picture(scene, scene_frame: float, say=print) -> np.ndarray:
+def picture(scene, scene_frame: float, say=print, stopped=_never) -> np.ndarray:
     """The picture (H, W, 4) float32 of an effect scene at one of its frames: scene-linear, premultiplied, top row
     first. One of FAULTS: there is none, in one sentence. say: called with a sentence when the device is a lesser one.
+    stopped: asked whether the picture is not wanted any longer; StoppedError: it is not.
     """
+    if stopped():
+        raise StoppedError
     edit, effect, strip = strips.find_edit(scene)
     frame = strips.timeline_frame(strip, scene_frame)
     found = moment(edit, effect, strip, frame, say)
     if weights_folder is not None:
-        values = _studio().run(found.renderer.coefficients, found.instant)
+        values = _studio().run(found.renderer.coefficients, found.instant, stopped=stopped)
         _write_weights(values, [s.name for s in effect.shutters], frame - strip.left_handle + 1)
-    return _studio().picture(scene, found)
+    return _studio().picture(scene, found, stopped)
 
 
 def begin_next(scene, scene_frame: float) -> None:

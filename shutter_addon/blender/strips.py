@@ -27,6 +27,75 @@ def effect_strips(edit) -> list:
     ]
 
 
+def own_strips(edit) -> list:
+    """The strips that were made for effects, those too whose scene has another engine or is gone."""
+    if edit.sequence_editor is None:
+        return []
+    return [strip for strip in edit.sequence_editor.strips_all if strip.type == "SCENE" and _is_own(strip)]
+
+
+def _is_own(strip) -> bool:
+    scene, identity = strip.scene, strip.virtual_shutter_effect
+    if scene is None:
+        return identity != ""
+    return scene.render.engine == ENGINE or scene.virtual_shutter.identity == identity != ""
+
+
+def mend(strip) -> None:
+    """Has the sequencer ask the engine for the strip's whole picture, whatever its scene went through."""
+    for owner, name, value in _needs(strip):
+        if getattr(owner, name) != value:
+            setattr(owner, name, value)
+    if _camera(strip) is None:
+        _add_camera(strip.scene)
+
+
+def left_out(edit) -> str | None:
+    """Why the sequencer leaves an effect out of the edit's current frame; None: it does not."""
+    for strip in own_strips(edit):
+        if _is_shown(edit, strip):
+            if strip.scene is None:
+                return rpt_('the scene of "{strip}" was deleted').format(strip=strip.name)
+            if _camera(strip) is None:
+                return rpt_('the scene of "{strip}" has no camera').format(strip=strip.name)
+            for owner, name, value in _needs(strip):
+                if getattr(owner, name) != value:
+                    setting = owner.bl_rna.properties[name].name
+                    return rpt_('the setting "{setting}" leaves "{strip}" out').format(
+                        setting=setting, strip=strip.name
+                    )
+    return None
+
+
+def _needs(strip):
+    """Owner, name and value of what a strip's picture needs, besides a camera."""
+    scene = strip.scene
+    yield strip, "scene_input", "CAMERA"
+    yield scene.render, "engine", ENGINE
+    yield scene.render, "resolution_percentage", 100
+    yield scene.render, "use_border", False
+    if scene.compositing_node_group is not None:
+        yield scene.render, "use_compositing", False
+    if not any(layer.use for layer in scene.view_layers):
+        yield scene.view_layers[0], "use", True
+
+
+def _camera(strip):
+    bound = (marker.camera for marker in strip.scene.timeline_markers if marker.camera)
+    return strip.scene_camera or strip.scene.camera or next(bound, None)
+
+
+def _is_shown(edit, strip) -> bool:
+    """Whether the strip is at the edit's current frame, and neither muted nor in a meta strip that is not."""
+    while strip is not None:
+        outer = strip.parent_meta()
+        channel = (outer or edit.sequence_editor).channels[strip.channel]
+        if strip.mute or channel.mute or not strip.left_handle <= edit.frame_current < strip.right_handle:
+            return False
+        strip = outer
+    return True
+
+
 def effect_of(edit, scene):
     """The edit's effect that an effect scene shows, or None."""
     return next((effect for effect in edit.virtual_shutter.effects if effect.scene == scene), None)
@@ -203,9 +272,14 @@ def new_scene(edit, name: str, size, length: int):
     scene.frame_start, scene.frame_end = 1, length
     # A Scene strip plays at its scene's rate; at the edit's it shows one frame per timeline frame.
     scene.render.fps, scene.render.fps_base = edit.render.fps, edit.render.fps_base
-    # Without a camera, Blender renders a Scene strip empty and never asks the engine.
-    camera = bpy.data.objects.new(f"{name} Camera", bpy.data.cameras.new(f"{name} Camera"))
-    scene.collection.objects.link(camera)
-    scene.camera = camera
+    _add_camera(scene)
     scene.annotation = bpy.data.annotations.new(name)
     return scene
+
+
+def _add_camera(scene) -> None:
+    """Without a camera, Blender renders a Scene strip empty and never asks the engine."""
+    name = f"{scene.name} Camera"
+    camera = bpy.data.objects.new(name, bpy.data.cameras.new(name))
+    scene.collection.objects.link(camera)
+    scene.camera = camera

@@ -17,6 +17,7 @@ def write_exr(path: Path, values: np.ndarray, names: list[str]) -> None:
     spec = OpenImageIO.ImageSpec(width, height, channels, OpenImageIO.FLOAT)
     spec.channelnames = tuple(names)
     spec["compression"] = "zip"
+    spec["DateTime"] = "1970:01:01 00:00:00"  # else the time of writing: equal samples are equal files
     try:
         with whole.writing(path) as part:
             output = OpenImageIO.ImageOutput.create(str(part))

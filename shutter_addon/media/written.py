@@ -1,10 +1,13 @@
 """Checks of written files: a full disk leaves them short, and Blender does not always say so."""
 
+from contextlib import suppress
 from pathlib import Path
 
 import OpenImageIO
 
 _PNG_END = b"IEND\xaeB`\x82"
+_BLEND_END = 32  # bytes of its last block
+_ZSTD_TABLE_END = b"\xb1\xea\x92\x8f"
 
 
 def is_whole_picture(path: Path) -> bool:
@@ -25,11 +28,41 @@ def is_whole_picture(path: Path) -> bool:
 def is_whole_movie(path: Path, count: int) -> bool:
     """Whether a movie holds that many pictures, without decoding them; without PyAV, whether there is anything."""
     try:
-        import av
+        import av  # noqa: F401
     except ImportError:
         return path.is_file() and path.stat().st_size > 0
+    return whole_pictures(path) >= count
+
+
+def whole_pictures(path: Path) -> int:
+    """How many pictures a movie holds, without decoding them; 0: it cannot be read, or PyAV is missing."""
+    try:
+        import av
+    except ImportError:
+        return 0
     try:
         with av.open(str(path)) as container:
-            return sum(packet.size > 0 for packet in container.demux(video=0)) >= count
+            return sum(packet.size > 0 for packet in container.demux(video=0))
     except (av.error.FFmpegError, IndexError):
-        return False
+        return 0
+
+
+def is_whole_blend(path: Path) -> bool:
+    """Whether a .blend file is complete, by its end alone: its last block, or the table behind compressed ones."""
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - _BLEND_END))
+        end = file.read()
+    return b"ENDB" in end or end.endswith(_ZSTD_TABLE_END)
+
+
+def why_short(folder: Path) -> str:
+    """Why files in a folder may have been cut short: what the system says to another file there."""
+    probe = folder / "probe"
+    try:
+        probe.write_bytes(bytes(1 << 20))
+    except OSError as error:
+        return (error.strerror or str(error)).lower()
+    finally:
+        with suppress(OSError):
+            probe.unlink(missing_ok=True)
+    return "Blender does not say why"

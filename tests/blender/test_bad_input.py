@@ -14,6 +14,7 @@ import pytest
 from support import read_picture, recipe, write_frames
 
 from shutter_addon.media import open_source
+from shutter_addon.media.written import whole_pictures
 
 STILL = recipe(4, [1, 0, 0, 0])
 
@@ -204,7 +205,7 @@ def test_a_full_disk(command, frames, tmp_path, output):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("output", ["out", "film.mp4"])
 def test_stopped_halfway(bunny, tmp_path, number, output):
-    """Finished frames stay, whole; nothing else does."""
+    """Finished frames stay, whole, and those of a movie under a name that says so; nothing else does."""
     (tmp_path / "r.json").write_text(json.dumps(recipe(8, np.ones(8))))
     options = ["--recipe", tmp_path / "r.json", "--output", tmp_path / output]
     arguments = [sys.executable, "-m", "shutter_addon", "render", bunny, *options]
@@ -213,14 +214,15 @@ def test_stopped_halfway(bunny, tmp_path, number, output):
         if output == "out":
             wait_for(lambda: len(list(part.parent.glob("*.png"))) >= 3, process)
         else:
-            wait_for(lambda: any(p.stat().st_size for p in part.iterdir()), process)
+            wait_for(lambda: any(p.stat().st_size > 1000 for p in part.iterdir()), process)
         os.kill(process.pid, number)
         process.wait(timeout=60)
     assert process.returncode == 130
     left = sorted(p for p in tmp_path.rglob("*") if p.is_file() and p.name != "r.json")
     assert not list(tmp_path.rglob(".part-*"))
     if output == "film.mp4":
-        assert left == []
+        assert [path.name for path in left] == ["film.part.mp4"]
+        assert 1 <= whole_pictures(left[0]) < 132
     else:
         assert 3 <= len(left) < 132
         for path in left:

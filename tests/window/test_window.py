@@ -5,6 +5,8 @@ import OpenImageIO
 import pytest
 from telling import linked, needs_window, tell
 
+from shutter_addon.media.written import whole_pictures
+
 TOLERANCE = 2
 
 pytestmark = needs_window
@@ -124,3 +126,23 @@ def test_what_is_drawn_over_the_preview_agrees(told):
 def crop(folder, entry):
     left, top, width, height = entry["crop"]
     return pixels(folder / f"{entry['step']}.png", (left, top, left + width, top + height))
+
+
+def test_renders_that_end_early(tmp_path):
+    """A picture that fails ends the job, as Esc does: the movie is finished up to there, and a menu says why."""
+    seen, console = tell("failing.py", "opengl", linked(tmp_path))
+    ends = {entry["output"]: entry["ended"] for entry in seen if "output" in entry}
+    assert ends == {
+        "film.mp4": ["render_cancel"],
+        "folder": ["render_cancel"],
+        "stopped.mp4": ["render_cancel"],
+        "after.mp4": ["render_complete"],
+    }
+    assert whole_pictures(tmp_path / "film.mp4") == 14
+    assert len(list((tmp_path / "folder").iterdir())) == 14
+    assert 1 <= whole_pictures(tmp_path / "stopped.mp4") < 185
+    assert whole_pictures(tmp_path / "after.mp4") == 5
+    assert console.count("Virtual Shutter: f0015.png: cannot be decoded") == 2
+    assert "Traceback" not in console
+    (scenes,) = (entry["scenes"] for entry in seen if "scenes" in entry)
+    assert len(scenes) == 2

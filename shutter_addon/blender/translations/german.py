@@ -56,6 +56,9 @@ MESSAGES = {
     ("*", '"{effect}" has no shutter'): "„{effect}“ hat keinen Verschluss",
     ("*", 'scene "{scene}" belongs to no Shutter strip'): "Szene „{scene}“ gehört zu keinem Verschlussstreifen",
     ("*", 'the source strip of "{strip}" was deleted'): "der Quellstreifen von „{strip}“ wurde gelöscht",
+    ("*", 'the scene of "{strip}" was deleted'): "die Szene von „{strip}“ wurde gelöscht",
+    ("*", 'the scene of "{strip}" has no camera'): "die Szene von „{strip}“ hat keine Kamera",
+    ("*", 'the setting "{setting}" leaves "{strip}" out'): "die Einstellung „{setting}“ lässt „{strip}“ weg",
     ("*", 'strip "{strip}" has no files'): "Streifen „{strip}“ hat keine Dateien",
     ("*", 'strip "{strip}" has no clip'): "Streifen „{strip}“ hat keinen Clip",
     (

@@ -1,0 +1,279 @@
+"""Renders whose pictures fail: they end with a sentence, whoever renders, and nothing without its effect is written."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import read_picture, recipe, write_frames
+
+from shutter_addon.core import recipe as recipes
+from shutter_addon.media.written import whole_pictures
+
+ROOT = Path(__file__).parents[2]
+BROKEN = 4
+
+
+@pytest.fixture
+def film(bpy, edit, tmp_path):
+    """Six frames under an effect that shows them a frame late, to be rendered as pictures; the edit."""
+    from shutter_addon.blender import effects, pictures, rendering, strips
+
+    pictures.forget()
+    frames = np.random.default_rng(0).integers(0, 256, (6, 32, 32, 3), dtype=np.uint8)
+    first = write_frames(tmp_path / "in", frames)
+    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
+    for i in range(2, 7):
+        source.elements.append(f"f{i:04d}.png")
+    strip, effect = strips.add_effect(edit, source)
+    effects.apply(edit, effect, strip, recipes.parse(json.dumps(recipe(2, [0, 1]))))
+    edit.render.resolution_x = edit.render.resolution_y = 32
+    edit.frame_start, edit.frame_end = 1, 6
+    edit.render.image_settings.media_type = "IMAGE"
+    edit.render.image_settings.file_format = "PNG"
+    edit.render.use_file_extension = True
+    edit.render.filepath = f"{tmp_path / 'out'}/"
+    yield edit
+    rendering.failure = None
+
+
+def broken(tmp_path):
+    """Damages a frame; what undoes that."""
+    path = tmp_path / "in" / f"f{BROKEN:04d}.png"
+    data = path.read_bytes()
+    path.write_bytes(data[:100])
+    return lambda: path.write_bytes(data)
+
+
+def to_movie(edit, path):
+    edit.render.image_settings.media_type = "VIDEO"
+    edit.render.ffmpeg.format, edit.render.ffmpeg.codec = "MPEG4", "H264"
+    edit.render.use_file_extension = False
+    edit.render.filepath = str(path)
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def effect_scene(edit):
+    return edit.virtual_shutter.effects[0].scene
+
+
+def test_a_python_that_uses_blender_lives_on(bpy, film, tmp_path, capfd):
+    from shutter_addon.blender import pictures
+
+    mend = broken(tmp_path)
+    for _ in range(2):  # the sequencer keeps what it showed in the failed picture's place
+        assert bpy.ops.render.render(animation=True) == {"CANCELLED"}
+        assert names(tmp_path / "out") == ["0001.png", "0002.png"]
+        said = capfd.readouterr().err
+        assert said.count("Virtual Shutter: f0004.png") == 1
+        assert "Traceback" not in said
+    assert len(bpy.data.scenes) == 2
+    mend()
+    pictures.forget()
+    assert bpy.ops.render.render(animation=True) == {"FINISHED"}
+    assert len(names(tmp_path / "out")) == 6
+    expected = read_picture(tmp_path / "in" / "f0004.png")
+    assert np.abs(read_picture(tmp_path / "out" / "0003.png")[..., :3] - expected).max() <= 1
+
+
+def test_a_movie_is_finished_up_to_the_picture_that_fails(bpy, film, tmp_path):
+    broken(tmp_path)
+    to_movie(film, tmp_path / "film.mp4")
+    assert bpy.ops.render.render(animation=True) == {"CANCELLED"}
+    assert whole_pictures(tmp_path / "film.mp4") == 2
+
+
+def test_a_single_frame_that_fails_is_not_written(bpy, film, tmp_path):
+    broken(tmp_path)
+    film.frame_set(3)
+    film.render.filepath = str(tmp_path / "still.png")
+    assert bpy.ops.render.render(write_still=True) == {"CANCELLED"}
+    assert not (tmp_path / "still.png").exists()
+
+
+@pytest.mark.parametrize("name", ["resized", "begin_next", "moment"])
+@pytest.mark.parametrize("fault", [MemoryError(), KeyboardInterrupt(), ValueError("odd")])
+def test_no_fault_gives_a_plain_frame(bpy, film, tmp_path, capfd, monkeypatch, name, fault):
+    from shutter_addon.blender import pictures
+
+    def fails(*_arguments):
+        raise fault
+
+    monkeypatch.setattr(pictures, name, fails)
+    assert bpy.ops.render.render(animation=True) == {"CANCELLED"}
+    assert not (tmp_path / "out").exists()
+    expected = {MemoryError: "not enough memory", KeyboardInterrupt: "was stopped", ValueError: "internal error"}
+    assert expected[type(fault)] in capfd.readouterr().err
+
+
+def without_camera(bpy, edit, strip):
+    bpy.data.objects.remove(strip.scene.camera)
+
+
+def with_camera_elsewhere(bpy, edit, strip):
+    edit.collection.objects.link(strip.scene.camera)
+    strip.scene.collection.objects.unlink(strip.scene.camera)
+
+
+def with_sequencer_input(bpy, edit, strip):
+    strip.scene_input = "SEQUENCER"
+
+
+def with_another_engine(bpy, edit, strip):
+    strip.scene.render.engine = "BLENDER_WORKBENCH"
+
+
+def with_border(bpy, edit, strip):
+    strip.scene.render.use_border = True
+    strip.scene.render.border_max_x = 0.5
+
+
+def with_half_the_size(bpy, edit, strip):
+    strip.scene.render.resolution_percentage = 50
+
+
+def with_compositing(bpy, edit, strip):
+    strip.scene.compositing_node_group = bpy.data.node_groups.new("Nodes", "CompositorNodeTree")
+    strip.scene.render.use_compositing = True
+
+
+def with_no_view_layer(bpy, edit, strip):
+    strip.scene.view_layers[0].use = False
+
+
+CHANGES = [
+    without_camera,
+    with_camera_elsewhere,
+    with_sequencer_input,
+    with_another_engine,
+    with_border,
+    with_half_the_size,
+    with_compositing,
+    with_no_view_layer,
+]
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("late", [True, False])
+def test_effects_mend_what_hides_them(bpy, film, tmp_path, change, late):
+    """late: no update came before the render, as in a file that was saved by a Blender without the extension."""
+    from shutter_addon.blender import handlers, strips
+
+    update = handlers.HANDLERS["depsgraph_update_post"]
+    film.frame_set(2)
+    film.render.filepath = str(tmp_path / "before.png")
+    bpy.ops.render.render(write_still=True)
+    strip = strips.effect_strips(film)[0]
+    if late:
+        bpy.app.handlers.depsgraph_update_post.remove(update)
+    change(bpy, film, strip)
+    strip.invalidate_cache("RAW")
+    bpy.context.view_layer.update()
+    if not late:
+        update()
+    film.render.filepath = str(tmp_path / "after.png")
+    assert bpy.ops.render.render(write_still=True) == {"FINISHED"}
+    if late:
+        bpy.app.handlers.depsgraph_update_post.append(update)
+    assert len(film.virtual_shutter.effects) == 1
+    before, after = (read_picture(tmp_path / name) for name in ("before.png", "after.png"))
+    assert np.array_equal(before, after)
+    assert np.abs(after[..., :3] - read_picture(tmp_path / "in" / "f0003.png")).max() <= 1
+
+
+def test_an_effect_that_lost_its_scene_is_no_plain_film(bpy, film, tmp_path, capfd):
+    bpy.data.scenes.remove(effect_scene(film))
+    film.frame_end = 3
+    assert bpy.ops.render.render(animation=True) == {"CANCELLED"}
+    assert not (tmp_path / "out").exists()
+    assert 'Virtual Shutter: the scene of "Shutter" was deleted' in capfd.readouterr().err
+    film.sequence_editor.strips["Shutter"].mute = True
+    assert bpy.ops.render.render(animation=True) == {"FINISHED"}
+    assert len(names(tmp_path / "out")) == 3
+
+
+def test_a_linked_effect_that_cannot_be_mended_is_refused(bpy, film, tmp_path, capfd):
+    from shutter_addon.blender import handlers
+
+    bpy.app.handlers.depsgraph_update_post.remove(handlers.HANDLERS["depsgraph_update_post"])
+    film.name = "Film"
+    bpy.data.objects.remove(effect_scene(film).camera)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
+    bpy.app.handlers.depsgraph_update_post.append(handlers.HANDLERS["depsgraph_update_post"])
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, wanted):
+        wanted.scenes = ["Film"]
+    linked = bpy.data.scenes["Film"]
+    bpy.context.window.scene = linked
+    assert bpy.ops.render.render(animation=True, scene=linked.name) == {"CANCELLED"}
+    assert 'the scene of "Shutter" has no camera' in capfd.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+SCRIPT = """
+import sys
+import bpy
+from shutter_addon import blender
+blender.register()
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
+print(bpy.ops.render.render(animation=True), flush=True)
+blender.unregister()
+print("ALIVE")
+"""
+
+
+def test_ctrl_c_ends_a_render_in_a_python_of_its_own(bpy, film, tmp_path):
+    to_movie(film, tmp_path / "film.mp4")
+    film.frame_end = film.sequence_editor.strips["Shutter"].right_handle = 2000
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
+    stop = """
+import os, signal
+def stop(scene, *_):
+    if scene.frame_current == 20 and scene.render.engine == "VIRTUAL_SHUTTER":
+        from shutter_addon.blender import pictures
+        def interrupted(*_, **__): os.kill(os.getpid(), signal.SIGINT)
+        pictures.moment = interrupted
+"""
+    script = SCRIPT.replace("print(bpy.ops", f"{stop}bpy.app.handlers.render_init.append(stop)\nprint(bpy.ops")
+    command = [sys.executable, "-c", script, str(tmp_path / "edit.blend")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "{'CANCELLED'}\nALIVE" in done.stdout
+    assert "Virtual Shutter: the render was stopped" in done.stderr
+    assert whole_pictures(tmp_path / "film.mp4") == 19
+
+
+@pytest.mark.parametrize("output", ["film.mp4", "out/"])
+def test_blender_itself_ends_with_exit_code_2(bpy, film, blender, tmp_path, output):
+    broken(tmp_path)
+    if output == "film.mp4":
+        to_movie(film, tmp_path / output)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
+    done = blender(tmp_path / "edit.blend", "-a")
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert done.stderr.count("Virtual Shutter: f0004.png") == 1
+    if output == "film.mp4":
+        assert whole_pictures(tmp_path / output) == 2
+    else:
+        assert names(tmp_path / "out") == ["0001.png", "0002.png"]
+    render = "import bpy; print(bpy.ops.render.render(animation=True)); print('ALIVE')"
+    done = blender(tmp_path / "edit.blend", "--python-expr", render)
+    assert "{'CANCELLED'}\nALIVE" in done.stdout
+
+
+def test_blender_itself_renders_an_effect_without_its_camera(bpy, film, blender, tmp_path):
+    from shutter_addon.blender import handlers
+
+    bpy.app.handlers.depsgraph_update_post.remove(handlers.HANDLERS["depsgraph_update_post"])
+    bpy.data.objects.remove(effect_scene(film).camera)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
+    bpy.app.handlers.depsgraph_update_post.append(handlers.HANDLERS["depsgraph_update_post"])
+    done = blender(tmp_path / "edit.blend", "-f", "2")
+    assert done.returncode == 0, done.stdout + done.stderr
+    expected = read_picture(tmp_path / "in" / "f0003.png")
+    assert np.abs(read_picture(tmp_path / "out" / "0002.png")[..., :3] - expected).max() <= 1
