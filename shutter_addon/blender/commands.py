@@ -20,6 +20,7 @@ from ..compute.renderer import DEVICES
 from ..core import recipe
 from ..core.messages import signed
 from ..media import MediaError, open_source
+from ..media.files import check_name
 from . import edits, effects, inbetweens, outputs, pictures, sources, strips
 
 BAD_INPUT = 2
@@ -33,6 +34,9 @@ def main(argv: list[str]) -> int:
     parser = _parser()
     try:
         arguments = parser.parse_args(argv)
+        for path in vars(arguments).values():
+            if isinstance(path, Path):
+                check_name(os.path.abspath(path))
         (_render if arguments.command == "render" else _build_alone)(arguments)
     except SystemExit as stop:  # argparse: --help, or what it has said on stderr
         return stop.code
@@ -91,7 +95,7 @@ def _render(arguments) -> None:
         raise outputs.OutputError("nothing to do: give --output, --save or both")
     source_recipe = _recipe(arguments)
     path = Path(os.path.abspath(arguments.source))
-    with open_source(path) as medium:
+    with _opened(path) as medium:
         output = Path(os.path.abspath(arguments.output)) if arguments.output else None
         if output:
             outputs.check(output, arguments.format, (medium.width, medium.height))
@@ -111,6 +115,14 @@ def _render(arguments) -> None:
         if arguments.weights:
             arguments.weights.mkdir(parents=True, exist_ok=True)
         outputs.film(edit, output)
+
+
+def _opened(path: Path):
+    """The source, with a word on stderr of files that were left out."""
+    medium = open_source(path)
+    if left_out := getattr(medium, "left_out", ""):
+        print(signed(left_out), file=sys.stderr)
+    return medium
 
 
 def _recipe(arguments) -> recipe.Recipe:
@@ -138,7 +150,7 @@ def _build_lacking(edit) -> None:
 
 def _build_alone(arguments) -> None:
     path = Path(os.path.abspath(arguments.source))
-    with open_source(path) as medium:
+    with _opened(path) as medium:
         first, last = _frames(arguments.frames, medium.count)
         strip = edits.make_source(path, medium)
     # A strip may read the file in another way, with a colour space of Blender's own choice.

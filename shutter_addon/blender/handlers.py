@@ -11,6 +11,7 @@ def _before_load(*_):
     building.stop()
     pictures.forget()
     cache.forget()
+    sources.forget()
 
 
 @persistent

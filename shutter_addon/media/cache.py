@@ -17,6 +17,7 @@ import numpy as np
 from OpenImageIO import ImageOutput, ImageSpec
 
 from .errors import MediaError
+from .files import check_name
 from .sequence import SequenceSource
 from .written import is_whole_picture
 
@@ -230,14 +231,15 @@ def write_picture(path: Path, picture: np.ndarray, alpha: str) -> None:
     OSError, MediaError: it cannot be written whole."""
     picture = picture[..., :3] if alpha == "opaque" else picture
     height, width, channels = picture.shape
+    name = check_name(path)
     spec = ImageSpec(width, height, channels, SAMPLES[picture.dtype.name])
     spec["oiio:UnassociatedAlpha"] = 1
     spec["DateTime"] = "1970:01:01 00:00:00"  # of an EXR, else the time of writing
     spec["png:compressionLevel"] = 1
     spec["png:filter"] = 0x20  # "up" alone takes half the time of a choice for each row, and no more room
     spec["compression"] = "piz"
-    output = ImageOutput.create(str(path))
-    written = output.open(str(path), spec) and output.write_image(np.ascontiguousarray(picture))
+    output = ImageOutput.create(name)
+    written = output.open(name, spec) and output.write_image(np.ascontiguousarray(picture))
     if not (output.close() and written and is_whole_picture(path)):
         raise MediaError(f"{path.parent}: an in-between frame could not be written whole; is the disk full?")
 

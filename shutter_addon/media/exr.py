@@ -6,6 +6,7 @@ import numpy as np
 import OpenImageIO
 
 from .errors import MediaError
+from .files import check_name
 
 
 def write_exr(path: Path, values: np.ndarray, names: list[str]) -> None:
@@ -17,8 +18,9 @@ def write_exr(path: Path, values: np.ndarray, names: list[str]) -> None:
     spec.channelnames = tuple(names)
     spec["compression"] = "zip"
     part = path.with_name(f".{path.stem}.part.exr")
-    output = OpenImageIO.ImageOutput.create(str(part))
-    written = output.open(str(part), spec) and output.write_image(np.ascontiguousarray(values, dtype=np.float32))
+    name = check_name(part)
+    output = OpenImageIO.ImageOutput.create(name)
+    written = output.open(name, spec) and output.write_image(np.ascontiguousarray(values, dtype=np.float32))
     if not (output.close() and written):
         part.unlink(missing_ok=True)
         raise MediaError(f"{path}: {output.geterror() or 'cannot be written'}")

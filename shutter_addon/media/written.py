@@ -4,6 +4,8 @@ from pathlib import Path
 
 import OpenImageIO
 
+from .files import check_name
+
 _PNG_END = b"IEND\xaeB`\x82"
 
 
@@ -13,7 +15,7 @@ def is_whole_picture(path: Path) -> bool:
         with path.open("rb") as file:
             file.seek(max(0, path.stat().st_size - len(_PNG_END)))
             return file.read() == _PNG_END
-    image = OpenImageIO.ImageInput.open(str(path))
+    image = OpenImageIO.ImageInput.open(check_name(path))
     if image is None:
         return False
     spec = image.spec()
