@@ -8,7 +8,7 @@ import av
 from av.video.frame import PictureType
 
 from .errors import MediaError
-from .files import check_size
+from .files import FOREIGN
 
 KEPT_DECODING = 16  # frames ahead that are cheaper to reach by decoding on than by a seek, whatever the file
 MISSING = 1.0  # seconds between a file's end and the end that it promises, from which on it counts as cut off
@@ -207,7 +207,7 @@ class _Run:
     def _decode(self, packet):
         try:
             return self._codec.decode(packet)
-        except av.error.FFmpegError as error:
+        except (av.error.FFmpegError, ValueError) as error:  # ValueError: of a decoder that could not be opened
             self.fault = f"{DAMAGED} ({reason(error)})"
             return []
 
@@ -245,12 +245,11 @@ def _video_stream(container, name, number):
     if not streams or container.format.name == "tty":  # FFmpeg takes any text for a movie of a terminal
         raise MediaError(f"{name}: no video stream")
     if container.format.name.endswith("_pipe"):  # FFmpeg takes any picture for a movie of one frame
-        raise MediaError(f"{name}: an image of a kind that Blender does not read; save it as PNG, TIFF or EXR first")
+        raise MediaError(f"{name}: {FOREIGN}")
     if number >= len(streams):
         raise MediaError(f"{name}: no video stream {number}, it has {len(streams)}")
     if streams[number].codec_context is None:
         raise MediaError(f"{name}: its video codec is unknown")
-    check_size(name, streams[number].width, streams[number].height)
     return streams[number]
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from .errors import MediaError
 
 PIXELS = 1 << 28  # 16384×16384; FFmpeg decodes no more either, and a damaged header may promise anything
+FOREIGN = "an image of a kind that Blender does not read; save it as PNG, TIFF or EXR first"
 
 
 def check_file(path):
@@ -24,12 +25,13 @@ def check_file(path):
 
 def check_name(path):
     """The path as text, as OpenImageIO and Blender want it; MediaError unless it is UTF-8."""
+    name = os.fspath(path)
     try:
-        os.fspath(path).encode()
+        name.encode()
     except UnicodeEncodeError:
         sentence = "its path is not UTF-8; rename the file, or the folder that is not"
-        raise MediaError(f"{path}: {sentence}") from None
-    return os.fspath(path)
+        raise MediaError(f"{name}: {sentence}") from None
+    return name
 
 
 def check_size(name, width, height):

@@ -11,7 +11,7 @@ import numpy as np
 from OpenImageIO import ImageInput, ImageSpec, geterror
 
 from .errors import MediaError
-from .files import check_file, check_index, check_name, check_size
+from .files import FOREIGN, check_file, check_index, check_name, check_size
 
 # Blender takes these for scene linear, even logarithmic DPX, and every other format for sRGB, even float TIFF.
 LINEAR_SUFFIXES = frozenset({".exr", ".hdr", ".rgbe", ".dpx", ".cin"})
@@ -19,6 +19,7 @@ OTHER_SUFFIXES = ".png .jpg .jpeg .jpe .tif .tiff .tga .bmp .webp .jp2 .j2k .j2c
 IMAGE_SUFFIXES = LINEAR_SUFFIXES.union(OTHER_SUFFIXES.split())
 WITHOUT_ALPHA = frozenset({".jpg", ".jpeg", ".jpe", ".hdr", ".rgbe"})
 SAMPLES = {"uint8": np.uint8, "uint16": np.uint16, "half": np.float16}  # all others are read as float
+BLENDERS_FORMATS = "openexr hdr dpx cineon png jpeg tiff targa bmp webp jpeg2000 psd sgi dds"
 ALPHA = 2, 4  # channels of colours with alpha: YA, RGBA
 COLOURS = ("RGBA", "RGB"), ("XYZA", "XYZ"), ("YA", "Y")  # in an EXR; those before go before
 NO_GREY = frozenset({"X", "BY", "RY"})  # beside these, Y is not all of the picture
@@ -164,8 +165,10 @@ def _opened(path):
     wishes.attribute("oiio:UnassociatedAlpha", 1)  # no premultiplication on reading
     image = ImageInput.open(check_name(path), wishes)
     if image is None:
-        raise MediaError(f"{path.name}: cannot be read as an image ({_told(geterror, 'unknown format')})")
+        raise MediaError(f"{path.name}: cannot be read as an image ({_told(geterror, path, 'unknown format')})")
     try:
+        if image.format_name() not in BLENDERS_FORMATS.split():
+            raise MediaError(f"{path.name}: {FOREIGN}")
         spec, layer = _first_colours(image, path)
         check_size(path.name, spec.width, spec.height)
         yield image, spec, layer
@@ -226,18 +229,19 @@ def _samples(image, spec, layer, path):
         kind = "uint"  # whole numbers of an EXR stand for themselves
     samples = image.read_image(image.current_subimage(), 0, first, stop, kind)
     if samples is None or image.has_error or samples.size != spec.height * spec.width * (stop - first):
-        raise MediaError(f"{path.name}: cannot be decoded ({_told(image.geterror, 'its data are damaged')})")
+        raise MediaError(f"{path.name}: cannot be decoded ({_told(image.geterror, path, 'its data are damaged')})")
     samples = samples.reshape(spec.height, spec.width, stop - first)[..., [channel - first for channel in layer]]
     return samples.astype(_dtype(spec), copy=False)
 
 
-def _told(geterror, otherwise):
-    """What OpenImageIO says of an error, for use inside a sentence; it may quote bytes that are no text."""
+def _told(geterror, path, otherwise):
+    """What OpenImageIO says of an error in a file, for use inside a sentence; it may quote bytes that are no text."""
     try:
-        return " ".join(geterror().split()) or otherwise
+        text = geterror()
     except UnicodeDecodeError as error:
-        return _as_text(error)
+        text = _as_text(error)
+    return " ".join(text.replace(str(path), path.name).split()).partition(". ")[0] or otherwise
 
 
 def _as_text(error):
-    return " ".join(error.object.decode(errors="replace").split())
+    return error.object.decode(errors="replace")

@@ -70,8 +70,8 @@ def test_the_widest_gap(tmp_path):
 
 def test_no_longer_than_blender_counts(tmp_path):
     save_image(tmp_path / "a_0.png", picture(0, 8, 8))
-    for number in range(100, 1_048_700, 100):
-        os.link(tmp_path / "a_0.png", tmp_path / f"a_{number}.png")
+    for sparse in range(100, 1_048_700, 100):
+        os.link(tmp_path / "a_0.png", tmp_path / f"a_{sparse}.png")
     with open_source(tmp_path / "a_0.png") as source:
         assert source.count == 1_048_501
         assert source.left_out.endswith("too many numbers lie before a_1048600.png")
