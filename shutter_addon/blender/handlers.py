@@ -42,13 +42,13 @@ def _show_scribbles():
 
 @persistent
 def _before_render(scene, *_):
-    if scene.render.engine != strips.ENGINE:
-        sources.look_again()
-    # In a window the render has a thread of its own, and the last update has seen to copies.
-    if bpy.app.background and scene.render.engine != strips.ENGINE:
+    if scene.render.engine == strips.ENGINE:
+        return
+    sources.look_again()
+    if bpy.app.background:  # in a window the render has a thread of its own, and the last update has seen to copies
         copies.adopt()
-        for edit in bpy.data.scenes:
-            cache.invalidate_changed(edit)
+    for edit in bpy.data.scenes:
+        cache.invalidate_changed(edit)
 
 
 HANDLERS = {
