@@ -27,8 +27,8 @@ _TIMING = (
 
 
 def built_key(effect, source) -> tuple:
-    """Which in-between frames an effect has; equal keys: the same, of the same files, and none was built or removed
-    meanwhile. MediaError: the source strip has no files."""
+    """Which in-between frames an effect has of the files that its source reads; equal keys: the same, and none was
+    built or removed meanwhile. MediaError: the source strip has no files."""
     if inbetweens.factor(effect) == 1:
         return ()
     try:
@@ -41,7 +41,7 @@ def built_key(effect, source) -> tuple:
         while len(_built) >= _KEPT:
             del _built[next(iter(_built))]
         _built[key] = files.stamp(*key)
-    return *key, _built[key], sources.every_file_key(source)
+    return *key, _built[key]
 
 
 def forget() -> None:

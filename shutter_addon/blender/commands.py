@@ -22,6 +22,7 @@ from ..compute.renderer import DEVICES
 from ..core import recipe, whole
 from ..core.messages import signed
 from ..media import MediaError, open_source
+from ..media.files import check_name
 from ..media.written import is_whole_blend, why_short
 from . import edits, effects, inbetweens, outputs, pictures, sources, strips
 
@@ -36,6 +37,9 @@ def main(argv: list[str]) -> int:
     parser, arguments = _parser(), None
     try:
         arguments = parser.parse_args(argv)
+        for path in vars(arguments).values():
+            if isinstance(path, Path):
+                check_name(os.path.abspath(path))
         (_render if arguments.command == "render" else _build_alone)(arguments)
     except SystemExit as stop:  # argparse: --help, or what it has said on stderr
         return stop.code
@@ -111,7 +115,7 @@ def _render(arguments) -> None:
         raise outputs.OutputError("nothing to do: give --output, --save or both")
     source_recipe = _recipe(arguments)
     path = Path(os.path.abspath(arguments.source))
-    with open_source(path) as medium:
+    with _opened(path) as medium:
         output, file_format = arguments.output, arguments.format or "png"
         if output:
             outputs.check(output, arguments.format, (medium.width, medium.height))
@@ -159,6 +163,14 @@ def _files(medium) -> list[Path]:
     return [*files, *(files[0].with_name(name) for name in names)]
 
 
+def _opened(path: Path):
+    """The source, with a word on stderr of files that were left out."""
+    medium = open_source(path)
+    if left_out := getattr(medium, "left_out", ""):
+        print(signed(left_out), file=sys.stderr)
+    return medium
+
+
 def _recipe(arguments) -> recipe.Recipe:
     """The recipe, with the in-between frames that were asked for."""
     found = recipe.load(arguments.recipe)
@@ -183,7 +195,7 @@ def _build_lacking(edit) -> None:
 
 def _build_alone(arguments) -> None:
     path = Path(os.path.abspath(arguments.source))
-    with open_source(path) as medium:
+    with _opened(path) as medium:
         first, last = _frames(arguments.frames, medium.count)
         strip = edits.make_source(path, medium)
     # A strip may read the file in another way, with a colour space of Blender's own choice.

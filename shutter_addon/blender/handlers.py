@@ -14,6 +14,7 @@ def _before_load(*_):
     building.stop()
     pictures.forget()
     cache.forget()
+    sources.forget()
 
 
 @persistent
@@ -50,14 +51,14 @@ def _before_render(scene, *_):
         return
     rendering.begin(scene)
     cache.drop_spoilt()
-    if scene.render.engine != strips.ENGINE:
-        sources.look_again()
-    # In a window the render has a thread of its own, and the last update has seen to copies.
-    if bpy.app.background and scene.render.engine != strips.ENGINE:
+    if scene.render.engine == strips.ENGINE:
+        return
+    sources.look_again()
+    if bpy.app.background:  # in a window the render has a thread of its own, and the last update has seen to copies
         lifecycle.mend()
         copies.adopt()
-        for edit in bpy.data.scenes:
-            cache.invalidate_changed(edit)
+    for edit in bpy.data.scenes:
+        cache.invalidate_changed(edit)
 
 
 @persistent

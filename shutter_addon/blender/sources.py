@@ -2,7 +2,7 @@
 
 import os
 import re
-import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -10,8 +10,21 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..media import MediaError, open_source
 
-_FRESH = 1.0  # seconds that the files of a sequence, which may be long, are not asked again
-_every_file: dict[tuple, tuple[float, tuple]] = {}  # when they were asked, and what they were
+_AT_ONCE = 100  # files of a sequence, which may be long, that one look asks, beside the first and the last
+
+
+@dataclass
+class _Look:
+    """What is known of a strip's files: path and stamp of each, which of them is next, how many are still to be asked
+    at once, and a number that changes with what is known."""
+
+    known: list
+    next: int
+    due: int
+    key: int = 0
+
+
+_looks: dict[tuple, _Look] = {}  # by edit and strip
 
 
 def media_key(strip) -> tuple:
@@ -20,26 +33,43 @@ def media_key(strip) -> tuple:
 
 
 def files_key(strip) -> tuple:
-    """The strip's files as they are now, as far as its first and last tell. MediaError: it has none."""
+    """The strip's files: the first and the last as they are now, and those between as they were when they were looked
+    at: each call looks at a hundred of them, in turn. MediaError: it has none."""
     count, path = _files(strip)
-    ends = dict.fromkeys((path(0), path(count - 1)))  # an image sequence may be long
-    return count, *((str(end), _stamp(end)) for end in ends)
-
-
-def every_file_key(strip) -> tuple:
-    """All of the strip's files as they are now, or were a second ago. MediaError: it has none."""
-    count, path = _files(strip)
-    key = count, path(0), path(count - 1)
-    when, stamps = _every_file.get(key, (0.0, ()))
-    if not when or time.monotonic() - when > _FRESH:
-        stamps = tuple(_stamp(path(i)) for i in range(count))
-        _every_file[key] = time.monotonic(), stamps
-    return stamps
+    ends = dict.fromkeys((path(0), path(count - 1)))
+    return count, *((str(end), _stamp(end)) for end in ends), _between(strip, count, path)
 
 
 def look_again() -> None:
-    """Has all files asked again at once."""
-    _every_file.clear()
+    """Has all files asked again at the next look."""
+    for look in list(_looks.values()):
+        look.due = len(look.known)
+
+
+def forget() -> None:
+    """Forgets what the files were, before another file is loaded."""
+    _looks.clear()
+
+
+def _between(strip, count, path) -> int:
+    """A number that changes when a file of the strip is found replaced. One that is gone is not: what was made of it
+    still holds, and whoever needs the file itself is told."""
+    if count < 3:
+        return 0
+    place = strip.id_data.session_uid, strip.name
+    look = _looks.get(place)
+    if look is None or len(look.known) != count:
+        look = _looks[place] = _Look([None] * count, 0, count)
+    changed = False
+    for index in range(look.next, look.next + max(look.due, min(_AT_ONCE, count))):
+        file = path(index % count)
+        found, known = (file, _stamp(file)), look.known[index % count]
+        if found != known and (known is None or found[1] is not None or found[0] != known[0]):
+            look.known[index % count], changed = found, True
+    look.next, look.due = (index + 1) % count, 0
+    if changed:
+        look.key = hash(tuple(look.known))
+    return look.key
 
 
 def stem(strip) -> str:

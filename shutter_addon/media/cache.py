@@ -20,6 +20,7 @@ from OpenImageIO import ImageInput, ImageOutput, ImageSpec, geterror
 
 from ..core import whole
 from .errors import MediaError
+from .files import check_name
 from .folder import Folder
 from .written import is_whole_picture
 
@@ -213,13 +214,14 @@ class Cache:
         """The file of a picture as `write_picture` makes them for this source, open; None: it is another."""
         wishes = ImageSpec()
         wishes.attribute("oiio:UnassociatedAlpha", 1)  # no premultiplication on reading
-        image = ImageInput.open(str(path), wishes)
-        if image is None:
-            geterror()
-            return None
-        if all(getattr(image.spec(), name) == getattr(self._spec, name) for name in _SHAPE):
-            return image
-        image.close()
+        image = ImageInput.open(check_name(path), wishes)
+        with suppress(UnicodeDecodeError):  # of names and errors in a damaged file
+            if image is None:
+                geterror()
+            elif all(getattr(image.spec(), name) == getattr(self._spec, name) for name in _SHAPE):
+                return image
+        if image is not None:
+            image.close()
         return None
 
 
@@ -303,17 +305,17 @@ def write_picture(path: Path, picture: np.ndarray, alpha: str) -> bool:
     """Writes (height, width, 4) samples without loss, as PNG or EXR by the path's ending: RGB if alpha is "opaque",
     else RGBA as it is, premultiplied or not. Equal samples give equal bytes. Whether it is whole.
 
-    OSError: it cannot be written."""
+    OSError, MediaError: it cannot be written."""
     height, width, _ = picture.shape
-    spec = _spec(width, height, picture.dtype, alpha)
+    name, spec = check_name(path), _spec(width, height, picture.dtype, alpha)
     spec["oiio:UnassociatedAlpha"] = 1
     spec["DateTime"] = "1970:01:01 00:00:00"  # of an EXR, else the time of writing
     spec["png:compressionLevel"] = 1
     spec["png:filter"] = 0x20  # "up" alone takes half the time of a choice for each row, and no more room
     spec["compression"] = "piz"
-    output = ImageOutput.create(str(path))
+    output = ImageOutput.create(name)
     samples = np.ascontiguousarray(picture[..., : spec.nchannels])
-    written = output.open(str(path), spec) and output.write_image(samples)
+    written = output.open(name, spec) and output.write_image(samples)
     return output.close() and written and is_whole_picture(path)
 
 

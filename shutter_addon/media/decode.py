@@ -8,6 +8,7 @@ import av
 from av.video.frame import PictureType
 
 from .errors import MediaError
+from .files import FOREIGN
 
 KEPT_DECODING = 16  # frames ahead that are cheaper to reach by decoding on than by a seek, whatever the file
 MISSING = 1.0  # seconds between a file's end and the end that it promises, from which on it counts as cut off
@@ -206,7 +207,7 @@ class _Run:
     def _decode(self, packet):
         try:
             return self._codec.decode(packet)
-        except av.error.FFmpegError as error:
+        except (av.error.FFmpegError, ValueError) as error:  # ValueError: of a decoder that could not be opened
             self.fault = f"{DAMAGED} ({reason(error)})"
             return []
 
@@ -243,6 +244,8 @@ def _video_stream(container, name, number):
     streams = [s for s in container.streams.video if not s.disposition & pictures]
     if not streams or container.format.name == "tty":  # FFmpeg takes any text for a movie of a terminal
         raise MediaError(f"{name}: no video stream")
+    if container.format.name.endswith("_pipe"):  # FFmpeg takes any picture for a movie of one frame
+        raise MediaError(f"{name}: {FOREIGN}")
     if number >= len(streams):
         raise MediaError(f"{name}: no video stream {number}, it has {len(streams)}")
     if streams[number].codec_context is None:

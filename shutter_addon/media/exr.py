@@ -7,6 +7,7 @@ import OpenImageIO
 
 from ..core import whole
 from .errors import MediaError
+from .files import check_name
 
 
 def write_exr(path: Path, values: np.ndarray, names: list[str]) -> None:
@@ -20,8 +21,9 @@ def write_exr(path: Path, values: np.ndarray, names: list[str]) -> None:
     spec["DateTime"] = "1970:01:01 00:00:00"  # else the time of writing: equal samples are equal files
     try:
         with whole.writing(path) as part:
-            output = OpenImageIO.ImageOutput.create(str(part))
-            written = output.open(str(part), spec) and output.write_image(np.ascontiguousarray(values, np.float32))
+            name = check_name(part)
+            output = OpenImageIO.ImageOutput.create(name)
+            written = output.open(name, spec) and output.write_image(np.ascontiguousarray(values, np.float32))
             if not (output.close() and written):
                 raise MediaError(f"{path}: {output.geterror() or 'cannot be written'}")
     except OSError as error:

@@ -5,6 +5,9 @@ from pathlib import Path
 
 from .errors import MediaError
 
+PIXELS = 1 << 28  # 16384×16384; FFmpeg decodes no more either, and a damaged header may promise anything
+FOREIGN = "an image of a kind that Blender does not read; save it as PNG, TIFF or EXR first"
+
 
 def check_file(path):
     """The path as a Path; MediaError unless it is a file with something in it that may be read."""
@@ -18,6 +21,23 @@ def check_file(path):
     if not os.access(path, os.R_OK):
         raise MediaError(f"{path.name}: may not be read")
     return path
+
+
+def check_name(path):
+    """The path as text, as OpenImageIO and Blender want it; MediaError unless it is UTF-8."""
+    name = os.fspath(path)
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        sentence = "its path is not UTF-8; rename the file, or the folder that is not"
+        raise MediaError(f"{name}: {sentence}") from None
+    return name
+
+
+def check_size(name, width, height):
+    """MediaError for a picture of no pixels, or of more than can be worked with."""
+    if not 0 < width * height <= PIXELS:
+        raise MediaError(f"{name}: {width}×{height} are too many pixels, or none; up to 16384×16384 can be read")
 
 
 def check_index(source, index):

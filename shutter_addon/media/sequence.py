@@ -2,36 +2,52 @@
 
 import bisect
 import re
+from contextlib import contextmanager
+from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from OpenImageIO import ImageInput, ImageSpec, geterror
 
 from .errors import MediaError
-from .files import check_file, check_index
+from .files import FOREIGN, check_file, check_index, check_name, check_size
 
 # Blender takes these for scene linear, even logarithmic DPX, and every other format for sRGB, even float TIFF.
 LINEAR_SUFFIXES = frozenset({".exr", ".hdr", ".rgbe", ".dpx", ".cin"})
-OTHER_SUFFIXES = ".png .jpg .jpeg .jpe .tif .tiff .tga .bmp .webp .jp2 .j2k .j2c .jxl .psd .sgi .rgb .rgba .bw .ppm"
+OTHER_SUFFIXES = ".png .jpg .jpeg .jpe .tif .tiff .tga .bmp .webp .jp2 .j2k .j2c .psd .sgi .rgb .rgba .bw"
 IMAGE_SUFFIXES = LINEAR_SUFFIXES.union(OTHER_SUFFIXES.split())
+WITHOUT_ALPHA = frozenset({".jpg", ".jpeg", ".jpe", ".hdr", ".rgbe"})
 SAMPLES = {"uint8": np.uint8, "uint16": np.uint16, "half": np.float16}  # all others are read as float
+BLENDERS_FORMATS = "openexr hdr dpx cineon png jpeg tiff targa bmp webp jpeg2000 psd sgi dds"
+ALPHA = 2, 4  # channels of colours with alpha: YA, RGBA
+COLOURS = ("RGBA", "RGB"), ("XYZA", "XYZ"), ("YA", "Y")  # in an EXR; those before go before
+NO_GREY = frozenset({"X", "BY", "RY"})  # beside these, Y is not all of the picture
+MISSING = 100  # numbers in a row; what lies beyond a wider gap is another sequence, or a stray number
+LONGEST = 1_048_574  # Blender's last frame
 
 
 class SequenceSource:
     """Images as frames.
 
     Found beside its first file, frame i is the file whose number is i above the first's; where a number is missing,
-    the file before it holds. With `files` (an image strip's list) frame i is files[i].
-    Samples are as stored: straight alpha stays straight, EXIF orientation is left alone, as in Blender; an EXR's data
-    window is laid into its display window. All frames must have the first one's size and sample type.
+    the file before it holds. Where more than MISSING in a row are, the sequence ends, and `left_out` says so. With
+    `files` (an image strip's list) frame i is files[i].
+    Samples are as stored: straight alpha stays straight, EXIF orientation is left alone, and of an EXR the data window
+    is the picture, wherever its display window lies; all as in Blender. All frames must have the first one's size and
+    sample type; one with alpha among them, and the source has alpha.
     """
 
     def __init__(self, path, *, files=None, fps=None, alpha=None):
         path = Path(path)
         self.fps = fps
+        self.left_out = ""
         if files is None:
             self.path = check_file(path)
-            self._starts, self._files = _numbered(path)
+            self._starts, self._files, beyond = _numbered(path)
+            if beyond:
+                last = self._files[-1].name
+                self.left_out = f"{path.name}: the sequence ends with {last}; too many numbers lie before {beyond.name}"
         else:
             folder = path if path.is_dir() else path.parent
             self._files = [folder / file for file in files]
@@ -40,12 +56,12 @@ class SequenceSource:
             self._starts = range(len(self._files))
             self.path = check_file(self._files[0])
         self.count = self._starts[-1] + 1
-        image, spec, layer = _open(self.path)
-        image.close()
-        self.width, self.height = spec.full_width, spec.full_height
-        self.dtype = _dtype(spec)
+        with _opened(self.path) as (_image, spec, layer):
+            self.width, self.height = spec.width, spec.height
+            self.dtype = _dtype(spec)
         self.transfer = "linear" if self.path.suffix.lower() in LINEAR_SUFFIXES else "srgb"
-        self.alpha = "opaque" if len(layer) in (1, 3) else alpha or self._usual_alpha()
+        has_alpha = len(layer) in ALPHA or any(map(_has_alpha, dict.fromkeys(self._files)))
+        self.alpha = (alpha or self._usual_alpha()) if has_alpha else "opaque"
         self.options = {}
 
     @property
@@ -59,17 +75,17 @@ class SequenceSource:
         Raises MediaError for a file that is missing, damaged or unlike the first, IndexError outside 0 … count-1."""
         check_index(self, index)
         path = check_file(self._files[bisect.bisect_right(self._starts, index) - 1])
-        image, spec, layer = _open(path)
-        try:
+        with _opened(path) as (image, spec, layer):
             self._check_like_first(path, spec)
-            return self._expand(_samples(image, spec, layer, path), spec)
-        finally:
-            image.close()
+            return self._expand(_samples(image, spec, layer, path))
 
     def _check_like_first(self, path, spec):
-        size, dtype = (spec.full_width, spec.full_height), _dtype(spec)
+        size, dtype = (spec.width, spec.height), _dtype(spec)
         if size != (self.width, self.height):
-            raise MediaError(f"{path.name}: is {size[0]}×{size[1]}, but {self.path.name} is {self.width}×{self.height}")
+            window = "" if size == (spec.full_width, spec.full_height) else " (its data window)"
+            raise MediaError(
+                f"{path.name}: is {size[0]}×{size[1]}{window}, but {self.path.name} is {self.width}×{self.height}"
+            )
         if dtype != self.dtype:
             raise MediaError(f"{path.name}: has {dtype} samples, but {self.path.name} has {self.dtype}")
 
@@ -78,16 +94,13 @@ class SequenceSource:
         deep_tiff = self.path.suffix.lower() in (".tif", ".tiff") and self.dtype == np.uint16
         return "premultiplied" if self.transfer == "linear" or deep_tiff else "straight"
 
-    def _expand(self, samples, spec):
-        """Y, YA, RGB or RGBA samples as RGBA, at their place in the display window; nothing is there outside them."""
-        picture = np.zeros((self.height, self.width, 4), self.dtype)
-        y, rows = _overlap(spec.y - spec.full_y, spec.height, self.height)
-        x, columns = _overlap(spec.x - spec.full_x, spec.width, self.width)
-        inside, samples = picture[y, x], samples[rows, columns]
-        colours, has_alpha = (3, 1)[samples.shape[2] < 3], samples.shape[2] % 2 == 0
-        inside[..., :3] = samples[..., :colours]
+    def _expand(self, samples):
+        """Y, YA, RGB or RGBA samples as RGBA."""
+        picture = np.empty((self.height, self.width, 4), self.dtype)
+        channels = samples.shape[2]
+        picture[..., :3] = samples[..., : 1 if channels < 3 else 3]
         opaque = np.iinfo(self.dtype).max if self.dtype.kind == "u" else 1
-        inside[..., 3] = samples[..., -1] if has_alpha else opaque
+        picture[..., 3] = samples[..., -1] if channels in ALPHA else opaque
         return picture
 
     def close(self):
@@ -100,58 +113,108 @@ class SequenceSource:
         self.close()
 
 
-def _overlap(offset, length, whole):
-    """Where `length` samples that begin at `offset` lie within 0 … whole, as slices of the whole and of the samples."""
-    start, stop = max(offset, 0), max(min(offset + length, whole), 0)
-    return slice(start, max(stop, start)), slice(start - offset, max(stop, start) - offset)
-
-
 def _numbered(path):
-    """(frame numbers from 0, files) from that file on: those that differ in the last number of the name only."""
+    """(frame numbers from 0, files, the file beyond too wide a gap or None) from that file on: those that differ in the
+    last number of the name only."""
     match = re.fullmatch(r"(.*?)(\d+)(\D*)", path.stem)
     if match is None:
-        return [0], [path]
+        return [0], [path], None
     prefix, digits, suffix = match.groups()
     alike = re.compile(re.escape(prefix) + r"(\d+)" + re.escape(suffix + path.suffix))
     first, found = int(digits), {}
-    for file in sorted(path.parent.iterdir()):
+    for file in sorted(_listed(path.parent)):
         match = alike.fullmatch(file.name)
-        if match and int(match[1]) >= first and (int(match[1]) not in found or len(match[1]) == len(digits)):
-            found[int(match[1])] = file
-    return [number - first for number in sorted(found)], [found[number] for number in sorted(found)]
+        number = int(match[1]) - first if match else -1
+        if number >= 0 and (number not in found or len(match[1]) == len(digits)):
+            found[number] = file
+    numbers = sorted(found)
+    gaps = (i for i, (a, b) in enumerate(pairwise(numbers), 1) if b - a > MISSING + 1 or b >= LONGEST)
+    end = next(gaps, len(numbers))
+    files = [found[number] for number in numbers]
+    return numbers[:end], files[:end], files[end] if end < len(files) else None
 
 
-def _open(path):
-    """(open image, spec, its colour channels' positions: Y, YA, RGB or RGBA)."""
+def _listed(folder):
+    try:
+        return list(folder.iterdir())
+    except OSError as error:
+        raise MediaError(f"{folder}: cannot be listed ({error.strerror})") from None
+
+
+def _has_alpha(path):
+    """Whether that file of a sequence has alpha, as far as it can be read; it is opened only if it changed since."""
+    if path.suffix.lower() in WITHOUT_ALPHA:
+        return False
+    try:
+        status = path.stat()
+        return _had_alpha(path, status.st_size, status.st_mtime_ns)
+    except (OSError, MediaError):  # who needs the frame is told
+        return False
+
+
+@lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
+def _had_alpha(path, _size, _mtime):
+    with _opened(path) as (_image, _spec, layer):
+        return len(layer) in ALPHA
+
+
+@contextmanager
+def _opened(path):
+    """(open image, spec, its colour channels' positions: Y, YA, RGB or RGBA). MediaError: there is no such image."""
     wishes = ImageSpec()
     wishes.attribute("oiio:UnassociatedAlpha", 1)  # no premultiplication on reading
-    image = ImageInput.open(str(path), wishes)
+    image = ImageInput.open(check_name(path), wishes)
     if image is None:
-        raise MediaError(f"{path.name}: cannot be read as an image ({_sentence(geterror())})")
+        raise MediaError(f"{path.name}: cannot be read as an image ({_told(geterror, path, 'unknown format')})")
+    try:
+        if image.format_name() not in BLENDERS_FORMATS.split():
+            raise MediaError(f"{path.name}: {FOREIGN}")
+        spec, layer = _first_colours(image, path)
+        check_size(path.name, spec.width, spec.height)
+        yield image, spec, layer
+    except UnicodeDecodeError as error:  # names within a damaged file
+        raise MediaError(f"{path.name}: cannot be read as an image ({_as_text(error)})") from None
+    finally:
+        image.close()
+
+
+def _first_colours(image, path):
+    """(spec, positions) of the channels that Blender shows."""
+    spec = whole = image.spec()
+    if image.format_name() != "openexr":
+        return spec, [*range(min(spec.nchannels, 4))]
     names, part = [], 0
     while image.seek_subimage(part, 0):
         spec = image.spec()
         layer = _colour_channels(spec.channelnames)
         if layer and not spec.deep:
-            return image, image.spec(), layer
-        names += spec.channelnames
+            if (spec.width, spec.height) != (whole.width, whole.height):
+                raise MediaError(f"{path.name}: its parts have different data windows")
+            return spec, layer
+        names += [f"deep {name}" for name in spec.channelnames] if spec.deep else spec.channelnames
         part += 1
-    image.close()
     raise MediaError(f"{path.name}: no colour channels, only {', '.join(names)}")
 
 
 def _colour_channels(names):
-    """Where the first layer that has colours keeps them: plain names before layers, "Combined" before other ones."""
-    layers = {}
+    """Where an EXR keeps the colours that Blender shows: those of its first layer, there plain ones or "Combined"
+    before other passes; XYZ for want of colours, and then grey."""
+    passes = {}
     for position, name in enumerate(names):
-        layer, _, channel = name.rpartition(".")
-        layers.setdefault(layer, {})[channel.upper()] = position
-    order = sorted(layers, key=lambda layer: (layer != "", not layer.endswith("Combined")))
-    for wanted in ("RGBA", "RGB", "YA", "Y"):
-        for layer in order:
-            if all(channel in layers[layer] for channel in wanted):
-                return [layers[layer][channel] for channel in wanted]
+        place, _, channel = name.rpartition(".")
+        passes.setdefault(place, {})[channel.upper()] = position
+    order = sorted(passes, key=_rank)
+    for kinds in COLOURS:
+        for channels in map(passes.get, order):
+            for wanted in kinds:
+                if channels.keys() >= set(wanted) and not ("Y" in kinds and channels.keys() & NO_GREY):
+                    return [channels[channel] for channel in wanted]
     return []
+
+
+def _rank(place):
+    layer, _, name = place.rpartition(".")
+    return layer, name not in ("", "Combined"), name
 
 
 def _dtype(spec):
@@ -159,14 +222,26 @@ def _dtype(spec):
 
 
 def _samples(image, spec, layer, path):
-    """The layer's samples (height, width, channels) of the data window."""
+    """The layer's samples (height, width, channels)."""
     kinds = {np.uint8: "uint8", np.uint16: "uint16", np.float16: "half", np.float32: "float"}
-    first, stop = min(layer), max(layer) + 1
-    samples = image.read_image(image.current_subimage(), 0, first, stop, kinds[_dtype(spec).type])
-    if samples is None or image.has_error:
-        raise MediaError(f"{path.name}: cannot be decoded ({_sentence(image.geterror())})")
-    return samples.reshape(spec.height, spec.width, stop - first)[..., [channel - first for channel in layer]]
+    kind, first, stop = kinds[_dtype(spec).type], min(layer), max(layer) + 1
+    if image.format_name() == "openexr" and str(spec.channelformat(layer[0])) == "uint":
+        kind = "uint"  # whole numbers of an EXR stand for themselves
+    samples = image.read_image(image.current_subimage(), 0, first, stop, kind)
+    if samples is None or image.has_error or samples.size != spec.height * spec.width * (stop - first):
+        raise MediaError(f"{path.name}: cannot be decoded ({_told(image.geterror, path, 'its data are damaged')})")
+    samples = samples.reshape(spec.height, spec.width, stop - first)[..., [channel - first for channel in layer]]
+    return samples.astype(_dtype(spec), copy=False)
 
 
-def _sentence(text):
-    return " ".join(text.split()) or "unknown format"
+def _told(geterror, path, otherwise):
+    """What OpenImageIO says of an error in a file, for use inside a sentence; it may quote bytes that are no text."""
+    try:
+        text = geterror()
+    except UnicodeDecodeError as error:
+        text = _as_text(error)
+    return " ".join(text.replace(str(path), path.name).split()).partition(". ")[0] or otherwise
+
+
+def _as_text(error):
+    return error.object.decode(errors="replace")

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import OpenImageIO
 
+from .files import check_name
+
 _PNG_END = b"IEND\xaeB`\x82"
 _BLEND_END = 32  # bytes of its last block
 _ZSTD_TABLE_END = b"\xb1\xea\x92\x8f"
@@ -16,7 +18,7 @@ def is_whole_picture(path: Path) -> bool:
         with path.open("rb") as file:
             file.seek(max(0, path.stat().st_size - len(_PNG_END)))
             return file.read() == _PNG_END
-    image = OpenImageIO.ImageInput.open(str(path))
+    image = OpenImageIO.ImageInput.open(check_name(path))
     if image is None:
         return False
     spec = image.spec()

@@ -3,6 +3,7 @@
 import json
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 from support import read_picture, recipe, write_frames
 
-from shutter_addon.media import open_source
+from shutter_addon.media import MediaError, open_source
 from shutter_addon.media.written import whole_pictures
 
 STILL = recipe(4, [1, 0, 0, 0])
@@ -53,6 +54,38 @@ def test_no_medium(command, tmp_path, name, content, words):
         path.write_bytes(content)
     refused(command(path, "--output", tmp_path / "out", recipe=STILL, check=False), *words)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names are bytes on POSIX systems only")
+@pytest.mark.parametrize("option", ["source", "--output", "--save", "--weights", "--cache", "--recipe"])
+def test_names_that_are_not_utf8(command, frames, tmp_path, option):
+    odd = tmp_path / os.fsdecode(b"caf\xe9")
+    odd.mkdir()
+    shutil.copy(frames, odd / "f0001.png")
+    (odd / "recipe.json").write_text(json.dumps(STILL))
+    source = odd / "f0001.png" if option == "source" else frames
+    given = {"--output": odd / "out", "--save": odd / "a.blend", "--recipe": odd / "recipe.json"}
+    more = () if option == "source" else (option, given.get(option, odd))
+    output = () if option == "--output" else ("--output", tmp_path / "out")
+    known = None if option == "--recipe" else STILL
+    refused(command(source, *output, *more, recipe=known, check=False), "caf\\udce9", "not UTF-8")
+    assert sorted(path.name for path in odd.iterdir()) == ["f0001.png", "recipe.json"]
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names are bytes on POSIX systems only")
+def test_a_strip_whose_folder_is_not_utf8(edit, frames, tmp_path):
+    """Blender's file browser finds such files."""
+    from shutter_addon.blender import strips
+
+    odd = tmp_path / os.fsdecode(b"caf\xe9")
+    shutil.copytree(frames.parent, odd)
+    source = edit.sequence_editor.strips.new_image("images", str(frames), 1, 1)
+    source.directory = str(odd)
+    with pytest.raises(MediaError) as caught:
+        strips.add_effect(edit, source)
+    assert str(caught.value).isprintable()
+    assert str(caught.value).endswith("its path is not UTF-8; rename the file, or the folder that is not")
 
 
 def test_audio_only(command, tmp_path):

@@ -208,6 +208,42 @@ def test_stamps_of_in_between_frames_are_bounded(effect, tmp_path, monkeypatch):
     assert len(cache._built) == cache._KEPT
 
 
+def test_a_file_replaced_in_the_middle_is_rendered(bpy, edit, effect, render, images):
+    """In place, as Blender writes over its own renders: the folder tells nothing of it."""
+    before = render(edit, [FRAME])[FRAME]
+    replaced = np.full((32, 32, 3), 200, dtype=np.uint8)
+    write_frames(images.parent, [replaced] * FRAME, "other")
+    path = images.parent / f"f{FRAME:04d}.png"
+    path.write_bytes((images.parent / f"other{FRAME:04d}.png").read_bytes())
+    after = render(edit, [FRAME])[FRAME]
+    assert not np.array_equal(after, before)
+    edit.sequence_editor.use_cache_raw = edit.sequence_editor.use_cache_final = False
+    assert np.array_equal(render(edit, [FRAME])[FRAME], after)
+
+
+def test_replaced_files_of_a_long_sequence_are_noticed_little_by_little(bpy, edit, effect, images, monkeypatch):
+    """Each look asks few of its files, and all of them are asked in turn."""
+    from shutter_addon.blender import cache, sources
+
+    source = edit.sequence_editor.strips["images"]
+    for _ in range(970):
+        source.elements.append(images.name)
+    asked = []
+    stamp = sources._stamp
+    monkeypatch.setattr(sources, "_stamp", lambda path: asked.append(path) or stamp(path))
+    cache.invalidate_changed(edit)
+    for _ in range(10):
+        asked.clear()
+        assert not cache.invalidate_changed(edit)
+        assert 0 < len(asked) < 110
+    (images.parent / "f0015.png").write_bytes(images.read_bytes() + b"more")
+    assert any(cache.invalidate_changed(edit) for _ in range(10))
+    (images.parent / "f0016.png").write_bytes(images.read_bytes() + b"more")
+    sources.look_again()
+    assert cache.invalidate_changed(edit)
+    assert not cache.invalidate_changed(edit)
+
+
 def test_finished_frames_are_kept_while_nothing_changes(bpy, edit, effect, render, images):
     """Frames are there even when files in between are not: playing and selecting drop none."""
     before = render(edit, [3, FRAME])

@@ -31,13 +31,18 @@ def pngs(folder, channels=3, count=12, samples=np.uint8):
     return write_frames(folder, RNG.integers(0, top, (count, 32, 48, channels), dtype=samples))
 
 
-def exrs(folder, count=4):
+def exrs(folder, count=4, corner=None):
+    """corner: where the data window begins in a larger display window."""
     folder.mkdir()
     for i in range(1, count + 1):
         pixels = RNG.random((32, 48, 4), dtype=np.float32)
         pixels[..., :3] *= pixels[..., 3:]
+        spec = OpenImageIO.ImageSpec(48, 32, 4, "half")
+        if corner:
+            spec.x, spec.y = corner
+            spec.full_width, spec.full_height = 60, 40
         output = OpenImageIO.ImageOutput.create("exr")
-        output.open(str(folder / f"f{i:04d}.exr"), OpenImageIO.ImageSpec(48, 32, 4, "half"))
+        output.open(str(folder / f"f{i:04d}.exr"), spec)
         output.write_image(pixels)
         output.close()
     return folder / "f0001.exr"
@@ -109,8 +114,17 @@ def test_start_and_offset_of_images(bpy, edit, render, tmp_path, clip_strip):
     check(edit, render, source, range(1, 8))
 
 
-def test_float_images(edit, render, tmp_path, clip_strip):
-    check(edit, render, clip_strip(exrs(tmp_path / "in")), [1, 2, 4], depth="16")
+@pytest.mark.parametrize("corner", [None, (5, 3), (-5, 20)])
+def test_float_images(edit, render, tmp_path, clip_strip, corner):
+    check(edit, render, clip_strip(exrs(tmp_path / "in", corner=corner)), [1, 2, 4], depth="16")
+
+
+def test_images_some_of_which_have_alpha(edit, render, tmp_path, clip_strip):
+    first = pngs(tmp_path / "in", 3)
+    later = pngs(tmp_path / "other", 4)
+    for name in ("f0003.png", "f0007.png"):
+        later.with_name(name).replace(first.with_name(name))
+    check(edit, render, clip_strip(first), [1, 3, 4, 7], depth="16")
 
 
 @pytest.mark.parametrize("space", ["Non-Color", "Linear Rec.709", "Rec.2020", "AgX Log"])

@@ -200,3 +200,13 @@ def test_a_gap_in_the_numbering_holds(command, noise, tmp_path, same_pixels):
     command(first, "--output", tmp_path / "out", recipe=recipe(1, [1]))
     for frame, source in zip(range(1, 7), (0, 1, 1, 3, 4, 5), strict=True):
         same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), frames[source], 1)
+
+
+def test_a_number_far_off_is_left_out(command, noise, tmp_path):
+    first = write_frames(tmp_path / "in", noise[1][:2])
+    (tmp_path / "in" / "f20261121.png").write_bytes(first.read_bytes())
+    done = command(first, "--output", tmp_path / "out", recipe=recipe(1, [1]))
+    assert done.stderr.splitlines()[0] == (
+        "Virtual Shutter: f0001.png: the sequence ends with f0002.png; too many numbers lie before f20261121.png"
+    )
+    assert len(list((tmp_path / "out").iterdir())) == 2

@@ -91,16 +91,45 @@ IMAGES = {
 }
 
 
+MIXED = {
+    "colours, then alpha": ("a.png", "uint8", (3, 4, 3)),
+    "colours, then grey, then alpha": ("a.png", "uint8", (3, 1, 2)),
+    "alpha, then colours, then grey": ("a.png", "uint8", (4, 3, 1)),
+    "16 bit": ("a.tif", "uint16", (3, 3, 4)),
+    "half exr": ("a.exr", "half", (3, 4, 3)),
+}
+
+
 @pytest.mark.parametrize("kind", IMAGES)
 def test_images(edit, render, tmp_path, kind, same_pixels):
     """Every format, with Blender's own idea of its colour space and alpha; two steps of the window each way."""
     name, samples, channels = IMAGES[kind]
+    _compare(edit, render, tmp_path, same_pixels, name, samples, (channels,) * 3)
+
+
+@pytest.mark.parametrize("kind", MIXED)
+def test_images_some_of_which_have_alpha(edit, render, tmp_path, kind, same_pixels):
+    _compare(edit, render, tmp_path, same_pixels, *MIXED[kind])
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+@pytest.mark.parametrize("corner", [(4, 2), (-4, 2), (100, 100)])
+def test_cropped_exrs(edit, render, tmp_path, corner, channels, same_pixels):
+    """The data window inside the display window, across its edge, beside it."""
+    _compare(edit, render, tmp_path, same_pixels, "a.exr", "half", (channels,) * 3, corner)
+
+
+def _compare(edit, render, tmp_path, same_pixels, name, samples, channels, corner=None):
+    """The plain strip of three images, with that many channels, and the effect over it."""
     rng = np.random.default_rng(0)
-    for i in (1, 2, 3):
-        pixels = rng.random((24, 32, channels), dtype=np.float32)
-        if channels == 4:
-            pixels[..., :3] *= pixels[..., 3:]
-        spec = OpenImageIO.ImageSpec(32, 24, channels, samples)
+    for i, count in enumerate(channels, 1):
+        pixels = rng.random((24, 32, count), dtype=np.float32)
+        if count in (2, 4):
+            pixels[..., :-1] *= pixels[..., -1:]
+        spec = OpenImageIO.ImageSpec(32, 24, count, samples)
+        if corner:
+            spec.x, spec.y = corner
+            spec.full_x, spec.full_y, spec.full_width, spec.full_height = 0, 0, 40, 30
         path = tmp_path / name.replace("a.", f"a{i}.")
         output = OpenImageIO.ImageOutput.create(str(path))
         assert output.open(str(path), spec), OpenImageIO.geterror()

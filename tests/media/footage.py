@@ -125,11 +125,13 @@ def damage_frame(source, path, index):
 def save_image(path, array, samples="uint8", **attributes):
     """Writes an array (height, width, channels) of 0 … 1 or of whole samples; attributes' __ stands for a colon.
 
-    names: the channels' names; data, display: windows (x, y, width, height)."""
+    names: the channels' names; alpha: which of them is; at: the data window's corner; display: the window
+    (x, y, width, height)."""
     height, width, channels = array.shape
     spec = ImageSpec(width, height, channels, samples)
     if "names" in attributes:
         spec.channelnames = attributes.pop("names")
+    spec.alpha_channel = attributes.pop("alpha", spec.alpha_channel)
     spec.x, spec.y = attributes.pop("at", (0, 0))
     x, y, w, h = attributes.pop("display", (0, 0, width, height))
     spec.full_x, spec.full_y, spec.full_width, spec.full_height = x, y, w, h

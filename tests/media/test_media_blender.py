@@ -12,6 +12,8 @@ CLEAR = {"pictures": [see_through(n) for n in range(3)], "array_format": "rgba"}
 RGB, RGBA = picture(5) / np.float32(255), see_through(5) / np.float32(255)
 STRAIGHT = {"oiio__UnassociatedAlpha": 1}
 ASSOCIATED = np.dstack([RGBA[..., :3] * RGBA[..., 3:], RGBA[..., 3]])
+LAYERS = np.dstack([RGB / 2, ASSOCIATED])
+FIRST_LAYER = [*(f"a.{c}" for c in "RGB"), *(f"z.Combined.{c}" for c in "RGBA")]
 
 EXACT = (
     "b_frames.mp4 open.mkv open.mp4 open.ts hevc.mp4 refresh.mp4 mpeg4.avi mpeg4.mp4 mpeg2.mpg mpeg2.ts "
@@ -28,7 +30,10 @@ IMAGES = (
     "rgb8.png rgba8.png rgb16.png rgba16.png gray.png gray_alpha.png rgb.jpg turned.jpg rgb8.tif "
     "turned.tif rgba8.tif associated8.tif rgb16.tif associated16.tif float.tif float_alpha.tif "
     "ten_bits.dpx log.dpx half.exr float_alpha.exr gray.exr layers.exr render.exr radiance.hdr targa.tga "
-    "bitmap.bmp web.webp straight.exr log.png acescg.exr filmic.png linear.png"
+    "bitmap.bmp web.webp straight.exr log.png acescg.exr filmic.png linear.png "
+    "inside.exr inside_alpha.exr outside.exr across.exr across_alpha.exr beside.exr placed.tif unnamed.tif two.tga "
+    "clear.bmp clear.webp plain.jp2 clear.jp2 plain.sgi clear.sgi pair.exr "
+    "whole.exr plain_layer.exr first_layer.exr no_combined.exr xyz.exr"
 )
 
 
@@ -110,6 +115,27 @@ def images(folder):
         ("targa.tga", RGBA, "uint8", {}),
         ("bitmap.bmp", RGB, "uint8", {}),
         ("web.webp", RGB, "uint8", {}),
+        ("inside.exr", RGB, "half", {"at": (10, 6), "display": (0, 0, 160, 90)}),
+        ("inside_alpha.exr", ASSOCIATED, "half", {"at": (10, 6), "display": (0, 0, 160, 90)}),
+        ("outside.exr", ASSOCIATED, "half", {"at": (-10, -6), "display": (0, 0, 64, 32)}),
+        ("across.exr", RGB, "half", {"at": (40, -20), "display": (0, 0, 128, 64)}),
+        ("across_alpha.exr", ASSOCIATED, "half", {"at": (-40, 20), "display": (-10, 0, 128, 64)}),
+        ("beside.exr", ASSOCIATED, "half", {"at": (300, 0), "display": (0, 0, 200, 200)}),
+        ("placed.tif", RGB, "uint8", {"at": (5, 7), "display": (0, 0, 200, 100)}),
+        ("unnamed.tif", RGBA, "uint8", {"names": ["R", "G", "B", "unknown"], "alpha": -1}),
+        ("two.tga", RGBA[..., [0, 3]], "uint8", {}),
+        ("clear.bmp", RGBA, "uint8", {}),
+        ("clear.webp", RGBA, "uint8", STRAIGHT),
+        ("plain.jp2", RGB, "uint16", {}),
+        ("clear.jp2", RGBA, "uint8", STRAIGHT),
+        ("plain.sgi", RGB, "uint16", {}),
+        ("clear.sgi", RGBA, "uint8", {}),
+        ("pair.exr", ASSOCIATED[..., [0, 3]], "half", {"names": ["Y", "A"]}),
+        ("whole.exr", RGB, "uint", {}),
+        ("plain_layer.exr", LAYERS, "half", {"names": [*"RGB", *(f"l.{c}" for c in "RGBA")]}),
+        ("first_layer.exr", LAYERS, "half", {"names": FIRST_LAYER}),
+        ("no_combined.exr", LAYERS, "half", {"names": [f"V.{name}" for name in FIRST_LAYER]}),
+        ("xyz.exr", RGB, "half", {"names": [*"XYZ"]}),
     ]:
         yield name, save_image(folder / name, array, samples, **more)
 

@@ -1,7 +1,11 @@
 """Bad input: one clear sentence that names the file, and whatever is sound can still be read."""
 
 import contextlib
+import os
 import re
+import shutil
+import struct
+import zlib
 
 import av
 import numpy as np
@@ -9,14 +13,17 @@ import pytest
 from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, save_image
 
 from shutter_addon.media import MediaError, open_source
+from shutter_addon.media.cache import write_picture
+from shutter_addon.media.exr import write_exr
+from shutter_addon.media.sequence import IMAGE_SUFFIXES
 
 
-def sentence(path, **options):
+def sentence(path, longest=150, **options):
     with pytest.raises(MediaError) as caught:
         open_source(path, **options)
     text = str(caught.value)
     assert "\n" not in text
-    assert len(text) < 150
+    assert len(text) < longest
     return text
 
 
@@ -167,6 +174,134 @@ def test_unlike_frames_of_a_sequence(tmp_path):
     assert bad[2] == "a_2.png: has uint16 samples, but a_0.png has uint8"
     assert re.match(r"a_3\.png: cannot be (decoded|read as an image) \(.+\)$", bad[3])
     assert bad[4] == f"a_4.png: no such file in {tmp_path}"
+
+
+@pytest.mark.parametrize("name", ["a.jxl", "a.ppm", "a.gif"])
+def test_images_that_blender_does_not_read(tmp_path, name):
+    path = save_image(tmp_path / name, picture(5))
+    text = f"{name}: an image of a kind that Blender does not read; save it as PNG, TIFF or EXR first"
+    if name != "a.gif":  # which is a movie as well
+        assert sentence(path) == text
+    assert sentence(tmp_path, files=[name]) == text
+    path.rename(tmp_path / "a.png")
+    assert sentence(tmp_path / "a.png") == text.replace(name, "a.png")
+
+
+@pytest.mark.parametrize("suffix", sorted(IMAGE_SUFFIXES))
+def test_noise_by_the_name_of_an_image(tmp_path, suffix):
+    (tmp_path / f"a{suffix}").write_bytes(np.random.default_rng(0).bytes(5000))
+    assert re.match(rf"a\{suffix}: cannot be read as an image \(.{{12,}}\)$", sentence(tmp_path / f"a{suffix}", 200))
+
+
+WRITABLE = sorted(IMAGE_SUFFIXES - {".cin", ".psd", ".rgba", ".bw", ".j2c", ".jpe", ".jpeg", ".tiff", ".rgbe"})
+
+
+@pytest.mark.parametrize("suffix", WRITABLE)
+def test_damaged_images(tmp_path, suffix):
+    """Cut off anywhere, bits flipped anywhere, most of them in the header: a picture, or a sentence."""
+    rng = np.random.default_rng(0)
+    whole = save_image(tmp_path / f"whole{suffix}", picture(5)).read_bytes()
+    path = tmp_path / f"a{suffix}"
+    told = []
+    for turn in range(120):
+        data = bytearray(whole)
+        if turn % 3 == 0:
+            del data[rng.integers(1, len(data)) :]
+        else:
+            for place in rng.integers(0, len(data) if turn % 3 == 1 else min(512, len(data)), 3):
+                data[place] ^= 1 << rng.integers(8)
+        path.write_bytes(data)
+        try:
+            with open_source(path) as source:
+                source.read(0)
+        except MediaError as error:
+            told.append(str(error))
+    assert len(told) > 5
+    assert all(re.match(rf"a\{suffix}: .*[^ :(]\)?$", text) for text in told)
+
+
+def png(width, height):
+    header = struct.pack(">2I5B", width, height, 8, 2, 0, 0, 0)
+    chunks = {b"IHDR": header, b"IDAT": zlib.compress(b"\0\0\0\0"), b"IEND": b""}
+    data = [struct.pack(">I", len(d)) + n + d + struct.pack(">I", zlib.crc32(n + d)) for n, d in chunks.items()]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(data)
+
+
+def tga(width, height):
+    return struct.pack("<3B5x4H2B", 0, 0, 2, 0, 0, width, height, 24, 0)
+
+
+def hdr(width, height):
+    return f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n".encode()
+
+
+@pytest.mark.parametrize("header", [png, tga, hdr])
+def test_images_of_absurd_size(tmp_path, header):
+    path = tmp_path / f"a.{header.__name__}"
+    path.write_bytes(header(60000, 60000) + bytes(100))
+    assert re.match(
+        rf"{path.name}: (60000×60000 are too many pixels|cannot be read as an image \(.+\)$)", sentence(path)
+    )
+    path.write_bytes(header(16000, 16000) + bytes(100))
+    with pytest.raises(MediaError, match=rf"^{re.escape(path.name)}: cannot be (decoded|read as an image) \(.+\)$"):
+        open_source(path).read(0)
+
+
+def test_movie_of_absurd_size(tmp_path):
+    path = make_movie(tmp_path / "a.avi", "ffv1", 5)
+    data = path.read_bytes()
+    where = data.index(b"strf") + 12
+    assert struct.unpack_from("<2i", data, where) == (128, 64)
+    path.write_bytes(data[:where] + struct.pack("<2i", 30000, 20000) + data[where + 8 :])
+    assert sentence(path) == "a.avi: no frame of it can be decoded"
+
+
+def test_movie_whose_decoder_cannot_be_opened(tmp_path):
+    path = make_movie(tmp_path / "a.mkv", "ffv1", 5)
+    with av.open(str(path)) as movie:
+        header = bytes(movie.streams.video[0].codec_context.extradata)
+    path.write_bytes(path.read_bytes().replace(header, header[:-4] + b"\0\0\0\0"))
+    assert sentence(path) == "a.mkv: no frame of it can be decoded"
+
+
+def test_damaged_image_whose_fault_is_no_text(tmp_path):
+    """OpenEXR quotes what it finds."""
+    path = save_image(tmp_path / "a.exr", picture(5) / 255, "half")
+    data = path.read_bytes()
+    for name in (
+        b"compression\0compression",
+        b"channels\0chlist",
+        b"lineOrder\0lineOrder",
+        b"R\0",
+        b"dataWindow\0box2i",
+    ):
+        assert name in data
+        path.write_bytes(data.replace(name, b"\xff\xfe" + name[2:] if len(name) > 2 else b"\xff\0", 1))
+        with contextlib.suppress(MediaError):
+            open_source(path).read(0)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names are bytes on POSIX systems only")
+def test_names_that_are_not_utf8(tmp_path):
+    folder = tmp_path / os.fsdecode(b"caf\xe9")
+    folder.mkdir()
+    for name in ("a_1.png", "m.mp4"):
+        whole = (
+            save_image(tmp_path / name, picture(5)) if name == "a_1.png" else make_movie(tmp_path / name, "mpeg4", 3)
+        )
+        for path in (folder / name, tmp_path / os.fsdecode(b"\xff" + name.encode())):
+            shutil.copy(whole, path)
+            if name == "m.mp4":
+                with open_source(path) as source:
+                    assert number(source.read(2)) == 2
+                continue
+            text = sentence(path)
+            assert text.isprintable()
+            assert text.endswith("its path is not UTF-8; rename the file, or the folder that is not")
+    with pytest.raises(MediaError, match="its path is not UTF-8"):
+        write_exr(folder / "a.exr", np.zeros((4, 4, 1), np.float32), ["Y"])
+    with pytest.raises(MediaError, match="its path is not UTF-8"):
+        write_picture(folder / "a.png", picture(5), "opaque")
 
 
 @pytest.mark.parametrize("suffix", ["jpg", "tif", "exr", "dpx"])

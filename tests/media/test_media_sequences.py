@@ -1,5 +1,6 @@
 """Image sequences: which file an index means, and the samples as the files hold them."""
 
+import os
 import struct
 import zlib
 
@@ -47,6 +48,33 @@ def test_gap_holds_the_file_before(tmp_path):
     with open_source(first, fps=24) as source:
         assert shown(source) == [0, 1, 1, 1, 2, 2, 3]
         assert source.fps == 24
+
+
+@pytest.mark.parametrize("stray", ["a_0106.png", "a_20261121.png", f"a_{10**59 + 7}.png"])
+def test_a_number_far_off_belongs_to_another_sequence(tmp_path, stray):
+    first = numbered(tmp_path, ["a_0003.png", "a_0004.png", stray])
+    with open_source(first) as source:
+        assert shown(source) == [0, 1]
+        assert source.files == [first, tmp_path / "a_0004.png"]
+        assert source.left_out == (
+            f"a_0003.png: the sequence ends with a_0004.png; too many numbers lie before {stray}"
+        )
+
+
+def test_the_widest_gap(tmp_path):
+    first = numbered(tmp_path, ["a_0003.png", "a_0004.png", "a_0105.png"])
+    with open_source(first) as source:
+        assert (source.count, number(source.read(101)), number(source.read(102))) == (103, 1, 2)
+        assert source.left_out == ""
+
+
+def test_no_longer_than_blender_counts(tmp_path):
+    save_image(tmp_path / "a_0.png", picture(0, 8, 8))
+    for sparse in range(100, 1_048_700, 100):
+        os.link(tmp_path / "a_0.png", tmp_path / f"a_{sparse}.png")
+    with open_source(tmp_path / "a_0.png") as source:
+        assert source.count == 1_048_501
+        assert source.left_out.endswith("too many numbers lie before a_1048600.png")
 
 
 def test_sequence_starts_with_the_file_given(tmp_path):
@@ -136,18 +164,53 @@ def test_any_channels_become_rgba(tmp_path, channels):
         ((-90, -20), (-30, -10, 150, 40)),
     ],
 )
-def test_data_window_lies_in_display_window(tmp_path, at, display):
+def test_data_window_is_the_picture(tmp_path, at, display):
     stored = (see_through(5) / np.float32(255)).astype(np.float16)
     path = save_image(tmp_path / "a.exr", stored, "half", at=at, display=display)
     with open_source(path) as source:
-        frame = source.read(0)
-    left, top, width, height = display
-    assert frame.shape == (height, width, 4)
-    for y in range(0, height, 3):
-        for x in range(0, width, 3):
-            column, row = x + left - at[0], y + top - at[1]
-            inside = 0 <= column < WIDTH and 0 <= row < HEIGHT
-            assert np.array_equal(frame[y, x], stored[row, column] if inside else np.zeros(4)), (x, y)
+        assert (source.width, source.height) == (WIDTH, HEIGHT)
+        assert np.array_equal(source.read(0), stored)
+
+
+def test_data_windows_that_differ(tmp_path):
+    for n, size in enumerate([(128, 64), (100, 40)]):
+        save_image(tmp_path / f"a_{n}.exr", picture(n, *size) / 255, "half", at=(n, n), display=(0, 0, 160, 90))
+    sentence = r"^a_1\.exr: is 100×40 \(its data window\), but a_0\.exr is 128×64$"
+    with open_source(tmp_path / "a_0.exr") as source, pytest.raises(MediaError, match=sentence):
+        source.read(1)
+
+
+ALPHAS = {
+    "first alone": (1, 0, 0),
+    "last alone": (0, 0, 1),
+    "middle alone": (0, 1, 0),
+    "none": (0, 0, 0),
+}
+
+
+@pytest.mark.parametrize("alphas", ALPHAS)
+@pytest.mark.parametrize("colours", [1, 3])
+@pytest.mark.parametrize("suffix", [".png", ".tif", ".exr"])
+def test_one_file_with_alpha_among_others(tmp_path, suffix, colours, alphas):
+    for n, alpha in enumerate(ALPHAS[alphas]):
+        channels = [*range(colours), 3][: colours + alpha]
+        names = {"names": ["RGBA"[i] if colours == 3 else "YYYA"[i] for i in channels]} if suffix == ".exr" else {}
+        kind = "half" if suffix == ".exr" else "uint8"
+        save_image(tmp_path / f"a_{n}{suffix}", see_through(n)[..., channels] / np.float32(255), kind, **names)
+    with open_source(tmp_path / f"a_0{suffix}") as source:
+        assert source.alpha == ("opaque" if alphas == "none" else "premultiplied" if suffix == ".exr" else "straight")
+        top = np.iinfo(source.dtype).max if source.dtype.kind == "u" else 1
+        for n, alpha in enumerate(ALPHAS[alphas]):
+            stored = see_through(n)[..., 3] / 255 if alpha else 1
+            assert np.abs(source.read(n)[..., 3] / top - stored).max() < 0.001
+
+
+def test_a_file_that_gets_alpha(tmp_path):
+    """What was found out of a file holds as long as the file is the same."""
+    first = numbered(tmp_path, ["a_0.png", "a_1.png", "a_2.png"])
+    assert open_source(first).alpha == "opaque"
+    save_image(tmp_path / "a_1.png", see_through(1), **STRAIGHT)
+    assert open_source(first).alpha == "straight"
 
 
 @pytest.mark.parametrize(
@@ -168,6 +231,10 @@ def test_data_window_lies_in_display_window(tmp_path, at, display):
             [4, 5, 6],
         ),
         (["Z", "mask.Y"], [1]),
+        (["l.R", "l.G", "l.B", "l.A", "R", "G", "B"], [4, 5, 6]),
+        (["b.R", "b.G", "b.B", "b.A", "a.R", "a.G", "a.B"], [4, 5, 6]),
+        (["z.Combined.R", "z.Combined.G", "z.Combined.B", "a.R", "a.G", "a.B"], [3, 4, 5]),
+        (["Normal.X", "Normal.Y", "Normal.Z", "mask.Y"], [0, 1, 2]),
     ],
 )
 def test_layers_with_colours_are_chosen(tmp_path, names, wanted):
