@@ -48,12 +48,12 @@ def _original(edit, scene):
 
 def _settle(edit, effect, parts: dict) -> None:
     """Moves the effect's keys to its strips, and gives strips of other origins a copy of it."""
-    path = effect.path_from_id()
+    path, scene = effect.path_from_id(), effect.scene
     start = effect.start if effect.start in parts else min(parts)
     if start != effect.start:
         _move(edit, effect, path, start - effect.start)
     for origin in sorted(parts.keys() - {start}):
-        _duplicate(edit, path, edit, parts[origin], origin, _copied(effect.scene))
+        _duplicate(edit, path, edit, parts[origin], origin, _copied(scene))  # no effect is where it was after that
 
 
 def _duplicate(old_edit, path: str, edit, parts, origin: float, scene) -> None:
