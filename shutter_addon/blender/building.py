@@ -50,7 +50,10 @@ def look(edit, effect, strip) -> Look:
     when, *found = _looks.get(key, (0.0,))
     if not when or time.monotonic() - when > _FRESH:
         found = cache.state(medium, *settings), cache.size(settings[0], medium)
+        _looks.pop(key, None)  # the newest are the last
         _looks[key] = time.monotonic(), *found
+        while len(_looks) > _KEPT:
+            del _looks[next(iter(_looks))]
     return Look(*found, doubled.result() * (settings[1] - 1) if doubled.done() else None)
 
 
@@ -170,7 +173,7 @@ class _OfInbetweens(_OfEffect):
         if _running is not None:
             return refused(cls, rpt_("In-between frames are being built; Esc stops that"))
         try:
-            inbetweens.folder(effect)
+            inbetweens.settings(effect)
         except effects.EffectError as error:
             return refused(cls, str(error))
         return True
@@ -184,7 +187,7 @@ class SHUTTER_OT_inbetween_build(_OfInbetweens, Operator):
 
     @classmethod
     def possible(cls, effect):
-        if inbetweens.factor(effect) == 1:
+        if effect.inbetween == "1":
             return refused(cls, rpt_("Choose a factor first"))
         return super().possible(effect)
 

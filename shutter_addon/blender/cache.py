@@ -4,6 +4,7 @@ Blender knows of a strip's own properties only. Properties of the effect drop fr
 strokes and the source are compared with what they were, as no callback tells of them.
 """
 
+import bpy
 import numpy as np
 
 from ..media import MediaError
@@ -26,9 +27,9 @@ _TIMING = (
 def built_key(effect, source) -> tuple:
     """Which in-between frames an effect has; equal keys: the same, of the same files, and none was built or removed
     meanwhile. MediaError: the source strip has no files."""
-    if inbetweens.factor(effect) == 1:
-        return ()
     try:
+        if inbetweens.factor(effect) == 1:
+            return ()
         folder, *made = inbetweens.settings(effect)
     except effects.EffectError as error:
         return (str(error),)
@@ -42,6 +43,13 @@ def forget() -> None:
     """Forgets what the effects of a file were, before another one is loaded."""
     _signatures.clear()
     _built.clear()
+
+
+def drop_removed() -> None:
+    """Forgets effect scenes that are gone."""
+    scenes = {scene.session_uid for scene in bpy.data.scenes}
+    for uid in _signatures.keys() - scenes:
+        del _signatures[uid]
 
 
 def invalidate(edit, scene=None) -> None:
@@ -87,7 +95,8 @@ def _signature(edit, effect, strip):
                 repr(getattr(modifier, p.identifier)) for p in modifier.bl_rna.properties if p.type != "POINTER"
             )
     transform = strip.transform
-    yield tuple(getattr(transform, name) for name in _PLACE), tuple(transform.origin)
+    # As words: "not a number" is never the same again.
+    yield repr([getattr(transform, name) for name in _PLACE]), repr(tuple(transform.origin))
     yield strip.use_flip_x, strip.use_flip_y  # scribbles lie mirrored with it
     if (source := strips.nearest_source(edit, effect, strip)) is not None:
         yield from _source(effect, source)

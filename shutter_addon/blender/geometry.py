@@ -21,6 +21,12 @@ def picture_to_image(strip, size) -> np.ndarray:
     return np.diag([-1.0 if strip.use_flip_x else 1.0, -1.0 if strip.use_flip_y else 1.0, 1.0]) @ matrix
 
 
+def is_invertible(matrix: np.ndarray) -> bool:
+    """Whether a matrix (3, 3) leads back: a strip may be scaled to nothing, and a file may hold what is no number."""
+    with np.errstate(all="ignore"):
+        return bool(np.isfinite(matrix).all() and np.isfinite(1 / np.linalg.det(matrix)))
+
+
 def mapped(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Points (n, 2) through a matrix (3, 3)."""
     return points @ matrix[:2, :2].T + matrix[:2, 2]

@@ -3,7 +3,7 @@
 import bpy
 from bpy.app.handlers import persistent
 
-from . import building, cache, copies, lifecycle, pictures, sources, strips
+from . import building, cache, copies, kept, lifecycle, pictures, sources, strips
 
 
 @persistent
@@ -11,6 +11,8 @@ def _before_load(*_):
     building.stop()
     pictures.forget()
     cache.forget()
+    lifecycle.forget()
+    sources.look_again()
 
 
 @persistent
@@ -69,3 +71,6 @@ def unregister():
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).remove(function)
     pictures.forget()
+    lifecycle.forget()
+    sources.look_again()
+    kept.forget()
