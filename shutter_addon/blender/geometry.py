@@ -11,7 +11,8 @@ def picture_to_image(strip, size) -> np.ndarray:
     """
     width, height = size
     t = strip.transform
-    cos, sin = np.cos(t.rotation), np.sin(t.rotation)
+    with np.errstate(invalid="ignore"):  # whoever needs numbers looks
+        cos, sin = np.cos(t.rotation), np.sin(t.rotation)
     pivot = (np.array(t.origin) - 0.5) * (width, height)
     linear = np.array([[cos, -sin], [sin, cos]]) * (t.scale_x, t.scale_y)
     corner = -(pivot + np.array([width, height]) / 2)
