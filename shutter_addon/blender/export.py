@@ -98,6 +98,7 @@ def _shutter(curves, path: str, chosen, source, name: str, strip) -> recipe.Shut
 def _time(curves, path: str, effect, strip) -> list[recipe.TimeKey]:
     curve = curves.find(f"{path}.source_time")
 
+    @cache
     def at(frame):
         return curves.value(effect, path, "source_time", frame)
 
@@ -120,7 +121,7 @@ def _region(curves, path: str, source, effect, strip) -> recipe.Region | None:
     width = _short(curves.value(source, path, "width", strip.left_handle))
     keyed = [curve for name, index in _CHANNELS if (curve := curves.find(f"{path}.{name}", index))]
     timing = curves.find(f"{path}.location")
-    place = partial(_place, curves, path, source)
+    place = cache(partial(_place, curves, path, source))
     frames = set(animation.key_frames(keyed))
     # The ease from a drawing to the next is that of the key at its frame.
     words = {number: animation.ease_at(timing, number) for number in drawings} if len(drawings) > 1 else {}

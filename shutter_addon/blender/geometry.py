@@ -3,6 +3,7 @@
 import numpy as np
 
 
+@np.errstate(invalid="ignore")  # of a transform that is no number nothing is; effects.image_to_picture says so
 def picture_to_image(strip, size) -> np.ndarray:
     """Matrix (3, 3) from fractions of the strip's picture to the sequencer's image space.
 
@@ -11,8 +12,7 @@ def picture_to_image(strip, size) -> np.ndarray:
     """
     width, height = size
     t = strip.transform
-    with np.errstate(invalid="ignore"):  # whoever needs numbers looks
-        cos, sin = np.cos(t.rotation), np.sin(t.rotation)
+    cos, sin = np.cos(t.rotation), np.sin(t.rotation)
     pivot = (np.array(t.origin) - 0.5) * (width, height)
     linear = np.array([[cos, -sin], [sin, cos]]) * (t.scale_x, t.scale_y)
     corner = -(pivot + np.array([width, height]) / 2)

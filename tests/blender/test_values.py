@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from support import sequencer, write_frames
 
+from shutter_addon.core.limits import MAX_SHUTTERS
+
 NAN, INF = math.nan, math.inf
 
 
@@ -140,7 +142,10 @@ IMPOSSIBLE = {
         lambda e: setattr(strip_of(e).transform, "offset_x", NAN),
         'strip "Shutter": a number of its transform',
     ),
-    "shutters": (lambda e: [e.shutters.add() for _ in range(70)], 'shutter "Long" and 71 more: 64 are the most'),
+    "shutters": (
+        lambda e: [e.shutters.add() for _ in range(MAX_SHUTTERS)],
+        f'shutter "Long" and {MAX_SHUTTERS + 1} more: {MAX_SHUTTERS} are the most',
+    ),
     "points": (
         lambda e: draw(e.scene.annotation.layers[0], [(0, 0)] * 100_001),
         'region "Face": more than 100000 points',
