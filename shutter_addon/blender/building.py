@@ -50,10 +50,7 @@ def look(edit, effect, strip) -> Look:
     when, *found = _looks.get(key, (0.0,))
     if not when or time.monotonic() - when > _FRESH:
         found = cache.state(medium, *settings), cache.size(settings[0], medium)
-        _looks.pop(key, None)  # the newest are the last
         _looks[key] = time.monotonic(), *found
-        while len(_looks) > _KEPT:
-            del _looks[next(iter(_looks))]
     return Look(*found, doubled.result() * (settings[1] - 1) if doubled.done() else None)
 
 

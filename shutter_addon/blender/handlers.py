@@ -12,7 +12,6 @@ def _before_load(*_):
     pictures.forget()
     cache.forget()
     lifecycle.forget()
-    sources.look_again()
 
 
 @persistent
@@ -72,5 +71,4 @@ def unregister():
         getattr(bpy.app.handlers, name).remove(function)
     pictures.forget()
     lifecycle.forget()
-    sources.look_again()
     kept.forget()

@@ -11,7 +11,6 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..media import MediaError, open_source
 
 _FRESH = 1.0  # seconds that the files of a sequence, which may be long, are not asked again
-_MOST = 16  # sequences whose files are remembered
 _every_file: dict[tuple, tuple[float, tuple]] = {}  # when they were asked, and what they were
 
 
@@ -34,10 +33,7 @@ def every_file_key(strip) -> tuple:
     when, stamps = _every_file.get(key, (0.0, ()))
     if not when or time.monotonic() - when > _FRESH:
         stamps = tuple(_stamp(path(i)) for i in range(count))
-        _every_file.pop(key, None)  # the newest are the last
         _every_file[key] = time.monotonic(), stamps
-        while len(_every_file) > _MOST:
-            del _every_file[next(iter(_every_file))]
     return stamps
 
 

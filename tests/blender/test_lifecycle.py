@@ -358,28 +358,16 @@ def test_only_the_last_effects_that_were_removed_are_kept(edit, add):
 
 
 def test_the_extension_leaves_nothing_kept(bpy, edit, add):
-    from shutter_addon.blender import handlers, kept, lifecycle, sources
+    from shutter_addon.blender import handlers, kept, lifecycle
 
     add()
     kept.keep(edit, edit.virtual_shutter.effects[0])
-    sources.every_file_key(edit.sequence_editor.strips["images"])
     update(bpy)
     assert kept._effects
     assert lifecycle._layer_names
-    assert sources._every_file
     handlers.unregister()
     try:
-        assert not (kept._effects or lifecycle._layer_names or sources._every_file)
+        assert not kept._effects
+        assert not lifecycle._layer_names
     finally:
         handlers.register()
-
-
-def test_files_of_many_sequences_are_not_remembered(edit, add):
-    from shutter_addon.blender import sources
-
-    add()
-    source = edit.sequence_editor.strips["images"]
-    for i in range(3 * sources._MOST):
-        source.directory = f"//folder {i}/"
-        sources.every_file_key(source)
-    assert len(sources._every_file) == sources._MOST

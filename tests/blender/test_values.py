@@ -363,8 +363,18 @@ class Layout:
 
 def show(bpy, edit):
     """Calls what Blender calls where an effect is shown: handlers, polls, panels, gizmos."""
-    from shutter_addon.blender import bar_editor, building, cache, lifecycle, operators, panels, preview
-    from shutter_addon.blender import region_gizmo, split_gizmo, strips
+    from shutter_addon.blender import (
+        bar_editor,
+        building,
+        cache,
+        lifecycle,
+        operators,
+        panels,
+        preview,
+        region_gizmo,
+        split_gizmo,
+        strips,
+    )
 
     lifecycle.update()
     cache.invalidate_changed(edit)
