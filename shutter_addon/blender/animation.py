@@ -7,31 +7,51 @@ import re
 from itertools import pairwise
 
 import bpy
+import numpy as np
 from bpy_extras import anim_utils
 
 from ..core import keyframes
+from . import values
 
 
 class Curves:
     """The F-curves of a scene, found by path."""
 
     def __init__(self, scene):
-        self._curves = {(c.data_path, c.array_index): c for c in curves_under(scene, "") if not c.mute}
+        self._scene = scene
+        self._curves = {(c.data_path, c.array_index): c for c in curves_under(scene, "") if not (c.mute or c.is_empty)}
+        self._checked = set()
 
     def find(self, path: str, index: int = 0):
-        """The F-curve of a property, or None; muted ones do not count."""
-        return self._curves.get((path, index))
+        """The F-curve of a property, or None; muted and empty ones do not count. EffectError: a key of it lies where
+        no timeline is."""
+        curve = self._curves.get((path, index))
+        if curve is not None and curve not in self._checked:
+            owner, _, name = path.rpartition(".")
+            values.check_keys(self._scene.path_resolve(owner), name, _points(curve)[:, 0])
+            self._checked.add(curve)
+        return curve
 
     def value(self, owner, path: str, name: str, frame: float):
-        """A float property, or a float vector as a list, at a frame; path: the owner's, from the scene."""
+        """A float property, or a float vector as a list, at a frame; path: the owner's, from the scene. EffectError:
+        it is outside of its range."""
         value = getattr(owner, name)
         if isinstance(value, float):
-            return self._component(f"{path}.{name}", 0, frame, value)
-        return [self._component(f"{path}.{name}", i, frame, v) for i, v in enumerate(value)]
+            return self._component(owner, path, name, 0, frame, value)
+        return [self._component(owner, path, name, i, frame, v) for i, v in enumerate(value)]
 
-    def _component(self, path, index, frame, value):
-        curve = self._curves.get((path, index))
-        return curve.evaluate(frame) if curve and not curve.is_empty else value
+    def _component(self, owner, path, name, index, frame, value):
+        curve = self.find(f"{path}.{name}", index)
+        if curve is None:
+            return values.number(owner, name, value)
+        return values.curved(owner, name, curve, frame)
+
+
+def _points(curve) -> np.ndarray:
+    """Frames and values (n, 2) of an F-curve's keys."""
+    numbers = np.empty((len(curve.keyframe_points), 2), dtype=np.float32)
+    curve.keyframe_points.foreach_get("co", numbers.reshape(-1))
+    return numbers
 
 
 def key_frames(curves) -> list[float]:

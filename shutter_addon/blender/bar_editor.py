@@ -9,6 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Gizmo, GizmoGroup
 
 from . import drawing, editing, keymaps, strips
+from .values import EffectError
 
 _MARGIN, _HEIGHT, _BAR = 16, 96, 16  # in units of the interface
 _PAD, _HEADER = 8, 18
@@ -75,11 +76,20 @@ def bar_under(context, x: float, y: float) -> int | None:
     found = strips.active(context)
     if found is None or context.region is None or context.region.type != "PREVIEW":
         return None
-    effect = found[1]
+    if (values := _shown(found[1])) is None:
+        return None
+    place = _layout(context, values)
+    return place.bar_at(x) if place.contains(x, y) else None
+
+
+def _shown(effect) -> np.ndarray | None:
+    """Bars (L,) that the editor shows; None: there is no shutter, or none that a picture can be made with."""
     if editing.active_shutter(effect) is None:
         return None
-    place = _layout(context, editing.bars(editing.active_shutter(effect)))
-    return place.bar_at(x) if place.contains(x, y) else None
+    try:
+        return editing.bars_now(effect, effect.active_shutter)
+    except EffectError:  # panels and the live preview tell it
+        return None
 
 
 def _key_colors() -> dict:
@@ -97,9 +107,9 @@ class SHUTTER_GT_bars(Gizmo):
 
     def draw(self, context):
         effect = strips.active(context)[1]
-        shutter = editing.active_shutter(effect)
-        values = editing.bars_now(effect, effect.active_shutter)
-        _draw(_layout(context, values), shutter, values, editing.key_state(effect, effect.active_shutter))
+        if (values := _shown(effect)) is not None:
+            states = editing.key_state(effect, effect.active_shutter)
+            _draw(_layout(context, values), editing.active_shutter(effect), values, states)
 
     def test_select(self, context, location):
         return 0 if bar_under(context, *location) is not None else -1

@@ -178,7 +178,7 @@ class _OfInbetweens(_OfEffect):
         if _running is not None:
             return refused(cls, rpt_("In-between frames are being built; Esc stops that"))
         try:
-            inbetweens.folder(effect)
+            inbetweens.settings(effect)
         except effects.EffectError as error:
             return refused(cls, str(error))
         return True
@@ -192,7 +192,7 @@ class SHUTTER_OT_inbetween_build(_OfInbetweens, Operator):
 
     @classmethod
     def possible(cls, effect):
-        if inbetweens.factor(effect) == 1:
+        if effect.inbetween == "1":
             return refused(cls, rpt_("Choose a factor first"))
         return super().possible(effect)
 

@@ -29,9 +29,9 @@ _TIMING = (
 def built_key(effect, source) -> tuple:
     """Which in-between frames an effect has of the files that its source reads; equal keys: the same, and none was
     built or removed meanwhile. MediaError: the source strip has no files."""
-    if inbetweens.factor(effect) == 1:
-        return ()
     try:
+        if inbetweens.factor(effect) == 1:
+            return ()
         folder, *made = inbetweens.settings(effect)
     except effects.EffectError as error:
         return (str(error),)
@@ -48,6 +48,13 @@ def forget() -> None:
     """Forgets what the effects of a file were, before another one is loaded."""
     _signatures.clear()
     _built.clear()
+
+
+def drop_removed() -> None:
+    """Forgets effect scenes that are gone."""
+    scenes = {scene.session_uid for scene in bpy.data.scenes}
+    for uid in _signatures.keys() - scenes:
+        del _signatures[uid]
 
 
 def invalidate(edit, scene=None) -> None:
@@ -104,7 +111,8 @@ def _signature(edit, effect, strip):
                 repr(getattr(modifier, p.identifier)) for p in modifier.bl_rna.properties if p.type != "POINTER"
             )
     transform = strip.transform
-    yield tuple(getattr(transform, name) for name in _PLACE), tuple(transform.origin)
+    # As words: "not a number" is never the same again.
+    yield repr([getattr(transform, name) for name in _PLACE]), repr(tuple(transform.origin))
     yield strip.use_flip_x, strip.use_flip_y  # scribbles lie mirrored with it
     if (source := strips.nearest_source(edit, effect, strip)) is not None:
         yield from _source(effect, source)

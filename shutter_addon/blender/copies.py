@@ -6,7 +6,8 @@ original's effect, at the original's place in time. Parts of a cut strip have th
 
 import bpy
 
-from . import animation, strips
+from ..core.limits import MAX_FRAME
+from . import animation, strips, values
 
 
 def adopt() -> None:
@@ -48,12 +49,14 @@ def _original(edit, scene):
 
 def _settle(edit, effect, parts: dict) -> None:
     """Moves the effect's keys to its strips, and gives strips of other origins a copy of it."""
-    path = effect.path_from_id()
+    path, scene = effect.path_from_id(), effect.scene
     start = effect.start if effect.start in parts else min(parts)
+    if not abs(effect.start) <= 2 * MAX_FRAME:  # no frame: its keys are where they are
+        effect.start = start
     if start != effect.start:
         _move(edit, effect, path, start - effect.start)
     for origin in sorted(parts.keys() - {start}):
-        _duplicate(edit, path, edit, parts[origin], origin, _copied(effect.scene))
+        _duplicate(edit, path, edit, parts[origin], origin, _copied(scene))  # no effect is where it was after that
 
 
 def _duplicate(old_edit, path: str, edit, parts, origin: float, scene) -> None:
@@ -95,4 +98,4 @@ def copy_properties(old, new) -> None:
             for item in getattr(old, name):
                 copy_properties(item, getattr(new, name).add())
         elif not prop.is_readonly:
-            setattr(new, name, getattr(old, name))
+            values.store(new, name, values.stored(old, name))

@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import presets, shutters
-from . import animation, copies, effects
+from . import animation, copies, effects, inbetweens, values
 from .effects import layer_of
 
 # Told apart on footage and by colour-blind eyes (Okabe and Ito).
@@ -33,12 +33,12 @@ def effect_of(item):
 
 def active_shutter(effect):
     """The shutter that is chosen in the list, or None."""
-    return effect.shutters[effect.active_shutter] if effect.active_shutter < len(effect.shutters) else None
+    return effect.shutters[effect.active_shutter] if 0 <= effect.active_shutter < len(effect.shutters) else None
 
 
 def active_region(effect):
     """The region that is chosen in the list, if it is one of the active shutter's; or None."""
-    region = effect.regions[effect.active_region] if effect.active_region < len(effect.regions) else None
+    region = effect.regions[effect.active_region] if 0 <= effect.active_region < len(effect.regions) else None
     shutter = active_shutter(effect)
     return region if region and shutter and region.shutter == shutter.name else None
 
@@ -86,9 +86,10 @@ def start(effect) -> None:
 def add_shutter(effect, name: str = "", bars=None):
     """Appends a shutter, fully open unless bars (window,) are given, and makes it the active one."""
     color = COLORS[len(effect.shutters) % len(COLORS)]
+    weights = np.ones(values.number(effect, "window")) if bars is None else bars
     shutter = effect.shutters.add()
     shutter.name, shutter.color = name or data_("Shutter"), color
-    for weight in np.ones(effect.window) if bars is None else bars:
+    for weight in weights:
         shutter.bars.add().weight = weight
     effect.active_shutter = len(effect.shutters) - 1
     return shutter
@@ -141,27 +142,27 @@ def rename(effect, old: str, new: str) -> str:
 
 def bars(shutter) -> np.ndarray:
     """A shutter's bars as they stand, float64 (L,)."""
-    values = np.empty(len(shutter.bars), dtype=np.float32)
-    shutter.bars.foreach_get("weight", values)
-    return values.astype(np.float64)
+    weights = np.empty(len(shutter.bars), dtype=np.float32)
+    shutter.bars.foreach_get("weight", weights)
+    return weights.astype(np.float64)
 
 
-def summary(values) -> str:
+def summary(weights) -> str:
     """A shutter's bars (L,) in words: its angle, and how many frames' light it gathers."""
-    light = shutters.exposure(values)
+    light = shutters.exposure(weights)
     if not light:
         return iface_("All bars are zero: the shutter never opens")
-    angle, frames = f"{shutters.open_angle(values):.0f}", f"{light:.3g}"
+    angle, frames = f"{shutters.open_angle(weights):.0f}", f"{light:.3g}"
     if frames == "1":
         return iface_("{angle}°, 1 frame of light").format(angle=angle)
     return iface_("{angle}°, {frames} frames of light").format(angle=angle, frames=frames)
 
 
-def set_bars(shutter, values) -> None:
+def set_bars(shutter, weights) -> None:
     """Gives a shutter these bars (L,); those that stay are not touched."""
-    for bar, value in zip(shutter.bars, values, strict=True):
-        if bar.weight != np.float32(value):
-            bar.weight = value
+    for bar, weight in zip(shutter.bars, weights, strict=True):
+        if bar.weight != np.float32(weight):
+            bar.weight = weight
 
 
 def auto_key(context) -> bool:
@@ -169,9 +170,15 @@ def auto_key(context) -> bool:
     return context.scene.tool_settings.use_keyframe_insert_auto
 
 
-def paint(effect, index: int, values, key: bool = False) -> None:
-    """Gives a shutter bars (L,) as an editor does at the current frame; key: and keys them there."""
-    set_bars(effect.shutters[index], values)
+def paint(effect, index: int, weights, key: bool = False) -> None:
+    """Gives a shutter bars (L,) as an editor does at the current frame, and as many as it may lack or have too many;
+    key: and keys them there."""
+    shutter = effect.shutters[index]
+    while len(shutter.bars) > len(weights):
+        shutter.bars.remove(len(shutter.bars) - 1)
+    while len(shutter.bars) < len(weights):
+        shutter.bars.add()
+    set_bars(shutter, weights)
     if key:
         key_bars(effect, index)
 
@@ -186,8 +193,11 @@ def fit_bars(effect) -> None:
 def fit_factor(effect) -> None:
     """After a change of the factor of in-between frames: the bars, keyed ones as well, stand for the same times.
 
-    EffectError: it would take too many bars; the factor is put back, and nothing has changed."""
-    factor, position = int(effect.inbetween), effect.position.lower()
+    EffectError: it would take too many bars; the factor is put back, and nothing has changed. Or a value that no effect
+    can have is in the way."""
+    factor, position = inbetweens.factor(effect), values.word(effect, "position").lower()
+    if str(effect.bars_per_frame) not in effect.bl_rna.properties["inbetween"].enum_items:
+        effect.bars_per_frame = factor  # what the bars stood for is not known
     if factor == effect.bars_per_frame:
         return
 
@@ -224,10 +234,10 @@ def _change_bars(effect, index: int, change) -> None:
 
 def _changed_key(old, keyed, frame: float, change):
     """Frame, changed bars, and ease of the key at a frame."""
-    values = old.copy()
-    values[list(keyed)] = [max(curve.evaluate(frame), 0.0) for curve in keyed.values()]
+    weights = old.copy()
+    weights[list(keyed)] = [max(curve.evaluate(frame), 0.0) for curve in keyed.values()]
     own = next(c for c in keyed.values() if any(key.co[0] == frame for key in c.keyframe_points))
-    return frame, change(values), animation.ease_at(own, frame)
+    return frame, change(weights), animation.ease_at(own, frame)
 
 
 def key_bars(effect, index: int) -> None:
@@ -277,7 +287,7 @@ def _state(curve, value: float, edit) -> str:
 def bars_now(effect, index: int) -> np.ndarray:
     """Bars (L,) that the picture at the current frame is made with, interpolated between keys.
 
-    Bars that were changed since, and not keyed yet, count as they stand.
+    Bars that were changed since, and not keyed yet, count as they stand. EffectError: the picture cannot be made.
     """
     stored = bars(effect.shutters[index])
     if "changed" in key_state(effect, index):

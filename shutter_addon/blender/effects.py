@@ -5,21 +5,19 @@ import numpy as np
 from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..core import keyframes, recipe, scribbles, shutters
-from . import animation, geometry
+from ..core import keyframes, limits, recipe, scribbles, shutters
+from . import animation, geometry, values
+from .values import EffectError
 
+# Pixels of a strip's side on the image, below which nobody sees where its scribbles are.
+_SMALLEST = 4
 OPTIONS = ("position", "interpolation", "light", "exposure", "edges")
-
-
-class EffectError(RuntimeError):
-    """The effect cannot be rendered as it stands; the message is one sentence for the user."""
 
 
 def instant(edit, effect, strip, frame: float) -> recipe.Instant:
     """The effect at a timeline frame of its edit; strip: the effect strip that shows it. EffectError: no shutter
-    at all, or one that never opens."""
-    if not effect.shutters:
-        raise EffectError(rpt_('"{effect}" has no shutter').format(effect=effect.name))
+    at all, one that never opens, or a value that no effect can have."""
+    check_counts(effect)
     curves, path = animation.Curves(edit), effect.path_from_id()
     chosen = options(effect, curves, frame)
     bars = [
@@ -27,6 +25,16 @@ def instant(edit, effect, strip, frame: float) -> recipe.Instant:
         for i, shutter in enumerate(effect.shutters)
     ]
     return recipe.Instant(chosen, np.stack(bars), tuple(_shapes_at(edit, effect, strip, curves, frame)))
+
+
+def check_counts(effect) -> None:
+    """EffectError: there are no shutters, or more of anything than an effect has."""
+    if not effect.shutters:
+        raise EffectError(rpt_('"{effect}" has no shutter').format(effect=effect.name))
+    for items, most in ((effect.shutters, limits.MAX_SHUTTERS), (effect.regions, limits.MAX_REGIONS)):
+        if len(items) > most:
+            sentence = rpt_("{place} and {count} more: {most} are the most")
+            raise EffectError(sentence.format(place=values.place(items[0]), count=len(items) - 1, most=most))
 
 
 def source_time(edit, effect, frame: float) -> tuple[float, bool]:
@@ -61,43 +69,48 @@ def checked(name: str, bars: np.ndarray, frame: float) -> np.ndarray:
 
 
 def options(effect, curves=None, frame: float = 0.0) -> recipe.Options:
-    """The effect's options in the recipe's words: at a frame of the edit, given its curves; otherwise as they stand."""
+    """The effect's options in the recipe's words: at a frame of the edit, given its curves; otherwise as they stand.
+    EffectError: one that no effect can have."""
     path = effect.path_from_id()
 
     def at(name):
         curve = curves.find(f"{path}.{name}") if curves else None
-        if curve is None or curve.is_empty:
-            return getattr(effect, name)
-        value, prop = curve.evaluate(frame), effect.bl_rna.properties[name]
-        return value >= 0.5 if prop.type == "BOOLEAN" else prop.enum_items[round(value)].identifier
+        value = None if curve is None else curve.evaluate(frame)
+        if effect.bl_rna.properties[name].type == "ENUM":
+            return values.word(effect, name, value)
+        return getattr(effect, name) if value is None else value >= 0.5
 
     words = {name: at(name).lower() for name in OPTIONS}
     return recipe.Options(
-        effect.window,
+        values.number(effect, "window"),
         **words,
         aggregate=int(at("aggregate")),
         border=at("border"),
         stop_at_cuts=at("stop_at_cuts"),
-        step=int(effect.inbetween),
+        step=int(values.word(effect, "inbetween")),
     )
 
 
 def bars_at(curves, path: str, shutter, chosen: recipe.Options, frame: float) -> np.ndarray:
     """Bars (window,) of a shutter at a frame; between keys by displacement with the ease of the F-curves, or as the
-    F-curves are, if that is the interpolation. path: the shutter's, from the scene; chosen: the effect's options."""
+    F-curves are, if that is the interpolation. path: the shutter's, from the scene; chosen: the effect's options.
+    EffectError: they are not as many, or one cannot be."""
     window = chosen.window
-    stored = np.zeros(window)
-    weights = [bar.weight for bar in shutter.bars][:window]
-    stored[: len(weights)] = weights
+    if len(shutter.bars) != window:
+        sentence = rpt_("{place}: {count} bars, the window is {window}")
+        raise EffectError(sentence.format(place=values.place(shutter), count=len(shutter.bars), window=window))
+    stored = np.array([bar.weight for bar in shutter.bars])
     keyed = {i: curve for i in range(window) if (curve := curves.find(f"{path}.bars[{i}].weight"))}
-    if not keyed:
-        return stored
 
     def at(time):
         bars = stored.copy()
-        bars[list(keyed)] = [max(curve.evaluate(time), 0.0) for curve in keyed.values()]
+        # No bar is below 0, a curve may be. In this order "not a number" stays what it is.
+        bars[list(keyed)] = [min(max(curve.evaluate(time), 0.0), limits.MAX_BAR) for curve in keyed.values()]
+        values.check(shutter.bars, "weight", bars)
         return bars
 
+    if not keyed:
+        return at(frame)
     frames = animation.key_frames(keyed.values())
     if not frames:  # curves of samples or of modifiers alone
         return at(frame)
@@ -122,17 +135,22 @@ def drawn_regions(effect) -> list:
 def _shapes_at(edit, effect, strip, curves, frame: float):
     names = [shutter.name for shutter in effect.shutters]
     width, height = picture_size(effect)
+    room = limits.MAX_POINTS
     for i, region in enumerate(effect.regions):
         path = f"{effect.path_from_id()}.regions[{i}]"
         if region.shutter not in names:
             continue
         strokes = strokes_at(edit, effect, strip, i, frame, curves)
+        room -= sum(map(len, strokes))
+        if room < 0:
+            sentence = rpt_("{place}: more than {most} points with those before it")
+            raise EffectError(sentence.format(place=values.place(region), most=limits.MAX_POINTS))
         location = curves.value(region, path, "location", frame)
         rotation = np.degrees(curves.value(region, path, "rotation", frame))
         scale = curves.value(region, path, "scale", frame)
         yield scribbles.Shape(
             names.index(region.shutter),
-            region.kind.lower(),
+            values.word(region, "kind").lower(),
             curves.value(region, path, "width", frame),
             scribbles.transform(strokes, location, rotation, scale, width / height),
         )
@@ -145,29 +163,46 @@ def picture_size(effect) -> tuple[int, int]:
 
 def strokes_at(edit, effect, strip, index: int, frame: float, curves=None) -> list[np.ndarray]:
     """A region's strokes (n, 2) on the picture at a frame, not moved yet; between two drawings with the ease of its
-    location's keys."""
+    location's keys. None where nobody sees the strip. EffectError: they lie nowhere."""
     region, (width, height) = effect.regions[index], picture_size(effect)
-    layer = layer_of(effect, region)
-    if layer is None or not layer.frames:
+    layer, to_picture = layer_of(effect, region), image_to_picture(effect, strip)
+    if layer is None or not layer.frames or to_picture is None:
         return []
     drawings = sorted(layer.frames, key=lambda drawing: drawing.frame_number)
     numbers = [drawing.frame_number for drawing in drawings]
     before, after, u = keyframes.span(numbers, frame)
     timing = (curves or animation.Curves(edit)).find(f"{effect.path_from_id()}.regions[{index}].location")
-    to_picture = np.linalg.inv(geometry.picture_to_image(strip, (width, height)))
     u = keyframes.eased(u, animation.ease_at(timing, numbers[before]))
-    first, second = (points(drawings[i], to_picture) for i in (before, after))
+    first, second = (points(region, drawings[i], to_picture) for i in (before, after))
     return scribbles.between_strokes(first, second, u, width / height)
 
 
-def points(drawing, to_picture) -> list[np.ndarray]:
-    """The strokes (n, 2) of an annotation's frame, on the picture."""
+def image_to_picture(effect, strip) -> np.ndarray | None:
+    """Matrix (3, 3) from the sequencer's image to fractions of the strip's picture; None where the strip is scaled to
+    nothing that can be seen. EffectError: its transform is none."""
+    matrix = geometry.picture_to_image(strip, picture_size(effect))
+    if not np.isfinite(matrix).all():
+        raise EffectError(rpt_('strip "{strip}": a number of its transform is not finite').format(strip=strip.name))
+    if np.hypot(*matrix[:2, :2]).min() < _SMALLEST:
+        return None
+    return np.linalg.inv(matrix)
+
+
+def points(region, drawing, to_picture) -> list[np.ndarray]:
+    """The strokes (n, 2) of an annotation's frame that belongs to a region, on the picture. EffectError: they lie too
+    far from it."""
     result = []
     for stroke in drawing.strokes:
         flat = np.empty(len(stroke.points) * 3, dtype=np.float32)
         stroke.points.foreach_get("co", flat)
         if len(flat):
             result.append(geometry.mapped(to_picture, flat.reshape(-1, 3)[:, :2].astype(np.float64)))
+            if not (np.abs(result[-1]) <= limits.MAX_DISTANCE).all():
+                raise EffectError(
+                    rpt_("{place}: a point of its strokes is nowhere near the picture").format(
+                        place=values.place(region)
+                    )
+                )
     return result
 
 
@@ -240,7 +275,8 @@ def _add_region(edit, effect, strip, path: str, source: recipe.Region, first: fl
 
 def layer_of(effect, region):
     """The annotation layer of a region, or None."""
-    return effect.scene.annotation.layers.get(region.layer) if effect.scene.annotation else None
+    annotation = effect.scene and effect.scene.annotation
+    return annotation.layers.get(region.layer) if annotation else None
 
 
 def annotation(effect):

@@ -15,8 +15,8 @@ from itertools import pairwise
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..core import keyframes, recipe
-from . import animation, effects, geometry, inbetweens
+from ..core import keyframes, limits, recipe
+from . import animation, effects, inbetweens, values
 
 # Of the largest bar, of fractions of the picture, of degrees; of the larger key's value where that is above 1.
 TOLERANCE = 1e-4
@@ -28,8 +28,12 @@ def recipe_of(edit, effect, strip) -> recipe.Recipe:
 
     Left out are regions without strokes or shutter, drawings before the first that has strokes, and keys of widths and
     of options, which are as at the strip's first frame."""
-    if not effect.shutters:
-        raise effects.EffectError(rpt_('"{effect}" has no shutter').format(effect=effect.name))
+    effects.check_counts(effect)
+    if not -limits.MAX_FRAME <= strip.left_handle <= strip.right_handle <= limits.MAX_FRAME:
+        sentence = rpt_('strip "{strip}" lies at frames {first} to {last}, where no timeline is')
+        raise effects.EffectError(
+            sentence.format(strip=strip.name, first=strip.left_handle, last=strip.right_handle - 1)
+        )
     curves, path = animation.Curves(edit), effect.path_from_id()
     chosen = effects.options(effect, curves, strip.left_handle)
     names = _different([shutter.name for shutter in effect.shutters])
@@ -47,7 +51,7 @@ def recipe_of(edit, effect, strip) -> recipe.Recipe:
         shutters=shutters,
         regions=[region for region in regions if region],
         inbetween=inbetweens.factor(effect),
-        inbetween_method=effect.inbetween_method.lower(),
+        inbetween_method=inbetweens.method(effect),
         time=_time(curves, path, effect, strip) if effect.use_source_time else [],
         **{name: value for name, value in asdict(chosen).items() if name != "step"},
     )
@@ -70,7 +74,7 @@ def _shutter(curves, path: str, chosen, source, name: str, strip) -> recipe.Shut
     def bars(frame):
         return effects.checked(source.name, effects.bars_at(curves, path, source, chosen, frame), frame)
 
-    color = tuple(map(_short, source.color))
+    color = tuple(_short(values.number(source, "color", component)) for component in source.color)
     keyed = [curve for k in range(chosen.window) if (curve := curves.find(f"{path}.bars[{k}].weight"))]
     if not keyed:
         return recipe.Shutter(name, color, [_short(v) for v in bars(strip.left_handle)])
@@ -94,6 +98,7 @@ def _shutter(curves, path: str, chosen, source, name: str, strip) -> recipe.Shut
 def _time(curves, path: str, effect, strip) -> list[recipe.TimeKey]:
     curve = curves.find(f"{path}.source_time")
 
+    @cache
     def at(frame):
         return curves.value(effect, path, "source_time", frame)
 
@@ -116,7 +121,7 @@ def _region(curves, path: str, source, effect, strip) -> recipe.Region | None:
     width = _short(curves.value(source, path, "width", strip.left_handle))
     keyed = [curve for name, index in _CHANNELS if (curve := curves.find(f"{path}.{name}", index))]
     timing = curves.find(f"{path}.location")
-    place = partial(_place, curves, path, source)
+    place = cache(partial(_place, curves, path, source))
     frames = set(animation.key_frames(keyed))
     # The ease from a drawing to the next is that of the key at its frame.
     words = {number: animation.ease_at(timing, number) for number in drawings} if len(drawings) > 1 else {}
@@ -138,7 +143,7 @@ def _region(curves, path: str, source, effect, strip) -> recipe.Region | None:
     return recipe.Region(
         source.shutter,
         source.name,
-        source.kind.lower(),
+        values.word(source, "kind").lower(),
         width,
         drawings[first],
         [_region_key(frame, place(frame), redrawn.get(frame), ease, strip) for frame, ease in keys],
@@ -161,13 +166,15 @@ def _place(curves, path: str, source, frame: float) -> np.ndarray:
 
 def _drawings(effect, source, strip) -> dict[int, list]:
     """A region's strokes by the timeline frames they were drawn at, from the first that has any."""
-    layer = effects.layer_of(effect, source)
-    to_picture = np.linalg.inv(geometry.picture_to_image(strip, effects.picture_size(effect)))
+    layer, to_picture = effects.layer_of(effect, source), effects.image_to_picture(effect, strip)
+    if to_picture is None:
+        raise effects.EffectError(rpt_('strip "{strip}" is too small to find its scribbles').format(strip=strip.name))
     drawings = sorted(layer.frames, key=lambda drawing: drawing.frame_number) if layer else []
     result = {}
     for drawing in drawings:
         strokes = [
-            [tuple(point) for point in np.round(points, 6).tolist()] for points in effects.points(drawing, to_picture)
+            [tuple(point) for point in np.round(points, 6).tolist()]
+            for points in effects.points(source, drawing, to_picture)
         ]
         if strokes or result:
             result[drawing.frame_number] = strokes

@@ -3,6 +3,7 @@
 import numpy as np
 
 
+@np.errstate(invalid="ignore")  # of a transform that is no number nothing is; effects.image_to_picture says so
 def picture_to_image(strip, size) -> np.ndarray:
     """Matrix (3, 3) from fractions of the strip's picture to the sequencer's image space.
 
@@ -19,6 +20,12 @@ def picture_to_image(strip, size) -> np.ndarray:
     matrix = np.eye(3)
     matrix[:2, :2], matrix[:2, 2] = linear * (width, height), offset
     return np.diag([-1.0 if strip.use_flip_x else 1.0, -1.0 if strip.use_flip_y else 1.0, 1.0]) @ matrix
+
+
+def is_invertible(matrix: np.ndarray) -> bool:
+    """Whether a matrix (3, 3) leads back: a strip may be scaled to nothing, and a file may hold what is no number."""
+    with np.errstate(all="ignore"):
+        return bool(np.isfinite(matrix).all() and np.isfinite(1 / np.linalg.det(matrix)))
 
 
 def mapped(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:

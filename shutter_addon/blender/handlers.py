@@ -6,7 +6,7 @@ import sys
 import bpy
 from bpy.app.handlers import persistent
 
-from . import building, cache, copies, lifecycle, pictures, rendering, sources, strips
+from . import building, cache, copies, kept, lifecycle, pictures, rendering, sources, strips
 
 
 @persistent
@@ -15,6 +15,7 @@ def _before_load(*_):
     pictures.forget()
     cache.forget()
     sources.forget()
+    lifecycle.forget()
 
 
 @persistent
@@ -99,3 +100,5 @@ def unregister():
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).remove(function)
     pictures.forget()
+    lifecycle.forget()
+    kept.forget()

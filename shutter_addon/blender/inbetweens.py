@@ -5,7 +5,7 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from . import effects
+from . import effects, values
 
 FOLDER = "virtual_shutter_inbetween"
 METHODS = {"QUICK": "quick", "GOOD": "good"}
@@ -18,7 +18,7 @@ def folder(effect) -> Path:
     or of an extension that is not installed."""
     if given is not None:
         return given
-    if effect.inbetween_place == "USER":
+    if values.word(effect, "inbetween_place") == "USER":
         package = __package__.rpartition(".shutter_addon")[0]
         try:
             return Path(bpy.utils.extension_path_user(package, path=FOLDER))
@@ -32,13 +32,14 @@ def folder(effect) -> Path:
 
 
 def factor(effect) -> int:
-    """How many frames there are for each of the source; 1: in-between frames are off."""
-    return int(effect.inbetween)
+    """How many frames there are for each of the source; 1: in-between frames are off. EffectError: it is none of those
+    there are."""
+    return int(values.word(effect, "inbetween"))
 
 
 def method(effect) -> str:
     """One of media.flow.METHODS."""
-    return METHODS[effect.inbetween_method]
+    return METHODS[values.word(effect, "inbetween_method")]
 
 
 def settings(effect) -> tuple[Path, int, str]:

@@ -1,7 +1,9 @@
-"""What was removed, kept in memory: a strip that is cut and pasted gets its effect back."""
+"""What was removed last, kept in memory: a strip that is cut and pasted gets its effect back, in another file as well,
+as Blender's clipboard outlives the one it was cut from."""
 
-from . import animation, strips
+from . import animation, strips, values
 
+_MOST = 64
 _effects: dict = {}
 
 
@@ -13,12 +15,20 @@ def keep(edit, effect) -> None:
     curves = [_plain(curve) for curve in animation.curves_under(edit, path + ".")]
     for curve in curves:
         curve["data_path"] = curve["data_path"].removeprefix(path)
+    _effects.pop(scene.virtual_shutter.identity, None)  # the newest are the last
     _effects[scene.virtual_shutter.identity] = {
         "scene": (scene.name, (scene.render.resolution_x, scene.render.resolution_y), scene.frame_end),
         "effect": _plain(effect),
         "curves": curves,
         "layers": [_plain(layer) for layer in scene.annotation.layers] if scene.annotation else [],
     }
+    while len(_effects) > _MOST:
+        del _effects[next(iter(_effects))]
+
+
+def forget() -> None:
+    """Keeps nothing any more: when the extension goes."""
+    _effects.clear()
 
 
 def restore(edit, identity: str):
@@ -30,36 +40,36 @@ def restore(edit, identity: str):
     effect = edit.virtual_shutter.effects.add()
     _fill(effect, data["effect"])
     effect.scene = scene
-    for values in data["curves"]:
-        path = effect.path_from_id() + values["data_path"]
-        curve = animation.new_curve(edit, path, values["array_index"])
-        _fill(curve, values | {"data_path": path})
+    for plain in data["curves"]:
+        path = effect.path_from_id() + plain["data_path"]
+        curve = animation.new_curve(edit, path, plain["array_index"])
+        _fill(curve, plain | {"data_path": path})
         curve.update()
-    for values in data["layers"]:
-        _fill(scene.annotation.layers.new(values["info"], set_active=False), values)
+    for plain in data["layers"]:
+        _fill(scene.annotation.layers.new(plain["info"], set_active=False), plain)
     return scene
 
 
 def _plain(struct) -> dict:
     """A struct of Blender's with all that is in it as plain data; what it points to is left out."""
-    values = {}
+    plain = {}
     for prop in struct.bl_rna.properties:
         name = prop.identifier
         if prop.type == "COLLECTION":
-            values[name] = [_plain(item) for item in getattr(struct, name)]
+            plain[name] = [_plain(item) for item in getattr(struct, name)]
         elif prop.type != "POINTER" and name != "co_ui":  # setting that one moves a key's handles
-            value = getattr(struct, name)
-            values[name] = tuple(value) if getattr(prop, "is_array", False) else value
-    return values
+            value = values.stored(struct, name)
+            plain[name] = tuple(value) if getattr(prop, "is_array", False) else value
+    return plain
 
 
-def _fill(struct, values: dict) -> None:
-    for name, value in values.items():
+def _fill(struct, plain: dict) -> None:
+    for name, value in plain.items():
         if isinstance(value, list):
             for item in value:
                 _fill(_add(getattr(struct, name), name, item), item)
         elif not struct.is_property_readonly(name):
-            setattr(struct, name, value)
+            values.store(struct, name, value)
 
 
 def _add(collection, name: str, item: dict):

@@ -8,7 +8,7 @@ from . import animation, cache, copies, kept, pictures, strips
 
 EFFECTS = "virtual_shutter.effects"
 
-_layer_names: dict = {}
+_layer_names: dict[int, list[str]] = {}  # by session_uid of an annotation, as they were at the last update
 
 
 def update(updated=None) -> None:
@@ -26,7 +26,7 @@ def update(updated=None) -> None:
     for edit in edits:
         _remove_effects(edit)
         _unmute_sources(edit)
-        _follow_layers(edit)
+    _follow_layers(edits)
     _remove_scenes(updated)
     _identify()
     for edit in _edits():
@@ -39,6 +39,11 @@ def mend() -> None:
         for strip in strips.own_strips(edit):
             if strip.scene is not None and strip.scene.library is None:
                 strips.mend(strip)
+
+
+def forget() -> None:
+    """Forgets what the annotations of a file were, before another one is loaded."""
+    _layer_names.clear()
 
 
 def _edits() -> list:
@@ -116,7 +121,8 @@ def _remove(scene) -> None:
     camera, annotation = scene.camera, scene.annotation
     bpy.data.scenes.remove(scene)
     pictures.drop_removed()
-    if camera is not None and camera.library is None and not camera.users:
+    cache.drop_removed()
+    if camera is not None and camera.type == "CAMERA" and camera.library is None and not camera.users:
         data = camera.data
         bpy.data.objects.remove(camera)
         if not data.users:
@@ -138,14 +144,16 @@ def _identify() -> None:
                 strip.virtual_shutter_effect = strip.scene.virtual_shutter.identity
 
 
-def _follow_layers(edit) -> None:
+def _follow_layers(edits) -> None:
     """Regions keep their layer when it is renamed: one name among the same number of layers is another."""
-    for effect in edit.virtual_shutter.effects:
+    known = dict(_layer_names)
+    _layer_names.clear()  # of annotations that are gone
+    for effect in [effect for edit in edits for effect in edit.virtual_shutter.effects]:
         annotation = effect.scene.annotation
         if annotation is None:
             continue
         names = [layer.info for layer in annotation.layers]
-        before = _layer_names.get(annotation.session_uid, names)
+        before = known.get(annotation.session_uid, names)
         _layer_names[annotation.session_uid] = names
         changed = [(old, new) for old, new in zip(before, names, strict=False) if old != new]
         if len(before) == len(names) and len(changed) == 1:

@@ -9,7 +9,7 @@ from bpy.types import Operator
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..core import presets, recipe
-from . import editing, effects, export, icons, strips
+from . import editing, effects, export, icons, strips, values
 from .pictures import FAULTS
 from .properties import KINDS
 from .translations import CONTEXT
@@ -50,7 +50,11 @@ class _OfEffect:
         return True
 
     def execute(self, context):
-        result = self.change(context, strips.active(context)[1])
+        try:
+            result = self.change(context, strips.active(context)[1])
+        except effects.EffectError as error:
+            self.report({"ERROR"}, str(error))
+            result = {"CANCELLED"}
         redraw(context)
         return result or {"FINISHED"}
 
@@ -210,8 +214,8 @@ class SHUTTER_OT_preset(_OfShutter, Operator):
     preset: EnumProperty(name="Preset", items=_presets, translation_context=CONTEXT)
 
     def change(self, context, effect):
-        values = presets.bars(self.preset, effect.window)
-        editing.paint(effect, effect.active_shutter, values, editing.auto_key(context))
+        weights = presets.bars(self.preset, values.number(effect, "window"))
+        editing.paint(effect, effect.active_shutter, weights, editing.auto_key(context))
 
 
 class SHUTTER_OT_bars_key(_OfShutter, Operator):
@@ -253,7 +257,11 @@ class SHUTTER_OT_bar_set(_OfShutter, Operator):
         place = bar_under(context, event.mouse_region_x, event.mouse_region_y)
         if place is not None:
             self.bar = place + 1
-        bars = editing.bars_now(effect, effect.active_shutter)
+        try:
+            bars = editing.bars_now(effect, effect.active_shutter)
+        except effects.EffectError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
         self.weight = bars[min(self.bar, len(bars)) - 1]
         title = iface_("Bar {number}").format(number=self.bar)
         return context.window_manager.invoke_props_dialog(self, width=200, title=title)
@@ -263,12 +271,12 @@ class SHUTTER_OT_bar_set(_OfShutter, Operator):
         self.layout.prop(self, "weight")
 
     def change(self, context, effect):
-        values = editing.bars_now(effect, effect.active_shutter)
-        if self.bar > len(values):
-            self.report({"ERROR"}, rpt_("The shutter has {count} bars").format(count=len(values)))
+        weights = editing.bars_now(effect, effect.active_shutter)
+        if self.bar > len(weights):
+            self.report({"ERROR"}, rpt_("The shutter has {count} bars").format(count=len(weights)))
             return {"CANCELLED"}
-        values[self.bar - 1] = self.weight
-        editing.paint(effect, effect.active_shutter, values, editing.auto_key(context))
+        weights[self.bar - 1] = self.weight
+        editing.paint(effect, effect.active_shutter, weights, editing.auto_key(context))
         return None
 
 
@@ -456,7 +464,7 @@ class SHUTTER_OT_recipe_export(_OfEffect, ExportHelper, Operator):
         try:
             path = chosen_file(self)
             recipe.save(export.recipe_of(edit, effect, strip), path)
-        except (recipe.RecipeError, effects.EffectError) as error:
+        except recipe.RecipeError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         except OSError as error:

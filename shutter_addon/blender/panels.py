@@ -5,7 +5,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.types import Menu, Panel, UIList
 
-from . import building, editing, inbetweens, strips
+from . import building, editing, strips, values
 from .pictures import FAULTS
 
 # Beyond this a column of numbers helps nobody: the bar editor and the Graph Editor do.
@@ -99,10 +99,14 @@ class _Shutters:
         row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
         layout.use_property_split = True
         layout.prop(effect, "window")
-        values = editing.bars_now(effect, effect.active_shutter)
+        try:
+            bars = editing.bars_now(effect, effect.active_shutter)
+        except values.EffectError as error:
+            layout.label(text=str(error), icon="ERROR", translate=False)
+            return
         row = layout.row()
-        row.active = not values.any()
-        row.label(text=editing.summary(values), icon="NONE" if values.any() else "ERROR", translate=False)
+        row.active = not bars.any()
+        row.label(text=editing.summary(bars), icon="NONE" if bars.any() else "ERROR", translate=False)
 
 
 def _draw_live(layout, context):
@@ -143,6 +147,10 @@ class _Regions(_WithEffect):
         row.alignment = "RIGHT"
         row.label(text="Shutter")
         row.operator_menu_enum("shutter.region_assign", "shutter", text=region.shutter, translate=False)
+        try:
+            values.check_region(region)
+        except values.EffectError as error:
+            layout.label(text=str(error), icon="ERROR", translate=False)
         layout.prop(region, "kind")
         if region.kind == "LINE":
             layout.prop(region, "width")
@@ -205,13 +213,14 @@ class _Inbetween(_WithEffect):
         column.enabled = not is_built
         column.prop(effect, "inbetween", text="Factor")
         column = column.column()
-        column.active = inbetweens.factor(effect) > 1
+        is_on = effect.inbetween != "1"
+        column.active = is_on
         column.prop(effect, "inbetween_method")
         column.prop(effect, "inbetween_place")
         if is_built:
             progress = iface_("{done} of {total}").format(done=build.done, total=build.total)
             layout.progress(factor=build.done / max(build.total, 1), text=progress, translate=False)
-        elif inbetweens.factor(effect) > 1:
+        elif is_on:
             try:
                 _draw_look(layout, building.look(edit, effect, strip))
             except FAULTS as error:

@@ -151,12 +151,15 @@ class Studio:
 
     def keep(self, scenes: set[int]) -> None:
         """Closes what belongs to other scenes than those of these session_uids."""
-        for place in [place for place in self._renderers if place not in scenes]:
-            self._begun.pop(place, None)
+        for known in (self.shown, self._begun):
+            for place in known.keys() - scenes:
+                del known[place]
+        for place in self._renderers.keys() - scenes:
             self.run(self._renderers.pop(place)[1].close)
 
     def forget(self) -> None:
         """Closes all sources and frees the device."""
+        self.shown.clear()
         self._begun.clear()
         for _key, renderer in self._renderers.values():
             self.run(renderer.close)

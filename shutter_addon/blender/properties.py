@@ -4,6 +4,7 @@
 are the effect's strips. Frames are timeline frames of the edit, as everywhere in Blender.
 """
 
+import math
 import sys
 
 import bpy
@@ -19,6 +20,7 @@ from bpy.props import (
 )
 from bpy.types import PropertyGroup
 
+from ..core.limits import MAX_BAR, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_SCALE
 from ..core.shutters import MAX_WINDOW
 from . import cache, editing, effects
 from .translations import CONTEXT
@@ -89,14 +91,18 @@ def _recolored(shutter, _context):
 
 
 def _lengthened(effect, context):
-    editing.fit_bars(effect)
-    _changed(effect, context)
+    _fit(editing.fit_bars, effect, context)
 
 
 def _multiplied(effect, context):
+    _fit(editing.fit_factor, effect, context)
+
+
+def _fit(change, effect, context):
+    """What a change of a property asks for; why it cannot be would only be printed from here."""
     try:
-        editing.fit_factor(effect)
-    except effects.EffectError as error:  # from here it would only be printed
+        change(effect)
+    except effects.EffectError as error:
         sentence = str(error)
         if bpy.app.background:
             print(sentence, file=sys.stderr)
@@ -121,6 +127,7 @@ class ShutterBar(PropertyGroup):
         description="How much the bar's frame contributes",
         default=1.0,
         min=0.0,
+        max=MAX_BAR,
         soft_max=1.0,
         update=_changed,
     )
@@ -158,6 +165,7 @@ class ShutterRegion(PropertyGroup):
         description="Width of the lines as a fraction of the picture's height",
         default=0.02,
         min=0.0,
+        max=MAX_DISTANCE,
         soft_max=0.5,
         update=_changed,
     )
@@ -166,12 +174,26 @@ class ShutterRegion(PropertyGroup):
         description="Distance from where the region was drawn, as a fraction of the picture",
         subtype="XYZ",
         size=2,
+        min=-MAX_DISTANCE,
+        max=MAX_DISTANCE,
         update=_changed,
     )
     rotation: FloatProperty(
-        name="Rotation", description="Rotation about the region's center", subtype="ANGLE", update=_changed
+        name="Rotation",
+        description="Rotation about the region's center",
+        subtype="ANGLE",
+        min=-math.radians(MAX_DEGREES),
+        max=math.radians(MAX_DEGREES),
+        update=_changed,
     )
-    scale: FloatProperty(name="Scale", description="Scale about the region's center", default=1.0, update=_changed)
+    scale: FloatProperty(
+        name="Scale",
+        description="Scale about the region's center",
+        default=1.0,
+        min=-MAX_SCALE,
+        max=MAX_SCALE,
+        update=_changed,
+    )
 
 
 class ShutterEffect(PropertyGroup):
@@ -260,6 +282,8 @@ class ShutterEffect(PropertyGroup):
         name="Source Time",
         description="Source frame that is shown, 1 is the source's first; keyed, it is a speed ramp",
         default=1.0,
+        min=-MAX_FRAME,
+        max=MAX_FRAME,
         soft_min=1.0,
         update=_changed,
     )

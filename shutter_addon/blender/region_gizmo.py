@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Gizmo, GizmoGroup
 
 from ..core import scribbles
-from . import drawing, editing, effects, geometry, keymaps, strips
+from . import drawing, editing, effects, geometry, keymaps, strips, values
 
 _RADIUS = 7  # of a handle, in units of the interface
 _NEAREST = 0.03  # of the corner's handle to the centre's, in parts of the picture
@@ -40,7 +40,11 @@ def place(context) -> Place | None:
     if region is None:
         return None
     edit, effect, strip = found
-    strokes = effects.strokes_at(edit, effect, strip, effect.active_region, edit.frame_current_final)
+    try:
+        strokes = effects.strokes_at(edit, effect, strip, effect.active_region, edit.frame_current_final)
+        values.check_region(region)
+    except values.EffectError:  # panels and the live preview tell it
+        return None
     if not strokes:
         return None
     width, height = effects.picture_size(effect)

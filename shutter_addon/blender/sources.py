@@ -80,8 +80,9 @@ def stem(strip) -> str:
 def reading(strip) -> tuple:
     """How the strip's files are read: colour space, alpha and the like."""
     clip = strip.clip if strip.type == "MOVIECLIP" else None
+    reader = clip if strip.type == "MOVIECLIP" else strip
     return (
-        (clip or strip).colorspace_settings.name,
+        reader and reader.colorspace_settings.name,
         strip.alpha_mode,
         strip.use_deinterlace,
         getattr(strip, "stream_index", 0),

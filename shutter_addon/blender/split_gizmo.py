@@ -11,11 +11,12 @@ _COLOR = (1.0, 1.0, 1.0, 0.9)
 
 
 def _to_region(context) -> np.ndarray | None:
-    """Matrix from fractions of the shown picture to the region's pixels; None where no split is shown."""
+    """Matrix from fractions of the shown picture to the region's pixels; None where no split is shown, or seen."""
     settings = context.window_manager.virtual_shutter
     if not settings.live or settings.view != "SPLIT" or (found := preview.shown(context)) is None:
         return None
-    return geometry.picture_to_region(found.strip, effects.picture_size(found.effect), context.region)
+    matrix = geometry.picture_to_region(found.strip, effects.picture_size(found.effect), context.region)
+    return matrix if geometry.is_invertible(matrix) else None
 
 
 def _line(context, matrix) -> np.ndarray:

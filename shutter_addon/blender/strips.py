@@ -174,8 +174,11 @@ def timeline_frame(strip, scene_frame: float) -> float:
 
 def source_of(edit, effect, strip):
     """The effect's source strip: of those with its identity (parts of a cut strip, copies) the nearest in time, then
-    the nearest below. EffectError: there is none any more."""
+    the nearest below. EffectError: there is none any more, or none that has frames."""
     if (source := nearest_source(edit, effect, strip)) is None:
+        if others := _with_identity(edit, effect.source):
+            sentence = rpt_('the source of "{strip}", "{source}", is not a movie, image or clip strip')
+            raise effects.EffectError(sentence.format(strip=strip.name, source=others[0].name))
         raise effects.EffectError(rpt_('the source strip of "{strip}" was deleted').format(strip=strip.name))
     return source
 
@@ -194,8 +197,13 @@ def nearest_source(edit, effect, strip):
         apart = max(other.left_handle - strip.right_handle + 1, strip.left_handle - other.right_handle + 1, 0)
         return apart, other.channel > strip.channel, abs(strip.channel - other.channel)
 
-    candidates = [s for s in edit.sequence_editor.strips_all if s.virtual_shutter_source == effect.source]
+    candidates = [other for other in _with_identity(edit, effect.source) if other.type in SOURCES]
     return min(candidates, key=distance, default=None)
+
+
+def _with_identity(edit, identity: str) -> list:
+    """The edit's strips that an effect with this source is for, whatever they are."""
+    return [strip for strip in edit.sequence_editor.strips_all if strip.virtual_shutter_source == identity != ""]
 
 
 def add_effect(edit, source):

@@ -2,14 +2,20 @@
 
 import ctypes
 import math
+from bisect import bisect_left
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from . import sources
+from .values import EffectError
 
 # eSeqRetimingKeyFlag: the key starts a smooth transition between two speeds.
 _TRANSITION_IN = 1 << 0
+# Of factors, which are float32.
+_CLOSE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -25,11 +31,15 @@ def source_frame(strip, frame: float, medium, scene_fps: float) -> int:
     """Frame of the medium that a source strip shows at a timeline frame; medium: its opened medium, as Shots has it.
 
     Trims, cuts, playback rate, retiming keys, reversed frames and strobe as Blender's sequencer applies them. Where
-    there are frames between filmed ones, it is the nearest of all, which Blender knows nothing of.
+    there are frames between filmed ones, it is the nearest of all, which Blender knows nothing of. EffectError: how the
+    strip is retimed cannot be known.
     """
     length = max(1, medium.filmed - strip.content_trim_start - strip.content_trim_end)
     keys = _retiming_keys(strip)
     rate = _playback_rate(strip, keys, length, float(medium.fps or 0) / medium.step / scene_fps)
+    if strip.type == "MOVIECLIP" and abs(length / rate - (strip.content_end - strip.content_start)) > 1:
+        sentence = rpt_('strip "{strip}" is not as long as its clip: retimed clips are not supported')
+        raise EffectError(sentence.format(strip=strip.name))
 
     def position(time):
         return _position(strip, keys, rate, length, time)
@@ -42,8 +52,8 @@ def source_frame(strip, frame: float, medium, scene_fps: float) -> int:
     # Blender decodes the nearest frame, but keeps it for every position with the same whole part: of a slow strip that
     # plays forward, the first of those positions decides.
     whole = int(position(frame))
-    while frame - 1 >= strip.left_handle and int(position(frame - 1)) == whole:
-        frame -= 1
+    earlier = range(1, max(math.floor(frame - strip.left_handle), 0) + 1)
+    frame -= bisect_left(earlier, True, key=lambda back: int(position(frame - back)) != whole)
     index = math.floor(position(frame) + np.float32(0.5))
     return first + min(index, length - 1)
 
@@ -80,14 +90,37 @@ def _retiming_keys(strip) -> list[RetimingKey]:
     """The strip's retiming keys from Blender's memory: Python gets their timeline frames, but not what they show.
 
     Of a clip strip it gets none at all.
-    SeqRetimingKey begins with double strip_frame_index, int flag, float retiming_factor.
+    SeqRetimingKey begins with double strip_frame_index, int flag, float retiming_factor. EffectError: not in this
+    Blender.
     """
 
     class Raw(ctypes.Structure):
         _fields_ = (("index", ctypes.c_double), ("flag", ctypes.c_int), ("factor", ctypes.c_float))
 
-    raw = [Raw.from_address(key.as_pointer()) for key in getattr(strip, "retiming_keys", ())]
-    return [RetimingKey(key.index, key.flag, key.factor) for key in raw]
+    shown = list(getattr(strip, "retiming_keys", ()))
+    raw = [Raw.from_address(key.as_pointer()) for key in shown]
+    keys = [RetimingKey(key.index, key.flag, key.factor) for key in raw]
+    if not are_retiming_keys(keys, [key.timeline_frame - strip.content_start for key in shown]):
+        sentence = rpt_('strip "{strip}": its retiming keys cannot be read in this version of Blender')
+        raise EffectError(sentence.format(strip=strip.name))
+    return keys
+
+
+def are_retiming_keys(keys: list[RetimingKey], indices: list[float]) -> bool:
+    """Whether keys are as Blender has them: from the first frame on, which shows the content's start, to the last one,
+    which shows its end, in order, and where Python sees them. indices: whole frames behind the content's start."""
+    if not keys and not indices:
+        return True
+    factors = [key.factor for key in keys]
+    return (
+        len(keys) == len(indices)
+        and all(abs(key.index - index) <= 1 for key, index in zip(keys, indices, strict=True))
+        and all(first.index <= second.index for first, second in pairwise(keys))
+        and all(-_CLOSE <= factor <= 1 + _CLOSE for factor in factors)
+        and abs(keys[0].index) <= _CLOSE
+        and abs(factors[0]) <= _CLOSE
+        and (len(keys) == 1 or abs(factors[-1] - 1) <= _CLOSE)
+    )
 
 
 def retimed(keys: list[RetimingKey], position: float) -> np.float32:

@@ -16,7 +16,7 @@ class Source(Protocol):
     """The frames of a movie or of an image sequence; close it, or use it in a `with`.
 
     width, height: pixels
-    count: frames as Blender's strip counts them (its frame_duration)
+    count: frames as Blender's strip counts them (its content_duration)
     fps: frames per second, None for an image sequence
     dtype: uint8, uint16, float16 or float32, the samples' type; whole numbers stand for 0 … 1
     transfer: "srgb" (sRGB display values) or "linear" (scene linear, Rec.709 primaries)

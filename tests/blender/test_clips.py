@@ -6,7 +6,7 @@ import av
 import numpy as np
 import OpenImageIO
 import pytest
-from support import recipe, write_frames
+from support import recipe, sequencer, write_frames
 
 from shutter_addon.core import recipe as recipes
 
@@ -136,15 +136,31 @@ def test_colour_spaces(edit, render, tmp_path, clip_strip, movie, space):
 
 
 def test_what_is_not_supported_is_said(edit, clip_strip, movie):
-    from shutter_addon.blender import pictures, strips
+    from shutter_addon.blender import editing, pictures, strips
 
     source = clip_strip(movie)
     strip, effect = strips.add_effect(edit, source)
-    effect.shutters.add().bars.add()
+    editing.start(effect)
     pictures.picture(strip.scene, 1)
     source.stabilize2d = True
     with pytest.raises(pictures.FAULTS, match='"clip": undistorted or stabilized clips are not supported'):
         pictures.picture(strip.scene, 1)
     source.stabilize2d, source.clip = False, None
     with pytest.raises(pictures.FAULTS, match='"clip" has no clip'):
+        pictures.picture(strip.scene, 1)
+
+
+def test_a_retimed_clip_is_refused(bpy, edit, clip_strip, movie):
+    from shutter_addon.blender import editing, pictures, strips
+
+    source = clip_strip(movie)
+    edit.sequence_editor.active_strip, source.select, source.show_retiming_keys = source, True, True
+    edit.frame_current = 5
+    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+        bpy.ops.sequencer.retiming_key_add(timeline_frame=5)
+        bpy.ops.sequencer.retiming_segment_speed_set(speed=50.0)
+    assert source.content_end - source.content_start > 30
+    strip, effect = strips.add_effect(edit, source)
+    editing.start(effect)
+    with pytest.raises(pictures.FAULTS, match='"clip" is not as long as its clip'):
         pictures.picture(strip.scene, 1)

@@ -324,3 +324,50 @@ def test_an_edit_appended_twice_has_two_effects_of_its_own(bpy, library, render)
     bpy.context.window.scene = films[1]  # an operator renders at the frame of the window's scene
     shown = render(films[1], list(pictures))
     assert all(np.array_equal(shown[frame], picture) for frame, picture in pictures.items())
+
+
+def test_nothing_is_remembered_of_what_is_gone(bpy, edit, add):
+    from shutter_addon.blender import cache, lifecycle, pictures
+
+    first, second = add(1), add(101)
+    update(bpy)
+    annotation, scene = second.scene.annotation.session_uid, second.scene.session_uid
+    pictures.picture(second.scene, 5)
+    assert annotation in lifecycle._layer_names
+    assert scene in cache._signatures
+    edit.sequence_editor.strips.remove(second)
+    update(bpy)
+    assert list(lifecycle._layer_names) == [first.scene.annotation.session_uid]
+    assert scene not in cache._signatures
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    assert not lifecycle._layer_names
+    assert not cache._signatures
+
+
+def test_only_the_last_effects_that_were_removed_are_kept(edit, add):
+    from shutter_addon.blender import kept
+
+    scene, effect = add().scene, edit.virtual_shutter.effects[0]
+    for i in range(3 * kept._MOST):
+        scene.virtual_shutter.identity = f"identity {i % (2 * kept._MOST)}"
+        kept.keep(edit, effect)
+    assert len(kept._effects) == kept._MOST
+    assert list(kept._effects)[-1] == scene.virtual_shutter.identity
+    assert kept.restore(edit, "identity 1000") is None
+    assert kept.restore(edit, scene.virtual_shutter.identity).virtual_shutter.identity == scene.virtual_shutter.identity
+
+
+def test_the_extension_leaves_nothing_kept(bpy, edit, add):
+    from shutter_addon.blender import handlers, kept, lifecycle
+
+    add()
+    kept.keep(edit, edit.virtual_shutter.effects[0])
+    update(bpy)
+    assert kept._effects
+    assert lifecycle._layer_names
+    handlers.unregister()
+    try:
+        assert not kept._effects
+        assert not lifecycle._layer_names
+    finally:
+        handlers.register()

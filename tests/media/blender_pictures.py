@@ -63,7 +63,7 @@ def _render(folder):
             bpy.ops.render.render(write_still=True, scene=scene.name)
         element = strip.elements[0]
         results[name] = {
-            "count": strip.frame_duration,
+            "count": strip.content_duration,
             "fps": getattr(element, "orig_fps", None),
             "size": size,
             "colorspace": strip.colorspace_settings.name,

@@ -59,6 +59,56 @@ MESSAGES = {
     ("*", 'the scene of "{strip}" was deleted'): "die Szene von „{strip}“ wurde gelöscht",
     ("*", 'the scene of "{strip}" has no camera'): "die Szene von „{strip}“ hat keine Kamera",
     ("*", 'the setting "{setting}" leaves "{strip}" out'): "die Einstellung „{setting}“ lässt „{strip}“ weg",
+    (
+        "*",
+        'the source of "{strip}", "{source}", is not a movie, image or clip strip',
+    ): "die Quelle von „{strip}“, „{source}“, ist kein Film-, Bild- oder Clipstreifen",
+    ("*", 'effect "{name}"'): "Effekt „{name}“",
+    ("*", 'shutter "{name}"'): "Verschluss „{name}“",
+    ("*", 'region "{name}"'): "Region „{name}“",
+    ("*", "{shutter}, bar {number}"): "{shutter}, Balken {number}",
+    (
+        "*",
+        "{place}: {property} is {value}, not {low} to {high}",
+    ): "{place}: {property} ist {value}, nicht {low} bis {high}",
+    ("*", "{place}: {property} is none of its choices"): "{place}: {property} ist keine der Möglichkeiten",
+    (
+        "*",
+        "{place}: {property} has a keyframe at frame {frame}, not {low} to {high}",
+    ): "{place}: {property} hat ein Schlüsselbild bei Bild {frame}, nicht {low} bis {high}",
+    ("*", "{place}: {count} bars, the window is {window}"): "{place}: {count} Balken, das Zeitfenster ist {window}",
+    (
+        "*",
+        "{place} and {count} more: {most} are the most",
+    ): "{place} und {count} weitere: höchstens {most} sind möglich",
+    (
+        "*",
+        "{place}: more than {most} points with those before it",
+    ): "{place}: mehr als {most} Punkte mit denen davor",
+    (
+        "*",
+        "{place}: a point of its strokes is nowhere near the picture",
+    ): "{place}: ein Punkt ihrer Striche liegt weit weg vom Bild",
+    (
+        "*",
+        'strip "{strip}": a number of its transform is not finite',
+    ): "Streifen „{strip}“: eine Zahl seiner Transformation ist nicht endlich",
+    (
+        "*",
+        'strip "{strip}" is too small to find its scribbles',
+    ): "Streifen „{strip}“ ist zu klein, um seine Markierungen zu finden",
+    (
+        "*",
+        'strip "{strip}" lies at frames {first} to {last}, where no timeline is',
+    ): "Streifen „{strip}“ liegt bei den Bildern {first} bis {last}, wo keine Zeitleiste ist",
+    (
+        "*",
+        'strip "{strip}": its retiming keys cannot be read in this version of Blender',
+    ): "Streifen „{strip}“: seine Retiming-Schlüssel sind in dieser Version von Blender nicht lesbar",
+    (
+        "*",
+        'strip "{strip}" is not as long as its clip: retimed clips are not supported',
+    ): "Streifen „{strip}“ ist nicht so lang wie sein Clip: Clips mit geänderter Zeit werden nicht unterstützt",
     ("*", 'strip "{strip}" has no files'): "Streifen „{strip}“ hat keine Dateien",
     ("*", 'strip "{strip}" has no clip'): "Streifen „{strip}“ hat keinen Clip",
     (

@@ -1,0 +1,62 @@
+"""What Blender deprecates of strips, and will remove, is used nowhere."""
+
+import ast
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = ("shutter_addon", "scripts", "gallery", "tests", "docs", ".")
+SUFFIXES = {".py", ".md", ""}
+# Scenes and clips have properties of the same names, which stay.
+OTHERS = {"scene", "edit", "edit()", "film", "clip"}
+
+
+def deprecated(bpy):
+    """Names of strips' deprecated properties; and those of them that other types have as well."""
+    strips, others = set(), set()
+    for name in dir(bpy.types):
+        rna = getattr(getattr(bpy.types, name), "bl_rna", None)
+        for prop in rna.properties if rna else ():
+            (strips if prop.is_deprecated and name.endswith("Strip") else others).add(prop.identifier)
+    return strips, strips & others
+
+
+def files():
+    found = (path for folder in FOLDERS for path in (ROOT / folder).glob("*" if folder == "." else "**/*"))
+    return [path for path in found if path.is_file() and path.suffix in SUFFIXES and ".venv" not in path.parts]
+
+
+def uses(path, alone, shared):
+    """Lines of a file that use a name which strips alone have, or one that others share, of a strip."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        return
+    if alone:
+        words = re.compile(rf"\b({'|'.join(sorted(alone))})\b")
+        yield from (f"{path}:{i}: {line.strip()}" for i, line in enumerate(text.splitlines(), 1) if words.search(line))
+    if path.suffix == ".py":
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.Attribute) and node.attr in shared:
+                owner = ast.unparse(node.value)
+                if owner.rpartition(".")[2] not in OTHERS:
+                    yield f"{path}:{node.lineno}: {owner}.{node.attr}"
+
+
+def test_nothing_deprecated_of_strips(bpy):
+    strips, shared = deprecated(bpy)
+    assert len(strips) >= 9
+    assert shared
+    assert len(files()) > 100
+    assert not [use for path in files() for use in uses(path, strips - shared, shared)]
+
+
+def test_uses_are_found(bpy, tmp_path):
+    strips, shared = deprecated(bpy)
+    path = tmp_path / "code.py"
+    for name in strips:
+        path.write_text(f"strip.{name} = 1")
+        assert list(uses(path, strips - shared, shared)), name
+    for name in shared:
+        path.write_text(f"edit.{name} = item.clip.{name}")
+        assert not list(uses(path, strips - shared, shared)), name

@@ -1,0 +1,399 @@
+"""Files with values that no effect can have: a picture or one sentence, and no trace anywhere."""
+
+import math
+import random
+from contextlib import suppress
+
+import numpy as np
+import pytest
+from support import sequencer, write_frames
+
+from shutter_addon.core.limits import MAX_SHUTTERS
+
+NAN, INF = math.nan, math.inf
+
+
+@pytest.fixture(autouse=True)
+def _no_exception(capfd):
+    """Blender prints what a handler raises, and goes on."""
+    yield
+    assert "Traceback" not in capfd.readouterr().err
+
+
+@pytest.fixture
+def effect(bpy, edit, tmp_path, monkeypatch):
+    """An effect of two shutters, the second keyed and drawn with; its strip active."""
+    from shutter_addon.blender import editing, effects, pictures, strips
+
+    monkeypatch.setattr(pictures, "device", "cpu")
+    frames = np.random.default_rng(0).integers(0, 256, (12, 24, 40, 3), dtype=np.uint8)
+    first = write_frames(tmp_path / "in", frames)
+    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
+    for file in sorted(first.parent.iterdir())[1:]:
+        source.elements.append(file.name)
+    strip, effect = strips.add_effect(edit, source)
+    effect.window = 4
+    editing.start(effect)
+    region = editing.add_region(effect, effect.shutters[1], name="Face")
+    draw(effects.layer_of(effect, region), [(-9, -9), (9, 0), (3, 8)])
+    for frame in (1, 9):
+        edit.frame_set(frame)
+        effect.shutters[1].bars[0].weight = frame / 9
+        editing.key_bars(effect, 1)
+        editing.key_region(effect, 0)
+    edit.keyframe_insert(f"{effect.path_from_id()}.source_time")
+    strips.choose(edit, strip)
+    edit.frame_set(4)
+    yield effect
+    pictures.forget()
+
+
+def draw(layer, points):
+    drawing = layer.frames[0] if layer.frames else layer.frames.new(1)
+    stroke = drawing.strokes.new()
+    stroke.points.add(len(points))
+    stroke.points.foreach_set("co", [number for x, y in points for number in (x, y, 0)])
+
+
+def raw(group, name, value):
+    """Writes what a file may hold, past the property's range; a frame change writes keyed ones over again."""
+    unkey(group, name)
+    group.bl_system_properties_get(do_create=True)[name] = value
+
+
+def unkey(group, name):
+    from shutter_addon.blender import animation
+
+    animation.remove_curves(group.id_data, f"{group.path_from_id()}.{name}")
+
+
+def key(group, name, *points, index=0):
+    """Gives a property an F-curve with these keys (frame, value)."""
+    from shutter_addon.blender import animation
+
+    curve = animation.new_curve(group.id_data, f"{group.path_from_id()}.{name}", index)
+    curve.keyframe_points.add(len(points))
+    curve.keyframe_points.foreach_set("co", [number for point in points for number in point])
+
+
+def strip_of(effect):
+    return effect.id_data.sequence_editor.strips["Shutter"]
+
+
+def source_of(effect):
+    return effect.id_data.sequence_editor.strips["images"]
+
+
+def identify_another(effect, kind):
+    """Gives the source's identity to a strip that has no frames, and to that alone."""
+    strips = effect.id_data.sequence_editor.strips
+    source_of(effect).virtual_shutter_source = ""
+    new = {"META": lambda: strips.new_meta("other", 7, 1)}.get(
+        kind, lambda: strips.new_effect("other", kind, 7, 1, length=9)
+    )
+    new().virtual_shutter_source = effect.source
+
+
+def use_time(effect, value):
+    effect.use_source_time = True
+    unkey(effect, "source_time")
+    effect.source_time = value
+
+
+IMPOSSIBLE = {
+    "window -5": (lambda e: raw(e, "window", -5), 'effect "Shutter": Window is -5, not 1 to 256'),
+    "window 0": (lambda e: raw(e, "window", 0), 'effect "Shutter": Window is 0'),
+    "window 1e9": (lambda e: raw(e, "window", 10**9), 'effect "Shutter": Window is 1e'),
+    "position": (lambda e: raw(e, "position", 77), 'effect "Shutter": Position is none of its choices'),
+    "light": (lambda e: raw(e, "light", -1), 'effect "Shutter": Light is none'),
+    "aggregate": (lambda e: raw(e, "aggregate", 9), 'effect "Shutter": Aggregate is none'),
+    "inbetween": (lambda e: raw(e, "inbetween", 9), 'effect "Shutter": In-Between Frames is none'),
+    "keyed position": (lambda e: key(e, "position", (1, -1)), 'effect "Shutter": Position is none'),
+    "keyed light": (lambda e: key(e, "light", (1, NAN)), 'effect "Shutter": Light is none'),
+    "kind": (lambda e: raw(e.regions[0], "kind", 5), 'region "Face": Type is none'),
+    "a bar": (lambda e: raw(e.shutters[0].bars[2], "weight", -4.0), 'shutter "Long", bar 3: Weight is -4, not 0 to'),
+    "a nan bar": (lambda e: raw(e.shutters[0].bars[0], "weight", NAN), 'shutter "Long", bar 1: Weight is nan'),
+    "a bar 1e30": (lambda e: raw(e.shutters[0].bars[0], "weight", 1e30), "bar 1: Weight is 1e+30, not 0 to 1000000"),
+    "few bars": (lambda e: e.shutters[0].bars.remove(0), 'shutter "Long": 3 bars, the window is 4'),
+    "many bars": (lambda e: e.shutters[1].bars.add(), 'shutter "Sharp": 5 bars, the window is 4'),
+    "no bars": (lambda e: e.shutters[0].bars.clear(), 'shutter "Long": 0 bars'),
+    "keyed nan bar": (
+        lambda e: key(e.shutters[1].bars[0], "weight", (1, NAN)),
+        'shutter "Sharp", bar 1: Weight is nan',
+    ),
+    "keyed nan": (lambda e: key(e.regions[0], "scale", (1, NAN), (9, NAN)), 'region "Face": Scale is nan'),
+    "nan scale": (lambda e: raw(e.regions[0], "scale", NAN), 'region "Face": Scale is nan, not -1000 to 1000'),
+    "scale 1e30": (lambda e: raw(e.regions[0], "scale", 1e30), 'region "Face": Scale is 1e+30'),
+    "rotation": (lambda e: raw(e.regions[0], "rotation", INF), 'region "Face": Rotation is inf, not -360000 to 360000'),
+    "location": (lambda e: raw(e.regions[0], "location", [0.0, NAN]), 'region "Face": Location is nan'),
+    "width": (lambda e: raw(e.regions[0], "width", -1.0), 'region "Face": Width is -1'),
+    "source time": (lambda e: use_time(e, NAN), 'effect "Shutter": Source Time is nan'),
+    "a nan key": (
+        lambda e: key(e.shutters[1].bars[0], "weight", (NAN, 1), (5, 1)),
+        'shutter "Sharp", bar 1: Weight has a keyframe at frame nan',
+    ),
+    "a far key": (
+        lambda e: key(e.regions[0], "location", (1, 0), (3e9, 1)),
+        'region "Face": Location has a keyframe at frame 3e+09, not -1048574 to 1048574',
+    ),
+    "nan strokes": (lambda e: draw(e.scene.annotation.layers[0], [(0, NAN)]), 'region "Face": a point of its strokes'),
+    "far strokes": (lambda e: draw(e.scene.annotation.layers[0], [(1e20, 0)]), 'region "Face": a point of its strokes'),
+    "transform": (
+        lambda e: setattr(strip_of(e).transform, "offset_x", NAN),
+        'strip "Shutter": a number of its transform',
+    ),
+    "shutters": (
+        lambda e: [e.shutters.add() for _ in range(MAX_SHUTTERS)],
+        f'shutter "Long" and {MAX_SHUTTERS + 1} more: {MAX_SHUTTERS} are the most',
+    ),
+    "points": (
+        lambda e: draw(e.scene.annotation.layers[0], [(0, 0)] * 100_001),
+        'region "Face": more than 100000 points',
+    ),
+    "no identity": (
+        lambda e: setattr(e, "source", "") or setattr(source_of(e), "virtual_shutter_source", ""),
+        'the source strip of "Shutter" was deleted',
+    ),
+    "a meta": (lambda e: identify_another(e, "META"), 'the source of "Shutter", "other", is not a movie'),
+    "a color": (lambda e: identify_another(e, "COLOR"), 'the source of "Shutter", "other", is not a movie'),
+    "a text": (lambda e: identify_another(e, "TEXT"), 'the source of "Shutter", "other", is not a movie'),
+}
+
+
+@pytest.mark.parametrize("name", IMPOSSIBLE)
+def test_one_sentence_tells_the_place(bpy, edit, effect, name):
+    """From the renderer, and from wherever the effect is shown no trace."""
+    from shutter_addon.blender import pictures
+
+    scene = effect.scene
+    assert pictures.picture(scene, 4).shape == (24, 40, 4)
+    change, sentence = IMPOSSIBLE[name]
+    change(effect)
+    with pytest.raises(pictures.FAULTS) as raised:
+        pictures.picture(scene, 4)
+    assert sentence in str(raised.value)
+    assert len(str(raised.value)) <= 300
+    exported(edit, effect)
+    show(bpy, edit)
+
+
+def test_what_f_curves_give_stays_in_range(bpy, edit, effect):
+    """As Blender has it: a curve that overshoots is cut off where the property ends."""
+    from shutter_addon.blender import effects
+
+    region = effect.regions[0]
+    key(region, "width", (1, -5), (9, -5))
+    key(region, "scale", (1, 1e30), (9, 1e30))
+    key(effect.shutters[1].bars[0], "weight", (1, 1e30), (9, 1e30))
+    edit.frame_set(3)
+    found = effects.instant(edit, effect, strip_of(effect), 3)
+    assert (region.width, region.scale) == (0, 1000)
+    assert found.shapes[0].width == 0
+    assert np.ptp(found.shapes[0].strokes[0], axis=0).max() < 1000
+    assert found.bars[1, 0] == 1e6
+
+
+def test_a_strip_that_is_scaled_to_nothing(bpy, edit, effect):
+    """A strip may grow from nothing: where nobody sees it, its scribbles do not matter. A recipe would lack them."""
+    from shutter_addon.blender import export, pictures
+
+    strip = strip_of(effect)
+    strip.transform.scale_x = 0
+    assert pictures.picture(effect.scene, 4).shape == (24, 40, 4)
+    with pytest.raises(pictures.FAULTS, match='strip "Shutter" is too small to find its scribbles'):
+        export.recipe_of(edit, effect, strip)
+    show(bpy, edit)
+
+
+def test_what_nobody_renders_does_not_matter(bpy, edit, effect):
+    """Names twice, layers and shutters that there are not, places in lists beyond their ends."""
+    from shutter_addon.blender import editing, pictures
+
+    before = pictures.picture(effect.scene, 4)
+    raw(effect, "active_shutter", -3)
+    raw(effect, "active_region", 99)
+    raw(effect, "start", NAN)
+    raw(effect.shutters[0], "color", [NAN, 2.0, -1.0])
+    for layer, shutter in (("none", "Sharp"), ("Face", "none")):
+        region = effect.regions.add()
+        region.name, region.layer, region.shutter = "Face", layer, shutter
+    other = edit.virtual_shutter.effects.add()
+    other.name = effect.name
+    effect = edit.virtual_shutter.effects[0]
+    assert editing.active_shutter(effect) is editing.active_region(effect) is None
+    assert np.array_equal(pictures.picture(effect.scene, 4), before)
+    show(bpy, edit)
+
+
+@pytest.mark.parametrize("start", [NAN, 1e30])
+def test_keys_stay_where_they_are_when_the_start_is_none(bpy, edit, effect, start):
+    from shutter_addon.blender import animation, lifecycle
+
+    def keys():
+        return [tuple(point.co) for curve in animation.curves_under(edit, "") for point in curve.keyframe_points]
+
+    before = keys()
+    raw(effect, "start", start)
+    lifecycle.update()
+    assert keys() == before
+    assert edit.virtual_shutter.effects[0].start == 1
+
+
+def test_a_copy_has_the_same_impossible_choice(bpy, edit, effect):
+    """Copies of what cannot be copied would come with every update, and never be finished."""
+    from shutter_addon.blender import copies, pictures
+
+    raw(effect, "position", 77)
+    raw(effect.regions[0], "kind", 5)
+    edit.sequence_editor.strips.new_scene("copy", effect.scene, 5, 100)
+    for _ in range(3):
+        copies.adopt()
+    assert len(edit.virtual_shutter.effects) == 2
+    for scene in [effect.scene for effect in edit.virtual_shutter.effects]:
+        with pytest.raises(pictures.FAULTS, match="Position is none of its choices"):
+            pictures.picture(scene, 4)
+
+
+def test_a_cut_strip_comes_back_with_its_impossible_choice(bpy, edit, effect):
+    from shutter_addon.blender import kept
+
+    raw(effect, "position", 77)
+    identity = effect.scene.virtual_shutter.identity
+    kept.keep(edit, effect)
+    scene = kept.restore(edit, identity)
+    assert scene.virtual_shutter.identity == identity
+    assert edit.virtual_shutter.effects[-1].position == ""
+    bpy.data.scenes.remove(scene)
+
+
+def test_editors_can_mend_it(bpy, edit, effect):
+    """What the panel offers leads back to a picture."""
+    from shutter_addon.blender import pictures
+
+    scene = effect.scene
+    raw(effect, "window", 10**9)
+    raw(effect, "position", 77)
+    effect.shutters[0].bars.clear()
+    effect.shutters[0].bars.add()
+    effect.window, effect.position = 6, "END"
+    assert [len(shutter.bars) for shutter in effect.shutters] == [6, 6]
+    effect.shutters[0].bars.remove(0)
+    with sequencer(bpy):
+        assert bpy.ops.shutter.preset(preset="ANGLE_360") == {"FINISHED"}  # of the active one
+        effect.active_shutter = 0
+        assert bpy.ops.shutter.preset(preset="ANGLE_360") == {"FINISHED"}
+    assert pictures.picture(scene, 4).shape == (24, 40, 4)
+
+
+def test_operators_report_it(bpy, edit, effect):
+    raw(effect, "window", -5)
+    with sequencer(bpy):
+        for operator in (bpy.ops.shutter.preset, bpy.ops.shutter.bars_key, bpy.ops.shutter.shutter_add):
+            with pytest.raises(RuntimeError, match='effect "Shutter": Window is -5'):
+                operator()
+    assert len(effect.shutters) == 2
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_random_values(bpy, edit, effect, seed):
+    """Whatever properties of a good effect become: a picture or a sentence."""
+    rng = random.Random(seed)
+    for _ in range(rng.randint(1, 4)):
+        corrupt(rng, effect)
+        edit.frame_set(rng.randint(1, 12))
+    effect = edit.virtual_shutter.effects[0] if edit.virtual_shutter.effects else None
+    if effect is not None:
+        rendered(effect.scene)
+        exported(edit, effect)
+    show(bpy, edit)
+
+
+def corrupt(rng, effect):
+    """Gives a random property of the effect, or of what belongs to it, a random value, or a random F-curve."""
+    groups = [effect, *effect.shutters, *effect.regions, *effect.shutters[0].bars, *effect.shutters[1].bars]
+    natives = [strip_of(effect).transform, strip_of(effect).crop, source_of(effect), strip_of(effect)]
+    group = rng.choice(groups[:1] * 6 + groups + natives * 2)
+    names = [
+        prop.identifier
+        for prop in group.bl_rna.properties
+        if prop.type in {"INT", "FLOAT", "ENUM", "BOOLEAN", "STRING"} and not (prop.is_readonly or prop.is_deprecated)
+    ]
+    name = rng.choice(names)
+    number = rng.choice([NAN, INF, -INF, 0.0, -1.0, 1e9, -1e9, 1e30, 3e9, 77.0, 0.5, 256.0])
+    if group in groups and rng.random() < 0.3:
+        key(group, name, (rng.choice([1, -5, NAN, 3e9, 1e30]), number), (9, rng.choice([NAN, 1e30, 2.0, number])))
+    elif group in groups:
+        prop = group.bl_rna.properties[name]
+        whole = int(number) if abs(number) < 2**31 else rng.choice([-(2**31), 2**31 - 1])
+        value = {"FLOAT": number, "STRING": rng.choice(["", "Face", "x" * 500])}.get(prop.type, whole)
+        with suppress(TypeError):  # a vector takes no number
+            raw(group, name, value)
+    else:
+        with suppress(TypeError, ValueError, OverflowError):  # Blender's own keep to their types
+            setattr(group, name, rng.choice([number, int(min(max(number, -9e8), 9e8)) if number == number else 0]))
+
+
+def rendered(scene):
+    from shutter_addon.blender import pictures
+
+    with suppress(pictures.FAULTS):
+        assert np.isfinite(pictures.picture(scene, 4)).all()
+
+
+def exported(edit, effect):
+    from shutter_addon.blender import export, pictures
+    from shutter_addon.core.recipe import RecipeError
+
+    with suppress(*pictures.FAULTS, RecipeError):
+        export.recipe_of(edit, effect, strip_of(effect))
+
+
+class Layout:
+    """Takes all that a panel draws, as a region does that is in no window."""
+
+    def __init__(self, *_arguments, **_options):
+        pass
+
+    def __getattr__(self, _name):
+        return Layout
+
+    def separator(self):
+        pass
+
+
+def show(bpy, edit):
+    """Calls what Blender calls where an effect is shown: handlers, polls, panels, gizmos."""
+    from shutter_addon.blender import (
+        bar_editor,
+        building,
+        cache,
+        lifecycle,
+        operators,
+        panels,
+        preview,
+        region_gizmo,
+        split_gizmo,
+        strips,
+    )
+
+    lifecycle.update()
+    cache.invalidate_changed(edit)
+    assert not cache.invalidate_changed(edit), "it would be drawn again and again"
+    with sequencer(bpy) as area:
+        region = next(region for region in area.regions if region.type == "PREVIEW")
+        with bpy.context.temp_override(region=region):
+            context = bpy.context
+            preview.shown(context)
+            bar_editor.bar_under(context, 30, 30)
+            region_gizmo.place(context)
+            for cls in (*operators.classes, *building.classes, *bar_editor.classes, *region_gizmo.classes):
+                if hasattr(cls, "poll"):
+                    cls.poll(context)
+            split_gizmo.SHUTTER_GGT_split.poll(context)
+            for cls in (*panels._InSidebar.__subclasses__(), *panels._InProperties.__subclasses__()):
+                if cls.poll(context):
+                    drawn = type("Drawn", (), {"layout": Layout()})()
+                    next(base for base in cls.__mro__ if "draw" in vars(base)).draw(drawn, context)
+            found = strips.active(context)
+            for region in found[1].regions if found else ():
+                panels.SHUTTER_UL_regions.draw_item(None, context, Layout(), found[1], region, 0, None, "", 0)
