@@ -7,6 +7,7 @@ import re
 from itertools import pairwise
 
 import bpy
+import numpy as np
 from bpy_extras import anim_utils
 
 from ..core import keyframes
@@ -17,10 +18,17 @@ class Curves:
 
     def __init__(self, scene):
         self._curves = {(c.data_path, c.array_index): c for c in curves_under(scene, "") if not c.mute}
+        self._frames: dict[str, list[float]] = {}
 
     def find(self, path: str, index: int = 0):
         """The F-curve of a property, or None; muted ones do not count."""
         return self._curves.get((path, index))
+
+    def key_frames(self, path: str, curves) -> list[float]:
+        """As key_frames below, of the curves under a path, which are asked once."""
+        if path not in self._frames:
+            self._frames[path] = key_frames(curves)
+        return self._frames[path]
 
     def value(self, owner, path: str, name: str, frame: float):
         """A float property, or a float vector as a list, at a frame; path: the owner's, from the scene."""
@@ -36,7 +44,12 @@ class Curves:
 
 def key_frames(curves) -> list[float]:
     """Frames with a key on any of the curves, ascending."""
-    return sorted({key.co[0] for curve in curves for key in curve.keyframe_points})
+    frames = [np.empty(0, np.float32)]
+    for curve in curves:
+        points = np.empty(2 * len(curve.keyframe_points), np.float32)
+        curve.keyframe_points.foreach_get("co", points)
+        frames.append(points[::2])
+    return np.unique(np.concatenate(frames)).tolist()
 
 
 def progress(curves, start: float, end: float, frame: float) -> float:
@@ -55,6 +68,16 @@ def ease_at(curve, frame: float) -> str:
             word = key.interpolation.lower()
             return word if word in keyframes.EASES else "bezier"
     return "linear"
+
+
+def eases(curves) -> dict[float, str]:
+    """As ease_at, for every frame with a key on any of the curves: of the first curve that has one there."""
+    found: dict[float, str] = {}
+    for curve in curves:
+        for key in curve.keyframe_points:
+            word = key.interpolation.lower()
+            found.setdefault(key.co[0], word if word in keyframes.EASES else "bezier")
+    return found
 
 
 def set_keys(scene, path: str, index: int, keys, group: str = "") -> None:

@@ -119,7 +119,8 @@ def _region(curves, path: str, source, effect, strip) -> recipe.Region | None:
     place = partial(_place, curves, path, source)
     frames = set(animation.key_frames(keyed))
     # The ease from a drawing to the next is that of the key at its frame.
-    words = {number: animation.ease_at(timing, number) for number in drawings} if len(drawings) > 1 else {}
+    eases = animation.eases([timing] if timing else [])
+    words = {number: eases.get(number, "linear") for number in drawings} if len(drawings) > 1 else {}
     frames.update(words)
     if not frames and tuple(place(strip.left_handle)) != (0, 0, 0, 1):
         frames.add(strip.left_handle)
@@ -186,10 +187,11 @@ def _keys(fits, still, keyed, frames: list, words: dict, strip) -> list[tuple[fl
     def baked(outside, held):
         return [] if all(still(frame, held) for frame in outside) else [(frame, "linear") for frame in outside]
 
+    eases = animation.eases(keyed)
     keys = baked([frame for frame in shown if frame < frames[0]], frames[0])
     for first, second in pairwise(frames):
         shares = {frame: (frame - first) / (second - first) for frame in _whole_between(first, second)}
-        candidates = [words[first]] if first in words else [_word(keyed, first), *keyframes.EASES]
+        candidates = [words[first]] if first in words else [eases.get(first, "linear"), *keyframes.EASES]
         for word in candidates:
             if all(fits(first, second, frame, keyframes.eased(share, word)) for frame, share in shares.items()):
                 keys.append((first, word))
@@ -197,18 +199,12 @@ def _keys(fits, still, keyed, frames: list, words: dict, strip) -> list[tuple[fl
         else:
             keys += [(first, candidates[0]), *((frame, "linear") for frame in shares)]
     last = frames[-1]
-    keys.append((last, words.get(last) or _word(keyed, last)))
+    keys.append((last, words.get(last) or eases.get(last, "linear")))
     return keys + baked([frame for frame in shown if frame > last], last)
 
 
 def _whole_between(first: float, second: float) -> range:
     return range(math.floor(first) + 1, math.ceil(second))
-
-
-def _word(keyed, frame: float) -> str:
-    """The ease of the first curve that has a key at a frame."""
-    curve = next((curve for curve in keyed if frame in animation.key_frames([curve])), None)
-    return animation.ease_at(curve, frame)
 
 
 def _short(value: float) -> float:
