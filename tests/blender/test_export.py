@@ -34,7 +34,7 @@ whole_frames = st.lists(st.integers(-20, 60).map(float), min_size=1, max_size=4,
 
 @st.composite
 def shutters(draw, name, window):
-    bars = st.lists(numbers(0, 1e6), min_size=window, max_size=window).filter(any)
+    bars = st.lists(numbers(0, 1e6), min_size=window, max_size=window).filter(lambda bars: sum(bars) > 1e-5)
     color = draw(st.tuples(*[numbers(0, 1)] * 3))
     if draw(st.booleans()):
         return recipes.Shutter(name, color, draw(bars))
@@ -125,7 +125,7 @@ def test_on_a_moved_turned_and_scaled_strip(effect_on, source, rotation, scale, 
 
 
 @settings(max_examples=60, suppress_health_check=list(HealthCheck))
-@given(st.floats(1e-3, 1e3), st.floats(-1000, 1000), st.floats(0, 1e4))
+@given(st.floats(1e-3, 1e3), st.floats(-1000, 1000), st.floats(0, 1e3))
 def test_numbers_that_float32_cannot_hold(effect_on, weight, degrees, width):
     """The nearest that it can; and from then on the same."""
     region = {"shutter": "A", "width": width, "strokes": [[[0.1, 0.2]]], "keys": [{"frame": 1, "rotation": degrees}]}
