@@ -3,7 +3,8 @@
 Blender keeps numbers as float32: a recipe gets the shortest decimals that give the same ones back, and points to a
 millionth of the picture. So a recipe's numbers come back as they were written, up to seven digits.
 Between two keys a recipe knows three eases. Where Blender's curves do something else, by free handles, channels keyed
-apart, modifiers, there is a key per frame: at every whole frame recipe and effect agree within TOLERANCE.
+apart, modifiers, there is a key per frame: at every whole frame that the strip shows, recipe and effect agree within
+TOLERANCE.
 """
 
 import math
@@ -176,7 +177,7 @@ def _drawings(effect, source, strip) -> dict[int, list]:
 
 
 def _keys(fits, still, keyed, frames: list, words: dict, strip) -> list[tuple[float, str]]:
-    """Frames and eases of the keys that give the effect at every whole frame.
+    """Frames and eases of the keys that give the effect at every whole frame of the strip.
 
     fits: whether at a frame a share is right between two keys; still: whether a frame shows what another does;
     keyed: the F-curves; frames: where there has to be a key; words: the ease that a key has to have."""
@@ -190,7 +191,9 @@ def _keys(fits, still, keyed, frames: list, words: dict, strip) -> list[tuple[fl
     eases = animation.eases(keyed)
     keys = baked([frame for frame in shown if frame < frames[0]], frames[0])
     for first, second in pairwise(frames):
-        shares = {frame: (frame - first) / (second - first) for frame in _whole_between(first, second)}
+        # Keys may lie a million frames outside.
+        between = range(max(math.floor(first) + 1, shown.start), min(math.ceil(second), shown.stop))
+        shares = {frame: (frame - first) / (second - first) for frame in between}
         candidates = [words[first]] if first in words else [eases.get(first, "linear"), *keyframes.EASES]
         for word in candidates:
             if all(fits(first, second, frame, keyframes.eased(share, word)) for frame, share in shares.items()):
@@ -201,10 +204,6 @@ def _keys(fits, still, keyed, frames: list, words: dict, strip) -> list[tuple[fl
     last = frames[-1]
     keys.append((last, words.get(last) or eases.get(last, "linear")))
     return keys + baked([frame for frame in shown if frame > last], last)
-
-
-def _whole_between(first: float, second: float) -> range:
-    return range(math.floor(first) + 1, math.ceil(second))
 
 
 def _short(value: float) -> float:

@@ -202,9 +202,8 @@ def load(path: str | Path) -> Recipe:
 def _read(path: Path) -> str:
     """The text of a file, a little more at most than a recipe may have. RecipeError, OSError, ValueError: there is
     none."""
-    if path.is_dir():
-        raise RecipeError("a directory, not a file")
-    if path.exists() and not path.is_file():  # opening a pipe would wait for ever, and a device has no end
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        # opening a pipe would wait for ever, and a device has no end
         raise RecipeError("a pipe or a device, not a file")
     with path.open("rb") as file:
         data = file.read(limits.MAX_BYTES + 1)
