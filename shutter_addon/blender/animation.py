@@ -21,6 +21,7 @@ class Curves:
         self._scene = scene
         self._curves = {(c.data_path, c.array_index): c for c in curves_under(scene, "") if not (c.mute or c.is_empty)}
         self._checked = set()
+        self._frames: dict[str, list[float]] = {}
 
     def find(self, path: str, index: int = 0):
         """The F-curve of a property, or None; muted and empty ones do not count. EffectError: a key of it lies where
@@ -31,6 +32,12 @@ class Curves:
             values.check_keys(self._scene.path_resolve(owner), name, _points(curve)[:, 0])
             self._checked.add(curve)
         return curve
+
+    def key_frames(self, path: str, curves) -> list[float]:
+        """As key_frames below, of the curves under a path, which are asked once."""
+        if path not in self._frames:
+            self._frames[path] = key_frames(curves)
+        return self._frames[path]
 
     def value(self, owner, path: str, name: str, frame: float):
         """A float property, or a float vector as a list, at a frame; path: the owner's, from the scene. EffectError:
@@ -56,7 +63,12 @@ def _points(curve) -> np.ndarray:
 
 def key_frames(curves) -> list[float]:
     """Frames with a key on any of the curves, ascending."""
-    return sorted({key.co[0] for curve in curves for key in curve.keyframe_points})
+    frames = [np.empty(0, np.float32)]
+    for curve in curves:
+        points = np.empty(2 * len(curve.keyframe_points), np.float32)
+        curve.keyframe_points.foreach_get("co", points)
+        frames.append(points[::2])
+    return np.unique(np.concatenate(frames)).tolist()
 
 
 def progress(curves, start: float, end: float, frame: float) -> float:
@@ -75,6 +87,16 @@ def ease_at(curve, frame: float) -> str:
             word = key.interpolation.lower()
             return word if word in keyframes.EASES else "bezier"
     return "linear"
+
+
+def eases(curves) -> dict[float, str]:
+    """As ease_at, for every frame with a key on any of the curves: of the first curve that has one there."""
+    found: dict[float, str] = {}
+    for curve in curves:
+        for key in curve.keyframe_points:
+            word = key.interpolation.lower()
+            found.setdefault(key.co[0], word if word in keyframes.EASES else "bezier")
+    return found
 
 
 def set_keys(scene, path: str, index: int, keys, group: str = "") -> None:

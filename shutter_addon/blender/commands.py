@@ -20,7 +20,7 @@ import bpy
 from ..compute.errors import NoDeviceError
 from ..compute.renderer import DEVICES
 from ..core import recipe, whole
-from ..core.messages import signed
+from ..core.messages import sentence, signed
 from ..media import MediaError, open_source
 from ..media.files import check_name
 from ..media.written import is_whole_blend, why_short
@@ -62,9 +62,9 @@ def main(argv: list[str]) -> int:
     return 0
 
 
-def _refuse(sentence: str, code: int = BAD_INPUT) -> int:
+def _refuse(reason: str, code: int = BAD_INPUT) -> int:
     with suppress(OSError):  # nobody reads it
-        print(signed(sentence), file=sys.stderr)
+        print(signed(reason), file=sys.stderr)
     return code
 
 
@@ -219,9 +219,9 @@ def _frames(text: str | None, count: int) -> tuple[int, int]:
     """First and last timeline frame of `A:B`, of `A` alone, or of the whole clip."""
     if text is None:
         return 1, count
-    numbers = re.fullmatch(r"(-?\d+)(?::(-?\d+))?", text)
+    numbers = re.fullmatch(r"(-?\d{1,9})(?::(-?\d{1,9}))?", text)
     if not numbers:
-        raise outputs.OutputError(f'--frames: "{text}" is not A:B')
+        raise outputs.OutputError(f'--frames: "{sentence(text, 40)}" is not A:B')
     first, last = int(numbers[1]), int(numbers[2] or numbers[1])
     if not 1 <= first <= last <= count:
         raise outputs.OutputError(f"--frames: {text} is not within the clip's frames 1:{count}")

@@ -223,7 +223,8 @@ def _change_bars(effect, index: int, change) -> None:
     curves = animation.Curves(edit)
     old = bars(shutter)
     keyed = {k: curve for k in range(len(old)) if (curve := curves.find(f"{path}[{k}].weight"))}
-    keys = [_changed_key(old, keyed, frame, change) for frame in animation.key_frames(keyed.values())]
+    words = sorted(animation.eases(keyed.values()).items())
+    keys = [(frame, change(_bars_keyed(old, keyed, frame)), ease) for frame, ease in words]
     animation.remove_curves(edit, f"{path}[")
     shutter.bars.clear()
     for k, weight in enumerate(change(old)):
@@ -232,12 +233,11 @@ def _change_bars(effect, index: int, change) -> None:
             animation.set_keys(edit, f"{path}[{k}].weight", 0, [(frame, bar[k], ease) for frame, bar, ease in keys])
 
 
-def _changed_key(old, keyed, frame: float, change):
-    """Frame, changed bars, and ease of the key at a frame."""
+def _bars_keyed(old, keyed, frame: float) -> np.ndarray:
+    """The bars at a frame, where some have F-curves."""
     weights = old.copy()
     weights[list(keyed)] = [max(curve.evaluate(frame), 0.0) for curve in keyed.values()]
-    own = next(c for c in keyed.values() if any(key.co[0] == frame for key in c.keyframe_points))
-    return frame, change(weights), animation.ease_at(own, frame)
+    return weights
 
 
 def key_bars(effect, index: int) -> None:

@@ -111,7 +111,7 @@ def bars_at(curves, path: str, shutter, chosen: recipe.Options, frame: float) ->
 
     if not keyed:
         return at(frame)
-    frames = animation.key_frames(keyed.values())
+    frames = curves.key_frames(path, keyed.values())
     if not frames:  # curves of samples or of modifiers alone
         return at(frame)
     before, after, _ = keyframes.span(frames, frame)
@@ -207,9 +207,11 @@ def points(region, drawing, to_picture) -> list[np.ndarray]:
 
 
 def apply(edit, effect, strip, source: recipe.Recipe) -> None:
-    """Replaces the effect's data and keys by a recipe, whose frame 1 is the strip's first."""
-    clear(edit, effect)
+    """Replaces the effect's data and keys by a recipe, whose frame 1 is the strip's first. EffectError: its keys cannot
+    lie there; nothing has changed."""
     first = strip.left_handle - 1
+    _check_keys(source, first)
+    clear(edit, effect)
     # Bars per frame before the factor, which else would change the window.
     effect.bars_per_frame, effect.inbetween = source.inbetween, str(source.inbetween)
     effect.inbetween_method = source.inbetween_method.upper()
@@ -226,8 +228,21 @@ def apply(edit, effect, strip, source: recipe.Recipe) -> None:
         animation.set_keys(edit, f"{path}.source_time", 0, keys, group=effect.name)
     for i, shutter in enumerate(source.shutters):
         _add_shutter(edit, effect, f"{path}.shutters[{i}]", shutter, first)
+    colors = {shutter.name: shutter.color for shutter in source.shutters}
     for i, region in enumerate(source.regions):
-        _add_region(edit, effect, strip, f"{path}.regions[{i}]", region, first)
+        _add_region(edit, effect, strip, f"{path}.regions[{i}]", region, colors[region.shutter], first)
+
+
+def _check_keys(source: recipe.Recipe, first: float) -> None:
+    """EffectError: keys would lie beyond Blender's timeline, or on the same frame, as it counts in float32."""
+    for keys in (source.time, *(part.keys for part in (*source.shutters, *source.regions))):
+        frames = np.array([key.frame + first for key in keys], dtype=np.float32)
+        if (wrong := np.flatnonzero(np.abs(frames) > limits.MAX_FRAME)).size:
+            sentence = rpt_("frame {frame} of the recipe: a key cannot lie beyond Blender's timeline")
+            raise EffectError(sentence.format(frame=f"{keys[wrong[0]].frame:.10g}"))
+        if (wrong := np.flatnonzero(np.diff(frames) == 0)).size:
+            sentence = rpt_("frame {frame} of the recipe: so late on the timeline, the next key is on the same frame")
+            raise EffectError(sentence.format(frame=f"{keys[wrong[0]].frame:.10g}"))
 
 
 def clear(edit, effect) -> None:
@@ -252,11 +267,10 @@ def _add_shutter(edit, effect, path: str, source: recipe.Shutter, first: float) 
             animation.set_keys(edit, f"{path}.bars[{k}].weight", 0, keys)
 
 
-def _add_region(edit, effect, strip, path: str, source: recipe.Region, first: float) -> None:
+def _add_region(edit, effect, strip, path: str, source: recipe.Region, color, first: float) -> None:
     region = effect.regions.add()
     region.name, region.shutter, region.width = source.name, source.shutter, source.width
     region.kind = source.kind.upper()
-    color = next(shutter.color for shutter in effect.shutters if shutter.name == source.shutter)
     region.layer = _draw(effect, strip, source, color, first)
     if not source.keys:
         return

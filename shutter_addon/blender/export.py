@@ -3,7 +3,8 @@
 Blender keeps numbers as float32: a recipe gets the shortest decimals that give the same ones back, and points to a
 millionth of the picture. So a recipe's numbers come back as they were written, up to seven digits.
 Between two keys a recipe knows three eases. Where Blender's curves do something else, by free handles, channels keyed
-apart, modifiers, there is a key per frame: at every whole frame recipe and effect agree within TOLERANCE.
+apart, modifiers, there is a key per frame: at every whole frame that the strip shows, recipe and effect agree within
+TOLERANCE.
 """
 
 import math
@@ -124,7 +125,8 @@ def _region(curves, path: str, source, effect, strip) -> recipe.Region | None:
     place = cache(partial(_place, curves, path, source))
     frames = set(animation.key_frames(keyed))
     # The ease from a drawing to the next is that of the key at its frame.
-    words = {number: animation.ease_at(timing, number) for number in drawings} if len(drawings) > 1 else {}
+    eases = animation.eases([timing] if timing else [])
+    words = {number: eases.get(number, "linear") for number in drawings} if len(drawings) > 1 else {}
     frames.update(words)
     if not frames and tuple(place(strip.left_handle)) != (0, 0, 0, 1):
         frames.add(strip.left_handle)
@@ -182,7 +184,7 @@ def _drawings(effect, source, strip) -> dict[int, list]:
 
 
 def _keys(fits, still, keyed, frames: list, words: dict, strip) -> list[tuple[float, str]]:
-    """Frames and eases of the keys that give the effect at every whole frame.
+    """Frames and eases of the keys that give the effect at every whole frame of the strip.
 
     fits: whether at a frame a share is right between two keys; still: whether a frame shows what another does;
     keyed: the F-curves; frames: where there has to be a key; words: the ease that a key has to have."""
@@ -193,10 +195,13 @@ def _keys(fits, still, keyed, frames: list, words: dict, strip) -> list[tuple[fl
     def baked(outside, held):
         return [] if all(still(frame, held) for frame in outside) else [(frame, "linear") for frame in outside]
 
+    eases = animation.eases(keyed)
     keys = baked([frame for frame in shown if frame < frames[0]], frames[0])
     for first, second in pairwise(frames):
-        shares = {frame: (frame - first) / (second - first) for frame in _whole_between(first, second)}
-        candidates = [words[first]] if first in words else [_word(keyed, first), *keyframes.EASES]
+        # Keys may lie a million frames outside.
+        between = range(max(math.floor(first) + 1, shown.start), min(math.ceil(second), shown.stop))
+        shares = {frame: (frame - first) / (second - first) for frame in between}
+        candidates = [words[first]] if first in words else [eases.get(first, "linear"), *keyframes.EASES]
         for word in candidates:
             if all(fits(first, second, frame, keyframes.eased(share, word)) for frame, share in shares.items()):
                 keys.append((first, word))
@@ -204,18 +209,8 @@ def _keys(fits, still, keyed, frames: list, words: dict, strip) -> list[tuple[fl
         else:
             keys += [(first, candidates[0]), *((frame, "linear") for frame in shares)]
     last = frames[-1]
-    keys.append((last, words.get(last) or _word(keyed, last)))
+    keys.append((last, words.get(last) or eases.get(last, "linear")))
     return keys + baked([frame for frame in shown if frame > last], last)
-
-
-def _whole_between(first: float, second: float) -> range:
-    return range(math.floor(first) + 1, math.ceil(second))
-
-
-def _word(keyed, frame: float) -> str:
-    """The ease of the first curve that has a key at a frame."""
-    curve = next((curve for curve in keyed if frame in animation.key_frames([curve])), None)
-    return animation.ease_at(curve, frame)
 
 
 def _short(value: float) -> float:

@@ -442,11 +442,10 @@ class SHUTTER_OT_recipe_import(_OfEffect, ImportHelper, Operator):
     def change(self, context, effect):
         edit, _effect, strip = strips.active(context)
         try:
-            loaded = recipe.load(chosen_file(self))
-        except recipe.RecipeError as error:
+            effects.apply(edit, effect, strip, recipe.load(chosen_file(self)))
+        except (recipe.RecipeError, effects.EffectError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        effects.apply(edit, effect, strip, loaded)
         return None
 
 

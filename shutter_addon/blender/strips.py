@@ -6,12 +6,11 @@ import bpy
 from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ..core.limits import MAX_FRAME
 from . import effects, sources
 
 ENGINE = "VIRTUAL_SHUTTER"
 SOURCES = ("MOVIE", "IMAGE", "MOVIECLIP")
-# Past its scene's end a Scene strip shows the last frame. Source and strip may be made longer, by hand or by speed.
-_SPARE = 100_000
 _COLOR = "COLOR_06"
 _LOOK = ("use_flip_x", "use_flip_y", "color_multiply", "color_saturation", "multiply_alpha")
 
@@ -214,9 +213,8 @@ def add_effect(edit, source):
     medium.close()
     if not source.virtual_shutter_source:
         source.virtual_shutter_source = uuid.uuid4().hex
-    length = max(source.content_end, source.right_handle) - source.content_start
     name = data_("Shutter {source}").format(source=source.name)
-    scene = new_scene(edit, name, (medium.width, medium.height), int(length) + _SPARE)
+    scene = new_scene(edit, name, (medium.width, medium.height))
     scene.virtual_shutter.identity = uuid.uuid4().hex
     level = (source.parent_meta() or edit.sequence_editor).strips
     taken = {s.channel for s in level if _overlap(s, source)}
@@ -271,13 +269,15 @@ def copy_look(source, strip) -> None:
         setattr(strip, name, getattr(source, name))
 
 
-def new_scene(edit, name: str, size, length: int):
+def new_scene(edit, name: str, size):
     """A scene for an effect of the edit, with a camera and an empty annotation."""
     scene = bpy.data.scenes.new(name)
     scene.render.engine = ENGINE
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
-    scene.frame_start, scene.frame_end = 1, length
+    # Past its scene's end a Scene strip shows the last frame. Source and strip may be made longer, by hand, by speed or
+    # by keys of the source time.
+    scene.frame_start, scene.frame_end = 1, MAX_FRAME
     # A Scene strip plays at its scene's rate; at the edit's it shows one frame per timeline frame.
     scene.render.fps, scene.render.fps_base = edit.render.fps, edit.render.fps_base
     _add_camera(scene)

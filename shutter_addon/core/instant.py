@@ -55,7 +55,9 @@ class Instant:
 
     @property
     def gains(self) -> np.ndarray:
-        """Brightness (N,) of each shutter: all 1, or its exposure over the reference ("weighted")."""
+        """Brightness (N,) of each shutter: all 1, or its exposure over the reference ("weighted").
+
+        It scales linear light, after decoding where encoded values are summed, as an aperture would."""
         exposures = self.bars.sum(axis=1)
         if self.options.exposure == "normalized":
             return np.ones_like(exposures)

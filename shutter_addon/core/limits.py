@@ -10,8 +10,8 @@ MAX_DISTANCE = 1000.0
 # Scale to either side of 0, and rotation in degrees to either side: a thousand turns.
 MAX_SCALE = 1000.0
 MAX_DEGREES = 360_000.0
-# As many as a GPU's textures and registers hold, with 256 bars each.
-MAX_SHUTTERS = 64
+# Each is a part of every pixel's registers on a GPU; for more than 40, a software renderer takes minutes to compile.
+MAX_SHUTTERS = 32
 MAX_REGIONS = 1000
 # Of all regions together, of each one's drawing with the most points.
 MAX_POINTS = 100_000

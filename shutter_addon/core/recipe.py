@@ -8,16 +8,18 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections import Counter
 from dataclasses import dataclass, field, is_dataclass, replace
-from functools import cache, partial
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal, get_args, get_origin
 
 import numpy as np
 
-from . import keyframes, scribbles, shutters, whole
+from . import keyframes, limits, scribbles, shutters, whole
 from .instant import Edges, Exposure, Instant, Interpolation, Light, Options, Position
+from .messages import sentence
 
 Point = tuple[float, float]
 Stroke = list[Point]
@@ -25,8 +27,15 @@ Ease = Literal["linear", "bezier", "constant"]
 Factor = Literal[1, 2, 4, 8, 16]
 
 
+# Longer numbers are read as floats, which need no time for it; a whole number that counts anything is far shorter.
+_MAX_DIGITS = 300
+
+
 class RecipeError(ValueError):
-    """A recipe that breaks the format; the message is one sentence that names the place."""
+    """A recipe that breaks the format; the message is one sentence (core.messages) that begins with the place."""
+
+    def __init__(self, text: str):
+        super().__init__(sentence(text))
 
 
 @dataclass(frozen=True)
@@ -136,12 +145,12 @@ class Recipe:
 
     def at(self, frame: float, aspect: float) -> Instant:
         """The effect at a timeline frame (1 = the strip's first), for a picture of width / height = aspect."""
-        order = [shutter.name for shutter in self.shutters]
+        order = {shutter.name: i for i, shutter in enumerate(self.shutters)}
         return Instant(
             self.options,
             np.stack([shutter.at(frame, self.interpolation) for shutter in self.shutters]),
             tuple(
-                scribbles.Shape(order.index(region.shutter), region.kind, region.width, region.at(frame, aspect))
+                scribbles.Shape(order[region.shutter], region.kind, region.width, region.at(frame, aspect))
                 for region in self.regions
             ),
         )
@@ -180,21 +189,41 @@ def with_inbetween(source: Recipe, factor: int) -> Recipe:
 def load(path: str | Path) -> Recipe:
     """The recipe in a JSON file. RecipeError: it cannot be read, or breaks the format."""
     try:
-        return parse(Path(path).read_text(encoding="utf-8"))
+        return parse(_read(Path(path)))
     except OSError as error:
-        raise RecipeError(f"{path}: {error.strerror}") from None
+        raise RecipeError(f"{path}: {error.strerror or error}") from None
     except UnicodeDecodeError:
-        raise RecipeError(f"{path}: not a text file") from None
-    except RecipeError as error:
+        raise RecipeError(f"{path}: not a text file in UTF-8") from None
+    except ValueError as error:  # RecipeError, or a name that no file can have
         raise RecipeError(f"{path}: {error}") from None
+
+
+def _read(path: Path) -> str:
+    """The text of a file, a little more at most than a recipe may have. RecipeError, OSError, ValueError: there is
+    none."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        # opening a pipe would wait for ever, and a device has no end
+        raise RecipeError("a pipe or a device, not a file")
+    with path.open("rb") as file:
+        data = file.read(limits.MAX_BYTES + 1)
+    _check_size(data)
+    return data.decode("utf-8")
+
+
+def _check_size(text: str | bytes) -> None:
+    if len(text) > limits.MAX_BYTES:
+        raise RecipeError(f"more than {limits.MAX_BYTES // 1_000_000} MB, which no recipe has")
 
 
 def parse(text: str) -> Recipe:
     """The recipe in a JSON text. RecipeError: one sentence that names the place, as `shutters[1].bars: …`."""
+    _check_size(text)
     try:
-        data = json.loads(text)
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise RecipeError(f"not JSON: {error}") from None
+        data = json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_object, parse_int=_whole)
+    except json.JSONDecodeError as error:
+        raise RecipeError(f"line {error.lineno}, column {error.colno}: not JSON ({error.msg})") from None
+    except RecursionError:
+        raise RecipeError("recipe: lists or objects within one another, too many") from None
     converter = _converter()
     try:
         recipe = converter.structure(data, Recipe)
@@ -207,15 +236,13 @@ def parse(text: str) -> Recipe:
 def dump(recipe: Recipe) -> str:
     """The recipe as JSON text; `parse(dump(r)) == r`. Fields that carry nothing are left out."""
     text = json.dumps(_compact(_converter().unstructure(recipe)), indent=1, ensure_ascii=False)
-    # People read and edit these files: a list of numbers stays on one line.
-    return (
-        re.sub(
-            r"\[[-+.\de,\s]+\]",
-            lambda numbers: " ".join(numbers[0].split()).replace("[ ", "[").replace(" ]", "]"),
-            text,
-        )
-        + "\n"
-    )
+    # People read and edit these files: a list of numbers stays on one line. Texts are found as well, to be passed over.
+    return re.sub(r'"(?:[^"\\]|\\.)*"|\[[-+.\de,\s]+\]', _on_one_line, text) + "\n"
+
+
+def _on_one_line(found: re.Match) -> str:
+    text = found[0]
+    return text if text[0] == '"' else " ".join(text.split()).replace("[ ", "[").replace(" ]", "]")
 
 
 def save(recipe: Recipe, path: str | Path) -> None:
@@ -231,6 +258,22 @@ def _compact(value):
 
 
 # Reading: the converter checks the structure, _check what no type can say.
+
+
+class _Doubled(dict):
+    """An object of JSON that has a field twice, its name in `field`: which one is meant, nobody knows."""
+
+
+def _object(pairs: list) -> dict:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        found = _Doubled(found)
+        found.field = Counter(name for name, _ in pairs).most_common(1)[0][0]
+    return found
+
+
+def _whole(digits: str) -> int | float:
+    return int(digits) if len(digits) <= _MAX_DIGITS else float(digits)
 
 
 def _number(value, _kind) -> float:
@@ -270,20 +313,40 @@ def _tuple(kind, converter):
     return structure
 
 
-def _after_check(factory, wanted: type, name: str):
-    """A hook factory whose hooks take JSON's `wanted` only: Python walks through texts and objects as well."""
+def _list(kind, converter):
+    (inner,) = get_args(kind)
+    structure_item = converter.get_structure_hook(inner)
 
-    def make(kind, converter):
-        structure = factory(kind, converter)
+    def structure(value, _kind):
+        if not isinstance(value, list):
+            raise ValueError(f"{_shown(value)} is not a list")
+        return [item(value, index) for index in range(len(value))]
 
-        def checked(value, kind):
-            if not isinstance(value, wanted):
-                raise ValueError(f"{_shown(value)} is not {name}")
-            return structure(value, kind)
+    def item(value, index):
+        try:
+            return structure_item(value[index], inner)
+        except Exception as error:  # the first one is enough; cattrs' own lists gather millions
+            from cattrs.errors import IterableValidationError, IterableValidationNote
 
-        return checked
+            error.add_note(IterableValidationNote(f"index {index}", index, inner))
+            raise IterableValidationError("in a list", [error], kind) from None
 
-    return make
+    return structure
+
+
+def _dataclass(kind, converter):
+    from cattrs.gen import make_dict_structure_fn
+
+    structure_fields = make_dict_structure_fn(kind, converter, _cattrs_forbid_extra_keys=True)
+
+    def structure(value, kind):
+        if not isinstance(value, dict):
+            raise ValueError(f"{_shown(value)} is not an object")
+        if isinstance(value, _Doubled):
+            raise ValueError(f"field {_shown(value.field)} stands there twice")
+        return structure_fields(value, kind)
+
+    return structure
 
 
 @cache
@@ -292,8 +355,6 @@ def _converter():
     without it."""
     try:
         import cattrs
-        from cattrs.cols import list_structure_factory
-        from cattrs.gen import make_dict_structure_fn
     except ImportError as error:
         raise RecipeError(
             f"recipes need the Python package cattrs ({error}); install it for Blender's Python"
@@ -305,17 +366,27 @@ def _converter():
     converter.register_structure_hook(bool, _exactly(bool, "true or false"))
     converter.register_structure_hook_func(lambda kind: get_origin(kind) is Literal, _choice)
     converter.register_structure_hook_factory(lambda kind: get_origin(kind) is tuple, _tuple)
-    converter.register_structure_hook_factory(
-        lambda kind: get_origin(kind) is list, _after_check(list_structure_factory, list, "a list")
-    )
-    strict = partial(make_dict_structure_fn, _cattrs_forbid_extra_keys=True)
-    converter.register_structure_hook_factory(is_dataclass, _after_check(strict, dict, "an object"))
+    converter.register_structure_hook_factory(lambda kind: get_origin(kind) is list, _list)
+    converter.register_structure_hook_factory(is_dataclass, _dataclass)
     return converter
 
 
 def _shown(value) -> str:
-    text = json.dumps(value, ensure_ascii=False)
+    """A value as JSON, or its first 40 characters; of large ones the rest is not looked at."""
+    text = ""
+    for part in json.JSONEncoder(ensure_ascii=False).iterencode(value):
+        text += part
+        if len(text) > 40:
+            break
+    return _cut(text)
+
+
+def _cut(text: str) -> str:
     return text if len(text) <= 40 else text[:37] + "…"
+
+
+def _plain(number: float) -> str:
+    return f"{number:.10g}"
 
 
 def _first_fault(error: Exception) -> str:
@@ -323,71 +394,117 @@ def _first_fault(error: Exception) -> str:
     import cattrs
     from cattrs.errors import ForbiddenExtraKeysError
 
-    def sentence(error, kind):
+    def described(error, kind):
         if isinstance(error, KeyError):
             return "missing"
         if isinstance(error, ForbiddenExtraKeysError):
-            return f"unknown field {', '.join(sorted(error.extra_fields))}"
+            names = sorted(error.extra_fields)
+            more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+            return f"unknown field {', '.join(map(_cut, names[:3]))}{more}"
         return str(error)
 
-    message, _, place = cattrs.transform_error(error, "$", sentence)[0].rpartition(" @ $")
+    message, _, place = cattrs.transform_error(error, "$", described)[0].rpartition(" @ $")
     return f"{place.lstrip('.') or 'recipe'}: {message}"
 
 
+def _require(condition, place: str, message: str) -> None:
+    if not condition:
+        raise RecipeError(f"{place}: {message}")
+
+
+def _require_within(value: float, most: float, place: str, least: float | None = None) -> None:
+    """least: −most, where it is not given."""
+    least = -most if least is None else least
+    _require(least <= value <= most, place, f"{_plain(value)} is not {_plain(least)} to {_plain(most)}")
+
+
 def _check(recipe: Recipe) -> None:
-    def require(condition, place, message):
-        if not condition:
-            raise RecipeError(f"{place}: {message}")
-
-    require(
-        1 <= recipe.window <= shutters.MAX_WINDOW,
-        "window",
-        f"{recipe.window} is not 1 to {shutters.MAX_WINDOW}",
-    )
-    require(recipe.shutters, "shutters", "there is none; the first is the default")
-    names = [shutter.name for shutter in recipe.shutters]
+    window = f"{_shown(recipe.window)} is not 1 to {shutters.MAX_WINDOW}"
+    _require(1 <= recipe.window <= shutters.MAX_WINDOW, "window", window)
+    _require(recipe.shutters, "shutters", "there is none; the first is the default")
+    _check_count(recipe.shutters, limits.MAX_SHUTTERS, "shutters")
+    _check_count(recipe.regions, limits.MAX_REGIONS, "regions")
+    places: dict[str, int] = {}
     for i, shutter in enumerate(recipe.shutters):
-        place = f"shutters[{i}]"
-        require(
-            names.index(shutter.name) == i,
-            f"{place}.name",
-            f'"{shutter.name}" is taken by shutters[{names.index(shutter.name)}]',
-        )
-        require((shutter.bars is None) != (not shutter.keys), place, "either bars or keys, one of the two")
-        require(all(0 <= c <= 1 for c in shutter.color), f"{place}.color", "not three numbers from 0 to 1")
-        _check_frames(shutter.keys, f"{place}.keys", require)
-        for where, bars in (
-            [(f"{place}.bars", shutter.bars)]
-            if shutter.bars is not None
-            else [(f"{place}.keys[{k}].bars", key.bars) for k, key in enumerate(shutter.keys)]
-        ):
-            require(len(bars) == recipe.window, where, f"{len(bars)} values, window is {recipe.window}")
-            try:
-                shutters.check_bars(bars)
-            except shutters.ShutterError as error:
-                raise RecipeError(f"{where}: {error}") from None
-    _check_frames(recipe.time, "time", require)
+        _check_name(shutter.name, f"shutters[{i}].name")
+        taken = places.setdefault(shutter.name, i)
+        _require(taken == i, f"shutters[{i}].name", f"{_shown(shutter.name)} is taken by shutters[{taken}]")
+        _check_shutter(shutter, recipe.window, f"shutters[{i}]")
+    _check_frames(recipe.time, "time")
+    for k, key in enumerate(recipe.time):
+        _require_within(key.value, limits.MAX_FRAME, f"time[{k}].value")
     for i, region in enumerate(recipe.regions):
-        place = f"regions[{i}]"
-        require(region.shutter in names, f"{place}.shutter", f'there is no shutter "{region.shutter}"')
-        require(region.width >= 0, f"{place}.width", f"{region.width} is negative")
-        require(region.drawings()[0][1], f"{place}.strokes", "empty: nothing is drawn")
-        _check_frames(region.keys, f"{place}.keys", require)
-        redrawn = any(key.strokes is not None for key in region.keys)
-        for k, key in enumerate(region.keys):
-            whole = not (redrawn if k == 0 else key.strokes is not None) or key.frame == int(key.frame)
-            require(whole, f"{place}.keys[{k}].frame", f"{key.frame:g} is no whole frame, but redrawn")
-        for where, strokes in [(place, region.strokes)] + [
-            (f"{place}.keys[{k}]", key.strokes) for k, key in enumerate(region.keys) if key.strokes is not None
-        ]:
-            for j, stroke in enumerate(strokes):
-                require(stroke, f"{where}.strokes[{j}]", "empty: a stroke has at least one point")
+        there_is_none = f"there is no shutter {_shown(region.shutter)}"
+        _require(region.shutter in places, f"regions[{i}].shutter", there_is_none)
+        _check_region(region, f"regions[{i}]")
+    points = sum(_most_points(region) for region in recipe.regions)
+    _require(points <= limits.MAX_POINTS, "regions", f"{points} points at once, the most are {limits.MAX_POINTS}")
 
 
-def _check_frames(keys, place, require) -> None:
+def _check_shutter(shutter: Shutter, window: int, place: str) -> None:
+    _require((shutter.bars is None) != (not shutter.keys), place, "either bars or keys, one of the two")
+    _require(all(0 <= c <= 1 for c in shutter.color), f"{place}.color", "not three numbers from 0 to 1")
+    _check_frames(shutter.keys, f"{place}.keys")
+    for where, bars in (
+        [(f"{place}.bars", shutter.bars)]
+        if shutter.bars is not None
+        else [(f"{place}.keys[{k}].bars", key.bars) for k, key in enumerate(shutter.keys)]
+    ):
+        _require(len(bars) == window, where, f"{len(bars)} values, window is {window}")
+        try:
+            shutters.check_bars(bars)
+        except shutters.ShutterError as error:
+            raise RecipeError(f"{where}: {error}") from None
+
+
+def _check_region(region: Region, place: str) -> None:
+    _check_name(region.name, f"{place}.name")
+    _require(region.width >= 0, f"{place}.width", f"{region.width} is negative")
+    _require_within(region.width, limits.MAX_DISTANCE, f"{place}.width", 0)
+    _require(region.drawings()[0][1], f"{place}.strokes", "empty: nothing is drawn")
+    _check_frames(region.keys, f"{place}.keys")
+    redrawn = any(key.strokes is not None for key in region.keys)
+    for k, key in enumerate(region.keys):
+        where = f"{place}.keys[{k}]"
+        whole = not (redrawn if k == 0 else key.strokes is not None) or key.frame == int(key.frame)
+        _require(whole, f"{where}.frame", f"{_plain(key.frame)} is no whole frame, but redrawn")
+        for axis, value in enumerate(key.location):
+            _require_within(value, limits.MAX_DISTANCE, f"{where}.location[{axis}]")
+        _require_within(key.rotation, limits.MAX_DEGREES, f"{where}.rotation")
+        _require_within(key.scale, limits.MAX_SCALE, f"{where}.scale")
+        if key.strokes is not None:
+            _check_strokes(key.strokes, f"{where}.strokes")
+    _check_strokes(region.strokes, f"{place}.strokes")
+
+
+def _check_strokes(strokes: list[Stroke], place: str) -> None:
+    for j, stroke in enumerate(strokes):
+        _require(stroke, f"{place}[{j}]", "empty: a stroke has at least one point")
+        for n, point in enumerate(stroke):
+            for axis, value in enumerate(point):
+                if not -limits.MAX_DISTANCE <= value <= limits.MAX_DISTANCE:
+                    _require_within(value, limits.MAX_DISTANCE, f"{place}[{j}][{n}][{axis}]")
+
+
+def _most_points(region: Region) -> int:
+    """The points of the region's drawing that has the most."""
+    return max(sum(map(len, strokes)) for _, strokes in region.drawings())
+
+
+def _check_count(items: list, most: int, place: str) -> None:
+    _require(len(items) <= most, place, f"{len(items)}, the most are {most}")
+
+
+def _check_name(name: str, place: str) -> None:
+    _require(len(name) <= limits.MAX_NAME, place, f"{len(name)} characters, the most are {limits.MAX_NAME}")
+    wrong = next((c for c in name if c == "\0" or "\ud800" <= c <= "\udfff"), "")
+    _require(not wrong, place, f"U+{ord(wrong or ' '):04X} is no character of a name")
+
+
+def _check_frames(keys: list, place: str) -> None:
+    _check_count(keys, limits.MAX_KEYS, place)
+    for k, key in enumerate(keys):
+        _require_within(key.frame, limits.MAX_FRAME, f"{place}[{k}].frame")
     for k, (first, second) in enumerate(pairwise(keys)):
-        require(
-            first.frame < second.frame,
-            f"{place}[{k + 1}].frame",
-            f"{second.frame:g} does not follow {first.frame:g}",
-        )
+        follows = f"{_plain(second.frame)} does not follow {_plain(first.frame)}"
+        _require(first.frame < second.frame, f"{place}[{k + 1}].frame", follows)

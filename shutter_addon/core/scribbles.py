@@ -15,6 +15,8 @@ import numpy as np
 _MIN_RADIUS = 0.7072
 # Long segments are cut to this many pixels, so that the box around each stays small.
 _MAX_SEGMENT = 128.0
+# In pixels, far beyond all that limits.py allows: from here on float64 could not say where a line crosses the picture.
+_FARTHEST = 1e12
 FREE = 0
 
 
@@ -89,7 +91,7 @@ def rasterise(shapes, width: int, height: int, *, border: bool = False) -> np.nd
         for stroke in shape.strokes:
             if len(stroke) == 0:
                 continue
-            pixels = np.asarray(stroke, dtype=np.float64) * size
+            pixels = np.clip(np.asarray(stroke, dtype=np.float64) * size, -_FARTHEST, _FARTHEST)
             pixels[:, 1] = height - pixels[:, 1]
             filled = shape.kind == "lasso" and _fill(labels, pixels, shape.shutter + 1)
             if not filled:
@@ -108,11 +110,26 @@ def _draw(labels: np.ndarray, points: np.ndarray, radius: float, label: int) -> 
     radius = max(radius, _MIN_RADIUS)
     if len(points) == 1:
         points = np.repeat(points, 2, axis=0)
-    for a, b in pairwise(points):
+    seen = _seen(points[:-1], np.diff(points, axis=0), np.array(labels.shape[::-1]), radius + 1)
+    for k in np.flatnonzero(seen[0] <= seen[1]):
+        a, b = points[k : k + 2]
         pieces = max(1, int(np.ceil(np.hypot(*(b - a)) / max(_MAX_SEGMENT, 4 * radius))))
-        ends = a + (b - a) * np.linspace(0, 1, pieces + 1)[:, None]
+        first, last = max(int(seen[0, k] * pieces) - 1, 0), min(int(seen[1, k] * pieces) + 2, pieces)
+        shares = np.arange(first, last + 1) * (1 / pieces)
+        ends = a + (b - a) * np.where(np.arange(first, last + 1) == pieces, 1.0, shares)[:, None]
         for p, q in pairwise(ends):
             _draw_segment(labels, p, q, radius, label)
+
+
+def _seen(starts: np.ndarray, steps: np.ndarray, size: np.ndarray, reach: float) -> np.ndarray:
+    """The shares (2, n) of segments between which they are within `reach` of a picture of this size (x, y), in either
+    direction; the first is above the second where they are nowhere. starts, steps: (n, 2) in pixels."""
+    inside = (starts >= -reach) & (starts <= size + reach)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        low, high = np.sort([(-reach - starts) / steps, (size + reach - starts) / steps], axis=0)
+    # Along an axis that it does not move on, a segment is inside throughout, or nowhere.
+    low[steps == 0], high[steps == 0] = 0, np.where(inside, 1, -1)[steps == 0]
+    return np.stack([low.max(axis=1, initial=0), high.min(axis=1, initial=1)])
 
 
 def _draw_segment(labels, a, b, radius, label) -> None:
@@ -120,14 +137,15 @@ def _draw_segment(labels, a, b, radius, label) -> None:
     limit = np.array([width, height])
     low = np.clip(np.floor(np.minimum(a, b) - radius), 0, limit).astype(int)
     high = np.clip(np.ceil(np.maximum(a, b) + radius), 0, limit).astype(int)
-    if (low >= high).any():
+    box = labels[low[1] : high[1], low[0] : high[0]]
+    if (box == label).all():  # or there is none; a thick line's segments cover one another
         return
     x = np.arange(low[0], high[0]) + 0.5 - a[0]
     y = (np.arange(low[1], high[1]) + 0.5 - a[1])[:, None]
     d = b - a
     along = np.clip((x * d[0] + y * d[1]) / max(d @ d, 1e-12), 0, 1)
     near = (x - along * d[0]) ** 2 + (y - along * d[1]) ** 2 <= radius * radius
-    labels[low[1] : high[1], low[0] : high[0]][near] = label
+    box[near] = label
 
 
 def _fill(labels: np.ndarray, points: np.ndarray, label: int) -> bool:

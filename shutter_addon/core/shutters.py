@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .limits import MAX_BAR, MIN_EXPOSURE
+
 MAX_WINDOW = 256
 
 # Levels of z closer than this are one: float rounding of equal sums, far below any visible weight.
@@ -22,7 +24,8 @@ class ShutterError(ValueError):
 
 
 def check_bars(bars) -> np.ndarray:
-    """Bars as a float64 array (L,), or ShutterError: 1 to 256 finite numbers ≥ 0, not all of them 0."""
+    """Bars as a float64 array (L,), or ShutterError: 1 to 256 numbers from 0 to a million, a millionth together or
+    more. What counts is what they are as float32: Blender has no others."""
     bars = np.asarray(bars, dtype=np.float64)
     if bars.ndim != 1 or not 1 <= len(bars) <= MAX_WINDOW:
         raise ShutterError(f"a shutter has 1 to {MAX_WINDOW} bars, not {bars.size}")
@@ -30,8 +33,12 @@ def check_bars(bars) -> np.ndarray:
         raise ShutterError("a bar is not a finite number")
     if (bars < 0).any():
         raise ShutterError("a bar is negative")
+    if (bars > MAX_BAR).any():
+        raise ShutterError("a bar is above a million")
     if not bars.any():
         raise ShutterError("all bars are zero: the shutter never opens")
+    if exposure(bars.astype(np.float32)) < np.float32(MIN_EXPOSURE):
+        raise ShutterError("the bars are less than a millionth together: the shutter never opens")
     return bars
 
 

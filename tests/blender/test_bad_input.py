@@ -151,6 +151,10 @@ def test_damaged_in_the_middle(command, frames, tmp_path):
         ({"shutters": [{"name": "A", "bars": [1, 1, 1]}]}, ["shutters[0].bars: 3 values, window is 4"]),
         ({"surprise": 1}, ["unknown field surprise"]),
         ({"regions": [{"shutter": "A", "strokes": [[]]}]}, ["regions[0]"]),
+        ({"regions": [{"shutter": "S0", "strokes": [[[-1e7, 0], [1e7, 1]]]}]}, ["regions[0].strokes[0][0][0]: -1"]),
+        ({"time": [{"frame": 1e12, "value": 1}]}, ["time[0].frame: 1e+12 is not"]),
+        ({"shutters": [{"name": "\ud800\0", "bars": [1, 0, 0, 0]}]}, ["shutters[0].name: U+D800"]),
+        ({"\ud800\x1b": 1}, ["unknown field \\ud800\\x1b"]),
     ],
 )
 def test_wrong_recipe(command, frames, tmp_path, change, words):
@@ -161,14 +165,18 @@ def test_wrong_recipe(command, frames, tmp_path, change, words):
 
 def test_no_recipe(command, frames, tmp_path):
     (tmp_path / "r.json").write_text("{")
-    for path in (tmp_path / "r.json", tmp_path / "none.json"):
-        refused(command(frames, "--recipe", path, "--output", tmp_path / "out", check=False), path.name)
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "r.json", tmp_path / "none.json", tmp_path, tmp_path / "pipe"):
+        done = command(frames, "--recipe", path, "--output", tmp_path / "out", check=False, timeout=60)
+        refused(done, path.name)
 
 
-@pytest.mark.parametrize("text", ["0:3", "3:2", "1:7", "a:b", "7", "-1:2"])
+@pytest.mark.parametrize("text", ["0:3", "3:2", "1:7", "a:b", "7", "-1:2", "9" * 39, "1:" + "9" * 5000])
 def test_frames_outside_the_clip(command, frames, tmp_path, text):
     refused(
-        command(frames, "--output", tmp_path / "out", f"--frames={text}", recipe=STILL, check=False), "--frames", text
+        command(frames, "--output", tmp_path / "out", f"--frames={text}", recipe=STILL, check=False),
+        "--frames",
+        text[:18],
     )
     assert not (tmp_path / "out").exists()
 

@@ -177,6 +177,19 @@ def test_movies(command, bunny, tmp_path, ending):
         assert difference < 6
 
 
+def test_source_time_up_to_the_last_frame_of_the_timeline(command, noise, tmp_path, same_pixels):
+    """A freeze of more than an hour, a way on behind it, and the last frame that Blender has."""
+    first, frames = noise
+    keys = {1: 2, 100_100: 2, 100_104: 6, 1_048_574: 12}
+    data = recipe(1, [1], time=[{"frame": frame, "value": value} for frame, value in keys.items()])
+    for chunk in ("100100:100104", "1048574"):
+        command(first, "--output", tmp_path / "out", "--frames", chunk, recipe=data)
+    shown = {100_100: 2, 100_101: 3, 100_102: 4, 100_103: 5, 100_104: 6, 1_048_574: 12}
+    assert len(list((tmp_path / "out").iterdir())) == len(shown)
+    for frame, number in shown.items():
+        same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), frames[number - 1], 1)
+
+
 def test_alpha_is_carried(command, tmp_path, same_pixels):
     frames = np.random.default_rng(4).integers(0, 256, (4, 16, 20, 4), dtype=np.uint8)
     frames[:, :8, :, 3] = 255

@@ -34,7 +34,7 @@ whole_frames = st.lists(st.integers(-20, 60).map(float), min_size=1, max_size=4,
 
 @st.composite
 def shutters(draw, name, window):
-    bars = st.lists(numbers(0, 1e6), min_size=window, max_size=window).filter(any)
+    bars = st.lists(numbers(0, 1e6), min_size=window, max_size=window).filter(lambda bars: sum(bars) > 1e-5)
     color = draw(st.tuples(*[numbers(0, 1)] * 3))
     if draw(st.booleans()):
         return recipes.Shutter(name, color, draw(bars))
@@ -349,6 +349,64 @@ def test_what_no_recipe_can_hold(effect_on):
         curve(edit, f"shutters[1].bars[{k}].weight").keyframe_points[1].co[1] = 0
     with pytest.raises(EffectError, match='shutter "Keyed" at frame 47: all bars are zero'):
         export(effect_on)
+
+
+@pytest.mark.parametrize(
+    ("keys", "sentence"),
+    [
+        ([1, 1_048_574], "frame 1048574 of the recipe: a key cannot lie beyond Blender's timeline"),
+        ([1, 1.0000001], "frame 1 of the recipe: so late on the timeline, the next key is on the same frame"),
+    ],
+)
+@pytest.mark.parametrize("part", ["time", "shutters", "regions"])
+def test_keys_that_cannot_lie_there_leave_the_effect_as_it_was(effect_on, part, keys, sentence):
+    """The strip begins at frame 31, and Blender counts frames in float32."""
+    from shutter_addon.blender.effects import EffectError
+
+    apply(effect_on, BASE)
+    before = export(effect_on)
+    data = {"version": 1, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
+    if part == "time":
+        data["time"] = [{"frame": frame, "value": 1} for frame in keys]
+    elif part == "shutters":
+        data["shutters"] = [{"name": "A", "keys": [{"frame": frame, "bars": [1]} for frame in keys]}]
+    else:
+        data["regions"] = [{"shutter": "A", "strokes": [[[0, 0]]], "keys": [{"frame": frame} for frame in keys]}]
+    with pytest.raises(EffectError, match=sentence):
+        apply(effect_on, data)
+    assert export(effect_on) == before
+
+
+def test_what_a_recipe_may_hold_at_most(effect_on):
+    """It is put into Blender's data, comes back as it was, and is drawn; in seconds."""
+    from shutter_addon.blender import effects
+
+    far = {"location": [-1000, 1000], "rotation": -360_000, "scale": -1000}
+    first, last = -1_048_574 - FIRST + 1 + 2 * (FIRST - 1), 1_048_574 - FIRST + 1
+    keys = [{"frame": first, "bars": [1e6] * 256}, {"frame": last, "bars": [1e-6, *[0] * 255]}]
+    moves = [{"frame": first, **far}, {"frame": last, "strokes": [[[-900, 900]] * 90]}]
+    region = {"shutter": "0", "name": "é" * 63, "width": 1000, "strokes": [[[-900, 900]] * 95]}
+    data = {
+        "version": 1,
+        "window": 256,
+        "shutters": [{"name": str(i), "keys": keys} for i in range(32)],
+        "regions": [region | {"keys": moves if i < 20 else []} for i in range(1000)],
+        "time": [{"frame": first, "value": -1_048_574}, {"frame": last, "value": 1_048_574}],
+    }
+    apply(effect_on, data)
+    assert effects.instant(*effect_on, 40).bars.shape == (32, 256)
+    found = export(effect_on)
+    assert found == recipes.parse(json.dumps(data))
+
+
+def test_a_key_at_every_frame_is_soon_written(effect_on):
+    """As a baked speed ramp has them, and baked bars."""
+    frames = range(1, 10_001)
+    ramp = [{"frame": frame, "value": frame % 7 + 1} for frame in frames]
+    keys = [{"frame": frame, "bars": [1, frame % 3, 0]} for frame in frames]
+    apply(effect_on, {"version": 1, "window": 3, "shutters": [{"name": "A", "keys": keys}], "time": ramp})
+    found = export(effect_on)
+    assert (len(found.time), len(found.shutters[0].keys)) == (10_000, 10_000)
 
 
 def test_a_written_recipe_reads_the_same(effect_on, tmp_path):

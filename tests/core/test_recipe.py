@@ -1,12 +1,14 @@
 import copy
 import json
+import os
+import sys
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shutter_addon.core import recipe
+from shutter_addon.core import limits, recipe, scribbles
 from shutter_addon.core.compositor import window_positions
 
 EXAMPLE = {
@@ -117,19 +119,184 @@ def broken(change):
             lambda d: d["regions"][0]["keys"][1].update(frame=2.5, strokes=[[[0, 0]]]),
             "regions[0].keys[1].frame: 2.5 is no whole frame",
         ),
+        (lambda d: d.update({"x" * 5000: 1}), "recipe: unknown field xxxxxxxx"),
+        (lambda d: d.update({f"x{i}": 1 for i in range(99)}), "recipe: unknown field x0, x1, x10 and 96 more"),
+        (lambda d: d.update(window=10**200), "window: 1000"),
+        (lambda d: d.update(shutters=[[[7] * 1000] * 100]), "shutters[0]: [[7, 7"),
+        (lambda d: d["shutters"][0].update(bars=["1"] * 1_000_000), 'shutters[0].bars[0]: "1" is not a number'),
+        (lambda d: d["shutters"][0].update(bars=[1e6] * 7 + [1.1e6]), "shutters[0].bars: a bar is above a million"),
+        (lambda d: d["shutters"][0].update(bars=[1e-46] * 8), "shutters[0].bars: the bars are less than a millionth"),
+        (lambda d: d["shutters"][0].update(name="x" * 64), "shutters[0].name: 64 characters, the most are 63"),
+        (lambda d: d["shutters"][0].update(name="a\0"), "shutters[0].name: U+0000 is no character"),
+        (lambda d: d["regions"][0].update(name="\udcff"), "regions[0].name: U+DCFF is no character"),
+        (lambda d: d["regions"][0].update(name="x" * 64), "regions[0].name: 64 characters"),
+        (lambda d: d["regions"][0].update(shutter="X" * 999), 'regions[0].shutter: there is no shutter "XXXX'),
+        (
+            lambda d: d.update(shutters=[{"name": f"{i}", "bars": [1] * 8} for i in range(20_000)]),
+            "shutters: 20000, the most are 32",
+        ),
+        (lambda d: d.update(regions=[d["regions"][0]] * 1001), "regions: 1001, the most are 1000"),
+        (
+            lambda d: d["regions"].append({"shutter": "Long", "strokes": [[[0, 0]] * 50_000] * 2}),
+            "regions: 100002 points at once, the most are 100000",
+        ),
+        (lambda d: d["regions"][0].update(strokes=[[[0, 0], [1e39, 0]]]), "regions[0].strokes[0][1][0]: 1e+39 is not"),
+        (lambda d: d["regions"][0].update(strokes=[[[0, -1000.5]]]), "regions[0].strokes[0][0][1]: -1000.5 is not -10"),
+        (
+            lambda d: d["regions"][0]["keys"][1].update(strokes=[[[0, 1e4]]]),
+            "regions[0].keys[1].strokes[0][0][1]: 10000 is not -1000 to 1000",
+        ),
+        (lambda d: d["regions"][0].update(width=1e4), "regions[0].width: 10000 is not 0 to 1000"),
+        (lambda d: d["regions"][0]["keys"][0].update(scale=1e30), "regions[0].keys[0].scale: 1e+30 is not -1000 to"),
+        (lambda d: d["regions"][0]["keys"][0].update(rotation=4e5), "regions[0].keys[0].rotation: 400000 is not"),
+        (lambda d: d["regions"][0]["keys"][0].update(location=[0, 2e3]), "regions[0].keys[0].location[1]: 2000 is not"),
+        (lambda d: d["regions"][0]["keys"][1].update(frame=3e9), "regions[0].keys[1].frame: 3000000000 is not"),
+        (lambda d: d["shutters"][1]["keys"][1].update(frame=1e12), "shutters[1].keys[1].frame: 1e+12 is not"),
+        (
+            lambda d: d.update(time=[{"frame": 1048575, "value": 1}]),
+            "time[0].frame: 1048575 is not -1048574 to 1048574",
+        ),
+        (lambda d: d.update(time=[{"frame": 1, "value": 1e308}]), "time[0].value: 1e+308 is not -1048574 to 1048574"),
+        (
+            lambda d: d.update(time=[{"frame": k, "value": 1} for k in range(100_001)]),
+            "time: 100001, the most are 100000",
+        ),
+        (
+            lambda d: d.update(time=[{"frame": 1e6 + 0.5, "value": 1}, {"frame": 1e6, "value": 1}]),
+            "time[1].frame: 1000000 does not follow 1000000.5",
+        ),
     ],
 )
 def test_one_sentence_that_names_the_place(change, sentence):
     with pytest.raises(recipe.RecipeError) as fault:
         recipe.parse(broken(change))
     assert str(fault.value).startswith(sentence)
-    assert "\n" not in str(fault.value)
+    assert is_a_sentence(str(fault.value))
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "null", "3", '"a"', "[" * 100_000])
-def test_no_recipe_at_all(text):
-    with pytest.raises(recipe.RecipeError):
+def is_a_sentence(text):
+    return text.isprintable() and 0 < len(text) <= 300
+
+
+DEEP = 100_000
+ONE = '{"version": 1, "window": 1, "shutters": [{"name": "A", "bars": [1]}], '
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "line 1, column 1: not JSON"),
+        ("{", "line 1, column 2: not JSON"),
+        ('{"version": 1,\n "window": }', "line 2, column 12: not JSON"),
+        ("[]", "recipe: [] is not an object"),
+        ("null", "recipe: null is not an object"),
+        ("3", "recipe: 3 is not an object"),
+        ('"a"', 'recipe: "a" is not an object'),
+        ("[" * DEEP, "recipe: lists or objects within one another, too many"),
+        ('{"a":' * DEEP, "recipe: lists or objects within one another, too many"),
+        ('{"version": 1, "window": ' + "9" * 5000 + "}", "window: Infinity is not a whole number"),
+        (
+            ONE + '"regions": [{"shutter": "A", "width": -' + "9" * 5000 + "}]}",
+            "regions[0].width: -inf is not a finite number",
+        ),
+        ('{"version": 1, "window": 1, "window": 2}', 'recipe: field "window" stands there twice'),
+        (ONE + '"time": [{"frame": 1, "value": 1, "frame": 2}]}', 'time[0]: field "frame" stands there twice'),
+    ],
+    ids=lambda value: value[:20],
+)
+def test_no_recipe_at_all(text, sentence):
+    with pytest.raises(recipe.RecipeError) as fault:
         recipe.parse(text)
+    assert str(fault.value).startswith(sentence)
+    assert is_a_sentence(str(fault.value))
+
+
+def test_lists_that_are_read_but_too_deep_to_be_shown():
+    deep = "[" * 900 + "]" * 900  # the reader and the writer of JSON may go to different depths
+    with pytest.raises(recipe.RecipeError, match=r"^shutters\[0\]: \[\[\["):
+        recipe.parse('{"version": 1, "window": 1, "shutters": [' + deep + "]}")
+
+
+def test_at_the_ends_of_all_ranges():
+    far = {"location": [-1000, 1000], "rotation": -360_000, "scale": -1000}
+    ends = {
+        "version": 1,
+        "window": 2,
+        "shutters": [{"name": "é" * 63, "bars": [1e6, 1e6]}, {"name": "", "bars": [1e-6, 0]}],
+        "regions": [
+            {
+                "shutter": "",
+                "width": 1000,
+                "strokes": [[[-1000, 1000], [1000, -1000]]],
+                "keys": [{"frame": -1048574, **far}, {"frame": 1048574}],
+            }
+        ],
+        "time": [{"frame": -1048574, "value": 1048574}, {"frame": 1048574, "value": -1048574}],
+    }
+    found = recipe.parse(json.dumps(ends))
+    assert recipe.parse(recipe.dump(found)) == found
+    assert scribbles.rasterise(found.at(-1048574, 1.5).shapes, 6, 4).all()
+
+
+ANYTHING = st.one_of(
+    st.sampled_from(
+        [None, True, -1, 0, 10**400, 1e-46, 1e39, -1e308, float("nan"), float("inf"), "", "\ud800", [], {}]
+    ),
+    st.floats(),
+    st.integers(),
+    st.text(max_size=80),
+    st.recursive(st.floats() | st.just([0.5, 0.5]), lambda inner: st.lists(inner, max_size=4), max_leaves=20),
+)
+
+
+def places(value, path=()):
+    """All places in JSON, by keys and indices."""
+    yield path
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, inner in items:
+        yield from places(inner, (*path, key))
+
+
+@settings(deadline=5000)
+@given(
+    st.lists(st.tuples(st.sampled_from(list(places(EXAMPLE))[1:]), ANYTHING), min_size=1, max_size=3),
+    st.one_of(st.integers(-50, 50), st.floats(-2e6, 2e6)),
+)
+def test_a_hostile_recipe_is_refused_in_a_sentence_or_soon_drawn(changes, frame):
+    data = copy.deepcopy(EXAMPLE)
+    for path, value in changes:
+        inner = data
+        try:
+            for key in path[:-1]:
+                inner = inner[key]
+            inner[path[-1]] = value
+        except (TypeError, LookupError):  # an earlier change has taken it away
+            continue
+    old = sys.get_int_max_str_digits()
+    sys.set_int_max_str_digits(0)
+    text = json.dumps(data)
+    sys.set_int_max_str_digits(old)
+    try:
+        found = recipe.parse(text)
+    except recipe.RecipeError as error:
+        assert is_a_sentence(str(error))
+        return
+    assert recipe.parse(recipe.dump(found)) == found
+    moment = found.at(frame, 16 / 9)
+    assert np.isfinite(moment.bars).all()
+    assert np.isfinite(moment.gains.astype(np.float32)).all()
+    assert scribbles.rasterise(moment.shapes, 64, 36).shape == (36, 64)
+
+
+@given(st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=63))
+def test_any_name_comes_back(name):
+    found = recipe.Recipe(1, 1, [recipe.Shutter(name, bars=[1.0])])
+    assert recipe.parse(recipe.dump(found)) == found
+
+
+def test_a_name_that_looks_like_a_list_comes_back():
+    found = recipe.Recipe(1, 1, [recipe.Shutter('[1,   2 ] "\\" [3,  4]', bars=[1.0])])
+    assert recipe.parse(recipe.dump(found)) == found
 
 
 def test_files(tmp_path):
@@ -147,13 +314,43 @@ def test_files(tmp_path):
             recipe.load(path)
 
 
-def test_nothing_is_saved_through_a_link(tmp_path):
+def test_a_file_with_a_byte_order_mark(tmp_path):
+    (tmp_path / "r.json").write_text(json.dumps(EXAMPLE), encoding="utf-8-sig")
+    assert recipe.load(tmp_path / "r.json") == recipe.parse(json.dumps(EXAMPLE))
+
+
+def test_what_is_no_file(tmp_path):
+    """A pipe that nobody writes to, a device without an end, more than a recipe can be, names that no file has."""
+    os.mkfifo(tmp_path / "pipe")
+    with (tmp_path / "large").open("wb") as file:
+        file.truncate(limits.MAX_BYTES + 1)
+    (tmp_path / ("é" * 100 + "\udcff")).touch()
+    for path, sentence in [
+        (tmp_path / "pipe", "a pipe or a device"),
+        ("/dev/zero", "a pipe or a device"),
+        (tmp_path / "large", "more than 64 MB"),
+        (tmp_path / ("é" * 100 + "\udcff"), "line 1, column 1: not JSON"),
+        (tmp_path / ("x" * 300), "too long"),
+        (tmp_path / "a\0b", "null"),
+        ("/" + "x/" * 1000, "No such file|too long"),
+    ]:
+        with pytest.raises(recipe.RecipeError, match=sentence) as fault:
+            recipe.load(path)
+        assert str(fault.value).startswith(str(path)[:20])
+        assert is_a_sentence(str(fault.value))
+
+
+def test_saving_touches_no_other_file(tmp_path):
     (tmp_path / "others").write_text("others'")
     for name in ("r.json", "r.json.part"):
         (tmp_path / name).symlink_to("others")
     recipe.save(recipe.parse(json.dumps(EXAMPLE)), tmp_path / "r.json")
     assert (tmp_path / "others").read_text() == "others'"
     assert recipe.load(tmp_path / "r.json") == recipe.parse(json.dumps(EXAMPLE))
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(IsADirectoryError):
+        recipe.save(recipe.parse(json.dumps(EXAMPLE)), tmp_path / "folder")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["folder", "others", "r.json", "r.json.part"]
 
 
 def region(**fields):

@@ -1,5 +1,6 @@
 """Scribbles against pixels found one by one."""
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -56,6 +57,37 @@ def test_a_lasso_covers_what_it_winds_around(stroke, size):
     on_edge = np.min([distance(points, p, q) for p, q in zip(a, b, strict=True)], axis=0) < 1e-6
     if (inside & ~on_edge).any():
         assert np.array_equal((labels == 1)[~on_edge], inside[~on_edge])
+
+
+@settings(deadline=5000)
+@given(
+    st.lists(st.tuples(st.floats(-math.pi, math.pi), st.floats(0, 39), st.floats(0, 1)), min_size=1, max_size=4),
+    st.sampled_from([0.0, 0.05, 3.0, 1e6]),
+    st.sampled_from(["line", "lasso"]),
+)
+def test_what_lies_far_outside_costs_nothing(corners, line_width, kind):
+    """Up to any distance, in any direction."""
+    away = [(10**far * math.cos(angle), 10**far * math.sin(angle)) for angle, far, _ in corners]
+    stroke = np.array(
+        [point for (x, y), (*_, near) in zip(away, corners, strict=True) for point in ((x, y), (near, 0.5))]
+    )
+    labels = scribbles.rasterise([Shape(0, kind, line_width, (stroke,))], 640, 360)
+    assert labels.shape == (360, 640)
+
+
+@pytest.mark.parametrize("far", [1e3, 1e7, 1e9])
+@pytest.mark.parametrize("line_width", [0.0, 0.1])
+def test_a_line_from_far_away_to_far_away(far, line_width):
+    """The same as its part near the picture."""
+    long = Shape(0, "line", line_width, (np.array([[-far, -far * 0.5], [far, far * 0.5]]) + 0.5,))
+    short = Shape(0, "line", line_width, (np.array([[-4.0, -2.0], [4.0, 2.0]]) + 0.5,))
+    different = scribbles.rasterise([long], 320, 180) != scribbles.rasterise([short], 320, 180)
+    assert different.sum() <= 2  # pixels whose centres lie on its edge
+
+
+def test_a_thick_line_of_many_points_is_soon_drawn():
+    stroke = np.random.default_rng(0).random((20_000, 2))
+    assert (scribbles.rasterise([Shape(0, "line", 1000.0, (stroke,))], 320, 180) == 1).all()
 
 
 def test_a_lasso_that_holds_no_pixel_centre_still_marks_its_place():

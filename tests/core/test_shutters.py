@@ -149,11 +149,22 @@ def test_many_coefficients_at_once():
         ([1.0, -0.1], "negative"),
         ([1.0, float("nan")], "finite"),
         ([1.0, float("inf")], "finite"),
+        ([1.0, 1e6 + 0.1], "above a million"),
+        ([1e308] * 256, "above a million"),
+        ([1e-46], "less than a millionth"),
+        ([1e-40] * 256, "less than a millionth"),
     ],
 )
 def test_no_shutter(bars, sentence):
     with pytest.raises(shutters.ShutterError, match=sentence):
         shutters.check_bars(bars)
+
+
+@pytest.mark.parametrize("bars", [[1e-6], [1e-7] * 10, [1e6] * 256, [1e-46, 1.0], [0.1, 1e-40]])
+def test_a_shutter_is_one_as_float32_too(bars):
+    """What a recipe may hold, Blender's properties can: of the smallest numbers they keep none."""
+    shutters.check_bars(bars)
+    shutters.check_bars(np.float32(bars))
 
 
 def test_open_span():

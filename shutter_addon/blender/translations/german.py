@@ -146,6 +146,11 @@ MESSAGES = {
     ("*", "all bars are zero: the shutter never opens"): "alle Balken sind null, der Verschluss öffnet nie",
     ("*", "a bar is negative"): "ein Balken ist negativ",
     ("*", "a bar is not a finite number"): "ein Balken ist keine endliche Zahl",
+    ("*", "a bar is above a million"): "ein Balken ist größer als eine Million",
+    (
+        "*",
+        "the bars are less than a millionth together: the shutter never opens",
+    ): "die Balken sind zusammen weniger als ein Millionstel, der Verschluss öffnet nie",
     # Presets
     ("Operator", "Apply Shutter Preset"): "Verschluss-Voreinstellung anwenden",
     (
@@ -337,8 +342,8 @@ MESSAGES = {
     ("Virtual Shutter", "Weighted"): "Gewichtet",
     (
         "*",
-        "A shutter that is open for less time than the default is darker",
-    ): "Ein Verschluss, der kürzer als der Standard offen ist, ist dunkler",
+        "A shutter that is open for less time than the default is darker, in linear light whatever is summed",
+    ): "Ein Verschluss, der kürzer als der Standard offen ist, ist dunkler, in linearem Licht, was auch summiert wird",
     ("Virtual Shutter", "Clip Ends"): "Clip-Enden",
     (
         "*",
@@ -496,6 +501,14 @@ MESSAGES = {
         "*",
         "Replace the shutters, regions, keyframes and options of the effect with those of a recipe file",
     ): "Verschlüsse, Regionen, Schlüsselbilder und Optionen des Effekts durch die einer Rezeptdatei ersetzen",
+    (
+        "*",
+        "frame {frame} of the recipe: a key cannot lie beyond Blender's timeline",
+    ): "Bild {frame} des Rezepts: ein Schlüsselbild kann nicht außerhalb von Blenders Zeitleiste liegen",
+    (
+        "*",
+        "frame {frame} of the recipe: so late on the timeline, the next key is on the same frame",
+    ): "Bild {frame} des Rezepts: so spät auf der Zeitleiste liegt das nächste Schlüsselbild auf demselben Bild",
     ("Operator", "Export Recipe"): "Rezept exportieren",
     (
         "*",
