@@ -56,8 +56,8 @@ def regions(draw, names):
 
 
 @st.composite
-def valid_recipes(draw):
-    window = draw(st.integers(1, 6))
+def valid_recipes(draw, longest=6):
+    window = draw(st.integers(1, longest))
     names = draw(st.lists(text, min_size=1, max_size=3, unique=True))
     return recipes.Recipe(
         1,

@@ -1,0 +1,13 @@
+"""What scripts/fuzz.py tries: a module per kind of input, with two functions.
+
+make(random, folder) writes an input into a folder, by that source of chance alone. run(folder) runs the product on a
+copy of it, and raises what is a fault. In the copy, what lies in the WRITTEN folders alone may change."""
+
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+WRITTEN = ("out", "cache")
+
+# For the tests' makers of footage, edits and recipes, and their comparison of a device with the reference.
+sys.path += [str(ROOT / folder) for folder in (".", "tests/media", "tests/blender", "tests/compute")]

@@ -1,0 +1,115 @@
+"""Recipes: valid ones of all features, with values, structure and bytes made wrong; rendered, and composed by both
+devices."""
+
+import json
+import sys
+
+import numpy as np
+
+from . import hostile, trial
+
+SIZE = 20, 12
+OPENEXR = b"\x76\x2f\x31\x01"  # what its files begin with
+FOOTAGE = (
+    {"dtype": "uint8"},
+    {"dtype": "uint8", "alpha": "straight"},
+    {"dtype": "uint16", "alpha": "premultiplied"},
+    {"dtype": "float16", "alpha": "premultiplied", "transfer": "linear"},
+    {"dtype": "float32", "alpha": "straight"},
+)
+
+
+def plausible(random, longest: int) -> dict:
+    """A recipe that keeps to the format, with a window of so many frames at most."""
+    from test_export import valid_recipes
+
+    from shutter_addon.core import recipe
+
+    return json.loads(recipe.dump(hostile.drawn(valid_recipes(longest), random)))
+
+
+def make(random, folder):
+    from support import write_frames
+
+    write_frames(folder / "in", np.random.default_rng(0).integers(0, 256, (4, *SIZE[::-1], 3), dtype=np.uint8))
+    hostile.outside(folder)
+    data = plausible(random, random.choice((4, 16, 256)))
+    text = hostile.as_json(hostile.spoiled(random, data, random.choice((0, 0, 1, 1, 1, 2, 5))))
+    (folder / "recipe.json").write_bytes(hostile.damaged(random, text) if random.random() < 0.1 else text)
+    plan = {"footage": random.choice(FOOTAGE), "direction": random.choice((1, -1))}
+    (folder / "plan.json").write_text(json.dumps(plan))
+
+
+def run(folder):
+    from shutter_addon.core import recipe
+
+    with trial.only(recipe.RecipeError):
+        found = recipe.load(folder / "recipe.json")
+        if recipe.parse(recipe.dump(found)) != found:
+            raise trial.Fault("a recipe does not come back as it was")
+        render(folder, 0)
+        compose(found, json.loads((folder / "plan.json").read_text()))
+        return
+    render(folder, 2)
+
+
+def render(folder, expected: int):
+    """The command, twice."""
+    options = ["--recipe", folder / "recipe.json", "--frames", "1:2", "--weights", folder / "out" / "weights"]
+    for output in ("a", "b"):
+        command(expected, "render", folder / "in" / "f0001.png", *options, "--output", folder / "out" / output)
+    same_pictures(folder / "out" / "a", folder / "out" / "b")
+
+
+def command(expected: int | None, task: str, source, *options) -> int:
+    """Runs the extension's command, and gives its exit code. Fault: it was not the expected one."""
+    arguments = [task, *map(str, (source, *options))]
+    is_exr = any(path.is_file() and path.open("rb").read(4) == OPENEXR for path in source.parent.iterdir())
+    code, said = trial.forked(lambda: trial.anew("-m", "shutter_addon", *arguments) if is_exr else _main(arguments))
+    if code == 2:
+        trial.is_refusal(said)
+    if expected not in (None, code):
+        raise trial.Fault(f"ended with {code} instead of {expected}: {said.strip()[-300:]}")
+    return code
+
+
+def _main(arguments) -> int:
+    from shutter_addon.__main__ import main
+
+    sys.argv = ["shutter", *arguments]
+    return main()
+
+
+def same_pictures(first, second):
+    """Fault, unless two folders hold the same pictures."""
+    from OpenImageIO import ImageBuf
+
+    names, others = (sorted(path.name for path in folder.glob("*")) for folder in (first, second))
+    if names != others:
+        raise trial.Fault(f"other files from the same input: {names}, {others}")
+    for name in names:
+        if not np.array_equal(*(ImageBuf(str(folder / name)).get_pixels() for folder in (first, second))):
+            raise trial.Fault(f"another picture from the same input: {name}")
+
+
+def compose(found, plan: dict):
+    """The effect at some frames on both devices: against the reference, and their coefficients against each other."""
+    from test_composition import check, footage
+
+    from shutter_addon.compute.renderer import Renderer, open_compositor
+
+    source = footage(np.random.default_rng(1), 8, SIZE, **plan["footage"])
+    devices = {device: open_compositor(device)[0] for device in ("cpu", "gpu")}
+    keys = [key.frame for owner in (*found.shutters, *found.regions) for key in owner.keys]
+    for frame in (1, 2.5, *keys[:2]):
+        moment = found.at(frame, SIZE[0] / SIZE[1])
+        first, second = (Renderer(device, source).coefficients(moment).astype(float) for device in devices.values())
+        if not (apart := np.abs(first - second).max()) <= 1 / 255:
+            raise trial.Fault(f"coefficients are {255 * apart:.3g}/255 apart at frame {frame:g}")
+        for name, device in devices.items():
+            try:
+                once, again = (check(device, source, moment, 3, plan["direction"])[0] for _ in range(2))
+            except AssertionError:
+                raise trial.Fault(f"{name} differs from the reference: {plan['footage']}, frame {frame:g}") from None
+            if not np.array_equal(once, again):
+                raise trial.Fault(f"{name} gives another picture for the same recipe at frame {frame:g}")
