@@ -2,7 +2,10 @@
 
 import math
 import random
+import subprocess
+import sys
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -283,6 +286,31 @@ def test_editors_can_mend_it(bpy, edit, effect):
         effect.active_shutter = 0
         assert bpy.ops.shutter.preset(preset="ANGLE_360") == {"FINISHED"}
     assert pictures.picture(scene, 4).shape == (24, 40, 4)
+
+
+def test_a_background_render_of_such_a_file_ends_with_the_sentence(bpy, edit, effect, tmp_path):
+    raw(effect, "window", 10**9)
+    raw(effect.regions[0], "scale", NAN)
+    edit.render.filepath = str(tmp_path / "out.png")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bad.blend"), copy=True)
+    script = """
+import sys, bpy
+from shutter_addon import blender
+blender.register()
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
+bpy.ops.render.render(write_still=True)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(tmp_path / "bad.blend")],
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr.strip() == 'Virtual Shutter: effect "Shutter": Window is 1e+09, not 1 to 256'
+    assert not (tmp_path / "out.png").exists()
 
 
 def test_operators_report_it(bpy, edit, effect):
