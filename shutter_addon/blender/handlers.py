@@ -100,5 +100,6 @@ def unregister():
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).remove(function)
     pictures.forget()
+    sources.forget()
     lifecycle.forget()
     kept.forget()
