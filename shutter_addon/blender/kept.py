@@ -14,7 +14,7 @@ def keep(edit, effect) -> None:
     for curve in curves:
         curve["data_path"] = curve["data_path"].removeprefix(path)
     _effects[scene.virtual_shutter.identity] = {
-        "scene": (scene.name, (scene.render.resolution_x, scene.render.resolution_y), scene.frame_end),
+        "scene": (scene.name, (scene.render.resolution_x, scene.render.resolution_y)),
         "effect": _plain(effect),
         "curves": curves,
         "layers": [_plain(layer) for layer in scene.annotation.layers] if scene.annotation else [],

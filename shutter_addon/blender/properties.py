@@ -39,7 +39,11 @@ LIGHTS = (
 )
 EXPOSURES = (
     ("NORMALIZED", "Normalized", "Every shutter gives the same brightness"),
-    ("WEIGHTED", "Weighted", "A shutter that is open for less time than the default is darker, in linear light whatever is summed"),
+    (
+        "WEIGHTED",
+        "Weighted",
+        "A shutter that is open for less time than the default is darker, in linear light whatever is summed",
+    ),
 )
 EDGES = (
     ("HOLD", "Hold", "Repeat the first or last frame beyond the clip's ends"),

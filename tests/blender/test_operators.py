@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 import wave
 
 import numpy as np
@@ -288,6 +289,10 @@ BROKEN = {
     "no text": (b"\xff\xfe\x00", "not a text file"),
     "a shutter that never opens": (json.dumps(recipe(2, [0, 0])), "never opens"),
     "a region of no shutter": (json.dumps(RECIPE | {"regions": [REGION | {"shutter": "S7"}]}), "S7"),
+    "a number of 5,000 digits": ('{"version": ' + "9" * 5000 + "}", "version"),
+    "lists within lists": ("[" * 100_000, "too many"),
+    "a name that is no text": (json.dumps(RECIPE | {"\ud800": 1}), "unknown field"),
+    "keys beyond the timeline": (json.dumps(RECIPE | {"time": [{"frame": 3e9, "value": 1}]}), "time[0].frame"),
 }
 
 
@@ -323,13 +328,18 @@ def test_a_folder_that_cannot_be_written(bpy, effect, tmp_path):
 
 
 def test_a_full_disk_leaves_the_old_recipe(bpy, effect, tmp_path):
-    """/dev/full takes no byte: as the place of the new file's first half, it is a disk without room."""
+    """No file may grow beyond ten bytes meanwhile."""
     path = tmp_path / "out.json"
     path.write_text("old")
-    (tmp_path / "out.json.part").symlink_to("/dev/full")
-    assert "No space left" in refusal(bpy, "recipe_export", filepath=str(path))
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10, limits[1]))
+    try:
+        said = refusal(bpy, "recipe_export", filepath=str(path))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert "File too large" in said
     assert path.read_text() == "old"
-    assert [file.name for file in tmp_path.glob("out*")] == ["out.json"]
+    assert [file.name for file in tmp_path.iterdir() if file.is_file()] == ["out.json"]
 
 
 def test_an_effect_that_cannot_be_rendered_is_not_exported(bpy, effect, editing, tmp_path):
