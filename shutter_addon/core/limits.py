@@ -23,4 +23,4 @@ MAX_NAME = 63
 MAX_BAR = 1e6
 MIN_EXPOSURE = 1e-6
 # Of a recipe's file.
-MAX_BYTES = 64_000_000
+MAX_BYTES = 32_000_000

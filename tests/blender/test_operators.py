@@ -289,6 +289,10 @@ BROKEN = {
     "no text": (b"\xff\xfe\x00", "not a text file"),
     "a shutter that never opens": (json.dumps(recipe(2, [0, 0])), "never opens"),
     "a region of no shutter": (json.dumps(RECIPE | {"regions": [REGION | {"shutter": "S7"}]}), "S7"),
+    "a number of 5,000 digits": ('{"version": ' + "9" * 5000 + "}", "version"),
+    "lists within lists": ("[" * 100_000, "too many"),
+    "a name that is no text": (json.dumps(RECIPE | {"\ud800": 1}), "unknown field"),
+    "keys beyond the timeline": (json.dumps(RECIPE | {"time": [{"frame": 3e9, "value": 1}]}), "time[0].frame"),
 }
 
 

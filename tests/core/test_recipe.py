@@ -328,7 +328,7 @@ def test_what_is_no_file(tmp_path):
     for path, sentence in [
         (tmp_path / "pipe", "a pipe or a device"),
         ("/dev/zero", "a pipe or a device"),
-        (tmp_path / "large", "more than 64 MB"),
+        (tmp_path / "large", "more than 32 MB"),
         (tmp_path / ("é" * 100 + "\udcff"), "line 1, column 1: not JSON"),
         (tmp_path / ("x" * 300), "too long"),
         (tmp_path / "a\0b", "null"),
