@@ -11,6 +11,7 @@ from pathlib import Path
 import bpy
 
 from ..core import whole
+from ..core.messages import UserError
 from ..media.written import is_whole_movie, is_whole_picture, whole_pictures, why_short
 from . import rendering, strips
 
@@ -36,7 +37,7 @@ _STAMPS = (
 _LONGEST = 1000  # bytes of a path, a frame's number included: Blender has room for 1023 and cuts off the rest
 
 
-class OutputError(ValueError):
+class OutputError(UserError, ValueError):
     """This cannot be written; the message is one sentence for the user."""
 
 
@@ -159,7 +160,7 @@ def film(edit, output: Path) -> None:
 
 def _finish(part: Path, output: Path, count: int) -> None:
     if not is_whole_movie(part, count):
-        raise OutputError(f"{output}: could not be written whole; {why_short(part.parent)}")
+        raise OutputError(f"{output}: could not be written whole ({why_short(part.parent)})")
     part.replace(output)
 
 

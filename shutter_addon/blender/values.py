@@ -14,11 +14,12 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup
 
 from ..core.limits import MAX_FRAME
+from ..core.messages import UserError
 
 _PLACES = {"": n_('effect "{name}"'), "shutters": n_('shutter "{name}"'), "regions": n_('region "{name}"')}
 
 
-class EffectError(RuntimeError):
+class EffectError(UserError, RuntimeError):
     """The effect cannot be rendered as it stands; the message is one sentence for the user."""
 
 

@@ -5,6 +5,13 @@ from __future__ import annotations
 LONGEST = 300  # characters of a sentence, as users see it
 
 
+class UserError(Exception):
+    """What a user can mend: one clear sentence, the place first, which can be shown anywhere whatever it quotes."""
+
+    def __str__(self) -> str:
+        return sentence(super().__str__())
+
+
 def sentence(text: object, longest: int = LONGEST) -> str:
     """The text on one line of at most `longest` characters; where it is longer, its middle is left out, for it begins
     with the place and ends with the reason. What cannot be shown (control characters, names of files that are not

@@ -19,7 +19,7 @@ import numpy as np
 
 from . import keyframes, limits, scribbles, shutters, whole
 from .instant import Edges, Exposure, Instant, Interpolation, Light, Options, Position
-from .messages import sentence
+from .messages import UserError, sentence
 
 Point = tuple[float, float]
 Stroke = list[Point]
@@ -31,7 +31,7 @@ Factor = Literal[1, 2, 4, 8, 16]
 _MAX_DIGITS = 300
 
 
-class RecipeError(ValueError):
+class RecipeError(UserError, ValueError):
     """A recipe that breaks the format; the message is one sentence (core.messages) that begins with the place."""
 
     def __init__(self, text: str):

@@ -22,7 +22,7 @@ from ..core import whole
 from .errors import MediaError
 from .files import check_name
 from .folder import Folder
-from .written import is_whole_picture
+from .written import is_whole_picture, why_short
 
 VERSION = 1  # raise it when the same frames give other in-betweens, or the folder changes: what there is gets stale
 MANIFEST, CHECKS = "manifest.json", "checks"
@@ -174,9 +174,8 @@ class Cache:
         try:
             with whole.writing(path) as part:
                 if not write_picture(part, picture, self.source.alpha):
-                    raise MediaError(
-                        f"{self.folder}: an in-between frame could not be written whole; is the disk full?"
-                    )
+                    reason = why_short(part.parent)
+                    raise MediaError(f"{self.folder}: an in-between frame could not be written whole ({reason})")
                 # Before it comes to its place: whatever kills us, each picture there can be told from others' files.
                 self.note(f"{_sha256(part)}  {path.name}")
         except OSError as error:

@@ -1,10 +1,7 @@
 """What the media layer says when it cannot do something."""
 
-from ..core.messages import sentence
+from ..core.messages import UserError
 
 
-class MediaError(Exception):
-    """One clear sentence for the user, naming the file, that can be shown anywhere whatever the file's name."""
-
-    def __str__(self):
-        return sentence(super().__str__())
+class MediaError(UserError):
+    """One clear sentence for the user, naming the file."""

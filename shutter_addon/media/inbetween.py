@@ -124,7 +124,7 @@ def estimate(source, factor: int) -> int:
         sizes = []
         for index in samples:
             if not write_picture(path, source.read(index), source.alpha):
-                raise MediaError(f"{folder}: a picture could not be written whole; is the disk full?")
+                raise MediaError(f"{folder}: a picture could not be written whole ({why_short(path.parent)})")
             sizes.append(path.stat().st_size)
     return (source.count - 1) * (factor - 1) * sum(sizes) // len(sizes)
 

@@ -67,4 +67,4 @@ def why_short(folder: Path) -> str:
     finally:
         with suppress(OSError):
             probe.unlink(missing_ok=True)
-    return "Blender does not say why"
+    return "nothing says why"
