@@ -176,9 +176,9 @@ class Case:
             return pixels * (4 * options.window + 16)
         if name != "compose" or method != "ours":
             return None
-        rows = len(table_of(self.instant)) - 1
-        open_frames = np.ptp(shutters.open_span(self.instant.bars))
-        way = gpu.way_of(self.window, options, rows, open_frames, False)
+        values, span = table_of(self.instant), shutters.open_span(self.instant.bars)
+        rows, open_frames = len(values) - 1, np.ptp(span)
+        way = gpu.way_of(self.window, options, values, span, False)
         read = {"sums": 32 * rows, "pieces": 4 * open_frames}.get(way, 8 * (open_frames + 1))
         if isinstance(self.window, Frames):
             read = 4 * open_frames

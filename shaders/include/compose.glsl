@@ -1,5 +1,5 @@
 // What both compositions share: the coefficients of a block's pixels, the sums over their frames, the finished picture.
-// An invocation composes four QUADS of four pixels above one another, so that what it looks up in the table serves all of
+// An invocation composes QUADS of four pixels above one another, so that what it looks up in the table serves all of
 // them. A quad is a matrix: a column each, of coefficients or of light. EACH calls a function for every quad: a compiler
 // that did not unroll a loop over them would keep their arrays in memory.
 // coefficients: four shutters per layer; table: row 0 the gains, then the knots or the bars, four shutters per texel.
@@ -13,12 +13,18 @@
 #include "sums.glsl"
 #endif
 
-#define QUADS 4
-#define EACH(does) \
-  does(0); \
-  does(1); \
-  does(2); \
-  does(3)
+#ifndef QUADS
+#  define QUADS 4
+#endif
+#if QUADS == 4
+#  define EACH(does) \
+    does(0); \
+    does(1); \
+    does(2); \
+    does(3)
+#else
+#  define EACH(does) does(0)
+#endif
 
 ivec2 corner;
 #if TILED

@@ -24,7 +24,13 @@ _LAYERS = dict.fromkeys(("origin", "direction", "layers", "lowest", "lowest_laye
 _OF_SUMS = {"sums": Image("rg32ui", reads=True, writes=False)}
 _UNIT = {"held": "int", "unit": "float"}
 # Blender knows only of constants that a source uses.
-_OF_WAY = {"pieces": ("rows",), "frames": ("rows", "first", "last"), "value": ("first", "last")}
+_OF_WAY = {"pieces": ("rows",), "value": ("first", "last")} | dict.fromkeys(
+    ("frames", "walk"), ("rows", "first", "last")
+)
+# Pixels above one another that one invocation composes.
+_LINES = {"sums": PAIR, "walk": 4}
+# Mesa's software renderer ends all loops of an invocation after 65,535 turns in all, without a word.
+_MOST_TURNS = 60_000
 # Pieces to compose from running sums, which a shader is compiled for; tables are filled up with pieces of nothing.
 _ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 
@@ -75,8 +81,8 @@ def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, encoded
     )
 
 
-def way_of(window, options: Options, rows: int, frames: int, shortened: bool) -> str:
-    """The quickest pass for so many pieces, and frames that any shutter exposes.
+def way_of(window, options: Options, values: np.ndarray, span: tuple[int, int], shortened: bool) -> str:
+    """The quickest pass for a table of pieces, and the span of frames that any shutter exposes.
 
     Measured at 1080p for 2 to 8 shutters over 16 to 64 frames, in times of the plain average of 16 frames: from the
     sums 0.3 + 0.23 · pieces; through frames 1 + 0.1 · frames. From frames as they are, piece by piece
@@ -84,9 +90,24 @@ def way_of(window, options: Options, rows: int, frames: int, shortened: bool) ->
     """
     if options.interpolation == "value":
         return "value"
-    if isinstance(window, Sums):
-        return "sums" if not shortened and _filled_rows(rows) <= 2 + 0.45 * frames else "frames"
-    return "pieces" if 3 * rows < 2 * frames else "frames"
+    rows, frames = len(values) - 1, span[1] - span[0]
+    if isinstance(window, Sums) and not shortened and _filled_rows(rows) <= 2 + 0.45 * frames:
+        return "sums"
+    if not isinstance(window, Sums) and 3 * rows < 2 * frames:
+        return "pieces"
+    return "frames" if turns_of_frames(values, span) <= _MOST_TURNS else "walk"
+
+
+def turns_of_frames(values: np.ndarray, span: tuple[int, int]) -> int:
+    """The most loop turns that compose_frames.glsl may take in a block, whatever its coefficients.
+
+    There a piece is looked at from the frame on in which it may begin, to that in which all before it have ended."""
+    groups = values.shape[1] // 2
+    start, end, apart = values[1:, :groups], values[1:, groups:-1], values[1:, -1, 1]
+    until = np.maximum.accumulate(end.max(axis=(1, 2)) + apart)
+    from_ = start.max(axis=(1, 2)) - 2 * apart  # the least of the shutters, less as much again
+    frames = np.clip(np.ceil(until), *span) - np.clip(np.floor(from_), *span) + 1
+    return int(frames.sum()) + len(start) + span[1] - span[0]
 
 
 def _filled_rows(rows: int) -> float:
@@ -184,14 +205,14 @@ class GPUCompositor:
         origin = int(compositor.window_positions(options, index, direction)[0])
         reach = sorted((origin + direction * first, origin + direction * (last - 1)))
         shortened = options.edges == "shorten" and (reach[0] < window.shot.start or reach[1] >= window.shot.stop)
-        way = way_of(window, options, len(values) - 1, last - first, shortened)
+        way = way_of(window, options, values, (first, last), shortened)
         if way == "sums":
             program, given = _from_sums(window, instant, values, origin, direction)
         else:
             program, given = _from_frames(way, window, instant, len(values) - 1, origin, direction, shortened)
             given["images"]["table"] = self._filled("table", values[None], "rgba32f")
         given["images"] |= {"picture": window.picture, "coefficients": handle}
-        lines = PAIR if way == "sums" else BLOCK
+        lines = _LINES.get(way, BLOCK)
         for top, height, stored in window.bands():
             name = "sums" if isinstance(window, Sums) else "frames"
             given["images" if name == "sums" else "textures"][name] = stored

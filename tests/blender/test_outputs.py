@@ -131,12 +131,12 @@ NAMES = [
 
 
 def test_names_of_folders_are_names(command, frames, tmp_path):
-    folders = Path("out", *NAMES, "a.b.", os.fsdecode(b"b\xff"))
+    folders = Path("out", *NAMES, "a.b.")
     command(frames, "--output", tmp_path / folders, "--frames", "2:3", recipe=STILL)
     assert sorted(everything(tmp_path / "out")) == [f"{folders.relative_to('out')}/{n:04d}.png" for n in (2, 3)]
 
 
-@pytest.mark.parametrize("name", ["{blend_name}-{fps}", "#a}", "x\ny", os.fsdecode(b"b\xff")])
+@pytest.mark.parametrize("name", ["{blend_name}-{fps}", "#a}", "x\ny"])
 def test_names_of_movies_are_names(command, frames, tmp_path, name):
     command(frames, f"--output={tmp_path / 'out' / name}.mp4", "--frames", "2:3", recipe=STILL)
     assert sorted(everything(tmp_path / "out")) == [f"{name}.mp4"]

@@ -236,7 +236,7 @@ import os, signal
 def stop(scene, *_):
     if scene.frame_current == 20 and scene.render.engine == "VIRTUAL_SHUTTER":
         from shutter_addon.blender import pictures
-        def interrupted(*_, **__): os.kill(os.getpid(), signal.SIGINT)
+        def interrupted(*_, **__): signal.raise_signal(signal.SIGINT)
         pictures.moment = interrupted
 """
     script = SCRIPT.replace("print(bpy.ops", f"{stop}bpy.app.handlers.render_init.append(stop)\nprint(bpy.ops")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shutter_addon.compute import cpu, window
+from shutter_addon.compute import cpu, gpu, window
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.errors import NoDeviceError
 from shutter_addon.compute.gpu import GPUCompositor
@@ -205,6 +205,32 @@ def test_number_of_shutters(device, count):
 def test_window_lengths(device, window):
     rng = np.random.default_rng(8)
     check(device, footage(rng, count=40), instant(rng, window=window), 3)
+
+
+def far_apart(rng, count, window, **options):
+    """Shutters that open at one end of the window or at the other, scribbled closely."""
+    shapes = [Shape(i, "line", 0.0, (np.array([[x, 0.05], [x, 0.95]]),)) for i, x in enumerate(rng.random(count))]
+    moment = instant(rng, window, tuple(shapes), count, **options)
+    moment.bars[:] = (rng.random((count, window)) + 0.01) * [
+        np.linspace(i % 2, 1 - i % 2, window) ** 4 + 0.01 for i in range(count)
+    ]
+    return moment
+
+
+@pytest.mark.parametrize("count", [3, 6])
+def test_long_windows_of_shutters_far_apart(device, count):
+    """More turns of loops than a software renderer goes through, were pieces looked at for blocks of pixels."""
+    rng = np.random.default_rng(18)
+    check(device, footage(rng, count=40), far_apart(rng, count, 256), 0)
+
+
+@pytest.mark.parametrize("edges", ["hold", "shorten"])
+@pytest.mark.parametrize("stored", ["uint8", "float32"])
+def test_walks_through_pieces(gpu_device, monkeypatch, edges, stored):
+    monkeypatch.setattr(gpu, "_MOST_TURNS", 0)
+    rng = np.random.default_rng(19)
+    source = footage(rng, dtype=np.dtype(stored), transfer="linear" if stored == "float32" else "srgb")
+    check(GPUCompositor(gpu_device), source, far_apart(rng, 5, 16, edges=edges), 15)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (33, 17), (2, 100)])
