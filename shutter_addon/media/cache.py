@@ -20,7 +20,7 @@ from .errors import MediaError
 from .sequence import SequenceSource
 from .written import is_whole_picture
 
-VERSION = 1  # raise it when the same frames give other in-betweens, or the folder changes: what there is gets stale
+VERSION = 2  # raise it when the same frames give other in-betweens, or the folder changes: what there is gets stale
 MANIFEST = "manifest.json"
 MAKER = "Virtual Shutter: in-between frames"
 SAMPLES = {"uint8": "uint8", "uint16": "uint16", "float16": "half", "float32": "float"}
