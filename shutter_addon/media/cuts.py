@@ -14,6 +14,9 @@ from .errors import MediaError
 NEIGHBOURS = 9
 # What is back after so many frames, or was there so many before, was a flash, or something that passed.
 PASSING = 3
+# The share of bits by which hashes of pictures differ that have nothing in common, PySceneDetect's own; and from
+# which on a picture is not the one from before a flash that has moved on.
+APART, BACK = 0.395, 0.35
 # PySceneDetect's own: neighbours on each side whose mean change a cut must exceed, and by how much.
 WINDOW, RATIO = 2, 3.0
 # Levels of 255 by which a cut changes brightness, its own for pictures that are GREY on average; darker ones need less,
@@ -65,7 +68,7 @@ def missing_package() -> str | None:
 
 
 def is_cut(before: list[Signature], after: list[Signature]) -> bool:
-    """Whether there is a cut between the frames before[-1] and after[0]. Nothing must be missing: see `missing_package`.
+    """Whether there is a cut between the frames before[-1] and after[0]. There must be no `missing_package`.
 
     before, after: signatures of up to NEIGHBOURS successive frames on each side, fewer at the clip's ends alone.
     There is one where PySceneDetect's HashDetector finds that the pictures have nothing in common, its ContentDetector
@@ -73,20 +76,23 @@ def is_cut(before: list[Signature], after: list[Signature]) -> bool:
     are asked as well about what comes a little later or came a little earlier: what passes is no cut. Not found are
     cuts between much the same pictures, into the midst of fast motion, and many of those to shots of one or two
     frames; taken for one is what changes most of a still picture at once, and stays."""
-    if not all(may_be_cut(earlier, after[0]) for earlier in before[: -PASSING - 2 : -1]):
+    if not may_be_cut(before[-1], after[0]):
         return False
-    if not all(may_be_cut(before[-1], later) for later in after[1 : PASSING + 1]):
+    passing = [(earlier, after[0]) for earlier in before[-PASSING - 1 : -1]]
+    passing += [(before[-1], later) for later in after[1 : PASSING + 1]]
+    if not all(may_be_cut(*pair, BACK) for pair in passing):
         return False
     return _stands_out(_moving(before[::-1]), _moving(after))
 
 
-def may_be_cut(before: Signature, after: Signature) -> bool:
-    """Whether `is_cut` can be true of these two neighbours, as far as they alone tell."""
+def may_be_cut(before: Signature, after: Signature, apart: float = APART) -> bool:
+    """Whether `is_cut` can be true of these two neighbours, as far as they alone tell. apart: how far their hashes must
+    be from each other."""
     from scenedetect.detectors import ContentDetector, HashDetector
 
     threshold = max(CHANGE * min(max(before.mean(), after.mean()) / GREY, 1.0), NOISE)
     differs = ContentDetector(threshold, min_scene_len=0, luma_only=True)
-    return _finds(differs, [before, after], 1) and _finds(HashDetector(min_scene_len=0), [before, after], 1)
+    return _finds(differs, [before, after], 1) and _finds(HashDetector(apart, min_scene_len=0), [before, after], 1)
 
 
 def _stands_out(before: list[Signature], after: list[Signature]) -> bool:

@@ -244,10 +244,18 @@ def test_what_a_lost_frame_might_hide_is_not_kept(tmp_path, folder, lost):
         for k in range(6 * number, 6 * number + 6):
             save_image(tmp_path / "shot" / f"{k}.png", np.roll(texture, k, 1))
     with open_source(tmp_path / "shot" / "0.png") as source:
-        hidden = source.files[lost].rename(tmp_path / "hidden.png")
-        with pytest.raises(MediaError, match=f"{lost}.png: "):
+        read = source.read
+
+        def fail(index):
+            if index == lost:
+                raise MediaError(f"{lost}.png: not there for a moment")
+            return read(index)
+
+        source.read = fail
+        with pytest.raises(MediaError, match=f"{lost}.png: not there"):
             build(source, folder, frames=(5, 5))
-        hidden.rename(source.files[lost])
+        assert state(source, folder).done == 0
+        source.read = read
         build(source, folder, frames=(5, 5))
         assert not pictures(folder)
         assert np.array_equal(opened(source, folder).read(5 * FACTOR + 3), source.read(6))
