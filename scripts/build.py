@@ -23,6 +23,7 @@ WHEELS = (
     "glcontext==3.1.0",
     "moderngl==5.13.0",
     "opencv-contrib-python-headless==5.0.0.93",
+    "scenedetect==0.6.7.1",  # without click and platformdirs, which its command alone needs
     "tqdm==4.70.1",
 )
 # By Blender's name of a system, the one that pip looks for: as old as PyAV's wheels allow.

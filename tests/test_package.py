@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[1]
 NAME = "bl_ext.user_default.virtual_shutter"
 MAKE_EDIT = ROOT / "tests" / "blender" / "installed.py"
 SYSTEM = {"linux": "linux-x64", "win32": "windows-x64", "darwin": "macos-arm64"}[sys.platform]
-WHEELS = {"av", "glcontext", "moderngl", "opencv_contrib_python_headless", "tqdm"}
+WHEELS = {"av", "glcontext", "moderngl", "opencv_contrib_python_headless", "scenedetect", "tqdm"}
 RECIPE = {
     "version": 1,
     "window": 4,
@@ -180,6 +180,24 @@ except NoDeviceError as error:
     assert auto == f"{forced}; composing with NumPy, which is slow"
 
 
+def test_cuts_are_found_without_what_pyscenedetects_command_needs():
+    code = (
+        "from shutter_addon.media import cuts\nprint(cuts.missing_package())\nprint('scenedetect._cli' in sys.modules)"
+    )
+    assert without(["click", "platformdirs"], code).split() == ["None", "False"]
+    assert without(["scenedetect"], code).split()[0] == "scenedetect"
+    assert without(["cv2"], code).split()[0] == "opencv-contrib-python-headless"
+
+
+def test_pyscenedetect_is_loaded_where_cuts_are_looked_for():
+    assert (
+        without(
+            [], "import shutter_addon.media.cuts, shutter_addon.media.inbetween\nprint('scenedetect' in sys.modules)"
+        )
+        == "False\n"
+    )
+
+
 class Installation:
     """A real Blender with user folders of its own."""
 
@@ -189,8 +207,8 @@ class Installation:
         self.user.mkdir(parents=True)
         self.extension = self.user / "extensions" / "user_default" / "virtual_shutter"
 
-    def run(self, *arguments, code=0, says="", environment=()):
-        """Runs Blender; what it printed. Nothing may stand on stderr but the one sentence that is expected."""
+    def run(self, *arguments, code=0, says=(), environment=()):
+        """Runs Blender; what it printed. Nothing may stand on stderr but the sentences that are expected."""
         done = subprocess.run(
             [*self.command, *map(str, arguments)],
             env=os.environ | {"BLENDER_USER_RESOURCES": str(self.user)} | dict(environment),
@@ -201,8 +219,8 @@ class Installation:
         )
         assert done.returncode == code, done.stdout + done.stderr
         said = [line for line in done.stderr.splitlines() if line and not any(own in line for own in BLENDERS_OWN)]
-        assert len(said) == bool(says), done.stderr
-        assert says in done.stderr
+        assert len(said) == len(says), done.stderr
+        assert all(sentence in done.stderr for sentence in says)
         assert "Traceback" not in done.stdout
         return done.stdout
 
@@ -275,7 +293,7 @@ def test_installed_with_wheels(blender, blenders_python, bunny, recipe, tmp_path
     blender.run("--command", "extension", "validate", path)
     blender.install(path)
     files = blender.files()
-    edit, wheels = tmp_path / "edit.blend", ["av", "moderngl", "glcontext", "tqdm", "cv2"]
+    edit, wheels = tmp_path / "edit.blend", ["av", "moderngl", "glcontext", "tqdm", "cv2", "scenedetect"]
     write = f"try: open({str(blender.extension / 'written')!r}, 'w')\nexcept OSError: print('CANNOT BE WRITTEN')"
     with blender.read_only():
         assert "CANNOT BE WRITTEN" in blender.run("-b", "--python-expr", write)
@@ -299,15 +317,16 @@ def test_installed_without_wheels(blender, dist, bunny, recipe, tmp_path):
     checkout_renders(bunny, recipe, frames, "1:5")
     edit, first = tmp_path / "edit.blend", frames / "0001.png"
     blender.run("-b", "--python-exit-code", 1, "--python", MAKE_EDIT, "--", first, recipe, edit, NAME)
-    blender.run("-b", edit, "-o", tmp_path / "real" / "####", "-s", 1, "-e", 2, "-a")
+    cuts = "Virtual Shutter: Stop at Cuts finds none, and windows run across them: the Python package"
+    blender.run("-b", edit, "-o", tmp_path / "real" / "####", "-s", 1, "-e", 2, "-a", says=[cuts])
     command, options = ("--command", "shutter", "render"), ("--recipe", recipe, "--output", tmp_path / "real")
-    blender.run(*command, first, *options, "--frames", 3, "--device", "gpu")
+    blender.run(*command, first, *options, "--frames", 3, "--device", "gpu", says=[cuts])
     numpy = "composing with NumPy, which is slow"
-    blender.run(*command, first, *options, "--frames", 4, says=numpy, environment=NO_OPENGL)
+    blender.run(*command, first, *options, "--frames", 4, says=[numpy, cuts], environment=NO_OPENGL)
     checkout_renders(first, recipe, tmp_path / "ours", "1:4")
     assert_alike(tmp_path / "real", tmp_path / "ours", 4)
     sentence = "Virtual Shutter: bigbuckbunny.mp4: movies need the Python package PyAV"
-    blender.run(*command, bunny, *options, code=2, says=sentence)
+    blender.run(*command, bunny, *options, code=2, says=[sentence])
     blender.remove()
 
 

@@ -5,6 +5,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.types import Menu, Panel, UIList
 
+from ..media import cuts
 from . import building, editing, strips, values
 from .pictures import FAULTS
 
@@ -191,6 +192,10 @@ class _Options(_WithEffect):
         layout.use_property_split = True
         for name in ("position", "interpolation", "light", "exposure", "edges", "stop_at_cuts", "aggregate", "border"):
             layout.prop(effect, name)
+        package = effect.stop_at_cuts and cuts.missing_package()
+        if package:
+            text = iface_("Cuts are not found: the Python package {package} is missing").format(package=package)
+            layout.label(text=text, translate=False, icon="ERROR")
         layout.prop(effect, "use_source_time")
         column = layout.column()
         column.active = effect.use_source_time

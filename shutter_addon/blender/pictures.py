@@ -15,7 +15,7 @@ from ..compute.errors import NoDeviceError
 from ..compute.gpu import GPUCompositor
 from ..compute.renderer import Renderer, open_compositor
 from ..core.instant import Instant
-from ..media import MediaError
+from ..media import MediaError, cuts
 from ..media.ahead import Ahead
 from ..media.cuts import Shots
 from ..media.exr import write_exr
@@ -26,6 +26,8 @@ FAULTS = (effects.EffectError, MediaError, NoDeviceError, MemoryError)
 
 device = "auto"
 weights_folder: Path | None = None
+
+_said: set[str] = set()  # what is said once
 
 
 class StoppedError(Exception):
@@ -202,18 +204,28 @@ def _lacks_moderngl() -> bool:
 
 def picture(scene, scene_frame: float, say=print, stopped=_never) -> np.ndarray:
     """The picture (H, W, 4) float32 of an effect scene at one of its frames: scene-linear, premultiplied, top row
-    first. One of FAULTS: there is none, in one sentence. say: called with a sentence when the device is a lesser one.
-    stopped: asked whether the picture is not wanted any longer; StoppedError: it is not.
+    first. One of FAULTS: there is none, in one sentence. say: called with a sentence when the device is a lesser one,
+    or cuts cannot be found. stopped: asked whether the picture is not wanted any longer; StoppedError: it is not.
     """
     if stopped():
         raise StoppedError
     edit, effect, strip = strips.find_edit(scene)
     frame = strips.timeline_frame(strip, scene_frame)
     found = moment(edit, effect, strip, frame, say)
+    if found.instant.options.stop_at_cuts:
+        _say_of_cuts(say)
     if weights_folder is not None:
         values = _studio().run(found.renderer.coefficients, found.instant, stopped=stopped)
         _write_weights(values, [s.name for s in effect.shutters], frame - strip.left_handle + 1)
     return _studio().picture(scene, found, stopped)
+
+
+def _say_of_cuts(say) -> None:
+    if package := cuts.missing_package():
+        sentence = f"Stop at Cuts finds none, and windows run across them: the Python package {package} is missing"
+        if sentence not in _said:
+            _said.add(sentence)
+            say(sentence)
 
 
 def begin_next(scene, scene_frame: float) -> None:
@@ -253,6 +265,7 @@ def pairs(edit, effect, strip, frames) -> set[int]:
         shown = moment(edit, effect, strip, frame)
         needed = shown.renderer.needed(shown.index, shown.direction, shown.instant, known=False)
         found |= {index // factor for index in needed if index % factor}
+        shown.renderer.source.release()  # what it read is not shown here
     return found
 
 

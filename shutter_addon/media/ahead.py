@@ -39,13 +39,16 @@ class Ahead:
     def read(self, index: int) -> np.ndarray:
         """The frame as the source gives it, but read-only; waits for it, ahead of all that is wanted.
 
-        Raises what the source raises, and MediaError if it is closed meanwhile."""
+        Raises what the source raises, once: it is tried again then. And MediaError if it is closed meanwhile."""
         with self._changed:
             self._asked.append(index)
             self._wake()
             self._changed.wait_for(lambda: index in self._done or self._thread is None)
             self._asked.remove(index)
             frame = self._done.get(index)
+            if isinstance(frame, Exception):
+                self._done.pop(index)
+                self._wanted = [i for i in self._wanted if i != index]
             self._drop()
         if frame is None:
             raise MediaError(f"{self._source.path.name}: closed while a frame was read")

@@ -1,6 +1,7 @@
-"""Cuts within a source, and frames that repeat the one before: decisions about few neighbouring frames, made of a small
-picture of each; and a source that knows where its shots end."""
+"""Cuts within a source, found by PySceneDetect, and frames that repeat the one before: decisions about few neighbouring
+frames, made of a small picture of each; and a source that knows where its shots end."""
 
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -8,17 +9,22 @@ import numpy as np
 from ..core import light
 from .errors import MediaError
 
-# The frames on each side of two neighbours that have a say in whether there is a cut between them: films animated on
-# threes, or with a 3:2 pulldown, move twice in so many, and a flash is mostly shorter.
-NEIGHBOURS = 4
-# What must change of the picture's own contrast. Within a shot that does not move fast it is 0.07 at most (the films in
-# assets), between different pictures 0.3 and more. In between are jumps within the shot of a camera that stands still.
-CHANGE = 0.12
-# Across a cut frames differ by so much more than beside it. The fastest pans and shakes, dissolves and fades stay below
-# 1.3; a cut into a pan of 8 % of the width a frame may be as low.
-CONTRAST = 1.4
-# Levels of 255 that are no structure: noise in flat or dark pictures.
-NOISE = 3.0
+# The frames on each side of two neighbours that have a say in whether there is a cut between them: in so many, a film
+# animated on threes shows as many pictures as PySceneDetect compares.
+NEIGHBOURS = 9
+# What is back after so many frames, or was there so many before, was a flash, or something that passed.
+PASSING = 3
+# The share of bits by which hashes of pictures differ that have nothing in common, PySceneDetect's own; and from
+# which on a picture is not the one from before a flash that has moved on.
+APART, BACK = 0.395, 0.35
+# PySceneDetect's own: neighbours on each side whose mean change a cut must exceed, and by how much.
+WINDOW, RATIO = 2, 3.0
+# Levels of 255 by which a cut changes brightness, its own for pictures that are GREY on average; darker ones need less,
+# in proportion, but for noise. A title that appears changes about 5.
+CHANGE, GREY, NOISE = 15.0, 90.0, 2.0
+# The frames on each side that have a say in whether a frame repeats the one before: films animated on threes, or with a
+# 3:2 pulldown, move twice in so many.
+BESIDE = 4
 # Levels by which blocks of repeated frames differ: 0.6 to 2.8 after H.264 and MPEG-4 of several qualities, mostly below
 # 2. Slow motion may be as small; but beside a repeated frame there is more, on the two films eight times as much.
 REPEATED, STILLER = 2.0, 4.0
@@ -50,36 +56,86 @@ def signature(frame: np.ndarray, transfer: str, alpha: str = "opaque") -> Signat
     return 255 * (light.to_encoded(colours) if transfer == "linear" else colours)
 
 
+@cache
+def missing_package() -> str | None:
+    """The Python package without which no cuts can be found; None where they can. The first call loads PySceneDetect,
+    which takes some 0.2 s."""
+    try:
+        import scenedetect.detectors  # noqa: F401
+    except ImportError as error:
+        return "opencv-contrib-python-headless" if error.name == "cv2" else "scenedetect"
+    return None
+
+
 def is_cut(before: list[Signature], after: list[Signature]) -> bool:
-    """Whether there is a cut between the frames before[-1] and after[0].
+    """Whether there is a cut between the frames before[-1] and after[0]. There must be no `missing_package`.
 
     before, after: signatures of up to NEIGHBOURS successive frames on each side, fewer at the clip's ends alone.
-    A cut parts frames that are alike from others that are alike: every frame before it differs from every one behind it
-    in structure (brightness and contrast apart), and by more than neighbours on one side do. So a flash that passes, a
-    fade, a dissolve, a pan or a shake is none. A change of side in the neighbourhood (the end of a very short shot) is
-    allowed. Not found are cuts between much the same pictures, or into the midst of a fast pan; taken for one is what
-    covers most of the picture at once, for NEIGHBOURS frames or longer."""
-    before, after = [_levelled(s) for s in before], [_levelled(s) for s in after]
-    if min(_change(a, b) for a in before for b in after) < CHANGE:
+    There is one where PySceneDetect's HashDetector finds that the pictures have nothing in common, its ContentDetector
+    that brightness changes, and its AdaptiveDetector that it changes by far more than between neighbours. The first two
+    are asked as well about what comes a little later or came a little earlier: what passes is no cut. Not found are
+    cuts between much the same pictures, into the midst of fast motion, and many of those to shots of one or two
+    frames; taken for one is what changes most of a still picture at once, and stays."""
+    if not may_be_cut(before[-1], after[0]):
         return False
-    beside = sorted(_difference(a, b) for side in (before, after) for a, b in pairwise(side))
-    whole = len(beside) == 2 * (NEIGHBOURS - 1)
-    usual = beside[-2] if whole else max(beside, default=0.0)
-    return min(_difference(a, b) for a in before for b in after) >= CONTRAST * usual
+    passing = [(earlier, after[0]) for earlier in before[-PASSING - 1 : -1]]
+    passing += [(before[-1], later) for later in after[1 : PASSING + 1]]
+    if not all(may_be_cut(*pair, BACK) for pair in passing):
+        return False
+    return _stands_out(_moving(before[::-1]), _moving(after))
 
 
-def may_be_cut(before: Signature, after: Signature) -> bool:
-    """Whether `is_cut` can be true of these two neighbours, as far as they alone tell."""
-    return _change(_levelled(before), _levelled(after)) >= CHANGE
+def may_be_cut(before: Signature, after: Signature, apart: float = APART) -> bool:
+    """Whether `is_cut` can be true of these two neighbours, as far as they alone tell. apart: how far their hashes must
+    be from each other."""
+    from scenedetect.detectors import ContentDetector, HashDetector
+
+    threshold = max(CHANGE * min(max(before.mean(), after.mean()) / GREY, 1.0), NOISE)
+    differs = ContentDetector(threshold, min_scene_len=0, luma_only=True)
+    return _finds(differs, [before, after], 1) and _finds(HashDetector(apart, min_scene_len=0), [before, after], 1)
+
+
+def _stands_out(before: list[Signature], after: list[Signature]) -> bool:
+    """Whether from before[0] to after[0] more changes than between neighbours; both lists lead away from there."""
+    from scenedetect.detectors import AdaptiveDetector
+
+    before, after = before[: WINDOW + 1], after[: WINDOW + 1]
+    # Held pictures stand for those that are not there, and their changes, of zero, must not count in the mean.
+    known = len(before) + len(after) - 2
+    ratio = RATIO * 2 * WINDOW / known if known else RATIO
+    before, after = ([*side, *[side[-1]] * (WINDOW + 1 - len(side))] for side in (before, after))
+    detector = AdaptiveDetector(ratio, min_scene_len=0, window_width=WINDOW, min_content_val=NOISE, luma_only=True)
+    return _finds(detector, [*before[::-1], *after], WINDOW + 1)
+
+
+def _finds(detector, pictures: list[Signature], index: int) -> bool:
+    """Whether a fresh detector finds a cut before that picture, of all."""
+    whole = (np.rint(picture[..., ::-1]).clip(0, 255).astype(np.uint8) for picture in pictures)  # OpenCV has BGR
+    return index in [found for i, picture in enumerate(whole) for found in detector.process_frame(i, picture)]
+
+
+def _moving(pictures: list[Signature]) -> list[Signature]:
+    """Those that do not repeat the one before."""
+    kept = pictures[:1]
+    for picture in pictures[1:]:
+        if _most(kept[-1], picture) > REPEATED:
+            kept.append(picture)
+    return kept
 
 
 def is_duplicate(before: list[Signature], after: list[Signature]) -> bool:
     """Whether the frame after[0] repeats before[-1], but for the noise of a codec; arguments as for is_cut.
 
     Nothing in the picture may have moved, and something must have moved beside: a still scene has no duplicates."""
+    before, after = before[-BESIDE:], after[:BESIDE]
     here = _most(before[-1], after[0])
     beside = max((_most(a, b) for side in (before, after) for a, b in pairwise(side)), default=0.0)
     return here <= REPEATED and here * STILLER < beside
+
+
+def may_be_duplicate(before: Signature, after: Signature) -> bool:
+    """Whether `is_duplicate` can be true of these two neighbours, as far as they alone tell."""
+    return _most(before, after) <= REPEATED
 
 
 def neighbours(index: int, count: int) -> range:
@@ -93,37 +149,25 @@ def sides(signatures: dict[int, Signature | None], index: int) -> tuple[list[Sig
     return _run(signatures, index - 1, -1)[::-1], _run(signatures, index, 1)
 
 
-def _levelled(picture: Signature) -> np.ndarray:
-    return picture - picture.mean()
-
-
-def _difference(a: np.ndarray, b: np.ndarray) -> float:
-    return float(np.abs(a - b).mean())
-
-
-def _change(a: np.ndarray, b: np.ndarray) -> float:
-    """The difference in structure: 0, or about 1 for pictures that have nothing in common."""
-    return _difference(a / (np.abs(a).mean() + NOISE), b / (np.abs(b).mean() + NOISE))
-
-
 def _most(a: Signature, b: Signature) -> float:
     return float(np.abs(a - b).max())
 
 
 class Shots:
-    """A source that knows where its shots end: a source itself.
+    """A source that knows where its shots end: a source itself. Where PySceneDetect is missing it has one.
 
     step: every step-th frame is one that was filmed. Cuts are looked for in these alone; those between two of them
     belong to the nearer, the middle one to the first, as Inbetween has it.
     Filmed frames get their signatures when a cut is first looked for, and wait for the next `read` then, as far as
-    there is room for them, so that none is decoded twice. Cuts are remembered, and depend on the frames alone.
+    there is room for them, so that none is decoded twice. Cuts are remembered, and depend on the frames alone;
+    what is decided without a frame that cannot be read is decided again.
     """
 
     def __init__(self, source, step: int = 1):
         self._source, self.step = source, step
         self.filmed = (source.count - 1) // step + 1  # how many frames are
         self._cuts: dict[int, bool] = {}  # by filmed frame: whether there is a cut before it
-        self._signatures: dict[int, Signature | None] = {}  # likewise
+        self._signatures: dict[int, Signature] = {}  # likewise
         self._handed: dict[int, np.ndarray] = {}
 
     def __getattr__(self, name):
@@ -141,8 +185,15 @@ class Shots:
         upwards, as decoders like it: the window's frames up to the first cut behind `index`, and where there may be a
         cut up to NEIGHBOURS frames on each side. known: it reads nothing, and where it does not know there is no cut.
         """
+        if known:
+            return self._shot(index, low, high, self._cuts.get)
+        shot = self._shot(index, low, high, self._is_cut)
+        beyond = NEIGHBOURS * self.step  # what was read there will be asked for soon, or never
+        self._handed = {i: frame for i, frame in self._handed.items() if low - beyond <= i <= high + beyond}
+        return shot
+
+    def _shot(self, index, low, high, is_cut) -> range:
         first = 0
-        is_cut = self._cuts.get if known else self._is_cut
         for i in self._after(low, high):
             if is_cut(i):
                 if self._start(i) > index:
@@ -170,7 +221,9 @@ class Shots:
         self._source.close()
 
     def _after(self, low: int, high: int) -> range:
-        """The filmed frames that begin between the frames from `low` to `high`."""
+        """The filmed frames that begin between the frames from `low` to `high`; none where cuts cannot be found."""
+        if missing_package():
+            return range(0)
         first, last = (self._filmed(min(max(i, 0), self.count - 1)) for i in (low, high))
         return range(first + 1, last + 1)
 
@@ -183,30 +236,36 @@ class Shots:
         return filmed * self.step - (self.step - 1) // 2
 
     def _is_cut(self, index: int) -> bool:
-        if index not in self._cuts:
-            self._cuts[index] = self._decide(index)
-        return self._cuts[index]
+        if index in self._cuts:
+            return self._cuts[index]
+        found, certain = self._decide(index)
+        if certain:
+            self._cuts[index] = found
+        return found
 
-    def _decide(self, index: int) -> bool:
+    def _decide(self, index: int) -> tuple[bool, bool]:
+        """Whether there is a cut before that filmed frame, and whether all that has a say in it could be read."""
         last, next_ = self._signature(index - 1), self._signature(index)
-        if last is None or next_ is None or not may_be_cut(last, next_):
-            return False
-        return is_cut(*sides({i: self._signature(i) for i in neighbours(index, self.filmed)}, index))
+        if last is None or next_ is None:
+            return False, False
+        if not may_be_cut(last, next_):
+            return False, True
+        beside = {i: self._signature(i) for i in neighbours(index, self.filmed)}
+        return is_cut(*sides(beside, index)), all(picture is not None for picture in beside.values())
 
     def _signature(self, index: int) -> Signature | None:
-        """None: the frame cannot be read. Whoever needs the frame itself will hear why."""
-        if index not in self._signatures:
-            try:
-                frame = self.read(index * self.step)
-            except MediaError:
-                found = None
-            else:
-                found = signature(frame, self.transfer, self.alpha)
-                self._hand_over(index * self.step, frame)
-            self._signatures[index] = found
-            while len(self._signatures) > _KEPT:
-                del self._signatures[next(iter(self._signatures))]
-        return self._signatures[index]
+        """None: the frame cannot be read now. Whoever needs the frame itself will hear why."""
+        if index in self._signatures:
+            return self._signatures[index]
+        try:
+            frame = self.read(index * self.step)
+        except MediaError:
+            return None
+        found = self._signatures[index] = signature(frame, self.transfer, self.alpha)
+        self._hand_over(index * self.step, frame)
+        while len(self._signatures) > _KEPT:
+            del self._signatures[next(iter(self._signatures))]
+        return found
 
     def _hand_over(self, index: int, frame: np.ndarray) -> None:
         self._handed[index] = frame

@@ -26,8 +26,9 @@ class FrameReader:
 
     def __init__(self, path, number=0):
         """number: which of the file's video streams. Raises MediaError if nothing of it can be decoded."""
-        self._path, self._number, self.container, self._threads = path, number, None, "AUTO"
-        self._run, self._landmarks = None, _Landmarks()
+        self._path, self._number, self._threads = path, number, "AUTO"
+        self.container = self.stream = self._codec = self._run = None
+        self._landmarks = _Landmarks()
         try:
             self._restart()
         except av.error.FFmpegError as error:
@@ -69,11 +70,13 @@ class FrameReader:
         return run.shown
 
     def close(self):
-        """Closes the file, until it is next asked for a frame."""
-        self._run = None
+        """Closes the file and ends the decoder's threads, until it is next asked for a frame."""
+        if self._run is not None:
+            self._run.close()
         if self.container is not None:
             self.container.close()
-            self.container = None
+        # PyAV's decoder has no close: its threads end when nothing refers to it.
+        self.container = self.stream = self._codec = self._run = None
 
     def _near(self, time, step):
         run = self._run
@@ -96,7 +99,7 @@ class FrameReader:
         except av.error.FFmpegError:
             return False
         self._codec.flush_buffers()
-        self._run = run = self._new_run(seeking=True)
+        run = self._begin(seeking=True)
         # No I frame: a wrong index or a gradual refresh. What follows would lack references.
         return run.shown is not None and (run.shown.key_frame or run.shown.pict_type == PictureType.I)
 
@@ -107,10 +110,15 @@ class FrameReader:
         self.stream = _video_stream(self.container, self._path.name, self._number)
         self.time_base, self.start = fraction(self.stream.time_base), self.stream.start_time or 0
         self._codec = _decoder(self.stream, self._threads)
-        self._run = self._new_run(seeking=False)
+        self._begin(seeking=False)
 
-    def _new_run(self, seeking):
-        return _Run(self.container, self.stream, self._codec, self._landmarks, seeking)
+    def _begin(self, seeking):
+        """The one run that there is from now on."""
+        if self._run is not None:
+            self._run.close()
+            self._run = None
+        self._run = _Run(self.container, self.stream, self._codec, self._landmarks, seeking)
+        return self._run
 
 
 class _Landmarks:
@@ -146,6 +154,10 @@ class _Run:
         self._frames = self._decoded(seeking)
         self.shown_time, self.shown = next(self._frames, (None, None))
         self.next_time, self.next = next(self._frames, (None, None))
+
+    def close(self):
+        """Ends it. The generator refers to the run and the run to it: together they would wait for the collector."""
+        self._frames.close()
 
     def advance(self):
         """On to the successor."""

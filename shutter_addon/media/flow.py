@@ -8,7 +8,7 @@ methodology for optical flow"). Along what has arrived, both frames are looked u
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 
 import numpy as np
 
@@ -156,7 +156,7 @@ def _look(picture, places, how=None) -> np.ndarray:
     return cv2.remap(picture, places, None, cv2.INTER_CUBIC if how is None else how, borderMode=cv2.BORDER_REPLICATE)
 
 
-@cache
+@lru_cache(maxsize=1)  # 66 MB at 4K; a build has pictures of one size
 def _grid(height: int, width: int) -> np.ndarray:
     """The places (H, W, 2) of all pixels."""
     return np.dstack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in (width, height))))

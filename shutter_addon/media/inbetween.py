@@ -15,6 +15,7 @@ from . import cuts
 from .cache import Cache, State, pair_line, write_picture
 from .errors import MediaError
 from .files import check_index
+from .written import why_short
 
 MEMORY = 4 << 30  # bytes that pairs at work may take together
 LAYERS = 26  # of a frame as float32, for a pair at work: 9 to 17 measured for "quick", 15 to 24.3 for "good"
@@ -102,7 +103,13 @@ def build(
 
     Killed, it goes on where it was; several may build in the same folder, and none harms another. Files come out the
     same, whatever the chunks and however often it was interrupted. The source must be used by nobody else meanwhile.
-    Gives how far it came. MediaError: a frame cannot be read or written; what is finished is kept."""
+    Gives how far it came. MediaError: a package is missing, or a frame cannot be read or written; what is finished is
+    kept."""
+    if package := cuts.missing_package():
+        raise MediaError(
+            f"in-between frames need the Python package {package}; "
+            "install the zip of Virtual Shutter that is made for your system"
+        )
     if between is None:
         from .flow import between
     cache, pairs = Cache(source, folder, factor, method), _pairs(source, frames)
@@ -159,19 +166,27 @@ class _Near:
     def __init__(self, source):
         self._source = source
         self._frames: dict[int, np.ndarray] = {}
-        self._signatures: dict[int, cuts.Signature | None] = {}
+        self._signatures: dict[int, cuts.Signature] = {}
 
     def pair(self, index: int) -> tuple[np.ndarray, np.ndarray, str | None]:
-        """Frames `index` and `index` + 1; and "same" if they are equal, "cut" if they are of two shots, else None."""
-        self._signatures = {i: self._signature(i) for i in cuts.neighbours(index + 1, self._source.count)}
+        """Frames `index` and `index` + 1; and "same" if they are equal, "cut" if they are of two shots, else None.
+
+        MediaError: one of them cannot be read, or one that has a say in what they are: that is kept for good."""
         first, second = self._frame(index), self._frame(index + 1)
+        kind = self._kind(first, second, index)
+        beside = cuts.neighbours(index + 1, self._source.count)
         self._frames = {i: frame for i, frame in self._frames.items() if i > index}
-        return first, second, self._kind(first, second, index)
+        self._signatures = {i: picture for i, picture in self._signatures.items() if i in beside}
+        return first, second, kind
 
     def _kind(self, first, second, index):
         if np.array_equal(first, second):
             return "same"
-        sides = cuts.sides(self._signatures, index + 1)
+        here = self._signature(index), self._signature(index + 1)
+        if not (cuts.may_be_cut(*here) or cuts.may_be_duplicate(*here)):
+            return None
+        beside = {i: self._signature(i) for i in cuts.neighbours(index + 1, self._source.count)}
+        sides = cuts.sides(beside, index + 1)
         if cuts.is_cut(*sides):
             return "cut"
         return "same" if cuts.is_duplicate(*sides) else None
@@ -182,13 +197,9 @@ class _Near:
         return self._frames[index]
 
     def _signature(self, index):
-        """None for a frame that cannot be read: only who needs the frame itself has to know."""
         if index not in self._signatures:
-            try:
-                frame = self._frame(index)
-            except MediaError:
-                return None
-            return cuts.signature(frame, self._source.transfer, self._source.alpha)
+            frame = self._frame(index)
+            self._signatures[index] = cuts.signature(frame, self._source.transfer, self._source.alpha)
         return self._signatures[index]
 
 

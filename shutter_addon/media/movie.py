@@ -1,5 +1,6 @@
 """Frames of a movie: those that Blender's movie strip shows, converted to RGB as Blender converts them."""
 
+import gc
 import math
 from fractions import Fraction
 
@@ -80,6 +81,7 @@ class MovieSource:
     def _graph_for(self, frame):
         key = (frame.format.name, frame.width, frame.height, frame.colorspace, frame.color_range)
         if key != self._graph_key:
+            self._drop_graph()
             graph = av.filter.Graph()
             size = "{}:{}".format(*self._size)
             nodes = [
@@ -93,8 +95,16 @@ class MovieSource:
         return self._graph
 
     def close(self):
-        """Closes the file; a later read opens it again."""
+        """Closes the file and ends all threads; a later read opens it again."""
         self._reader.close()
+        self._drop_graph()
+
+    def _drop_graph(self):
+        """Ends its threads. PyAV's graph and its filters refer to each other, and it has no close: the dicts in which
+        it holds them are emptied, or the threads would wait for the garbage collector."""
+        for held in gc.get_referents(self._graph):
+            if isinstance(held, dict):
+                held.clear()
         self._graph = self._graph_key = None
 
     def __enter__(self):

@@ -9,7 +9,7 @@ from test_composition import Footage, check, few_pieces, instant
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.core import presets
 from shutter_addon.core.instant import Instant, Options
-from shutter_addon.media.cuts import Shots
+from shutter_addon.media.cuts import NEIGHBOURS, Shots
 
 LENGTHS = 7, 6, 9
 ENDS = np.cumsum((0, *LENGTHS))
@@ -91,7 +91,7 @@ def test_within_a_shot_every_frame_is_decoded_once(device):
     for index in range(12):
         renderer.picture(index, moment)
     assert sorted(source.reads) == list(range(max(source.reads) + 1))
-    assert max(source.reads) <= 11 + 5 + 4  # and those that have a say in a cut
+    assert max(source.reads) <= 11 + 5 + NEIGHBOURS  # and those that have a say in a cut
     still = Instant(Options(6), presets.bars("STILL", 6)[None])
     source.reads.clear()
     Renderer(device, Shots(source)).picture(9, still)

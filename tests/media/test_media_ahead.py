@@ -18,7 +18,7 @@ class Footage:
     def __init__(self, count=40, size=(8, 6)):
         self.frames = np.random.default_rng(1).integers(0, 256, (count, size[1], size[0], 4), dtype=np.uint8)
         self.count, (self.width, self.height), self.dtype = count, size, np.dtype(np.uint8)
-        self.reads, self.threads, self.closed = [], set(), 0
+        self.reads, self.threads, self.closed, self.broken = [], set(), 0, {13}
         self.gate = threading.Event()
         self.gate.set()
 
@@ -28,7 +28,7 @@ class Footage:
         self.threads.add(threading.current_thread())
         if not 0 <= index < self.count:
             raise IndexError(index)
-        if index == 13:
+        if index in self.broken:
             raise MediaError("frame 13 of it cannot be decoded")
         return self.frames[index].copy()
 
@@ -113,6 +113,16 @@ def test_errors_come_out_of_read(ahead, source):
     with pytest.raises(IndexError):
         ahead.read(99)
     assert np.array_equal(ahead.read(14), source.frames[14])
+
+
+def test_a_frame_that_is_back_is_read(ahead, source):
+    """Though it was wanted, and is still."""
+    ahead.want([12, 13])
+    wait(ahead, [12, 13])
+    with pytest.raises(MediaError, match="frame 13"):
+        ahead.read(13)
+    source.broken = set()
+    assert np.array_equal(ahead.read(13), source.frames[13])
 
 
 def test_frames_cannot_be_written_into(ahead):

@@ -1,10 +1,16 @@
 """Cuts and repeated frames: films, pieces of them joined at known places, and what looks like a cut and is none."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from shutter_addon.media import MediaError, open_source
 from shutter_addon.media.cuts import NEIGHBOURS, Shots, is_cut, is_duplicate, signature
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +65,7 @@ def test_shots_that_are_joined(film):
     assert cuts(film[1:11], film[120:130]) == [10]  # the same camera, the rabbit elsewhere
 
 
-@pytest.mark.parametrize("length", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("length", [3, 4, 5, 8])
 def test_short_shots(film, length):
     assert cuts(film[:10], noise(length, 3), noise(10, 4)) == [10, 10 + length]
 
@@ -155,3 +161,57 @@ def test_where_a_frame_cannot_be_read_there_is_no_cut(film):
     assert Shots(Frames(frames)).around(2, 0, 17) == range(10)
     frames[9] = None
     assert Shots(Frames(frames)).around(2, 0, 17) == range(18)
+
+
+@pytest.mark.parametrize("lost", [9, 10, 4])
+def test_what_a_lost_frame_hid_is_found_when_it_is_back(film, lost):
+    """Whether it lay at the cut or beside it, and though the same object looked for the cut before."""
+    frames = [*film[:10], *noise(8, 11)]
+    source = Frames([None if i == lost else frame for i, frame in enumerate(frames)])
+    shots = Shots(source)
+    shots.around(2, 0, 17)
+    source.frames = frames
+    assert shots.around(2, 0, 17) == range(10)
+    assert shots.lacking(2, 0, 9) == set()
+
+
+def test_frames_that_nobody_reads_are_let_go(film):
+    """A look through a whole film, as for what its in-between frames lack, keeps those around the last window."""
+    for step in (1, 8):
+        shots = Shots(Frames(film.repeat(step, 0)[: 131 * step + 1]), step)
+        for index in range(shots.count):
+            shots.around(index, index, index + 3)
+            low, high = index - NEIGHBOURS * step, index + 3 + NEIGHBOURS * step
+            assert all(low <= i <= high for i in shots.handed())
+
+
+def test_without_pyscenedetect_the_whole_clip_is_one_shot():
+    code = """
+import sys
+sys.modules["scenedetect"] = None
+import numpy as np
+from shutter_addon.media import MediaError, cuts, inbetween
+class Frames:
+    count, transfer, alpha = 20, "srgb", "opaque"
+shots = cuts.Shots(Frames())
+print(cuts.missing_package(), shots.around(3, 0, 19), shots.lacking(3, 0, 19))
+try:
+    inbetween.build(Frames(), "nowhere", 4, "quick")
+except MediaError as error:
+    print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    shots, refusal = done.stdout.splitlines()
+    assert shots == "scenedetect range(0, 20) set()"
+    assert refusal.startswith("in-between frames need the Python package scenedetect; install the zip")
+
+
+def test_footage_that_moves_hard_has_no_cuts_and_joined_footage_has_all():
+    """A round of the script that measures it; what it says of shots of one and two frames, and of cuts between pans, is
+    in its docstring."""
+    sys.path.insert(0, str(ROOT / "scripts"))
+    import cut_quality
+
+    numbers = cut_quality.measure(1, 3)
+    hard = {"cut: shots of 1 and 2 frames", "cut: between pans", "cut: on twos and threes"}
+    assert {kind: counts for kind, counts in numbers.items() if counts[1] or (counts[2] and kind not in hard)} == {}

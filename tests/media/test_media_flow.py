@@ -193,3 +193,9 @@ def test_without_opencv_it_is_one_sentence(monkeypatch):
         monkeypatch.setattr(flow, "cv2", found)
         with pytest.raises(MediaError, match="need the Python package opencv-contrib-python-headless"):
             next(flow.between(pan(0), pan(8), 2))
+
+
+def test_grids_of_pictures_of_other_sizes_are_let_go():
+    for width in range(32, 40):
+        list(flow.between(*(frame(noise(seed, 32, width), np.uint8) for seed in (1, 2)), 2))
+    assert flow._grid.cache_info().currsize == 1

@@ -1,12 +1,14 @@
 """Movies: which frame an index means, in any order."""
 
 import random
+import subprocess
+import sys
 from pathlib import Path
 
 import av
 import numpy as np
 import pytest
-from footage import COUNT, HEIGHT, WIDTH, make_movie, number, picture, see_through
+from footage import COUNT, HEIGHT, WIDTH, cut_file, damage_frame, make_movie, number, picture, see_through
 
 from shutter_addon.media import open_source
 
@@ -16,6 +18,7 @@ UGLY = (
     "late.mkv no_key_first.ts no_index.avi"
 )
 NAMES = UGLY.split()
+ROOT = Path(__file__).parents[2]
 
 
 def all_frames(source):
@@ -185,3 +188,42 @@ def test_streams_are_counted_without_cover_pictures(tmp_path):
             out.mux(stream.encode())
     assert number(open_source(path).read(2)) == 2
     assert number(open_source(path, stream=1).read(2)) == 102
+
+
+THREADS = """
+import gc, sys
+from pathlib import Path
+from shutter_addon.media import Ahead, MediaError, open_source
+gc.disable()
+
+def threads():
+    return len(list(Path("/proc/self/task").iterdir()))
+
+def use(path):
+    try:
+        with Ahead(open_source(path)) as ahead, open_source(path) as source:
+            for index in (0, source.count - 1, 9, 2):
+                try:
+                    ahead.read(index), source.read(index)
+                except MediaError:
+                    pass
+    except MediaError:
+        pass
+
+use(sys.argv[1])
+before = threads()
+for _ in range(6):
+    for path in sys.argv[1:]:
+        use(path)
+print(threads() - before)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+def test_threads_end_when_a_movie_is_closed(movies, bunny, tmp_path):
+    """Without the garbage collector; of sound movies, of damaged ones, and of one that cannot be opened."""
+    whole = movies["b_frames.mp4"][0]
+    bad = damage_frame(whole, tmp_path / "damaged.mp4", 9), cut_file(whole, tmp_path / "cut.mp4", 0.5)
+    paths = bunny, whole, movies["open.mkv"][0], movies["vp9.webm"][0], *bad
+    command = [sys.executable, "-c", THREADS, *map(str, paths)]
+    assert subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout == "0\n"

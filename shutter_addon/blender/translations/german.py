@@ -374,6 +374,10 @@ MESSAGES = {
         "*",
         "Windows end at the source's cuts as they do at the clip's ends",
     ): "Zeitfenster enden an den Schnitten der Quelle wie an den Enden des Clips",
+    (
+        "*",
+        "Cuts are not found: the Python package {package} is missing",
+    ): "Schnitte werden nicht gefunden: das Python-Paket {package} fehlt",
     ("*", "Border"): "Rand",
     (
         "*",
