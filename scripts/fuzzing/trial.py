@@ -212,7 +212,7 @@ def forked(function) -> tuple[int, str]:
         print(said, file=sys.stderr)
         raise SystemExit(1)
     if code not in (0, 2):
-        raise Fault(f"ended with {code}: {said.strip()[-200:]}")
+        raise Fault(f"ended with {signal.Signals(-code).name if code < 0 else code}: {said.strip()[-200:]}")
     return code, said
 
 
