@@ -154,6 +154,7 @@ def attempt(folder: Path, module: str, seconds: float) -> None:
     for stream in (1, 2):
         os.dup2(log, stream)
     os.setpgid(0, 0)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     _watch(seconds)
     sys.path += import_module("fuzzing.warm").PATH
     kind, given, work = import_module(module), folder / "input", folder / "work"
