@@ -15,7 +15,7 @@ FAULTS = {
     "killed": lambda: os.kill(os.getpid(), signal.SIGKILL),
     "raises": lambda: int("five"),
     "leaves": lambda: os._exit(3),
-    "takes memory": lambda: [bytearray(1 << 31) for _ in range(5)],
+    "takes memory": lambda: bytearray(1 << 32),
     "prints a trace": lambda: print("Traceback (most recent call last):\n  …\nOSError: no", file=sys.stderr),
     "changes the source": lambda: Path("in/film").write_text("another"),
     "removes through a link": lambda: Path("cache/link/keep").unlink(),

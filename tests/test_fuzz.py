@@ -8,7 +8,7 @@ import planted
 import pytest
 
 SCRIPTS = Path(__file__).parents[1] / "scripts"
-INPUTS = {"recipes": 60, "media": 80, "caches": 60, "blends": 80}
+INPUTS = {"recipes": 40, "media": 80, "caches": 60, "blends": 50}
 
 
 @pytest.fixture

@@ -108,9 +108,9 @@ def _change(bpy, parts, what: str, which, value) -> None:
             ACTIONS[what](bpy, *found, value)
             return
         owner = (OURS | BLENDERS)[what](*found)
+        names = [p.identifier for p in owner.bl_rna.properties if not p.is_readonly and p.identifier not in LEFT_ALONE]
     except (KeyError, IndexError, StopIteration, RuntimeError, AttributeError, TypeError, ReferenceError):
         return  # something that it needs was removed before
-    names = [p.identifier for p in owner.bl_rna.properties if not p.is_readonly and p.identifier not in LEFT_ALONE]
     prop = owner.bl_rna.properties[sorted(names)[which % len(names)]]
     number, text, item = value
     stored = owner.bl_system_properties_get() if hasattr(owner, "bl_system_properties_get") else None

@@ -154,6 +154,7 @@ def attempt(folder: Path, module: str, seconds: float) -> None:
     for stream in (1, 2):
         os.dup2(log, stream)
     os.setpgid(0, 0)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     _watch(seconds)
     sys.path += import_module("fuzzing.warm").PATH
     kind, given, work = import_module(module), folder / "input", folder / "work"
@@ -212,7 +213,7 @@ def forked(function) -> tuple[int, str]:
         print(said, file=sys.stderr)
         raise SystemExit(1)
     if code not in (0, 2):
-        raise Fault(f"ended with {code}: {said.strip()[-200:]}")
+        raise Fault(f"ended with {signal.Signals(-code).name if code < 0 else code}: {said.strip()[-200:]}")
     return code, said
 
 
