@@ -119,17 +119,18 @@ int layer_of(int frame)
 vec4 frame_light(ivec2 place, int slot)
 {
   vec4 color = texelFetch(frames, ivec3(place, slot), 0);
-#if DECODE != 0
-#  if PREMULTIPLIED
-  color.rgb = straight(color);
+#if PREMULTIPLIED
+#  if DECODE == 1
+  color.rgb = to_linear_of_any(straight(color)) * cover(color);
+#  elif DECODE == 2
+  color.rgb = to_encoded(straight(color)) * color.a;
 #  endif
+#else
 #  if DECODE == 1
   color.rgb = to_linear(color.rgb);
-#  else
+#  elif DECODE == 2
   color.rgb = to_encoded(color.rgb);
 #  endif
-  color.rgb *= color.a;
-#elif !PREMULTIPLIED
   color.rgb *= color.a;
 #endif
   return color;

@@ -16,14 +16,25 @@ vec3 to_linear_exact(vec3 encoded)
   return mix(curve, encoded / 12.92, lessThanEqual(encoded, vec3(0.04045)));
 }
 
+// For code values of any range, as straight colours are that were premultiplied: in [0, 1] the polynomial's.
+vec3 to_linear_of_any(vec3 encoded)
+{
+  return mix(to_linear(encoded), to_linear_exact(encoded), greaterThan(encoded, vec3(1.0)));
+}
+
 vec3 to_encoded(vec3 linear)
 {
   vec3 curve = 1.055 * pow(max(linear, 0.0031308), vec3(1.0 / 2.4)) - 0.055;
   return mix(curve, linear * 12.92, lessThanEqual(linear, vec3(0.0031308)));
 }
 
-// Straight colour of a premultiplied one; what is fully transparent keeps its light.
+// What a premultiplied colour is multiplied by: what is fully transparent keeps its light.
+float cover(vec4 color)
+{
+  return color.a > 0.0 ? color.a : 1.0;
+}
+
 vec3 straight(vec4 color)
 {
-  return color.rgb / (color.a > 0.0 ? color.a : 1.0);
+  return color.rgb / cover(color);
 }

@@ -369,6 +369,8 @@ def _decoder(source, summed: str):
             rgba = samples.astype(np.float32) / white
             if source.alpha != "premultiplied":
                 rgba = light.premultiplied(rgba, convert)
+            elif convert is light.to_linear:
+                rgba = light.linearised(rgba)
             elif convert:
                 rgba = light.premultiplied(light.straight(rgba), convert)
             planes = np.ascontiguousarray(np.moveaxis(rgba, -1, 0))

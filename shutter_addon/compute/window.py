@@ -94,7 +94,9 @@ class Frames(Window):
         # Encoded floats may be above 1, beyond the shaders' curve.
         self._linearises = source.transfer == "srgb" and np.dtype(source.dtype).kind == "f"
         self.transfer = "linear" if self._linearises else source.transfer
-        kind, pixel_bytes = _STORED[np.dtype(source.dtype).type], 4 * np.dtype(source.dtype).itemsize
+        # And linear, what a half holds may be more than a half holds.
+        stored = np.dtype(np.float32 if self._linearises else source.dtype)
+        kind, pixel_bytes = _STORED[stored.type], 4 * stored.itemsize
         try:
             self._allocate(kind, pixel_bytes)
         except NoDeviceError:
@@ -135,9 +137,10 @@ class Frames(Window):
     def _read(self, index: int) -> np.ndarray:
         frame = self.source.read(index)
         if self._linearises:
-            rgb = light.straight(frame)[..., :3] if self.source.alpha == "premultiplied" else frame[..., :3]
-            scale = frame[..., 3:] if self.source.alpha == "premultiplied" else 1
-            frame = np.concatenate([light.to_linear(rgb) * scale, frame[..., 3:]], axis=-1)
+            frame = frame.astype(np.float32, copy=False)
+            if self.source.alpha == "premultiplied":
+                return light.linearised(frame)
+            frame = np.concatenate([light.to_linear(frame[..., :3]), frame[..., 3:]], axis=-1)
         return frame
 
     def _send(self, texture, rows: np.ndarray, layer: int) -> None:

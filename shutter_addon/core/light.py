@@ -27,5 +27,15 @@ def premultiplied(rgba: np.ndarray, convert=None) -> np.ndarray:
 
 def straight(rgba: np.ndarray) -> np.ndarray:
     """Premultiplied RGBA (…, 4) to straight; what is fully transparent keeps its colours (light without cover)."""
+    return np.concatenate([rgba[..., :3] / _cover(rgba), rgba[..., 3:]], axis=-1)
+
+
+def linearised(rgba: np.ndarray) -> np.ndarray:
+    """Premultiplied RGBA (…, 4) with straight sRGB code values, as linear light; light without cover stays."""
+    cover = _cover(rgba)
+    return np.concatenate([to_linear(rgba[..., :3] / cover) * cover, rgba[..., 3:]], axis=-1)
+
+
+def _cover(rgba: np.ndarray) -> np.ndarray:
     alpha = rgba[..., 3:]
-    return np.concatenate([rgba[..., :3] / np.where(alpha > 0, alpha, 1), alpha], axis=-1)
+    return np.where(alpha > 0, alpha, 1)

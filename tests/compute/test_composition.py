@@ -33,10 +33,9 @@ class Footage:
         values = self.frames.astype(np.float64)
         if self.dtype.kind == "u":
             values /= np.iinfo(self.dtype).max
-        convert = light.to_linear if self.transfer == "srgb" else None
         if self.alpha == "premultiplied":
-            return light.premultiplied(light.straight(values), convert)
-        return light.premultiplied(values, convert)
+            return light.linearised(values) if self.transfer == "srgb" else values
+        return light.premultiplied(values, light.to_linear if self.transfer == "srgb" else None)
 
 
 def footage(rng, count=20, size=(37, 23), dtype=np.uint8, **kind):
@@ -73,7 +72,8 @@ def device(request):
     return open_compositor(request.param)[0]
 
 
-def check(device, source, moment, index, direction=1, shot=None):
+def composed(device, source, moment, index, direction=1, shot=None):
+    """A device's picture, and the reference's with the same coefficients."""
     renderer = Renderer(device, source)
     picture = renderer.picture(index, moment, direction)
     c = renderer.coefficients(moment)
@@ -83,10 +83,15 @@ def check(device, source, moment, index, direction=1, shot=None):
     indices = compositor.window_indices(moment.options, index, shot or range(source.count), direction)
     expected = compositor.compose(moment, source.linear()[np.maximum(indices, 0)], indices >= 0, c)
     assert picture.shape == expected.shape
+    renderer.release_window()
+    return picture, expected
+
+
+def check(device, source, moment, index, direction=1, shot=None):
+    picture, expected = composed(device, source, moment, index, direction, shot)
     # Light above white differs in proportion: compare it relatively.
     difference = np.abs(light.to_encoded(picture.astype(np.float64)) - light.to_encoded(expected))
     assert (difference / np.maximum(1, np.abs(expected))).max() <= LEVEL
-    renderer.release_window()
     return picture, expected
 
 
@@ -163,6 +168,46 @@ def test_stored_types(device, dtype, alpha, transfer):
         source.frames[..., :3] = np.minimum(source.frames[..., :3], top)
     for light_ in ("linear", "encoded"):
         check(device, source, instant(rng, light=light_), 1)
+
+
+def soft_edges(rng, dtype, **kind):
+    """Premultiplied footage whose colours lie far above their alpha: all of a whole type's range; of floats HDR and
+    negative ones, small and large."""
+    source = footage(rng, dtype=dtype, size=(9, 7), alpha="premultiplied", **kind)
+    if source.dtype.kind == "f":
+        signs = rng.choice([1, 1, 1, -1], source.frames.shape)
+        source.frames[:] = signs * 10 ** rng.uniform(-4, 2.2, source.frames.shape)
+    alpha = rng.choice([0.004, 0.055, 0.5, 1], source.frames.shape[:3])
+    source.frames[..., 3] = alpha * (np.iinfo(dtype).max if source.dtype.kind == "u" else 1)
+    return source
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16, np.float32])
+@pytest.mark.parametrize("transfer", ["srgb", "linear"])
+@pytest.mark.parametrize("light_", ["linear", "encoded"])
+def test_colours_of_any_range(device, dtype, transfer, light_):
+    rng = np.random.default_rng(31)
+    source = soft_edges(rng, dtype, transfer=transfer)
+    ways = [instant(rng, window=3, light=light_), few_pieces(rng, 8, light=light_)]
+    ways += [instant(rng, light=light_, interpolation="value"), instant(rng, light=light_, edges="shorten")]
+    for moment in ways:
+        picture, expected = composed(device, source, moment, 17)
+        # A weight is as exact as float32: what is far brighter in one frame than in the others differs by that.
+        brightest = np.abs(source.linear()).max(axis=0)
+        assert (np.abs(picture - expected) <= 0.002 * np.abs(expected) + 1e-5 * brightest).all()
+
+
+@pytest.mark.parametrize("dtype", [np.uint16, np.float16, np.float32])
+def test_light_without_cover_is_kept(device, dtype):
+    """As Blender's own strip keeps it: of glows that are added to what lies below."""
+    frames = np.zeros((4, 2, 3, 4), dtype)
+    frames[..., :3] = np.iinfo(dtype).max // 2 if np.dtype(dtype).kind == "u" else 0.5
+    for transfer, lit in (("srgb", 0.2140), ("linear", 0.5)):
+        picture = Renderer(device, Footage(frames, transfer, "premultiplied")).picture(
+            0, Instant(Options(4), np.ones((1, 4)))
+        )
+        np.testing.assert_allclose(picture[..., :3], lit, atol=2e-4)
+        assert (picture[..., 3] == 0).all()
 
 
 @pytest.mark.parametrize("block", [2, 4])
