@@ -37,6 +37,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         # Blender's rows go up; composed pictures lie so in memory, and this copies nothing.
         result.layers[0].passes["Combined"].rect.foreach_set(np.ascontiguousarray(picture[::-1]).ravel())
         self.end_result(result)
+        self.update_progress(1.0)
         pictures.begin_next(scene, scene.frame_current)
 
     def _stopped(self) -> bool:
