@@ -229,7 +229,7 @@ class _Layout:
 
 def _draw(bpy):
     """What panels and lists do when they are drawn."""
-    from shutter_addon.blender import editing, panels, strips
+    from shutter_addon.blender import editing, effects, panels, strips
 
     for panel in panels.classes:
         if issubclass(panel, bpy.types.Panel) and panel.poll(bpy.context):
@@ -238,7 +238,8 @@ def _draw(bpy):
         effect = found[1]
         for i, shutter in enumerate(effect.shutters):
             panels.SHUTTER_UL_shutters.draw_item(None, None, _Layout(), effect, shutter, 0, effect, "", i)
-            editing.bars_now(effect, i)
+            with trial.only(effects.EffectError):
+                editing.bars_now(effect, i)
         for region in effect.regions:
             panels.SHUTTER_UL_regions.draw_item(None, None, _Layout(), effect, region, 0, effect, "", 0)
         panels.SHUTTER_UL_regions.filter_items(SimpleNamespace(bitflag_filter_item=1), None, effect, "regions")

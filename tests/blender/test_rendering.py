@@ -62,18 +62,6 @@ def effect_scene(edit):
     return edit.virtual_shutter.effects[0].scene
 
 
-def test_blender_is_asked_whether_it_stops_and_told_what_is_done(bpy, film, monkeypatch):
-    from shutter_addon.blender import engine
-
-    asked, told = [], []
-    monkeypatch.setattr(engine.VirtualShutterEngine, "test_break", lambda self: asked.append(1) or False)
-    monkeypatch.setattr(engine.VirtualShutterEngine, "update_progress", lambda self, share: told.append(share))
-    film.frame_end = 2
-    assert bpy.ops.render.render(animation=True) == {"FINISHED"}
-    assert asked
-    assert told == [1.0, 1.0]
-
-
 def test_a_python_that_uses_blender_lives_on(bpy, film, tmp_path, capfd):
     from shutter_addon.blender import pictures
 
