@@ -225,11 +225,12 @@ def anew(*arguments):
 
 
 def is_refusal(said: str) -> None:
-    """Fault, unless the command said one sentence, and one that is whole."""
+    """Fault, unless the command said why in one sentence, perhaps after a note, and both are whole."""
     sentences = [line for line in said.splitlines() if line.startswith("Virtual Shutter: ")]
-    if len(sentences) != 1 or len(sentences[0]) > 300:
+    if len(sentences) not in (1, 2) or max(map(len, sentences)) > 300:
         raise Fault(f"no single sentence of 300 characters: {said.strip()[:300]}")
-    is_whole(sentences[0].removeprefix("Virtual Shutter: "))
+    for text in sentences:
+        is_whole(text.removeprefix("Virtual Shutter: "))
 
 
 def is_whole(text: str) -> None:

@@ -232,7 +232,8 @@ def test_ctrl_c_ends_a_render_in_a_python_of_its_own(bpy, film, tmp_path):
     film.frame_end = film.sequence_editor.strips["Shutter"].right_handle = 2000
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
     stop = """
-import os, signal
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs are started without
 def stop(scene, *_):
     if scene.frame_current == 20 and scene.render.engine == "VIRTUAL_SHUTTER":
         from shutter_addon.blender import pictures
