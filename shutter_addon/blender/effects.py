@@ -96,9 +96,7 @@ def bars_at(curves, path: str, shutter, chosen: recipe.Options, frame: float) ->
     F-curves are, if that is the interpolation. path: the shutter's, from the scene; chosen: the effect's options.
     EffectError: they are not as many, or one cannot be."""
     window = chosen.window
-    if len(shutter.bars) != window:
-        sentence = rpt_("{place}: {count} bars, the window is {window}")
-        raise EffectError(sentence.format(place=values.place(shutter), count=len(shutter.bars), window=window))
+    check_bar_count(shutter, window)
     stored = np.array([bar.weight for bar in shutter.bars])
     keyed = {i: curve for i in range(window) if (curve := curves.find(f"{path}.bars[{i}].weight"))}
 
@@ -124,6 +122,13 @@ def bars_at(curves, path: str, shutter, chosen: recipe.Options, frame: float) ->
     return keyframes.between_bars(
         first, second, animation.progress(keyed.values(), frames[before], frames[after], frame)
     )
+
+
+def check_bar_count(shutter, window: int) -> None:
+    """EffectError: a shutter has not as many bars as the window is long."""
+    if len(shutter.bars) != window:
+        sentence = rpt_("{place}: {count} bars, the window is {window}")
+        raise EffectError(sentence.format(place=values.place(shutter), count=len(shutter.bars), window=window))
 
 
 def drawn_regions(effect) -> list:

@@ -76,6 +76,7 @@ def _shutter(curves, path: str, chosen, source, name: str, strip) -> recipe.Shut
         return effects.checked(source.name, effects.bars_at(curves, path, source, chosen, frame), frame)
 
     color = tuple(_short(values.number(source, "color", component)) for component in source.color)
+    effects.check_bar_count(source, chosen.window)
     keyed = [curve for k in range(chosen.window) if (curve := curves.find(f"{path}.bars[{k}].weight"))]
     if not keyed:
         return recipe.Shutter(name, color, [_short(v) for v in bars(strip.left_handle)])

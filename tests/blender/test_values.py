@@ -120,6 +120,10 @@ IMPOSSIBLE = {
     "few bars": (lambda e: e.shutters[0].bars.remove(0), 'shutter "Long": 3 bars, the window is 4'),
     "many bars": (lambda e: e.shutters[1].bars.add(), 'shutter "Sharp": 5 bars, the window is 4'),
     "no bars": (lambda e: e.shutters[0].bars.clear(), 'shutter "Long": 0 bars'),
+    "no keyed bars": (
+        lambda e: key(e.shutters[0].bars[3], "weight", (1, 1)) or e.shutters[0].bars.clear(),
+        'shutter "Long": 0 bars',
+    ),
     "keyed nan bar": (
         lambda e: key(e.shutters[1].bars[0], "weight", (1, NAN)),
         'shutter "Sharp", bar 1: Weight is nan',
