@@ -39,7 +39,7 @@ def main(argv: list[str]) -> int:
         arguments = parser.parse_args(argv)
         for path in vars(arguments).values():
             if isinstance(path, Path):
-                check_name(os.path.abspath(path))
+                check_name(path)
         (_render if arguments.command == "render" else _build_alone)(arguments)
     except SystemExit as stop:  # argparse: --help, or what it has said on stderr
         return stop.code
@@ -69,7 +69,7 @@ def _refuse(reason: str, code: int = BAD_INPUT) -> int:
 
 
 def _place(text: str) -> Path:
-    """A path as it is named; two slashes at its beginning, which Blender takes for the .blend's folder, are one."""
+    """A path as it is named. Two slashes at its beginning, which Blender takes for the .blend's folder, are one."""
     if not text:
         raise argparse.ArgumentTypeError("a name is missing")
     return Path(re.sub("^//+", "/", os.path.abspath(text)))
@@ -79,8 +79,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("shutter", description="Every pixel its own exposure.")
     commands = parser.add_subparsers(dest="command", required=True)
     render = commands.add_parser("render", help="render a source through a recipe")
-    render.add_argument("source", type=Path, help="a movie, or the first file of an image sequence")
-    render.add_argument("--recipe", type=Path, required=True, help="the effect, a JSON file")
+    render.add_argument("source", type=_place, help="a movie, or the first file of an image sequence")
+    render.add_argument("--recipe", type=_place, required=True, help="the effect, a JSON file")
     render.add_argument("--output", type=_place, help=f"a folder, or a movie ({', '.join(outputs.MOVIES)})")
     render.add_argument(
         "--format", choices=tuple(outputs.FORMATS), help="of the pictures in a folder: 16-bit png, float exr"
@@ -100,7 +100,7 @@ def _parser() -> argparse.ArgumentParser:
         help=f'where in-between frames lie (default: "{inbetweens.FOLDER}" beside the output, or beside FILE.blend)',
     )
     build = commands.add_parser("inbetween", help="build a source's in-between frames")
-    build.add_argument("source", type=Path, help="a movie, or the first file of an image sequence")
+    build.add_argument("source", type=_place, help="a movie, or the first file of an image sequence")
     build.add_argument(
         "--factor", type=int, choices=FACTORS[1:], required=True, help="how many times the source's rate"
     )
@@ -114,7 +114,7 @@ def _render(arguments) -> None:
     if arguments.output is None and arguments.save is None:
         raise outputs.OutputError("nothing to do: give --output, --save or both")
     source_recipe = _recipe(arguments)
-    path = Path(os.path.abspath(arguments.source))
+    path = arguments.source
     with _opened(path) as medium:
         output, file_format = arguments.output, arguments.format or "png"
         if output:
@@ -137,6 +137,7 @@ def _render(arguments) -> None:
         pictures.weights_folder = arguments.weights
         if arguments.weights:
             arguments.weights.mkdir(parents=True, exist_ok=True)
+            outputs.clear_up(arguments.weights)
         outputs.film(edit, output)
 
 
@@ -194,7 +195,7 @@ def _build_lacking(edit) -> None:
 
 
 def _build_alone(arguments) -> None:
-    path = Path(os.path.abspath(arguments.source))
+    path = arguments.source
     with _opened(path) as medium:
         first, last = _frames(arguments.frames, medium.count)
         strip = edits.make_source(path, medium)
@@ -231,7 +232,15 @@ def _frames(text: str | None, count: int) -> tuple[int, int]:
 def _save(edit, path: Path) -> None:
     """Saves the edit, its paths relative to the file: it may be opened on another machine. OutputError: it cannot be
     saved whole; what stood there stays."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        outputs.clear_up(path.parent)
+        _save_whole(edit, path)
+    except OSError as error:
+        raise outputs.OutputError(f"{path}: {error.strerror or error}") from None
+
+
+def _save_whole(edit, path: Path) -> None:
     with whole.part_folder(path.parent) as folder:
         part = folder / "edit.blend"
         try:

@@ -133,8 +133,7 @@ def film(edit, output: Path) -> None:
     name of its own. InterruptedRenderError: the same, by Ctrl-C or a farm's TERM."""
     folder = output.parent if is_movie(output) else output
     folder.mkdir(parents=True, exist_ok=True)
-    for left in whole.left_behind(folder):
-        shutil.rmtree(left, ignore_errors=True)
+    clear_up(folder)
     kept = edit.render.filepath
     faults: list[str] = []
     with whole.part_folder(folder) as part:
@@ -156,6 +155,13 @@ def film(edit, output: Path) -> None:
             if faults:
                 raise OutputError(faults[0] + rescued)
             raise InterruptedRenderError(f"{output}: stopped{rescued}")
+
+
+def clear_up(folder: Path) -> None:
+    """Removes what killed renders left half-written in a folder."""
+    with suppress(OSError):
+        for left in whole.left_behind(folder):
+            shutil.rmtree(left, ignore_errors=True)
 
 
 def _finish(part: Path, output: Path, count: int) -> None:
@@ -197,7 +203,7 @@ def _moved(part: Path, output: Path, edit):
             update()
             try:
                 os.utime(part)  # a movie's encoder may not write for long: nobody shall take it for left behind
-                for name in [name for name in missing if (part / name).exists()]:
+                for name in [path.name for path in part.iterdir() if path.name in missing]:
                     if not is_whole_picture(part / name):
                         raise OutputError(f"{output / name}: could not be written whole; {why_short(part)}")
                     (part / name).replace(missing.pop(name))

@@ -29,14 +29,19 @@ tell = _to_stderr  # what is done with the sentence that ends a render in the ba
 failure: str | None = None  # that sentence, of the render that runs or ran last
 _stopping = False
 _cancelling = False
-_film: int | None = None  # session_uid of the scene whose render runs; not of those that its Scene strips show
+_spent: list[tuple[str, str]] = []  # names of the scenes and cameras of small renders, see _cancel
+_film: int | None = None  # session_uid of the scene whose render runs; neither of those that its Scene strips show, nor
+# of what a preview shows
 _begun = False
 
 
 def begin(scene) -> None:
-    """A render begins: of a film, or of a scene in one."""
+    """A render begins: of a film, of a scene in one, or of a preview."""
     global _film, _begun, failure, _stopping
-    if scene.render.engine != ENGINE and not (_film is not None and _begun):
+    is_effect = scene.render.engine == ENGINE
+    in_film = _film is not None and (_begun or is_effect)
+    in_preview = is_effect and not (bpy.app.background or _in_job())
+    if not (in_film or in_preview):
         _film, _begun, failure, _stopping = scene.session_uid, False, None, False
 
 
@@ -55,6 +60,10 @@ def end(scene, alone: bool) -> None:
     global _film
     if scene.session_uid == _film:
         _film = None
+        if bpy.app.background:
+            _remove_spent()
+        else:  # what Blender keeps belongs to its main thread
+            bpy.app.timers.register(lambda: _PATIENCE if bpy.app.is_job_running("RENDER") else _remove_spent())
         if failure is not None and alone and bpy.app.background:
             leave(BAD_INPUT)
 
@@ -76,8 +85,8 @@ def stop() -> None:
 
 
 def stopping() -> bool:
-    """Whether the render was stopped, or has failed."""
-    return _stopping or failure is not None
+    """Whether the film that this picture or frame belongs to was stopped, or has failed."""
+    return _film is not None and ends_films() and (_stopping or failure is not None)
 
 
 def fail(text: str) -> None:
@@ -120,6 +129,7 @@ def _cancel() -> None:
     _cancelling = True
     scene = bpy.data.scenes.new("Cancelled")
     camera = bpy.data.objects.new("Cancelled", None)
+    _spent.append((scene.name, camera.name))
     try:
         scene.render.engine = ENGINE
         scene.render.resolution_x = scene.render.resolution_y = 4
@@ -128,8 +138,16 @@ def _cancel() -> None:
         with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]), suppress(RuntimeError):
             bpy.ops.render.render(scene=scene.name)
     finally:
-        bpy.data.batch_remove((scene, camera))
         _cancelling = False
+
+
+def _remove_spent() -> None:
+    """Removes what the small renders were of. Not before the film has ended: other effects of the same frame would be
+    rendered with what Blender frees along with them, and crash."""
+    while _spent:
+        scene, camera = _spent.pop()
+        found = (bpy.data.scenes.get(scene), bpy.data.objects.get(camera))
+        bpy.data.batch_remove([item for item in found if item is not None])
 
 
 def cancelling() -> bool:

@@ -142,8 +142,15 @@ def test_names_of_movies_are_names(command, frames, tmp_path, name):
     assert sorted(everything(tmp_path / "out")) == [f"{name}.mp4"]
 
 
+def test_where_an_edit_cannot_be_saved_comes_first(command, frames, tmp_path):
+    (tmp_path / "folder.blend").mkdir()
+    for place in (tmp_path / "folder.blend", "/proc/a.blend"):
+        refused(command(frames, "--save", place, recipe=STILL, check=False), f"Virtual Shutter: {place}: ")
+
+
 def test_two_slashes_are_one(command, frames, tmp_path):
-    command(frames, "--output", f"/{tmp_path}/out", "--frames", "2", "--save", f"/{tmp_path}/a.blend", recipe=STILL)
+    places = ["--output", f"/{tmp_path}/out", "--save", f"/{tmp_path}/a.blend"]
+    command(f"/{frames}", *places, "--frames", "2", recipe=STILL)
     assert sorted(everything(tmp_path / "out")) == ["0002.png"]
     assert (tmp_path / "a.blend").exists()
 
@@ -292,8 +299,13 @@ def test_what_killed_renders_leave_is_cleared(command, movie, frames, tmp_path):
     planted = link(out / f".part-{'1' * 16}", tmp_path / "in")
     for path in [left, *left.iterdir(), mine]:
         os.utime(path, (old, old))
-    command(frames, "--output", out, "--frames", "1", recipe=STILL)
-    assert not left.exists()
+    elsewhere = [tmp_path / name / f".part-{'2' * 16}" for name in ("weights", "saved")]
+    for folder in elsewhere:
+        folder.mkdir(parents=True)
+        os.utime(folder, (old, old))
+    places = ["--output", out, "--weights", tmp_path / "weights", "--save", tmp_path / "saved" / "a.blend"]
+    command(frames, *places, "--frames", "1", recipe=STILL)
+    assert not any(folder.exists() for folder in (left, *elsewhere))
     assert mine.exists()
     assert running.exists()
     assert planted.is_symlink()

@@ -81,6 +81,36 @@ def test_a_python_that_uses_blender_lives_on(bpy, film, tmp_path, capfd):
     assert np.abs(read_picture(tmp_path / "out" / "0003.png")[..., :3] - expected).max() <= 1
 
 
+def test_two_effects_of_a_frame_fail(bpy, film, tmp_path, capfd):
+    from shutter_addon.blender import effects, strips
+
+    source = film.sequence_editor.strips.new_image("more", str(tmp_path / "in" / "f0001.png"), 5, 1)
+    for i in range(2, 7):
+        source.elements.append(f"f{i:04d}.png")
+    strip, effect = strips.add_effect(film, source)
+    effects.apply(film, effect, strip, recipes.parse(json.dumps(recipe(2, [0, 1]))))
+    strip.blend_type = "ALPHA_OVER"
+    broken(tmp_path)
+    assert bpy.ops.render.render(animation=True) == {"CANCELLED"}
+    assert names(tmp_path / "out") == ["0001.png", "0002.png"]
+    assert capfd.readouterr().err.count("Virtual Shutter: f0004.png") == 1
+    assert len(bpy.data.scenes) == 3
+
+
+def test_what_follows_a_render_that_failed_knows_nothing_of_it(bpy, film, tmp_path, capfd):
+    mend = broken(tmp_path)
+    assert bpy.ops.render.render(animation=True) == {"CANCELLED"}
+    scene = effect_scene(film)
+    assert bpy.ops.render.render(scene=scene.name) == {"FINISHED"}
+    film.frame_set(3)
+    scene.frame_set(3)
+    capfd.readouterr()
+    for _ in range(2):  # and an effect's own scene ends like any film
+        assert bpy.ops.render.render(scene=scene.name) == {"CANCELLED"}
+        assert capfd.readouterr().err.count("Virtual Shutter: f0004.png") == 1
+    mend()
+
+
 def test_a_movie_is_finished_up_to_the_picture_that_fails(bpy, film, tmp_path):
     broken(tmp_path)
     to_movie(film, tmp_path / "film.mp4")
