@@ -12,6 +12,7 @@ sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "ble
 import bpy
 import numpy as np
 import support
+import traces
 from driver import OUT, area_of, enable, key, move, play, region_of, saw, shot, until
 
 FRAMES, BROKEN = 200, 15
@@ -25,12 +26,12 @@ def edit_now():
 def add_effect():
     frames = np.random.default_rng(1).integers(0, 256, (1, 360, 640, 3), dtype=np.uint8).repeat(FRAMES, 0)
     first = support.write_frames(OUT / "frames", frames)
-    broken = first.with_name(f"f{BROKEN:04d}.png")
-    broken.write_bytes(broken.read_bytes()[:200])
     strips = edit_now().sequence_editor_create().strips
     strip = strips.new_image("Noise", str(first), 1, 1)
     for path in sorted(first.parent.iterdir())[1:]:
         strip.elements.append(path.name)
+    # Missing, not cut off: of such a file, Blender's own thumbnails crash now and then.
+    first.with_name(f"f{BROKEN:04d}.png").unlink()
     edit_now().sequence_editor.active_strip = strip
     area = area_of("SEQUENCE_EDITOR", "SEQUENCER")
     window = bpy.context.window_manager.windows[0]
@@ -84,6 +85,20 @@ def story():
         yield 0.5
     scenes = [scene.name for scene in bpy.data.scenes]
     saw(scenes=scenes)
+    pictures = sys.modules[f"{traces.NAME}.shutter_addon.blender.pictures"]
+    picture, shown = pictures.picture, []
+
+    def asked(*arguments):
+        found = picture(*arguments)
+        shown.append(found.shape)
+        return found
+
+    pictures.picture = asked
+    edit.frame_set(BROKEN + 30)
+    area_of("SEQUENCE_EDITOR", "PREVIEW").tag_redraw()
+    yield from until(lambda: shown, "the preview shows another frame", 20)
+    pictures.picture = picture
+    saw(shown=shown)
     ended.clear()
     yield from begun(OUT / "stopped.mp4", BROKEN + 1, FRAMES)
     yield from until(lambda: edit.frame_current > BROKEN + 20 or not rendering(), "frames are rendered", 100)

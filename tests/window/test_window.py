@@ -142,7 +142,8 @@ def test_renders_that_end_early(tmp_path):
     assert len(list((tmp_path / "folder").iterdir())) == 14
     assert 1 <= whole_pictures(tmp_path / "stopped.mp4") < 185
     assert whole_pictures(tmp_path / "after.mp4") == 5
-    assert console.count("Virtual Shutter: f0015.png: cannot be decoded") == 2
+    assert console.count("Virtual Shutter: f0015.png: no such file") == 2
     assert "Traceback" not in console
     (scenes,) = (entry["scenes"] for entry in seen if "scenes" in entry)
     assert len(scenes) == 2
+    assert [entry["shown"][0] for entry in seen if "shown" in entry] == [[360, 640, 4]]
