@@ -174,8 +174,8 @@ void store(int quad, int pixel, float gain)
   }
   vec4 color = total[quad][pixel] / max(share[quad][pixel], 1e-6);
 #if EDGES == 2
-  // Where nothing of the shutter is left, the nearest frame that there is.
-  int nearest = layer_of(int(centre[quad][pixel]));
+  // Where nothing of the shutter is left, the nearest frame that there is (core/compositor.py has the 1e-3).
+  int nearest = layer_of(int(centre[quad][pixel] - 1e-3));
   color = share[quad][pixel] > 1e-6 ? color : frame_light(place_of_light(quad, pixel), nearest);
 #endif
 #if ENCODED

@@ -199,7 +199,7 @@ class CPUCompositor:
         bars = instant.bars[:, ::direction]
         origin = int(compositor.window_positions(options, index, direction).min())
         present = compositor.source_frames(options, origin + np.arange(options.window), window.shot) >= 0
-        expose = _way(window, options, bars, origin, present)
+        expose = _way(window, options, bars, origin, present, direction)
         for tile in window.tiles:
             c = tile.coefficients(handle, block)
             planes = expose(tile, c, block)
@@ -225,7 +225,7 @@ def _few(pieces: int, frames: int) -> bool:
     return 3 * pieces <= frames
 
 
-def _way(window, options: Options, bars: np.ndarray, origin: int, present: np.ndarray):
+def _way(window, options: Options, bars: np.ndarray, origin: int, present: np.ndarray, direction: int):
     """The quickest way to expose a tile: a function of tile, coefficients and block. Times count from the first frame
     that any shutter exposes."""
     first, last = shutters.open_span(bars)
@@ -237,7 +237,7 @@ def _way(window, options: Options, bars: np.ndarray, origin: int, present: np.nd
         weigh = partial(_displaced, knots, last - first)
     else:
         weigh = partial(_valued, bars / bars.sum(axis=1, keepdims=True))
-    return partial(_by_frames, window, weigh, origin, None if whole else np.flatnonzero(present) - first)
+    return partial(_by_frames, window, weigh, origin, None if whole else np.flatnonzero(present) - first, direction)
 
 
 def _mixed(times, c: np.ndarray) -> np.ndarray:
@@ -304,12 +304,12 @@ def _valued(normalised: np.ndarray, c: np.ndarray):
         yield frame, _mixed(normalised[None, :, frame], c)[0]
 
 
-def _by_frames(window, weigh, origin: int, present, tile: Tile, c: np.ndarray, block: int) -> np.ndarray:
+def _by_frames(window, weigh, origin: int, present, direction: int, tile: Tile, c: np.ndarray, block: int):
     """The light (3 or 4, h, w) of a tile, frame after frame; present: the frames that are, None for all of them."""
     weighted = ((frame, tile.pixels(weight, block)) for frame, weight in weigh(c))
     if present is None:
         return _sum(window, tile, origin, weighted)
-    return _without_absent(window, tile, origin, present, list(weighted))
+    return _without_absent(window, tile, origin, present, direction, list(weighted))
 
 
 def _sum(window, tile: Tile, origin: int, weighted) -> np.ndarray | None:
@@ -321,9 +321,10 @@ def _sum(window, tile: Tile, origin: int, weighted) -> np.ndarray | None:
     return total
 
 
-def _without_absent(window, tile: Tile, origin: int, present: np.ndarray, weighted: list) -> np.ndarray:
-    """The weight of absent frames is given to the others; where there are none, to the nearest."""
-    centre = sum(weight * (frame + 0.5) for frame, weight in weighted)
+def _without_absent(window, tile: Tile, origin: int, present: np.ndarray, direction: int, weighted: list):
+    """The light (3 or 4, h, w) where the weight of absent frames is given to the others; where there are none, to the
+    nearest."""
+    centre = sum(weight * (frame + 0.5) for frame, weight in weighted) - direction * compositor.CLOSE
     kept = [(frame, weight) for frame, weight in weighted if frame in present]
     share = sum(weight for _, weight in kept)
     picture = _sum(window, tile, origin, kept)

@@ -7,6 +7,10 @@ import numpy as np
 from . import light, shutters
 from .instant import Instant, Options
 
+# By how much of a frame the window's earlier ones are preferred, where the nearest frame is shown: of two that are as
+# near, rounding must not choose, for devices round differently.
+CLOSE = 1e-3
+
 
 def window_positions(options: Options, index: int, direction: int = 1) -> np.ndarray:
     """Where the window's frames (L,) lie around source frame `index`, beyond the clip's ends as well.
@@ -44,7 +48,8 @@ def compose(instant: Instant, frames, present, coefficients) -> np.ndarray:
     """The picture (H, W, 4) float64, scene-linear and premultiplied: F = e(q) · ∫ V(t + ⌊Q⁻¹(z)⌋) dz (§3.1, §3.4.1).
 
     frames: L pictures (H, W, 4), scene-linear, premultiplied; present: (L,) bool, False for frames left out, whose
-    share goes to the others (if none has a share: to the nearest present frame). coefficients: (N, H, W), Σ = 1.
+    share goes to the others (if none has a share: to the nearest present frame, of two the window's earlier one).
+    coefficients: (N, H, W), Σ = 1.
     """
     between = shutters.INTERPOLATIONS[instant.options.interpolation]
     normalised = instant.bars / instant.bars.sum(axis=1, keepdims=True)
@@ -65,7 +70,7 @@ def _without_absent(q: np.ndarray, present: np.ndarray) -> np.ndarray:
     share = kept.sum(axis=-1, keepdims=True)
     centre = (q * (np.arange(len(present)) + 0.5)).sum(axis=-1)
     places = np.flatnonzero(present)
-    nearest = places[np.abs(centre[..., None] - (places + 0.5)).argmin(axis=-1)]
+    nearest = places[np.abs(centre[..., None] - CLOSE - (places + 0.5)).argmin(axis=-1)]
     alone = np.arange(len(present)) == nearest[..., None]
     return np.where(share > 1e-6, kept / np.maximum(share, 1e-6), alone)
 

@@ -157,6 +157,18 @@ def test_shortened_to_nothing_shows_the_nearest_frame(device):
     assert np.abs(picture - source.linear()[19]).max() < 2e-5
 
 
+@pytest.mark.parametrize("bars", [[1, 0, 0, 1], [0.3, 0, 0, 0.3], [1, 0.7, 0, 0, 0.7, 1], [0.1, 0.7, 0, 0, 0.7, 0.1]])
+@pytest.mark.parametrize("shapes", [(), SHAPES])
+@pytest.mark.parametrize("direction", [1, -1])
+def test_of_two_frames_that_are_as_near_the_windows_earlier_is_shown(device, bars, shapes, direction):
+    """On every device: where all that there is of a clip lies midway between two cuts."""
+    source = footage(np.random.default_rng(4), count=2)
+    moment = Instant(Options(len(bars), edges="shorten", position="center"), np.array([bars] * 3, float), shapes)
+    index = {1: 0, -1: 1}[direction]
+    picture, _ = check(device, source, moment, index, direction)
+    assert np.abs(picture - source.linear()[index]).max() < 2e-5
+
+
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16, np.float32])
 @pytest.mark.parametrize("alpha", ["opaque", "straight", "premultiplied"])
 @pytest.mark.parametrize("transfer", ["srgb", "linear"])

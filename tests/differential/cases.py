@@ -1,0 +1,269 @@
+"""Random recipes over tiny footage of many kinds, each from a seed alone; knows nothing of the product."""
+
+import json
+from dataclasses import dataclass
+from fractions import Fraction
+
+import av
+import numpy as np
+from OpenImageIO import ImageOutput, ImageSpec
+from reference import Footage, time_at
+
+SIZES = (48, 27), (23, 17), (31, 20), (37, 23), (9, 33), (40, 7), (2, 2)
+# What a movie has is even: Blender's codecs want it.
+EVEN = (48, 28), (24, 18), (10, 34)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How footage is stored, and what the manual says of such files."""
+
+    name: str
+    samples: str  # NumPy's type
+    transfer: str = "srgb"
+    alpha: str = "opaque"
+    codec: str | None = None  # of a movie, and the format of its pixels
+    pixels: str = ""
+
+    @property
+    def is_lossy(self) -> bool:
+        return self.codec == "prores_ks"
+
+
+KINDS = (
+    Kind("rgb8.png", "uint8"),
+    Kind("rgba8.png", "uint8", alpha="straight"),
+    Kind("rgba16.png", "uint16", alpha="straight"),
+    Kind("soft16.tif", "uint16", alpha="premultiplied"),
+    Kind("float.tif", "float32", alpha="straight"),
+    Kind("half.exr", "float16", "linear", "premultiplied"),
+    Kind("float.exr", "float32", "linear", "premultiplied"),
+    Kind("opaque.exr", "float16", "linear"),
+    Kind("ffv1.mkv", "uint8", codec="ffv1", pixels="bgr0"),
+    Kind("deep.mkv", "uint16", codec="ffv1", pixels="rgb48le"),
+    Kind("alpha.mov", "uint8", alpha="straight", codec="png", pixels="rgba"),
+    Kind("soft.mov", "uint16", alpha="premultiplied", codec="png", pixels="rgba64be"),
+    Kind("prores.mov", "uint16", alpha="premultiplied", codec="prores_ks", pixels="yuva444p10le"),
+)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A recipe (JSON), the timeline frame to be shown, and footage: arrays (count, H, W, 4) as they are stored.
+
+    index, direction: the source frame where the recipe has no time keys, and whether the source runs backward."""
+
+    seed: int
+    recipe: str
+    frame: int
+    kind: Kind
+    stored: np.ndarray
+    index: int
+    direction: int
+
+    def footage(self, stored=None) -> Footage:
+        """As the reference has it."""
+        stored = self.stored if stored is None else stored
+        scale = np.iinfo(stored.dtype).max if stored.dtype.kind == "u" else 1
+        return Footage(stored.astype(float) / scale, self.kind.transfer, self.kind.alpha)
+
+
+def make(seed: int) -> Case:
+    """The case of a seed."""
+    rng = np.random.default_rng(seed)
+    kind = KINDS[seed % len(KINDS)]
+    sizes = EVEN if kind.codec else SIZES
+    width, height = sizes[rng.integers(len(sizes))]
+    count = int(rng.choice([2, 5, 9, 14])) if kind.codec else int(rng.choice([1, 2, 5, 9, 14]))
+    recipe = random_recipe(rng, count)
+    if kind.is_lossy:  # which leaves light where there is no cover, and that has no code
+        recipe["light"] = "linear"
+    frame = int(rng.integers(1, count + 1))
+    if "time" in recipe:
+        # Halfway between two source frames nobody can tell which is shown.
+        last = max(count, int(recipe["time"][-1]["frame"]))
+        clear = [f for f in range(1, last + 1) if abs(time_at(recipe, f) % 1 - 0.5) > 1e-3]
+        frame = int(rng.choice(clear))
+    uncovered = recipe["light"] == "linear"
+    stored = random_footage(rng, kind, (count, height, width), uncovered)
+    direction = -1 if rng.random() < 0.25 else 1
+    return Case(seed, json.dumps(recipe, indent=1), frame, kind, stored, int(rng.integers(count)), direction)
+
+
+# Recipes
+
+
+def choose(rng, *options):
+    return options[rng.integers(len(options))]
+
+
+def rounded(values):
+    return np.round(values, 5).tolist()
+
+
+def random_recipe(rng, count: int) -> dict:
+    window = int(choose(rng, 1, 2, 3, 4, 6, 8, 8, 11, 16, 24))
+    names = ["Default", "B", "ü", "D d", "E", "F"][: choose(rng, 1, 2, 2, 3, 3, 4, 5, 6)]
+    scale = choose(rng, 1, 1, 0.01, 50)
+    recipe = {
+        "version": 1,
+        "window": window,
+        "position": choose(rng, "start", "center", "end"),
+        "interpolation": choose(rng, "displacement", "displacement", "value"),
+        "light": choose(rng, "linear", "encoded"),
+        "exposure": choose(rng, "normalized", "weighted"),
+        "edges": choose(rng, "hold", "mirror", "shorten"),
+        "aggregate": choose(rng, 1, 1, 2, 4),
+        "border": choose(rng, False, True),
+        "stop_at_cuts": choose(rng, False, True),
+        "shutters": [random_shutter(rng, name, window, count, scale) for name in names],
+        "regions": [random_region(rng, names, count) for _ in range(rng.integers(0, 7))],
+    }
+    if rng.random() < 0.4:
+        recipe["time"] = random_time(rng, count)
+    return recipe
+
+
+def random_time(rng, count: int) -> list[dict]:
+    """Keys of the source time: forward, backward, in jumps and standing still."""
+    places = sorted(rng.choice(np.arange(-1, count + 8), int(rng.integers(1, 5)), replace=False).tolist())
+    values = rng.uniform(-1, count + 2, len(places))
+    for k in range(1, len(values)):
+        if rng.random() < 0.25:
+            values[k] = values[k - 1]
+    return [{"frame": f, "value": v, **ease(rng)} for f, v in zip(places, rounded(values), strict=True)]
+
+
+def ease(rng) -> dict:
+    found = choose(rng, None, "linear", "bezier", "bezier", "constant")
+    return {"ease": found} if found else {}
+
+
+def frames(rng, count: int, most: int) -> list[int]:
+    """Some frames of keys, in the clip and around it."""
+    return sorted(rng.choice(np.arange(-3, count + 6), int(rng.integers(1, most + 1)), replace=False).tolist())
+
+
+def random_bars(rng, window: int) -> np.ndarray:
+    """Bars (window,) that are open for 0.1 frames at least: "weighted", others are then 240 times as bright."""
+    bars = choose(rng, rng.random(window), np.ones(window), np.zeros(window), rng.random(window) ** 6)
+    bars = bars * (rng.random(window) > choose(rng, 0, 0, 0.5))
+    if bars.sum() < 0.1:
+        bars[rng.integers(window)] = rng.uniform(0.1, 1)
+    return bars
+
+
+def random_shutter(rng, name: str, window: int, count: int, scale: float) -> dict:
+    def bars():
+        return rounded(scale * random_bars(rng, window))
+
+    shutter = {"name": name, "color": rounded(rng.random(3))}
+    if rng.random() < 0.5:
+        return shutter | {"bars": bars()}
+    return shutter | {"keys": [{"frame": f, "bars": bars(), **ease(rng)} for f in frames(rng, count, 4)]}
+
+
+def random_stroke(rng, at_least: int) -> list:
+    steps = rng.normal(0, choose(rng, 0.05, 0.2, 0.5), (rng.integers(at_least, 7), 2))
+    return rounded(rng.random(2) + np.cumsum(steps, axis=0))
+
+
+def random_strokes(rng, kind: str) -> list:
+    at_least = 3 if kind == "lasso" else choose(rng, 1, 2, 2)
+    return [random_stroke(rng, at_least) for _ in range(choose(rng, 1, 1, 2, 3))]
+
+
+def random_region(rng, names: list[str], count: int) -> dict:
+    kind = choose(rng, "line", "lasso")
+    region = {"name": "R", "shutter": choose(rng, *names), "kind": kind, "strokes": random_strokes(rng, kind)}
+    if rng.random() < 0.8:
+        region["width"] = round(float(choose(rng, 0, 0.02, rng.uniform(0, 0.1), rng.uniform(0, 0.5))), 5)
+    if rng.random() < 0.5:
+        region["keys"] = [random_key(rng, kind, f) for f in frames(rng, count, 4)]
+    return region
+
+
+def random_key(rng, kind: str, frame: int) -> dict:
+    key = {"frame": frame, **ease(rng)}
+    if rng.random() < 0.6:
+        key["location"] = rounded(rng.normal(0, 0.2, 2))
+    if rng.random() < 0.6:
+        key["rotation"] = round(rng.uniform(-400, 400), 3)
+    if rng.random() < 0.6:
+        key["scale"] = round(rng.uniform(0.3, 2), 4)
+    if rng.random() < 0.4:
+        key["strokes"] = random_strokes(rng, kind)
+    return key
+
+
+# Footage
+
+
+def random_footage(rng, kind: Kind, shape, uncovered: bool) -> np.ndarray:
+    """Frames (count, H, W, 4) as they are stored: half noise and half gradients that move, with black, white and, where
+    the type holds it, more than white, less than black, and colours above their alpha.
+
+    uncovered: with light where premultiplied alpha is 0."""
+    count, height, width = shape
+    n, y, x = np.meshgrid(np.arange(count), np.arange(height), np.arange(width), indexing="ij")
+    waves = 0.5 + 0.5 * np.sin(rng.uniform(0.2, 0.6) * x + rng.uniform(0.2, 0.6) * y + rng.uniform(0.3, 2) * n)
+    values = np.where(x < width // 2, rng.random((4, *shape)), waves + 0.1 * rng.normal(size=(4, *shape)))
+    values = np.moveaxis(values, 0, -1)
+    colour, alpha = values[..., :3], values[..., 3:].clip(0, 1)
+    colour[rng.random(shape) < 0.05] = 0
+    colour[rng.random(shape) < 0.05] = 1
+    is_float = kind.samples.startswith("float")
+    if is_float:
+        colour = (1.2 * colour) ** 3 - 0.02
+        # Codes of 4 are a light of 30.
+        colour[rng.random(shape) < 0.02] *= choose(rng, 4, 20) if kind.transfer == "linear" else 2
+    else:
+        colour = colour.clip(0, 1)
+    alpha[rng.random(shape) < 0.1] = 0
+    alpha[rng.random(shape) < 0.2] = 1
+    if kind.alpha == "opaque":
+        alpha = np.ones_like(alpha)
+    elif kind.alpha == "premultiplied":
+        # Soft edges: straight colours of up to 6; below, nobody paints.
+        alpha = np.where(alpha < 0.04, 0, alpha)
+        colour = np.clip(colour, -6 * alpha, np.where(alpha > 0, 6 * alpha, 0.5) if uncovered else 6 * alpha)
+        alpha = alpha if is_float else np.round(alpha * 65535) / 65535
+    stored = np.concatenate([colour, alpha], axis=-1)
+    if is_float:
+        return stored.astype(kind.samples)
+    return np.rint(stored.clip(0, 1) * np.iinfo(kind.samples).max).astype(kind.samples)
+
+
+def write(case: Case, folder):
+    """Writes the case's footage into a folder; the movie, or the first file of the images."""
+    if case.kind.codec:
+        return write_movie(case, folder / case.kind.name)
+    for i, frame in enumerate(case.stored, start=1):
+        path = folder / f"{i:04d}{case.kind.name[case.kind.name.rindex('.') :]}"
+        write_image(path, frame[..., :3] if case.kind.alpha == "opaque" else frame)
+    return path.with_stem("0001")
+
+
+def write_image(path, array):
+    height, width, channels = array.shape
+    names = {"float16": "half", "float32": "float"}
+    spec = ImageSpec(width, height, channels, names.get(str(array.dtype), str(array.dtype)))
+    spec.attribute("oiio:UnassociatedAlpha", int(path.suffix != ".exr"))  # the samples as they are
+    output = ImageOutput.create(str(path))
+    assert output.open(str(path), spec), output.geterror()
+    assert output.write_image(np.ascontiguousarray(array)), output.geterror()
+    output.close()
+
+
+def write_movie(case: Case, path):
+    whole = {"uint8": "rgba", "uint16": "rgba64le"}[case.kind.samples]
+    with av.open(str(path), "w") as out:
+        stream = out.add_stream(case.kind.codec, rate=25)
+        stream.height, stream.width = case.stored.shape[1:3]
+        stream.pix_fmt = case.kind.pixels
+        for time, array in enumerate(case.stored):
+            frame = av.VideoFrame.from_ndarray(array, format=whole)
+            frame.pts, frame.time_base = time, Fraction(1, 25)
+            out.mux(stream.encode(frame.reformat(format=case.kind.pixels, threads=1)))
+        out.mux(stream.encode())
+    return path

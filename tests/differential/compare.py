@@ -1,0 +1,206 @@
+"""Compares the product with the reference, one random case after the other:
+
+    .venv/bin/python tests/differential/compare.py SEED … [--ways cpu,gpu,blender,film] [--output DIR]
+
+A picture may be 0.5/255 off, coefficients 1/255. How far a picture is off is the most of any channel of any pixel: in
+scene-linear light, or in the codes that a viewer sees (sRGB), whichever is more, both premultiplied; light above 1 in
+proportion. Coefficients are judged by themselves, against exact ones. For pictures the reference has the product's:
+their tolerance alone moves a picture by more than its own, where shutters that are far apart in time meet in noise.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from cases import Case, make, write, write_image
+from OpenImageIO import ImageBuf
+from reference import coefficients, picture, shown, time_at, to_encoded
+
+ROOT = Path(__file__).resolve().parents[2]
+PICTURE, COEFFICIENTS = 0.5 / 255, 1 / 255
+AMPLIFIED = 64
+
+
+class DifferenceError(AssertionError):
+    """The product differs from the reference; the message says where, by how much, and what repeats it."""
+
+
+def open_devices(names) -> dict:
+    """Compositors by name: "cpu" (NumPy), "gpu" (moderngl), "blender" (its own GPU, without a window)."""
+    from shutter_addon.compute.gpu import GPUCompositor
+    from shutter_addon.compute.renderer import open_compositor
+
+    devices = {name: open_compositor(name)[0] for name in names if name != "blender"}
+    if "blender" in names:
+        import gpu
+
+        gpu.init()
+        from shutter_addon.blender.device import BlenderDevice
+
+        devices["blender"] = GPUCompositor(BlenderDevice())
+    return devices
+
+
+def check(case: Case, devices: dict, folder: Path) -> dict:
+    """How far each device is off, as {device: (picture, coefficients)}. DifferenceError: too far; what differs is left
+    in the folder."""
+    from shutter_addon.compute.renderer import Renderer
+    from shutter_addon.core import recipe as recipes
+    from shutter_addon.media import open_source
+
+    recipe, parsed, found = json.loads(case.recipe), recipes.parse(case.recipe), {}
+    with tempfile.TemporaryDirectory() as files, open_source(write(case, Path(files))) as source:
+        footage = case.footage(samples_of(case, source))
+        index, direction = case.index, case.direction
+        if parsed.time:
+            index, direction = shown(recipe, case.frame, source.count)
+            if abs(parsed.time_at(case.frame) - time_at(recipe, case.frame)) > 1e-9:
+                raise DifferenceError(f"{told(case)}: another source time")
+        instant = parsed.at(case.frame, source.width / source.height)
+        for name, device in devices.items():
+            renderer = Renderer(device, source)
+            made, mix = renderer.picture(index, instant, direction), renderer.coefficients(instant)
+            with device.current():
+                renderer.release_window()
+            right = picture(recipe, case.frame, footage, index, direction, mix)
+            found[name] = judge(case, name, folder, made, right, mix)
+    return found
+
+
+def check_films(cases: list[Case], folder: Path) -> tuple[dict, list[DifferenceError]]:
+    """How far the frames are off that the command renders through Blender's sequencer, from footage that runs forward:
+    {seed: (picture, coefficients)}, and what is too far off."""
+    found, errors = {}, []
+    with tempfile.TemporaryDirectory() as files:
+        places = [Path(files) / str(case.seed) for case in cases]
+        render([film(case, place) for case, place in zip(cases, places, strict=True)])
+        for case, place in zip(cases, places, strict=True):
+            recipe, footage = json.loads(case.recipe), case.footage()
+            made, mix = (read_image(place / kind / f"{case.frame:04d}.exr") for kind in ("film", "weights"))
+            made = np.stack([made.get(name, np.ones_like(made["R"])) for name in "RGBA"], axis=-1)
+            mix = np.stack([mix[shutter["name"]] for shutter in recipe["shutters"]])
+            index, direction = shown(recipe, case.frame, len(footage.samples))
+            right = picture(recipe, case.frame, footage, index, direction, mix)
+            try:
+                found[case.seed] = judge(case, "film", folder, made, right, mix)
+            except DifferenceError as error:
+                errors.append(error)
+    return found, errors
+
+
+def can_be_a_film(case: Case) -> bool:
+    """Blender renders no picture smaller than 4×4. And of lossy footage, what was decoded is not known here."""
+    return min(case.stored.shape[1:3]) >= 4 and not case.kind.is_lossy
+
+
+def film(case: Case, place: Path) -> list[str]:
+    """The arguments of the command that renders the case's frame, in a new folder with its recipe and footage."""
+    place.mkdir()
+    # Noise may well look like a cut.
+    (place / "recipe.json").write_text(json.dumps(json.loads(case.recipe) | {"stop_at_cuts": False}))
+    options = ["--recipe", place / "recipe.json", "--output", place / "film", "--format", "exr"]
+    options += ["--weights", place / "weights", "--frames", case.frame]
+    return ["render", *map(str, [write(case, place), *options])]
+
+
+def render(films: list[list[str]]) -> None:
+    """Runs the command with each of these arguments, in another process."""
+    command = [sys.executable, Path(__file__).with_name("films.py")]
+    done = subprocess.run(command, input=json.dumps(films), capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise DifferenceError(f"films were not rendered: {done.stdout[-2000:]}{done.stderr[-2000:]}")
+
+
+def read_image(path: Path) -> dict:
+    """The channels (H, W) of an image, by name."""
+    image = ImageBuf(str(path))
+    return dict(zip(image.spec().channelnames, np.moveaxis(image.get_pixels(), -1, 0), strict=True))
+
+
+def samples_of(case: Case, source) -> np.ndarray:
+    """The samples that the reference gets: those that were written, but for a movie with loss. DifferenceError: they
+    are not read as they were written."""
+    read = np.stack([source.read(i) for i in range(source.count)])
+    if case.kind.is_lossy:
+        return read
+    taken_for = source.transfer, source.alpha, str(source.dtype)
+    if taken_for != (case.kind.transfer, case.kind.alpha, case.kind.samples) or not np.array_equal(read, case.stored):
+        raise DifferenceError(f"{told(case)}: the footage is not read as it was written")
+    return case.stored
+
+
+def judge(case: Case, way: str, folder: Path, made, right, mix) -> tuple[float, float]:
+    """How far a picture is off from the reference's Result, and coefficients from exact ones."""
+    made = np.where(right.doubtful[..., None], right.picture, made)
+    exact = coefficients(json.loads(case.recipe), case.frame, *case.stored.shape[2:0:-1])
+    mix, exact = np.moveaxis(mix, 0, -1), np.moveaxis(exact, 0, -1)
+    return (
+        within(PICTURE, light_apart(made, right.picture), case, f"{way}-picture", folder, made, right.picture),
+        within(COEFFICIENTS, np.abs(mix - exact), case, f"{way}-coefficients", folder, mix, exact),
+    )
+
+
+def light_apart(made, right) -> np.ndarray:
+    """How far pictures (H, W, 4) are apart, as codes where that is more."""
+    codes = [to_encoded(values[..., :3].astype(float)) for values in (made, right)]
+    apart = np.abs(made - right)
+    apart[..., :3] = np.maximum(apart[..., :3], np.abs(codes[0] - codes[1]))
+    return apart / np.maximum(1, np.abs(right))
+
+
+def within(tolerance: float, apart, case: Case, what: str, folder: Path, made, right) -> float:
+    """The most that arrays (H, W, channels) are apart."""
+    most = float(apart.max())  # NaN, where anything is
+    if most <= tolerance:
+        return most
+    place = folder / f"{case.seed}-{what}"
+    place.mkdir(parents=True, exist_ok=True)
+    write_image(place / "made.exr", made.astype(np.float32))
+    write_image(place / "right.exr", right.astype(np.float32))
+    amplified = np.rint(np.clip(np.nan_to_num(apart[..., :3], nan=1) * AMPLIFIED, 0, 1) * 255).astype(np.uint8)
+    write_image(place / f"difference-x{AMPLIFIED}.png", amplified.repeat(8, 0).repeat(8, 1))
+    (place / "recipe.json").write_text(case.recipe, encoding="utf-8")
+    y, x, channel = np.unravel_index(np.nan_to_num(apart, nan=np.inf).argmax(), apart.shape)
+    raise DifferenceError(
+        f"{told(case)}: {what} {255 * most:.3g}/255 off at row {y}, column {x}, channel {channel}: "
+        f"{made[y, x, channel]:.6g} instead of {right[y, x, channel]:.6g}; pictures in {place}\n    "
+        f".venv/bin/python {Path(__file__).relative_to(ROOT)} {case.seed} --ways {what.partition('-')[0]}"
+    )
+
+
+def told(case: Case) -> str:
+    return f"seed {case.seed}, frame {case.frame}, {case.kind.name}"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="Compares pictures and coefficients of random recipes.")
+    parser.add_argument("seeds", type=int, nargs="+", metavar="SEED")
+    parser.add_argument("--ways", default="cpu,gpu", help="of cpu, gpu, blender, film (default: cpu,gpu)")
+    parser.add_argument(
+        "--output", type=Path, default=ROOT / "out" / "differential", metavar="DIR", help="for pictures"
+    )
+    arguments = parser.parse_args()
+    ways = arguments.ways.split(",")
+    devices, failed = open_devices([way for way in ways if way != "film"]), False
+    for case in map(make, arguments.seeds):
+        try:
+            found = check(case, devices, arguments.output)
+            if "film" in ways and can_be_a_film(case):
+                films, errors = check_films([case], arguments.output)
+                found["film"] = films.get(case.seed)
+                for error in errors:
+                    raise error
+            print(f"{told(case)}:", *(f"{way} {255 * p:.3f} {255 * c:.3f}" for way, (p, c) in found.items()))
+        except DifferenceError as error:
+            print(error)
+            failed = True
+    return failed
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(ROOT))
+    sys.exit(main())

@@ -1,0 +1,357 @@
+"""A reference of its own for pictures and coefficients: what a recipe means, in float64, by NumPy and SciPy alone.
+
+It is written from the paper and the manual, shares no code with the product, and finds most results in another way: a
+pixel's shutter by the paper's bisection, brought to its end, in place of a table of knots; coefficients by a direct
+solve; lassos by the angles that their points run through; eases by de Casteljau. It is made to be read, for small
+pictures.
+
+What neither the paper nor the manual says is taken from the product; these are decisions, not results:
+- a line is never thinner than √2 pixels; so is the outline of a lasso that encloses no pixel's centre;
+- with `aggregate` scribbles are drawn into the grid of blocks as if it was the picture;
+- what is mirrored shows the clip's first and last frame once;
+- of a shutter that "shorten" leaves nothing of, the frame is shown that is nearest to the middle of its exposure, and
+  of two that are as near the window's earlier one;
+- a line's width does not grow with its region;
+- a premultiplied colour without cover (alpha 0) is light that is added to what lies below (as in Blender). What it is
+  among encoded values, nothing says; there this is no reference.
+
+A recipe is its JSON as a dictionary. Pictures are (H, W, 4) float64 with the top row first, scene-linear and
+premultiplied; coefficients are (N, h, w), of the pixels or of the blocks that share a shutter.
+"""
+
+from collections import namedtuple
+from itertools import pairwise
+
+import numpy as np
+from scipy.sparse import diags_array, eye_array, kron
+from scipy.sparse.linalg import spsolve
+
+# samples: (count, H, W, 4) float64, 0 … 1 for whole numbers, the top row first; transfer: "srgb" | "linear"; alpha:
+# "opaque" | "straight" | "premultiplied".
+Footage = namedtuple("Footage", "samples transfer alpha")
+# doubtful: (H, W) bool, where float32 cannot tell whether anything is left of a shutter, or which frame is the nearest.
+Result = namedtuple("Result", "picture doubtful")
+
+DEFAULTS = {
+    "position": "start",
+    "interpolation": "displacement",
+    "light": "linear",
+    "exposure": "normalized",
+    "edges": "hold",
+    "aggregate": 1,
+    "border": False,
+}
+LEAST_RADIUS = 0.7072
+NOTHING = 1e-6  # less of an exposure than this is nothing
+EARLIER = 1e-3  # by so much of a frame an earlier one is preferred
+ROUNDING = 1e-5  # in float32, of weights and times
+HALVINGS = 44  # of the bisection: what is left is far below what float32 holds
+
+
+def option(recipe, name):
+    return recipe.get(name, DEFAULTS[name])
+
+
+# Keys
+
+
+def progress(u, ease):
+    """How far a span has come after its share u. "bezier": handles of a third, flat."""
+    if ease == "constant":
+        return 0.0
+    if ease == "linear":
+        return u
+    values = [0.0, 0.0, 1.0, 1.0]  # of the curve's points; their times are 0, 1/3, 2/3, 1, so that u is its parameter
+    while len(values) > 1:
+        values = [(1 - u) * a + u * b for a, b in pairwise(values)]
+    return values[0]
+
+
+def between(keys, frame):
+    """The keys around a frame and how far the way from one to the other has come."""
+    before = [key for key in keys if key["frame"] <= frame]
+    after = [key for key in keys if key["frame"] > frame]
+    if not before:
+        return after[0], after[0], 0.0
+    if not after:
+        return before[-1], before[-1], 0.0
+    a, b = before[-1], after[0]
+    return a, b, progress((frame - a["frame"]) / (b["frame"] - a["frame"]), a.get("ease", "linear"))
+
+
+def time_at(recipe, frame):
+    """The source frame that its time keys show, 1 is the first; None: it has none."""
+    if not recipe.get("time"):
+        return None
+    a, b, u = between(recipe["time"], frame)
+    return (1 - u) * a["value"] + u * b["value"]
+
+
+def shown(recipe, frame, count):
+    """The source frame that is shown at a timeline frame, 0 is the first, and the direction that time runs in there:
+    −1 where it runs backward, or stands still after it did. A jump of a constant ease is no way."""
+    time = time_at(recipe, frame)
+    if time is None:
+        return int(frame) - 1, 1
+    index = int(np.floor(time - 1 + 0.5))
+    ways = [
+        (a["frame"], np.sign(b["value"] - a["value"]))
+        for a, b in pairwise(recipe["time"])
+        if a.get("ease", "linear") != "constant" and a["frame"] <= frame
+    ]
+    moving = [way for _, way in ways if way]
+    return min(max(index, 0), count - 1), -1 if moving and moving[-1] < 0 else 1
+
+
+def bars_at(shutter, frame, interpolation):
+    """A shutter's bars (L,) at a frame."""
+    if "keys" not in shutter:
+        return np.array(shutter["bars"], float)
+    a, b, u = between(shutter["keys"], frame)
+    both = np.array([a["bars"], b["bars"]], float)
+    if interpolation == "value":
+        return (1 - u) * both[0] + u * both[1]
+    mix = np.array([1 - u, u])
+    return displaced(both, mix[:, None])[:, 0] * (mix @ both.sum(axis=1))
+
+
+def strokes_at(region, frame, aspect):
+    """A region's strokes as complex numbers at a frame: fractions of the picture's height, the origin lower left."""
+    keys = region.get("keys", [])
+    drawings = [key for key in keys if "strokes" in key]
+    if not keys or "strokes" not in keys[0]:
+        drawings.insert(0, {"frame": keys[0]["frame"] if keys else 0, **region, **(_ease(keys))})
+    a, b, u = between(drawings, frame)
+    strokes = [as_complex(stroke, aspect) for stroke in a["strokes"]]
+    if u > 0:
+        others = [as_complex(stroke, aspect) for stroke in b["strokes"]]
+        strokes = [moved(s, others[i], u) if i < len(others) else s for i, s in enumerate(strokes)]
+    if not keys:
+        return strokes
+    points = np.concatenate(strokes)
+    centre = complex(points.real.min() + points.real.max(), points.imag.min() + points.imag.max()) / 2
+    a, b, u = between(keys, frame)
+
+    def value(name, default):
+        return (1 - u) * np.array(a.get(name, default), float) + u * np.array(b.get(name, default), float)
+
+    turn = value("scale", 1) * np.exp(1j * np.radians(value("rotation", 0)))
+    away = as_complex([value("location", (0, 0))], aspect)[0]
+    return [centre + turn * (stroke - centre) + away for stroke in strokes]
+
+
+def _ease(keys):
+    return {"ease": keys[0].get("ease", "linear")} if keys else {}
+
+
+def as_complex(points, aspect):
+    x, y = np.array(points, float).T
+    return x * aspect + 1j * y
+
+
+def moved(a, b, u):
+    """Between two strokes, point by point; of different numbers of points, by the shares of their lengths."""
+    if len(a) != len(b):
+        a, b = (at_equal_lengths(stroke, max(len(a), len(b))) for stroke in (a, b))
+    return (1 - u) * a + u * b
+
+
+def at_equal_lengths(stroke, count):
+    lengths = np.concatenate([[0], np.cumsum(np.abs(np.diff(stroke)))])
+    return np.interp(np.arange(count) / (count - 1) * lengths[-1], lengths, stroke)
+
+
+# Scribbles and coefficients
+
+
+def labels_at(recipe, frame, width, height):
+    """Labels (h, w) of the pixels, or of the blocks that share a shutter: −1 free, otherwise the shutter's number."""
+    block = option(recipe, "aggregate")
+    w, h = -(-width // block), -(-height // block)
+    # A centre as a fraction of the grid's height and width, whose pixels need not be square.
+    x, y = np.meshgrid((np.arange(w) + 0.5) / w, 1 - (np.arange(h) + 0.5) / h)
+    labels = np.full((h, w), -1)
+    if option(recipe, "border"):
+        inner = np.zeros((h, w), bool)
+        inner[1:-1, 1:-1] = True
+        labels[~inner] = 0
+    names = [shutter["name"] for shutter in recipe["shutters"]]
+    for region in recipe.get("regions", []):
+        lines, own = region.get("kind", "line") == "line", names.index(region["shutter"])
+        for stroke in strokes_at(region, frame, width / height):
+            points = stroke.real * (height / width) * w + 1j * stroke.imag * h
+            centres = x * w + 1j * y * h
+            radius = region.get("width", 0.02) * h / 2 if lines else 0
+            covered = np.zeros((h, w), bool) if lines else enclosed(centres, points)
+            if not covered.any():
+                covered = distance(centres, points) <= max(radius, LEAST_RADIUS)
+            labels[covered] = own
+    return labels
+
+
+def distance(places, points):
+    """From places to the nearest point of a polyline, or to its only one."""
+    best = np.abs(places - points[0])
+    for a, b in pairwise(points):
+        if a != b:
+            along = ((places - a) / (b - a)).real.clip(0, 1)
+            best = np.minimum(best, np.abs(places - (a + along * (b - a))))
+    return best
+
+
+def enclosed(places, points):
+    """Whether a closed polygon runs around places, however often: by the angle that it runs through."""
+    angle = np.zeros(places.shape)
+    for a, b in pairwise([*points, points[0]]):
+        angle += np.angle((b - places) * np.conj(a - places))
+    return np.rint(angle / (2 * np.pi)) != 0
+
+
+def coefficients(recipe, frame, width, height):
+    """The exact coefficients at a frame, for a picture of that size: scribbles are fixed, edges are free."""
+    labels = labels_at(recipe, frame, width, height)
+    count = len(recipe["shutters"])
+    if (labels < 0).all():
+        labels[:] = 0
+    values = (labels.ravel() == np.arange(count)[:, None]).astype(float)
+    free = labels.ravel() < 0
+    if free.any():
+        h, w = labels.shape
+        equations = (kron(eye_array(h), differences(w)) + kron(differences(h), eye_array(w))).tocsr()[free]
+        right = -(equations[:, ~free] @ values[:, ~free].T)
+        solved = spsolve(equations[:, free].tocsc(), right)
+        values[:, free] = solved.reshape(-1, count).T
+    return values.reshape(count, *labels.shape)
+
+
+def differences(n):
+    """Each of n cells less its neighbours in a row, whose ends are free: (n, n)."""
+    neighbours = np.full(n, 2.0)
+    neighbours[0] -= 1
+    neighbours[-1] -= 1
+    return diags_array([neighbours, -np.ones(n - 1), -np.ones(n - 1)], offsets=[0, 1, -1], shape=(n, n))
+
+
+# Shutters
+
+
+def displaced(bars, mix):
+    """The normalised bars (L, n) between shutters (N, L), for n mixes (N, n): by displacement, as in the paper's
+    appendix A. Q(τ) is the share z of the exposure up to which Σ cᵢ Sᵢ⁻¹(z) lies at τ or before."""
+    length = bars.shape[1]
+    sums = [np.concatenate([[0], np.cumsum(own)]) / own.sum() for own in bars]
+    times = np.arange(1, length)[:, None]
+    low, high = (np.full((length - 1, mix.shape[1]), share) for share in (0.0, 1.0))
+    for _ in range(HALVINGS):
+        z = (low + high) / 2
+        is_before = sum(c * inverse(own, z) for c, own in zip(mix, sums, strict=True)) <= times
+        low, high = np.where(is_before, z, low), np.where(is_before, high, z)
+    edge = np.zeros((1, mix.shape[1]))
+    return np.diff(np.concatenate([edge, (low + high) / 2, edge + 1]), axis=0)
+
+
+def inverse(sums, z):
+    """S⁻¹ of 0 < z < 1, where S is given at the frames' boundaries (L + 1,) and linear in between."""
+    last = np.searchsorted(sums, z, side="right").clip(1, len(sums) - 1)
+    before, after = sums[last - 1], sums[last]
+    return last - 1 + (z - before) / np.where(after > before, after - before, 1)
+
+
+# Pictures
+
+
+def positions(recipe, index, direction):
+    """Which source frames the window's frames are, were the clip endless."""
+    length = recipe["window"]
+    before = {"start": 0, "center": (length - 1) // 2, "end": length - 1}[option(recipe, "position")]
+    return [index + direction * (k - before) for k in range(length)]
+
+
+def at_edges(edges, position, count):
+    """The frame that is seen there; None: it is left out."""
+    if edges == "mirror" and count > 1:
+        while not 0 <= position < count:
+            position = -position if position < 0 else 2 * (count - 1) - position
+        return position
+    if edges == "shorten" and not 0 <= position < count:
+        return None
+    return min(max(position, 0), count - 1)
+
+
+def to_linear(code):
+    return np.where(code <= 0.04045, code / 12.92, ((np.maximum(code, 0.04) + 0.055) / 1.055) ** 2.4)
+
+
+def to_encoded(light):
+    return np.where(light <= 0.0031308, light * 12.92, 1.055 * np.maximum(light, 0.003) ** (1 / 2.4) - 0.055)
+
+
+def covering(alpha):
+    return np.where(alpha > 0, alpha, 1)
+
+
+def summed(footage, index, light):
+    """A frame's light (H, W, 4) as it is summed: premultiplied, its straight colours linear or encoded."""
+    colour, alpha = footage.samples[index][..., :3], footage.samples[index][..., 3:]
+    if footage.alpha == "opaque":
+        alpha = np.ones_like(alpha)
+    cover = alpha
+    if footage.alpha == "premultiplied":
+        cover = covering(alpha)
+        colour = colour / cover
+    if (footage.transfer, light) == ("srgb", "linear"):
+        colour = to_linear(colour)
+    elif (footage.transfer, light) == ("linear", "encoded"):
+        colour = to_encoded(colour)
+    return np.concatenate([colour * cover, alpha], axis=-1)
+
+
+def picture(recipe, frame, footage, index, direction, given=None):
+    """The picture at a timeline frame that shows the source frame `index`, as a Result. given: coefficients to compose
+    with, in place of the exact ones."""
+    count, height, width, _ = footage.samples.shape
+    mix = coefficients(recipe, frame, width, height) if given is None else np.asarray(given, float)
+    mix = mix / mix.sum(axis=0)
+    blocks = mix.shape[1:]
+    mix = mix.reshape(len(mix), -1)
+    bars = np.array([bars_at(shutter, frame, option(recipe, "interpolation")) for shutter in recipe["shutters"]])
+    exposures = bars.sum(axis=1)
+    if option(recipe, "interpolation") == "displacement":
+        weights = displaced(bars, mix)
+    else:
+        weights = (bars / exposures[:, None]).T @ mix
+    frames = [at_edges(option(recipe, "edges"), p, count) for p in positions(recipe, index, direction)]
+    weights, doubtful = shortened(weights, frames)
+    gain = np.ones(mix.shape[1])
+    if option(recipe, "exposure") == "weighted":
+        gain = exposures @ mix / exposures[0]
+
+    def of_pixels(values):
+        block = option(recipe, "aggregate")
+        return values.reshape(blocks).repeat(block, 0).repeat(block, 1)[:height, :width]
+
+    total = np.zeros((height, width, 4))
+    for weight, seen in zip(weights, frames, strict=True):
+        if seen is not None and weight.any():
+            total += of_pixels(weight)[..., None] * summed(footage, seen, option(recipe, "light"))
+    colour, alpha = total[..., :3], total[..., 3:]
+    if option(recipe, "light") == "encoded":
+        colour = to_linear(colour / covering(alpha)) * covering(alpha)
+    return Result(np.concatenate([colour * of_pixels(gain)[..., None], alpha], axis=-1), of_pixels(doubtful))
+
+
+def shortened(weights, frames):
+    """Weights (L, n) without frames that are left out (None): what remains is normalised, or the nearest frame is
+    shown. And where that is doubtful (n,)."""
+    there = np.array([seen is not None for seen in frames])
+    if there.all():
+        return weights, np.zeros(weights.shape[1], bool)
+    kept, places = weights * there[:, None], np.flatnonzero(there)
+    share = kept.sum(axis=0)
+    is_lost = share <= NOTHING
+    middle = (np.arange(len(frames)) + 0.5) @ weights - EARLIER
+    apart = np.abs(middle - (places[:, None] + 0.5))
+    alone = np.arange(len(frames))[:, None] == places[apart.argmin(axis=0)]
+    first, second = np.sort(np.concatenate([apart, np.full_like(apart[:1], np.inf)]), axis=0)[:2]
+    doubtful = is_lost & (second - first < ROUNDING) | (share > NOTHING / 100) & (share < ROUNDING)
+    return np.where(is_lost, alone, kept / np.where(is_lost, 1, share)), doubtful

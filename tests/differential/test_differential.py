@@ -1,0 +1,135 @@
+"""The product against a reference of its own: random recipes over footage of many kinds, on every device."""
+
+import ast
+import json
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases import KINDS, make
+from compare import PICTURE, DifferenceError, can_be_a_film, check, check_films, open_devices, within
+from reference import DEFAULTS, picture, shown
+
+from shutter_addon.core import compositor, keyframes, light, scribbles, shutters
+
+SEEDS = range(200)
+BATCH = 20
+IN_BLENDER = SEEDS[::8]  # which goes around the kinds of footage
+
+
+@pytest.fixture(scope="module")
+def devices():
+    found = open_devices(["cpu", "gpu"])
+    yield found
+    for device in found.values():
+        device.release()
+
+
+def differences(seeds, devices, folder) -> list[str]:
+    errors = []
+    for seed in seeds:
+        try:
+            check(make(seed), devices, folder)
+        except DifferenceError as error:
+            errors.append(str(error))
+    return errors
+
+
+@pytest.mark.parametrize("first", SEEDS[::BATCH])
+def test_pictures_and_coefficients(devices, first, tmp_path):
+    errors = differences(range(first, first + BATCH), devices, tmp_path)
+    assert not errors, "\n".join(errors)
+
+
+def test_on_blenders_gpu(tmp_path):
+    pytest.importorskip("bpy")
+    errors = differences(IN_BLENDER, open_devices(["blender"]), tmp_path)
+    assert not errors, "\n".join(errors)
+
+
+@pytest.mark.parametrize("first", SEEDS[::50])
+def test_films(first, tmp_path):
+    """The command, from files to files: F-curves, annotations, source times and Blender's sequencer between them."""
+    pytest.importorskip("bpy")
+    found, errors = check_films(
+        [case for case in map(make, SEEDS[first : first + 50]) if can_be_a_film(case)], tmp_path
+    )
+    assert not errors, "\n".join(map(str, errors))
+    assert len(found) > 35
+
+
+def test_the_reference_shares_nothing_with_the_product():
+    for name in ("reference", "cases"):
+        tree = ast.parse(Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8"))
+        imported = {name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names}
+        imported |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+        roots = {module.partition(".")[0] for module in imported}
+        allowed = {"collections", "itertools", "numpy", "scipy"}
+        assert roots <= (allowed if name == "reference" else allowed | CASES)
+
+
+CASES = {"json", "dataclasses", "fractions", "av", "OpenImageIO", "reference"}
+
+
+def test_recipes_have_all_that_a_recipe_may_have():
+    seen, doubtful = Counter(), []
+    for case in map(make, SEEDS):
+        recipe = json.loads(case.recipe)
+        keys = [key for owner in recipe["shutters"] + recipe["regions"] for key in owner.get("keys", [])]
+        seen.update((name, recipe[name]) for name in DEFAULTS)
+        seen.update({("ease", key.get("ease")) for key in keys} | {("redrawn", "strokes" in key) for key in keys})
+        seen.update({("kind", region["kind"]) for region in recipe["regions"]})
+        way = shown(recipe, case.frame, len(case.stored))[1]
+        seen.update([("shutters", len(recipe["shutters"])), ("time", way), ("direction", case.direction)])
+        seen.update([("footage", case.kind)])
+        found = picture(recipe, case.frame, case.footage(), case.index, case.direction)
+        doubtful.append(found.doubtful.mean())
+    values = {"position": 3, "interpolation": 2, "light": 2, "exposure": 2, "edges": 3, "aggregate": 3, "border": 2}
+    values |= {"ease": 4, "redrawn": 2, "kind": 2, "shutters": 6, "time": 2, "direction": 2, "footage": len(KINDS)}
+    assert Counter(name for name, _ in seen) == values
+    assert min(seen.values()) >= 10
+    assert np.mean(doubtful) < 0.01
+
+
+FAULTS = {
+    "an ease": (keyframes, "eased", lambda u, ease: u),
+    "a jump too early": (keyframes, "eased", lambda u, ease: 1.0 if ease == "constant" else eased(u, ease)),
+    "redrawn strokes": (scribbles, "between_strokes", lambda first, second, u, aspect: [*map(np.array, first)]),
+    "holes in lassos": (scribbles, "_fill", lambda labels, points, label: False),
+    "no displacement": (shutters, "displace", shutters.mix),
+    "another curve": (light, "to_linear", lambda code: np.sign(code) * np.abs(code) ** 2.2),
+    "an edge twice": (compositor, "source_frames", lambda *given: twice(*given)),
+    "not normalised": (compositor, "source_frames", lambda options, places, shot: places.clip(0, shot.stop - 1)),
+}
+eased, source_frames = keyframes.eased, compositor.source_frames
+
+
+def twice(options, positions, shot):
+    if options.edges != "mirror":
+        return source_frames(options, positions, shot)
+    folded = np.mod(positions, 2 * len(shot))
+    return np.minimum(folded, 2 * len(shot) - 1 - folded)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_planted_faults_are_found(monkeypatch, fault, tmp_path):
+    """Each makes some pictures wrong, which is told, with what repeats it, and left to be seen."""
+    monkeypatch.setattr(*FAULTS[fault])
+    errors = [error for error in differences(range(60), open_devices(["cpu"]), tmp_path) if "/255 off" in error]
+    assert errors
+    for error in errors:
+        told, again = error.splitlines()
+        place = Path(told.partition("pictures in ")[2])
+        names = sorted(path.name for path in place.iterdir())
+        assert names == ["difference-x64.png", "made.exr", "recipe.json", "right.exr"]
+        assert again.endswith(f"tests/differential/compare.py {place.name.partition('-')[0]} --ways cpu")
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 0.6 / 255])
+def test_no_value_passes_for_a_picture_that_is_none(value, tmp_path):
+    right = np.zeros((4, 4, 4))
+    made = right.copy()
+    made[2, 1, 3] = value
+    with np.errstate(invalid="ignore"), pytest.raises(DifferenceError, match="row 2, column 1, channel 3"):
+        within(PICTURE, np.abs(made - right), make(0), "cpu-picture", tmp_path, made, right)
