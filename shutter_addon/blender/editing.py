@@ -62,11 +62,12 @@ def aim_pen(effect) -> None:
 
 
 def unique(name: str, taken) -> str:
-    """The name, with a number behind it where it is taken, as Blender names things."""
-    base, number, wanted = name, 0, name
+    """The name, as long as a recipe has it, with a number behind it where it is taken, as Blender names things."""
+    number, wanted = 0, name[: limits.MAX_NAME]
     while wanted in taken:
         number += 1
-        wanted = f"{base}.{number:03d}"
+        end = f".{number:03d}"
+        wanted = name[: limits.MAX_NAME - len(end)] + end
     return wanted
 
 

@@ -85,6 +85,10 @@ MESSAGES = {
         "*",
         "{place}: {count} regions, {most} are the most",
     ): "{place}: {count} Regionen, höchstens {most} sind möglich",
+    (
+        "*",
+        "{place}: its name has {count} characters, {most} are the most",
+    ): "{place}: der Name hat {count} Zeichen, höchstens {most} sind möglich",
     ("*", "An effect has {most} shutters at most"): "Ein Effekt hat höchstens {most} Verschlüsse",
     ("*", "An effect has {most} regions at most"): "Ein Effekt hat höchstens {most} Regionen",
     (
