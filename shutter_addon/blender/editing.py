@@ -8,7 +8,7 @@ from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..core import presets, shutters
+from ..core import limits, presets, shutters
 from . import animation, copies, effects, inbetweens, values
 from .effects import layer_of
 
@@ -62,12 +62,22 @@ def aim_pen(effect) -> None:
 
 
 def unique(name: str, taken) -> str:
-    """The name, with a number behind it where it is taken, as Blender names things."""
-    base, number, wanted = name, 0, name
+    """The name, as long as a recipe has it, with a number behind it where it is taken, as Blender names things."""
+    number, wanted = 0, name[: limits.MAX_NAME]
     while wanted in taken:
         number += 1
-        wanted = f"{base}.{number:03d}"
+        end = f".{number:03d}"
+        wanted = name[: limits.MAX_NAME - len(end)] + end
     return wanted
+
+
+def why_full(effect, collection: str) -> str | None:
+    """Why an effect cannot have another one of its "shutters" or "regions", in a sentence; None if it can."""
+    most, sentence = {
+        "shutters": (limits.MAX_SHUTTERS, rpt_("An effect has {most} shutters at most")),
+        "regions": (limits.MAX_REGIONS, rpt_("An effect has {most} regions at most")),
+    }[collection]
+    return sentence.format(most=most) if len(getattr(effect, collection)) >= most else None
 
 
 # Shutters

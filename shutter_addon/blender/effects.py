@@ -31,10 +31,12 @@ def check_counts(effect) -> None:
     """EffectError: there are no shutters, or more of anything than an effect has."""
     if not effect.shutters:
         raise EffectError(rpt_('"{effect}" has no shutter').format(effect=effect.name))
-    for items, most in ((effect.shutters, limits.MAX_SHUTTERS), (effect.regions, limits.MAX_REGIONS)):
+    for sentence, items, most in (
+        (rpt_("{place}: {count} shutters, {most} are the most"), effect.shutters, limits.MAX_SHUTTERS),
+        (rpt_("{place}: {count} regions, {most} are the most"), effect.regions, limits.MAX_REGIONS),
+    ):
         if len(items) > most:
-            sentence = rpt_("{place} and {count} more: {most} are the most")
-            raise EffectError(sentence.format(place=values.place(items[0]), count=len(items) - 1, most=most))
+            raise EffectError(sentence.format(place=values.place(effect), count=len(items), most=most))
 
 
 def source_time(edit, effect, frame: float) -> tuple[float, bool]:

@@ -64,10 +64,23 @@ def _different(names: list[str]) -> list[str]:
     result = []
     for name in names:
         number = 1
-        while (new := name if number == 1 else f"{name} {number}") in result:
+        while (new := _numbered(name, number)) in result:
             number += 1
         result.append(new)
     return result
+
+
+def _numbered(name: str, number: int) -> str:
+    end = "" if number == 1 else f" {number}"
+    return name[: limits.MAX_NAME - len(end)] + end
+
+
+def _check_name(item) -> None:
+    """EffectError: the name is longer than a recipe has it, from a script or a file of another version."""
+    if len(item.name) > limits.MAX_NAME:
+        sentence = rpt_("{place}: its name has {count} characters, {most} are the most")
+        words = {"place": values.place(item), "count": len(item.name), "most": limits.MAX_NAME}
+        raise effects.EffectError(sentence.format(**words))
 
 
 def _shutter(curves, path: str, chosen, source, name: str, strip) -> recipe.Shutter:
@@ -75,6 +88,7 @@ def _shutter(curves, path: str, chosen, source, name: str, strip) -> recipe.Shut
     def bars(frame):
         return effects.checked(source.name, effects.bars_at(curves, path, source, chosen, frame), frame)
 
+    _check_name(source)
     color = tuple(_short(values.number(source, "color", component)) for component in source.color)
     effects.check_bar_count(source, chosen.window)
     keyed = [curve for k in range(chosen.window) if (curve := curves.find(f"{path}.bars[{k}].weight"))]
@@ -120,6 +134,7 @@ def _region(curves, path: str, source, effect, strip) -> recipe.Region | None:
     drawings = _drawings(effect, source, strip)
     if not drawings:
         return None
+    _check_name(source)
     width = _short(curves.value(source, path, "width", strip.left_handle))
     keyed = [curve for name, index in _CHANNELS if (curve := curves.find(f"{path}.{name}", index))]
     timing = curves.find(f"{path}.location")

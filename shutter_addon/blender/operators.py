@@ -75,6 +75,12 @@ class _OfRegion(_OfEffect):
         return editing.active_region(effect) is not None or refused(cls, rpt_("The shutter has no region: draw one"))
 
 
+def has_room(cls, effect, collection: str) -> bool:
+    """For poll(): whether the effect can have another one of its "shutters" or "regions"."""
+    sentence = editing.why_full(effect, collection)
+    return sentence is None or refused(cls, sentence)
+
+
 class SHUTTER_OT_add_effect(Operator):
     """Add a Shutter strip above the active strip, which gives every pixel an exposure of its own"""
 
@@ -139,6 +145,10 @@ class SHUTTER_OT_shutter_add(_OfEffect, Operator):
     bl_idname = "shutter.shutter_add"
     bl_label = "Add Shutter"
 
+    @classmethod
+    def possible(cls, effect):
+        return has_room(cls, effect, "shutters")
+
     def change(self, _context, effect):
         editing.add_shutter(effect)
 
@@ -148,6 +158,10 @@ class SHUTTER_OT_shutter_duplicate(_OfShutter, Operator):
 
     bl_idname = "shutter.shutter_duplicate"
     bl_label = "Duplicate Shutter"
+
+    @classmethod
+    def possible(cls, effect):
+        return super().possible(effect) and has_room(cls, effect, "shutters")
 
     def change(self, _context, effect):
         editing.duplicate_shutter(effect, effect.active_shutter)
@@ -294,9 +308,17 @@ class SHUTTER_OT_draw(_OfShutter, Operator):
     )
     kind: EnumProperty(name="Type", description="How the strokes cover the picture", items=KINDS, options={"SKIP_SAVE"})
 
+    @classmethod
+    def possible(cls, effect):
+        if not super().possible(effect):
+            return False
+        return editing.active_region(effect) is not None or has_room(cls, effect, "regions")
+
     def change(self, context, effect):
         region = editing.active_region(effect)
         if self.new or region is None:
+            if sentence := editing.why_full(effect, "regions"):  # poll() does not know what `new` is
+                raise effects.EffectError(sentence)
             region = editing.add_region(effect, editing.active_shutter(effect), self.kind)
         if not drawing_tool(context, effect, region, "builtin.annotate"):
             self.report({"INFO"}, "Open a sequencer with a preview to draw")
@@ -351,6 +373,10 @@ class SHUTTER_OT_region_take(_OfShutter, Operator):
     bl_label = "Add Region from Annotation Layer"
 
     layer: EnumProperty(name="Layer", items=_layers, translation_context=contexts.no_translation)
+
+    @classmethod
+    def possible(cls, effect):
+        return super().possible(effect) and has_room(cls, effect, "regions")
 
     @classmethod
     def poll(cls, context):

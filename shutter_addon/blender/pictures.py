@@ -152,12 +152,15 @@ class Studio:
         return renderer
 
     def keep(self, scenes: set[int]) -> None:
-        """Closes what belongs to other scenes than those of these session_uids."""
+        """Closes what belongs to other scenes than those of these session_uids. A render job may take them away
+        meanwhile."""
         for known in (self.shown, self._begun):
-            for place in known.keys() - scenes:
-                del known[place]
-        for place in self._renderers.keys() - scenes:
-            self.run(self._renderers.pop(place)[1].close)
+            for place in set(known) - scenes:
+                known.pop(place, None)
+        for place in set(self._renderers) - scenes:
+            _key, renderer = self._renderers.pop(place, (None, None))
+            if renderer is not None:
+                self.run(renderer.close)
 
     def forget(self) -> None:
         """Closes all sources and frees the device."""

@@ -20,7 +20,7 @@ from bpy.props import (
 )
 from bpy.types import PropertyGroup
 
-from ..core.limits import MAX_BAR, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_SCALE
+from ..core.limits import MAX_BAR, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE
 from ..core.shutters import MAX_WINDOW
 from . import cache, editing, effects
 from .translations import CONTEXT
@@ -90,6 +90,11 @@ def _renamed(shutter, new: str, old: str, _is_set) -> str:
     return editing.rename(editing.effect_of(shutter), old, new)
 
 
+def _shortened(_region, new: str, _old: str, _is_set) -> str:
+    """As recipes have names. Blender's own `maxlen` counts bytes, of which a character takes up to four."""
+    return new[:MAX_NAME]
+
+
 def _recolored(shutter, _context):
     editing.color_layers(editing.effect_of(shutter), shutter)
 
@@ -154,7 +159,7 @@ class Shutter(PropertyGroup):
 
 
 class ShutterRegion(PropertyGroup):
-    name: StringProperty(name="Name", description="Name of the region", default="Region")
+    name: StringProperty(name="Name", description="Name of the region", default="Region", set_transform=_shortened)
     shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=_changed)
     layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=_changed)
     kind: EnumProperty(

@@ -17,7 +17,8 @@ from .errors import MediaError
 from .files import check_index
 from .written import why_short
 
-MEMORY = 4 << 30  # bytes that pairs at work may take together
+MEMORY = 4 << 30  # bytes that pairs at work may take together, with the frames that are read ahead
+AHEAD = 640 << 20  # of these: enough for 16 bits in 4K, of which no frame is read twice
 LAYERS = 26  # of a frame as float32, for a pair at work: 9 to 17 measured for "quick", 15 to 24.3 for "good"
 
 
@@ -161,21 +162,26 @@ def _tasks(cache, pairs, between, cancelled) -> Iterator[Callable[[], bool]]:
 
 
 class _Near:
-    """A source's frames around a pair that moves onwards, and their signatures."""
+    """A source's frames around a pair that moves onwards, and their signatures.
+
+    Frames that are read ahead for their signatures wait for their pair, as many as there is room for: those that are
+    needed last are read again."""
 
     def __init__(self, source):
         self._source = source
-        self._frames: dict[int, np.ndarray] = {}
+        self._most = 2 + _ahead(source)
+        self._frames: dict[int, np.ndarray] = {}  # the pair's, and those that wait
         self._signatures: dict[int, cuts.Signature] = {}
 
     def pair(self, index: int) -> tuple[np.ndarray, np.ndarray, str | None]:
         """Frames `index` and `index` + 1; and "same" if they are equal, "cut" if they are of two shots, else None.
 
         MediaError: one of them cannot be read, or one that has a say in what they are: that is kept for good."""
-        first, second = self._frame(index), self._frame(index + 1)
+        self._frames = {i: frame for i, frame in self._frames.items() if i >= index}
+        first, second = (self._frames.setdefault(i, self._frame(i)) for i in (index, index + 1))
         kind = self._kind(first, second, index)
         beside = cuts.neighbours(index + 1, self._source.count)
-        self._frames = {i: frame for i, frame in self._frames.items() if i > index}
+        del self._frames[index]
         self._signatures = {i: picture for i, picture in self._signatures.items() if i in beside}
         return first, second, kind
 
@@ -192,13 +198,14 @@ class _Near:
         return "same" if cuts.is_duplicate(*sides) else None
 
     def _frame(self, index):
-        if index not in self._frames:
-            self._frames[index] = self._source.read(index)
-        return self._frames[index]
+        frame = self._frames.get(index)
+        return self._source.read(index) if frame is None else frame
 
     def _signature(self, index):
         if index not in self._signatures:
             frame = self._frame(index)
+            if index > min(self._frames) and len(self._frames) < self._most:  # those before the pair are done with
+                self._frames[index] = frame
             self._signatures[index] = cuts.signature(frame, self._source.transfer, self._source.alpha)
         return self._signatures[index]
 
@@ -233,4 +240,14 @@ def _in_parallel(tasks, workers) -> Iterator[bool]:
 def _workers(source) -> int:
     pair = source.width * source.height * 16 * LAYERS
     processors = getattr(os, "process_cpu_count", os.cpu_count)() or 1
-    return max(1, min(processors, MEMORY // pair))
+    return max(1, min(processors, (MEMORY - _ahead(source) * _size(source)) // pair))
+
+
+def _ahead(source) -> int:
+    """How many frames beyond a pair may be kept: all that have a say in what the pair is, if there is room."""
+    return min(cuts.NEIGHBOURS - 1, AHEAD // _size(source))
+
+
+def _size(source) -> int:
+    """Bytes of a frame."""
+    return source.width * source.height * 4 * source.dtype.itemsize

@@ -103,3 +103,24 @@ def test_a_frame_that_cannot_be_read_fails_only_when_it_is_shown(film, render, t
     render(edit, [3, 4])  # begins 5, whose window holds the eighth
     with pytest.raises(AssertionError):  # of the fixture, that there was no fault
         render(edit, [5])
+
+
+def test_what_a_job_takes_away_meanwhile_is_not_missed(bpy):
+    """Scenes that are gone are forgotten on the main thread; a render job may take up what was begun for them between
+    the look at what is known and its removal, which is where this one does."""
+    from shutter_addon.blender import pictures
+
+    class Job:
+        def __hash__(self):
+            return hash(7)
+
+        def __eq__(self, other):
+            for known in (studio.shown, studio._begun, studio._renderers):
+                known.pop(7, None)
+            return False
+
+    for name in ("shown", "_begun", "_renderers"):
+        studio = pictures.Studio(None)
+        getattr(studio, name)[7] = None
+        studio.keep({Job()})
+        assert getattr(studio, name) == {}

@@ -333,6 +333,46 @@ def test_a_source_time_without_keys_holds_a_frame(effect_on):
     assert not effect_on[1].use_source_time
 
 
+@pytest.mark.parametrize("letter", ["a", "ä", "字", "𝄞"])
+def test_names_are_as_long_as_recipes_have_them(effect_on, letter):
+    """In characters; whoever types more gets as many as there may be."""
+    from shutter_addon.blender import editing
+
+    _, effect, _ = effect_on
+    apply(effect_on, BASE)
+    for item in (effect.shutters[0], effect.regions[0]):
+        item.name = letter * 100
+        assert item.name == letter * 63
+    for _ in range(2):
+        editing.duplicate_shutter(effect, 0)
+    names = [shutter.name for shutter in effect.shutters]
+    assert names[:3] == [letter * 63, f"{letter * 59}.002", f"{letter * 59}.001"]
+    assert [shutter.name for shutter in export(effect_on).shutters] == names
+    for shutter in effect.shutters:  # as a copied file may have them
+        shutter.bl_system_properties_get()["name"] = letter * 63
+    names = [shutter.name for shutter in export(effect_on).shutters]
+    assert names[:2] == [letter * 63, f"{letter * 61} 2"]
+    assert len(set(names)) == len(names)
+
+
+@pytest.mark.parametrize("place", ["shutter", "region"])
+def test_a_longer_name_of_a_file_shows_and_is_no_recipe(effect_on, place):
+    from shutter_addon.blender import effects
+
+    edit, effect, strip = effect_on
+    apply(effect_on, BASE)
+    item, name = getattr(effect, f"{place}s")[0], "n" * 70
+    if place == "shutter":
+        for region in effect.regions:
+            region.shutter = name if region.shutter == item.name else region.shutter
+    item.bl_system_properties_get()["name"] = name
+    assert item.name == name
+    assert effects.instant(edit, effect, strip, FIRST).bars.any()
+    sentence = f'{place} "{name}": its name has 70 characters, 63 are the most'
+    with pytest.raises(effects.EffectError, match=sentence):
+        export(effect_on)
+
+
 def test_what_no_recipe_can_hold(effect_on):
     from shutter_addon.blender.effects import EffectError
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from support import recipe, sequencer
 
+from shutter_addon.core import limits
 from shutter_addon.core import recipe as recipes
 
 
@@ -431,6 +432,34 @@ def test_what_cannot_be_used_says_why(bpy, operators, edit, effect, tmp_path, si
             if sentence:
                 with pytest.raises(RuntimeError, match=sentence):
                     operator()
+
+
+@pytest.mark.parametrize("name", ["shutter_add", "shutter_duplicate"])
+def test_no_more_shutters_than_a_picture_has(bpy, effect, name):
+    while len(effect.shutters) < limits.MAX_SHUTTERS:
+        assert call(bpy, name) == {"FINISHED"}
+    with pytest.raises(RuntimeError, match=f"An effect has {limits.MAX_SHUTTERS} shutters at most"):
+        call(bpy, name)
+    assert len(effect.shutters) == limits.MAX_SHUTTERS
+
+
+def test_no_more_regions_than_a_picture_has(bpy, effect, preview):
+    full = f"An effect has {limits.MAX_REGIONS} regions at most"
+    preview.annotation = effect.scene.annotation
+    preview.annotation.layers.new("Notes").frames.new(3)
+    for number in range(limits.MAX_REGIONS):
+        region = effect.regions.add()
+        region.name, region.shutter = str(number), effect.shutters[0].name
+    # None of the second shutter's: whatever is drawn would be a new one.
+    effect.active_shutter = 1
+    for name, settings in (("draw", {}), ("draw", {"new": True}), ("region_take", {"layer": "Notes"})):
+        with pytest.raises(RuntimeError, match=full):
+            call(bpy, name, **settings)
+    effect.active_shutter = 0
+    with pytest.raises(RuntimeError, match=full):
+        call(bpy, "draw", new=True)
+    assert bpy.ops.shutter.draw() == {"FINISHED"}
+    assert len(effect.regions) == limits.MAX_REGIONS
 
 
 def test_the_last_shutter_stays(bpy, effect):

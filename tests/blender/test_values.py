@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from support import sequencer, write_frames
 
-from shutter_addon.core.limits import MAX_SHUTTERS
+from shutter_addon.core.limits import MAX_REGIONS, MAX_SHUTTERS
 
 NAN, INF = math.nan, math.inf
 
@@ -151,7 +151,11 @@ IMPOSSIBLE = {
     ),
     "shutters": (
         lambda e: [e.shutters.add() for _ in range(MAX_SHUTTERS)],
-        f'shutter "Long" and {MAX_SHUTTERS + 1} more: {MAX_SHUTTERS} are the most',
+        f'effect "Shutter": {MAX_SHUTTERS + 2} shutters, {MAX_SHUTTERS} are the most',
+    ),
+    "regions": (
+        lambda e: [e.regions.add() for _ in range(MAX_REGIONS)],
+        f'effect "Shutter": {MAX_REGIONS + 1} regions, {MAX_REGIONS} are the most',
     ),
     "points": (
         lambda e: draw(e.scene.annotation.layers[0], [(0, 0)] * 100_001),

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+import weakref
 from functools import partialmethod
 from pathlib import Path
 from types import SimpleNamespace
@@ -410,13 +411,56 @@ def test_a_full_disk_leaves_what_is_built(source, folder):
 
 @pytest.mark.parametrize("processors", [1, 16])
 @pytest.mark.parametrize("size", [(640, 360), (1920, 1080), (4096, 2160), (16384, 8192)])
-def test_pairs_at_work_fit_into_memory(monkeypatch, processors, size):
+@pytest.mark.parametrize("samples", ["uint8", "uint16", "float32"])
+def test_pairs_at_work_fit_into_memory(monkeypatch, processors, size, samples):
+    """And with them the frames beyond, up to eight that have a say in whether there is a cut."""
     monkeypatch.setattr(inbetween.os, "process_cpu_count", lambda: processors, raising=False)
-    workers = inbetween._workers(SimpleNamespace(width=size[0], height=size[1]))
+    source = SimpleNamespace(width=size[0], height=size[1], dtype=np.dtype(samples))
+    workers, ahead = inbetween._workers(source), inbetween._ahead(source)
     pair = 26 * 16 * size[0] * size[1]  # layers of four float32
+    beyond = ahead * 4 * source.dtype.itemsize * size[0] * size[1]
+    assert beyond <= 640 << 20
+    assert ahead == 8 or size[0] > 4096 or samples == "float32"
     assert 1 <= workers <= processors
-    assert workers == 1 or workers * pair <= 4 << 30
-    assert workers == processors or (workers + 1) * pair > 4 << 30
+    assert workers == 1 or workers * pair + beyond <= 4 << 30
+    assert workers == processors or (workers + 1) * pair + beyond > 4 << 30
+
+
+class Counting:
+    """A source that counts what is read of it, and how many of its frames are held at the same time."""
+
+    def __init__(self, source):
+        self._source, self.reads, self.most, self._given = source, [], 0, []
+
+    def __getattr__(self, name):
+        return getattr(self._source, name)
+
+    def read(self, index):
+        frame = self._source.read(index)
+        self.reads.append(index)
+        self._given = [given for given in self._given if given() is not None] + [weakref.ref(frame)]
+        self.most = max(self.most, len(self._given))
+        return frame
+
+
+@pytest.mark.parametrize("first", [0, 15])
+def test_frames_read_ahead_have_a_bound_and_are_read_once_within_it(tmp_path, monkeypatch, first):
+    """Of a still scene through a codec, where every pair might be a repeated frame and asks all around it."""
+    (tmp_path / "shot").mkdir()
+    random = np.random.default_rng(3)
+    for number in range(30):
+        noise = random.integers(0, 2, picture(2).shape)
+        save_image(tmp_path / "shot" / f"{number:02d}.png", (picture(2) | noise).astype(np.uint8))
+    with open_source(tmp_path / "shot" / "00.png") as source:
+        size, found = source.read(0).nbytes, []
+        for room in (8, 3, 0):
+            monkeypatch.setattr(inbetween, "AHEAD", room * size)
+            near = inbetween._Near(counting := Counting(source))
+            found.append([near.pair(index)[2] for index in range(first, 29)])
+            assert counting.most <= 2 + room + 1  # the pair, what waits, and what is being read
+            again = len(counting.reads) - len(set(counting.reads))
+            assert again == 0 if room == 8 else 0 < again <= 30 - first
+    assert found[0] == found[1] == found[2]
 
 
 PEAK = """

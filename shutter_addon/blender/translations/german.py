@@ -79,8 +79,18 @@ MESSAGES = {
     ("*", "{place}: {count} bars, the window is {window}"): "{place}: {count} Balken, das Zeitfenster ist {window}",
     (
         "*",
-        "{place} and {count} more: {most} are the most",
-    ): "{place} und {count} weitere: höchstens {most} sind möglich",
+        "{place}: {count} shutters, {most} are the most",
+    ): "{place}: {count} Verschlüsse, höchstens {most} sind möglich",
+    (
+        "*",
+        "{place}: {count} regions, {most} are the most",
+    ): "{place}: {count} Regionen, höchstens {most} sind möglich",
+    (
+        "*",
+        "{place}: its name has {count} characters, {most} are the most",
+    ): "{place}: der Name hat {count} Zeichen, höchstens {most} sind möglich",
+    ("*", "An effect has {most} shutters at most"): "Ein Effekt hat höchstens {most} Verschlüsse",
+    ("*", "An effect has {most} regions at most"): "Ein Effekt hat höchstens {most} Regionen",
     (
         "*",
         "{place}: more than {most} points with those before it",
