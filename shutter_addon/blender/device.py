@@ -145,8 +145,8 @@ def _unpack(kind: str, packing: int) -> Pass:
 
 
 def _exchanged(texture: Texture) -> tuple:
-    """The entry of _FORMATS. TypeError: Blender neither sends nor reads such a texture; asked to read one, it leaves the
-    memory as it was, without an error."""
+    """The entry of _FORMATS. TypeError: Blender neither sends nor reads such a texture; asked to read one, it leaves
+    the memory as it was, without an error."""
     if (found := _FORMATS[texture.kind]) is None:
         raise TypeError(f"{texture.kind}: such a texture is written and read by passes alone on Blender's GPU")
     return found
