@@ -18,4 +18,9 @@ void couplings(ivec2 i, out float c[9], out float diagonal)
   }
 }
 
+bool is_free(ivec2 i)
+{
+  return inside(i, size) && imageLoad(stencil, ivec3(i, 2)).x > 0.0;
+}
+
 #include "diffuse_weights.glsl"

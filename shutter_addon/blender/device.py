@@ -29,7 +29,7 @@ _FORMATS = {
     "rgba32f": (np.float32, "RGBA32F", _AS_IT_IS),
     "r32f": (np.float32, "R32F", _AS_IT_IS),
     "r16ui": (np.uint16, "R32F", _WHOLE),
-    "rg32ui": (np.uint32, None, _WHOLE),  # written by passes alone: floats do not hold it
+    "rg32ui": None,  # of passes alone: floats do not hold it, and Blender reads whole numbers of one component only
 }
 
 
@@ -66,7 +66,7 @@ class BlenderDevice:
 
     def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
         height, width = array.shape[:2]
-        _, sent_format, packing = _FORMATS[texture.kind]
+        _, sent_format, packing = _exchanged(texture)
         if texture.kind == "rgba8" and opaque:
             sent_format, packing = "R32F", _OPAQUE_BYTES
         size, data = (width, height), _buffer("FLOAT", _packed(array, packing))
@@ -83,8 +83,8 @@ class BlenderDevice:
     def read(self, texture: Texture) -> np.ndarray:
         """As GLDevice.read; by framebuffers, for GPUTexture.read() gives a first layer alone."""
         width, height, layers = texture.size
-        dtype, _, packing = _FORMATS[texture.kind]
-        components = 4 if texture.kind.startswith("rgba") else 2 if texture.kind.startswith("rg") else 1
+        dtype, _, packing = _exchanged(texture)
+        components = 4 if texture.kind.startswith("rgba") else 1
         sample, kind = (np.uint32, "UINT") if packing == _WHOLE else (np.float32, "FLOAT")
         array = np.empty((layers, height, width, components), sample)
         for layer, pixels in enumerate(array):
@@ -142,6 +142,14 @@ def _unpack(kind: str, packing: int) -> Pass:
         {"PACKING": packing},
         local_size=LOCAL_ROW,
     )
+
+
+def _exchanged(texture: Texture) -> tuple:
+    """The entry of _FORMATS. TypeError: Blender neither sends nor reads such a texture; asked to read one, it leaves
+    the memory as it was, without an error."""
+    if (found := _FORMATS[texture.kind]) is None:
+        raise TypeError(f"{texture.kind}: such a texture is written and read by passes alone on Blender's GPU")
+    return found
 
 
 def _buffer(kind: str, array: np.ndarray) -> gpu.types.Buffer:

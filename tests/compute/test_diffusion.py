@@ -28,7 +28,7 @@ def exact(labels, count):
         links = coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), shape=(labels.size,) * 2).tocsr()
         laplacian = (diags(np.asarray(links.sum(axis=1)).ravel()) - links).tocsr()[free]
         right = -laplacian[:, ~free] @ values[~free]
-        values[free] = splu(laplacian[:, free].tocsc(), permc_spec="MMD_AT_PLUS_A").solve(right)
+        values[free] = splu(laplacian[:, free].tocsc()).solve(right)
     return values.T.reshape(count, *labels.shape)
 
 
@@ -155,6 +155,32 @@ def scattered(width, height, share, shutters=3, seed=1):
     return labels.astype(np.uint16), shutters
 
 
+def lattice(across, down, at, seed, width=320, height=180, size=(1, 1), kept=1.0):
+    """Dots of random shutters, or blocks of `size` pixels, every so many pixels from one on; a share of them kept."""
+    labels, rng = blank(width, height), np.random.default_rng(seed)
+    columns, rows = -(-width // across), -(-height // down)
+    ids = rng.integers(1, 5, (rows, columns)) * (rng.random((rows, columns)) < kept)
+    for x, y in np.ndindex(size):
+        part = labels[at[1] + y :: down, at[0] + x :: across]
+        part[:] = ids[: part.shape[0], : part.shape[1]]
+    return labels, 4
+
+
+# Even cells are those of the coarser grids; pictures of even sizes end beyond the last of them.
+EVENS = ((2, 4), (4, 2), (4, 4), (2, 8), (8, 8))
+LATTICES = [(pitch, at, (1, 1), 1.0) for pitch in EVENS for at in ((0, 0), (1, 0), (2, 2))] + [
+    ((16, 8), (10, 0), (1, 1), 1.0),
+    ((20, 6), (18, 2), (1, 1), 0.7),
+    ((16, 16), (0, 0), (1, 1), 1.0),
+    ((4, 4), (0, 0), (1, 3), 1.0),
+    ((4, 4), (0, 0), (3, 1), 1.0),
+    ((4, 6), (0, 0), (1, 3), 1.0),
+    ((2, 4), (0, 0), (1, 1), 0.5),
+    ((4, 4), (0, 0), (1, 1), 0.3),
+    ((12, 4), (5, 3), (3, 3), 1.0),
+]
+
+
 def enclosed():
     """A 1-px ring of shutter 1 right inside one of shutter 2, and shutter 0 outside both."""
     shapes = [line(0, (0.02, 0.1), (0.05, 0.9), width=0.02), circle(1, 0.5, 0.5, 0.3), circle(2, 0.5, 0.5, 0.315)]
@@ -261,6 +287,34 @@ def test_is_the_exact_solution_on_both(scene, on_device):
 def test_blenders_gpu_solves_the_same(scene, on_device, on_blender):
     labels, count = SCENES[scene]
     np.testing.assert_allclose(on_blender(labels, count), on_device(labels, count), rtol=0, atol=LEVEL / 100)
+
+
+@pytest.mark.parametrize(("pitch", "at", "size", "kept"), LATTICES)
+def test_dots_anywhere_are_exact(on_device, pitch, at, size, kept):
+    labels, count = lattice(*pitch, at, 1, size=size, kept=kept)
+    np.testing.assert_allclose(on_device(labels, count), exact(labels, count), rtol=0, atol=LEVEL)
+
+
+def test_a_large_lattice(on_device):
+    """The larger the picture, the more grids lose what lies on their coarse cells."""
+    labels, count = lattice(8, 8, (0, 0), 2, 960, 540)
+    np.testing.assert_allclose(on_device(labels, count), exact(labels, count), rtol=0, atol=LEVEL)
+
+
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    count=st.sampled_from([10, 100, 1000, 5000]),
+    step=st.sampled_from([1, 2, 4, 8]),
+    width=st.integers(100, 330),
+)
+def test_random_dots(on_device, seed, count, step, width):
+    """On the cells of one of the coarser grids."""
+    rng = np.random.default_rng(seed)
+    labels = blank(width, 120)
+    x, y = rng.integers(0, width, count) // step * step, rng.integers(0, 120, count) // step * step
+    labels[y, x] = rng.integers(1, 5, count)
+    np.testing.assert_allclose(on_device(labels, 4), exact(labels, 4), rtol=0, atol=LEVEL)
 
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
