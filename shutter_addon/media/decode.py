@@ -15,6 +15,8 @@ MISSING = 1.0  # seconds between a file's end and the end that it promises, from
 # In MPEG program streams a seek may end inside a picture whose remains take the time stamp of the next one, so that
 # all up to the next time stamp are off. There only key frames count that a decode from the start has met before.
 MISLEADING = frozenset({"mpeg"})
+# FFmpeg takes any picture for a movie of one frame: these, and all formats that end in "_pipe".
+STILLS = frozenset({"image2", "alias_pix", "brender_pix", "fits", "ico"})
 DAMAGED = "its data are damaged"
 
 
@@ -256,7 +258,7 @@ def _video_stream(container, name, number):
     streams = [s for s in container.streams.video if not s.disposition & pictures]
     if not streams or container.format.name == "tty":  # FFmpeg takes any text for a movie of a terminal
         raise MediaError(f"{name}: no video stream")
-    if container.format.name.endswith("_pipe"):  # FFmpeg takes any picture for a movie of one frame
+    if container.format.name.endswith("_pipe") or container.format.name in STILLS:
         raise MediaError(f"{name}: {FOREIGN}")
     if number >= len(streams):
         raise MediaError(f"{name}: no video stream {number}, it has {len(streams)}")

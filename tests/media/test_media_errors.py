@@ -187,6 +187,14 @@ def test_images_that_blender_does_not_read(tmp_path, name):
     assert sentence(tmp_path / "a.png") == text.replace(name, "a.png")
 
 
+@pytest.mark.parametrize("name", ["a.ppm", "a%d.ppm", "a.jls"])
+def test_images_that_ffmpeg_knows_by_their_names_alone(tmp_path, name):
+    """As one whose header is a single line."""
+    (tmp_path / name).write_bytes(b"P6 4 4 255 " + bytes(4 * 4 * 3))
+    text = f"{name}: an image of a kind that Blender does not read; save it as PNG, TIFF or EXR first"
+    assert sentence(tmp_path / name) == text
+
+
 @pytest.mark.parametrize("suffix", sorted(IMAGE_SUFFIXES))
 def test_noise_by_the_name_of_an_image(tmp_path, suffix):
     (tmp_path / f"a{suffix}").write_bytes(np.random.default_rng(0).bytes(5000))
