@@ -8,7 +8,7 @@ import av
 from av.video.frame import PictureType
 
 from .errors import MediaError
-from .files import FOREIGN
+from .files import FOREIGN, OTHER, is_other
 
 KEPT_DECODING = 16  # frames ahead that are cheaper to reach by decoding on than by a seek, whatever the file
 MISSING = 1.0  # seconds between a file's end and the end that it promises, from which on it counts as cut off
@@ -108,6 +108,8 @@ class FrameReader:
     def _restart(self):
         """Decodes on from the start. Not by a seek: with an edit list or without an index that ends elsewhere."""
         self.close()
+        if is_other(self._path):  # in the place of the file that was there
+            raise MediaError(OTHER)
         self.container = av.open(str(self._path))
         self.stream = _video_stream(self.container, self._path.name, self._number)
         self.time_base, self.start = fraction(self.stream.time_base), self.stream.start_time or 0

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
+from stat import S_ISREG
 
 import numpy as np
 from OpenImageIO import ImageInput, ImageSpec, geterror
@@ -147,7 +148,7 @@ def _has_alpha(path):
         return False
     try:
         status = path.stat()
-        return _had_alpha(path, status.st_size, status.st_mtime_ns)
+        return S_ISREG(status.st_mode) and _had_alpha(path, status.st_size, status.st_mtime_ns)
     except (OSError, MediaError):  # who needs the frame is told
         return False
 
