@@ -13,6 +13,7 @@ from ..media import MediaError, open_source
 
 _AT_ONCE = 100  # files of a sequence, which may be long, that one look asks, beside the first and the last
 _REST = 1.0  # seconds from one look at them to the next: on a network's drive a look takes a while
+_KEPT = 256
 
 
 @dataclass
@@ -63,9 +64,12 @@ def _between(strip, count, path) -> int:
     if count < 3:
         return 0
     place = strip.id_data.session_uid, strip.name
-    look = _looks.get(place)
+    look = _looks.pop(place, None)
     if look is None or len(look.known) != count:
-        look = _looks[place] = _Look([None] * count, 0, count)
+        look = _Look([None] * count, 0, count)
+    _looks[place] = look
+    while len(_looks) > _KEPT:
+        del _looks[next(iter(_looks))]
     if not look.due and (filming or time.monotonic() - look.when < _REST):
         return look.key
     changed = False

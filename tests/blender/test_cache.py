@@ -313,6 +313,16 @@ def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, rend
     assert len(asked) == 102
 
 
+def test_what_is_known_of_files_is_bounded(edit, long, monkeypatch):
+    from shutter_addon.blender import sources
+
+    monkeypatch.setattr(sources, "_KEPT", 4)
+    for number in range(6):
+        long.name = f"images {number}"
+        sources.files_key(long)
+    assert [name for _edit, name in sources._looks] == [f"images {number}" for number in range(2, 6)]
+
+
 def test_finished_frames_are_kept_while_nothing_changes(bpy, edit, effect, render, images):
     """Frames are there even when files in between are not: playing and selecting drop none."""
     before = render(edit, [3, FRAME])
