@@ -1,7 +1,6 @@
 """The medium of a source strip: what it is, opened as shutter_addon.media has it."""
 
 import os
-import re
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..media import MediaError, open_source
+from ..media.sequence import by_number
 
 _AT_ONCE = 100  # files of a sequence, which may be long, that one look asks, beside the first and the last
 _REST = 1.0  # seconds from one look at them to the next: on a network's drive a look takes a while
@@ -157,14 +157,10 @@ def _clip_files(strip):
         sentence = rpt_('strip "{strip}": undistorted or stabilized clips are not supported')
         raise MediaError(sentence.format(strip=strip.name))
     path = Path(bpy.path.abspath(clip.filepath, library=clip.library))
-    number = re.search(r"(\d+)(\D*)$", path.stem)
-    if clip.source == "MOVIE" or number is None:
+    beside = by_number(path)
+    if clip.source == "MOVIE" or beside is None:
         return 1, lambda _i: path
-    first, digits = int(number[1]) + clip.frame_offset, len(number[1])
-    stem = path.stem[: number.start()]
-    return max(clip.frame_duration, 1), lambda i: path.with_name(
-        f"{stem}{first + i:0{digits}d}{number[2]}{path.suffix}"
-    )
+    return max(clip.frame_duration, 1), lambda i: beside(clip.frame_offset + i)
 
 
 def _stamp(path: Path):
