@@ -23,6 +23,7 @@ from ..core import recipe, whole
 from ..core.messages import sentence, signed
 from ..media import MediaError, open_source
 from ..media.files import check_name
+from ..media.sequence import by_number
 from ..media.written import is_whole_blend, why_short
 from . import edits, effects, inbetweens, outputs, pictures, sources, strips
 
@@ -156,12 +157,8 @@ def _written(arguments, file_format: str, frames: tuple[int, int]) -> list[Path]
 def _files(medium) -> list[Path]:
     """The files of an image sequence, also those that are missing in it: it would show them, were they there."""
     files = getattr(medium, "files", [])
-    numbered = re.fullmatch(r"(.*?)(\d+)(\D*)", files[0].name) if files else None
-    if numbered is None:
-        return list(files)
-    before, number, behind = numbered.groups()
-    names = (f"{before}{int(number) + i:0{len(number)}d}{behind}" for i in range(len(files)))
-    return [*files, *(files[0].with_name(name) for name in names)]
+    beside = by_number(files[0]) if files else None
+    return [*files, *(map(beside, range(len(files))) if beside else ())]
 
 
 def _opened(path: Path):

@@ -55,6 +55,7 @@ def _before_render(scene, *_):
     if scene.render.engine == strips.ENGINE:
         return
     sources.look_again()
+    sources.filming = rendering.runs()
     if bpy.app.background:  # in a window the render has a thread of its own, and the last update has seen to copies
         lifecycle.mend()
         copies.adopt()
@@ -76,6 +77,7 @@ def _after_render(scene, *_):
     if rendering.is_film(scene):
         cache.drop_spoilt()
     rendering.end(scene, alone=sys._getframe().f_back is None)
+    sources.filming = rendering.runs()
 
 
 HANDLERS = {

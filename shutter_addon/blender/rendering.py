@@ -45,6 +45,11 @@ def begin(scene) -> None:
         _film, _begun, failure, _stopping = scene.session_uid, False, None, False
 
 
+def runs() -> bool:
+    """Whether a film, or a single picture of it, is rendered."""
+    return _film is not None
+
+
 def is_film(scene) -> bool:
     """Whether this scene's frames are what is rendered; called before each of them."""
     global _begun

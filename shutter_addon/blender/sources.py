@@ -1,7 +1,7 @@
 """The medium of a source strip: what it is, opened as shutter_addon.media has it."""
 
 import os
-import re
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,22 +9,27 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..media import MediaError, open_source
+from ..media.sequence import by_number
 
 _AT_ONCE = 100  # files of a sequence, which may be long, that one look asks, beside the first and the last
+_REST = 1.0  # seconds from one look at them to the next: on a network's drive a look takes a while
+_KEPT = 256
 
 
 @dataclass
 class _Look:
     """What is known of a strip's files: path and stamp of each, which of them is next, how many are still to be asked
-    at once, and a number that changes with what is known."""
+    at once, when some were asked last, and a number that changes with what is known."""
 
     known: list
     next: int
     due: int
+    when: float = 0.0
     key: int = 0
 
 
 _looks: dict[tuple, _Look] = {}  # by edit and strip
+filming = False  # while a film is rendered, all its files have been asked before it
 
 
 def media_key(strip) -> tuple:
@@ -34,7 +39,7 @@ def media_key(strip) -> tuple:
 
 def files_key(strip) -> tuple:
     """The strip's files: the first and the last as they are now, and those between as they were when they were looked
-    at: each call looks at a hundred of them, in turn. MediaError: it has none."""
+    at: a hundred of them a second, in turn, and none while a film is rendered. MediaError: it has none."""
     count, path = _files(strip)
     ends = dict.fromkeys((path(0), path(count - 1)))
     return count, *((str(end), _stamp(end)) for end in ends), _between(strip, count, path)
@@ -48,6 +53,8 @@ def look_again() -> None:
 
 def forget() -> None:
     """Forgets what the files were, before another file is loaded."""
+    global filming
+    filming = False
     _looks.clear()
 
 
@@ -57,16 +64,21 @@ def _between(strip, count, path) -> int:
     if count < 3:
         return 0
     place = strip.id_data.session_uid, strip.name
-    look = _looks.get(place)
+    look = _looks.pop(place, None)
     if look is None or len(look.known) != count:
-        look = _looks[place] = _Look([None] * count, 0, count)
+        look = _Look([None] * count, 0, count)
+    _looks[place] = look
+    while len(_looks) > _KEPT:
+        del _looks[next(iter(_looks))]
+    if not look.due and (filming or time.monotonic() - look.when < _REST):
+        return look.key
     changed = False
     for index in range(look.next, look.next + max(look.due, min(_AT_ONCE, count))):
         file = path(index % count)
         found, known = (file, _stamp(file)), look.known[index % count]
         if found != known and (known is None or found[1] is not None or found[0] != known[0]):
             look.known[index % count], changed = found, True
-    look.next, look.due = (index + 1) % count, 0
+    look.next, look.due, look.when = (index + 1) % count, 0, time.monotonic()
     if changed:
         look.key = hash(tuple(look.known))
     return look.key
@@ -145,14 +157,10 @@ def _clip_files(strip):
         sentence = rpt_('strip "{strip}": undistorted or stabilized clips are not supported')
         raise MediaError(sentence.format(strip=strip.name))
     path = Path(bpy.path.abspath(clip.filepath, library=clip.library))
-    number = re.search(r"(\d+)(\D*)$", path.stem)
-    if clip.source == "MOVIE" or number is None:
+    beside = by_number(path)
+    if clip.source == "MOVIE" or beside is None:
         return 1, lambda _i: path
-    first, digits = int(number[1]) + clip.frame_offset, len(number[1])
-    stem = path.stem[: number.start()]
-    return max(clip.frame_duration, 1), lambda i: path.with_name(
-        f"{stem}{first + i:0{digits}d}{number[2]}{path.suffix}"
-    )
+    return max(clip.frame_duration, 1), lambda i: beside(clip.frame_offset + i)
 
 
 def _stamp(path: Path):

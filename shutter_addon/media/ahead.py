@@ -49,6 +49,7 @@ class Ahead:
             if isinstance(frame, Exception):
                 self._done.pop(index)
                 self._wanted = [i for i in self._wanted if i != index]
+                self._changed.notify_all()  # another read may wait for the same frame
             self._drop()
         if frame is None:
             raise MediaError(f"{self._source.path.name}: closed while a frame was read")

@@ -8,13 +8,15 @@ import av
 from av.video.frame import PictureType
 
 from .errors import MediaError
-from .files import FOREIGN
+from .files import FOREIGN, OTHER, is_other
 
 KEPT_DECODING = 16  # frames ahead that are cheaper to reach by decoding on than by a seek, whatever the file
 MISSING = 1.0  # seconds between a file's end and the end that it promises, from which on it counts as cut off
 # In MPEG program streams a seek may end inside a picture whose remains take the time stamp of the next one, so that
 # all up to the next time stamp are off. There only key frames count that a decode from the start has met before.
 MISLEADING = frozenset({"mpeg"})
+# FFmpeg takes any picture for a movie of one frame: these, and all formats that end in "_pipe".
+STILLS = frozenset({"image2", "alias_pix", "brender_pix", "fits", "ico"})
 DAMAGED = "its data are damaged"
 
 
@@ -106,6 +108,8 @@ class FrameReader:
     def _restart(self):
         """Decodes on from the start. Not by a seek: with an edit list or without an index that ends elsewhere."""
         self.close()
+        if is_other(self._path):  # in the place of the file that was there
+            raise MediaError(OTHER)
         self.container = av.open(str(self._path))
         self.stream = _video_stream(self.container, self._path.name, self._number)
         self.time_base, self.start = fraction(self.stream.time_base), self.stream.start_time or 0
@@ -256,7 +260,7 @@ def _video_stream(container, name, number):
     streams = [s for s in container.streams.video if not s.disposition & pictures]
     if not streams or container.format.name == "tty":  # FFmpeg takes any text for a movie of a terminal
         raise MediaError(f"{name}: no video stream")
-    if container.format.name.endswith("_pipe"):  # FFmpeg takes any picture for a movie of one frame
+    if container.format.name.endswith("_pipe") or container.format.name in STILLS:
         raise MediaError(f"{name}: {FOREIGN}")
     if number >= len(streams):
         raise MediaError(f"{name}: no video stream {number}, it has {len(streams)}")

@@ -6,6 +6,7 @@ from pathlib import Path
 from .errors import MediaError
 
 PIXELS = 1 << 28  # 16384×16384; FFmpeg decodes no more either, and a damaged header may promise anything
+OTHER = "is no file, but a pipe, a socket or a device"
 FOREIGN = "an image of a kind that Blender does not read; save it as PNG, TIFF or EXR first"
 
 
@@ -16,11 +17,18 @@ def check_file(path):
         raise MediaError(f"{path.name}: is a folder, not a file")
     if not path.exists():
         raise MediaError(f"{path.name}: no such file in {path.absolute().parent}")
+    if is_other(path):
+        raise MediaError(f"{path.name}: {OTHER}")
     if path.stat().st_size == 0:
         raise MediaError(f"{path.name}: file is empty")
     if not os.access(path, os.R_OK):
         raise MediaError(f"{path.name}: may not be read")
     return path
+
+
+def is_other(path):
+    """Whether something lies there that is neither a file nor a folder; who opens a pipe may wait for ever."""
+    return path.exists() and not (path.is_file() or path.is_dir())
 
 
 def check_name(path):

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
+from stat import S_ISREG
 
 import numpy as np
 from OpenImageIO import ImageInput, ImageSpec, geterror
@@ -116,10 +117,10 @@ class SequenceSource:
 def _numbered(path):
     """(frame numbers from 0, files, the file beyond too wide a gap or None) from that file on: those that differ in the
     last number of the name only."""
-    match = re.fullmatch(r"(.*?)(\d+)(\D*)", path.stem)
-    if match is None:
+    parts = _last_number(path.stem)
+    if parts is None:
         return [0], [path], None
-    prefix, digits, suffix = match.groups()
+    prefix, digits, suffix = parts
     alike = re.compile(re.escape(prefix) + r"(\d+)" + re.escape(suffix + path.suffix))
     first, found = int(digits), {}
     for file in sorted(_listed(path.parent)):
@@ -132,6 +133,21 @@ def _numbered(path):
     end = next(gaps, len(numbers))
     files = [found[number] for number in numbers]
     return numbers[:end], files[:end], files[end] if end < len(files) else None
+
+
+def _last_number(stem):
+    """(what is before it, its digits, what is behind it) of the last number in a file's stem; None: there is none."""
+    match = re.fullmatch(r"(.*?)(\d+)(\D*)", stem, re.DOTALL)
+    return match and match.groups()
+
+
+def by_number(path):
+    """A function that gives the file i numbers on from that one, in the same folder; None: its stem has no number."""
+    parts = _last_number(path.stem)
+    if parts is None:
+        return None
+    before, digits, behind = parts
+    return lambda i: path.with_name(f"{before}{int(digits) + i:0{len(digits)}d}{behind}{path.suffix}")
 
 
 def _listed(folder):
@@ -147,7 +163,7 @@ def _has_alpha(path):
         return False
     try:
         status = path.stat()
-        return _had_alpha(path, status.st_size, status.st_mtime_ns)
+        return S_ISREG(status.st_mode) and _had_alpha(path, status.st_size, status.st_mtime_ns)
     except (OSError, MediaError):  # who needs the frame is told
         return False
 

@@ -1,6 +1,7 @@
 """Every change that changes pictures reaches the sequencer's cache of finished frames; playing does not."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -221,27 +222,105 @@ def test_a_file_replaced_in_the_middle_is_rendered(bpy, edit, effect, render, im
     assert np.array_equal(render(edit, [FRAME])[FRAME], after)
 
 
-def test_replaced_files_of_a_long_sequence_are_noticed_little_by_little(bpy, edit, effect, images, monkeypatch):
+@pytest.fixture
+def clock(monkeypatch):
+    """A clock that stands still: a function that sets it forward."""
+    from shutter_addon.blender import sources
+
+    now = [1000.0]
+    monkeypatch.setattr(sources, "time", SimpleNamespace(monotonic=lambda: now[0]))
+
+    def wait(seconds):
+        now[0] += seconds
+
+    return wait
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """The files of which it was asked whether they are the same."""
+    from shutter_addon.blender import sources
+
+    asked, stamp = [], sources._stamp
+    monkeypatch.setattr(sources, "_stamp", lambda path: asked.append(path) or stamp(path))
+    return asked
+
+
+@pytest.fixture
+def long(edit, effect, images):
+    """A strip of a thousand files."""
+    source = edit.sequence_editor.strips["images"]
+    for name in [images.name] * 969 + ["f0030.png"]:
+        source.elements.append(name)
+    return source
+
+
+@pytest.mark.usefixtures("long")
+def test_replaced_files_of_a_long_sequence_are_noticed_little_by_little(edit, images, clock, asked):
     """Each look asks few of its files, and all of them are asked in turn."""
     from shutter_addon.blender import cache, sources
 
-    source = edit.sequence_editor.strips["images"]
-    for _ in range(970):
-        source.elements.append(images.name)
-    asked = []
-    stamp = sources._stamp
-    monkeypatch.setattr(sources, "_stamp", lambda path: asked.append(path) or stamp(path))
     cache.invalidate_changed(edit)
     for _ in range(10):
         asked.clear()
+        clock(1)
         assert not cache.invalidate_changed(edit)
-        assert 0 < len(asked) < 110
+        assert 50 < len(asked) < 110
     (images.parent / "f0015.png").write_bytes(images.read_bytes() + b"more")
-    assert any(cache.invalidate_changed(edit) for _ in range(10))
+    assert any(cache.invalidate_changed(edit) for _ in range(10) if clock(1) is None)
     (images.parent / "f0016.png").write_bytes(images.read_bytes() + b"more")
     sources.look_again()
     assert cache.invalidate_changed(edit)
     assert not cache.invalidate_changed(edit)
+
+
+@pytest.mark.usefixtures("clock", "long")
+def test_a_redraw_asks_the_ends_of_a_sequence_alone(edit, effect, asked):
+    from shutter_addon.blender import cache, pictures, strips
+
+    (strip,) = strips.effect_strips(edit)
+    cache.invalidate_changed(edit)
+    for frame in (FRAME, FRAME + 1):
+        asked.clear()
+        cache.invalidate_changed(edit)
+        pictures.moment(edit, effect, strip, frame)
+        assert len(asked) == 4
+
+
+def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, render, long, clock, asked, monkeypatch):
+    """However long a picture takes."""
+    from shutter_addon.blender import pictures, sources
+
+    begin, counts = pictures.begin_next, []
+
+    def begin_next(*arguments):
+        counts.append(len(asked))
+        asked.clear()
+        clock(60)
+        begin(*arguments)
+
+    monkeypatch.setattr(pictures, "begin_next", begin_next)
+    render(edit, [FRAME])
+    counts.clear()
+    edit.frame_start, edit.frame_end = 7, 11
+    bpy.ops.render.render(animation=True)
+    assert counts[0] >= len(long.elements)
+    assert len(counts) >= 5
+    assert 2 <= max(counts[1:]) < 10
+    assert not sources.filming
+    asked.clear()
+    sources.files_key(long)
+    assert len(asked) == 102
+
+
+def test_what_is_known_of_files_is_bounded(edit, long, monkeypatch):
+    from shutter_addon.blender import sources
+
+    monkeypatch.setattr(sources, "_KEPT", 4)
+    for number in range(6):
+        long.name = f"images {number}"
+        sources.files_key(long)
+    assert [name for _edit, name in sources._looks] == [f"images {number}" for number in range(2, 6)]
 
 
 def test_finished_frames_are_kept_while_nothing_changes(bpy, edit, effect, render, images):

@@ -228,6 +228,18 @@ def test_a_gap_in_the_numbering_holds(command, noise, tmp_path, same_pixels):
         same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), frames[source], 1)
 
 
+@pytest.mark.parametrize("suffix", [".png", ".jp2"])
+def test_files_that_a_gap_would_show_are_the_sources_own(noise, tmp_path, suffix):
+    """The number in a suffix is none of theirs."""
+    from shutter_addon.blender import commands
+
+    for path in sorted(write_frames(tmp_path, noise[1][:4]).parent.iterdir()):
+        path.rename(path.with_suffix(suffix))
+    (tmp_path / f"f0003{suffix}").unlink()
+    with open_source(tmp_path / f"f0001{suffix}") as source:
+        assert tmp_path / f"f0003{suffix}" in commands._files(source)
+
+
 def test_a_number_far_off_is_left_out(command, noise, tmp_path):
     first = write_frames(tmp_path / "in", noise[1][:2])
     (tmp_path / "in" / "f20261121.png").write_bytes(first.read_bytes())

@@ -125,6 +125,28 @@ def test_a_frame_that_is_back_is_read(ahead, source):
     assert np.array_equal(ahead.read(13), source.frames[13])
 
 
+def test_an_error_of_a_frame_that_two_threads_read(ahead, source):
+    """It is read again for the second."""
+    source.gate.clear()
+    outcomes, both = [], threading.Barrier(3, timeout=10)
+
+    def read():
+        with pytest.raises(MediaError, match="frame 13") as caught:
+            ahead.read(13)
+        outcomes.append(str(caught.value))
+        both.wait()
+
+    for _ in range(2):
+        threading.Thread(target=read, daemon=True).start()
+    until = time.monotonic() + 10
+    while len(ahead._asked) < 2:
+        assert time.monotonic() < until
+        time.sleep(0.001)
+    source.gate.set()
+    both.wait()
+    assert len(outcomes) == source.reads.count(13) == 2
+
+
 def test_frames_cannot_be_written_into(ahead):
     with pytest.raises(ValueError, match="read-only"):
         ahead.read(0)[:] = 0

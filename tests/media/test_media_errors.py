@@ -1,6 +1,7 @@
 """Bad input: one clear sentence that names the file, and whatever is sound can still be read."""
 
 import contextlib
+import faulthandler
 import os
 import re
 import shutil
@@ -67,6 +68,51 @@ def test_empty(tmp_path, name):
 def test_folder(tmp_path):
     (tmp_path / "clip.mp4").mkdir()
     assert sentence(tmp_path / "clip.mp4") == "clip.mp4: is a folder, not a file"
+
+
+@pytest.fixture
+def in_time():
+    """A hang is a failure. It ends all tests: libraries that wait for a pipe wait on after a signal."""
+    faulthandler.dump_traceback_later(60, exit=True)
+    yield
+    faulthandler.cancel_dump_traceback_later()
+
+
+OTHER = "is no file, but a pipe, a socket or a device"
+
+
+@pytest.mark.usefixtures("in_time")
+@pytest.mark.parametrize("name", ["clip.mp4", "frame_1.png"])
+def test_a_pipe_or_a_device(tmp_path, name):
+    os.mkfifo(tmp_path / name)
+    assert sentence(tmp_path / name) == f"{name}: {OTHER}"
+    (tmp_path / name).unlink()
+    (tmp_path / name).symlink_to("/dev/zero")
+    assert sentence(tmp_path / name) == f"{name}: {OTHER}"
+
+
+@pytest.mark.usefixtures("in_time")
+def test_a_pipe_among_the_files_of_a_sequence(tmp_path):
+    for n in range(3):
+        save_image(tmp_path / f"a_{n}.png", picture(n))
+    (tmp_path / "a_1.png").unlink()
+    os.mkfifo(tmp_path / "a_1.png")
+    for files in (None, [f"a_{n}.png" for n in range(3)]):
+        good, bad = readable(open_source(tmp_path / "a_0.png", files=files))
+        assert good == {0: 0, 2: 2}
+        assert bad == {1: f"a_1.png: {OTHER}"}
+
+
+@pytest.mark.usefixtures("in_time")
+def test_a_pipe_in_the_place_of_a_movie_that_was_read(tmp_path, movies):
+    path = tmp_path / "clip.mp4"
+    path.write_bytes(movies["open.mp4"][0].read_bytes())
+    with open_source(path) as source:
+        source.close()
+        path.unlink()
+        os.mkfifo(path)
+        with pytest.raises(MediaError, match=f"frame 3 of clip.mp4 cannot be decoded: {OTHER}"):
+            source.read(3)
 
 
 @pytest.mark.parametrize("name", ["clip.mp4", "frame.png", "notes.txt"])
@@ -185,6 +231,14 @@ def test_images_that_blender_does_not_read(tmp_path, name):
     assert sentence(tmp_path, files=[name]) == text
     path.rename(tmp_path / "a.png")
     assert sentence(tmp_path / "a.png") == text.replace(name, "a.png")
+
+
+@pytest.mark.parametrize("name", ["a.ppm", "a%d.ppm", "a.jls"])
+def test_images_that_ffmpeg_knows_by_their_names_alone(tmp_path, name):
+    """As one whose header is a single line."""
+    (tmp_path / name).write_bytes(b"P6 4 4 255 " + bytes(4 * 4 * 3))
+    text = f"{name}: an image of a kind that Blender does not read; save it as PNG, TIFF or EXR first"
+    assert sentence(tmp_path / name) == text
 
 
 @pytest.mark.parametrize("suffix", sorted(IMAGE_SUFFIXES))

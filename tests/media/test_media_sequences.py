@@ -3,6 +3,7 @@
 import os
 import struct
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from footage import HEIGHT, WIDTH, number, picture, save_image, see_through
 from OpenImageIO import ImageOutput, ImageSpec
 
 from shutter_addon.media import MediaError, open_source
+from shutter_addon.media.sequence import by_number
 
 STRAIGHT = {"oiio__UnassociatedAlpha": 1}
 
@@ -41,6 +43,24 @@ def test_files_are_found_by_number(tmp_path, names, numbers):
         assert shown(source) == numbers
         assert source.count == len(numbers)
         assert source.fps is None
+
+
+@pytest.mark.parametrize(
+    ("name", "number", "wanted"),
+    [
+        ("a_09.png", 1, "a_10.png"),
+        ("s2_t3_09v.tif", 91, "s2_t3_100v.tif"),
+        ("7.jp2", 1, "8.jp2"),
+        ("x-0100.png", -1, "x-0099.png"),
+        ("two\nlines_1.png", 1, "two\nlines_2.png"),
+    ],
+)
+def test_a_file_by_its_number(name, number, wanted):
+    assert by_number(Path("folder 1", name))(number) == Path("folder 1", wanted)
+
+
+def test_a_file_without_a_number():
+    assert by_number(Path("folder 1", "still.jp2")) is None
 
 
 def test_gap_holds_the_file_before(tmp_path):
