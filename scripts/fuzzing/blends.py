@@ -114,7 +114,7 @@ def _change(bpy, parts, what: str, which, value) -> None:
     prop = owner.bl_rna.properties[sorted(names)[which % len(names)]]
     number, text, item = value
     stored = owner.bl_system_properties_get() if hasattr(owner, "bl_system_properties_get") else None
-    kinds = {"INT": _whole(number), "FLOAT": number, "STRING": text, "ENUM": item, "BOOLEAN": item}
+    kinds = {"INT": _whole(number), "FLOAT": float(number), "STRING": text, "ENUM": item, "BOOLEAN": item}
     new = kinds.get(prop.type)
     if getattr(prop, "array_length", 0):
         new = [new] * prop.array_length
