@@ -131,10 +131,11 @@ def test_what_is_missing_is_said_and_what_is_built_is_shown(film, add, edit, ren
     same_pixels(light.to_encoded(picture()[..., :3]) * 255, shown(frames, (4, 4, 8)), 1)
 
 
-def test_in_betweens_of_a_file_that_was_replaced_are_not_shown(film, add, edit):
-    from shutter_addon.blender import cache, inbetweens, pictures
+def test_in_betweens_of_a_file_that_was_replaced_are_not_shown(film, add, edit, monkeypatch):
+    from shutter_addon.blender import cache, inbetweens, pictures, sources
     from shutter_addon.media import MediaError
 
+    monkeypatch.setattr(sources, "_REST", 0.0)
     first, _ = film
     *_, effect = add(first, COUNT, np.ones(6))
     before = pictures.picture(effect.scene, 2)
