@@ -28,8 +28,10 @@ class Curves:
         no timeline is."""
         curve = self._curves.get((path, index))
         if curve is not None and curve not in self._checked:
-            owner, _, name = path.rpartition(".")
-            values.check_keys(self._scene.path_resolve(owner), name, _points(curve)[:, 0])
+            beyond = values.beyond_timeline(_points(curve)[:, 0])
+            if beyond.size:
+                owner, _, name = path.rpartition(".")
+                values.refuse_key(self._scene.path_resolve(owner), name, beyond[0])
             self._checked.add(curve)
         return curve
 

@@ -83,13 +83,16 @@ def word(group, name: str, value: float | None = None) -> str:
     return identifier
 
 
-def check_keys(group, name: str, frames) -> None:
-    """EffectError: one of the frames (n,) of an F-curve's keys is on no timeline."""
-    beyond = frames[~(np.abs(frames) <= MAX_FRAME)]
-    if len(beyond):
-        sentence = rpt_("{place}: {property} has a keyframe at frame {frame}, not {low} to {high}")
-        words = {"place": place(group), "property": _called(group.bl_rna.properties[name]), "frame": f"{beyond[0]:.7g}"}
-        raise EffectError(sentence.format(**words, low=-MAX_FRAME, high=MAX_FRAME))
+def beyond_timeline(frames: np.ndarray) -> np.ndarray:
+    """Those of the frames (n,) of an F-curve's keys that are on no timeline."""
+    return frames[~(np.abs(frames) <= MAX_FRAME)]
+
+
+def refuse_key(group, name: str, frame: float) -> None:
+    """EffectError: a property has a key at a frame that is on no timeline."""
+    sentence = rpt_("{place}: {property} has a keyframe at frame {frame}, not {low} to {high}")
+    words = {"place": place(group), "property": _called(group.bl_rna.properties[name]), "frame": f"{frame:.7g}"}
+    raise EffectError(sentence.format(**words, low=-MAX_FRAME, high=MAX_FRAME))
 
 
 def stored(group, name: str):
