@@ -8,9 +8,11 @@ from shutter_addon.compute import diffusion_gpu, gpu, window
 from shutter_addon.compute.passes import SHADERS, Pass, body
 
 PASSES = [value for value in vars(diffusion_gpu).values() if isinstance(value, Pass)]
-PASSES += [gpu.composition(way, 3, "frames", 1, 2, True, False) for way in ("pieces", "frames", "value")]
+PASSES += [gpu.composition(way, 3, "frames", 1, 2, True, False) for way in ("pieces", "frames", "walk", "value")]
 PASSES += [
-    gpu.composition(way, 3, stored, 1, 2, True, False) for way in ("frames", "value") for stored in ("sums", "tiles")
+    gpu.composition(way, 3, stored, 1, 2, True, False)
+    for way in ("frames", "walk", "value")
+    for stored in ("sums", "tiles")
 ]
 for tiled in (True, False):
     PASSES += [gpu.composition_of_sums(4, 2, True, tiled, False)]
