@@ -47,6 +47,8 @@ def prepared():
     """The extension, whose panel of in-between frames is open and others are not, in a saved file with an effect."""
     driver.enable()
     sys.modules[f"{traces.NAME}.shutter_addon.media.flow"] = SimpleNamespace(between=slow_blend)
+    cuts = part("media.cuts")  # as optical flow, they need OpenCV; there are none in this film
+    cuts.missing_package, cuts.may_be_cut, cuts.is_cut = lambda: None, lambda *_: False, lambda *_: False
     panels = part("blender.panels")
     for name, closed in (("regions", True), ("options", True), ("inbetween", False)):
         panel = getattr(panels, f"SEQUENCER_PT_shutter_{name}")
