@@ -28,7 +28,7 @@ class Curves:
         no timeline is."""
         curve = self._curves.get((path, index))
         if curve is not None and curve not in self._checked:
-            beyond = values.beyond_timeline(_points(curve)[:, 0])
+            beyond = values.beyond_timeline(_frames(curve))
             if beyond.size:
                 owner, _, name = path.rpartition(".")
                 values.refuse_key(self._scene.path_resolve(owner), name, beyond[0])
@@ -56,21 +56,17 @@ class Curves:
         return values.curved(owner, name, curve, frame)
 
 
-def _points(curve) -> np.ndarray:
-    """Frames and values (n, 2) of an F-curve's keys."""
-    numbers = np.empty((len(curve.keyframe_points), 2), dtype=np.float32)
-    curve.keyframe_points.foreach_get("co", numbers.reshape(-1))
-    return numbers
+def _frames(curve) -> np.ndarray:
+    """Frames (n,) of an F-curve's keys."""
+    points = np.empty(2 * len(curve.keyframe_points), np.float32)
+    curve.keyframe_points.foreach_get("co", points)
+    return points[::2]
 
 
 def key_frames(curves) -> list[float]:
     """Frames with a key on any of the curves, ascending."""
-    frames = [np.empty(0, np.float32)]
-    for curve in curves:
-        points = np.empty(2 * len(curve.keyframe_points), np.float32)
-        curve.keyframe_points.foreach_get("co", points)
-        frames.append(points[::2])
-    return np.unique(np.concatenate(frames)).tolist()
+    frames = [_frames(curve) for curve in curves]
+    return np.unique(np.concatenate([np.empty(0, np.float32), *frames])).tolist()
 
 
 def progress(curves, start: float, end: float, frame: float) -> float:
