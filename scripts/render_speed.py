@@ -30,8 +30,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from shutter_addon import blender
-from shutter_addon.blender import edits, effects, outputs, pictures, strips
-from shutter_addon.blender.engine import VirtualShutterEngine
+from shutter_addon.blender.data import effects, strips
+from shutter_addon.blender.editing import new_edit
+from shutter_addon.blender.rendering import film_output, session
+from shutter_addon.blender.rendering.engine import VirtualShutterEngine
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.core import light, presets, recipe
@@ -79,8 +81,8 @@ def through_blender(edit, film: Path, render=VirtualShutterEngine.render) -> Non
     # Another engine would make it another strip, and the effect would go with it.
     kept, VirtualShutterEngine.render = VirtualShutterEngine.render, render
     try:
-        pictures.forget()
-        outputs.film(edit, film)
+        session.forget()
+        film_output.film(edit, film)
     finally:
         VirtualShutterEngine.render = kept
 
@@ -132,7 +134,7 @@ def _composed(edit, source, indices) -> dict[int, np.ndarray]:
 
 def measure(args) -> list[dict]:
     with open_source(args.footage) as medium:
-        edit = edits.make_edit(args.footage, medium, effect_recipe(args.window))
+        edit = new_edit.make_edit(args.footage, medium, effect_recipe(args.window))
         count, size = medium.count, (medium.width, medium.height)
     ffmpeg = shutil.which("ffmpeg")
     if ffmpeg is None:
@@ -141,7 +143,7 @@ def measure(args) -> list[dict]:
     errors = {}
     with tempfile.TemporaryDirectory() as folder:
         films = {way: Path(folder, f"{way}.mp4") for way in rates}
-        outputs.set_output(edit, films["ours"], "png", alpha=False)
+        film_output.set_output(edit, films["ours"], "png", alpha=False)
         for _ in range(args.rounds):
             for way, film in films.items():
                 start = time.perf_counter()

@@ -49,10 +49,12 @@ def add_effect(edit, source):
     from importlib import import_module
 
     layer = extension().__name__
-    strips, effects = (import_module(f"{layer}.{name}") for name in ("strips", "effects"))
+    add_effect, recipe_import = (
+        import_module(f"{layer}.{name}") for name in ("editing.add_effect", "data.recipe_import")
+    )
     recipe = import_module(f"{layer.rpartition('.')[0]}.core.recipe")
     presets = import_module(f"{layer.rpartition('.')[0]}.core.presets")
-    strip, effect = strips.add_effect(edit, source)
+    strip, effect = add_effect.add_effect(edit, source)
     lines = {"Sharp": [[0.3, 0.2], [0.5, 0.8]], "Ramp": [[0.7, 0.2], [0.7, 0.8]]}
     bars = {"Long": "ANGLE_360", "Sharp": "STILL", "Ramp": "RAMP_UP"}
     data = {
@@ -62,7 +64,7 @@ def add_effect(edit, source):
         "shutters": [{"name": n, "bars": presets.bars(p, WINDOW).tolist()} for n, p in bars.items()],
         "regions": [{"shutter": n, "kind": "line", "width": 0.02, "strokes": [points]} for n, points in lines.items()],
     }
-    effects.apply(edit, effect, strip, recipe.parse(json.dumps(data)))
+    recipe_import.apply(edit, effect, strip, recipe.parse(json.dumps(data)))
     return strip, effect
 
 

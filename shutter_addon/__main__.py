@@ -1,4 +1,4 @@
-"""`python -m shutter_addon render …` with the bpy wheel; see blender/commands.py."""
+"""`python -m shutter_addon render …` with the bpy wheel; see blender/command.py."""
 
 import os
 import sys
@@ -13,7 +13,7 @@ def main() -> int:
         import bpy  # noqa: F401
 
         from . import blender
-        from .blender.commands import main as command
+        from .blender.command import main as command
 
         blender.register()
     except KeyboardInterrupt:

@@ -75,7 +75,8 @@ def run(folder):
 
 def _edit(bpy, folder, data):
     """An edit as a user makes it: an effect on an image strip, from frame 1 to 40. The names of edit and source."""
-    from shutter_addon.blender import effects, strips
+    from shutter_addon.blender.data import recipe_import, selection
+    from shutter_addon.blender.editing import add_effect
     from shutter_addon.core import recipe
 
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
@@ -86,9 +87,9 @@ def _edit(bpy, folder, data):
     for number in (2, 3):
         source.elements.append(f"f{number:04d}.png")
     source.right_handle = 41
-    strip, effect = strips.add_effect(edit, source)
-    effects.apply(edit, effect, strip, recipe.parse(json.dumps(data)))
-    strips.choose(edit, strip)
+    strip, effect = add_effect.add_effect(edit, source)
+    recipe_import.apply(edit, effect, strip, recipe.parse(json.dumps(data)))
+    selection.choose(edit, strip)
     return edit.name, source.name
 
 
@@ -152,9 +153,9 @@ def _keys(bpy, edit, effect, strip, source, chance):
     path = f"{effect.path_from_id()}.{(*names, 'regions[0].location', 'regions[0].scale')[chance % 8]}"
     edit.animation_data_create()
     edit.keyframe_insert(path, frame=5)
-    from shutter_addon.blender import animation
+    from shutter_addon.blender.data import fcurves
 
-    for curve in animation.curves_under(edit, path):
+    for curve in fcurves.curves_under(edit, path):
         for key in curve.keyframe_points:
             key.co = [(5, -1), (5, 1e30), (1e9, 5), (-1e9, 1e9), (5, float("nan")), (float("nan"), 1)][chance // 8 % 6]
             key.interpolation = ("BEZIER", "ELASTIC", "CONSTANT")[chance // 64 % 3]
@@ -229,30 +230,32 @@ class _Layout:
 
 def _draw(bpy):
     """What panels and lists do when they are drawn."""
-    from shutter_addon.blender import editing, effects, panels, strips
+    from shutter_addon.blender.data import effects, selection
+    from shutter_addon.blender.editing import bar_edits
+    from shutter_addon.blender.interface import panels
 
     for panel in panels.classes:
         if issubclass(panel, bpy.types.Panel) and panel.poll(bpy.context):
             panel.draw(SimpleNamespace(layout=_Layout()), bpy.context)
-    if found := strips.active(bpy.context):
+    if found := selection.active(bpy.context):
         effect = found[1]
         for i, shutter in enumerate(effect.shutters):
             panels.SHUTTER_UL_shutters.draw_item(None, None, _Layout(), effect, shutter, 0, effect, "", i)
             with trial.only(effects.EffectError):
-                editing.bars_now(effect, i)
+                bar_edits.bars_now(effect, i)
         for region in effect.regions:
             panels.SHUTTER_UL_regions.draw_item(None, None, _Layout(), effect, region, 0, effect, "", 0)
         panels.SHUTTER_UL_regions.filter_items(SimpleNamespace(bitflag_filter_item=1), None, effect, "regions")
 
 
 def _export(bpy):
-    from shutter_addon.blender import effects, export, strips
+    from shutter_addon.blender.data import effects, recipe_export, selection
     from shutter_addon.core.recipe import RecipeError
     from shutter_addon.media import MediaError
 
-    if found := strips.active(bpy.context):
+    if found := selection.active(bpy.context):
         with trial.only(effects.EffectError, RecipeError, MediaError):
-            export.recipe_of(*found)
+            recipe_export.recipe_of(*found)
 
 
 def _render(bpy, folder, frame: int) -> int:

@@ -1,19 +1,19 @@
 """Everything that touches bpy: properties, engine, strips, commands."""
 
-from . import (
+from . import handlers
+from .data import properties
+from .interface import (
     bar_editor,
-    building,
-    engine,
-    handlers,
     icons,
+    inbetween_build,
     operators,
     panels,
     preview,
-    properties,
     region_gizmo,
     split_gizmo,
     translations,
 )
+from .rendering import engine
 
 _modules = (
     translations,
@@ -22,7 +22,7 @@ _modules = (
     icons,
     preview,
     operators,
-    building,
+    inbetween_build,
     panels,
     bar_editor,
     region_gizmo,
@@ -51,6 +51,6 @@ def unregister():
 
 
 def _run(argv):
-    from .commands import main
+    from .command import main
 
     return main(argv)

@@ -6,15 +6,18 @@ import sys
 import bpy
 from bpy.app.handlers import persistent
 
-from . import building, cache, copies, kept, lifecycle, pictures, rendering, sources, strips
+from .data import selection, source_media, strips
+from .editing import copies, lifecycle, requirements, undelete
+from .interface import inbetween_build, preview_areas
+from .rendering import invalidation, render_job, session
 
 
 @persistent
 def _before_load(*_):
-    building.stop()
-    pictures.forget()
-    cache.forget()
-    sources.forget()
+    inbetween_build.stop()
+    session.forget()
+    invalidation.forget()
+    source_media.forget()
     lifecycle.forget()
 
 
@@ -26,58 +29,58 @@ def _after_load(*_):
 
 @persistent
 def _update(scene=None, *_):
-    if not rendering.cancelling():
+    if not render_job.cancelling():
         lifecycle.update(scene)
 
 
 @persistent
 def _after_undo(*_):
     for edit in bpy.data.scenes:
-        cache.invalidate(edit)
-    pictures.drop_removed()
+        strips.invalidate(edit)
+    session.drop_removed()
     _show_scribbles()
 
 
 def _show_scribbles():
     """Previews lose their annotation when undo removes it, and do not find it again with redo."""
-    found = strips.active(bpy.context)
-    for _window, area in strips.previews(bpy.context):
+    found = selection.active(bpy.context)
+    for _window, area in preview_areas.previews(bpy.context):
         if found and area.spaces.active.annotation is None:
             area.spaces.active.annotation = found[1].scene.annotation
 
 
 @persistent
 def _before_render(scene, *_):
-    if rendering.cancelling():
+    if render_job.cancelling():
         return
-    rendering.begin(scene)
-    cache.drop_spoilt()
+    render_job.begin(scene)
+    invalidation.drop_spoilt()
     if scene.render.engine == strips.ENGINE:
         return
-    sources.look_again()
-    sources.filming = rendering.runs()
+    source_media.look_again()
+    source_media.filming = render_job.runs()
     if bpy.app.background:  # in a window the render has a thread of its own, and the last update has seen to copies
         lifecycle.mend()
         copies.adopt()
     for edit in bpy.data.scenes:
-        cache.invalidate_changed(edit)
+        invalidation.invalidate_changed(edit)
 
 
 @persistent
 def _before_frame(scene, *_):
-    if rendering.is_film(scene):
-        if (sentence := strips.left_out(scene)) is not None:
-            rendering.fail(sentence)
-        if rendering.stopping():
-            rendering.cancel()
+    if render_job.is_film(scene):
+        if (sentence := requirements.left_out(scene)) is not None:
+            render_job.fail(sentence)
+        if render_job.stopping():
+            render_job.cancel()
 
 
 @persistent
 def _after_render(scene, *_):
-    if rendering.is_film(scene):
-        cache.drop_spoilt()
-    rendering.end(scene, alone=sys._getframe().f_back is None)
-    sources.filming = rendering.runs()
+    if render_job.is_film(scene):
+        invalidation.drop_spoilt()
+    render_job.end(scene, alone=sys._getframe().f_back is None)
+    source_media.filming = render_job.runs()
 
 
 HANDLERS = {
@@ -101,7 +104,7 @@ def register():
 def unregister():
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).remove(function)
-    pictures.forget()
-    sources.forget()
+    session.forget()
+    source_media.forget()
     lifecycle.forget()
-    kept.forget()
+    undelete.forget()

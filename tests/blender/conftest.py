@@ -40,21 +40,22 @@ def edit(bpy):
 @pytest.fixture
 def effect(bpy, edit, tmp_path):
     """What the button makes: an effect with two shutters, on an image strip from frame 1 to 40; its strip active."""
-    from shutter_addon.blender import editing, strips
+    from shutter_addon.blender.data import selection
+    from shutter_addon.blender.editing import add_effect, shutter_edits
 
     first = write_frames(tmp_path / "in", np.zeros((3, 24, 40, 3), dtype=np.uint8))
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
     source.right_handle = 41
-    strip, effect = strips.add_effect(edit, source)
-    editing.start(effect)
-    strips.choose(edit, strip)
+    strip, effect = add_effect.add_effect(edit, source)
+    shutter_edits.start(effect)
+    selection.choose(edit, strip)
     return effect
 
 
 @pytest.fixture
 def render(bpy, tmp_path, monkeypatch):
     """Renders frames of a scene through the sequencer: {frame: (H, W, 4) in 8-bit levels}, from 8 or 16 bits."""
-    from shutter_addon.blender import engine
+    from shutter_addon.blender.rendering import engine
 
     faults = []
     monkeypatch.setattr(engine, "fail", lambda _engine, sentence: faults.append(sentence))

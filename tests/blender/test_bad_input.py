@@ -76,14 +76,14 @@ def test_names_that_are_not_utf8(command, frames, tmp_path, option):
 @pytest.mark.skipif(os.name != "posix", reason="names are bytes on POSIX systems only")
 def test_a_strip_whose_folder_is_not_utf8(edit, frames, tmp_path):
     """Blender's file browser finds such files."""
-    from shutter_addon.blender import strips
+    from shutter_addon.blender.editing import add_effect
 
     odd = tmp_path / os.fsdecode(b"caf\xe9")
     shutil.copytree(frames.parent, odd)
     source = edit.sequence_editor.strips.new_image("images", str(frames), 1, 1)
     source.directory = str(odd)
     with pytest.raises(MediaError) as caught:
-        strips.add_effect(edit, source)
+        add_effect.add_effect(edit, source)
     assert str(caught.value).isprintable()
     assert str(caught.value).endswith("its path is not UTF-8; rename the file, or the folder that is not")
 

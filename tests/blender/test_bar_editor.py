@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 @pytest.fixture(scope="module")
 def editor(bpy):
-    from shutter_addon.blender import bar_editor
+    from shutter_addon.blender.interface import bar_editor
 
     return bar_editor
 

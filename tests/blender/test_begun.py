@@ -12,9 +12,11 @@ from shutter_addon.core import recipe as recipes
 @pytest.fixture
 def film(bpy, edit, tmp_path):
     """An edit of twelve frames of noise under an effect of two shutters and a line; its source, effect and strip."""
-    from shutter_addon.blender import effects, pictures, strips
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import add_effect
+    from shutter_addon.blender.rendering import session
 
-    pictures.forget()
+    session.forget()
     noise = np.random.default_rng(0).integers(0, 256, (12, 24, 40, 3), dtype=np.uint8)
     source = edit.sequence_editor.strips.new_image("images", str(write_frames(tmp_path / "in", noise[:1])), 1, 1)
     write_frames(tmp_path / "in", noise)
@@ -23,10 +25,10 @@ def film(bpy, edit, tmp_path):
     edit.render.resolution_x, edit.render.resolution_y = 40, 24
     edit.frame_start, edit.frame_end = 1, 12
     edit.sequence_editor.use_cache_raw = edit.sequence_editor.use_cache_final = False
-    strip, effect = strips.add_effect(edit, source)
+    strip, effect = add_effect.add_effect(edit, source)
     line = {"shutter": "S1", "kind": "line", "width": 0.1, "strokes": [[[0.2, 0.2], [0.3, 0.8]]]}
     data = recipe(4, [1, 1, 1, 1], [0, 0, 1, 0], regions=[line], border=True)
-    effects.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
+    recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
     return edit, source, effect, strip
 
 
@@ -52,11 +54,11 @@ def test_each_picture_of_a_film_is_made_once(film, render, composed):
 
 
 def test_nothing_is_begun_for_single_pictures(film, render, composed):
-    from shutter_addon.blender import pictures
+    from shutter_addon.blender.rendering import session
 
     edit, *_ = film
     render(edit, [5, 2, 9])
-    pictures.forget()  # which waits for what was begun
+    session.forget()  # which waits for what was begun
     assert composed == [4, 1, 8]
 
 
@@ -83,14 +85,14 @@ def replace(edit, source, effect, strip):
 @pytest.mark.parametrize("change", [weigh, move, slip, widen, replace])
 def test_a_change_leaves_no_trace(film, render, change):
     """Frame 4 is begun when 2 and 3 are rendered; what is shown after a change is what a fresh start shows."""
-    from shutter_addon.blender import pictures
+    from shutter_addon.blender.rendering import session
 
     edit = film[0]
     before = render(edit, [2, 3, 4], "16")[4]
     render(edit, [2, 3], "16")
     change(*film)
     shown = render(edit, [4], "16")[4]
-    pictures.forget()
+    session.forget()
     # Blender keeps the frame that it made last, whatever its settings: another one comes first.
     assert np.array_equal(shown, render(edit, [9, 4], "16")[4])
     assert change is replace or not np.array_equal(shown, before)
@@ -108,7 +110,7 @@ def test_a_frame_that_cannot_be_read_fails_only_when_it_is_shown(film, render, t
 def test_what_a_job_takes_away_meanwhile_is_not_missed(bpy):
     """Scenes that are gone are forgotten on the main thread; a render job may take up what was begun for them between
     the look at what is known and its removal, which is where this one does."""
-    from shutter_addon.blender import pictures
+    from shutter_addon.blender.rendering import session
 
     class Job:
         def __hash__(self):
@@ -120,7 +122,7 @@ def test_what_a_job_takes_away_meanwhile_is_not_missed(bpy):
             return False
 
     for name in ("shown", "_begun", "_renderers"):
-        studio = pictures.Studio(None)
+        studio = session.Studio(None)
         getattr(studio, name)[7] = None
         studio.keep({Job()})
         assert getattr(studio, name) == {}

@@ -15,11 +15,11 @@ FACTOR, COUNT = 4, 6
 
 
 @pytest.fixture
-def building(bpy):
-    from shutter_addon.blender import building
+def inbetween_build(bpy):
+    from shutter_addon.blender.interface import inbetween_build
 
-    yield building
-    building.stop()
+    yield inbetween_build
+    inbetween_build.stop()
 
 
 @pytest.fixture
@@ -53,7 +53,8 @@ def effect(bpy, edit, tmp_path, flow):
 
 def made(edit, folder, first=None):
     """An effect on pictures that are written there; first: the file that the strip begins with."""
-    from shutter_addon.blender import editing, strips
+    from shutter_addon.blender.data import selection
+    from shutter_addon.blender.editing import add_effect, shutter_edits
 
     written = write_frames(folder / "in", [ramp(number) for number in range(COUNT)])
     if first is not None:
@@ -61,23 +62,23 @@ def made(edit, folder, first=None):
     source = edit.sequence_editor.strips.new_image(folder.name, str(written), 1, 1)
     for path in sorted(set(written.parent.iterdir()) - {written}):
         source.elements.append(path.name)
-    strip, effect = strips.add_effect(edit, source)
-    editing.start(effect)
-    strips.choose(edit, strip)
+    strip, effect = add_effect.add_effect(edit, source)
+    shutter_edits.start(effect)
+    selection.choose(edit, strip)
     effect.inbetween = str(FACTOR)
     return effect
 
 
-def look(bpy, building):
+def look(bpy, inbetween_build):
     """What the panel finds, now."""
-    from shutter_addon.blender import strips
+    from shutter_addon.blender.data import selection
 
-    building._looks.clear()
-    return building.look(*strips.active(bpy.context))
+    inbetween_build._looks.clear()
+    return inbetween_build.look(*selection.active(bpy.context))
 
 
-def shown(bpy, building):
-    found = look(bpy, building).state
+def shown(bpy, inbetween_build):
+    found = look(bpy, inbetween_build).state
     return found.name, found.done, found.total
 
 
@@ -85,48 +86,49 @@ def pictures(folder):
     return sorted(path.name for path in folder.rglob("*.png") if path.parent.name != "in")
 
 
-def test_built_shown_and_removed(bpy, building, effect, tmp_path, capfd):
-    assert shown(bpy, building) == ("missing", 0, COUNT - 1)
+def test_built_shown_and_removed(bpy, inbetween_build, effect, tmp_path, capfd):
+    assert shown(bpy, inbetween_build) == ("missing", 0, COUNT - 1)
     assert bpy.ops.shutter.inbetween_build() == {"FINISHED"}
     assert "In-between frames are built" in capfd.readouterr().out
-    assert shown(bpy, building) == ("ready", COUNT - 1, COUNT - 1)
+    assert shown(bpy, inbetween_build) == ("ready", COUNT - 1, COUNT - 1)
     assert len(pictures(tmp_path)) == (COUNT - 1) * (FACTOR - 1)
     (cache,) = (tmp_path / "film" / "virtual_shutter_inbetween").iterdir()
     size = sum(path.stat().st_size for path in cache.rglob("*") if path.is_file())
-    assert look(bpy, building).size == size
+    assert look(bpy, inbetween_build).size == size
     (cache / "notes.txt").write_text("the user's")
     assert bpy.ops.shutter.inbetween_purge() == {"FINISHED"}
     said = capfd.readouterr().out
     assert "Removed" in said
     assert f'Warning: "{cache}": other files stay there (1)' in said
     assert [path.name for path in cache.iterdir()] == ["notes.txt"]
-    assert shown(bpy, building) == ("missing", 0, COUNT - 1)
-    assert look(bpy, building).size == 0
+    assert shown(bpy, inbetween_build) == ("missing", 0, COUNT - 1)
+    assert look(bpy, inbetween_build).size == 0
 
 
-def test_a_build_reopens_its_source_once_and_no_other(bpy, building, edit, effect, flow, tmp_path, monkeypatch):
+def test_a_build_reopens_its_source_once_and_no_other(bpy, inbetween_build, edit, effect, flow, tmp_path, monkeypatch):
     """However often pictures are asked for meanwhile."""
-    from shutter_addon.blender import cache, pictures, strips
+    from shutter_addon.blender.data import selection, strips
+    from shutter_addon.blender.rendering import invalidation, session
 
     bpy.ops.shutter.inbetween_build()
-    first = strips.active(bpy.context)[2]
+    first = selection.active(bpy.context)[2]
     made(edit, tmp_path / "other", "f0102.png")
-    begun = strips.active(bpy.context)
+    begun = selection.active(bpy.context)
     ready = edit, strips.effect_of(edit, first.scene), first
     opened, asked, go = [], threading.Semaphore(0), threading.Semaphore(0)
     monkeypatch.setattr(
-        pictures, "_open", lambda _, strip, usual=pictures._open: opened.append(strip.name) or usual(_, strip)
+        session, "_open", lambda _, strip, usual=session._open: opened.append(strip.name) or usual(_, strip)
     )
 
     def draw():
         for shown in (ready, begun):
-            pictures.moment(*shown, 1)
-        return cache.invalidate_changed(edit)
+            session.moment(*shown, 1)
+        return invalidation.invalidate_changed(edit)
 
     draw()
     assert len(opened) == 2
-    build = building.Build(*begun)
-    building._started(bpy.context, build)
+    build = inbetween_build.Build(*begun)
+    inbetween_build._started(bpy.context, build)
     flow += [asked.release, lambda: go.acquire(timeout=5)]
     for _ in range(COUNT - 1):
         assert asked.acquire(timeout=20)
@@ -135,7 +137,7 @@ def test_a_build_reopens_its_source_once_and_no_other(bpy, building, edit, effec
     wait([build.future], timeout=20)
     assert not draw()
     assert len(opened) == 2
-    building._ended()
+    inbetween_build._ended()
     assert draw()
     assert not draw()
     assert opened[2:] == [strips.source_of(*begun).name]
@@ -147,79 +149,79 @@ def test_nothing_is_left_of_an_empty_folder(bpy, effect, tmp_path):
     assert sorted(path.name for path in (tmp_path / "film").iterdir()) == ["film.blend", "in"]
 
 
-def test_a_stopped_build_keeps_what_it_has_and_goes_on(bpy, building, effect, flow, tmp_path, capfd):
+def test_a_stopped_build_keeps_what_it_has_and_goes_on(bpy, inbetween_build, effect, flow, tmp_path, capfd):
     pairs = []
-    flow += [lambda: pairs.append(1), lambda: len(pairs) == 4 and building.running().stop()]
+    flow += [lambda: pairs.append(1), lambda: len(pairs) == 4 and inbetween_build.running().stop()]
     assert bpy.ops.shutter.inbetween_build() == {"CANCELLED"}
     assert "Stopped: " in capfd.readouterr().out
-    name, done, total = shown(bpy, building)
+    name, done, total = shown(bpy, inbetween_build)
     assert (name, total) == ("partial", COUNT - 1)
     assert 0 < done < total
     flow[:] = [lambda: pairs.append(2)]
     assert bpy.ops.shutter.inbetween_build() == {"FINISHED"}
-    assert shown(bpy, building) == ("ready", total, total)
+    assert shown(bpy, inbetween_build) == ("ready", total, total)
     assert pairs.count(2) == total - done
 
 
-def test_a_build_that_is_stopped_at_once_has_built_nothing(bpy, building, effect, flow):
-    flow.append(lambda: building.running().stop())
+def test_a_build_that_is_stopped_at_once_has_built_nothing(bpy, inbetween_build, effect, flow):
+    flow.append(lambda: inbetween_build.running().stop())
     assert bpy.ops.shutter.inbetween_build() == {"CANCELLED"}
-    assert shown(bpy, building) == ("missing", 0, COUNT - 1)
+    assert shown(bpy, inbetween_build) == ("missing", 0, COUNT - 1)
 
 
-def test_a_second_build_is_refused_and_nothing_is_removed_meanwhile(bpy, building, effect, monkeypatch):
-    monkeypatch.setattr(building, "_running", SimpleNamespace(scene=0))
+def test_a_second_build_is_refused_and_nothing_is_removed_meanwhile(bpy, inbetween_build, effect, monkeypatch):
+    monkeypatch.setattr(inbetween_build, "_running", SimpleNamespace(scene=0))
     for operator in ("inbetween_build", "inbetween_purge"):
         with pytest.raises(RuntimeError, match="In-between frames are being built; Esc stops that"):
             getattr(bpy.ops.shutter, operator)()
     monkeypatch.undo()
 
 
-def test_a_changed_source_makes_them_stale(bpy, building, effect, tmp_path):
+def test_a_changed_source_makes_them_stale(bpy, inbetween_build, effect, tmp_path):
     bpy.ops.shutter.inbetween_build()
     write_frames(tmp_path / "film" / "in", [ramp(number + 9) for number in range(COUNT)])
-    assert shown(bpy, building) == ("stale", 0, COUNT - 1)
-    assert look(bpy, building).size > 0
+    assert shown(bpy, inbetween_build) == ("stale", 0, COUNT - 1)
+    assert look(bpy, inbetween_build).size > 0
     bpy.ops.shutter.inbetween_purge()
     assert pictures(tmp_path) == []
 
 
-def test_another_method_has_frames_of_its_own(bpy, building, effect):
+def test_another_method_has_frames_of_its_own(bpy, inbetween_build, effect):
     bpy.ops.shutter.inbetween_build()
     effect.inbetween_method = "GOOD"
-    assert shown(bpy, building) == ("missing", 0, COUNT - 1)
+    assert shown(bpy, inbetween_build) == ("missing", 0, COUNT - 1)
 
 
-def test_the_estimate_comes_when_it_is_known(bpy, building, effect):
+def test_the_estimate_comes_when_it_is_known(bpy, inbetween_build, effect):
     wait_until = time.monotonic() + 20
-    while (found := look(bpy, building)).estimate is None and time.monotonic() < wait_until:
+    while (found := look(bpy, inbetween_build)).estimate is None and time.monotonic() < wait_until:
         time.sleep(0.05)
     bpy.ops.shutter.inbetween_build()
-    assert found.estimate == pytest.approx(look(bpy, building).size, rel=0.5)
+    assert found.estimate == pytest.approx(look(bpy, inbetween_build).size, rel=0.5)
 
 
 @pytest.mark.usefixtures("effect")  # which is no more once the file is closed
-def test_a_moved_file_finds_its_frames(bpy, building, tmp_path):
+def test_a_moved_file_finds_its_frames(bpy, inbetween_build, tmp_path):
     bpy.ops.file.make_paths_relative()
     bpy.ops.wm.save_mainfile()
     bpy.ops.shutter.inbetween_build()
     shutil.move(tmp_path / "film", tmp_path / "elsewhere")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "elsewhere" / "film.blend"))
-    assert shown(bpy, building) == ("ready", COUNT - 1, COUNT - 1)
+    assert shown(bpy, inbetween_build) == ("ready", COUNT - 1, COUNT - 1)
 
 
-def test_an_unsaved_file_has_no_place_for_them(bpy, building, edit, tmp_path, flow):
-    from shutter_addon.blender import effects
+def test_an_unsaved_file_has_no_place_for_them(bpy, inbetween_build, edit, tmp_path, flow):
+    from shutter_addon.blender.data import effects
 
     made(edit, tmp_path)
     with pytest.raises(effects.EffectError, match="save it first"):
-        look(bpy, building)
+        look(bpy, inbetween_build)
     for operator in ("inbetween_build", "inbetween_purge"):
         with pytest.raises(RuntimeError, match="save it first"):
             getattr(bpy.ops.shutter, operator)()
 
 
-def test_a_checkout_that_is_not_installed_has_no_folder_of_its_own(bpy, building, effect):
+def test_a_checkout_that_is_not_installed_has_no_folder_of_its_own(bpy, inbetween_build, effect):
     effect.inbetween_place = "USER"
     with pytest.raises(RuntimeError, match="only an installed extension has a folder of its own"):
         bpy.ops.shutter.inbetween_build()
@@ -231,15 +233,15 @@ def test_without_a_factor_there_is_nothing_to_build(bpy, effect):
         bpy.ops.shutter.inbetween_build()
 
 
-def test_a_folder_that_cannot_be_written_is_one_sentence(bpy, building, effect, tmp_path):
+def test_a_folder_that_cannot_be_written_is_one_sentence(bpy, inbetween_build, effect, tmp_path):
     (tmp_path / "film" / "virtual_shutter_inbetween").write_text("a file in the way")
     with pytest.raises(RuntimeError, match="in-between frames cannot be written there") as raised:
         bpy.ops.shutter.inbetween_build()
     assert "Traceback" not in str(raised.value)
-    assert building.running() is None
+    assert inbetween_build.running() is None
 
 
-def test_a_folder_that_is_a_link_is_one_sentence_when_it_is_to_be_emptied(bpy, building, effect, tmp_path):
+def test_a_folder_that_is_a_link_is_one_sentence_when_it_is_to_be_emptied(bpy, inbetween_build, effect, tmp_path):
     (tmp_path / "disk").mkdir()
     (tmp_path / "film" / "virtual_shutter_inbetween").symlink_to(tmp_path / "disk")
     assert bpy.ops.shutter.inbetween_build() == {"FINISHED"}
@@ -247,19 +249,26 @@ def test_a_folder_that_is_a_link_is_one_sentence_when_it_is_to_be_emptied(bpy, b
     with pytest.raises(RuntimeError, match=r"virtual_shutter_inbetween: cannot be removed \(it is a link, and"):
         bpy.ops.shutter.inbetween_purge()
     assert pictures(tmp_path / "disk") == built != []
-    assert shown(bpy, building) == ("ready", COUNT - 1, COUNT - 1)
+    assert shown(bpy, inbetween_build) == ("ready", COUNT - 1, COUNT - 1)
 
 
 @pytest.mark.usefixtures("effect")
-def test_what_is_known_is_forgotten_with_the_file(bpy, building, edit):
-    from shutter_addon.blender import cache as finished
+def test_what_is_known_is_forgotten_with_the_file(bpy, inbetween_build, edit):
+    from shutter_addon.blender.rendering import invalidation as finished
     from shutter_addon.media import cache
 
     bpy.ops.shutter.inbetween_build()
-    look(bpy, building)
+    look(bpy, inbetween_build)
     finished.invalidate_changed(edit)
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    known = [cache._finished, cache._sizes, building._looks, building._media, finished._signatures, finished._built]
+    known = [
+        cache._finished,
+        cache._sizes,
+        inbetween_build._looks,
+        inbetween_build._media,
+        finished._signatures,
+        finished._built,
+    ]
     assert not any(known)
     assert cache._content.cache_info().currsize == 0
 
@@ -271,26 +280,26 @@ def test_footage_that_is_gone_is_one_sentence(bpy, effect, tmp_path):
 
 
 @pytest.mark.usefixtures("effect")
-def test_a_file_is_closed_in_the_midst_of_a_build(bpy, building, flow):
+def test_a_file_is_closed_in_the_midst_of_a_build(bpy, inbetween_build, flow):
     """What a window does: the build runs on while Blender handles events."""
-    from shutter_addon.blender import strips
+    from shutter_addon.blender.data import selection
 
     flow.append(lambda: time.sleep(0.05))
-    build = building.Build(*strips.active(bpy.context))
-    building._started(bpy.context, build)
+    build = inbetween_build.Build(*selection.active(bpy.context))
+    inbetween_build._started(bpy.context, build)
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    assert building.running() is None
+    assert inbetween_build.running() is None
     assert build.future.done()
     assert build.future.result().name == "partial"
 
 
-def test_a_look_costs_a_redraw_next_to_nothing(bpy, building, effect):
-    from shutter_addon.blender import strips
+def test_a_look_costs_a_redraw_next_to_nothing(bpy, inbetween_build, effect):
+    from shutter_addon.blender.data import selection
 
     bpy.ops.shutter.inbetween_build()
-    found = strips.active(bpy.context)
-    building.look(*found)
+    found = selection.active(bpy.context)
+    inbetween_build.look(*found)
     start = time.perf_counter()
     for _ in range(100):
-        building.look(*found)
+        inbetween_build.look(*found)
     assert (time.perf_counter() - start) / 100 < 2e-3

@@ -24,22 +24,23 @@ def images(tmp_path):
 @pytest.fixture
 def effect(bpy, edit, images):
     """An effect on an image strip, with keyed bars and a region that moves."""
-    from shutter_addon.blender import effects, strips
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import add_effect
 
     edit.render.resolution_x = edit.render.resolution_y = 32
     source = edit.sequence_editor.strips.new_image("images", str(images), 1, 1)
     for file in sorted(images.parent.iterdir())[1:]:
         source.elements.append(file.name)
-    strip, effect = strips.add_effect(edit, source)
-    effects.apply(edit, effect, strip, recipes.parse(json.dumps(KEYED)))
+    strip, effect = add_effect.add_effect(edit, source)
+    recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(KEYED)))
     bpy.context.view_layer.update()
     return effect
 
 
 def curve(edit, name):
-    from shutter_addon.blender import animation
+    from shutter_addon.blender.data import fcurves
 
-    return next(c for c in animation.curves_under(edit, "virtual_shutter") if c.data_path.endswith(name))
+    return next(c for c in fcurves.curves_under(edit, "virtual_shutter") if c.data_path.endswith(name))
 
 
 def layer(edit):
@@ -188,25 +189,27 @@ def test_the_cache_is_on(bpy, edit, effect, render):
 
 
 def test_what_is_known_of_effects_goes_with_them(edit, effect):
-    from shutter_addon.blender import cache, lifecycle
+    from shutter_addon.blender.editing import lifecycle
+    from shutter_addon.blender.rendering import invalidation
 
-    cache.invalidate_changed(edit)
-    assert effect.scene.session_uid in cache._signatures
+    invalidation.invalidate_changed(edit)
+    assert effect.scene.session_uid in invalidation._signatures
     edit.sequence_editor.strips.remove(next(strip for strip in edit.sequence_editor.strips if strip.type == "SCENE"))
     lifecycle.update()
-    cache.invalidate_changed(edit)
-    assert not cache._signatures
+    invalidation.invalidate_changed(edit)
+    assert not invalidation._signatures
 
 
 def test_stamps_of_in_between_frames_are_bounded(effect, tmp_path, monkeypatch):
-    from shutter_addon.blender import cache, inbetweens, strips
+    from shutter_addon.blender.data import inbetween_settings, strips
+    from shutter_addon.blender.rendering import invalidation
 
     effect.inbetween = "4"
     source = strips.source_of(effect.id_data, effect, strips.effect_strips(effect.id_data)[0])
-    for number in range(2 * cache._KEPT):
-        monkeypatch.setattr(inbetweens, "given", tmp_path / f"{number}")
-        cache.built_key(effect, source)
-    assert len(cache._built) == cache._KEPT
+    for number in range(2 * invalidation._KEPT):
+        monkeypatch.setattr(inbetween_settings, "given", tmp_path / f"{number}")
+        invalidation.built_key(effect, source)
+    assert len(invalidation._built) == invalidation._KEPT
 
 
 def test_a_file_replaced_in_the_middle_is_rendered(bpy, edit, effect, render, images):
@@ -225,10 +228,10 @@ def test_a_file_replaced_in_the_middle_is_rendered(bpy, edit, effect, render, im
 @pytest.fixture
 def clock(monkeypatch):
     """A clock that stands still: a function that sets it forward."""
-    from shutter_addon.blender import sources
+    from shutter_addon.blender.data import source_media
 
     now = [1000.0]
-    monkeypatch.setattr(sources, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr(source_media, "time", SimpleNamespace(monotonic=lambda: now[0]))
 
     def wait(seconds):
         now[0] += seconds
@@ -239,10 +242,10 @@ def clock(monkeypatch):
 @pytest.fixture
 def asked(monkeypatch):
     """The files of which it was asked whether they are the same."""
-    from shutter_addon.blender import sources
+    from shutter_addon.blender.data import source_media
 
-    asked, stamp = [], sources._stamp
-    monkeypatch.setattr(sources, "_stamp", lambda path: asked.append(path) or stamp(path))
+    asked, stamp = [], source_media._stamp
+    monkeypatch.setattr(source_media, "_stamp", lambda path: asked.append(path) or stamp(path))
     return asked
 
 
@@ -258,40 +261,43 @@ def long(edit, effect, images):
 @pytest.mark.usefixtures("long")
 def test_replaced_files_of_a_long_sequence_are_noticed_little_by_little(edit, images, clock, asked):
     """Each look asks few of its files, and all of them are asked in turn."""
-    from shutter_addon.blender import cache, sources
+    from shutter_addon.blender.data import source_media
+    from shutter_addon.blender.rendering import invalidation
 
-    cache.invalidate_changed(edit)
+    invalidation.invalidate_changed(edit)
     for _ in range(10):
         asked.clear()
         clock(1)
-        assert not cache.invalidate_changed(edit)
+        assert not invalidation.invalidate_changed(edit)
         assert 50 < len(asked) < 110
     (images.parent / "f0015.png").write_bytes(images.read_bytes() + b"more")
-    assert any(cache.invalidate_changed(edit) for _ in range(10) if clock(1) is None)
+    assert any(invalidation.invalidate_changed(edit) for _ in range(10) if clock(1) is None)
     (images.parent / "f0016.png").write_bytes(images.read_bytes() + b"more")
-    sources.look_again()
-    assert cache.invalidate_changed(edit)
-    assert not cache.invalidate_changed(edit)
+    source_media.look_again()
+    assert invalidation.invalidate_changed(edit)
+    assert not invalidation.invalidate_changed(edit)
 
 
 @pytest.mark.usefixtures("clock", "long")
 def test_a_redraw_asks_the_ends_of_a_sequence_alone(edit, effect, asked):
-    from shutter_addon.blender import cache, pictures, strips
+    from shutter_addon.blender.data import strips
+    from shutter_addon.blender.rendering import invalidation, session
 
     (strip,) = strips.effect_strips(edit)
-    cache.invalidate_changed(edit)
+    invalidation.invalidate_changed(edit)
     for frame in (FRAME, FRAME + 1):
         asked.clear()
-        cache.invalidate_changed(edit)
-        pictures.moment(edit, effect, strip, frame)
+        invalidation.invalidate_changed(edit)
+        session.moment(edit, effect, strip, frame)
         assert len(asked) == 4
 
 
 def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, render, long, clock, asked, monkeypatch):
     """However long a picture takes."""
-    from shutter_addon.blender import pictures, sources
+    from shutter_addon.blender.data import source_media
+    from shutter_addon.blender.rendering import session
 
-    begin, counts = pictures.begin_next, []
+    begin, counts = session.begin_next, []
 
     def begin_next(*arguments):
         counts.append(len(asked))
@@ -299,7 +305,7 @@ def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, rend
         clock(60)
         begin(*arguments)
 
-    monkeypatch.setattr(pictures, "begin_next", begin_next)
+    monkeypatch.setattr(session, "begin_next", begin_next)
     render(edit, [FRAME])
     counts.clear()
     edit.frame_start, edit.frame_end = 7, 11
@@ -307,20 +313,20 @@ def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, rend
     assert counts[0] >= len(long.elements)
     assert len(counts) >= 5
     assert 2 <= max(counts[1:]) < 10
-    assert not sources.filming
+    assert not source_media.filming
     asked.clear()
-    sources.files_key(long)
+    source_media.files_key(long)
     assert len(asked) == 102
 
 
 def test_what_is_known_of_files_is_bounded(edit, long, monkeypatch):
-    from shutter_addon.blender import sources
+    from shutter_addon.blender.data import source_media
 
-    monkeypatch.setattr(sources, "_KEPT", 4)
+    monkeypatch.setattr(source_media, "_KEPT", 4)
     for number in range(6):
         long.name = f"images {number}"
-        sources.files_key(long)
-    assert [name for _edit, name in sources._looks] == [f"images {number}" for number in range(2, 6)]
+        source_media.files_key(long)
+    assert [name for _edit, name in source_media._looks] == [f"images {number}" for number in range(2, 6)]
 
 
 def test_finished_frames_are_kept_while_nothing_changes(bpy, edit, effect, render, images):

@@ -61,11 +61,12 @@ def clip_strip(bpy, edit):
 
 
 def check(edit, render, source, frames, depth="8", levels=1):
-    from shutter_addon.blender import effects, strips
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import add_effect
 
     plain = render(edit, frames, depth)
-    strip, effect = strips.add_effect(edit, source)
-    effects.apply(edit, effect, strip, recipes.parse(json.dumps(recipe(4, [1, 0, 0, 0]))))
+    strip, effect = add_effect.add_effect(edit, source)
+    recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(recipe(4, [1, 0, 0, 0]))))
     shown = render(edit, [int(frame) for frame in np.random.default_rng(0).permutation(list(frames))], depth)
     for frame in frames:
         solid = plain[frame][..., 3] > 25
@@ -136,22 +137,24 @@ def test_colour_spaces(edit, render, tmp_path, clip_strip, movie, space):
 
 
 def test_what_is_not_supported_is_said(edit, clip_strip, movie):
-    from shutter_addon.blender import editing, pictures, strips
+    from shutter_addon.blender.editing import add_effect, shutter_edits
+    from shutter_addon.blender.rendering import session
 
     source = clip_strip(movie)
-    strip, effect = strips.add_effect(edit, source)
-    editing.start(effect)
-    pictures.picture(strip.scene, 1)
+    strip, effect = add_effect.add_effect(edit, source)
+    shutter_edits.start(effect)
+    session.picture(strip.scene, 1)
     source.stabilize2d = True
-    with pytest.raises(pictures.FAULTS, match='"clip": undistorted or stabilized clips are not supported'):
-        pictures.picture(strip.scene, 1)
+    with pytest.raises(session.FAULTS, match='"clip": undistorted or stabilized clips are not supported'):
+        session.picture(strip.scene, 1)
     source.stabilize2d, source.clip = False, None
-    with pytest.raises(pictures.FAULTS, match='"clip" has no clip'):
-        pictures.picture(strip.scene, 1)
+    with pytest.raises(session.FAULTS, match='"clip" has no clip'):
+        session.picture(strip.scene, 1)
 
 
 def test_a_retimed_clip_is_refused(bpy, edit, clip_strip, movie):
-    from shutter_addon.blender import editing, pictures, strips
+    from shutter_addon.blender.editing import add_effect, shutter_edits
+    from shutter_addon.blender.rendering import session
 
     source = clip_strip(movie)
     edit.sequence_editor.active_strip, source.select, source.show_retiming_keys = source, True, True
@@ -160,7 +163,7 @@ def test_a_retimed_clip_is_refused(bpy, edit, clip_strip, movie):
         bpy.ops.sequencer.retiming_key_add(timeline_frame=5)
         bpy.ops.sequencer.retiming_segment_speed_set(speed=50.0)
     assert source.content_end - source.content_start > 30
-    strip, effect = strips.add_effect(edit, source)
-    editing.start(effect)
-    with pytest.raises(pictures.FAULTS, match='"clip" is not as long as its clip'):
-        pictures.picture(strip.scene, 1)
+    strip, effect = add_effect.add_effect(edit, source)
+    shutter_edits.start(effect)
+    with pytest.raises(session.FAULTS, match='"clip" is not as long as its clip'):
+        session.picture(strip.scene, 1)

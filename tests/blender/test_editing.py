@@ -5,39 +5,35 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from shutter_addon.blender.data import annotations, consistency, selection
+from shutter_addon.blender.editing import bar_edits, region_edits, shutter_edits
+
 RNG = np.random.default_rng(5)
 
 
 @pytest.fixture
-def editing(bpy):
-    from shutter_addon.blender import editing
-
-    return editing
-
-
-@pytest.fixture
-def three(effect, editing):
+def three(effect):
     """An effect with shutters A, B and C of random bars, keyed at frames 1 and 9."""
     edit = effect.id_data
     for i, name in enumerate("ABC"):
         if i == len(effect.shutters):
-            editing.add_shutter(effect)
+            shutter_edits.add_shutter(effect)
         effect.shutters[i].name = name
         for frame in (1, 9):
             edit.frame_set(frame)
-            editing.set_bars(effect.shutters[i], RNG.random(effect.window))
-            editing.key_bars(effect, i)
+            bar_edits.set_bars(effect.shutters[i], RNG.random(effect.window))
+            bar_edits.key_bars(effect, i)
     return effect
 
 
 def curves(effect, under):
     """Keys of the effect's F-curves under a path: {(path from there, index): [(frame, value, interpolation)]}."""
-    from shutter_addon.blender import animation
+    from shutter_addon.blender.data import fcurves
 
     path = f"{effect.path_from_id()}.{under}"
     return {
         (c.data_path.removeprefix(path), c.array_index): [(*k.co, k.interpolation) for k in c.keyframe_points]
-        for c in animation.curves_under(effect.id_data, path)
+        for c in fcurves.curves_under(effect.id_data, path)
     }
 
 
@@ -54,15 +50,15 @@ def layers(effect):
     return [layer.info for layer in effect.scene.annotation.layers]
 
 
-def draw(effect, editing, index, points=((0, 0), (5, 5)), frame=1):
-    stroke = editing.layer_of(effect, effect.regions[index]).frames.new(frame).strokes.new()
+def draw(effect, index, points=((0, 0), (5, 5)), frame=1):
+    stroke = annotations.layer_of(effect, effect.regions[index]).frames.new(frame).strokes.new()
     stroke.points.add(len(points))
     stroke.points.foreach_set("co", np.ravel([(*p, 0) for p in points]))
 
 
 def picture_bars(effect, index, frame):
     """What a picture at a frame is made with."""
-    from shutter_addon.blender import effects, strips
+    from shutter_addon.blender.data import effects, strips
 
     edit, _, strip = strips.find_edit(effect.scene)
     return effects.instant(edit, effect, strip, frame).bars[index]
@@ -71,44 +67,44 @@ def picture_bars(effect, index, frame):
 # Finding
 
 
-def test_what_belongs_to_an_effect_finds_it(effect, editing):
-    region = editing.add_region(effect, effect.shutters[1])
-    assert editing.effect_of(region) == editing.effect_of(effect.shutters[1]) == effect
+def test_what_belongs_to_an_effect_finds_it(effect):
+    region = region_edits.add_region(effect, effect.shutters[1])
+    assert selection.effect_of_item(region) == selection.effect_of_item(effect.shutters[1]) == effect
 
 
-def test_the_active_shutter_and_its_active_region(effect, editing):
+def test_the_active_shutter_and_its_active_region(effect):
     effect.active_shutter = 1
-    assert editing.active_shutter(effect) == effect.shutters[1]
-    assert editing.active_region(effect) is None
-    editing.add_region(effect, effect.shutters[1])
-    assert editing.active_region(effect) == effect.regions[0]
+    assert selection.active_shutter(effect) == effect.shutters[1]
+    assert selection.active_region(effect) is None
+    region_edits.add_region(effect, effect.shutters[1])
+    assert selection.active_region(effect) == effect.regions[0]
     effect.active_shutter = 0
-    assert editing.active_region(effect) is None, "the region is the other shutter's"
+    assert selection.active_region(effect) is None, "the region is the other shutter's"
     effect.shutters.clear()
-    assert editing.active_shutter(effect) is None
-    assert editing.active_region(effect) is None
+    assert selection.active_shutter(effect) is None
+    assert selection.active_region(effect) is None
 
 
-def test_with_a_shutter_one_of_its_regions_is_active(effect, editing):
+def test_with_a_shutter_one_of_its_regions_is_active(effect):
     """Else the list shows regions, and every button says that there is none."""
     for shutter in (0, 0, 1, 1, 0):
-        editing.add_region(effect, effect.shutters[shutter])
+        region_edits.add_region(effect, effect.shutters[shutter])
     effect.active_shutter = 1
     assert effect.active_region == 3
-    editing.remove_region(effect, 3)
+    region_edits.remove_region(effect, 3)
     assert effect.active_region == 2
-    editing.remove_region(effect, 2)
-    assert editing.active_region(effect) is None
+    region_edits.remove_region(effect, 2)
+    assert selection.active_region(effect) is None
     effect.active_shutter = 0
-    assert editing.active_region(effect).shutter == "Long"
-    editing.remove_shutter(effect, 0)
+    assert selection.active_region(effect).shutter == "Long"
+    shutter_edits.remove_shutter(effect, 0)
     assert effect.active_region == 0
 
 
 @given(st.text(max_size=5), st.sets(st.text(max_size=5)))
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_a_unique_name_is_the_wish_or_begins_with_it(editing, name, taken):
-    found = editing.unique(name, taken)
+def test_a_unique_name_is_the_wish_or_begins_with_it(name, taken):
+    found = consistency.unique(name, taken)
     assert found not in taken
     assert found.startswith(name)
     assert (found == name) == (name not in taken)
@@ -117,29 +113,29 @@ def test_a_unique_name_is_the_wish_or_begins_with_it(editing, name, taken):
 # Shutters
 
 
-def test_a_new_effect_has_a_long_and_a_sharp_shutter(effect, editing):
+def test_a_new_effect_has_a_long_and_a_sharp_shutter(effect):
     assert [shutter.name for shutter in effect.shutters] == ["Long", "Sharp"]
-    assert editing.bars(effect.shutters[0]).tolist() == [1] * 8
-    assert editing.bars(effect.shutters[1]).tolist() == [1] + [0] * 7
+    assert consistency.bars(effect.shutters[0]).tolist() == [1] * 8
+    assert consistency.bars(effect.shutters[1]).tolist() == [1] + [0] * 7
     assert effect.border
     assert effect.active_shutter == 1
 
 
-def test_an_added_shutter_is_open_has_a_name_and_a_color_and_is_active(effect, editing):
-    first, second = (editing.add_shutter(effect).name for _ in range(2))
+def test_an_added_shutter_is_open_has_a_name_and_a_color_and_is_active(effect):
+    first, second = (shutter_edits.add_shutter(effect).name for _ in range(2))
     assert (first, second) == ("Shutter", "Shutter.001")
     assert effect.active_shutter == 3
-    assert editing.bars(effect.shutters[3]).tolist() == [1] * 8
+    assert consistency.bars(effect.shutters[3]).tolist() == [1] * 8
     assert len({tuple(shutter.color) for shutter in effect.shutters}) == 4
-    for _ in editing.COLORS:  # there are more shutters than colours
-        editing.add_shutter(effect)
-    assert len({shutter.name for shutter in effect.shutters}) == 4 + len(editing.COLORS)
+    for _ in shutter_edits.COLORS:  # there are more shutters than colours
+        shutter_edits.add_shutter(effect)
+    assert len({shutter.name for shutter in effect.shutters}) == 4 + len(shutter_edits.COLORS)
 
 
-def test_a_duplicate_comes_behind_with_bars_and_keys_of_its_own(three, editing):
+def test_a_duplicate_comes_behind_with_bars_and_keys_of_its_own(three):
     before = shutters_of(three)
-    editing.add_region(three, three.shutters[0])
-    copy = editing.duplicate_shutter(three, 0)
+    region_edits.add_region(three, three.shutters[0])
+    copy = shutter_edits.duplicate_shutter(three, 0)
     assert copy == three.shutters[1]
     assert three.active_shutter == 1
     assert [shutter.name for shutter in three.shutters] == ["A", "A.001", "B", "C"]
@@ -147,41 +143,41 @@ def test_a_duplicate_comes_behind_with_bars_and_keys_of_its_own(three, editing):
     assert {name: after[name] for name in "ABC"} == before
     assert after["A.001"][1] == before["A"][1] != {}
     assert after["A.001"][0] not in [color for color, _ in before.values()]
-    assert editing.bars(three.shutters[1]).tolist() == editing.bars(three.shutters[0]).tolist()
+    assert consistency.bars(three.shutters[1]).tolist() == consistency.bars(three.shutters[0]).tolist()
     assert three.regions[0].shutter == "A"
 
 
-def test_a_removed_shutter_takes_its_keys_regions_and_layers_along(three, editing):
+def test_a_removed_shutter_takes_its_keys_regions_and_layers_along(three):
     for name in "BAB":
-        editing.add_region(three, three.shutters[name])
-        editing.key_region(three, len(three.regions) - 1)
+        region_edits.add_region(three, three.shutters[name])
+        region_edits.key_region(three, len(three.regions) - 1)
     shutters, regions = shutters_of(three), regions_of(three)
-    editing.remove_shutter(three, 1)
+    shutter_edits.remove_shutter(three, 1)
     del shutters["B"], regions["B"], regions["B.001"]
     assert shutters_of(three) == shutters
     assert regions_of(three) == regions
     assert layers(three) == ["A"]
     assert [shutter.name for shutter in three.shutters] == ["A", "C"]
     assert three.active_shutter == 1
-    editing.remove_shutter(three, 1)
-    editing.remove_shutter(three, 0)
+    shutter_edits.remove_shutter(three, 1)
+    shutter_edits.remove_shutter(three, 0)
     assert three.active_shutter == three.active_region == 0
     assert curves(three, "") == {}
     assert layers(three) == []
 
 
 @pytest.mark.parametrize(("index", "to", "order"), [(0, 2, "BCA"), (2, 0, "CAB"), (1, 1, "ABC"), (1, 2, "ACB")])
-def test_a_moved_shutter_keeps_its_keys(three, editing, index, to, order):
+def test_a_moved_shutter_keeps_its_keys(three, index, to, order):
     before = shutters_of(three)
-    editing.move_shutter(three, index, to)
+    shutter_edits.move_shutter(three, index, to)
     assert "".join(shutter.name for shutter in three.shutters) == order
     assert shutters_of(three) == before
     assert three.active_shutter == to
 
 
-def test_regions_follow_a_renamed_shutter(three, editing):
+def test_regions_follow_a_renamed_shutter(three):
     for name in "AB":
-        editing.add_region(three, three.shutters[name])
+        region_edits.add_region(three, three.shutters[name])
     three.shutters[0].name = "B"
     assert three.shutters[0].name == "B.001"
     assert [region.shutter for region in three.regions] == ["B.001", "B"]
@@ -189,17 +185,17 @@ def test_regions_follow_a_renamed_shutter(three, editing):
     assert three.shutters[0].name == "B.001"
 
 
-def test_a_copy_with_the_same_name_takes_no_regions_along(three, editing):
+def test_a_copy_with_the_same_name_takes_no_regions_along(three):
     """As in old files, or of a recipe: the regions are those of the first."""
-    editing.add_region(three, three.shutters[0])
+    region_edits.add_region(three, three.shutters[0])
     three.shutters[1]["name"] = "A"  # past the property's own check
-    assert editing.rename(three, "A", "Z") == "Z"
+    assert consistency.rename(three, "A", "Z") == "Z"
     assert three.regions[0].shutter == "A"
 
 
-def test_scribbles_have_the_color_of_their_shutter(effect, editing):
+def test_scribbles_have_the_color_of_their_shutter(effect):
     for shutter in (0, 1):
-        editing.add_region(effect, effect.shutters[shutter])
+        region_edits.add_region(effect, effect.shutters[shutter])
     colors = [tuple(layer.color) for layer in effect.scene.annotation.layers]
     assert colors == [pytest.approx(tuple(shutter.color)) for shutter in effect.shutters]
     effect.shutters[1].color = (0.1, 0.2, 0.3)
@@ -210,75 +206,75 @@ def test_scribbles_have_the_color_of_their_shutter(effect, editing):
 # Bars
 
 
-def test_set_bars(effect, editing):
+def test_set_bars(effect):
     values = RNG.random(8)
-    editing.set_bars(effect.shutters[0], values)
-    assert editing.bars(effect.shutters[0]) == pytest.approx(values, abs=1e-7)
+    bar_edits.set_bars(effect.shutters[0], values)
+    assert consistency.bars(effect.shutters[0]) == pytest.approx(values, abs=1e-7)
     with pytest.raises(ValueError, match="shorter"):
-        editing.set_bars(effect.shutters[0], values[:5])
+        bar_edits.set_bars(effect.shutters[0], values[:5])
 
 
-def test_bars_that_stay_keep_the_sequencers_frames(effect, editing, monkeypatch):
-    from shutter_addon.blender import cache
+def test_bars_that_stay_keep_the_sequencers_frames(effect, monkeypatch):
+    from shutter_addon.blender.data import strips
 
     dropped = []
-    monkeypatch.setattr(cache, "invalidate", dropped.append)
-    editing.set_bars(effect.shutters[0], np.ones(8))
+    monkeypatch.setattr(strips, "invalidate", dropped.append)
+    bar_edits.set_bars(effect.shutters[0], np.ones(8))
     assert not dropped
-    editing.set_bars(effect.shutters[0], [0.5, *np.ones(7)])
+    bar_edits.set_bars(effect.shutters[0], [0.5, *np.ones(7)])
     assert len(dropped) == 1
 
 
-def test_painted_bars_are_keyed_if_asked(effect, editing):
-    editing.paint(effect, 0, np.full(8, 0.5))
-    assert editing.key_state(effect, 0) == [""] * 8
-    editing.paint(effect, 0, np.full(8, 0.25), key=True)
-    assert editing.bars(effect.shutters[0]).tolist() == [0.25] * 8
-    assert editing.key_state(effect, 0) == ["keyed"] * 8
+def test_painted_bars_are_keyed_if_asked(effect):
+    bar_edits.paint(effect, 0, np.full(8, 0.5))
+    assert bar_edits.key_state(effect, 0) == [""] * 8
+    bar_edits.paint(effect, 0, np.full(8, 0.25), key=True)
+    assert consistency.bars(effect.shutters[0]).tolist() == [0.25] * 8
+    assert bar_edits.key_state(effect, 0) == ["keyed"] * 8
 
 
-def test_a_summary_in_words(editing):
-    assert editing.summary(np.ones(8)) == "360°, 8 frames of light"
-    assert editing.summary([1, 0, 0, 0]) == "90°, 1 frame of light"
-    assert editing.summary([0.5, 0.5]) == "360°, 1 frame of light"
-    assert editing.summary(np.float32([0.1] * 10)) == "360°, 1 frame of light"
-    assert "never opens" in editing.summary([0, 0])
+def test_a_summary_in_words():
+    assert bar_edits.summary(np.ones(8)) == "360°, 8 frames of light"
+    assert bar_edits.summary([1, 0, 0, 0]) == "90°, 1 frame of light"
+    assert bar_edits.summary([0.5, 0.5]) == "360°, 1 frame of light"
+    assert bar_edits.summary(np.float32([0.1] * 10)) == "360°, 1 frame of light"
+    assert "never opens" in bar_edits.summary([0, 0])
 
 
 @given(st.integers(1, 24), st.sampled_from([(1, 1), (2, 4), (3, 3), (4, 2)]), st.booleans())
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=20)
-def test_another_window_keeps_shape_and_share_of_light(effect, editing, window, shape, closed):
+def test_another_window_keeps_shape_and_share_of_light(effect, window, shape, closed):
     from shutter_addon.core import shutters
 
-    editing.set_bars(effect.shutters[0], np.repeat([1.0, 0.25][: 2 - closed] + [0.0] * closed, 4))
-    before = [editing.bars(shutter) for shutter in effect.shutters]
+    bar_edits.set_bars(effect.shutters[0], np.repeat([1.0, 0.25][: 2 - closed] + [0.0] * closed, 4))
+    before = [consistency.bars(shutter) for shutter in effect.shutters]
     effect.window = window
     for shutter, old in zip(effect.shutters, before, strict=True):
-        assert editing.bars(shutter) == pytest.approx(shutters.resample(old, window), abs=1e-6)
-        assert editing.bars(shutter).mean() == pytest.approx(old.mean(), abs=1e-6)
+        assert consistency.bars(shutter) == pytest.approx(shutters.resample(old, window), abs=1e-6)
+        assert consistency.bars(shutter).mean() == pytest.approx(old.mean(), abs=1e-6)
     effect.window = 8
 
 
 @pytest.mark.parametrize("window", [16, 24, 80])
-def test_another_window_and_back_is_exact(three, editing, window):
-    editing.add_shutter(three)  # without keys
+def test_another_window_and_back_is_exact(three, window):
+    shutter_edits.add_shutter(three)  # without keys
     before = shutters_of(three)
-    bars = [editing.bars(shutter) for shutter in three.shutters]
+    bars = [consistency.bars(shutter) for shutter in three.shutters]
     three.window = window
     assert [len(shutter.bars) for shutter in three.shutters] == [window] * 4
     assert len(curves(three, "shutters")) == 3 * window
     for shutter, old in zip(three.shutters, bars, strict=True):
-        assert editing.bars(shutter).tolist() == np.repeat(old, window // 8).tolist()
+        assert consistency.bars(shutter).tolist() == np.repeat(old, window // 8).tolist()
     three.window = 8
     assert shutters_of(three) == before
-    assert [editing.bars(shutter).tolist() for shutter in three.shutters] == [b.tolist() for b in bars]
+    assert [consistency.bars(shutter).tolist() for shutter in three.shutters] == [b.tolist() for b in bars]
 
 
-def test_another_window_keeps_keys_at_their_frames_with_their_ease(three, editing):
-    from shutter_addon.blender import animation
+def test_another_window_keeps_keys_at_their_frames_with_their_ease(three):
+    from shutter_addon.blender.data import fcurves
     from shutter_addon.core import shutters
 
-    for curve in animation.curves_under(three.id_data, f"{three.path_from_id()}.shutters[0]"):
+    for curve in fcurves.curves_under(three.id_data, f"{three.path_from_id()}.shutters[0]"):
         curve.keyframe_points[0].interpolation = "CONSTANT"
     old = {frame: picture_bars(three, 0, frame) for frame in (1, 5, 9)}
     three.window = 6
@@ -288,7 +284,7 @@ def test_another_window_keeps_keys_at_their_frames_with_their_ease(three, editin
         assert picture_bars(three, 0, frame) == pytest.approx(shutters.resample(old[frame], 6), abs=1e-6)
 
 
-def test_a_single_keyed_bar_becomes_keys_on_all(effect, editing):
+def test_a_single_keyed_bar_becomes_keys_on_all(effect):
     edit = effect.id_data
     for frame, weight in ((1, 0.0), (9, 1.0)):
         effect.shutters[0].bars[2].weight = weight
@@ -299,151 +295,151 @@ def test_a_single_keyed_bar_becomes_keys_on_all(effect, editing):
     assert picture_bars(effect, 0, 9) == pytest.approx([1, 1, 1, 1])
 
 
-def test_key_states_as_blender_colors_them(effect, editing):
+def test_key_states_as_blender_colors_them(effect):
     edit = effect.id_data
     edit.frame_set(4)
-    assert editing.key_state(effect, 0) == [""] * 8
+    assert bar_edits.key_state(effect, 0) == [""] * 8
     edit.keyframe_insert(effect.shutters[0].bars[2].path_from_id("weight"))
-    assert editing.key_state(effect, 0) == ["", "", "keyed", *[""] * 5]
+    assert bar_edits.key_state(effect, 0) == ["", "", "keyed", *[""] * 5]
     edit.frame_set(5)
-    assert editing.key_state(effect, 0)[2] == "animated"
+    assert bar_edits.key_state(effect, 0)[2] == "animated"
     effect.shutters[0].bars[2].weight = 0.25
-    assert editing.key_state(effect, 0)[2] == "changed"
+    assert bar_edits.key_state(effect, 0)[2] == "changed"
     edit.frame_set(5)
-    assert editing.key_state(effect, 0)[2] == "animated", "an unkeyed change goes with the frame"
+    assert bar_edits.key_state(effect, 0)[2] == "animated", "an unkeyed change goes with the frame"
 
 
-def test_keys_go_at_the_current_frame_alone(three, editing):
+def test_keys_go_at_the_current_frame_alone(three):
     edit = three.id_data
     before = shutters_of(three)
     edit.frame_set(5)
-    assert not editing.unkey_bars(three, 1)
+    assert not bar_edits.unkey_bars(three, 1)
     assert shutters_of(three) == before
-    editing.key_bars(three, 1)
+    bar_edits.key_bars(three, 1)
     assert {len(keys) for keys in curves(three, "shutters[1]").values()} == {3}
-    assert editing.unkey_bars(three, 1)
-    assert not editing.unkey_bars(three, 1)
+    assert bar_edits.unkey_bars(three, 1)
+    assert not bar_edits.unkey_bars(three, 1)
     assert shutters_of(three) == before
     for frame in (1, 9):
         edit.frame_set(frame)
-        assert editing.unkey_bars(three, 1)
+        assert bar_edits.unkey_bars(three, 1)
     del before["B"]
     after = shutters_of(three)
     assert after.pop("B")[1] == {}, "an F-curve without keys would hold the bars at zero"
     assert after == before
 
 
-def test_bars_now_are_those_of_the_picture(three, editing):
+def test_bars_now_are_those_of_the_picture(three):
     edit = three.id_data
     for frame in np.arange(-2, 12, 0.5):
         edit.frame_set(int(frame // 1), subframe=frame % 1)
         for index in range(3):
-            now = editing.bars_now(three, index)
+            now = bar_edits.bars_now(three, index)
             assert now == pytest.approx(picture_bars(three, index, frame), abs=1e-9), frame
     # Between keys that is not what the F-curves show: times move.
     edit.frame_set(5)
-    assert np.abs(editing.bars_now(three, 0) - editing.bars(three.shutters[0])).max() > 0.01
+    assert np.abs(bar_edits.bars_now(three, 0) - consistency.bars(three.shutters[0])).max() > 0.01
 
 
-def test_bars_now_are_the_changed_ones_until_the_frame_changes(three, editing):
+def test_bars_now_are_the_changed_ones_until_the_frame_changes(three):
     edit = three.id_data
     edit.frame_set(5)
-    shown = editing.bars_now(three, 0)
-    editing.set_bars(three.shutters[0], np.full(8, 0.5))
-    assert editing.bars_now(three, 0).tolist() == [0.5] * 8
+    shown = bar_edits.bars_now(three, 0)
+    bar_edits.set_bars(three.shutters[0], np.full(8, 0.5))
+    assert bar_edits.bars_now(three, 0).tolist() == [0.5] * 8
     edit.frame_set(5)
-    assert editing.bars_now(three, 0) == pytest.approx(shown)
+    assert bar_edits.bars_now(three, 0) == pytest.approx(shown)
 
 
-def test_a_key_between_keys_keeps_the_picture(effect, editing):
+def test_a_key_between_keys_keeps_the_picture(effect):
     """Between two sharp frames lies a sharp frame: the F-curves, a cross-fade, would key two half ones."""
     edit = effect.id_data
     for frame, bars in ((1, np.eye(8)[0]), (9, np.eye(8)[7])):
         edit.frame_set(frame)
-        editing.paint(effect, 0, bars, key=True)
+        bar_edits.paint(effect, 0, bars, key=True)
     edit.frame_set(5)
-    shown = editing.bars_now(effect, 0)
+    shown = bar_edits.bars_now(effect, 0)
     assert shown[[3, 4]] == pytest.approx([0.5, 0.5])
-    editing.key_bars(effect, 0)
-    assert editing.key_state(effect, 0) == ["keyed"] * 8
-    assert editing.bars_now(effect, 0) == pytest.approx(shown, abs=1e-6)
+    bar_edits.key_bars(effect, 0)
+    assert bar_edits.key_state(effect, 0) == ["keyed"] * 8
+    assert bar_edits.bars_now(effect, 0) == pytest.approx(shown, abs=1e-6)
     assert picture_bars(effect, 0, 5) == pytest.approx(shown, abs=1e-6)
 
 
-def test_changed_bars_are_keyed_as_they_stand(three, editing):
+def test_changed_bars_are_keyed_as_they_stand(three):
     three.id_data.frame_set(5)
     values = RNG.random(8)
-    editing.paint(three, 0, values, key=True)
+    bar_edits.paint(three, 0, values, key=True)
     assert picture_bars(three, 0, 5) == pytest.approx(values, abs=1e-6)
 
 
 # Regions
 
 
-def test_a_region_has_a_layer_of_its_own(effect, editing):
+def test_a_region_has_a_layer_of_its_own(effect):
     effect.scene.annotation = None
-    region = editing.add_region(effect, effect.shutters[1], "LASSO")
+    region = region_edits.add_region(effect, effect.shutters[1], "LASSO")
     assert (region.name, region.shutter, region.kind, region.layer) == ("Sharp", "Sharp", "LASSO", "Sharp")
-    region = editing.add_region(effect, effect.shutters[1])
+    region = region_edits.add_region(effect, effect.shutters[1])
     assert (region.name, region.kind, region.layer) == ("Sharp.001", "LINE", "Sharp.001")
     assert effect.active_region == 1
     assert layers(effect) == ["Sharp", "Sharp.001"]
-    assert editing.layer_of(effect, region).info == "Sharp.001"
+    assert annotations.layer_of(effect, region).info == "Sharp.001"
     assert effect.scene.annotation.layers.active_note == "Sharp.001"
 
 
-def test_the_pen_draws_for_the_chosen_shutter(effect, editing):
-    editing.start(effect)
+def test_the_pen_draws_for_the_chosen_shutter(effect):
+    shutter_edits.start(effect)
     for shutter in effect.shutters:
-        editing.add_region(effect, shutter)
+        region_edits.add_region(effect, shutter)
     layers = effect.scene.annotation.layers
     for index, shutter in enumerate(effect.shutters):
         effect.active_shutter = index
-        assert editing.active_region(effect).shutter == shutter.name
-        assert layers[layers.active_index] == editing.layer_of(effect, editing.active_region(effect))
+        assert selection.active_region(effect).shutter == shutter.name
+        assert layers[layers.active_index] == annotations.layer_of(effect, selection.active_region(effect))
 
 
-def test_a_region_without_annotation_has_no_layer(effect, editing):
-    region = editing.add_region(effect, effect.shutters[1])
+def test_a_region_without_annotation_has_no_layer(effect):
+    region = region_edits.add_region(effect, effect.shutters[1])
     effect.scene.annotation.layers.remove(effect.scene.annotation.layers[0])
-    assert editing.layer_of(effect, region) is None
+    assert annotations.layer_of(effect, region) is None
     effect.scene.annotation = None
-    assert editing.layer_of(effect, region) is None
-    editing.remove_region(effect, 0)
+    assert annotations.layer_of(effect, region) is None
+    region_edits.remove_region(effect, 0)
     assert len(effect.regions) == 0
 
 
-def test_a_removed_region_takes_its_keys_and_its_layer_along(effect, editing):
+def test_a_removed_region_takes_its_keys_and_its_layer_along(effect):
     for _ in range(3):
-        editing.add_region(effect, effect.shutters[1])
-        editing.key_region(effect, len(effect.regions) - 1)
+        region_edits.add_region(effect, effect.shutters[1])
+        region_edits.key_region(effect, len(effect.regions) - 1)
     before = regions_of(effect)
-    editing.remove_region(effect, 1)
+    region_edits.remove_region(effect, 1)
     del before["Sharp.001"]
     assert regions_of(effect) == before
     assert layers(effect) == ["Sharp", "Sharp.002"]
 
 
 @pytest.mark.parametrize(("index", "to"), [(0, 2), (2, 0), (1, 2)])
-def test_a_moved_region_keeps_its_keys(effect, editing, index, to):
+def test_a_moved_region_keeps_its_keys(effect, index, to):
     for i in range(3):
-        region = editing.add_region(effect, effect.shutters[1])
+        region = region_edits.add_region(effect, effect.shutters[1])
         region.location = (i / 10, 0.5)
-        editing.key_region(effect, i)
+        region_edits.key_region(effect, i)
     before, names = regions_of(effect), [region.name for region in effect.regions]
-    editing.move_region(effect, index, to)
+    region_edits.move_region(effect, index, to)
     names.insert(to, names.pop(index))
     assert [region.name for region in effect.regions] == names
     assert regions_of(effect) == before
     assert effect.active_region == to
 
 
-def test_keys_of_a_region(effect, editing):
-    editing.add_region(effect, effect.shutters[1])
+def test_keys_of_a_region(effect):
+    region_edits.add_region(effect, effect.shutters[1])
     region = effect.regions[0]
     region.location, region.rotation, region.scale = (0.25, 0.5), 1.5, 2.0
     effect.id_data.frame_set(7)
-    editing.key_region(effect, 0)
+    region_edits.key_region(effect, 0)
     keys = {place: [key[:2] for key in keys] for place, keys in curves(effect, "regions[0].").items()}
     assert keys == {
         ("location", 0): [(7, 0.25)],
@@ -453,36 +449,36 @@ def test_keys_of_a_region(effect, editing):
     }
 
 
-def test_a_layer_of_the_effect_becomes_a_region(effect, editing):
-    editing.add_region(effect, effect.shutters[0])
-    draw(effect, editing, 0)
+def test_a_layer_of_the_effect_becomes_a_region(effect):
+    region_edits.add_region(effect, effect.shutters[0])
+    draw(effect, 0)
     own = effect.scene.annotation.layers.new("Mine", set_active=False)
     stroke = own.frames.new(3).strokes.new()
     stroke.points.add(1)
     stroke.points[0].co = (7, 8, 0)
-    free = editing.free_layers(effect, effect.scene.annotation)
+    free = region_edits.free_layers(effect, effect.scene.annotation)
     assert [layer.info for layer in free] == ["Mine"]
-    region = editing.take_layer(effect, effect.shutters[1], own)
+    region = region_edits.take_layer(effect, effect.shutters[1], own)
     assert (region.name, region.shutter) == ("Mine", "Sharp")
-    (drawing,) = editing.layer_of(effect, region).frames
+    (drawing,) = annotations.layer_of(effect, region).frames
     assert drawing.frame_number == 3
     assert [tuple(point.co) for point in drawing.strokes[0].points] == [(7, 8, 0)]
     assert len(layers(effect)) == 2
-    assert editing.free_layers(effect, effect.scene.annotation) == []
+    assert region_edits.free_layers(effect, effect.scene.annotation) == []
 
 
-def test_a_layer_of_another_annotation_is_copied(bpy, effect, editing):
+def test_a_layer_of_another_annotation_is_copied(bpy, effect):
     other = bpy.data.annotations.new("Notes")
     layer = other.layers.new("Sharp")
     for frame, count in ((2, 3), (5, 1)):
         stroke = layer.frames.new(frame).strokes.new()
         stroke.points.add(count)
         stroke.points.foreach_set("co", np.arange(3 * count))
-    editing.add_region(effect, effect.shutters[1])  # takes the name
-    assert [found.info for found in editing.free_layers(effect, other)] == ["Sharp"]
-    region = editing.take_layer(effect, effect.shutters[1], layer)
+    region_edits.add_region(effect, effect.shutters[1])  # takes the name
+    assert [found.info for found in region_edits.free_layers(effect, other)] == ["Sharp"]
+    region = region_edits.take_layer(effect, effect.shutters[1], layer)
     assert region.name == region.layer == "Sharp.001"
-    copy = editing.layer_of(effect, region)
+    copy = annotations.layer_of(effect, region)
     for old, new in zip(layer.frames, copy.frames, strict=True):
         assert new.frame_number == old.frame_number
         for a, b in zip(old.strokes, new.strokes, strict=True):
@@ -491,17 +487,17 @@ def test_a_layer_of_another_annotation_is_copied(bpy, effect, editing):
     assert len(other.layers) == 1
 
 
-def test_no_annotation_has_no_free_layers(effect, editing):
-    assert editing.free_layers(effect, None) == []
+def test_no_annotation_has_no_free_layers(effect):
+    assert region_edits.free_layers(effect, None) == []
 
 
 # What can be keyed
 
 
-def test_only_what_renders_by_its_keys_can_be_keyed(effect, editing):
+def test_only_what_renders_by_its_keys_can_be_keyed(effect):
     """The renderer evaluates F-curves itself, as the effect's scene is another: keys on anything else would do
     nothing, or for the window leave the bars behind."""
-    editing.add_region(effect, effect.shutters[1])
+    region_edits.add_region(effect, effect.shutters[1])
     groups = effect, effect.shutters[0], effect.shutters[0].bars[0], effect.regions[0]
     can = {
         (type(group).__name__, prop.identifier)
@@ -517,8 +513,8 @@ def test_only_what_renders_by_its_keys_can_be_keyed(effect, editing):
     }
 
 
-def test_keyed_options_hold_from_their_key_on(effect, editing):
-    from shutter_addon.blender import animation, effects
+def test_keyed_options_hold_from_their_key_on(effect):
+    from shutter_addon.blender.data import effects, fcurves
 
     edit = effect.id_data
     for frame, border, edges, aggregate in ((1, False, "HOLD", "1"), (20, True, "SHORTEN", "4")):
@@ -526,7 +522,7 @@ def test_keyed_options_hold_from_their_key_on(effect, editing):
         effect.stop_at_cuts = not border
         for name in ("border", "edges", "aggregate", "stop_at_cuts"):
             effect.keyframe_insert(name, frame=frame)
-    curves = animation.Curves(edit)
+    curves = fcurves.Curves(edit)
     found = [effects.options(effect, curves, frame) for frame in (1, 19, 20, 40)]
     assert [(o.border, o.edges, o.aggregate) for o in found] == [(False, "hold", 1)] * 2 + [(True, "shorten", 4)] * 2
     assert [o.stop_at_cuts for o in found] == [True, True, False, False]

@@ -64,7 +64,8 @@ def keyed_recipe(window=8):
 @pytest.fixture
 def effect_on(bpy, edit, tmp_path):
     """An image strip at frame 31 with a recipe's effect; gives a function of the strip's own frames."""
-    from shutter_addon.blender import effects, strips
+    from shutter_addon.blender.data import effects, recipe_import
+    from shutter_addon.blender.editing import add_effect
 
     def make(data, transform=None):
         first = write_frames(tmp_path / "in", np.zeros((2, 24, 40, 3), dtype=np.uint8))
@@ -72,8 +73,8 @@ def effect_on(bpy, edit, tmp_path):
         source.right_handle = 71
         for name, value in (transform or {}).items():
             setattr(source.transform, name, value)
-        strip, effect = strips.add_effect(edit, source)
-        effects.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
+        strip, effect = add_effect.add_effect(edit, source)
+        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
         return lambda frame: effects.instant(edit, effect, strip, frame + 30)
 
     return make
@@ -108,7 +109,7 @@ def test_a_moved_scaled_and_turned_strip(effect_on):
 
 def test_a_picture_point_lies_where_blender_draws_it(bpy, edit, render, tmp_path):
     """geometry.picture_to_image against a bright pixel block in a rendered, transformed strip."""
-    from shutter_addon.blender import geometry
+    from shutter_addon.blender.data import geometry
 
     picture = np.zeros((1, 40, 60, 3), dtype=np.uint8)
     picture[0, 10:14, 40:44] = 255  # centre: 42/60 across, 12/40 from the top
@@ -124,13 +125,13 @@ def test_a_picture_point_lies_where_blender_draws_it(bpy, edit, render, tmp_path
 
 
 def test_applying_another_recipe_leaves_nothing_of_the_first(bpy, edit, effect_on):
-    from shutter_addon.blender import effects
+    from shutter_addon.blender.data import effects, recipe_import
 
     effect_on(keyed_recipe())
     effect = edit.virtual_shutter.effects[0]
     strip = next(s for s in edit.sequence_editor.strips if s.type == "SCENE")
     plain = recipes.parse('{"version": 1, "window": 2, "shutters": [{"name": "A", "bars": [1, 0]}]}')
-    effects.apply(edit, effect, strip, plain)
+    recipe_import.apply(edit, effect, strip, plain)
     check(effects.instant(edit, effect, strip, 40), plain.at(10, 40 / 24))
     from bpy_extras import anim_utils
 

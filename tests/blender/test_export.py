@@ -81,23 +81,23 @@ def valid_recipes(draw, longest=6):
 @pytest.fixture
 def effect_on(bpy, edit, tmp_path):
     """An effect on an image strip from frame 31 to 70; gives edit, effect and strip."""
-    from shutter_addon.blender import strips
+    from shutter_addon.blender.editing import add_effect
 
     first = write_frames(tmp_path / "in", np.zeros((2, 24, 40, 3), dtype=np.uint8))
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, FIRST)
     source.right_handle = LAST + 1
-    strip, effect = strips.add_effect(edit, source)
+    strip, effect = add_effect.add_effect(edit, source)
     return edit, effect, strip
 
 
 def apply(effect_on, data):
-    from shutter_addon.blender import effects
+    from shutter_addon.blender.data import recipe_import
 
-    effects.apply(*effect_on, recipes.parse(json.dumps(data)) if isinstance(data, dict) else data)
+    recipe_import.apply(*effect_on, recipes.parse(json.dumps(data)) if isinstance(data, dict) else data)
 
 
 def export(effect_on):
-    from shutter_addon.blender.export import recipe_of
+    from shutter_addon.blender.data.recipe_export import recipe_of
 
     return recipe_of(*effect_on)
 
@@ -171,9 +171,9 @@ BASE = {
 
 
 def curve(edit, name, index=0):
-    from shutter_addon.blender import animation
+    from shutter_addon.blender.data import fcurves
 
-    found = (c for c in animation.curves_under(edit, "virtual_shutter") if c.data_path.endswith(name))
+    found = (c for c in fcurves.curves_under(edit, "virtual_shutter") if c.data_path.endswith(name))
     return next(c for c in found if c.array_index == index)
 
 
@@ -192,10 +192,10 @@ def free_handles(edit, effect):
 def keyed_by_blender_in_part(edit, effect):
     """Some bars, some channels, some frames."""
     for name in ("bars[0].weight", "bars[3].weight", "rotation", "scale"):
-        from shutter_addon.blender import animation
+        from shutter_addon.blender.data import fcurves
 
-        found = next(c for c in animation.curves_under(edit, "") if c.data_path.endswith(name))
-        animation.remove_curves(edit, found.data_path)
+        found = next(c for c in fcurves.curves_under(edit, "") if c.data_path.endswith(name))
+        fcurves.remove_curves(edit, found.data_path)
     for frame, weight in ((35, 0.9), (50, 0.2)):
         effect.shutters[1].bars[1].weight = weight
         edit.keyframe_insert("virtual_shutter.effects[0].shutters[1].bars[1].weight", frame=frame)
@@ -231,9 +231,9 @@ def sampled(edit, effect):
 
 
 def placed_without_keys(edit, effect):
-    from shutter_addon.blender import animation
+    from shutter_addon.blender.data import fcurves
 
-    animation.remove_curves(edit, "virtual_shutter.effects[0].regions")
+    fcurves.remove_curves(edit, "virtual_shutter.effects[0].regions")
     layer = effect.scene.annotation.layers[0]
     layer.frames.remove(layer.frames[1])
     effect.regions[0].location, effect.regions[0].rotation = (0.25, 0.5), 0.3
@@ -262,7 +262,7 @@ CASES = [
 @pytest.mark.parametrize("change", CASES, ids=lambda change: change.__name__)
 def test_what_blender_made_agrees_at_every_frame(effect_on, change):
     """Within the tolerance that export states, and again after importing it."""
-    from shutter_addon.blender import effects
+    from shutter_addon.blender.data import effects
 
     apply(effect_on, BASE)
     change(effect_on[0], effect_on[1])
@@ -301,7 +301,7 @@ def test_keys_of_the_source_time_lie_in_a_group_of_the_effect(effect_on):
 @pytest.mark.parametrize("ease", ["linear", "bezier"])
 def test_a_source_time_that_stands_still_keeps_its_direction(effect_on, ease):
     """At the last key of a ramp, and in a freeze behind it; a jump has none."""
-    from shutter_addon.blender import animation, effects
+    from shutter_addon.blender.data import effects, fcurves
 
     edit, effect, _ = effect_on
     keys = [
@@ -313,10 +313,10 @@ def test_a_source_time_that_stands_still_keeps_its_direction(effect_on, ease):
         (51, 15, "constant"),
     ]
     effect.use_source_time = True
-    animation.set_keys(edit, f"{effect.path_from_id()}.source_time", 0, keys)
+    fcurves.set_keys(edit, f"{effect.path_from_id()}.source_time", 0, keys)
     backward = {frame: effects.source_time(edit, effect, frame)[1] for frame in (1, 6, 11, 16, 26, 31, 36, 41, 51, 90)}
     assert [frame for frame, found in backward.items() if found] == [26, 31, 36, 41, 51, 90]
-    animation.set_keys(edit, f"{effect.path_from_id()}.source_time", 0, [(1, 10, "constant"), (11, 5, "constant")])
+    fcurves.set_keys(edit, f"{effect.path_from_id()}.source_time", 0, [(1, 10, "constant"), (11, 5, "constant")])
     assert not effects.source_time(edit, effect, 11)[1]
 
 
@@ -336,7 +336,7 @@ def test_a_source_time_without_keys_holds_a_frame(effect_on):
 @pytest.mark.parametrize("letter", ["a", "ä", "字", "𝄞"])
 def test_names_are_as_long_as_recipes_have_them(effect_on, letter):
     """In characters; whoever types more gets as many as there may be."""
-    from shutter_addon.blender import editing
+    from shutter_addon.blender.editing import shutter_edits
 
     _, effect, _ = effect_on
     apply(effect_on, BASE)
@@ -344,7 +344,7 @@ def test_names_are_as_long_as_recipes_have_them(effect_on, letter):
         item.name = letter * 100
         assert item.name == letter * 63
     for _ in range(2):
-        editing.duplicate_shutter(effect, 0)
+        shutter_edits.duplicate_shutter(effect, 0)
     names = [shutter.name for shutter in effect.shutters]
     assert names[:3] == [letter * 63, f"{letter * 59}.002", f"{letter * 59}.001"]
     assert [shutter.name for shutter in export(effect_on).shutters] == names
@@ -357,7 +357,7 @@ def test_names_are_as_long_as_recipes_have_them(effect_on, letter):
 
 @pytest.mark.parametrize("place", ["shutter", "region"])
 def test_a_longer_name_of_a_file_shows_and_is_no_recipe(effect_on, place):
-    from shutter_addon.blender import effects
+    from shutter_addon.blender.data import effects
 
     edit, effect, strip = effect_on
     apply(effect_on, BASE)
@@ -374,7 +374,7 @@ def test_a_longer_name_of_a_file_shows_and_is_no_recipe(effect_on, place):
 
 
 def test_what_no_recipe_can_hold(effect_on):
-    from shutter_addon.blender.effects import EffectError
+    from shutter_addon.blender.data.effects import EffectError
 
     edit, effect, _ = effect_on
     with pytest.raises(EffectError, match='"Shutter" has no shutter'):
@@ -401,7 +401,7 @@ def test_what_no_recipe_can_hold(effect_on):
 @pytest.mark.parametrize("part", ["time", "shutters", "regions"])
 def test_keys_that_cannot_lie_there_leave_the_effect_as_it_was(effect_on, part, keys, sentence):
     """The strip begins at frame 31, and Blender counts frames in float32."""
-    from shutter_addon.blender.effects import EffectError
+    from shutter_addon.blender.data.effects import EffectError
 
     apply(effect_on, BASE)
     before = export(effect_on)
@@ -419,7 +419,7 @@ def test_keys_that_cannot_lie_there_leave_the_effect_as_it_was(effect_on, part, 
 
 def test_what_a_recipe_may_hold_at_most(effect_on):
     """It is put into Blender's data, comes back as it was, and is drawn; in seconds."""
-    from shutter_addon.blender import effects
+    from shutter_addon.blender.data import effects
 
     far = {"location": [-1000, 1000], "rotation": -360_000, "scale": -1000}
     first, last = -1_048_574 - FIRST + 1 + 2 * (FIRST - 1), 1_048_574 - FIRST + 1

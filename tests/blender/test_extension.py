@@ -125,7 +125,7 @@ def test_python_ends_while_an_effect_is_shown(user_folder, bunny, tmp_path):
 import sys, bpy, addon_utils
 from importlib import import_module
 addon_utils.enable({EXTENSION!r}, default_set=True)
-sys.exit(import_module({EXTENSION!r} + ".shutter_addon.blender.commands").main(sys.argv[1:]))
+sys.exit(import_module({EXTENSION!r} + ".shutter_addon.blender.command").main(sys.argv[1:]))
 """
     (tmp_path / "recipe.json").write_text(json.dumps(LONG_AND_SHARP))
     options = ("--recipe", tmp_path / "recipe.json", "--output", tmp_path / "out", "--frames", 1)

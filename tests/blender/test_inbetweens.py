@@ -25,10 +25,10 @@ def cut_film():
 @pytest.fixture
 def film(tmp_path, monkeypatch):
     """A cut film with its in-betweens: the first file, and all frames in linear light (count, H, W, 3)."""
-    from shutter_addon.blender import inbetweens
+    from shutter_addon.blender.data import inbetween_settings
 
     first = write_frames(tmp_path / "film", cut_film())
-    monkeypatch.setattr(inbetweens, "given", tmp_path / "cache")
+    monkeypatch.setattr(inbetween_settings, "given", tmp_path / "cache")
     with open_source(first) as source:
         build(source, tmp_path / "cache")
         with inbetween.Inbetween(source, tmp_path / "cache", FACTOR, "quick") as every:
@@ -43,17 +43,17 @@ def build(source, folder, **more):
 @pytest.fixture
 def add(bpy, edit):
     """Puts an effect of the factor on an image strip of files from frame 1 on; shutter: its bars."""
-    from shutter_addon.blender import editing, strips
+    from shutter_addon.blender.editing import add_effect, shutter_edits
 
     def added(first, count, bars, **options):
         source = edit.sequence_editor.strips.new_image("film", str(first), 1, 1)
         for number in range(2, count + 1):
             source.elements.append(f"f{number:04d}.png")
-        strip, effect = strips.add_effect(edit, source)
+        strip, effect = add_effect.add_effect(edit, source)
         edit.render.resolution_x, edit.render.resolution_y = 40, 24
         effect.inbetween = str(FACTOR)
         effect.window = len(bars)
-        editing.add_shutter(effect, "S", bars)
+        shutter_edits.add_shutter(effect, "S", bars)
         for name, value in options.items():
             setattr(effect, name, value)
         return source, strip, effect
@@ -103,9 +103,9 @@ def test_a_slow_strip_shows_in_betweens(film, add, edit, render, same_pixels):
     source.retiming_keys.add(timeline_frame=source.right_handle)
     source.retiming_keys[-1].timeline_frame = 1 + 4 * COUNT
     strip.right_handle = source.right_handle
-    from shutter_addon.blender import pictures
+    from shutter_addon.blender.rendering import session
 
-    found = {frame: pictures.moment(edit, _effect, strip, frame).index for frame in range(1, 30)}
+    found = {frame: session.moment(edit, _effect, strip, frame).index for frame in range(1, 30)}
     assert len(set(found.values())) > 20
     for frame, picture in render(edit, (3, 8)).items():
         same_pixels(picture[..., :3], shown(frames, [found[frame]]), 1)
@@ -113,56 +113,59 @@ def test_a_slow_strip_shows_in_betweens(film, add, edit, render, same_pixels):
 
 
 def test_what_is_missing_is_said_and_what_is_built_is_shown(film, add, edit, render, tmp_path, same_pixels):
-    from shutter_addon.blender import inbetweens, pictures
+    from shutter_addon.blender.data import inbetween_settings
+    from shutter_addon.blender.rendering import session
     from shutter_addon.media import MediaError, cache
 
     first, frames = film
     *_, effect = add(first, COUNT, np.ones(6))
-    picture = partial(pictures.picture, effect.scene, 2)
+    picture = partial(session.picture, effect.scene, 2)
     picture()
-    cache.purge(inbetweens.given)
-    for way in (picture, pictures.moment(*pictures.strips.find_edit(effect.scene), 2).check):
+    cache.purge(inbetween_settings.given)
+    for way in (picture, session.moment(*session.strips.find_edit(effect.scene), 2).check):
         with pytest.raises(MediaError, match=r"in-between frames of frame 2 are missing"):
             way()
     with open_source(first) as source:
-        build(source, inbetweens.given, frames=(1, 2))
+        build(source, inbetween_settings.given, frames=(1, 2))
     same_pixels(light.to_encoded(picture()[..., :3]) * 255, shown(frames, range(4, 10)), 1)
     effect.inbetween = "1"  # a frame and a half
     same_pixels(light.to_encoded(picture()[..., :3]) * 255, shown(frames, (4, 4, 8)), 1)
 
 
 def test_in_betweens_of_a_file_that_was_replaced_are_not_shown(film, add, edit, monkeypatch):
-    from shutter_addon.blender import cache, inbetweens, pictures, sources
+    from shutter_addon.blender.data import inbetween_settings, source_media
+    from shutter_addon.blender.rendering import invalidation, session
     from shutter_addon.media import MediaError
 
-    monkeypatch.setattr(sources, "_REST", 0.0)
+    monkeypatch.setattr(source_media, "_REST", 0.0)
     first, _ = film
     *_, effect = add(first, COUNT, np.ones(6))
-    before = pictures.picture(effect.scene, 2)
-    cache.invalidate_changed(edit)
+    before = session.picture(effect.scene, 2)
+    invalidation.invalidate_changed(edit)
     (first.parent / "f0003.png").write_bytes((first.parent / "f0009.png").read_bytes())
-    assert cache.invalidate_changed(edit)
+    assert invalidation.invalidate_changed(edit)
     with pytest.raises(MediaError, match=r"in-between frames of frame 2 are missing"):
-        pictures.picture(effect.scene, 2)
+        session.picture(effect.scene, 2)
     with open_source(first) as source:
-        build(source, inbetweens.given)
-    assert not np.allclose(pictures.picture(effect.scene, 2), before)
+        build(source, inbetween_settings.given)
+    assert not np.allclose(session.picture(effect.scene, 2), before)
 
 
 def test_finished_frames_are_dropped_when_in_betweens_come_and_go(film, add, edit):
-    from shutter_addon.blender import cache, inbetweens
+    from shutter_addon.blender.data import inbetween_settings
+    from shutter_addon.blender.rendering import invalidation
     from shutter_addon.media.cache import purge
 
     first, _ = film
     add(first, COUNT, np.ones(6))
-    cache.invalidate_changed(edit)
-    assert not cache.invalidate_changed(edit)
-    purge(inbetweens.given)
-    assert cache.invalidate_changed(edit)
-    assert not cache.invalidate_changed(edit)
+    invalidation.invalidate_changed(edit)
+    assert not invalidation.invalidate_changed(edit)
+    purge(inbetween_settings.given)
+    assert invalidation.invalidate_changed(edit)
+    assert not invalidation.invalidate_changed(edit)
     with open_source(first) as source:
-        build(source, inbetweens.given, frames=(0, 0))
-    assert cache.invalidate_changed(edit)
+        build(source, inbetween_settings.given, frames=(0, 0))
+    assert invalidation.invalidate_changed(edit)
 
 
 # Bars
@@ -170,15 +173,15 @@ def test_finished_frames_are_dropped_when_in_betweens_come_and_go(film, add, edi
 
 @pytest.mark.parametrize("factor", ["2", "4", "8", "16"])
 def test_bars_stand_for_the_same_times_at_another_factor(effect, factor):
-    from shutter_addon.blender import editing
+    from shutter_addon.blender.editing import bar_edits
 
     rng = np.random.default_rng(3)
     for shutter in effect.shutters:
-        editing.set_bars(shutter, rng.random(8))
-    editing.key_bars(effect, 0)
+        bar_edits.set_bars(shutter, rng.random(8))
+    bar_edits.key_bars(effect, 0)
     effect.id_data.frame_set(9)
-    editing.set_bars(effect.shutters[0], rng.random(8))
-    editing.key_bars(effect, 0)
+    bar_edits.set_bars(effect.shutters[0], rng.random(8))
+    bar_edits.key_bars(effect, 0)
     before = [[at(effect, i, frame) for frame in (1, 9)] for i in range(2)]
     effect.inbetween = factor
     assert effect.window == 8 * int(factor)
@@ -192,46 +195,47 @@ def test_bars_stand_for_the_same_times_at_another_factor(effect, factor):
 
 
 def at(effect, index, frame):
-    from shutter_addon.blender import animation, effects
+    from shutter_addon.blender.data import effects, fcurves
 
-    curves, path = animation.Curves(effect.id_data), f"{effect.path_from_id()}.shutters[{index}]"
+    curves, path = fcurves.Curves(effect.id_data), f"{effect.path_from_id()}.shutters[{index}]"
     return effects.bars_at(curves, path, effect.shutters[index], effects.options(effect), frame)
 
 
 def test_a_part_of_a_source_frame_becomes_a_whole_one(effect):
     """With closed bars at the window's far side."""
-    from shutter_addon.blender import editing
+    from shutter_addon.blender.data import consistency
+    from shutter_addon.blender.editing import bar_edits
 
     effect.inbetween = "8"
     effect.window = 12
-    editing.set_bars(effect.shutters[0], np.ones(12))
+    bar_edits.set_bars(effect.shutters[0], np.ones(12))
     effect.inbetween = "1"
-    assert editing.bars(effect.shutters[0]).tolist() == [1, 0.5]
+    assert consistency.bars(effect.shutters[0]).tolist() == [1, 0.5]
     assert shutters.multiplied(np.ones(12), 8, 1, "end").tolist() == [0.5, 1]
     assert shutters.multiplied(np.ones(12), 8, 1, "center").tolist() == [1, 0.5]
     assert shutters.multiplied(np.ones(12), 8, 4).tolist() == [1] * 6
 
 
 def test_too_many_bars_are_refused_and_nothing_changes(effect, capfd):
-    from shutter_addon.blender import editing
+    from shutter_addon.blender.data import consistency
 
     effect.window = 40
-    before = [editing.bars(shutter).tolist() for shutter in effect.shutters]
+    before = [consistency.bars(shutter).tolist() for shutter in effect.shutters]
     effect.inbetween = "8"
     assert "8× in-between frames take 320 bars; a shutter has 256 at most" in capfd.readouterr().err
     assert (effect.inbetween, effect.window) == ("1", 40)
-    assert [editing.bars(shutter).tolist() for shutter in effect.shutters] == before
+    assert [consistency.bars(shutter).tolist() for shutter in effect.shutters] == before
     with pytest.raises(shutters.ShutterError, match="not 320"):
         shutters.multiplied(np.ones(40), 1, 8)
 
 
 def test_a_copy_of_an_effect_keeps_its_bars(effect, edit):
-    from shutter_addon.blender import copies
+    from shutter_addon.blender.data import property_copy
 
     effect.inbetween = "4"
     path = effect.path_from_id()
     copy = edit.virtual_shutter.effects.add()
     effect = edit.path_resolve(path)
-    copies.copy_properties(effect, copy)
+    property_copy.copy_properties(effect, copy)
     assert (copy.inbetween, copy.window, copy.bars_per_frame) == ("4", 32, 4)
     assert [len(shutter.bars) for shutter in copy.shutters] == [32, 32]

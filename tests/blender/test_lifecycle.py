@@ -30,7 +30,8 @@ def images(tmp_path):
 @pytest.fixture
 def add(edit, images):
     """Puts an image strip with an effect at a frame of the edit."""
-    from shutter_addon.blender import effects, strips
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import add_effect
 
     edit.render.resolution_x = edit.render.resolution_y = 32
 
@@ -38,8 +39,8 @@ def add(edit, images):
         source = edit.sequence_editor.strips.new_image("images", str(images), 1, start)
         for file in sorted(images.parent.iterdir())[1:]:
             source.elements.append(file.name)
-        strip, effect = strips.add_effect(edit, source)
-        effects.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
+        strip, effect = add_effect.add_effect(edit, source)
+        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
         return strip
 
     return add
@@ -55,11 +56,11 @@ def census(bpy):
 
 
 def curves(edit):
-    from shutter_addon.blender import animation
+    from shutter_addon.blender.data import fcurves
 
     return {
         (curve.data_path, curve.array_index): [tuple(key.co) for key in curve.keyframe_points]
-        for curve in animation.curves_under(edit, "")
+        for curve in fcurves.curves_under(edit, "")
     }
 
 
@@ -103,11 +104,11 @@ def test_a_source_that_was_muted_shows_again(bpy, edit, add):
 
 
 def test_a_source_that_the_user_muted_stays_so(bpy, edit, images):
-    from shutter_addon.blender import strips
+    from shutter_addon.blender.editing import add_effect
 
     source = edit.sequence_editor.strips.new_image("images", str(images), 1, 1)
     source.mute = True
-    strip, _ = strips.add_effect(edit, source)
+    strip, _ = add_effect.add_effect(edit, source)
     edit.sequence_editor.strips.remove(strip)
     update(bpy)
     assert source.mute
@@ -227,7 +228,7 @@ def test_a_region_follows_its_layer(bpy, edit, add):
     layer.info = "Renamed"
     update(bpy)
     assert effect.regions[0].layer == "Renamed"
-    from shutter_addon.blender import effects
+    from shutter_addon.blender.data import effects
 
     assert len(effects.instant(edit, effect, strip, 5).shapes[0].strokes) == 1
     strip.scene.annotation.layers.remove(layer)
@@ -247,13 +248,13 @@ def test_linked_scenes_stay(bpy, edit, add, tmp_path):
 
 
 def test_effect_and_source_are_connected_as_the_source_was(edit, add, images):
-    from shutter_addon.blender import strips
+    from shutter_addon.blender.editing import add_effect
 
     source = edit.sequence_editor.strips.new_image("images", str(images), 1, 1)
     friend = edit.sequence_editor.strips.new_image("friend", str(images), 2, 1)
-    strips.connect(edit, [source, friend])
+    add_effect.connect(edit, [source, friend])
     source.select, friend.select = True, False
-    strip, _ = strips.add_effect(edit, source)
+    strip, _ = add_effect.add_effect(edit, source)
     assert {s.name for s in strip.connections} == {"images", "friend"}
     assert {s.name for s in friend.connections} == {"images", "Shutter"}
     assert (source.select, friend.select) == (True, False)
@@ -327,47 +328,52 @@ def test_an_edit_appended_twice_has_two_effects_of_its_own(bpy, library, render)
 
 
 def test_nothing_is_remembered_of_what_is_gone(bpy, edit, add):
-    from shutter_addon.blender import cache, lifecycle, pictures
+    from shutter_addon.blender.editing import lifecycle
+    from shutter_addon.blender.rendering import invalidation, session
 
     first, second = add(1), add(101)
     update(bpy)
     annotation, scene = second.scene.annotation.session_uid, second.scene.session_uid
-    pictures.picture(second.scene, 5)
+    session.picture(second.scene, 5)
     assert annotation in lifecycle._layer_names
-    assert scene in cache._signatures
+    assert scene in invalidation._signatures
     edit.sequence_editor.strips.remove(second)
     update(bpy)
     assert list(lifecycle._layer_names) == [first.scene.annotation.session_uid]
-    assert scene not in cache._signatures
+    assert scene not in invalidation._signatures
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     assert not lifecycle._layer_names
-    assert not cache._signatures
+    assert not invalidation._signatures
 
 
 def test_only_the_last_effects_that_were_removed_are_kept(edit, add):
-    from shutter_addon.blender import kept
+    from shutter_addon.blender.editing import undelete
 
     scene, effect = add().scene, edit.virtual_shutter.effects[0]
-    for i in range(3 * kept._MOST):
-        scene.virtual_shutter.identity = f"identity {i % (2 * kept._MOST)}"
-        kept.keep(edit, effect)
-    assert len(kept._effects) == kept._MOST
-    assert list(kept._effects)[-1] == scene.virtual_shutter.identity
-    assert kept.restore(edit, "identity 1000") is None
-    assert kept.restore(edit, scene.virtual_shutter.identity).virtual_shutter.identity == scene.virtual_shutter.identity
+    for i in range(3 * undelete._MOST):
+        scene.virtual_shutter.identity = f"identity {i % (2 * undelete._MOST)}"
+        undelete.keep(edit, effect)
+    assert len(undelete._effects) == undelete._MOST
+    assert list(undelete._effects)[-1] == scene.virtual_shutter.identity
+    assert undelete.restore(edit, "identity 1000") is None
+    assert (
+        undelete.restore(edit, scene.virtual_shutter.identity).virtual_shutter.identity
+        == scene.virtual_shutter.identity
+    )
 
 
 def test_the_extension_leaves_nothing_kept(bpy, edit, add):
-    from shutter_addon.blender import handlers, kept, lifecycle
+    from shutter_addon.blender import handlers
+    from shutter_addon.blender.editing import lifecycle, undelete
 
     add()
-    kept.keep(edit, edit.virtual_shutter.effects[0])
+    undelete.keep(edit, edit.virtual_shutter.effects[0])
     update(bpy)
-    assert kept._effects
+    assert undelete._effects
     assert lifecycle._layer_names
     handlers.unregister()
     try:
-        assert not kept._effects
+        assert not undelete._effects
         assert not lifecycle._layer_names
     finally:
         handlers.register()

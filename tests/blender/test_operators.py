@@ -9,22 +9,17 @@ import numpy as np
 import pytest
 from support import recipe, sequencer
 
+from shutter_addon.blender.data import annotations, consistency, selection
+from shutter_addon.blender.editing import bar_edits, region_edits
 from shutter_addon.core import limits
 from shutter_addon.core import recipe as recipes
 
 
 @pytest.fixture
 def operators(bpy):
-    from shutter_addon.blender import operators
+    from shutter_addon.blender.interface import operators
 
     return operators
-
-
-@pytest.fixture
-def editing(bpy):
-    from shutter_addon.blender import editing
-
-    return editing
 
 
 def call(bpy, name, *arguments, **settings):
@@ -39,12 +34,12 @@ def effect_now(bpy):
 
 def state(bpy):
     """All that operators change."""
-    from shutter_addon.blender import animation
+    from shutter_addon.blender.data import fcurves
 
     edit = bpy.context.scene
     keys = {
         (c.data_path, c.array_index): [tuple(k.co) for k in c.keyframe_points]
-        for c in animation.curves_under(edit, "virtual_shutter")
+        for c in fcurves.curves_under(edit, "virtual_shutter")
     }
     effects = [
         (
@@ -116,9 +111,8 @@ def test_add_effect_says_what_is_wrong_with_the_footage(bpy, edit, tmp_path):
 
 
 def test_the_source_strip_stands_for_its_effect(bpy, edit, effect, does):
-    from shutter_addon.blender import strips
 
-    strips.choose(edit, next(strip for strip in edit.sequence_editor.strips if strip.type == "IMAGE"))
+    selection.choose(edit, next(strip for strip in edit.sequence_editor.strips if strip.type == "IMAGE"))
     assert len(does("shutter_add").shutters) == 3
 
 
@@ -144,24 +138,24 @@ def test_shutters_come_go_and_move(bpy, effect, does):
 
 
 @pytest.mark.parametrize("preset", ["ANGLE_180", "GAUSSIAN", "LAST"])
-def test_preset(bpy, effect, editing, does, preset):
+def test_preset(bpy, effect, does, preset):
     from shutter_addon.core import presets
 
     effect = does("preset", preset=preset)
-    assert editing.bars(effect.shutters[1]) == pytest.approx(presets.bars(preset, 8), abs=1e-6)
-    assert editing.key_state(effect, 1) == [""] * 8
+    assert consistency.bars(effect.shutters[1]) == pytest.approx(presets.bars(preset, 8), abs=1e-6)
+    assert bar_edits.key_state(effect, 1) == [""] * 8
     bpy.context.scene.tool_settings.use_keyframe_insert_auto = True
     effect = does("preset", preset="TRAIL")
-    assert editing.key_state(effect, 1) == ["keyed"] * 8
+    assert bar_edits.key_state(effect, 1) == ["keyed"] * 8
 
 
-def test_bars_are_keyed_unkeyed_and_typed(bpy, effect, editing, does):
+def test_bars_are_keyed_unkeyed_and_typed(bpy, effect, does):
     effect = does("bars_key")
-    assert editing.key_state(effect, 1) == ["keyed"] * 8
+    assert bar_edits.key_state(effect, 1) == ["keyed"] * 8
     effect = does("bars_unkey")
-    assert editing.key_state(effect, 1) == [""] * 8
+    assert bar_edits.key_state(effect, 1) == [""] * 8
     effect = does("bar_set", bar=3, weight=0.25)
-    assert editing.bars(effect.shutters[1]).tolist() == [1, 0, 0.25, 0, 0, 0, 0, 0]
+    assert consistency.bars(effect.shutters[1]).tolist() == [1, 0, 0.25, 0, 0, 0, 0, 0]
     with pytest.raises(RuntimeError, match="The shutter has 8 bars"):
         call(bpy, "bar_set", bar=9, weight=0.5)
 
@@ -171,14 +165,14 @@ def test_no_key_to_delete(bpy, effect, capfd):
     assert "No bar has a keyframe at the current frame" in capfd.readouterr().out
 
 
-def test_a_typed_bar_between_keys_leaves_the_others_as_they_show(bpy, effect, editing):
+def test_a_typed_bar_between_keys_leaves_the_others_as_they_show(bpy, effect):
     edit = bpy.context.scene
     for frame, bars in ((1, np.eye(8)[0]), (9, np.eye(8)[7])):
         edit.frame_set(frame)
-        editing.paint(effect, 1, bars, key=True)
+        bar_edits.paint(effect, 1, bars, key=True)
     edit.frame_set(5)
     assert call(bpy, "bar_set", bar=1, weight=0.75) == {"FINISHED"}
-    assert editing.bars(effect.shutters[1]) == pytest.approx([0.75, 0, 0, 0.5, 0.5, 0, 0, 0])
+    assert consistency.bars(effect.shutters[1]) == pytest.approx([0.75, 0, 0, 0.5, 0.5, 0, 0, 0])
 
 
 def test_a_drawn_region_is_one_step_of_undo(bpy, effect, does):
@@ -202,21 +196,21 @@ def test_draw_makes_a_region_and_takes_up_the_pen(bpy, effect, preview):
     assert tool(bpy) == "builtin.annotate_eraser"
 
 
-def test_the_pen_draws_on_the_layer_of_the_active_region(bpy, effect, editing, preview):
+def test_the_pen_draws_on_the_layer_of_the_active_region(bpy, effect, preview):
     for _ in range(2):
-        editing.add_region(effect, effect.shutters[1])
+        region_edits.add_region(effect, effect.shutters[1])
     effect.active_region = 0
     bpy.ops.shutter.draw()
     assert preview.annotation.layers.active_note == "Sharp"
     effect.scene.annotation.layers.remove(effect.scene.annotation.layers["Sharp"])
     bpy.ops.shutter.draw()
     assert preview.annotation.layers.active_note == effect.regions[0].layer
-    assert editing.layer_of(effect, effect.regions[0]) is not None
+    assert annotations.layer_of(effect, effect.regions[0]) is not None
 
 
 @pytest.mark.parametrize("name", ["draw", "erase"])
-def test_without_a_preview_the_user_is_told(bpy, effect, editing, capfd, name):
-    editing.add_region(effect, effect.shutters[1])
+def test_without_a_preview_the_user_is_told(bpy, effect, capfd, name):
+    region_edits.add_region(effect, effect.shutters[1])
     assert call(bpy, name) == {"FINISHED"}
     assert "Open a sequencer with a preview" in capfd.readouterr().out
 
@@ -230,17 +224,17 @@ def test_region_take(bpy, effect, preview, does):
         call(bpy, "region_take")
 
 
-def test_region_assign(bpy, effect, editing, does):
-    editing.add_region(effect, effect.shutters[1])
+def test_region_assign(bpy, effect, does):
+    region_edits.add_region(effect, effect.shutters[1])
     effect = does("region_assign", shutter="0")
-    region = editing.active_region(effect)
+    region = selection.active_region(effect)
     assert (region.shutter, effect.active_shutter) == ("Long", 0)
-    assert editing.layer_of(effect, region).color == effect.shutters[0].color
+    assert annotations.layer_of(effect, region).color == effect.shutters[0].color
 
 
-def test_regions_are_keyed_move_and_go(bpy, effect, editing, does):
+def test_regions_are_keyed_move_and_go(bpy, effect, does):
     for _ in range(2):
-        editing.add_region(effect, effect.shutters[1])
+        region_edits.add_region(effect, effect.shutters[1])
     effect = does("region_key")
     assert len(state(bpy)[2]) == 4
     effect = does("region_move", direction="UP")
@@ -345,8 +339,8 @@ def test_a_full_disk_leaves_the_old_recipe(bpy, effect, tmp_path):
     assert [file.name for file in tmp_path.iterdir() if file.name != "in"] == ["out.json"]
 
 
-def test_an_effect_that_cannot_be_rendered_is_not_exported(bpy, effect, editing, tmp_path):
-    editing.set_bars(effect.shutters[1], np.zeros(8))
+def test_an_effect_that_cannot_be_rendered_is_not_exported(bpy, effect, tmp_path):
+    bar_edits.set_bars(effect.shutters[1], np.zeros(8))
     path = tmp_path / "out.json"
     assert "never opens" in refusal(bpy, "recipe_export", filepath=str(path))
     assert not path.exists()

@@ -19,16 +19,18 @@ BROKEN = 4
 @pytest.fixture
 def film(bpy, edit, tmp_path):
     """Six frames under an effect that shows them a frame late, to be rendered as pictures; the edit."""
-    from shutter_addon.blender import effects, pictures, rendering, strips
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import add_effect
+    from shutter_addon.blender.rendering import render_job, session
 
-    pictures.forget()
+    session.forget()
     frames = np.random.default_rng(0).integers(0, 256, (6, 32, 32, 3), dtype=np.uint8)
     first = write_frames(tmp_path / "in", frames)
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
     for i in range(2, 7):
         source.elements.append(f"f{i:04d}.png")
-    strip, effect = strips.add_effect(edit, source)
-    effects.apply(edit, effect, strip, recipes.parse(json.dumps(recipe(2, [0, 1]))))
+    strip, effect = add_effect.add_effect(edit, source)
+    recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(recipe(2, [0, 1]))))
     edit.render.resolution_x = edit.render.resolution_y = 32
     edit.frame_start, edit.frame_end = 1, 6
     edit.render.image_settings.media_type = "IMAGE"
@@ -36,7 +38,7 @@ def film(bpy, edit, tmp_path):
     edit.render.use_file_extension = True
     edit.render.filepath = f"{tmp_path / 'out'}/"
     yield edit
-    rendering.failure = None
+    render_job.failure = None
 
 
 def broken(tmp_path):
@@ -63,7 +65,7 @@ def effect_scene(edit):
 
 
 def test_a_python_that_uses_blender_lives_on(bpy, film, tmp_path, capfd):
-    from shutter_addon.blender import pictures
+    from shutter_addon.blender.rendering import session
 
     mend = broken(tmp_path)
     for _ in range(2):  # the sequencer keeps what it showed in the failed picture's place
@@ -74,7 +76,7 @@ def test_a_python_that_uses_blender_lives_on(bpy, film, tmp_path, capfd):
         assert "Traceback" not in said
     assert len(bpy.data.scenes) == 2
     mend()
-    pictures.forget()
+    session.forget()
     assert bpy.ops.render.render(animation=True) == {"FINISHED"}
     assert len(names(tmp_path / "out")) == 6
     expected = read_picture(tmp_path / "in" / "f0004.png")
@@ -82,13 +84,14 @@ def test_a_python_that_uses_blender_lives_on(bpy, film, tmp_path, capfd):
 
 
 def test_two_effects_of_a_frame_fail(bpy, film, tmp_path, capfd):
-    from shutter_addon.blender import effects, strips
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import add_effect
 
     source = film.sequence_editor.strips.new_image("more", str(tmp_path / "in" / "f0001.png"), 5, 1)
     for i in range(2, 7):
         source.elements.append(f"f{i:04d}.png")
-    strip, effect = strips.add_effect(film, source)
-    effects.apply(film, effect, strip, recipes.parse(json.dumps(recipe(2, [0, 1]))))
+    strip, effect = add_effect.add_effect(film, source)
+    recipe_import.apply(film, effect, strip, recipes.parse(json.dumps(recipe(2, [0, 1]))))
     strip.blend_type = "ALPHA_OVER"
     broken(tmp_path)
     assert bpy.ops.render.render(animation=True) == {"CANCELLED"}
@@ -129,12 +132,12 @@ def test_a_single_frame_that_fails_is_not_written(bpy, film, tmp_path):
 @pytest.mark.parametrize("name", ["resized", "begin_next", "moment"])
 @pytest.mark.parametrize("fault", [MemoryError(), KeyboardInterrupt(), ValueError("odd")])
 def test_no_fault_gives_a_plain_frame(bpy, film, tmp_path, capfd, monkeypatch, name, fault):
-    from shutter_addon.blender import pictures
+    from shutter_addon.blender.rendering import session
 
     def fails(*_arguments):
         raise fault
 
-    monkeypatch.setattr(pictures, name, fails)
+    monkeypatch.setattr(session, name, fails)
     assert bpy.ops.render.render(animation=True) == {"CANCELLED"}
     assert not (tmp_path / "out").exists()
     expected = {MemoryError: "not enough memory", KeyboardInterrupt: "was stopped", ValueError: "internal error"}
@@ -192,7 +195,8 @@ CHANGES = [
 @pytest.mark.parametrize("late", [True, False])
 def test_effects_mend_what_hides_them(bpy, film, tmp_path, change, late):
     """late: no update came before the render, as in a file that was saved by a Blender without the extension."""
-    from shutter_addon.blender import handlers, strips
+    from shutter_addon.blender import handlers
+    from shutter_addon.blender.data import strips
 
     update = handlers.HANDLERS["depsgraph_update_post"]
     film.frame_set(2)
@@ -268,7 +272,7 @@ def stop(scene, *_):
     if scene.frame_current == 20 and scene.render.engine == "VIRTUAL_SHUTTER":
         from shutter_addon.blender import pictures
         def interrupted(*_, **__): signal.raise_signal(signal.SIGINT)
-        pictures.moment = interrupted
+        session.moment = interrupted
 """
     script = SCRIPT.replace("print(bpy.ops", f"{stop}bpy.app.handlers.render_init.append(stop)\nprint(bpy.ops")
     command = [sys.executable, "-c", script, str(tmp_path / "edit.blend")]

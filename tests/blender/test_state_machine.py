@@ -45,13 +45,13 @@ def layers(effect):
 
 def snapshot(bpy):
     """All that the user made; what Blender or chance names, and values that curves drive, left out."""
-    from shutter_addon.blender import animation
+    from shutter_addon.blender.data import fcurves
 
     result = []
     for edit in edits(bpy):
         curves = {
             (c.data_path, c.array_index): [(*k.co, *k.handle_left, k.interpolation) for k in c.keyframe_points]
-            for c in animation.curves_under(edit, "virtual_shutter")
+            for c in fcurves.curves_under(edit, "virtual_shutter")
         }
         effects = [
             (
@@ -151,15 +151,16 @@ class Work(RuleBasedStateMachine):
 
     @rule(data=st.data(), late=st.booleans())
     def add_effect(self, data, late):
-        from shutter_addon.blender import effects, strips
+        from shutter_addon.blender.data import recipe_import
+        from shutter_addon.blender.editing import add_effect
 
         edit = data.draw(st.sampled_from(edits(self.bpy)))
         if not (sources := plain_strips(edit, "IMAGE")) or len(edit.virtual_shutter.effects) >= MOST_EFFECTS:
             return
         with self.step(late):
-            strip, effect = strips.add_effect(edit, data.draw(st.sampled_from(sources)))
+            strip, effect = add_effect.add_effect(edit, data.draw(st.sampled_from(sources)))
             chosen = data.draw(st.sampled_from(RECIPES))
-            effects.apply(edit, effect, strip, recipes.parse(json.dumps(chosen)))
+            recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(chosen)))
 
     @rule(data=st.data(), late=st.booleans(), kind=st.sampled_from(["SCENE", "SCENE", "IMAGE"]))
     def remove_strip(self, data, late, kind):
@@ -281,7 +282,7 @@ class Work(RuleBasedStateMachine):
 
     @invariant()
     def effects_and_strips_are_in_line(self):
-        from shutter_addon.blender import effects, strips
+        from shutter_addon.blender.data import effects, strips
 
         made = [scene for scene in self.bpy.data.scenes if scene.render.engine == strips.ENGINE]
         known = []
@@ -307,11 +308,11 @@ class Work(RuleBasedStateMachine):
 
     @invariant()
     def keys_have_their_properties(self):
-        from shutter_addon.blender import animation
+        from shutter_addon.blender.data import fcurves
 
         actions = []
         for edit in edits(self.bpy):
-            for curve in animation.curves_under(edit, "virtual_shutter"):
+            for curve in fcurves.curves_under(edit, "virtual_shutter"):
                 edit.path_resolve(curve.data_path)
             if edit.virtual_shutter.effects and edit.animation_data:
                 actions.append((edit.animation_data.action, edit.animation_data.action_slot_handle))
@@ -319,7 +320,7 @@ class Work(RuleBasedStateMachine):
 
     @invariant()
     def a_second_update_changes_nothing(self):
-        from shutter_addon.blender import lifecycle
+        from shutter_addon.blender.editing import lifecycle
 
         before = snapshot(self.bpy), [s.name for s in self.bpy.data.scenes]
         lifecycle.update()

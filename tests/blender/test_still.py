@@ -16,13 +16,14 @@ def still_on(edit):
     """An edit of a movie under a still-frame effect, in the movie's size; gives the effect's strip."""
 
     def make(path):
-        from shutter_addon.blender import effects, strips
+        from shutter_addon.blender.data import recipe_import
+        from shutter_addon.blender.editing import add_effect
 
         source = edit.sequence_editor.strips.new_movie("movie", str(path), 1, 1)
         edit.render.resolution_x = source.elements[0].orig_width
         edit.render.resolution_y = source.elements[0].orig_height
-        strip, effect = strips.add_effect(edit, source)
-        effects.apply(edit, effect, strip, recipes.parse(json.dumps(recipe(16, np.eye(16)[0]))))
+        strip, effect = add_effect.add_effect(edit, source)
+        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(recipe(16, np.eye(16)[0]))))
         edit.render.resolution_x, edit.render.resolution_y = (
             strip.scene.render.resolution_x,
             strip.scene.render.resolution_y,
@@ -140,11 +141,12 @@ def _compare(edit, render, tmp_path, same_pixels, name, samples, channels, corne
         source.elements.append(name.replace("a.", f"a{i}."))
     edit.render.resolution_x, edit.render.resolution_y = 32, 24
     plain = render(edit, [1, 2, 3], "16")
-    from shutter_addon.blender import effects, strips
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import add_effect
 
-    _, effect = strips.add_effect(edit, source)
+    _, effect = add_effect.add_effect(edit, source)
     strip = next(s for s in edit.sequence_editor.strips if s.type == "SCENE")
-    effects.apply(edit, effect, strip, recipes.parse(json.dumps(recipe(2, [1, 0]))))
+    recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(recipe(2, [1, 0]))))
     shown = render(edit, [3, 1, 2], "16")
     for frame in (1, 2, 3):
         solid = plain[frame][..., 3] > 25  # of less, straight colours are mostly rounding

@@ -46,7 +46,8 @@ def images(tmp_path_factory):
 @pytest.fixture
 def effect_on(bpy, edit):
     """Puts an effect on a strip: still frames by default; gives strip and effect."""
-    from shutter_addon.blender import effects, strips
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import add_effect
     from shutter_addon.core import recipe as recipes
 
     edit.render.resolution_x = edit.render.resolution_y = 32
@@ -55,8 +56,8 @@ def effect_on(bpy, edit):
     def add(source, data=None):
         import json
 
-        strip, effect = strips.add_effect(edit, source)
-        effects.apply(edit, effect, strip, recipes.parse(json.dumps(data or recipe(4, [1, 0, 0, 0]))))
+        strip, effect = add_effect.add_effect(edit, source)
+        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data or recipe(4, [1, 0, 0, 0]))))
         return strip, effect
 
     return add
@@ -358,22 +359,22 @@ def test_half_resolution(edit, render, effect_on, movie):
 
 
 def test_a_deleted_source_is_said(bpy, edit, effect_on, movie):
-    from shutter_addon.blender import pictures
+    from shutter_addon.blender.rendering import session
 
     source = new_movie(edit, movie)
     _, effect = effect_on(source)
     edit.sequence_editor.strips.remove(source)
-    with pytest.raises(pictures.FAULTS, match='the source strip of "Shutter" was deleted'):
-        pictures.picture(effect.scene, 5)
+    with pytest.raises(session.FAULTS, match='the source strip of "Shutter" was deleted'):
+        session.picture(effect.scene, 5)
 
 
 def test_no_shutters_and_a_closed_shutter_are_said(bpy, edit, effect_on, movie):
-    from shutter_addon.blender import pictures
+    from shutter_addon.blender.rendering import session
 
     _, effect = effect_on(new_movie(edit, movie))
     effect.shutters[0].bars[0].weight = 0
-    with pytest.raises(pictures.FAULTS, match='shutter "S0" at frame 5: all bars are zero'):
-        pictures.picture(effect.scene, 5)
+    with pytest.raises(session.FAULTS, match='shutter "S0" at frame 5: all bars are zero'):
+        session.picture(effect.scene, 5)
     effect.shutters.clear()
-    with pytest.raises(pictures.FAULTS, match='"Shutter" has no shutter'):
-        pictures.picture(effect.scene, 5)
+    with pytest.raises(session.FAULTS, match='"Shutter" has no shutter'):
+        session.picture(effect.scene, 5)

@@ -11,7 +11,7 @@ TOLD = Path(__file__).parent / "told.py"
 
 @pytest.fixture(scope="module")
 def german(bpy):
-    from shutter_addon.blender.translations import LANGUAGES
+    from shutter_addon.blender.interface.translations import LANGUAGES
 
     return LANGUAGES["de_DE"]
 

@@ -26,29 +26,31 @@ def _no_exception(capfd):
 @pytest.fixture
 def effect(bpy, edit, tmp_path, monkeypatch):
     """An effect of two shutters, the second keyed and drawn with; its strip active."""
-    from shutter_addon.blender import editing, effects, pictures, strips
+    from shutter_addon.blender.data import annotations, selection
+    from shutter_addon.blender.editing import add_effect, bar_edits, region_edits, shutter_edits
+    from shutter_addon.blender.rendering import session
 
-    monkeypatch.setattr(pictures, "device", "cpu")
+    monkeypatch.setattr(session, "device", "cpu")
     frames = np.random.default_rng(0).integers(0, 256, (12, 24, 40, 3), dtype=np.uint8)
     first = write_frames(tmp_path / "in", frames)
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
     for file in sorted(first.parent.iterdir())[1:]:
         source.elements.append(file.name)
-    strip, effect = strips.add_effect(edit, source)
+    strip, effect = add_effect.add_effect(edit, source)
     effect.window = 4
-    editing.start(effect)
-    region = editing.add_region(effect, effect.shutters[1], name="Face")
-    draw(effects.layer_of(effect, region), [(-9, -9), (9, 0), (3, 8)])
+    shutter_edits.start(effect)
+    region = region_edits.add_region(effect, effect.shutters[1], name="Face")
+    draw(annotations.layer_of(effect, region), [(-9, -9), (9, 0), (3, 8)])
     for frame in (1, 9):
         edit.frame_set(frame)
         effect.shutters[1].bars[0].weight = frame / 9
-        editing.key_bars(effect, 1)
-        editing.key_region(effect, 0)
+        bar_edits.key_bars(effect, 1)
+        region_edits.key_region(effect, 0)
     edit.keyframe_insert(f"{effect.path_from_id()}.source_time")
-    strips.choose(edit, strip)
+    selection.choose(edit, strip)
     edit.frame_set(4)
     yield effect
-    pictures.forget()
+    session.forget()
 
 
 def draw(layer, points):
@@ -65,16 +67,16 @@ def raw(group, name, value):
 
 
 def unkey(group, name):
-    from shutter_addon.blender import animation
+    from shutter_addon.blender.data import fcurves
 
-    animation.remove_curves(group.id_data, f"{group.path_from_id()}.{name}")
+    fcurves.remove_curves(group.id_data, f"{group.path_from_id()}.{name}")
 
 
 def key(group, name, *points, index=0):
     """Gives a property an F-curve with these keys (frame, value)."""
-    from shutter_addon.blender import animation
+    from shutter_addon.blender.data import fcurves
 
-    curve = animation.new_curve(group.id_data, f"{group.path_from_id()}.{name}", index)
+    curve = fcurves.new_curve(group.id_data, f"{group.path_from_id()}.{name}", index)
     curve.keyframe_points.add(len(points))
     curve.keyframe_points.foreach_set("co", [number for point in points for number in point])
 
@@ -174,14 +176,14 @@ IMPOSSIBLE = {
 @pytest.mark.parametrize("name", IMPOSSIBLE)
 def test_one_sentence_tells_the_place(bpy, edit, effect, name):
     """From the renderer, and from wherever the effect is shown no trace."""
-    from shutter_addon.blender import pictures
+    from shutter_addon.blender.rendering import session
 
     scene = effect.scene
-    assert pictures.picture(scene, 4).shape == (24, 40, 4)
+    assert session.picture(scene, 4).shape == (24, 40, 4)
     change, sentence = IMPOSSIBLE[name]
     change(effect)
-    with pytest.raises(pictures.FAULTS) as raised:
-        pictures.picture(scene, 4)
+    with pytest.raises(session.FAULTS) as raised:
+        session.picture(scene, 4)
     assert sentence in str(raised.value)
     assert len(str(raised.value)) <= 300
     exported(edit, effect)
@@ -190,7 +192,7 @@ def test_one_sentence_tells_the_place(bpy, edit, effect, name):
 
 def test_what_f_curves_give_stays_in_range(bpy, edit, effect):
     """As Blender has it: a curve that overshoots is cut off where the property ends."""
-    from shutter_addon.blender import effects
+    from shutter_addon.blender.data import effects
 
     region = effect.regions[0]
     key(region, "width", (1, -5), (9, -5))
@@ -206,21 +208,23 @@ def test_what_f_curves_give_stays_in_range(bpy, edit, effect):
 
 def test_a_strip_that_is_scaled_to_nothing(bpy, edit, effect):
     """A strip may grow from nothing: where nobody sees it, its scribbles do not matter. A recipe would lack them."""
-    from shutter_addon.blender import export, pictures
+    from shutter_addon.blender.data import recipe_export
+    from shutter_addon.blender.rendering import session
 
     strip = strip_of(effect)
     strip.transform.scale_x = 0
-    assert pictures.picture(effect.scene, 4).shape == (24, 40, 4)
-    with pytest.raises(pictures.FAULTS, match='strip "Shutter" is too small to find its scribbles'):
-        export.recipe_of(edit, effect, strip)
+    assert session.picture(effect.scene, 4).shape == (24, 40, 4)
+    with pytest.raises(session.FAULTS, match='strip "Shutter" is too small to find its scribbles'):
+        recipe_export.recipe_of(edit, effect, strip)
     show(bpy, edit)
 
 
 def test_what_nobody_renders_does_not_matter(bpy, edit, effect):
     """Names twice, layers and shutters that there are not, places in lists beyond their ends."""
-    from shutter_addon.blender import editing, pictures
+    from shutter_addon.blender.data import selection
+    from shutter_addon.blender.rendering import session
 
-    before = pictures.picture(effect.scene, 4)
+    before = session.picture(effect.scene, 4)
     raw(effect, "active_shutter", -3)
     raw(effect, "active_region", 99)
     raw(effect, "start", NAN)
@@ -231,17 +235,18 @@ def test_what_nobody_renders_does_not_matter(bpy, edit, effect):
     other = edit.virtual_shutter.effects.add()
     other.name = effect.name
     effect = edit.virtual_shutter.effects[0]
-    assert editing.active_shutter(effect) is editing.active_region(effect) is None
-    assert np.array_equal(pictures.picture(effect.scene, 4), before)
+    assert selection.active_shutter(effect) is selection.active_region(effect) is None
+    assert np.array_equal(session.picture(effect.scene, 4), before)
     show(bpy, edit)
 
 
 @pytest.mark.parametrize("start", [NAN, 1e30])
 def test_keys_stay_where_they_are_when_the_start_is_none(bpy, edit, effect, start):
-    from shutter_addon.blender import animation, lifecycle
+    from shutter_addon.blender.data import fcurves
+    from shutter_addon.blender.editing import lifecycle
 
     def keys():
-        return [tuple(point.co) for curve in animation.curves_under(edit, "") for point in curve.keyframe_points]
+        return [tuple(point.co) for curve in fcurves.curves_under(edit, "") for point in curve.keyframe_points]
 
     before = keys()
     raw(effect, "start", start)
@@ -252,7 +257,8 @@ def test_keys_stay_where_they_are_when_the_start_is_none(bpy, edit, effect, star
 
 def test_a_copy_has_the_same_impossible_choice(bpy, edit, effect):
     """Copies of what cannot be copied would come with every update, and never be finished."""
-    from shutter_addon.blender import copies, pictures
+    from shutter_addon.blender.editing import copies
+    from shutter_addon.blender.rendering import session
 
     raw(effect, "position", 77)
     raw(effect.regions[0], "kind", 5)
@@ -261,17 +267,17 @@ def test_a_copy_has_the_same_impossible_choice(bpy, edit, effect):
         copies.adopt()
     assert len(edit.virtual_shutter.effects) == 2
     for scene in [effect.scene for effect in edit.virtual_shutter.effects]:
-        with pytest.raises(pictures.FAULTS, match="Position is none of its choices"):
-            pictures.picture(scene, 4)
+        with pytest.raises(session.FAULTS, match="Position is none of its choices"):
+            session.picture(scene, 4)
 
 
 def test_a_cut_strip_comes_back_with_its_impossible_choice(bpy, edit, effect):
-    from shutter_addon.blender import kept
+    from shutter_addon.blender.editing import undelete
 
     raw(effect, "position", 77)
     identity = effect.scene.virtual_shutter.identity
-    kept.keep(edit, effect)
-    scene = kept.restore(edit, identity)
+    undelete.keep(edit, effect)
+    scene = undelete.restore(edit, identity)
     assert scene.virtual_shutter.identity == identity
     assert edit.virtual_shutter.effects[-1].position == ""
     bpy.data.scenes.remove(scene)
@@ -279,7 +285,7 @@ def test_a_cut_strip_comes_back_with_its_impossible_choice(bpy, edit, effect):
 
 def test_editors_can_mend_it(bpy, edit, effect):
     """What the panel offers leads back to a picture."""
-    from shutter_addon.blender import pictures
+    from shutter_addon.blender.rendering import session
 
     scene = effect.scene
     raw(effect, "window", 10**9)
@@ -293,7 +299,7 @@ def test_editors_can_mend_it(bpy, edit, effect):
         assert bpy.ops.shutter.preset(preset="ANGLE_360") == {"FINISHED"}  # of the active one
         effect.active_shutter = 0
         assert bpy.ops.shutter.preset(preset="ANGLE_360") == {"FINISHED"}
-    assert pictures.picture(scene, 4).shape == (24, 40, 4)
+    assert session.picture(scene, 4).shape == (24, 40, 4)
 
 
 def test_a_render_of_such_a_file_ends_with_the_sentence(bpy, edit, effect, tmp_path):
@@ -371,18 +377,19 @@ def corrupt(rng, effect):
 
 
 def rendered(scene):
-    from shutter_addon.blender import pictures
+    from shutter_addon.blender.rendering import session
 
-    with suppress(pictures.FAULTS):
-        assert np.isfinite(pictures.picture(scene, 4)).all()
+    with suppress(session.FAULTS):
+        assert np.isfinite(session.picture(scene, 4)).all()
 
 
 def exported(edit, effect):
-    from shutter_addon.blender import export, pictures
+    from shutter_addon.blender.data import recipe_export
+    from shutter_addon.blender.rendering import session
     from shutter_addon.core.recipe import RecipeError
 
-    with suppress(*pictures.FAULTS, RecipeError):
-        export.recipe_of(edit, effect, strip_of(effect))
+    with suppress(*session.FAULTS, RecipeError):
+        recipe_export.recipe_of(edit, effect, strip_of(effect))
 
 
 class Layout:
@@ -400,22 +407,22 @@ class Layout:
 
 def show(bpy, edit):
     """Calls what Blender calls where an effect is shown: handlers, polls, panels, gizmos."""
-    from shutter_addon.blender import (
+    from shutter_addon.blender.data import selection
+    from shutter_addon.blender.editing import lifecycle
+    from shutter_addon.blender.interface import (
         bar_editor,
-        building,
-        cache,
-        lifecycle,
+        inbetween_build,
         operators,
         panels,
         preview,
         region_gizmo,
         split_gizmo,
-        strips,
     )
+    from shutter_addon.blender.rendering import invalidation
 
     lifecycle.update()
-    cache.invalidate_changed(edit)
-    assert not cache.invalidate_changed(edit), "it would be drawn again and again"
+    invalidation.invalidate_changed(edit)
+    assert not invalidation.invalidate_changed(edit), "it would be drawn again and again"
     with sequencer(bpy) as area:
         region = next(region for region in area.regions if region.type == "PREVIEW")
         with bpy.context.temp_override(region=region):
@@ -423,7 +430,7 @@ def show(bpy, edit):
             preview.shown(context)
             bar_editor.bar_under(context, 30, 30)
             region_gizmo.place(context)
-            for cls in (*operators.classes, *building.classes, *bar_editor.classes, *region_gizmo.classes):
+            for cls in (*operators.classes, *inbetween_build.classes, *bar_editor.classes, *region_gizmo.classes):
                 if hasattr(cls, "poll"):
                     cls.poll(context)
             split_gizmo.SHUTTER_GGT_split.poll(context)
@@ -431,6 +438,6 @@ def show(bpy, edit):
                 if cls.poll(context):
                     drawn = type("Drawn", (), {"layout": Layout()})()
                     next(base for base in cls.__mro__ if "draw" in vars(base)).draw(drawn, context)
-            found = strips.active(context)
+            found = selection.active(context)
             for region in found[1].regions if found else ():
                 panels.SHUTTER_UL_regions.draw_item(None, context, Layout(), found[1], region, 0, None, "", 0)

@@ -10,7 +10,7 @@ import bpy
 from bpy.app.translations import pgettext
 from support import EXTENSION, sequencer
 
-translations = importlib.import_module(f"{EXTENSION}.shutter_addon.blender.translations")
+translations = importlib.import_module(f"{EXTENSION}.shutter_addon.blender.interface.translations")
 view = bpy.context.preferences.view
 view.language = "de_DE"
 view.use_translate_interface = view.use_translate_tooltips = view.use_translate_reports = True

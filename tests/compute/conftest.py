@@ -10,7 +10,7 @@ def blender_device():
     import gpu
 
     gpu.init()
-    from shutter_addon.blender.device import BlenderDevice
+    from shutter_addon.blender.rendering.blender_gpu import BlenderDevice
 
     device = BlenderDevice()
     yield device

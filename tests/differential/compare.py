@@ -39,7 +39,7 @@ def open_devices(names) -> dict:
         import gpu
 
         gpu.init()
-        from shutter_addon.blender.device import BlenderDevice
+        from shutter_addon.blender.rendering.blender_gpu import BlenderDevice
 
         devices["blender"] = GPUCompositor(BlenderDevice())
     return devices

@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import bpy  # noqa: F401 (before all that needs it)
 
 from shutter_addon import blender
-from shutter_addon.blender.commands import main
+from shutter_addon.blender.command import main
 
 blender.register()
 failed = [arguments for arguments in json.load(sys.stdin) if main(arguments)]

@@ -31,7 +31,7 @@ def part(name):
 
 
 def bars():
-    return part("editing").bars_now(effect_now(), 0)
+    return part("editing.bar_edits").bars_now(effect_now(), 0)
 
 
 def preview():
@@ -50,7 +50,7 @@ def add_effect():
 def paint(bar, weight):
     """Drags a bar of the bar editor to a weight."""
     _, _, region = preview()
-    editor = part("bar_editor")
+    editor = part("interface.bar_editor")
     place = editor.layout(region.width, bars(), bpy.context.preferences.system.ui_scale)
     left, bottom, right, top = place.box
     x = left + (bar + 0.5) * (right - left) / place.count
@@ -61,7 +61,7 @@ def paint(bar, weight):
 
 def painted_between_keys():
     """The other bars stay as they were shown; an undo brings all of them back."""
-    editing, effect, edit = part("editing"), effect_now(), edit_now()
+    editing, effect, edit = part("editing.bar_edits"), effect_now(), edit_now()
     effect.active_shutter = 0
     for frame, shown in ((1, np.eye(8)[0]), (9, np.eye(8)[7])):
         edit.frame_set(frame)

@@ -49,7 +49,7 @@ def prepared():
     sys.modules[f"{traces.NAME}.shutter_addon.media.flow"] = SimpleNamespace(between=slow_blend)
     cuts = part("media.cuts")  # as optical flow, they need OpenCV; there are none in this film
     cuts.missing_package, cuts.may_be_cut, cuts.is_cut = lambda: None, lambda *_: False, lambda *_: False
-    panels = part("blender.panels")
+    panels = part("blender.interface.panels")
     for name, closed in (("regions", True), ("options", True), ("inbetween", False)):
         panel = getattr(panels, f"SEQUENCER_PT_shutter_{name}")
         bpy.utils.unregister_class(panel)
@@ -88,9 +88,9 @@ def opened():
 
 
 def look():
-    building = part("blender.building")
+    building = part("blender.interface.inbetween_build")
     building._looks.clear()
-    return building.look(*part("blender.strips").active(bpy.context))
+    return building.look(*part("blender.data.selection").active(bpy.context))
 
 
 def shown(name):
@@ -108,13 +108,13 @@ def shown(name):
 def building_begun():
     with driver.override("PREVIEW"):
         assert bpy.ops.shutter.inbetween_build("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
-    running = part("blender.building").running()
+    running = part("blender.interface.inbetween_build").running()
     yield from driver.until(lambda: running.done >= 4, "pairs are built")
     assert not bpy.ops.shutter.inbetween_build.poll()
 
 
 def ended():
-    yield from driver.until(lambda: part("blender.building").running() is None, "the build ends", 30)
+    yield from driver.until(lambda: part("blender.interface.inbetween_build").running() is None, "the build ends", 30)
 
 
 def built():
@@ -137,7 +137,7 @@ def undone_meanwhile():
     yield from building_begun()
     driver.key("ctrl+z")
     yield from driver.until(lambda: story.effect().border, "the border is back")
-    assert part("blender.building").running() is not None
+    assert part("blender.interface.inbetween_build").running() is not None
 
 
 def gone_stale_and_built_again():
@@ -163,7 +163,7 @@ def removed():
 def put_elsewhere():
     """The extension's own folder lies among the user's."""
     story.effect().inbetween_place = "USER"
-    folder = part("blender.inbetweens").folder(story.effect())
+    folder = part("blender.data.inbetween_settings").folder(story.effect())
     assert Path(os.environ["BLENDER_USER_RESOURCES"]) in folder.parents, folder
     yield from building_begun()
     driver.key("Escape")
@@ -196,7 +196,7 @@ def closed_meanwhile():
     yield from built_anew()
     bpy.ops.wm.open_mainfile(filepath=str(FILM / "film.blend"))
     yield 1.0
-    assert part("blender.building").running() is None
+    assert part("blender.interface.inbetween_build").running() is None
     assert story.effect().inbetween == "4"
     driver.shot("opened again")
     driver.move(story.preview(), 50, 50)  # the operator that waits for an event gets one

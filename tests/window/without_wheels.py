@@ -63,16 +63,16 @@ def story():
     add_effect()
     yield 1.0
     shot("preview")
-    engine = part("engine").VirtualShutterEngine
+    engine = part("rendering.engine").VirtualShutterEngine
     say, said = engine._say, []
     engine._say = lambda self, message: (said.append(message), say(self, message))
     edit.frame_set(3)
     yield 1.0
-    assert part("pictures")._window._compositor.device.name, "the preview is on Blender's GPU"
+    assert part("rendering.session")._window._compositor.device.name, "the preview is on Blender's GPU"
     assert not said, said
     effect = edit.virtual_shutter.effects[0]
-    shown = part("pictures").picture(effect.scene, 3)
-    for strip in part("strips").effect_strips(edit):
+    shown = part("rendering.session").picture(effect.scene, 3)
+    for strip in part("data.strips").effect_strips(edit):
         strip.invalidate_cache("RAW")
     yield from rendered()
     job = support.read_picture(OUT / "job.png")[..., :3] / 255

@@ -1,0 +1,265 @@
+"""The command: from a source and a recipe to a finished film, through Blender's sequencer.
+
+`python -m shutter_addon render …`, and `blender -c shutter render …` in an installed Blender. `inbetween` in place of
+`render` builds in-between frames alone.
+"""
+
+import argparse
+import os
+import re
+import sys
+import traceback
+from contextlib import suppress
+from dataclasses import replace
+from itertools import groupby
+from pathlib import Path
+from typing import get_args
+
+import bpy
+
+from ..compute.errors import NoDeviceError
+from ..compute.renderer import DEVICES
+from ..core import recipe, whole
+from ..core.messages import sentence, signed
+from ..media import MediaError, open_source
+from ..media.files import check_name
+from ..media.sequence import by_number
+from ..media.written import is_whole_blend, why_short
+from .data import effects, inbetween_settings, source_media, strips
+from .editing import new_edit
+from .rendering import film_output, session
+
+BAD_INPUT = 2
+FACTORS = get_args(recipe.Factor)  # 1: none
+METHODS = tuple(inbetween_settings.METHODS.values())
+FAULTS = (recipe.RecipeError, MediaError, film_output.OutputError, effects.EffectError, NoDeviceError)
+
+
+def main(argv: list[str]) -> int:
+    """Runs the command; its exit code: 0, or 2 after one sentence on stderr; 130 where it was stopped."""
+    parser, arguments = _parser(), None
+    try:
+        arguments = parser.parse_args(argv)
+        for path in vars(arguments).values():
+            if isinstance(path, Path):
+                check_name(path)
+        (_render if arguments.command == "render" else _build_alone)(arguments)
+    except SystemExit as stop:  # argparse: --help, or what it has said on stderr
+        return stop.code
+    except KeyboardInterrupt:  # while in-between frames are built; those that are finished stay
+        return film_output.INTERRUPTED
+    except film_output.InterruptedRenderError as stopped:
+        return _refuse(str(stopped), film_output.INTERRUPTED)
+    except FAULTS as error:
+        return _refuse(str(error))
+    except MemoryError as error:
+        return _refuse(str(error) or "not enough memory")
+    except OSError as error:
+        place = getattr(arguments, "output", None) or getattr(arguments, "save", None) or arguments.cache
+        return _refuse(film_output.in_words(error, place))
+    except RuntimeError as error:  # from Blender
+        return _refuse(film_output.message(error))
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        return _refuse(f"internal error: {error!r} in {Path(place.filename).name}, line {place.lineno}")
+    return 0
+
+
+def _refuse(reason: str, code: int = BAD_INPUT) -> int:
+    with suppress(OSError):  # nobody reads it
+        print(signed(reason), file=sys.stderr)
+    return code
+
+
+def _place(text: str) -> Path:
+    """A path as it is named. Two slashes at its beginning, which Blender takes for the .blend's folder, are one."""
+    if not text:
+        raise argparse.ArgumentTypeError("a name is missing")
+    return Path(re.sub("^//+", "/", os.path.abspath(text)))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser("shutter", description="Every pixel its own exposure.")
+    commands = parser.add_subparsers(dest="command", required=True)
+    render = commands.add_parser("render", help="render a source through a recipe")
+    render.add_argument("source", type=_place, help="a movie, or the first file of an image sequence")
+    render.add_argument("--recipe", type=_place, required=True, help="the effect, a JSON file")
+    render.add_argument("--output", type=_place, help=f"a folder, or a movie ({', '.join(film_output.MOVIES)})")
+    render.add_argument(
+        "--format", choices=tuple(film_output.FORMATS), help="of the pictures in a folder: 16-bit png, float exr"
+    )
+    render.add_argument("--frames", metavar="A:B", help="timeline frames A to B; 1 is the strip's first")
+    render.add_argument("--device", choices=DEVICES, default="auto", help="gpu: OpenGL 4.3; cpu: NumPy")
+    render.add_argument("--weights", type=_place, metavar="DIR", help="also write the coefficients, as float EXR")
+    render.add_argument("--save", type=_place, metavar="FILE.blend", help="keep the edit")
+    render.add_argument(
+        "--inbetween", type=int, choices=FACTORS, help="in-between frames, in place of the recipe's factor"
+    )
+    render.add_argument("--inbetween-method", choices=METHODS, help="in place of the recipe's")
+    render.add_argument(
+        "--cache",
+        type=_place,
+        metavar="DIR",
+        help=f'where in-between frames lie (default: "{inbetween_settings.FOLDER}" beside the output, or beside FILE.blend)',
+    )
+    build = commands.add_parser("inbetween", help="build a source's in-between frames")
+    build.add_argument("source", type=_place, help="a movie, or the first file of an image sequence")
+    build.add_argument(
+        "--factor", type=int, choices=FACTORS[1:], required=True, help="how many times the source's rate"
+    )
+    build.add_argument("--method", choices=METHODS, default="quick", help="of optical flow")
+    build.add_argument("--frames", metavar="A:B", help="source frames A to B, and up to the one behind; 1 is the first")
+    build.add_argument("--cache", type=_place, metavar="DIR", required=True, help="where in-between frames shall lie")
+    return parser
+
+
+def _render(arguments) -> None:
+    if arguments.output is None and arguments.save is None:
+        raise film_output.OutputError("nothing to do: give --output, --save or both")
+    source_recipe = _recipe(arguments)
+    path = arguments.source
+    with _opened(path) as medium:
+        output, file_format = arguments.output, arguments.format or "png"
+        if output:
+            film_output.check(output, arguments.format, (medium.width, medium.height))
+            if arguments.save and film_output.is_movie(output) and "#" in output.name:
+                raise film_output.OutputError(f"{output}: in a saved edit, Blender takes # for the frames' numbers")
+        frames = _frames(arguments.frames, new_edit.length(medium, source_recipe))
+        film_output.spare(_written(arguments, file_format, frames), [path, *_files(medium), arguments.recipe])
+        edit = new_edit.make_edit(path, medium, source_recipe)
+    edit.frame_start, edit.frame_end = frames
+    if output:
+        film_output.set_output(edit, output, file_format, alpha=medium.alpha != "opaque")
+    if arguments.save:
+        _save(edit, arguments.save)
+    session.device = arguments.device
+    if source_recipe.inbetween > 1:
+        inbetween_settings.given = _cache(arguments)
+        _build_lacking(edit)
+    if output:
+        session.weights_folder = arguments.weights
+        if arguments.weights:
+            arguments.weights.mkdir(parents=True, exist_ok=True)
+            film_output.clear_up(arguments.weights)
+        film_output.film(edit, output)
+
+
+def _written(arguments, file_format: str, frames: tuple[int, int]) -> list[Path]:
+    """All files that a render writes, but for in-between frames."""
+    found = [arguments.save] if arguments.save else []
+    if arguments.output and film_output.is_movie(arguments.output):
+        found.append(arguments.output)
+    elif arguments.output:
+        found += film_output.pictures_of(arguments.output, file_format, frames)
+        if arguments.weights:
+            found += film_output.pictures_of(arguments.weights, "exr", frames)
+    return found
+
+
+def _files(medium) -> list[Path]:
+    """The files of an image sequence, also those that are missing in it: it would show them, were they there."""
+    files = getattr(medium, "files", [])
+    beside = by_number(files[0]) if files else None
+    return [*files, *(map(beside, range(len(files))) if beside else ())]
+
+
+def _opened(path: Path):
+    """The source, with a word on stderr of files that were left out."""
+    medium = open_source(path)
+    if left_out := getattr(medium, "left_out", ""):
+        print(signed(left_out), file=sys.stderr)
+    return medium
+
+
+def _recipe(arguments) -> recipe.Recipe:
+    """The recipe, with the in-between frames that were asked for."""
+    found = recipe.load(arguments.recipe)
+    if arguments.inbetween is not None:
+        found = recipe.with_inbetween(found, arguments.inbetween)
+    return replace(found, inbetween_method=arguments.inbetween_method or found.inbetween_method)
+
+
+def _cache(arguments) -> Path:
+    """The folder of in-between frames: where a saved edit will look for them, if it is to be saved."""
+    return arguments.cache or (arguments.save or arguments.output).parent / inbetween_settings.FOLDER
+
+
+def _build_lacking(edit) -> None:
+    """Builds the in-between frames that the edit's frames need."""
+    strip = strips.effect_strips(edit)[0]
+    effect = strips.effect_of(edit, strip.scene)
+    pairs = session.pairs(edit, effect, strip, range(edit.frame_start, edit.frame_end + 1))
+    with source_media.open_media(strips.source_of(edit, effect, strip)) as medium:
+        _build(medium, *inbetween_settings.settings(effect), sorted(pairs))
+
+
+def _build_alone(arguments) -> None:
+    path = arguments.source
+    with _opened(path) as medium:
+        first, last = _frames(arguments.frames, medium.count)
+        strip = new_edit.make_source(path, medium)
+    # A strip may read the file in another way, with a colour space of Blender's own choice.
+    with source_media.open_media(strip) as medium:
+        pairs = range(first - 1, min(last, medium.count - 1))
+        _build(medium, arguments.cache, arguments.factor, arguments.method, pairs)
+
+
+def _build(medium, folder: Path, factor: int, method: str, pairs) -> None:
+    """Builds the in-betweens of these pairs of source frames, each given by its first, in ascending order."""
+    from ..media.inbetween import build
+
+    with film_output.progress(len(pairs), "pair") as moved:
+        # pairs that follow one another, whose difference from their place among all is the same
+        for _, chunk in groupby(enumerate(pairs), lambda item: item[1] - item[0]):
+            numbers = [pair for _, pair in chunk]
+            build(medium, folder, factor, method, (numbers[0], numbers[-1]), update=lambda *_: moved())
+
+
+def _frames(text: str | None, count: int) -> tuple[int, int]:
+    """First and last timeline frame of `A:B`, of `A` alone, or of the whole clip."""
+    if text is None:
+        return 1, count
+    numbers = re.fullmatch(r"(-?\d{1,9})(?::(-?\d{1,9}))?", text)
+    if not numbers:
+        raise film_output.OutputError(f'--frames: "{sentence(text, 40)}" is not A:B')
+    first, last = int(numbers[1]), int(numbers[2] or numbers[1])
+    if not 1 <= first <= last <= count:
+        raise film_output.OutputError(f"--frames: {text} is not within the clip's frames 1:{count}")
+    return first, last
+
+
+def _save(edit, path: Path) -> None:
+    """Saves the edit, its paths relative to the file: it may be opened on another machine. OutputError: it cannot be
+    saved whole; what stood there stays."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        film_output.clear_up(path.parent)
+        _save_whole(edit, path)
+    except OSError as error:
+        raise film_output.OutputError(f"{path}: {error.strerror or error}") from None
+
+
+def _save_whole(edit, path: Path) -> None:
+    with whole.part_folder(path.parent) as folder:
+        part = folder / "edit.blend"
+        try:
+            with film_output.quiet(), new_edit.paths_relative(edit, path.parent):
+                bpy.ops.wm.save_as_mainfile(filepath=str(part), compress=True, copy=True, relative_remap=False)
+        except RuntimeError as error:
+            raise film_output.OutputError(f"{path}: {film_output.message(error)}") from None
+        if not _is_whole(part, edit.name):
+            raise film_output.OutputError(f"{path}: could not be saved whole; {why_short(folder)}")
+        if path.is_file() and bpy.context.preferences.filepaths.save_version:
+            path.replace(f"{path}1")  # as Blender itself keeps what stood there
+        part.replace(path)
+
+
+def _is_whole(path: Path, scene: str) -> bool:
+    """Whether a .blend file was written to its end, and Blender finds the scene in it."""
+    if not is_whole_blend(path):
+        return False
+    try:
+        with bpy.data.libraries.load(str(path)) as (found, _):
+            return scene in found.scenes
+    except OSError:
+        return False

@@ -1,0 +1,121 @@
+"""What has to change along with a property of an effect: bars with the window, regions with names, scribbles with colors."""
+
+import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...core import limits, shutters
+from . import fcurves, inbetween_settings, validation
+from .annotations import layer_of
+from .selection import active_region, active_shutter
+
+
+def choose_region(effect) -> None:
+    """Makes a region of the active shutter the active one, the nearest in the list, unless it is one or there is none:
+    the list shows that shutter's alone."""
+    shutter = active_shutter(effect)
+    own = [i for i, region in enumerate(effect.regions) if shutter and region.shutter == shutter.name]
+    if own and effect.active_region not in own:
+        effect.active_region = min(own, key=lambda i: abs(i - effect.active_region))
+
+
+def aim_pen(effect) -> None:
+    """Strokes are drawn on the active region's layer from now on."""
+    region = active_region(effect)
+    layer = layer_of(effect, region) if region else None
+    if layer is not None:
+        layers = effect.scene.annotation.layers
+        layers.active_index = next(i for i, other in enumerate(layers) if other == layer)
+
+
+def unique(name: str, taken) -> str:
+    """The name, as long as a recipe has it, with a number behind it where it is taken, as Blender names things."""
+    number, wanted = 0, name[: limits.MAX_NAME]
+    while wanted in taken:
+        number += 1
+        end = f".{number:03d}"
+        wanted = name[: limits.MAX_NAME - len(end)] + end
+    return wanted
+
+
+def rename(effect, old: str, new: str) -> str:
+    """The name that a shutter gets for a wish: a unique one. Its regions follow it."""
+    others = [shutter.name for shutter in effect.shutters]
+    others.remove(old)
+    new = unique(new, others)
+    # A name that is taken twice is that of a copy: the regions belong to the original.
+    if old not in others:
+        for region in effect.regions:
+            if region.shutter == old:
+                region.shutter = new
+    return new
+
+
+def bars(shutter) -> np.ndarray:
+    """A shutter's bars as they stand, float64 (L,)."""
+    weights = np.empty(len(shutter.bars), dtype=np.float32)
+    shutter.bars.foreach_get("weight", weights)
+    return weights.astype(np.float64)
+
+
+def fit_bars(effect) -> None:
+    """After a change of the window's length: all shutters, their keys as well, keep their shape and share of light."""
+    for index, shutter in enumerate(effect.shutters):
+        if len(shutter.bars) not in (0, effect.window):
+            _change_bars(effect, index, lambda old: shutters.resample(old, effect.window))
+
+
+def fit_factor(effect) -> None:
+    """After a change of the factor of in-between frames: the bars, keyed ones as well, stand for the same times.
+
+    EffectError: it would take too many bars; the factor is put back, and nothing has changed. Or a value that no effect
+    can have is in the way."""
+    factor, position = inbetween_settings.factor(effect), validation.word(effect, "position").lower()
+    if str(effect.bars_per_frame) not in effect.bl_rna.properties["inbetween"].enum_items:
+        effect.bars_per_frame = factor  # what the bars stood for is not known
+    if factor == effect.bars_per_frame:
+        return
+
+    def multiplied(old):
+        return shutters.multiplied(old, effect.bars_per_frame, factor, position)
+
+    try:
+        window = len(multiplied(np.ones(effect.window)))
+    except shutters.ShutterError:
+        effect.inbetween = str(effect.bars_per_frame)
+        count = effect.window * factor // effect.bars_per_frame
+        sentence = rpt_("{factor}× in-between frames take {count} bars; a shutter has {most} at most")
+        raise validation.EffectError(sentence.format(factor=factor, count=count, most=shutters.MAX_WINDOW)) from None
+    for index in range(len(effect.shutters)):
+        _change_bars(effect, index, multiplied)
+    effect.bars_per_frame, effect.window = factor, window
+
+
+def _change_bars(effect, index: int, change) -> None:
+    """Gives a shutter other bars, and as many, at all its keys: those that `change` makes of the old ones."""
+    shutter = effect.shutters[index]
+    edit, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
+    curves = fcurves.Curves(edit)
+    old = bars(shutter)
+    keyed = {k: curve for k in range(len(old)) if (curve := curves.find(f"{path}[{k}].weight"))}
+    words = sorted(fcurves.eases(keyed.values()).items())
+    keys = [(frame, change(_bars_keyed(old, keyed, frame)), ease) for frame, ease in words]
+    fcurves.remove_curves(edit, f"{path}[")
+    shutter.bars.clear()
+    for k, weight in enumerate(change(old)):
+        shutter.bars.add().weight = weight
+        if keys:
+            fcurves.set_keys(edit, f"{path}[{k}].weight", 0, [(frame, bar[k], ease) for frame, bar, ease in keys])
+
+
+def _bars_keyed(old, keyed, frame: float) -> np.ndarray:
+    """The bars at a frame, where some have F-curves."""
+    weights = old.copy()
+    weights[list(keyed)] = [max(curve.evaluate(frame), 0.0) for curve in keyed.values()]
+    return weights
+
+
+def color_layers(effect, shutter) -> None:
+    """Scribbles have the colour of their shutter."""
+    for region in effect.regions:
+        if region.shutter == shutter.name and (layer := layer_of(effect, region)) is not None:
+            layer.color = shutter.color

@@ -1,0 +1,179 @@
+"""F-curves of the edit's Scene: values at any frame, whatever frame Blender itself is at.
+
+The engine is called with the effect scene's depsgraph, which knows nothing of the edit's animation.
+"""
+
+import re
+from itertools import pairwise
+
+import bpy
+import numpy as np
+from bpy_extras import anim_utils
+
+from ...core import keyframes
+from . import validation
+
+
+class Curves:
+    """The F-curves of a scene, found by path."""
+
+    def __init__(self, scene):
+        self._scene = scene
+        self._curves = {(c.data_path, c.array_index): c for c in curves_under(scene, "") if not (c.mute or c.is_empty)}
+        self._checked = set()
+        self._frames: dict[str, list[float]] = {}
+
+    def find(self, path: str, index: int = 0):
+        """The F-curve of a property, or None; muted and empty ones do not count. EffectError: a key of it lies where
+        no timeline is."""
+        curve = self._curves.get((path, index))
+        if curve is not None and curve not in self._checked:
+            beyond = validation.beyond_timeline(_frames(curve))
+            if beyond.size:
+                owner, _, name = path.rpartition(".")
+                validation.refuse_key(self._scene.path_resolve(owner), name, beyond[0])
+            self._checked.add(curve)
+        return curve
+
+    def key_frames(self, path: str, curves) -> list[float]:
+        """As key_frames below, of the curves under a path, which are asked once."""
+        if path not in self._frames:
+            self._frames[path] = key_frames(curves)
+        return self._frames[path]
+
+    def value(self, owner, path: str, name: str, frame: float):
+        """A float property, or a float vector as a list, at a frame; path: the owner's, from the scene. EffectError:
+        it is outside of its range."""
+        value = getattr(owner, name)
+        if isinstance(value, float):
+            return self._component(owner, path, name, 0, frame, value)
+        return [self._component(owner, path, name, i, frame, v) for i, v in enumerate(value)]
+
+    def _component(self, owner, path, name, index, frame, value):
+        curve = self.find(f"{path}.{name}", index)
+        if curve is None:
+            return validation.number(owner, name, value)
+        return validation.curved(owner, name, curve, frame)
+
+
+def _frames(curve) -> np.ndarray:
+    """Frames (n,) of an F-curve's keys."""
+    points = np.empty(2 * len(curve.keyframe_points), np.float32)
+    curve.keyframe_points.foreach_get("co", points)
+    return points[::2]
+
+
+def key_frames(curves) -> list[float]:
+    """Frames with a key on any of the curves, ascending."""
+    frames = [_frames(curve) for curve in curves]
+    return np.unique(np.concatenate([np.empty(0, np.float32), *frames])).tolist()
+
+
+def progress(curves, start: float, end: float, frame: float) -> float:
+    """Share 0 to 1 of the way between two keys at a frame, with the easing of the curve that changes most."""
+    curve = max(curves, key=lambda c: abs(c.evaluate(end) - c.evaluate(start)))
+    change = curve.evaluate(end) - curve.evaluate(start)
+    if abs(change) < 1e-9:
+        return 0.0
+    return min(max((curve.evaluate(frame) - curve.evaluate(start)) / change, 0.0), 1.0)
+
+
+def ease_at(curve, frame: float) -> str:
+    """The recipe's word for the ease of the span that starts at a frame; linear where there is no key."""
+    for key in curve.keyframe_points if curve else ():
+        if key.co[0] == frame:
+            word = key.interpolation.lower()
+            return word if word in keyframes.EASES else "bezier"
+    return "linear"
+
+
+def eases(curves) -> dict[float, str]:
+    """As ease_at, for every frame with a key on any of the curves: of the first curve that has one there."""
+    found: dict[float, str] = {}
+    for curve in curves:
+        for key in curve.keyframe_points:
+            word = key.interpolation.lower()
+            found.setdefault(key.co[0], word if word in keyframes.EASES else "bezier")
+    return found
+
+
+def set_keys(scene, path: str, index: int, keys, group: str = "") -> None:
+    """Replaces a property's F-curve by keys (frame, value, ease of the span that follows)."""
+    points = new_curve(scene, path, index, group).keyframe_points
+    points.add(len(keys))
+    points.foreach_set("co", [number for frame, value, _ in keys for number in (frame, value)])
+    for point, (_, _, ease) in zip(points, keys, strict=True):
+        point.interpolation = ease.upper()
+        point.handle_left_type = point.handle_right_type = "FREE"
+    # Flat handles of a third of the span: eased is u²(3 − 2u), as in core.keyframes, whatever lies beside it.
+    reach = [(b[0] - a[0]) / 3 for a, b in pairwise(keys)]
+    for point, before, after in zip(points, [1.0, *reach], [*reach, 1.0], strict=True):
+        point.handle_left = point.co[0] - before, point.co[1]
+        point.handle_right = point.co[0] + after, point.co[1]
+
+
+def new_curve(scene, path: str, index: int = 0, group: str = ""):
+    """An empty F-curve for a property, in place of the one it may have, and in a group of that name."""
+    bag = _channelbag(scene)
+    if (old := bag.fcurves.find(path, index=index)) is not None:
+        bag.fcurves.remove(old)
+    return bag.fcurves.new(path, index=index, group_name=group)
+
+
+def _channelbag(scene):
+    animation = scene.animation_data_create()
+    if animation.action is None:
+        animation.action = bpy.data.actions.new(f"{scene.name}Action")
+    if animation.action_slot is None:
+        animation.action_slot = animation.action.slots.new("SCENE", scene.name)
+    return anim_utils.action_ensure_channelbag_for_slot(animation.action, animation.action_slot)
+
+
+def remove_curves(scene, path: str) -> None:
+    """Removes the scene's F-curves whose path starts with `path`."""
+    for curve in curves_under(scene, path):
+        _channelbag(scene).fcurves.remove(curve)
+
+
+def move_curves(scene, path: str, frames: float) -> None:
+    """Moves the keys of the F-curves whose path starts with `path` in time."""
+    for curve in curves_under(scene, path):
+        for point in curve.keyframe_points:
+            point.co[0] += frames
+            point.handle_left[0] += frames
+            point.handle_right[0] += frames
+        curve.update()
+
+
+def copy_curves(scene, path: str, new_scene, new_path: str) -> None:
+    """Copies the F-curves whose path starts with `path` to the same properties under `new_path` of a scene."""
+    for curve in curves_under(scene, path):
+        copy = _channelbag(new_scene).fcurves.new_from_fcurve(
+            curve, data_path=new_path + curve.data_path.removeprefix(path)
+        )
+        copy.array_index = curve.array_index
+
+
+def reindex(scene, path: str, places: dict[int, int | None]) -> None:
+    """Keeps F-curves with the items of the collection at `path` whose places changed: old index → new, None: removed.
+
+    Blender finds properties by index, and knows nothing of items that move.
+    """
+    item = re.compile(re.escape(path) + r"\[(\d+)\]")
+    for curve in curves_under(scene, f"{path}["):
+        found = item.match(curve.data_path)
+        index = int(found[1])
+        place = places.get(index, index)
+        if place is None:
+            _channelbag(scene).fcurves.remove(curve)
+        elif place != index:
+            curve.data_path = f"{path}[{place}]{curve.data_path[found.end() :]}"
+
+
+def curves_under(scene, path: str) -> list:
+    """The scene's F-curves whose path starts with `path`."""
+    animation = scene.animation_data
+    if not (animation and animation.action and animation.action_slot):
+        return []
+    bag = anim_utils.action_get_channelbag_for_slot(animation.action, animation.action_slot)
+    return [curve for curve in bag.fcurves if curve.data_path.startswith(path)] if bag else []

@@ -1,0 +1,334 @@
+"""The effect's data: on the edit's Scene, where it can be keyed (properties nested on a strip cannot).
+
+`scene.virtual_shutter.effects[i]` belongs to the effect scene it points to; the Scene strips that show that scene
+are the effect's strips. Frames are timeline frames of the edit, as everywhere in Blender.
+"""
+
+import math
+import sys
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+from bpy.types import PropertyGroup
+
+from ...core.limits import MAX_BAR, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE
+from ...core.shutters import MAX_WINDOW
+from . import consistency, effects, selection, strips
+
+# Of labels that Blender translates in another sense ("Window" is one on the screen). Operators have a context anyway.
+CONTEXT = "Virtual Shutter"
+
+# Enum identifiers are the recipe's words in capitals.
+POSITIONS = (
+    ("START", "Start", "The window begins at the frame"),
+    ("CENTER", "Center", "The frame lies in the middle of the window"),
+    ("END", "End", "The window ends at the frame"),
+)
+INTERPOLATIONS = (
+    ("DISPLACEMENT", "Displacement", "Move times between shutters and between keyframes"),
+    ("VALUE", "Value", "Cross-fade pictures between shutters, and fade every bar by itself between keyframes"),
+)
+LIGHTS = (
+    ("LINEAR", "Linear", "Sum light as a camera does, so that bright streaks stay bright"),
+    ("ENCODED", "Encoded", "Sum the values that the footage is encoded with, which dims bright streaks"),
+)
+EXPOSURES = (
+    ("NORMALIZED", "Normalized", "Every shutter gives the same brightness"),
+    (
+        "WEIGHTED",
+        "Weighted",
+        "A shutter that is open for less time than the default is darker, in linear light whatever is summed",
+    ),
+)
+EDGES = (
+    ("HOLD", "Hold", "Repeat the first or last frame beyond the clip's ends"),
+    ("MIRROR", "Mirror", "Play the clip backward beyond its ends"),
+    ("SHORTEN", "Shorten", "Leave out what lies beyond the clip's ends"),
+)
+AGGREGATES = (
+    ("1", "1×1", "Every pixel has its own shutter"),
+    ("2", "2×2", "Blocks of 2×2 pixels share a shutter"),
+    ("4", "4×4", "Blocks of 4×4 pixels share a shutter"),
+)
+INBETWEENS = (
+    ("1", "Off", "The source's own frames alone"),
+    ("2", "2×", "One frame between two of the source"),
+    ("4", "4×", "Three frames between two of the source"),
+    ("8", "8×", "Seven frames between two of the source"),
+    ("16", "16×", "Fifteen frames between two of the source"),
+)
+METHODS = (
+    ("QUICK", "Quick", "Optical flow by DIS"),
+    ("GOOD", "Good", "Optical flow that takes longer, and is better"),
+)
+PLACES = (
+    ("FILE", "Beside the File", "A folder beside the .blend file"),
+    ("USER", "Extension", "The extension's own folder"),
+)
+KINDS = (
+    ("LINE", "Line", "The strokes themselves, as wide as the region's width"),
+    ("LASSO", "Lasso", "All that the strokes enclose"),
+)
+
+# The renderer asks the F-curves itself: keys on these would show, and not render.
+_UNKEYED = set()
+
+
+def _changed(group, _context):
+    """The sequencer keeps finished frames, and knows nothing of what the effect's strips depend on."""
+    strips.invalidate(group.id_data)
+
+
+def _renamed(shutter, new: str, old: str, _is_set) -> str:
+    return consistency.rename(selection.effect_of_item(shutter), old, new)
+
+
+def _shortened(_region, new: str, _old: str, _is_set) -> str:
+    """As recipes have names. Blender's own `maxlen` counts bytes, of which a character takes up to four."""
+    return new[:MAX_NAME]
+
+
+def _recolored(shutter, _context):
+    consistency.color_layers(selection.effect_of_item(shutter), shutter)
+
+
+def _lengthened(effect, context):
+    _fit(consistency.fit_bars, effect, context)
+
+
+def _multiplied(effect, context):
+    _fit(consistency.fit_factor, effect, context)
+
+
+def _fit(change, effect, context):
+    """What a change of a property asks for; why it cannot be would only be printed from here."""
+    try:
+        change(effect)
+    except effects.EffectError as error:
+        sentence = str(error)
+        if bpy.app.background:
+            print(sentence, file=sys.stderr)
+        else:
+            show = context.window_manager.popup_menu
+            show(lambda menu, _context: menu.layout.label(text=sentence, translate=False), icon="ERROR")
+    _changed(effect, context)
+
+
+def _chosen(effect, context):
+    consistency.choose_region(effect)
+    _aimed(effect, context)
+
+
+def _aimed(effect, _context):
+    consistency.aim_pen(effect)
+
+
+class ShutterBar(PropertyGroup):
+    weight: FloatProperty(
+        name="Weight",
+        description="How much the bar's frame contributes",
+        default=1.0,
+        min=0.0,
+        max=MAX_BAR,
+        soft_max=1.0,
+        update=_changed,
+    )
+
+
+class Shutter(PropertyGroup):
+    name: StringProperty(name="Name", description="Name of the shutter", default="Shutter", set_transform=_renamed)
+    color: FloatVectorProperty(
+        name="Color",
+        description="Color of the shutter's bars, scribbles and coefficients",
+        subtype="COLOR_GAMMA",
+        size=3,
+        min=0.0,
+        max=1.0,
+        default=(0.8, 0.8, 0.8),
+        update=_recolored,
+        options=_UNKEYED,
+    )
+    bars: CollectionProperty(type=ShutterBar)
+
+
+class ShutterRegion(PropertyGroup):
+    name: StringProperty(name="Name", description="Name of the region", default="Region", set_transform=_shortened)
+    shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=_changed)
+    layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=_changed)
+    kind: EnumProperty(
+        name="Type",
+        description="How the strokes cover the picture",
+        items=KINDS,
+        update=_changed,
+        options=_UNKEYED,
+    )
+    width: FloatProperty(
+        name="Width",
+        description="Width of the lines as a fraction of the picture's height",
+        default=0.02,
+        min=0.0,
+        max=MAX_DISTANCE,
+        soft_max=0.5,
+        update=_changed,
+    )
+    location: FloatVectorProperty(
+        name="Location",
+        description="Distance from where the region was drawn, as a fraction of the picture",
+        subtype="XYZ",
+        size=2,
+        min=-MAX_DISTANCE,
+        max=MAX_DISTANCE,
+        update=_changed,
+    )
+    rotation: FloatProperty(
+        name="Rotation",
+        description="Rotation about the region's center",
+        subtype="ANGLE",
+        min=-math.radians(MAX_DEGREES),
+        max=math.radians(MAX_DEGREES),
+        update=_changed,
+    )
+    scale: FloatProperty(
+        name="Scale",
+        description="Scale about the region's center",
+        default=1.0,
+        min=-MAX_SCALE,
+        max=MAX_SCALE,
+        update=_changed,
+    )
+
+
+class ShutterEffect(PropertyGroup):
+    name: StringProperty(name="Name", description="Name of the effect", default="Shutter")
+    scene: PointerProperty(name="Scene", description="Scene that the effect's strips show", type=bpy.types.Scene)
+    source: StringProperty(name="Source", description="Identity of the source strip")
+    start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts", options=_UNKEYED)
+    window: IntProperty(
+        name="Window",
+        description="Number of source frames that a shutter can expose",
+        default=8,
+        min=1,
+        max=MAX_WINDOW,
+        update=_lengthened,
+        options=_UNKEYED,
+        translation_context=CONTEXT,
+    )
+    position: EnumProperty(
+        name="Position", description="Where the window lies around the frame", items=POSITIONS, update=_changed
+    )
+    interpolation: EnumProperty(
+        name="Interpolation",
+        description="How shutters blend, in the picture and between keyframes",
+        items=INTERPOLATIONS,
+        update=_changed,
+    )
+    light: EnumProperty(name="Light", description="How the window's frames are summed", items=LIGHTS, update=_changed)
+    exposure: EnumProperty(
+        name="Exposure",
+        description="How bright shutters are that are open for different times",
+        items=EXPOSURES,
+        update=_changed,
+        translation_context=CONTEXT,
+    )
+    edges: EnumProperty(
+        name="Clip Ends",
+        description="What a window gets that reaches beyond the ends of the clip, or of the shot",
+        items=EDGES,
+        update=_changed,
+        translation_context=CONTEXT,
+    )
+    aggregate: EnumProperty(
+        name="Aggregate",
+        description="Pixels that share a shutter (larger blocks are quicker)",
+        items=AGGREGATES,
+        update=_changed,
+    )
+    stop_at_cuts: BoolProperty(
+        name="Stop at Cuts",
+        description="Windows end at the source's cuts as they do at the clip's ends",
+        default=True,
+        update=_changed,
+    )
+    border: BoolProperty(
+        name="Border",
+        description="Make the picture's edge a scribble of the default shutter",
+        update=_changed,
+    )
+    bars_per_frame: IntProperty(
+        name="Bars per Frame",
+        description="How many bars of the window stand for a source frame",
+        default=1,
+        options={"HIDDEN"},
+    )
+    inbetween: EnumProperty(
+        name="In-Between Frames",
+        description="Frames between those of the source, by optical flow: bars count them all, "
+        "and a still frame becomes as many equal bars",
+        items=INBETWEENS,
+        update=_multiplied,
+        options=_UNKEYED,
+    )
+    inbetween_method: EnumProperty(
+        name="Method", description="How in-between frames are made", items=METHODS, update=_changed, options=_UNKEYED
+    )
+    inbetween_place: EnumProperty(
+        name="Place", description="Where in-between frames lie", items=PLACES, update=_changed, options=_UNKEYED
+    )
+    use_source_time: BoolProperty(
+        name="Use Source Time",
+        description="Show the source at the time that is set here, in place of the strip's own timing",
+        update=_changed,
+        options=_UNKEYED,
+    )
+    source_time: FloatProperty(
+        name="Source Time",
+        description="Source frame that is shown, 1 is the source's first; keyed, it is a speed ramp",
+        default=1.0,
+        min=-MAX_FRAME,
+        max=MAX_FRAME,
+        soft_min=1.0,
+        update=_changed,
+    )
+    shutters: CollectionProperty(type=Shutter)
+    regions: CollectionProperty(type=ShutterRegion)
+    active_shutter: IntProperty(name="Active Shutter", min=0, update=_chosen, options=_UNKEYED)
+    active_region: IntProperty(name="Active Region", min=0, update=_aimed, options=_UNKEYED)
+
+
+class ShutterScene(PropertyGroup):
+    """Of an edit: its effects. Of an effect's scene: an identity, by which a copy is known."""
+
+    effects: CollectionProperty(type=ShutterEffect)
+    identity: StringProperty()
+
+
+classes = (ShutterBar, Shutter, ShutterRegion, ShutterEffect, ShutterScene)
+
+
+def register():
+    for cls in classes:
+        bpy.utils.register_class(cls)
+    bpy.types.Scene.virtual_shutter = PointerProperty(type=ShutterScene)
+    # A strip cannot be pointed to and may be renamed: the source strip carries the identity that effects look for.
+    bpy.types.Strip.virtual_shutter_source = StringProperty(options={"HIDDEN"})
+    # The effect strip carries its scene's: Blender's clipboard drops the scene itself.
+    bpy.types.Strip.virtual_shutter_effect = StringProperty(options={"HIDDEN"})
+    # That the source was muted when the effect was made, and shall show again when it goes.
+    bpy.types.Strip.virtual_shutter_muted = BoolProperty(options={"HIDDEN"})
+
+
+def unregister():
+    for name in ("source", "effect", "muted"):
+        delattr(bpy.types.Strip, f"virtual_shutter_{name}")
+    del bpy.types.Scene.virtual_shutter
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,31 @@
+"""Property groups as they are stored, enum numbers without an item included."""
+
+from bpy.types import PropertyGroup
+
+
+def copy_properties(old, new) -> None:
+    """Copies a property group with all that is in it; IDs stay shared."""
+    for prop in old.bl_rna.properties:
+        name = prop.identifier
+        if prop.type == "COLLECTION":
+            getattr(new, name).clear()
+            for item in getattr(old, name):
+                copy_properties(item, getattr(new, name).add())
+        elif not prop.is_readonly:
+            store(new, name, stored(old, name))
+
+
+def stored(group, name: str):
+    """A property's value for a copy of the group; of an enum that has none of its items, the number it is kept as."""
+    value = getattr(group, name)
+    if value == "" and group.bl_rna.properties[name].type == "ENUM" and isinstance(group, PropertyGroup):
+        return group.bl_system_properties_get()[name]
+    return value
+
+
+def store(group, name: str, value) -> None:
+    """Gives a property what `stored` gave."""
+    if isinstance(value, int) and group.bl_rna.properties[name].type == "ENUM":
+        group.bl_system_properties_get(do_create=True)[name] = value
+    else:
+        setattr(group, name, value)

@@ -1,0 +1,109 @@
+"""A recipe into Blender's data: shutters, regions, strokes, keys and options."""
+
+import numpy as np
+from bpy.app.translations import pgettext_data as data_
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...core import limits, recipe
+from . import fcurves, geometry
+from .annotations import annotation, picture_size
+from .effects import OPTIONS
+from .validation import EffectError
+
+
+def apply(edit, effect, strip, source: recipe.Recipe) -> None:
+    """Replaces the effect's data and keys by a recipe, whose frame 1 is the strip's first. EffectError: its keys cannot
+    lie there; nothing has changed."""
+    first = strip.left_handle - 1
+    _check_keys(source, first)
+    clear(edit, effect)
+    # Bars per frame before the factor, which else would change the window.
+    effect.bars_per_frame, effect.inbetween = source.inbetween, str(source.inbetween)
+    effect.inbetween_method = source.inbetween_method.upper()
+    effect.window = source.window
+    for name in OPTIONS:
+        setattr(effect, name, getattr(source, name).upper())
+    effect.aggregate, effect.border = str(source.aggregate), source.border
+    effect.stop_at_cuts = source.stop_at_cuts
+    path = effect.path_from_id()
+    effect.use_source_time = bool(source.time)
+    if source.time:
+        keys = [(key.frame + first, key.value, key.ease) for key in source.time]
+        effect.source_time = source.time[0].value
+        fcurves.set_keys(edit, f"{path}.source_time", 0, keys, group=effect.name)
+    for i, shutter in enumerate(source.shutters):
+        _add_shutter(edit, effect, f"{path}.shutters[{i}]", shutter, first)
+    colors = {shutter.name: shutter.color for shutter in source.shutters}
+    for i, region in enumerate(source.regions):
+        _add_region(edit, effect, strip, f"{path}.regions[{i}]", region, colors[region.shutter], first)
+
+
+def _check_keys(source: recipe.Recipe, first: float) -> None:
+    """EffectError: keys would lie beyond Blender's timeline, or on the same frame, as it counts in float32."""
+    for keys in (source.time, *(part.keys for part in (*source.shutters, *source.regions))):
+        frames = np.array([key.frame + first for key in keys], dtype=np.float32)
+        if (wrong := np.flatnonzero(np.abs(frames) > limits.MAX_FRAME)).size:
+            sentence = rpt_("frame {frame} of the recipe: a key cannot lie beyond Blender's timeline")
+            raise EffectError(sentence.format(frame=f"{keys[wrong[0]].frame:.10g}"))
+        if (wrong := np.flatnonzero(np.diff(frames) == 0)).size:
+            sentence = rpt_("frame {frame} of the recipe: so late on the timeline, the next key is on the same frame")
+            raise EffectError(sentence.format(frame=f"{keys[wrong[0]].frame:.10g}"))
+
+
+def clear(edit, effect) -> None:
+    """Removes the effect's shutters, regions, scribbles and keys."""
+    fcurves.remove_curves(edit, effect.path_from_id() + ".")
+    effect.shutters.clear()
+    effect.regions.clear()
+    effect.active_shutter = effect.active_region = 0
+    if effect.scene.annotation is not None:
+        for layer in list(effect.scene.annotation.layers):
+            effect.scene.annotation.layers.remove(layer)
+
+
+def _add_shutter(edit, effect, path: str, source: recipe.Shutter, first: float) -> None:
+    shutter = effect.shutters.add()
+    shutter.name, shutter.color = source.name, source.color
+    for weight in source.bars if source.bars is not None else source.keys[0].bars:
+        shutter.bars.add().weight = weight
+    if source.keys:
+        for k in range(len(shutter.bars)):
+            keys = [(key.frame + first, key.bars[k], key.ease) for key in source.keys]
+            fcurves.set_keys(edit, f"{path}.bars[{k}].weight", 0, keys)
+
+
+def _add_region(edit, effect, strip, path: str, source: recipe.Region, color, first: float) -> None:
+    region = effect.regions.add()
+    region.name, region.shutter, region.width = source.name, source.shutter, source.width
+    region.kind = source.kind.upper()
+    region.layer = _draw(effect, strip, source, color, first)
+    if not source.keys:
+        return
+    start = source.keys[0]
+    region.location, region.rotation, region.scale = start.location, np.radians(start.rotation), start.scale
+    channels = {
+        ("location", 0): lambda key: key.location[0],
+        ("location", 1): lambda key: key.location[1],
+        ("rotation", 0): lambda key: np.radians(key.rotation),
+        ("scale", 0): lambda key: key.scale,
+    }
+    for (name, index), value in channels.items():
+        keys = [(key.frame + first, value(key), key.ease) for key in source.keys]
+        fcurves.set_keys(edit, f"{path}.{name}", index, keys)
+
+
+def _draw(effect, strip, source: recipe.Region, color, first: float) -> str:
+    """Draws a region's strokes on an annotation layer of its own, a frame per drawing; the layer's name."""
+    layer = annotation(effect).layers.new(source.name or data_("Region"), set_active=False)
+    layer.color = color
+    to_image = geometry.picture_to_image(strip, picture_size(effect))
+    for key, strokes in source.drawings():
+        drawing = layer.frames.new(int((key.frame if key else 1) + first))
+        for points in strokes:
+            stroke = drawing.strokes.new()
+            stroke.display_mode = "2DSPACE"
+            stroke.points.add(len(points))
+            image = np.zeros((len(points), 3), dtype=np.float32)
+            image[:, :2] = geometry.mapped(to_image, np.asarray(points))
+            stroke.points.foreach_set("co", image.ravel())
+    return layer.info

@@ -1,0 +1,172 @@
+"""The medium of a source strip: what it is, opened as shutter_addon.media has it."""
+
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...media import MediaError, open_source
+from ...media.sequence import by_number
+
+_AT_ONCE = 100  # files of a sequence, which may be long, that one look asks, beside the first and the last
+_REST = 1.0  # seconds from one look at them to the next: on a network's drive a look takes a while
+_KEPT = 256
+
+
+@dataclass
+class _Look:
+    """What is known of a strip's files: path and stamp of each, which of them is next, how many are still to be asked
+    at once, when some were asked last, and a number that changes with what is known."""
+
+    known: list
+    next: int
+    due: int
+    when: float = 0.0
+    key: int = 0
+
+
+_looks: dict[tuple, _Look] = {}  # by edit and strip
+filming = False  # while a film is rendered, all its files have been asked before it
+
+
+def media_key(strip) -> tuple:
+    """What the strip reads and how; equal keys give the same frames."""
+    return strip.type, *files_key(strip), *reading(strip)
+
+
+def files_key(strip) -> tuple:
+    """The strip's files: the first and the last as they are now, and those between as they were when they were looked
+    at: a hundred of them a second, in turn, and none while a film is rendered. MediaError: it has none."""
+    count, path = _files(strip)
+    ends = dict.fromkeys((path(0), path(count - 1)))
+    return count, *((str(end), _stamp(end)) for end in ends), _between(strip, count, path)
+
+
+def look_again() -> None:
+    """Has all files asked again at the next look."""
+    for look in list(_looks.values()):
+        look.due = len(look.known)
+
+
+def forget() -> None:
+    """Forgets what the files were, before another file is loaded."""
+    global filming
+    filming = False
+    _looks.clear()
+
+
+def _between(strip, count, path) -> int:
+    """A number that changes when a file of the strip is found replaced. One that is gone is not: what was made of it
+    still holds, and whoever needs the file itself is told."""
+    if count < 3:
+        return 0
+    place = strip.id_data.session_uid, strip.name
+    look = _looks.pop(place, None)
+    if look is None or len(look.known) != count:
+        look = _Look([None] * count, 0, count)
+    _looks[place] = look
+    while len(_looks) > _KEPT:
+        del _looks[next(iter(_looks))]
+    if not look.due and (filming or time.monotonic() - look.when < _REST):
+        return look.key
+    changed = False
+    for index in range(look.next, look.next + max(look.due, min(_AT_ONCE, count))):
+        file = path(index % count)
+        found, known = (file, _stamp(file)), look.known[index % count]
+        if found != known and (known is None or found[1] is not None or found[0] != known[0]):
+            look.known[index % count], changed = found, True
+    look.next, look.due, look.when = (index + 1) % count, 0, time.monotonic()
+    if changed:
+        look.key = hash(tuple(look.known))
+    return look.key
+
+
+def stem(strip) -> str:
+    """The name of the strip's first file, without its suffix. MediaError: it has none."""
+    return _files(strip)[1](0).stem
+
+
+def reading(strip) -> tuple:
+    """How the strip's files are read: colour space, alpha and the like."""
+    clip = strip.clip if strip.type == "MOVIECLIP" else None
+    reader = clip if strip.type == "MOVIECLIP" else strip
+    return (
+        reader and reader.colorspace_settings.name,
+        strip.alpha_mode,
+        strip.use_deinterlace,
+        getattr(strip, "stream_index", 0),
+        clip and (clip.filepath, clip.frame_offset, strip.undistort, strip.stabilize2d),
+    )
+
+
+def open_media(strip):
+    """The strip's medium, as Blender would show it. MediaError: it cannot be read."""
+    count, path = _files(strip)
+    paths = [path(i) for i in range(count)]
+    config = Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"), "config.ocio")  # finds folders only
+    return open_source(
+        paths[0],
+        files=None if _is_movie(strip) else paths,
+        stream=getattr(strip, "stream_index", 0),
+        colorspace=reading(strip)[0],
+        config=config,
+        alpha=_alpha(strip),
+        deinterlace=strip.type == "MOVIE" and strip.use_deinterlace,
+    )
+
+
+def first_frame(strip) -> int:
+    """Which frame of the medium is the first of the strip's content."""
+    return strip.clip.frame_offset if strip.type == "MOVIECLIP" and _is_movie(strip) else 0
+
+
+def _is_movie(strip) -> bool:
+    return strip.type == "MOVIE" or (strip.type == "MOVIECLIP" and strip.clip.source == "MOVIE")
+
+
+def _alpha(strip) -> str | None:
+    """An image strip has its own idea of its files' alpha; a clip takes what is usual for them."""
+    if strip.type == "MOVIECLIP":
+        return None
+    return "premultiplied" if strip.alpha_mode == "PREMUL" else "straight"
+
+
+def _files(strip):
+    """How many files the strip reads, and a function that gives the path of each."""
+    if strip.type == "MOVIECLIP":
+        return _clip_files(strip)
+    library = strip.id_data.library
+    if strip.type == "MOVIE":
+        movie = Path(bpy.path.abspath(strip.filepath, library=library))
+        return 1, lambda _i: movie
+    folder, elements = Path(bpy.path.abspath(strip.directory, library=library)), strip.elements
+    if not elements:
+        raise MediaError(rpt_('strip "{strip}" has no files').format(strip=strip.name))
+    return len(elements), lambda i: folder / elements[i].filename
+
+
+def _clip_files(strip):
+    """A clip's movie, or its images by their numbers, without a gap."""
+    clip = strip.clip
+    if clip is None:
+        raise MediaError(rpt_('strip "{strip}" has no clip').format(strip=strip.name))
+    if strip.undistort or strip.stabilize2d:
+        sentence = rpt_('strip "{strip}": undistorted or stabilized clips are not supported')
+        raise MediaError(sentence.format(strip=strip.name))
+    path = Path(bpy.path.abspath(clip.filepath, library=clip.library))
+    beside = by_number(path)
+    if clip.source == "MOVIE" or beside is None:
+        return 1, lambda _i: path
+    return max(clip.frame_duration, 1), lambda i: beside(clip.frame_offset + i)
+
+
+def _stamp(path: Path):
+    """Tells a file that was replaced from what it was; None for a missing one."""
+    try:
+        status = os.stat(path)
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_size

@@ -1,0 +1,100 @@
+"""Effect strips: a Scene strip above its source, and the scene, data and source that belong to it."""
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from . import effects
+
+ENGINE = "VIRTUAL_SHUTTER"
+SOURCES = ("MOVIE", "IMAGE", "MOVIECLIP")
+
+
+def effect_strips(edit) -> list:
+    """The edit's effect strips, those inside meta strips too."""
+    if edit.sequence_editor is None:
+        return []
+    return [
+        strip
+        for strip in edit.sequence_editor.strips_all
+        if strip.type == "SCENE" and strip.scene and strip.scene.render.engine == ENGINE
+    ]
+
+
+def own_strips(edit) -> list:
+    """The strips that were made for effects, those too whose scene has another engine or is gone."""
+    if edit.sequence_editor is None:
+        return []
+    return [strip for strip in edit.sequence_editor.strips_all if strip.type == "SCENE" and _is_own(strip)]
+
+
+def _is_own(strip) -> bool:
+    scene, identity = strip.scene, strip.virtual_shutter_effect
+    if scene is None:
+        return identity != ""
+    return scene.render.engine == ENGINE or scene.virtual_shutter.identity == identity != ""
+
+
+def effect_of(edit, scene):
+    """The edit's effect that an effect scene shows, or None."""
+    return next((effect for effect in edit.virtual_shutter.effects if effect.scene == scene), None)
+
+
+def find_edit(scene):
+    """Edit, effect and one of its strips for an effect scene. EffectError: nothing uses it any more."""
+    for edit in bpy.data.scenes:
+        if (effect := effect_of(edit, scene)) is not None:
+            for strip in effect_strips(edit):
+                if strip.scene == scene:
+                    return edit, effect, strip
+    raise effects.EffectError(rpt_('scene "{scene}" belongs to no Shutter strip').format(scene=scene.name))
+
+
+def origin(strip) -> float:
+    """Timeline frame at which the strip's untrimmed content would start: the same for all parts of a cut strip."""
+    return strip.content_start - strip.content_trim_start
+
+
+def timeline_frame(strip, scene_frame: float) -> float:
+    """The timeline frame at which an effect strip shows a frame of its scene."""
+    return origin(strip) + scene_frame - strip.scene.frame_start
+
+
+def source_of(edit, effect, strip):
+    """The effect's source strip: of those with its identity (parts of a cut strip, copies) the nearest in time, then
+    the nearest below. EffectError: there is none any more, or none that has frames."""
+    if (source := nearest_source(edit, effect, strip)) is None:
+        if others := _with_identity(edit, effect.source):
+            sentence = rpt_('the source of "{strip}", "{source}", is not a movie, image or clip strip')
+            raise effects.EffectError(sentence.format(strip=strip.name, source=others[0].name))
+        raise effects.EffectError(rpt_('the source strip of "{strip}" was deleted').format(strip=strip.name))
+    return source
+
+
+def shown_sources(edit) -> set[str]:
+    """Names of the strips that are sources of the edit's effect strips."""
+    pairs = [(effect, strip) for strip in effect_strips(edit) if (effect := effect_of(edit, strip.scene))]
+    sources = [nearest_source(edit, effect, strip) for effect, strip in pairs]
+    return {source.name for source in sources if source is not None}
+
+
+def nearest_source(edit, effect, strip):
+    """What source_of finds, or None."""
+
+    def distance(other):
+        apart = max(other.left_handle - strip.right_handle + 1, strip.left_handle - other.right_handle + 1, 0)
+        return apart, other.channel > strip.channel, abs(strip.channel - other.channel)
+
+    candidates = [other for other in _with_identity(edit, effect.source) if other.type in SOURCES]
+    return min(candidates, key=distance, default=None)
+
+
+def _with_identity(edit, identity: str) -> list:
+    """The edit's strips that an effect with this source is for, whatever they are."""
+    return [strip for strip in edit.sequence_editor.strips_all if strip.virtual_shutter_source == identity != ""]
+
+
+def invalidate(edit, scene=None) -> None:
+    """Drops the finished frames of an edit's effect strips; of those that show one scene, if given."""
+    for strip in effect_strips(edit):
+        if scene is None or strip.scene == scene:
+            strip.invalidate_cache("RAW")  # and with them all that was composed of them

@@ -1,0 +1,98 @@
+"""Values of an effect as a .blend file may hold them: one that no effect can have is refused, by its place.
+
+Blender keeps properties in their ranges where users and F-curves set them. Scripts and files of other versions get past
+that, and "not a number" past every range.
+"""
+
+import math
+import re
+
+import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...core.limits import MAX_FRAME
+from ...core.messages import UserError
+
+_PLACES = {"": n_('effect "{name}"'), "shutters": n_('shutter "{name}"'), "regions": n_('region "{name}"')}
+
+
+class EffectError(UserError, RuntimeError):
+    """The effect cannot be rendered as it stands; the message is one sentence for the user."""
+
+
+def place(group) -> str:
+    """The effect, shutter, bar or region that a property group is, in the user's words."""
+    path = group.path_from_id()
+    found = re.match(r".*?effects\[\d+\](?:\.(shutters|regions)\[\d+\])?", path)
+    words = rpt_(_PLACES[found[1] or ""]).format(name=group.id_data.path_resolve(found[0]).name)
+    bar = re.search(r"\.bars\[(\d+)\]$", path)
+    return rpt_("{shutter}, bar {number}").format(shutter=words, number=int(bar[1]) + 1) if bar else words
+
+
+def number(group, name: str, value=None):
+    """A number, or one of a vector's, as the property has it; or `value`, which it would be. EffectError: it is outside
+    of the property's range."""
+    value, prop = getattr(group, name) if value is None else value, group.bl_rna.properties[name]
+    if prop.hard_min <= value <= prop.hard_max:  # nothing but a number is
+        return value
+    show = math.degrees if prop.subtype == "ANGLE" else float
+    low, high = (f"{show(limit):.7g}" for limit in (prop.hard_min, prop.hard_max))
+    sentence = rpt_("{place}: {property} is {value}, not {low} to {high}")
+    raise EffectError(
+        sentence.format(place=place(group), property=_called(prop), value=f"{show(value):.7g}", low=low, high=high)
+    )
+
+
+def curved(group, name: str, curve, frame: float) -> float:
+    """A number that an F-curve gives, in the property's range, where Blender keeps it. EffectError: it is none."""
+    prop = group.bl_rna.properties[name]
+    # In this order "not a number" stays what it is.
+    return number(group, name, min(max(curve.evaluate(frame), prop.hard_min), prop.hard_max))
+
+
+def check(items, name: str, found: np.ndarray) -> None:
+    """EffectError: one of the numbers (n,) of as many items of a collection is outside of the property's range."""
+    prop = items[0].bl_rna.properties[name]
+    for i in np.flatnonzero(~((found >= prop.hard_min) & (found <= prop.hard_max))):
+        number(items[int(i)], name, float(found[i]))
+
+
+def check_region(region) -> None:
+    """EffectError: a property of a region, as it stands, is outside of its range."""
+    word(region, "kind")
+    for name in ("width", "location", "rotation", "scale"):
+        for value in np.atleast_1d(getattr(region, name)):
+            number(region, name, float(value))
+
+
+def word(group, name: str, value: float | None = None) -> str:
+    """The identifier of an enum as the property has it; or of the item with the number `value`. EffectError: it has
+    none of its items."""
+    prop = group.bl_rna.properties[name]
+    if value is None:
+        identifier = getattr(group, name)
+    else:
+        wanted = round(value) if math.isfinite(value) else None
+        identifier = next((item.identifier for item in prop.enum_items if item.value == wanted), "")
+    if not identifier:
+        sentence = rpt_("{place}: {property} is none of its choices")
+        raise EffectError(sentence.format(place=place(group), property=_called(prop)))
+    return identifier
+
+
+def beyond_timeline(frames: np.ndarray) -> np.ndarray:
+    """Those of the frames (n,) of an F-curve's keys that are on no timeline."""
+    return frames[~(np.abs(frames) <= MAX_FRAME)]
+
+
+def refuse_key(group, name: str, frame: float) -> None:
+    """EffectError: a property has a key at a frame that is on no timeline."""
+    sentence = rpt_("{place}: {property} has a keyframe at frame {frame}, not {low} to {high}")
+    words = {"place": place(group), "property": _called(group.bl_rna.properties[name]), "frame": f"{frame:.7g}"}
+    raise EffectError(sentence.format(**words, low=-MAX_FRAME, high=MAX_FRAME))
+
+
+def _called(prop) -> str:
+    return iface_(prop.name, prop.translation_context)

@@ -1,0 +1,1 @@
+"""What happens to effects: added, edited, copied, removed, brought back."""

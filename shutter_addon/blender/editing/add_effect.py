@@ -1,0 +1,103 @@
+"""A new effect: its strip above the source, and its scene."""
+
+import uuid
+
+import bpy
+from bpy.app.translations import pgettext_data as data_
+
+from ...core.limits import MAX_FRAME
+from ..data import source_media
+from ..data.strips import ENGINE, effect_of, origin
+
+_COLOR = "COLOR_06"
+
+
+_LOOK = ("use_flip_x", "use_flip_y", "color_multiply", "color_saturation", "multiply_alpha")
+
+
+def add_effect(edit, source):
+    """Puts a new effect on a movie, image or clip strip: its strip above the source, same range, transform and crop.
+
+    Returns strip and effect; the effect has no shutter yet. MediaError: the source cannot be read."""
+    medium = source_media.open_media(source)
+    medium.close()
+    if not source.virtual_shutter_source:
+        source.virtual_shutter_source = uuid.uuid4().hex
+    name = data_("Shutter {source}").format(source=source.name)
+    scene = new_scene(edit, name, (medium.width, medium.height))
+    scene.virtual_shutter.identity = uuid.uuid4().hex
+    level = (source.parent_meta() or edit.sequence_editor).strips
+    taken = {s.channel for s in level if _overlap(s, source)}
+    channel = next(c for c in range(source.channel + 1, source.channel + len(taken) + 2) if c not in taken)
+    strip = level.new_scene(data_("Shutter"), scene, channel, int(source.content_start))
+    strip.left_handle, strip.right_handle = source.left_handle, source.right_handle
+    strip.blend_type = source.blend_type
+    copy_look(source, strip)
+    # Through a transparent picture the plain source would show. An opaque one stays: mute the effect to see it.
+    if medium.alpha != "opaque" and not source.mute:
+        source.mute = source.virtual_shutter_muted = True
+    effect = edit.virtual_shutter.effects.add()
+    effect.name, effect.scene, effect.source, effect.start = (
+        strip.name,
+        scene,
+        source.virtual_shutter_source,
+        origin(strip),
+    )
+    strip.virtual_shutter_effect = scene.virtual_shutter.identity
+    edit.render.sequencer_gl_preview = "RENDERED"  # or the preview shows the effect's empty scene
+    strip.color_tag = _COLOR
+    connect(edit, [strip, source, *source.connections])
+    return strip, effect_of(edit, scene)  # again: an operator's update may move the collection's items in memory
+
+
+def connect(edit, connected) -> None:
+    """Connects strips, so that they are selected and moved together; each leaves the strips it was connected to."""
+    selected = [strip for strip in edit.sequence_editor.strips_all if strip.select]
+    for strip in selected:
+        strip.select = False
+    for strip in connected:
+        strip.select = True
+    # Blender has an operator only, which takes the selection; this override is all it asks for.
+    with bpy.context.temp_override(sequencer_scene=edit):
+        bpy.ops.sequencer.connect(toggle=False)
+    for strip in connected:
+        strip.select = strip in selected
+
+
+def _overlap(a, b) -> bool:
+    return a.left_handle < b.right_handle and b.left_handle < a.right_handle
+
+
+def copy_look(source, strip) -> None:
+    """Transform, crop, flip and colour of the source strip."""
+    for group in ("transform", "crop"):
+        old, new = getattr(source, group), getattr(strip, group)
+        for prop in old.bl_rna.properties:
+            if not prop.is_readonly:
+                setattr(new, prop.identifier, getattr(old, prop.identifier))
+    for name in _LOOK:
+        setattr(strip, name, getattr(source, name))
+
+
+def new_scene(edit, name: str, size):
+    """A scene for an effect of the edit, with a camera and an empty annotation."""
+    scene = bpy.data.scenes.new(name)
+    scene.render.engine = ENGINE
+    scene.render.resolution_x, scene.render.resolution_y = size
+    scene.render.resolution_percentage = 100
+    # Past its scene's end a Scene strip shows the last frame. Source and strip may be made longer, by hand, by speed or
+    # by keys of the source time.
+    scene.frame_start, scene.frame_end = 1, MAX_FRAME
+    # A Scene strip plays at its scene's rate; at the edit's it shows one frame per timeline frame.
+    scene.render.fps, scene.render.fps_base = edit.render.fps, edit.render.fps_base
+    add_camera(scene)
+    scene.annotation = bpy.data.annotations.new(name)
+    return scene
+
+
+def add_camera(scene) -> None:
+    """Without a camera, Blender renders a Scene strip empty and never asks the engine."""
+    name = f"{scene.name} Camera"
+    camera = bpy.data.objects.new(name, bpy.data.cameras.new(name))
+    scene.collection.objects.link(camera)
+    scene.camera = camera

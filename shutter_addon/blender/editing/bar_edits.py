@@ -1,0 +1,102 @@
+"""A shutter's bars: painted, keyed, and as they are at the current frame."""
+
+import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
+
+from ...core import shutters
+from ..data import effects, fcurves
+from ..data.consistency import bars
+
+
+def summary(weights) -> str:
+    """A shutter's bars (L,) in words: its angle, and how many frames' light it gathers."""
+    light = shutters.exposure(weights)
+    if not light:
+        return iface_("All bars are zero: the shutter never opens")
+    angle, frames = f"{shutters.open_angle(weights):.0f}", f"{light:.3g}"
+    if frames == "1":
+        return iface_("{angle}°, 1 frame of light").format(angle=angle)
+    return iface_("{angle}°, {frames} frames of light").format(angle=angle, frames=frames)
+
+
+def set_bars(shutter, weights) -> None:
+    """Gives a shutter these bars (L,); those that stay are not touched."""
+    for bar, weight in zip(shutter.bars, weights, strict=True):
+        if bar.weight != np.float32(weight):
+            bar.weight = weight
+
+
+def auto_key(context) -> bool:
+    """Whether Blender's auto keying is on."""
+    return context.scene.tool_settings.use_keyframe_insert_auto
+
+
+def paint(effect, index: int, weights, key: bool = False) -> None:
+    """Gives a shutter bars (L,) as an editor does at the current frame, and as many as it may lack or have too many;
+    key: and keys them there."""
+    shutter = effect.shutters[index]
+    while len(shutter.bars) > len(weights):
+        shutter.bars.remove(len(shutter.bars) - 1)
+    while len(shutter.bars) < len(weights):
+        shutter.bars.add()
+    set_bars(shutter, weights)
+    if key:
+        key_bars(effect, index)
+
+
+def key_bars(effect, index: int) -> None:
+    """Keys all bars of a shutter at the current frame, as Blender's own key buttons do."""
+    path, group = f"{effect.path_from_id()}.shutters[{index}].bars", effect.shutters[index].name
+    # Between keys the bars stand where their F-curves are, a cross-fade: the picture is made with others.
+    set_bars(effect.shutters[index], bars_now(effect, index))
+    for k in range(len(effect.shutters[index].bars)):
+        effect.id_data.keyframe_insert(f"{path}[{k}].weight", group=group)
+
+
+def unkey_bars(effect, index: int) -> bool:
+    """Deletes the keys of a shutter's bars at the current frame; whether there were any."""
+    edit, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
+    curves = fcurves.Curves(edit)
+    keyed = [k for k in range(len(effect.shutters[index].bars)) if curves.find(f"{path}[{k}].weight")]
+    deleted = [_deleted(edit, f"{path}[{k}].weight") for k in keyed]
+    return any(deleted)
+
+
+def _deleted(edit, path: str) -> bool:
+    try:
+        return edit.keyframe_delete(path)
+    except RuntimeError:  # no key at this frame
+        return False
+
+
+def key_state(effect, index: int) -> list[str]:
+    """For each bar of a shutter, as Blender colours its fields: "", "animated", "keyed" here, or "changed" since."""
+    edit, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
+    curves = fcurves.Curves(edit)
+    return [
+        _state(curves.find(f"{path}[{k}].weight"), bar.weight, edit)
+        for k, bar in enumerate(effect.shutters[index].bars)
+    ]
+
+
+def _state(curve, value: float, edit) -> str:
+    if curve is None:
+        return ""
+    frame = edit.frame_current_final
+    if abs(max(curve.evaluate(frame), 0.0) - value) > 1e-4:  # no bar is below 0, a curve may be
+        return "changed"
+    return "keyed" if any(abs(key.co[0] - frame) < 1e-3 for key in curve.keyframe_points) else "animated"
+
+
+def bars_now(effect, index: int) -> np.ndarray:
+    """Bars (L,) that the picture at the current frame is made with, interpolated between keys.
+
+    Bars that were changed since, and not keyed yet, count as they stand. EffectError: the picture cannot be made.
+    """
+    stored = bars(effect.shutters[index])
+    if "changed" in key_state(effect, index):
+        return stored
+    edit, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}]"
+    curves, frame = fcurves.Curves(edit), edit.frame_current_final
+    chosen = effects.options(effect, curves, frame)
+    return effects.bars_at(curves, path, effect.shutters[index], chosen, frame)

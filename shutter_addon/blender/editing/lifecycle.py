@@ -1,0 +1,164 @@
+"""Effects come and go with their strips, however strips are deleted, pasted or brought back by undo."""
+
+import uuid
+
+import bpy
+
+from ..data import fcurves, strips
+from ..rendering import invalidation, session
+from . import copies, requirements, undelete
+
+EFFECTS = "virtual_shutter.effects"
+
+_layer_names: dict[int, list[str]] = {}  # by session_uid of an annotation, as they were at the last update
+
+
+def update(updated=None) -> None:
+    """Brings the effects of all edits in line with their strips. A second call changes nothing.
+
+    updated: the scene whose depsgraph is being updated, which must not go now."""
+    if bpy.app.is_job_running("RENDER"):
+        return
+    edits = _edits()
+    for edit in edits:
+        _reconnect(edit)
+    mend()
+    _separate_actions(edits)
+    copies.adopt()
+    for edit in edits:
+        _remove_effects(edit)
+        _unmute_sources(edit)
+    _follow_layers(edits)
+    _remove_scenes(updated)
+    _identify()
+    for edit in _edits():
+        invalidation.invalidate_changed(edit)
+
+
+def mend() -> None:
+    """Undoes what would leave effects out of the picture: their camera deleted, another engine, and the like."""
+    for edit in _edits():
+        for strip in strips.own_strips(edit):
+            if strip.scene is not None and strip.scene.library is None:
+                requirements.mend(strip)
+
+
+def forget() -> None:
+    """Forgets what the annotations of a file were, before another one is loaded."""
+    _layer_names.clear()
+
+
+def _edits() -> list:
+    return [scene for scene in bpy.data.scenes if scene.library is None]  # linked ones cannot be changed
+
+
+def _reconnect(edit) -> None:
+    """Gives pasted effect strips their scene again: Blender's clipboard holds strips, but not the scenes they show."""
+    for strip in edit.sequence_editor.strips_all if edit.sequence_editor else ():
+        if strip.type == "SCENE" and strip.scene is None and strip.virtual_shutter_effect:
+            scene = _scene_of(strip.virtual_shutter_effect) or undelete.restore(edit, strip.virtual_shutter_effect)
+            if scene is not None:
+                strip.scene = scene
+
+
+def _scene_of(identity: str):
+    return next((scene for scene in _effect_scenes() if scene.virtual_shutter.identity == identity), None)
+
+
+def _effect_scenes() -> list:
+    """The scenes that were made for effects, and can be changed."""
+    return [
+        scene
+        for scene in bpy.data.scenes
+        if scene.library is None and scene.render.engine == strips.ENGINE and scene.virtual_shutter.identity
+    ]
+
+
+def _separate_actions(edits) -> None:
+    """A copied edit gets keys of its own: Blender lets both share an action."""
+    taken = set()
+    for edit in edits:
+        animation_data = edit.animation_data
+        if not (edit.virtual_shutter.effects and animation_data and animation_data.action):
+            continue
+        if (key := (animation_data.action, animation_data.action_slot_handle)) in taken:
+            animation_data.action = animation_data.action.copy()
+        taken.add(key)
+
+
+def _remove_effects(edit) -> None:
+    """Removes the edit's effects that none of its strips shows any more."""
+    shown = {strip.scene for strip in strips.effect_strips(edit)}
+    effects = edit.virtual_shutter.effects
+    stay = [effect.scene in shown for effect in effects]
+    if all(stay):
+        return
+    places = {i: sum(stay[:i]) if stays else None for i, stays in enumerate(stay)}
+    for i in reversed([i for i, stays in enumerate(stay) if not stays]):
+        undelete.keep(edit, effects[i])
+        effects.remove(i)
+    fcurves.reindex(edit, EFFECTS, places)
+
+
+def _unmute_sources(edit) -> None:
+    """Sources that an effect muted show again once no effect strip shows them."""
+    muted = [s for s in edit.sequence_editor.strips_all if s.virtual_shutter_muted] if edit.sequence_editor else []
+    shown = strips.shown_sources(edit) if muted else ()
+    for source in muted:
+        if source.name not in shown:
+            source.mute = source.virtual_shutter_muted = False
+
+
+def _remove_scenes(updated) -> None:
+    """Removes effect scenes that no strip and no window shows, with what was made for them."""
+    shown = {strip.scene for edit in bpy.data.scenes for strip in strips.effect_strips(edit)}
+    windows = [window for manager in bpy.data.window_managers for window in manager.windows]
+    shown.update(scene for window in windows for scene in (window.scene, window.workspace.sequencer_scene))
+    for scene in _effect_scenes():
+        if scene not in shown and scene != updated:
+            _remove(scene)
+
+
+def _remove(scene) -> None:
+    camera, annotation = scene.camera, scene.annotation
+    bpy.data.scenes.remove(scene)
+    session.drop_removed()
+    invalidation.drop_removed()
+    if camera is not None and camera.type == "CAMERA" and camera.library is None and not camera.users:
+        data = camera.data
+        bpy.data.objects.remove(camera)
+        if not data.users:
+            bpy.data.cameras.remove(data)
+    if annotation is not None and annotation.library is None and not annotation.users:
+        bpy.data.annotations.remove(annotation)
+
+
+def _identify() -> None:
+    """Every effect scene has an identity of its own, and its strips carry it."""
+    taken = set()
+    for scene in _effect_scenes():
+        if scene.virtual_shutter.identity in taken:
+            scene.virtual_shutter.identity = uuid.uuid4().hex
+        taken.add(scene.virtual_shutter.identity)
+    for edit in _edits():
+        for strip in strips.effect_strips(edit):
+            if strip.virtual_shutter_effect != strip.scene.virtual_shutter.identity:
+                strip.virtual_shutter_effect = strip.scene.virtual_shutter.identity
+
+
+def _follow_layers(edits) -> None:
+    """Regions keep their layer when it is renamed: one name among the same number of layers is another."""
+    known = dict(_layer_names)
+    _layer_names.clear()  # of annotations that are gone
+    for effect in [effect for edit in edits for effect in edit.virtual_shutter.effects]:
+        annotation = effect.scene.annotation
+        if annotation is None:
+            continue
+        names = [layer.info for layer in annotation.layers]
+        before = known.get(annotation.session_uid, names)
+        _layer_names[annotation.session_uid] = names
+        changed = [(old, new) for old, new in zip(before, names, strict=False) if old != new]
+        if len(before) == len(names) and len(changed) == 1:
+            for region in effect.regions:
+                if region.layer == changed[0][0]:
+                    region.layer = changed[0][1]

@@ -1,0 +1,79 @@
+"""Whole edits made from nothing: a source strip, its effect, and where the film goes."""
+
+import math
+import os
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import bpy
+
+from ..data import recipe_import
+from . import add_effect
+
+_PATHS = {"MOVIE": "filepath", "IMAGE": "directory", "SOUND": "filepath"}  # the property of a strip of that type
+
+
+def make_edit(path: Path, medium, source_recipe):
+    """An edit of one source strip (an opened medium's) under one effect strip; its scene."""
+    source = make_source(path, medium)
+    edit = source.id_data
+    strip, effect = add_effect.add_effect(edit, source)
+    recipe_import.apply(edit, effect, strip, source_recipe)
+    strip.right_handle = length(medium, source_recipe) + 1
+    edit.frame_start, edit.frame_end = strip.left_handle, strip.right_handle - 1
+    edit.frame_current = edit.frame_start
+    return edit
+
+
+def make_source(path: Path, medium):
+    """A source strip (an opened medium's), alone in an edit that fits it."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    edit = bpy.context.scene
+    edit.name = "Edit"
+    render = edit.render
+    if medium.fps:
+        render.fps = max(1, round(medium.fps))
+        render.fps_base = render.fps / float(medium.fps)
+    render.resolution_x, render.resolution_y = medium.width, medium.height
+    render.resolution_percentage = 100
+    # Dither would add noise to a still frame; Standard shows code values as the source has them.
+    render.dither_intensity = 0
+    edit.view_settings.view_transform = "Standard"
+    return _add_source(edit.sequence_editor_create(), path, medium)
+
+
+def length(medium, source_recipe) -> int:
+    """How many timeline frames the edit has: the source's, and more where its time is keyed beyond them."""
+    return max([medium.count, *(math.ceil(key.frame) for key in source_recipe.time)])
+
+
+def _add_source(editor, path: Path, medium):
+    name = path.name
+    if medium.fps is not None:
+        if medium.has_audio:
+            editor.strips.new_sound(f"{name} Sound", str(path), 1, 1)
+        return editor.strips.new_movie(name, str(path), 2, 1)
+    strip = editor.strips.new_image(name, str(medium.files[0]), 2, 1)
+    for file in medium.files[1:]:
+        strip.elements.append(file.name)
+    return strip
+
+
+@contextmanager
+def paths_relative(edit, folder: Path):
+    """Inside, the edit's paths are relative to the folder that it is saved in, as far as there is such a path."""
+    owners = [(edit.render, "filepath")]
+    for strip in edit.sequence_editor.strips_all:
+        if strip.type in _PATHS:
+            owners.append((strip.sound if strip.type == "SOUND" else strip, _PATHS[strip.type]))
+    before = [(owner, name, getattr(owner, name)) for owner, name in owners]
+    for owner, name, path in before:
+        if path:
+            with suppress(ValueError):  # another drive
+                # relpath leaves out the slash behind a folder
+                setattr(owner, name, bpy.path.relpath(path, start=str(folder)) + ("/" if path.endswith(os.sep) else ""))
+    try:
+        yield
+    finally:
+        for owner, name, path in before:
+            setattr(owner, name, path)

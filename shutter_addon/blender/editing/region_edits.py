@@ -1,0 +1,86 @@
+"""An effect's regions and their annotation layers: added, removed, moved, keyed."""
+
+import numpy as np
+
+from ..data.annotations import annotation, layer_of
+from ..data.consistency import choose_region, color_layers, unique
+from . import collection_edits
+
+CHANNELS = ("location", "rotation", "scale")
+
+
+def add_region(effect, shutter, kind: str = "LINE", name: str = ""):
+    """Appends a region of a shutter, on an empty annotation layer of its own, and makes it the active one."""
+    region = effect.regions.add()
+    region.name = unique(name or shutter.name, {r.name for r in effect.regions})
+    region.shutter, region.kind = shutter.name, kind
+    new_layer(effect, region)
+    effect.active_region = len(effect.regions) - 1
+    return region
+
+
+def new_layer(effect, region):
+    """Gives a region an empty annotation layer, named after it and in its shutter's colour."""
+    layer = annotation(effect).layers.new(region.name, set_active=True)
+    layer.color = effect.shutters[region.shutter].color
+    region.layer = layer.info
+    return layer
+
+
+def remove_region(effect, index: int) -> None:
+    """Removes a region, its keys and its annotation layer."""
+    layer = layer_of(effect, effect.regions[index])
+    if layer is not None:
+        effect.scene.annotation.layers.remove(layer)
+    collection_edits.remove(effect, "regions", index)
+    effect.active_region = min(effect.active_region, max(len(effect.regions) - 1, 0))
+    choose_region(effect)
+
+
+def move_region(effect, index: int, to: int) -> None:
+    """Moves a region in the list; later ones lie over earlier ones."""
+    collection_edits.move(effect, "regions", index, to)
+    effect.active_region = to
+
+
+def assign_region(effect, index: int, shutter) -> None:
+    """Gives a region to another shutter, which becomes the active one."""
+    effect.regions[index].shutter = shutter.name
+    color_layers(effect, shutter)
+    effect.active_region = index
+    effect.active_shutter = list(effect.shutters).index(shutter)
+
+
+def take_layer(effect, shutter, layer):
+    """A region of a shutter from any annotation layer, whose drawings are copied unless it is one of the effect's."""
+    own = effect.scene.annotation and layer.id_data == effect.scene.annotation
+    region = add_region(effect, shutter, name=layer.info)
+    copy = layer_of(effect, region)
+    for drawing in layer.frames:
+        _copy_strokes(drawing, copy.frames.new(drawing.frame_number))
+    if own:
+        effect.scene.annotation.layers.remove(layer)
+    return region
+
+
+def _copy_strokes(old, new) -> None:
+    for stroke in old.strokes:
+        copy = new.strokes.new()
+        copy.display_mode = "2DSPACE"
+        copy.points.add(len(stroke.points))
+        flat = np.empty(len(stroke.points) * 3, dtype=np.float32)
+        stroke.points.foreach_get("co", flat)
+        copy.points.foreach_set("co", flat)
+
+
+def free_layers(effect, annotation) -> list:
+    """Layers of an annotation that are no region yet."""
+    taken = {region.layer for region in effect.regions} if annotation == effect.scene.annotation else set()
+    return [layer for layer in annotation.layers if layer.info not in taken] if annotation else []
+
+
+def key_region(effect, index: int) -> None:
+    """Keys a region's location, rotation and scale at the current frame."""
+    path = f"{effect.path_from_id()}.regions[{index}]"
+    for name in CHANNELS:
+        effect.id_data.keyframe_insert(f"{path}.{name}", group=effect.regions[index].name)

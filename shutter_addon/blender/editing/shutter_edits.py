@@ -1,0 +1,86 @@
+"""Changes to an effect: its shutters, their bars and keys, and its regions. Operators and gizmos call these.
+
+Shutters and regions are items of collections: where one goes or moves, its F-curves go and move with it.
+"""
+
+import numpy as np
+from bpy.app.translations import pgettext_data as data_
+
+from ...core import presets
+from ..data import fcurves, property_copy, validation
+from . import collection_edits
+from .region_edits import remove_region
+
+# Told apart on footage and by colour-blind eyes (Okabe and Ito).
+COLORS = (
+    (0.337, 0.706, 0.914),
+    (0.902, 0.624, 0.0),
+    (0.0, 0.62, 0.451),
+    (0.8, 0.475, 0.655),
+    (0.941, 0.894, 0.259),
+    (0.835, 0.369, 0.0),
+    (0.0, 0.447, 0.698),
+)
+
+
+# Shutters
+
+
+def start(effect) -> None:
+    """What a new effect begins with: a long shutter everywhere, and a sharp one to scribble with.
+
+    With the border, the first scribble is sharp around itself; without, it would be the only one, and hold everywhere.
+    """
+    effect.border = True
+    add_shutter(effect, data_("Long"), presets.bars("ANGLE_360", effect.window))
+    add_shutter(effect, data_("Sharp"), presets.bars("STILL", effect.window))
+
+
+def add_shutter(effect, name: str = "", bars=None):
+    """Appends a shutter, fully open unless bars (window,) are given, and makes it the active one."""
+    color = COLORS[len(effect.shutters) % len(COLORS)]
+    weights = np.ones(validation.number(effect, "window")) if bars is None else bars
+    shutter = effect.shutters.add()
+    shutter.name, shutter.color = name or data_("Shutter"), color
+    for weight in weights:
+        shutter.bars.add().weight = weight
+    effect.active_shutter = len(effect.shutters) - 1
+    return shutter
+
+
+def duplicate_shutter(effect, index: int):
+    """A copy of a shutter, with its keys, behind it; regions stay with the original."""
+    edit, path = effect.id_data, f"{effect.path_from_id()}.shutters"
+    effect.shutters.add()
+    last = len(effect.shutters) - 1
+    old, new = effect.shutters[index], effect.shutters[last]
+    property_copy.copy_properties(old, new)
+    new.color = COLORS[last % len(COLORS)]
+    fcurves.copy_curves(edit, f"{path}[{index}].", edit, f"{path}[{last}].")
+    move_shutter(effect, last, index + 1)
+    effect.active_shutter = index + 1
+    return effect.shutters[index + 1]
+
+
+def remove_shutter(effect, index: int) -> None:
+    """Removes a shutter, its keys and its regions. The first of those that remain is the default."""
+    name = effect.shutters[index].name
+    for i in reversed([i for i, region in enumerate(effect.regions) if region.shutter == name]):
+        remove_region(effect, i)
+    collection_edits.remove(effect, "shutters", index)
+    effect.active_shutter = min(effect.active_shutter, max(len(effect.shutters) - 1, 0))
+
+
+def move_shutter(effect, index: int, to: int) -> None:
+    """Moves a shutter in the list; whichever comes first is the default."""
+    collection_edits.move(effect, "shutters", index, to)
+    effect.active_shutter = to
+
+
+# Bars
+
+
+# Regions
+
+
+# Collections

@@ -1,0 +1,86 @@
+"""What was removed last, kept in memory: a strip that is cut and pasted gets its effect back, in another file as well,
+as Blender's clipboard outlives the one it was cut from."""
+
+from ..data import fcurves, property_copy
+from . import add_effect
+
+_MOST = 64
+_effects: dict = {}
+
+
+def keep(edit, effect) -> None:
+    """Keeps all that belongs to an effect, by its scene's identity."""
+    scene, path = effect.scene, effect.path_from_id()
+    if scene is None or not scene.virtual_shutter.identity:
+        return
+    curves = [_plain(curve) for curve in fcurves.curves_under(edit, path + ".")]
+    for curve in curves:
+        curve["data_path"] = curve["data_path"].removeprefix(path)
+    _effects.pop(scene.virtual_shutter.identity, None)  # the newest are the last
+    _effects[scene.virtual_shutter.identity] = {
+        "scene": (scene.name, (scene.render.resolution_x, scene.render.resolution_y)),
+        "effect": _plain(effect),
+        "curves": curves,
+        "layers": [_plain(layer) for layer in scene.annotation.layers] if scene.annotation else [],
+    }
+    while len(_effects) > _MOST:
+        del _effects[next(iter(_effects))]
+
+
+def forget() -> None:
+    """Keeps nothing any more: when the extension goes."""
+    _effects.clear()
+
+
+def restore(edit, identity: str):
+    """Makes a kept effect again in an edit; its scene, or None when nothing was kept."""
+    if (data := _effects.get(identity)) is None:
+        return None
+    scene = add_effect.new_scene(edit, *data["scene"])
+    scene.virtual_shutter.identity = identity
+    effect = edit.virtual_shutter.effects.add()
+    _fill(effect, data["effect"])
+    effect.scene = scene
+    for plain in data["curves"]:
+        path = effect.path_from_id() + plain["data_path"]
+        curve = fcurves.new_curve(edit, path, plain["array_index"])
+        _fill(curve, plain | {"data_path": path})
+        curve.update()
+    for plain in data["layers"]:
+        _fill(scene.annotation.layers.new(plain["info"], set_active=False), plain)
+    return scene
+
+
+def _plain(struct) -> dict:
+    """A struct of Blender's with all that is in it as plain data; what it points to is left out."""
+    plain = {}
+    for prop in struct.bl_rna.properties:
+        name = prop.identifier
+        if prop.type == "COLLECTION":
+            plain[name] = [_plain(item) for item in getattr(struct, name)]
+        elif prop.type != "POINTER" and name != "co_ui":  # setting that one moves a key's handles
+            value = property_copy.stored(struct, name)
+            plain[name] = tuple(value) if getattr(prop, "is_array", False) else value
+    return plain
+
+
+def _fill(struct, plain: dict) -> None:
+    for name, value in plain.items():
+        if isinstance(value, list):
+            for item in value:
+                _fill(_add(getattr(struct, name), name, item), item)
+        elif not struct.is_property_readonly(name):
+            property_copy.store(struct, name, value)
+
+
+def _add(collection, name: str, item: dict):
+    if name == "frames":
+        return collection.new(item["frame_number"])
+    if name == "modifiers":
+        return collection.new(item["type"])
+    if name == "strokes":
+        return collection.new()
+    if name in ("points", "keyframe_points"):
+        collection.add(1)
+        return collection[-1]
+    return collection.add()

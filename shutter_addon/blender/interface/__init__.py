@@ -1,0 +1,1 @@
+"""What users see and click: operators, panels, preview, gizmos, languages."""

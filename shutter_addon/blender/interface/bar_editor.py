@@ -1,0 +1,224 @@
+"""The bar editor: a gizmo in the sequencer's preview that shows the active shutter's bars, to paint and to key."""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from bpy.app.translations import contexts
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.types import Gizmo, GizmoGroup
+
+from ..data import consistency, selection
+from ..data.validation import EffectError
+from ..editing import bar_edits
+from . import drawing, keymaps
+
+_MARGIN, _HEIGHT, _BAR = 16, 96, 16  # in units of the interface
+_PAD, _HEADER = 8, 18
+_SNAP = 0.1
+_FINE = 0.1
+_THRESHOLD = 3  # pixels that make a click a drag
+_BACK = (0.08, 0.08, 0.08, 0.8)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the bars lie in the region, in pixels: the frame around them, and the box in which they stand."""
+
+    frame: tuple[float, float, float, float]
+    box: tuple[float, float, float, float]
+    count: int
+    top: float  # weight at the box's upper edge
+
+    def bar_at(self, x: float) -> int:
+        """The bar under x; the first or last beyond the ends."""
+        left, _, right, _ = self.box
+        return min(max(int((x - left) / (right - left) * self.count), 0), self.count - 1)
+
+    def weight_at(self, y: float) -> float:
+        """The weight at y, not below 0."""
+        _, bottom, _, top = self.box
+        return max((y - bottom) / (top - bottom) * self.top, 0.0)
+
+    def contains(self, x: float, y: float) -> bool:
+        left, bottom, right, top = self.frame
+        return left <= x < right and bottom <= y < top
+
+
+def layout(width: float, bars, unit: float) -> Layout:
+    """The bar editor's place at the lower left of a region of this width for bars (L,); unit: of the interface, in
+    pixels."""
+    margin, pad = _MARGIN * unit, _PAD * unit
+    # A region that is too narrow shows the editor's left part.
+    width = max(min(max(len(bars) * _BAR, 200) * unit, width - 2 * margin), 4 * pad)
+    frame = margin, margin, margin + width, margin + _HEIGHT * unit
+    box = frame[0] + pad, frame[1] + pad, frame[2] - pad, frame[3] - _HEADER * unit
+    return Layout(frame, box, len(bars), max(1.0, float(np.max(bars, initial=0.0))))
+
+
+def _layout(context, bars) -> Layout:
+    return layout(context.region.width, bars, drawing.ui_scale())
+
+
+def painted(values, place: Layout, start, end, snap: bool) -> np.ndarray:
+    """Bars (L,) after a stroke from one point to another: every bar it crosses takes the stroke's height there."""
+    result = np.array(values, dtype=np.float64)
+    first, last = place.bar_at(start[0]), place.bar_at(end[0])
+    steps = abs(last - first)
+    for step in range(steps + 1):
+        u = step / steps if steps else 1.0
+        weight = min(place.weight_at((1 - u) * start[1] + u * end[1]), place.top)
+        bar = first + step * (1 if last >= first else -1)
+        result[bar] = round(weight / _SNAP) * _SNAP if snap else weight
+    return result
+
+
+def bar_under(context, x: float, y: float) -> int | None:
+    """The bar of the active shutter at a point of the preview's region, or None."""
+    found = selection.active(context)
+    if found is None or context.region is None or context.region.type != "PREVIEW":
+        return None
+    if (values := _shown(found[1])) is None:
+        return None
+    place = _layout(context, values)
+    return place.bar_at(x) if place.contains(x, y) else None
+
+
+def _shown(effect) -> np.ndarray | None:
+    """Bars (L,) that the editor shows; None: there is no shutter, or none that a picture can be made with."""
+    if selection.active_shutter(effect) is None:
+        return None
+    try:
+        return bar_edits.bars_now(effect, effect.active_shutter)
+    except EffectError:  # panels and the live preview tell it
+        return None
+
+
+def _key_colors() -> dict:
+    """As in Blender's own fields."""
+    theme = bpy.context.preferences.themes[0].user_interface.wcol_state
+    return {"animated": theme.inner_anim, "keyed": theme.inner_key, "changed": theme.inner_changed}
+
+
+class SHUTTER_GT_bars(Gizmo):
+    bl_idname = "SHUTTER_GT_bars"
+
+    def setup(self):
+        self.use_draw_modal = True
+        self.use_grab_cursor = False
+
+    def draw(self, context):
+        effect = selection.active(context)[1]
+        if (values := _shown(effect)) is not None:
+            states = bar_edits.key_state(effect, effect.active_shutter)
+            _draw(_layout(context, values), selection.active_shutter(effect), values, states)
+
+    def test_select(self, context, location):
+        return 0 if bar_under(context, *location) is not None else -1
+
+    def invoke(self, context, event):
+        effect = selection.active(context)[1]
+        self.index = effect.active_shutter
+        self.before = consistency.bars(effect.shutters[self.index])
+        # Between keys what is shown, and painted on, is not what is stored.
+        self.values = bar_edits.bars_now(effect, self.index)
+        # The scale stays while dragging, or a bar would run away from the pointer.
+        self.place = _layout(context, self.values)
+        self.mouse = self.point = event.mouse_region_x, event.mouse_region_y
+        self.paints = False  # a click does not, nor the two of a double click
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event, tweak):
+        mouse = event.mouse_region_x, event.mouse_region_y
+        self.paints = self.paints or max(abs(a - b) for a, b in zip(mouse, self.mouse, strict=True)) >= _THRESHOLD
+        # `tweak` knows of keys that are pressed while dragging, the event of those that were held before.
+        fine, snap = "PRECISE" in tweak or event.shift, "SNAP" in tweak or event.ctrl
+        if self.paints and (mouse != self.mouse or snap):
+            point = mouse[0], self.point[1] + (mouse[1] - self.mouse[1]) * (_FINE if fine else 1.0)
+            self.mouse = mouse
+            self._paint(context, point, snap)
+        return {"RUNNING_MODAL"}
+
+    def _paint(self, context, point, snap: bool):
+        effect = selection.active(context)[1]
+        self.values = painted(self.values, self.place, self.point, point, snap)
+        bar_edits.paint(effect, self.index, self.values)
+        self.point = point
+        context.area.tag_redraw()
+
+    def exit(self, context, cancel):
+        found = selection.active(context)
+        if found is None or not self.paints:
+            return
+        effect = found[1]
+        if cancel:
+            bar_edits.set_bars(effect.shutters[self.index], self.before)
+            return
+        if bar_edits.auto_key(context):
+            bar_edits.key_bars(effect, self.index)
+        bpy.ops.ed.undo_push(message=iface_("Paint Bars", contexts.operator_default))
+
+
+def _draw(place: Layout, shutter, values, states) -> None:
+    left, bottom, right, top = place.box
+    edges = np.linspace(left, right, place.count + 1)
+    heights = bottom + np.minimum(values / place.top, 1.0) * (top - bottom)
+    gap = 1.0 if edges[1] - edges[0] > 3 else 0.0
+    colors = _key_colors()
+    drawing.rectangles([place.frame], [_BACK])
+    drawing.rectangles(
+        [(a, bottom, b - gap, max(h, bottom + 1)) for a, b, h in zip(edges, edges[1:], heights, strict=False)],
+        np.tile((*shutter.color, 0.95), (place.count, 1)),
+    )
+    foot = drawing.ui_scale() * 3
+    keyed = [i for i, state in enumerate(states) if state]
+    drawing.rectangles(
+        [(edges[i], bottom - foot - 1, edges[i + 1] - gap, bottom - 1) for i in keyed],
+        [(*colors[states[i]][:3], 1.0) for i in keyed],
+    )
+    ticks = range(0, place.count + 1, max(1, 4 * (place.count // 32), 4 if place.count > 8 else 1))
+    drawing.rectangles(
+        [(edges[k] - 0.5, bottom - foot - 4, edges[k] + 0.5, bottom - 1) for k in ticks],
+        np.tile((1, 1, 1, 0.5), (len(ticks), 1)),
+    )
+    words = f"{shutter.name}   {bar_edits.summary(values)}"
+    drawing.text(left, top + drawing.ui_scale() * 4, words)
+
+
+class SHUTTER_GGT_bars(GizmoGroup):
+    bl_idname = "SHUTTER_GGT_bars"
+    bl_label = "Shutter Bars"
+    bl_space_type = "SEQUENCE_EDITOR"
+    bl_region_type = "PREVIEW"
+    bl_options = {"PERSISTENT"}
+
+    @classmethod
+    def poll(cls, context):
+        found = selection.active(context)
+        return found is not None and selection.active_shutter(found[1]) is not None and found[0].is_editable
+
+    @classmethod
+    def setup_keymap(cls, keyconfig):
+        keymap = keymaps.new(cls, keyconfig)
+        keymap.keymap_items.new("shutter.bar_set", "LEFTMOUSE", "DOUBLE_CLICK")
+        keymap.keymap_items.new("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", any=True)
+        keymap.keymap_items.new("shutter.bars_key", "I", "PRESS")
+        keymap.keymap_items.new("shutter.bars_unkey", "I", "PRESS", alt=True)
+        return keymap
+
+    def setup(self, _context):
+        self.bars = self.gizmos.new(SHUTTER_GT_bars.bl_idname)
+
+
+classes = (SHUTTER_GT_bars, SHUTTER_GGT_bars)
+
+
+def register():
+    for cls in classes:
+        bpy.utils.register_class(cls)
+
+
+def unregister():
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)
+    keymaps.remove(SHUTTER_GGT_bars)

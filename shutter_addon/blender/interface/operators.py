@@ -1,0 +1,535 @@
+"""Operators: what the user can do, as thin calls of plain functions."""
+
+import bpy
+from bpy.app.translations import contexts
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.types import Operator
+from bpy_extras.io_utils import ExportHelper, ImportHelper
+
+from ...core import presets, recipe
+from ..data import consistency, effects, recipe_export, recipe_import, selection, strips, validation
+from ..data.properties import CONTEXT, KINDS
+from ..editing import add_effect, bar_edits, collection_edits, region_edits, shutter_edits
+from ..rendering.session import FAULTS
+from . import icons, preview_areas
+
+UNDOABLE = {"REGISTER", "UNDO"}
+
+
+def refused(cls, sentence: str) -> bool:
+    """For poll(): greys the operator out, and says why."""
+    cls.poll_message_set(sentence)
+    return False
+
+
+def redraw(context) -> None:
+    """Sequencer and properties show the effect's data, of whose changes Blender does not know."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in {"SEQUENCE_EDITOR", "PROPERTIES", "DOPESHEET_EDITOR", "GRAPH_EDITOR"}:
+                area.tag_redraw()
+
+
+class _OfEffect:
+    """Works on the effect of the active strip."""
+
+    bl_options = UNDOABLE
+
+    @classmethod
+    def poll(cls, context):
+        found = selection.active(context)
+        if found is None:
+            return refused(cls, rpt_("Select a Shutter strip or its source strip"))
+        if not found[0].is_editable:
+            return refused(cls, rpt_("The edit is linked from another file"))
+        return cls.possible(found[1])
+
+    @classmethod
+    def possible(cls, effect):
+        return True
+
+    def execute(self, context):
+        try:
+            result = self.change(context, selection.active(context)[1])
+        except effects.EffectError as error:
+            self.report({"ERROR"}, str(error))
+            result = {"CANCELLED"}
+        redraw(context)
+        return result or {"FINISHED"}
+
+
+class _OfShutter(_OfEffect):
+    """Works on the active shutter."""
+
+    @classmethod
+    def possible(cls, effect):
+        return selection.active_shutter(effect) is not None or refused(cls, rpt_("The effect has no shutter: add one"))
+
+
+class _OfRegion(_OfEffect):
+    """Works on the active region."""
+
+    @classmethod
+    def possible(cls, effect):
+        return selection.active_region(effect) is not None or refused(cls, rpt_("The shutter has no region: draw one"))
+
+
+def has_room(cls, effect, collection: str) -> bool:
+    """For poll(): whether the effect can have another one of its "shutters" or "regions"."""
+    sentence = collection_edits.why_full(effect, collection)
+    return sentence is None or refused(cls, sentence)
+
+
+class SHUTTER_OT_add_effect(Operator):
+    """Add a Shutter strip above the active strip, which gives every pixel an exposure of its own"""
+
+    bl_idname = "shutter.add_effect"
+    bl_label = "Add Shutter Strip"
+    bl_options = UNDOABLE
+
+    @classmethod
+    def poll(cls, context):
+        edit, source = selection.edit_of(context), selection.active_strip(context)
+        if edit is None or source is None:
+            return refused(cls, rpt_("Select a movie, image or clip strip"))
+        if not edit.is_editable:
+            return refused(cls, rpt_("The edit is linked from another file"))
+        if source.type not in strips.SOURCES:
+            return refused(cls, rpt_("The active strip is not a movie, image or clip strip"))
+        return True
+
+    def execute(self, context):
+        edit, source = selection.edit_of(context), selection.active_strip(context)
+        try:
+            strip, effect = add_effect.add_effect(edit, source)
+        except FAULTS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        shutter_edits.start(effect)
+        selection.choose(edit, strip)
+        if not bpy.app.background:
+            show_panel(context)
+        redraw(context)
+        return {"FINISHED"}
+
+
+def show_panel(context) -> None:
+    """Opens the sidebar's Shutter tab beside the picture: in the Properties editor it is below all other panels."""
+    for _window, area in preview_areas.previews(context):
+        area.spaces.active.show_region_ui = True
+    # A sidebar has tabs once it has been drawn, which a slow window does late, and one without room never.
+    _waits[:] = [0.1] * 30
+    if not bpy.app.timers.is_registered(_choose_tab):
+        bpy.app.timers.register(_choose_tab, first_interval=0.1)
+
+
+_waits: list[float] = []
+
+
+def _choose_tab() -> float | None:
+    areas = [area for _window, area in preview_areas.previews(bpy.context)]
+    sidebars = [next(region for region in area.regions if region.type == "UI") for area in areas]
+    drawn = [s for s in sidebars if not s.is_property_readonly("active_panel_category")]
+    if len(drawn) < len(sidebars) and _waits:
+        return _waits.pop()
+    for sidebar in drawn:
+        sidebar.active_panel_category = "Shutter"
+        sidebar.tag_redraw()
+    return None
+
+
+class SHUTTER_OT_shutter_add(_OfEffect, Operator):
+    """Add a shutter that is fully open"""
+
+    bl_idname = "shutter.shutter_add"
+    bl_label = "Add Shutter"
+
+    @classmethod
+    def possible(cls, effect):
+        return has_room(cls, effect, "shutters")
+
+    def change(self, _context, effect):
+        shutter_edits.add_shutter(effect)
+
+
+class SHUTTER_OT_shutter_duplicate(_OfShutter, Operator):
+    """Add a copy of the active shutter, keyframes included"""
+
+    bl_idname = "shutter.shutter_duplicate"
+    bl_label = "Duplicate Shutter"
+
+    @classmethod
+    def possible(cls, effect):
+        return super().possible(effect) and has_room(cls, effect, "shutters")
+
+    def change(self, _context, effect):
+        shutter_edits.duplicate_shutter(effect, effect.active_shutter)
+
+
+class SHUTTER_OT_shutter_remove(_OfShutter, Operator):
+    """Remove the active shutter and its regions"""
+
+    bl_idname = "shutter.shutter_remove"
+    bl_label = "Remove Shutter"
+
+    @classmethod
+    def possible(cls, effect):
+        if len(effect.shutters) == 1:
+            return refused(cls, rpt_("The last shutter of an effect cannot be removed"))
+        return super().possible(effect)
+
+    def change(self, _context, effect):
+        shutter_edits.remove_shutter(effect, effect.active_shutter)
+
+
+class _Move:
+    direction: EnumProperty(name="Direction", items=(("UP", "Up", ""), ("DOWN", "Down", "")), options={"SKIP_SAVE"})
+
+    def target(self, places: list[int], index: int) -> int:
+        """The place after or before `index` in the list, among the places that it shows."""
+        step = places.index(index) + (1 if self.direction == "DOWN" else -1)
+        return places[min(max(step, 0), len(places) - 1)]
+
+
+class SHUTTER_OT_shutter_move(_Move, _OfShutter, Operator):
+    """Move the active shutter in the list (the first one is the default, which holds where nothing is scribbled)"""
+
+    bl_idname = "shutter.shutter_move"
+    bl_label = "Move Shutter"
+
+    def change(self, _context, effect):
+        index = effect.active_shutter
+        to = self.target(list(range(len(effect.shutters))), index)
+        if to == index:
+            return {"CANCELLED"}
+        shutter_edits.move_shutter(effect, index, to)
+        return None
+
+
+_preset_items = []
+
+
+def _presets(_self, _context):
+    """With icons, which exist only once the extension is registered; Blender needs the list kept."""
+    _preset_items[:] = [
+        (name, label, description, icons.of(name), i)
+        for i, (name, (label, description, _make, _defaults)) in enumerate(presets.PRESETS.items())
+    ]
+    return _preset_items
+
+
+class SHUTTER_OT_preset(_OfShutter, Operator):
+    """Give the active shutter the bars of a preset"""
+
+    bl_idname = "shutter.preset"
+    bl_label = "Apply Shutter Preset"
+
+    preset: EnumProperty(name="Preset", items=_presets, translation_context=CONTEXT)
+
+    def change(self, context, effect):
+        weights = presets.bars(self.preset, validation.number(effect, "window"))
+        bar_edits.paint(effect, effect.active_shutter, weights, bar_edits.auto_key(context))
+
+
+class SHUTTER_OT_bars_key(_OfShutter, Operator):
+    """Insert keyframes for all bars of the active shutter at the current frame"""
+
+    bl_idname = "shutter.bars_key"
+    bl_label = "Insert Bar Keyframes"
+
+    def change(self, _context, effect):
+        bar_edits.key_bars(effect, effect.active_shutter)
+
+
+class SHUTTER_OT_bars_unkey(_OfShutter, Operator):
+    """Delete the keyframes of all bars of the active shutter at the current frame"""
+
+    bl_idname = "shutter.bars_unkey"
+    bl_label = "Delete Bar Keyframes"
+
+    def change(self, _context, effect):
+        if not bar_edits.unkey_bars(effect, effect.active_shutter):
+            self.report({"WARNING"}, "No bar has a keyframe at the current frame")
+            return {"CANCELLED"}
+        return None
+
+
+class SHUTTER_OT_bar_set(_OfShutter, Operator):
+    """Set the weight of a bar as a number"""
+
+    bl_idname = "shutter.bar_set"
+    bl_label = "Set Bar Weight"
+
+    bar: IntProperty(name="Bar", description="Number of the bar, from 1", default=1, min=1)
+    weight: FloatProperty(name="Weight", description="How much the bar's frame contributes", min=0.0, soft_max=1.0)
+
+    def invoke(self, context, event):
+        from .bar_editor import bar_under
+
+        effect = selection.active(context)[1]
+        place = bar_under(context, event.mouse_region_x, event.mouse_region_y)
+        if place is not None:
+            self.bar = place + 1
+        try:
+            bars = bar_edits.bars_now(effect, effect.active_shutter)
+        except effects.EffectError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.weight = bars[min(self.bar, len(bars)) - 1]
+        title = iface_("Bar {number}").format(number=self.bar)
+        return context.window_manager.invoke_props_dialog(self, width=200, title=title)
+
+    def draw(self, _context):
+        self.layout.activate_init = True
+        self.layout.prop(self, "weight")
+
+    def change(self, context, effect):
+        weights = bar_edits.bars_now(effect, effect.active_shutter)
+        if self.bar > len(weights):
+            self.report({"ERROR"}, rpt_("The shutter has {count} bars").format(count=len(weights)))
+            return {"CANCELLED"}
+        weights[self.bar - 1] = self.weight
+        bar_edits.paint(effect, effect.active_shutter, weights, bar_edits.auto_key(context))
+        return None
+
+
+class SHUTTER_OT_draw(_OfShutter, Operator):
+    """Scribble in the preview where the active shutter holds (at another frame, this redraws the active region)"""
+
+    bl_idname = "shutter.draw"
+    bl_label = "Draw"
+
+    # Blender would use again what a button was pressed with before.
+    new: BoolProperty(
+        name="New Region",
+        description="Start a new region instead of adding strokes to the active one",
+        options={"SKIP_SAVE"},
+    )
+    kind: EnumProperty(name="Type", description="How the strokes cover the picture", items=KINDS, options={"SKIP_SAVE"})
+
+    @classmethod
+    def possible(cls, effect):
+        if not super().possible(effect):
+            return False
+        return selection.active_region(effect) is not None or has_room(cls, effect, "regions")
+
+    def change(self, context, effect):
+        region = selection.active_region(effect)
+        if self.new or region is None:
+            if sentence := collection_edits.why_full(effect, "regions"):  # poll() does not know what `new` is
+                raise effects.EffectError(sentence)
+            region = region_edits.add_region(effect, selection.active_shutter(effect), self.kind)
+        if not drawing_tool(context, effect, region, "builtin.annotate"):
+            self.report({"INFO"}, "Open a sequencer with a preview to draw")
+
+
+class SHUTTER_OT_erase(_OfRegion, Operator):
+    """Erase strokes of the active region in the preview"""
+
+    bl_idname = "shutter.erase"
+    bl_label = "Erase"
+
+    def change(self, context, effect):
+        if not drawing_tool(context, effect, selection.active_region(effect), "builtin.annotate_eraser"):
+            self.report({"INFO"}, "Open a sequencer with a preview to erase")
+
+
+def drawing_tool(context, effect, region, tool: str) -> bool:
+    """Makes the region's layer the active annotation of every preview, and the tool theirs; whether there is one."""
+    if shutter_edits.layer_of(effect, region) is None:
+        region_edits.new_layer(effect, region)
+    consistency.aim_pen(effect)
+    annotation = effect.scene.annotation
+    found = False
+    for window, area in preview_areas.previews(context):
+        area.spaces.active.annotation = annotation
+        area.spaces.active.preview_overlay.show_annotation = True
+        with context.temp_override(window=window, area=area, region=preview_areas.preview_region(area)):
+            bpy.ops.wm.tool_set_by_id(name=tool, space_type="SEQUENCE_EDITOR")
+        found = True
+    return found
+
+
+_layer_items = []
+
+
+def _layers(_self, context):
+    found = selection.active(context)
+    layers = region_edits.free_layers(found[1], annotation_of(context)) if found else []
+    _layer_items[:] = [(layer.info, layer.info, "") for layer in layers]
+    return _layer_items
+
+
+def annotation_of(context):
+    """The annotation that the first preview shows."""
+    return next((area.spaces.active.annotation for _window, area in preview_areas.previews(context)), None)
+
+
+class SHUTTER_OT_region_take(_OfShutter, Operator):
+    """Make an annotation layer of the preview a region of the active shutter"""
+
+    bl_idname = "shutter.region_take"
+    bl_label = "Add Region from Annotation Layer"
+
+    layer: EnumProperty(name="Layer", items=_layers, translation_context=contexts.no_translation)
+
+    @classmethod
+    def possible(cls, effect):
+        return super().possible(effect) and has_room(cls, effect, "regions")
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if not region_edits.free_layers(selection.active(context)[1], annotation_of(context)):
+            return refused(cls, rpt_("The preview shows no annotation layer that is not a region yet"))
+        return True
+
+    def change(self, context, effect):
+        layer = annotation_of(context).layers[self.layer]
+        region_edits.take_layer(effect, selection.active_shutter(effect), layer)
+        for _window, area in preview_areas.previews(context):
+            area.spaces.active.annotation = effect.scene.annotation
+
+
+_shutter_items = []
+
+
+def _shutters(_self, context):
+    found = selection.active(context)
+    shutters = found[1].shutters if found else []
+    _shutter_items[:] = [(str(i), shutter.name, "") for i, shutter in enumerate(shutters)]
+    return _shutter_items
+
+
+class SHUTTER_OT_region_assign(_OfRegion, Operator):
+    """Assign the active region to another shutter"""
+
+    bl_idname = "shutter.region_assign"
+    bl_label = "Assign Region to Shutter"
+
+    shutter: EnumProperty(name="Shutter", items=_shutters, translation_context=contexts.no_translation)
+
+    def change(self, _context, effect):
+        region_edits.assign_region(effect, effect.active_region, effect.shutters[int(self.shutter)])
+
+
+class SHUTTER_OT_region_remove(_OfRegion, Operator):
+    """Remove the active region and its strokes"""
+
+    bl_idname = "shutter.region_remove"
+    bl_label = "Remove Region"
+
+    def change(self, _context, effect):
+        region_edits.remove_region(effect, effect.active_region)
+
+
+class SHUTTER_OT_region_move(_Move, _OfRegion, Operator):
+    """Move the active region in the list (later ones lie over earlier ones)"""
+
+    bl_idname = "shutter.region_move"
+    bl_label = "Move Region"
+
+    def change(self, _context, effect):
+        index, name = effect.active_region, selection.active_shutter(effect).name
+        listed = [i for i, region in enumerate(effect.regions) if region.shutter == name]
+        if (to := self.target(listed, index)) == index:
+            return {"CANCELLED"}
+        region_edits.move_region(effect, index, to)
+        return None
+
+
+class SHUTTER_OT_region_key(_OfRegion, Operator):
+    """Insert keyframes for location, rotation and scale of the active region at the current frame"""
+
+    bl_idname = "shutter.region_key"
+    bl_label = "Insert Region Keyframes"
+
+    def change(self, _context, effect):
+        region_edits.key_region(effect, effect.active_region)
+
+
+def chosen_file(operator) -> str:
+    """The path that an operator got. RecipeError: it got none."""
+    if not operator.filepath:
+        raise recipe.RecipeError(rpt_("Choose a file"))
+    return operator.filepath
+
+
+class SHUTTER_OT_recipe_import(_OfEffect, ImportHelper, Operator):
+    """Replace the shutters, regions, keyframes and options of the effect with those of a recipe file"""
+
+    bl_idname = "shutter.recipe_import"
+    bl_label = "Import Recipe"
+    filename_ext = ".json"
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def change(self, context, effect):
+        edit, _effect, strip = selection.active(context)
+        try:
+            recipe_import.apply(edit, effect, strip, recipe.load(chosen_file(self)))
+        except (recipe.RecipeError, effects.EffectError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return None
+
+
+class SHUTTER_OT_recipe_export(_OfEffect, ExportHelper, Operator):
+    """Save the shutters, regions, keyframes and options of the effect as a recipe file"""
+
+    bl_idname = "shutter.recipe_export"
+    bl_label = "Export Recipe"
+    bl_options = {"REGISTER"}
+    filename_ext = ".json"
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def change(self, context, effect):
+        edit, _effect, strip = selection.active(context)
+        try:
+            path = chosen_file(self)
+            recipe.save(recipe_export.recipe_of(edit, effect, strip), path)
+        except recipe.RecipeError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        except OSError as error:
+            sentence = f"{self.filepath}: {error.strerror or error}"
+            self.report({"ERROR"}, sentence)
+            return {"CANCELLED"}
+        self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
+        return None
+
+
+classes = (
+    SHUTTER_OT_add_effect,
+    SHUTTER_OT_shutter_add,
+    SHUTTER_OT_shutter_duplicate,
+    SHUTTER_OT_shutter_remove,
+    SHUTTER_OT_shutter_move,
+    SHUTTER_OT_preset,
+    SHUTTER_OT_bars_key,
+    SHUTTER_OT_bars_unkey,
+    SHUTTER_OT_bar_set,
+    SHUTTER_OT_draw,
+    SHUTTER_OT_erase,
+    SHUTTER_OT_region_take,
+    SHUTTER_OT_region_assign,
+    SHUTTER_OT_region_remove,
+    SHUTTER_OT_region_move,
+    SHUTTER_OT_region_key,
+    SHUTTER_OT_recipe_import,
+    SHUTTER_OT_recipe_export,
+)
+
+
+def register():
+    for cls in classes:
+        bpy.utils.register_class(cls)
+
+
+def unregister():
+    if bpy.app.timers.is_registered(_choose_tab):
+        bpy.app.timers.unregister(_choose_tab)
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,384 @@
+"""Panels, lists and menus: in the Properties editor's Strip tab, and as a tab in the sequencer's sidebar."""
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
+from bpy.types import Menu, Panel, UIList
+
+from ...media import cuts
+from ..data import selection, strips, validation
+from ..editing import bar_edits, shutter_edits
+from ..rendering.session import FAULTS
+from . import inbetween_build
+
+# Beyond this a column of numbers helps nobody: the bar editor and the Graph Editor do.
+_MOST_NUMBERS = 64
+
+
+class SHUTTER_UL_shutters(UIList):
+    def draw_item(self, _context, layout, effect, shutter, _icon, _active, _property, index):
+        row = layout.row(align=True)
+        color = row.row(align=True)
+        color.ui_units_x = 1.0
+        color.prop(shutter, "color", text="")
+        row.prop(shutter, "name", text="", emboss=False)
+        if index == 0:
+            hint = row.row()
+            hint.active = False
+            hint.label(text="default")
+
+
+class SHUTTER_UL_regions(UIList):
+    def draw_item(self, _context, layout, effect, region, _icon, _active, _property, _index):
+        row = layout.row(align=True)
+        row.label(text="", icon="IPO_LINEAR" if region.kind == "LINE" else "MESH_CIRCLE")
+        row.prop(region, "name", text="", emboss=False)
+        layer = shutter_edits.layer_of(effect, region)
+        if layer is None or not any(drawing.strokes for drawing in layer.frames):
+            row.label(text="", icon="ERROR")
+        if layer is not None:
+            row.prop(layer, "annotation_hide", text="", emboss=False)
+
+    def filter_items(self, _context, effect, _property):
+        """Those of the active shutter."""
+        shutter = selection.active_shutter(effect)
+        own = [bool(shutter) and region.shutter == shutter.name for region in effect.regions]
+        return [self.bitflag_filter_item if is_own else 0 for is_own in own], []
+
+
+class SHUTTER_MT_presets(Menu):
+    bl_label = "Presets"
+
+    def draw(self, _context):
+        self.layout.operator_enum("shutter.preset", "preset")
+
+
+class SHUTTER_MT_shutters(Menu):
+    bl_label = "Shutter Specials"
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.operator("shutter.shutter_duplicate", icon="DUPLICATE")
+        layout.separator()
+        layout.operator("shutter.recipe_import", icon="IMPORT")
+        layout.operator("shutter.recipe_export", icon="EXPORT")
+
+
+def _list_buttons(layout, kind: str, menu: str | None = None):
+    column = layout.column(align=True)
+    if kind == "shutter":
+        column.operator("shutter.shutter_add", text="", icon="ADD")
+    else:
+        column.operator("shutter.draw", text="", icon="ADD").new = True
+    column.operator(f"shutter.{kind}_remove", text="", icon="REMOVE")
+    if menu:
+        column.menu(menu, text="", icon="DOWNARROW_HLT")
+    column.separator()
+    column.operator(f"shutter.{kind}_move", text="", icon="TRIA_UP").direction = "UP"
+    column.operator(f"shutter.{kind}_move", text="", icon="TRIA_DOWN").direction = "DOWN"
+    return column
+
+
+class _Shutters:
+    bl_label = "Shutter"
+
+    def draw(self, context):
+        layout = self.layout
+        found = selection.active(context)
+        if found is None:
+            layout.operator("shutter.add_effect", icon="ADD")
+            return
+        effect = found[1]
+        _draw_live(layout, context)
+        row = layout.row()
+        row.template_list("SHUTTER_UL_shutters", "", effect, "shutters", effect, "active_shutter", rows=4)
+        _list_buttons(row, "shutter", "SHUTTER_MT_shutters")
+        shutter = selection.active_shutter(effect)
+        if shutter is None:
+            return
+        row = layout.row(align=True)
+        row.menu("SHUTTER_MT_presets", icon="PRESET")
+        row.operator("shutter.bars_key", text="", icon="KEY_HLT")
+        row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
+        layout.use_property_split = True
+        layout.prop(effect, "window")
+        try:
+            bars = bar_edits.bars_now(effect, effect.active_shutter)
+        except validation.EffectError as error:
+            layout.label(text=str(error), icon="ERROR", translate=False)
+            return
+        row = layout.row()
+        row.active = not bars.any()
+        row.label(text=bar_edits.summary(bars), icon="NONE" if bars.any() else "ERROR", translate=False)
+
+
+def _draw_live(layout, context):
+    live = getattr(context.window_manager, "virtual_shutter", None)
+    if live is None:
+        return
+    row = layout.row(align=True)
+    row.prop(live, "live", toggle=True, icon="HIDE_OFF" if live.live else "HIDE_ON")
+    view = row.row(align=True)
+    view.active = live.live
+    view.prop(live, "view", text="")
+
+
+class _WithEffect:
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and selection.active(context) is not None
+
+
+class _Regions(_WithEffect):
+    bl_label = "Regions"
+
+    def draw(self, context):
+        layout = self.layout
+        effect = selection.active(context)[1]
+        row = layout.row()
+        row.template_list("SHUTTER_UL_regions", "", effect, "regions", effect, "active_region", rows=3)
+        _list_buttons(row, "region")
+        row = layout.row(align=True)
+        row.operator("shutter.draw", icon="GREASEPENCIL")
+        row.operator("shutter.erase")
+        row.operator_menu_enum("shutter.region_take", "layer", text="", icon="DOWNARROW_HLT")
+        region = selection.active_region(effect)
+        if region is None:
+            return
+        layout.use_property_split = True
+        row = layout.split(factor=0.4)
+        row.alignment = "RIGHT"
+        row.label(text="Shutter")
+        row.operator_menu_enum("shutter.region_assign", "shutter", text=region.shutter, translate=False)
+        try:
+            validation.check_region(region)
+        except validation.EffectError as error:
+            layout.label(text=str(error), icon="ERROR", translate=False)
+        layout.prop(region, "kind")
+        if region.kind == "LINE":
+            layout.prop(region, "width")
+        column = layout.column(align=True)
+        column.prop(region, "location")
+        column.prop(region, "rotation")
+        column.prop(region, "scale")
+        layout.operator("shutter.region_key", text="Insert Keyframes", icon="KEY_HLT")
+
+
+class _Bars(_WithEffect):
+    bl_label = "Bars"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        effect = selection.active(context)[1]
+        shutter = selection.active_shutter(effect)
+        if shutter is None:
+            return
+        layout = self.layout
+        layout.use_property_split = True
+        column = layout.column(align=True)
+        label = iface_("Frame {number}")
+        for k, bar in enumerate(shutter.bars[:_MOST_NUMBERS]):
+            column.prop(bar, "weight", text=label.format(number=k + 1), translate=False, slider=True)
+        if len(shutter.bars) > _MOST_NUMBERS:
+            more = iface_("and {count} more, in the bar editor").format(count=len(shutter.bars) - _MOST_NUMBERS)
+            column.label(text=more, translate=False)
+
+
+class _Options(_WithEffect):
+    bl_label = "Options"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        effect = selection.active(context)[1]
+        layout.use_property_split = True
+        for name in ("position", "interpolation", "light", "exposure", "edges", "stop_at_cuts", "aggregate", "border"):
+            layout.prop(effect, name)
+        package = effect.stop_at_cuts and cuts.missing_package()
+        if package:
+            text = iface_("Cuts are not found: the Python package {package} is missing").format(package=package)
+            layout.label(text=text, translate=False, icon="ERROR")
+        layout.prop(effect, "use_source_time")
+        column = layout.column()
+        column.active = effect.use_source_time
+        column.prop(effect, "source_time")
+        if effect.use_source_time and effect.inbetween == "1":
+            column.label(text="No in-between frames: the nearest source frame is shown", icon="INFO")
+
+
+class _Inbetween(_WithEffect):
+    bl_label = "In-Between Frames"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        edit, effect, strip = selection.active(context)
+        build = inbetween_build.running()
+        is_built = build is not None and build.scene == effect.scene.session_uid
+        column = layout.column()
+        column.use_property_split = True
+        column.enabled = not is_built
+        column.prop(effect, "inbetween", text="Factor")
+        column = column.column()
+        is_on = effect.inbetween != "1"
+        column.active = is_on
+        column.prop(effect, "inbetween_method")
+        column.prop(effect, "inbetween_place")
+        if is_built:
+            progress = iface_("{done} of {total}").format(done=build.done, total=build.total)
+            layout.progress(factor=build.done / max(build.total, 1), text=progress, translate=False)
+        elif is_on:
+            try:
+                _draw_look(layout, inbetween_build.look(edit, effect, strip))
+            except FAULTS as error:
+                layout.label(text=str(error), icon="ERROR", translate=False)
+        row = layout.row(align=True)
+        row.operator("shutter.inbetween_build", text="Build")
+        row.operator("shutter.inbetween_purge", text="Remove")
+
+
+# How a state of in-between frames is called, and its icon.
+_STATES = {
+    "missing": (n_("Missing"), "ERROR"),
+    "partial": (n_("Partial: {done} of {total}"), "ERROR"),
+    "stale": (n_("Stale: the source has changed"), "ERROR"),
+    "ready": (n_("Ready"), "CHECKMARK"),
+}
+
+
+def _draw_look(layout, look) -> None:
+    words, icon = _STATES[look.state.name]
+    words = iface_(words).format(done=look.state.done, total=look.state.total)
+    column = layout.column(align=True)
+    column.label(text=words, icon=icon, translate=False)
+    if look.size:
+        size = inbetween_build.size_in_words(look.size)
+        column.label(text=iface_("{size} on disk").format(size=size), icon="DISK_DRIVE", translate=False)
+    if look.state.name != "ready":
+        if look.estimate:
+            size = inbetween_build.size_in_words(look.estimate)
+            column.label(text=iface_("About {size} when built").format(size=size), icon="BLANK1", translate=False)
+        elif look.estimate is None:
+            _redraw_later()
+
+
+def _redraw_later() -> None:
+    if not bpy.app.timers.is_registered(_redraw):
+        bpy.app.timers.register(_redraw, first_interval=inbetween_build.TICK)
+
+
+def _redraw() -> None:
+    inbetween_build.redraw_panels(bpy.context)
+
+
+class _InProperties:
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "strip"
+
+    @classmethod
+    def poll(cls, context):
+        strip = selection.active_strip(context)
+        return strip is not None and (strip.type in strips.SOURCES or selection.active(context) is not None)
+
+
+class _InSidebar:
+    bl_space_type = "SEQUENCE_EDITOR"
+    bl_region_type = "UI"
+    bl_category = "Shutter"
+
+    @classmethod
+    def poll(cls, context):
+        return selection.active_strip(context) is not None
+
+
+class STRIP_PT_shutter(_Shutters, _InProperties, Panel):
+    pass
+
+
+class STRIP_PT_shutter_regions(_Regions, _InProperties, Panel):
+    bl_parent_id = "STRIP_PT_shutter"
+
+
+class STRIP_PT_shutter_bars(_Bars, _InProperties, Panel):
+    bl_parent_id = "STRIP_PT_shutter"
+
+
+class STRIP_PT_shutter_options(_Options, _InProperties, Panel):
+    bl_parent_id = "STRIP_PT_shutter"
+
+
+class STRIP_PT_shutter_inbetween(_Inbetween, _InProperties, Panel):
+    bl_parent_id = "STRIP_PT_shutter"
+
+
+class SEQUENCER_PT_shutter(_Shutters, _InSidebar, Panel):
+    pass
+
+
+class SEQUENCER_PT_shutter_regions(_Regions, _InSidebar, Panel):
+    bl_parent_id = "SEQUENCER_PT_shutter"
+
+
+class SEQUENCER_PT_shutter_bars(_Bars, _InSidebar, Panel):
+    bl_parent_id = "SEQUENCER_PT_shutter"
+
+
+class SEQUENCER_PT_shutter_options(_Options, _InSidebar, Panel):
+    bl_parent_id = "SEQUENCER_PT_shutter"
+
+
+class SEQUENCER_PT_shutter_inbetween(_Inbetween, _InSidebar, Panel):
+    bl_parent_id = "SEQUENCER_PT_shutter"
+
+
+def _add_entry(self, _context):
+    self.layout.separator()
+    self.layout.operator("shutter.add_effect", text="Shutter")
+
+
+def _strip_entry(self, context):
+    strip = selection.active_strip(context)
+    if strip is not None and strip.type in strips.SOURCES:
+        self.layout.separator()
+        self.layout.operator("shutter.add_effect")
+
+
+MENUS = {
+    "SEQUENCER_MT_add_effect": _add_entry,
+    "SEQUENCER_MT_strip": _strip_entry,
+    "SEQUENCER_MT_context_menu": _strip_entry,
+}
+
+classes = (
+    SHUTTER_UL_shutters,
+    SHUTTER_UL_regions,
+    SHUTTER_MT_presets,
+    SHUTTER_MT_shutters,
+    STRIP_PT_shutter,
+    STRIP_PT_shutter_regions,
+    STRIP_PT_shutter_bars,
+    STRIP_PT_shutter_options,
+    STRIP_PT_shutter_inbetween,
+    SEQUENCER_PT_shutter,
+    SEQUENCER_PT_shutter_regions,
+    SEQUENCER_PT_shutter_bars,
+    SEQUENCER_PT_shutter_options,
+    SEQUENCER_PT_shutter_inbetween,
+)
+
+
+def register():
+    for cls in classes:
+        bpy.utils.register_class(cls)
+    for menu, entry in MENUS.items():
+        getattr(bpy.types, menu).append(entry)
+
+
+def unregister():
+    for menu, entry in MENUS.items():
+        getattr(bpy.types, menu).remove(entry)
+    if bpy.app.timers.is_registered(_redraw):
+        bpy.app.timers.unregister(_redraw)
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,351 @@
+"""The live preview: what is drawn over the sequencer's picture, composed on Blender's GPU: views, and scribbles."""
+
+from dataclasses import dataclass, replace
+
+import bpy
+import gpu
+import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
+from bpy.types import PropertyGroup
+from gpu_extras.batch import batch_for_shader
+
+from ...compute.passes import body
+from ...core.recipe import Instant
+from ...media import MediaError
+from ..data import annotations, effects, geometry, selection, strips
+from ..data.properties import CONTEXT
+from ..editing import shutter_edits
+from ..rendering import invalidation, session
+from ..rendering.blender_gpu import Texture
+from . import drawing, preview_areas
+
+VIEWS = (
+    ("RESULT", "Result", "The finished picture"),
+    ("SPLIT", "Split", "The source on the left of the handle, the result on its right"),
+    ("SCRIBBLES", "Scribbles", "The source, and where each shutter is scribbled"),
+    ("COEFFICIENTS", "Coefficients", "How much of each shutter a pixel gets, in the shutters' colors"),
+)
+
+
+def redraw(_settings, _context) -> None:
+    """Draws all previews again."""
+    for _window, area in preview_areas.previews(bpy.context):
+        area.tag_redraw()  # of the area alone, Blender's picture and ours
+
+
+def _redraw_once() -> None:
+    redraw(None, bpy.context)
+
+
+def _follow_once() -> None:
+    """Previews that have the scribbles of another effect get those of the active one, and the pen draws there."""
+    if (found := selection.active(bpy.context)) is None:
+        return
+    for _window, area in preview_areas.previews(bpy.context):
+        if _is_of_another(area.spaces.active.annotation, *found[:2]):
+            area.spaces.active.annotation = found[1].scene.annotation
+
+
+def _is_of_another(annotation, edit, effect) -> bool:
+    others = (other.scene.annotation for other in edit.virtual_shutter.effects if other.scene)
+    return annotation is not None and annotation != effect.scene.annotation and annotation in others
+
+
+_TIMERS = (_redraw_once, _follow_once)
+
+
+class ShutterPreview(PropertyGroup):
+    """How the live preview looks: of the window manager, neither saved nor undone."""
+
+    live: BoolProperty(
+        name="Live", description="Show scribbles and views of the effect in the preview", default=True, update=redraw
+    )
+    view: EnumProperty(
+        name="View",
+        description="What the live preview shows",
+        items=VIEWS,
+        update=redraw,
+        translation_context=CONTEXT,
+    )
+    split: FloatProperty(
+        name="Split Position",
+        description="Where the source ends and the result begins, as a fraction of the picture's width",
+        subtype="FACTOR",
+        default=0.5,
+        min=0.0,
+        max=1.0,
+        update=redraw,
+    )
+
+
+@dataclass(frozen=True)
+class Shown:
+    """The effect strip that a preview shows."""
+
+    edit: object
+    effect: object
+    strip: object
+    strips_above: bool
+
+
+def shown(context) -> Shown | None:
+    """The effect strip under the playhead that the preview shows: the active one, or the highest."""
+    edit, space = selection.edit_of(context), context.space_data
+    if edit is None or edit.sequence_editor is None or space.display_mode != "IMAGE" or space.display_channel:
+        return None
+    visible = _visible(edit)
+    found = [
+        strip for strip in visible if strip.type == "SCENE" and strip.scene and strips.effect_of(edit, strip.scene)
+    ]
+    if not found:
+        return None
+    active = selection.active(context)
+    strip = next((s for s in found if active and s == active[2]), max(found, key=lambda s: s.channel))
+    above = any(other.channel > strip.channel for other in visible)
+    return Shown(edit, strips.effect_of(edit, strip.scene), strip, above)
+
+
+def _visible(edit) -> list:
+    """Strips with a picture under the playhead, not muted, of the edit or of the meta strip that is open."""
+    editor, frame = edit.sequence_editor, edit.frame_current
+    level = editor.meta_stack[-1] if editor.meta_stack else editor
+    return [
+        strip
+        for strip in level.strips
+        if strip.left_handle <= frame < strip.right_handle
+        and strip.type != "SOUND"
+        and not strip.mute
+        and not level.channels[strip.channel].mute
+    ]
+
+
+def _draw() -> None:
+    """The draw handler of the previews."""
+    context = bpy.context
+    settings = context.window_manager.virtual_shutter
+    if bpy.app.is_job_running("RENDER"):
+        return
+    # Blender tells nobody of strokes that are drawn or erased, but it draws the preview again.
+    edit = selection.edit_of(context)
+    if edit is not None and edit.library is None and invalidation.invalidate_changed(edit):
+        bpy.app.timers.register(_redraw_once)  # what is tagged while it is drawn is not drawn again
+    active = selection.active(context)
+    if active is not None and _is_of_another(context.space_data.annotation, *active[:2]):
+        bpy.app.timers.register(_follow_once)  # nothing may be changed while it is drawn
+    # A stroke that is being drawn would lie below our picture: Blender's own shows the same.
+    if not settings.live or any(op.bl_idname == "GPENCIL_OT_annotate" for op in context.window.modal_operators):
+        return
+    found = shown(context)
+    if found is None:
+        return
+    say = _Notes(context.region)
+    with drawing.pixel_space(context.region):
+        try:
+            _show(context, found, settings, say)
+        except session.FAULTS as error:
+            say(_fault(error))
+        say.draw()
+
+
+def _show(context, found: Shown, settings, say) -> None:
+    moment = session.moment(found.edit, found.effect, found.strip, found.edit.frame_current)
+    quad = Quad(context.region, found.strip, annotations.picture_size(found.effect))
+    has_result = settings.view in ("RESULT", "SPLIT")
+    left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
+    # Where the sequencer renders its preview, the engine has composed the result on this GPU by now, and it lies there
+    # in its place among the other strips, exact; what is drawn here passes through 8 bits on its way to the screen.
+    draws_result = has_result and found.edit.render.sequencer_gl_preview != "RENDERED"
+    if left > 0 or draws_result:
+        _warn(found, say)
+    if left > 0:
+        _show_source(quad, found, moment, left)
+    if has_result and not draws_result:
+        _tell_missing(moment, say)
+    if draws_result:
+        moment.prefetch()
+        texture = moment.renderer.draw(moment.index, moment.instant, moment.direction, quick=True)
+        quad.draw("show_picture", {"picture": texture}, left, 1.0, opacity=found.strip.blend_alpha)
+    if settings.view == "SCRIBBLES":
+        _show_scribbles(quad, found.effect, moment)
+    elif settings.view == "COEFFICIENTS":
+        _show_coefficients(quad, found.effect, moment)
+    else:
+        _show_strokes(context, quad, found.effect, moment)
+
+
+def _warn(found: Shown, say) -> None:
+    """Says what a picture that is drawn over the sequencer's cannot show."""
+    if found.strips_above:
+        say(rpt_("The strips above are hidden in this view"))
+    if found.edit.view_settings.view_transform != "Standard":
+        say(rpt_("This view has the view transform Standard"))
+
+
+def _tell_missing(moment, say) -> None:
+    """Says in the preview what the engine can only report."""
+    try:
+        moment.check()
+    except MediaError as error:
+        say(_fault(error))
+
+
+def _fault(error: Exception) -> str:
+    return rpt_("Shutter: {fault}").format(fault=error)
+
+
+def _show_strokes(context, quad, effect, moment) -> None:
+    """The scribbles where they are by now; Blender's own annotations show where they were drawn."""
+    space = context.space_data
+    if not (space.show_overlays and space.preview_overlay.show_annotation):
+        return
+    for region, shape in zip(effects.drawn_regions(effect), moment.instant.shapes, strict=True):
+        layer = shutter_edits.layer_of(effect, region)
+        if layer is not None and layer.annotation_hide:
+            continue
+        color = (*effect.shutters[shape.shutter].color, 1.0)
+        for points in shape.strokes:
+            drawing.lines(quad.on_region(points), color, closed=shape.kind == "lasso", width=2)
+
+
+def _show_source(quad, found: Shown, moment, right: float) -> None:
+    """The source's own frame, from the left edge on: that of a shutter that is open for it alone."""
+    options = replace(moment.instant.options, step=1)  # no in-between frames come first in reverse
+    still = np.zeros((1, options.window))
+    still[0, options.before] = 1
+    plain = replace(moment, instant=Instant(options, still))
+    plain.prefetch()
+    texture = moment.renderer.draw(plain.index, plain.instant, plain.direction)
+    quad.draw("show_picture", {"picture": texture}, 0.0, right, opacity=found.strip.blend_alpha)
+
+
+def _show_scribbles(quad, effect, moment) -> None:
+    labels, block = moment.renderer.drawn_labels(moment.instant)
+    quad.draw(
+        "show_scribbles", {"labels": labels, "palette": _palette(effect)}, opacity=0.7, block=block, size=_size(moment)
+    )
+
+
+def _show_coefficients(quad, effect, moment) -> None:
+    coefficients, block, count = moment.renderer.drawn_coefficients(moment.instant)
+    textures = {"coefficients": coefficients, "palette": _palette(effect)}
+    quad.draw("show_coefficients", textures, opacity=0.75, block=block, count=count, size=_size(moment))
+
+
+def _size(moment) -> tuple[int, int]:
+    return moment.renderer.source.width, moment.renderer.source.height
+
+
+def _palette(effect) -> Texture:
+    """The shutters' colours, display code values, side by side."""
+    colors = np.ones((len(effect.shutters), 4), dtype=np.float32)
+    colors[:, :3] = [shutter.color for shutter in effect.shutters]
+    size = len(colors), 1
+    data = gpu.types.Buffer("FLOAT", colors.size, colors.reshape(-1))
+    return Texture(gpu.types.GPUTexture(size, layers=1, format="RGBA32F", data=data), (*size, 1), "rgba32f")
+
+
+class Quad:
+    """Where a strip's picture lies in a preview's region, its crop considered."""
+
+    def __init__(self, region, strip, size):
+        self._matrix = geometry.picture_to_region(strip, size, region)
+        crop, (width, height) = strip.crop, size
+        self._low = np.array([crop.min_x / width, crop.min_y / height])
+        self._high = 1 - np.array([crop.max_x / width, crop.max_y / height])
+
+    def on_region(self, points) -> np.ndarray:
+        """Points (n, 2) of the strip's picture, in fractions, in pixels of the region."""
+        return geometry.mapped(self._matrix, np.asarray(points, dtype=np.float64))
+
+    def draw(self, name: str, textures: dict, left: float = 0.0, right: float = 1.0, **constants) -> None:
+        """Draws from `left` to `right`, in fractions of the picture's width, through a shader of shaders/."""
+        low, high = np.maximum(self._low, (left, 0)), np.minimum(self._high, (right, 1))
+        if (low >= high).any():
+            return
+        corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
+        shader = _shader(name)
+        shader.bind()
+        for sampler, texture in textures.items():
+            shader.uniform_sampler(sampler, texture.gpu)
+        for constant, value in constants.items():
+            (shader.uniform_float if isinstance(value, float) else shader.uniform_int)(constant, value)
+        where = {"corner": self.on_region(corners).tolist(), "place": corners}
+        gpu.state.blend_set("ALPHA_PREMULT")
+        batch_for_shader(shader, "TRI_FAN", where).draw(shader)
+        gpu.state.blend_set("NONE")
+
+
+_SAMPLERS = {
+    "show_picture": {"picture": "FLOAT_2D_ARRAY"},
+    "show_coefficients": {"coefficients": "FLOAT_2D_ARRAY", "palette": "FLOAT_2D_ARRAY"},
+    "show_scribbles": {"labels": "UINT_2D_ARRAY", "palette": "FLOAT_2D_ARRAY"},
+}
+_CONSTANTS = {
+    "show_picture": {"opacity": "FLOAT"},
+    "show_coefficients": {"opacity": "FLOAT", "size": "IVEC2", "block": "INT", "count": "INT"},
+    "show_scribbles": {"opacity": "FLOAT", "size": "IVEC2", "block": "INT"},
+}
+_shaders: dict = {}
+
+
+def _shader(name: str):
+    if name not in _shaders:
+        between = gpu.types.GPUStageInterfaceInfo("show_interface")
+        between.smooth("VEC2", "at")
+        info = gpu.types.GPUShaderCreateInfo()
+        info.push_constant("MAT4", "ModelViewProjectionMatrix")
+        info.push_constant("BOOL", "srgbTarget")  # set by Blender: what is drawn into encodes by itself
+        for constant, kind in _CONSTANTS[name].items():
+            info.push_constant(kind, constant)
+        for slot, (sampler, kind) in enumerate(_SAMPLERS[name].items()):
+            info.sampler(slot, kind, sampler)
+        info.vertex_in(0, "VEC2", "corner")
+        info.vertex_in(1, "VEC2", "place")
+        info.vertex_out(between)
+        info.fragment_out(0, "VEC4", "shown")
+        info.vertex_source(body("show_quad"))
+        info.fragment_source(body(name))
+        _shaders[name] = gpu.shader.create_from_info(info)
+    return _shaders[name]
+
+
+class _Notes:
+    """Sentences at the upper left of a region."""
+
+    def __init__(self, region):
+        self._region, self._lines = region, []
+
+    def __call__(self, sentence: str):
+        self._lines.append(sentence)
+
+    def draw(self):
+        unit = drawing.ui_scale()
+        for i, line in enumerate(self._lines):
+            drawing.text(16 * unit, self._region.height - (i + 2) * 18 * unit, line)
+
+
+classes = (ShutterPreview,)
+_handler = None
+
+
+def register():
+    global _handler
+    for cls in classes:
+        bpy.utils.register_class(cls)
+    bpy.types.WindowManager.virtual_shutter = PointerProperty(type=ShutterPreview)
+    # After the sequencer's picture and before annotations and gizmos, which stay visible.
+    _handler = bpy.types.SpaceSequenceEditor.draw_handler_add(_draw, (), "PREVIEW", "POST_VIEW")
+
+
+def unregister():
+    global _handler
+    bpy.types.SpaceSequenceEditor.draw_handler_remove(_handler, "PREVIEW")
+    _handler = None
+    for timer in _TIMERS:
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
+    _shaders.clear()
+    del bpy.types.WindowManager.virtual_shutter
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,175 @@
+"""Where the active region lies, and handles to move, turn and scale it in the sequencer's preview."""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from bpy.app.translations import contexts
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.types import Gizmo, GizmoGroup
+
+from ...core import scribbles
+from ..data import annotations, effects, geometry, selection, validation
+from ..editing import bar_edits, region_edits
+from . import drawing, keymaps
+
+_RADIUS = 7  # of a handle, in units of the interface
+_NEAREST = 0.03  # of the corner's handle to the centre's, in parts of the picture
+_MARK = (1.0, 1.0, 1.0, 0.9)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a region's handles are at the current frame, in pixels of the preview's region.
+
+    centre: the handle that moves; corner: the one that turns and scales. to_region: the matrix from fractions of the
+    picture, whose width over its height is aspect."""
+
+    centre: np.ndarray
+    corner: np.ndarray
+    to_region: np.ndarray
+    aspect: float
+
+    def on_picture(self, point) -> np.ndarray:
+        """A point of the region, in fractions of the picture."""
+        return geometry.mapped(np.linalg.inv(self.to_region), np.array([point], dtype=np.float64))[0]
+
+
+def place(context) -> Place | None:
+    """The place of the active region's handles, or None where there is no region, or nothing of it is drawn."""
+    found = selection.active(context)
+    region = selection.active_region(found[1]) if found else None
+    if region is None:
+        return None
+    edit, effect, strip = found
+    try:
+        strokes = effects.strokes_at(edit, effect, strip, effect.active_region, edit.frame_current_final)
+        validation.check_region(region)
+    except validation.EffectError:  # panels and the live preview tell it
+        return None
+    if not strokes:
+        return None
+    width, height = annotations.picture_size(effect)
+    points = np.concatenate(strokes)
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = (low + high) / 2
+    corner = np.maximum(high, middle + _NEAREST)
+    # Mirrored at the middle as well, so that it is what the corner turns about.
+    ((_, moved, _),) = scribbles.transform(
+        [[2 * middle - corner, corner, middle]],
+        region.location,
+        np.degrees(region.rotation),
+        region.scale,
+        width / height,
+    )
+    to_region = geometry.picture_to_region(strip, (width, height), context.region)
+    ends = geometry.mapped(to_region, np.stack([middle + np.array(region.location), moved]))
+    return Place(*ends, to_region, width / height)
+
+
+class SHUTTER_GT_region(Gizmo):
+    """One handle; `turns`: turns and scales, or moves."""
+
+    bl_idname = "SHUTTER_GT_region"
+
+    def setup(self):
+        self.use_draw_modal = True
+
+    def draw(self, context):
+        if (where := place(context)) is None:
+            return
+        if not self.turns:
+            drawing.lines([where.centre, where.corner], (1, 1, 1, 0.4))
+        x, y = where.corner if self.turns else where.centre
+        radius = drawing.ui_scale() * _RADIUS * (1.3 if self.is_highlight else 1.0)
+        turn = np.linspace(0, 2 * np.pi, 17)[:-1]
+        around = np.stack([x + radius * np.cos(turn), y + radius * np.sin(turn)], axis=1)
+        drawing.lines(around, _MARK, closed=True, width=2)
+        if not self.turns:
+            drawing.lines([(x - radius, y), (x + radius, y)], _MARK)
+            drawing.lines([(x, y - radius), (x, y + radius)], _MARK)
+
+    def test_select(self, context, location):
+        if (where := place(context)) is None:
+            return -1
+        handle = where.corner if self.turns else where.centre
+        return 0 if np.hypot(*(handle - location)) <= drawing.ui_scale() * _RADIUS * 1.5 else -1
+
+    def invoke(self, context, event):
+        region = selection.active_region(selection.active(context)[1])
+        self.before = tuple(region.location), region.rotation, region.scale
+        self.grabbed = event.mouse_region_x, event.mouse_region_y
+        self.where = place(context)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event, tweak):
+        mouse = event.mouse_region_x, event.mouse_region_y
+        fine = 0.1 if "PRECISE" in tweak or event.shift else 1.0
+        point = np.array(self.grabbed) + fine * (np.array(mouse) - self.grabbed)
+        region = selection.active_region(selection.active(context)[1])
+        (self._turn if self.turns else self._move)(region, point, "SNAP" in tweak or event.ctrl)
+        context.area.tag_redraw()
+        return {"RUNNING_MODAL"}
+
+    def _move(self, region, point, snap: bool):
+        moved = self.where.on_picture(point) - self.where.on_picture(self.grabbed)
+        if snap:  # along one axis
+            moved[np.abs(moved * (self.where.aspect, 1)).argmin()] = 0
+        region.location = np.array(self.before[0]) + moved
+
+    def _turn(self, region, point, snap: bool):
+        start, end = np.array(self.grabbed) - self.where.centre, np.array(point) - self.where.centre
+        turned = np.arctan2(end[1], end[0]) - np.arctan2(start[1], start[0])
+        rotation = self.before[1] + (turned + np.pi) % (2 * np.pi) - np.pi
+        region.rotation = np.radians(round(np.degrees(rotation) / 5) * 5) if snap else rotation
+        region.scale = self.before[2] * max(np.hypot(*end) / max(np.hypot(*start), 1.0), 0.01)
+
+    def exit(self, context, cancel):
+        found = selection.active(context)
+        region = selection.active_region(found[1]) if found else None
+        if region is None:
+            return
+        if cancel:
+            region.location, region.rotation, region.scale = self.before
+            return
+        if bar_edits.auto_key(context):
+            region_edits.key_region(found[1], found[1].active_region)
+        bpy.ops.ed.undo_push(message=iface_("Transform Region", contexts.operator_default))
+
+
+class SHUTTER_GGT_region(GizmoGroup):
+    bl_idname = "SHUTTER_GGT_region"
+    bl_label = "Shutter Region"
+    bl_space_type = "SEQUENCE_EDITOR"
+    bl_region_type = "PREVIEW"
+    bl_options = {"PERSISTENT"}
+
+    @classmethod
+    def poll(cls, context):
+        found = selection.active(context)
+        return found is not None and found[0].is_editable and selection.active_region(found[1]) is not None
+
+    @classmethod
+    def setup_keymap(cls, keyconfig):
+        keymap = keymaps.new(cls, keyconfig)
+        keymap.keymap_items.new("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", any=True)
+        keymap.keymap_items.new("shutter.region_key", "I", "PRESS")
+        return keymap
+
+    def setup(self, _context):
+        for turns in (False, True):
+            self.gizmos.new(SHUTTER_GT_region.bl_idname).turns = turns
+
+
+classes = (SHUTTER_GT_region, SHUTTER_GGT_region)
+
+
+def register():
+    for cls in classes:
+        bpy.utils.register_class(cls)
+
+
+def unregister():
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)
+    keymaps.remove(SHUTTER_GGT_region)

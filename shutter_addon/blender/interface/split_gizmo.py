@@ -1,0 +1,94 @@
+"""The handle of the live preview's split view."""
+
+import bpy
+import numpy as np
+from bpy.types import Gizmo, GizmoGroup
+
+from ..data import annotations, geometry
+from . import drawing, preview
+
+_REACH = 8  # of the pointer, in units of the interface
+_COLOR = (1.0, 1.0, 1.0, 0.9)
+
+
+def _to_region(context) -> np.ndarray | None:
+    """Matrix from fractions of the shown picture to the region's pixels; None where no split is shown, or seen."""
+    settings = context.window_manager.virtual_shutter
+    if not settings.live or settings.view != "SPLIT" or (found := preview.shown(context)) is None:
+        return None
+    matrix = geometry.picture_to_region(found.strip, annotations.picture_size(found.effect), context.region)
+    return matrix if geometry.is_invertible(matrix) else None
+
+
+def _line(context, matrix) -> np.ndarray:
+    at = context.window_manager.virtual_shutter.split
+    return geometry.mapped(matrix, np.array([(at, 0.0), (at, 1.0)]))
+
+
+class SHUTTER_GT_split(Gizmo):
+    bl_idname = "SHUTTER_GT_split"
+
+    def setup(self):
+        self.use_draw_modal = True
+
+    def draw(self, context):
+        if (matrix := _to_region(context)) is None:
+            return
+        line = _line(context, matrix)
+        x, y = line.mean(axis=0)
+        half = drawing.ui_scale() * _REACH / 2
+        drawing.lines(line, _COLOR, width=2 if self.is_highlight else 1)
+        drawing.rectangles([(x - half, y - 3 * half, x + half, y + 3 * half)], [_COLOR])
+
+    def test_select(self, context, location):
+        if (matrix := _to_region(context)) is None:
+            return -1
+        first, second = _line(context, matrix)
+        along = (second - first) / max(np.hypot(*(second - first)), 1e-6)
+        offset = np.array(location) - first
+        apart, place = abs(along[0] * offset[1] - along[1] * offset[0]), along @ offset
+        near = apart <= drawing.ui_scale() * _REACH and 0 <= place <= np.hypot(*(second - first))
+        return 0 if near else -1
+
+    def invoke(self, context, _event):
+        self.before = context.window_manager.virtual_shutter.split
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event, _tweak):
+        if (matrix := _to_region(context)) is not None:
+            point = np.array([(event.mouse_region_x, event.mouse_region_y)], dtype=np.float64)
+            context.window_manager.virtual_shutter.split = geometry.mapped(np.linalg.inv(matrix), point)[0, 0]
+        return {"RUNNING_MODAL"}
+
+    def exit(self, context, cancel):
+        if cancel:
+            context.window_manager.virtual_shutter.split = self.before
+
+
+class SHUTTER_GGT_split(GizmoGroup):
+    bl_idname = "SHUTTER_GGT_split"
+    bl_label = "Split View"
+    bl_space_type = "SEQUENCE_EDITOR"
+    bl_region_type = "PREVIEW"
+    bl_options = {"PERSISTENT"}
+
+    @classmethod
+    def poll(cls, context):
+        settings = context.window_manager.virtual_shutter
+        return settings.live and settings.view == "SPLIT" and preview.shown(context) is not None
+
+    def setup(self, _context):
+        self.gizmos.new(SHUTTER_GT_split.bl_idname)
+
+
+classes = (SHUTTER_GT_split, SHUTTER_GGT_split)
+
+
+def register():
+    for cls in classes:
+        bpy.utils.register_class(cls)
+
+
+def unregister():
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

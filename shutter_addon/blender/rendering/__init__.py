@@ -1,0 +1,1 @@
+"""From an effect to its pictures and films: engine, devices, sessions, render jobs."""

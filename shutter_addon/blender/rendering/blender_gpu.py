@@ -1,0 +1,185 @@
+"""Blender's own GPU as a device: what compute/gl.py does, through the `gpu` module, on OpenGL, Vulkan and Metal.
+
+Nothing can be sent into a part of a texture from Python, and floats alone can be sent at all. So what is written goes
+into a float texture of its own, small samples several to a float as whole numbers up to 2²⁴, which floats hold
+exactly; a pass unpacks them into the layer. (Bit patterns would be simpler, but a GPU may flush denormal floats.)
+"""
+
+from __future__ import annotations
+
+import subprocess
+from contextlib import nullcontext, suppress
+from dataclasses import dataclass
+from functools import cache
+
+import bpy
+import gpu
+import numpy as np
+
+from ...compute.errors import NoDeviceError
+from ...compute.passes import LOCAL_ROW, Image, Pass, body
+
+_TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
+_AS_IT_IS, _WHOLE, _OPAQUE_BYTES, _PAIRS_OF_BYTES, _SIXTEEN_BITS = range(5)
+# Format (as in GLSL): NumPy's type of what is written and read, the format sent, how shaders/unpack.glsl unpacks it.
+_FORMATS = {
+    "rgba8": (np.uint8, "RG32F", _PAIRS_OF_BYTES),
+    "rgba16": (np.uint16, "RGBA32F", _SIXTEEN_BITS),
+    "rgba16f": (np.float16, "RGBA32F", _AS_IT_IS),
+    "rgba32f": (np.float32, "RGBA32F", _AS_IT_IS),
+    "r32f": (np.float32, "R32F", _AS_IT_IS),
+    "r16ui": (np.uint16, "R32F", _WHOLE),
+    "rg32ui": None,  # of passes alone: floats do not hold it, and Blender reads whole numbers of one component only
+}
+
+
+@dataclass
+class Texture:
+    """A texture array: its gpu.types.GPUTexture, (width, height, layers), and format (as in GLSL)."""
+
+    gpu: gpu.types.GPUTexture | None
+    size: tuple[int, int, int]
+    kind: str
+
+    def release(self) -> None:
+        self.gpu = None
+
+
+class BlenderDevice:
+    """As compute.gl.GLDevice, wherever Blender's GPU context is current: in draw handlers, or after gpu.init()."""
+
+    def __init__(self):
+        self._shaders: dict[Pass, gpu.types.GPUShader] = {}
+        self.name = gpu.platform.renderer_get()
+        self.max_layers = gpu.capabilities.max_texture_layers_get()
+        self.max_size = gpu.capabilities.max_texture_size_get()
+
+    def current(self):
+        return nullcontext(self)
+
+    def texture(self, width: int, height: int, layers: int, kind: str) -> Texture:
+        if max(width, height) <= self.max_size and layers <= self.max_layers:  # on Vulkan Blender does not look
+            with suppress(RuntimeError):
+                texture = gpu.types.GPUTexture((width, height), layers=layers, format=kind.upper())
+                return Texture(texture, (width, height, layers), kind)
+        raise NoDeviceError(f"{self.name} has no room for {layers} layers of {width}×{height}")
+
+    def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
+        height, width = array.shape[:2]
+        _, sent_format, packing = _exchanged(texture)
+        if texture.kind == "rgba8" and opaque:
+            sent_format, packing = "R32F", _OPAQUE_BYTES
+        size, data = (width, height), _buffer("FLOAT", _packed(array, packing))
+        sent = gpu.types.GPUTexture(size, layers=1, format=sent_format, data=data)
+        self.run(
+            _unpack(texture.kind, packing),
+            size,
+            textures={"sent": Texture(sent, (*size, 1), sent_format.lower())},
+            images={"stored": texture},
+            size=size,
+            layer=layer,
+        )
+
+    def read(self, texture: Texture) -> np.ndarray:
+        """As GLDevice.read; by framebuffers, for GPUTexture.read() gives a first layer alone."""
+        width, height, layers = texture.size
+        dtype, _, packing = _exchanged(texture)
+        components = 4 if texture.kind.startswith("rgba") else 1
+        sample, kind = (np.uint32, "UINT") if packing == _WHOLE else (np.float32, "FLOAT")
+        array = np.empty((layers, height, width, components), sample)
+        for layer, pixels in enumerate(array):
+            framebuffer = gpu.types.GPUFrameBuffer(color_slots={"texture": texture.gpu, "layer": layer})
+            with framebuffer.bind():
+                framebuffer.read_color(0, 0, width, height, components, 0, kind, data=_buffer(kind, pixels))
+        if kind == "FLOAT" and np.dtype(dtype).kind == "u":
+            array = np.rint(array * np.float32(np.iinfo(dtype).max))
+        return array.astype(dtype, copy=False)
+
+    def run(
+        self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, blocks=None, **constants
+    ) -> None:
+        shader = self._shaders.get(program)
+        if shader is None:
+            shader = self._shaders[program] = _compiled(program)
+        shader.bind()
+        for name in program.samplers:
+            shader.uniform_sampler(name, textures[name].gpu)
+        for name in program.images:
+            shader.image(name, images[name].gpu)
+        uniforms = {name: gpu.types.GPUUniformBuf(_buffer("FLOAT", blocks[name])) for name in program.blocks}
+        for name, uniform in uniforms.items():  # which must outlive the dispatch
+            shader.uniform_block(name, uniform)
+        for name, kind in program.constants.items():
+            set_constant = shader.uniform_float if kind in ("float", "vec2") else shader.uniform_int
+            set_constant(name, constants[name])
+        gpu.compute.dispatch(shader, *program.groups(extent))  # which makes the next one wait for what this one stores
+
+    def release(self) -> None:
+        self._shaders = {}
+
+
+@cache
+def opens_in_background() -> bool:
+    """Whether Blender's GPU can be used without a window; it is from then on, on the main thread.
+
+    Another Blender tries first: where OpenGL is missing, 5.2's gpu.init() does not raise, it crashes."""
+    trial = ["--background", "--factory-startup", "--python-exit-code", "1", "--python-expr", "import gpu; gpu.init()"]
+    try:
+        subprocess.run([bpy.app.binary_path, *trial], check=True, capture_output=True, timeout=60)
+        gpu.init()
+    except (OSError, SystemError, subprocess.SubprocessError):
+        return False
+    return True
+
+
+@cache
+def _unpack(kind: str, packing: int) -> Pass:
+    return Pass(
+        "unpack",
+        {"sent": "sampler2DArray"},
+        {"stored": Image(kind)},
+        {"size": "ivec2", "layer": "int"},
+        {"PACKING": packing},
+        local_size=LOCAL_ROW,
+    )
+
+
+def _exchanged(texture: Texture) -> tuple:
+    """The entry of _FORMATS. TypeError: Blender neither sends nor reads such a texture; asked to read one, it leaves
+    the memory as it was, without an error."""
+    if (found := _FORMATS[texture.kind]) is None:
+        raise TypeError(f"{texture.kind}: such a texture is written and read by passes alone on Blender's GPU")
+    return found
+
+
+def _buffer(kind: str, array: np.ndarray) -> gpu.types.Buffer:
+    """Blender's view of a contiguous array: nothing is copied."""
+    return gpu.types.Buffer(kind, array.size, array.reshape(-1))
+
+
+def _packed(array: np.ndarray, packing: int) -> np.ndarray:
+    if packing == _OPAQUE_BYTES:
+        packed = np.empty(array.shape[:2], np.float32)
+        return np.bitwise_and(array.view(np.int32)[..., 0], np.int32(0xFFFFFF), out=packed, casting="unsafe")
+    if packing == _PAIRS_OF_BYTES:
+        array = array.view(np.uint16)
+    return array.astype(np.float32, copy=False)
+
+
+def _compiled(program: Pass) -> gpu.types.GPUShader:
+    info = gpu.types.GPUShaderCreateInfo()
+    for name, value in program.defines.items():
+        info.define(name, str(value))
+    for slot, (name, kind) in enumerate(program.samplers.items()):
+        info.sampler(slot, _TYPES[kind], name)
+    for slot, (name, image) in enumerate(program.images.items()):
+        kind = "UINT_2D_ARRAY" if image.format.endswith("ui") else "FLOAT_2D_ARRAY"
+        qualifiers = {way for way, used in (("READ", image.reads), ("WRITE", image.writes)) if used}
+        info.image(slot, image.format.upper(), kind, name, qualifiers=qualifiers)
+    for slot, (name, length) in enumerate(program.blocks.items()):
+        info.uniform_buf(slot, "vec4", f"{name}[{length}]")
+    for name, kind in program.constants.items():
+        info.push_constant(kind.upper(), name)
+    info.local_group_size(*program.local_size)
+    info.compute_source(body(program.name))
+    return gpu.shader.create_from_info(info)

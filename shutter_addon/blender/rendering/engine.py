@@ -1,0 +1,83 @@
+"""The render engine of effect scenes: Blender's sequencer calls it for every frame it needs of an effect strip."""
+
+import sys
+import traceback
+
+import bpy
+import numpy as np
+
+from ...core.messages import signed
+from ..data.strips import ENGINE
+from . import invalidation, render_job, session
+
+
+class VirtualShutterEngine(bpy.types.RenderEngine):
+    bl_idname = ENGINE
+    bl_label = "Virtual Shutter"
+    bl_use_preview = False
+
+    def render(self, depsgraph):
+        if render_job.cancelling():
+            self.report({"ERROR"}, self.bl_label)  # whatever it says, it ends the other render
+            return
+        try:
+            self._render(depsgraph)
+        except BaseException as error:  # Blender would print it, and render the frame without the effect
+            invalidation.spoilt.add(depsgraph.scene.session_uid)
+            if not isinstance(error, session.StoppedError):
+                fail(self, _in_words(error))
+            elif not self.test_break():
+                render_job.cancel(self.test_break)
+
+    def _render(self, depsgraph):
+        scene, width, height = depsgraph.scene, self.resolution_x, self.resolution_y
+        picture = session.picture(scene, scene.frame_current, self._say, self._stopped)
+        picture = session.resized(picture, width, height)
+        result = self.begin_result(0, 0, width, height)
+        # Blender's rows go up; composed pictures lie so in memory, and this copies nothing.
+        result.layers[0].passes["Combined"].rect.foreach_set(np.ascontiguousarray(picture[::-1]).ravel())
+        self.end_result(result)
+        self.update_progress(1.0)
+        session.begin_next(scene, scene.frame_current)
+
+    def _stopped(self) -> bool:
+        return self.test_break() or render_job.stopping()
+
+    def _say(self, message: str) -> None:
+        if bpy.app.background:
+            print(signed(message), file=sys.stderr, flush=True)
+        else:
+            self.report({"WARNING"}, signed(message))
+
+
+def _in_words(error: BaseException) -> str:
+    if isinstance(error, session.FAULTS):
+        return str(error) or "not enough memory"
+    if isinstance(error, KeyboardInterrupt):
+        return "the render was stopped"
+    traceback.print_exception(error)
+    return f"internal error: {error!r}"
+
+
+def fail(engine, sentence: str) -> None:
+    """Says why there is no picture, and ends the render: Blender would go on and write the frame without the effect.
+
+    A preview has its own way to say it, and nothing to end."""
+    if render_job.ends_films():
+        render_job.fail(sentence)
+        render_job.cancel(engine.test_break)
+    else:
+        engine.report({"ERROR"}, signed(sentence))
+
+
+classes = (VirtualShutterEngine,)
+
+
+def register():
+    for cls in classes:
+        bpy.utils.register_class(cls)
+
+
+def unregister():
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,306 @@
+"""Where a film goes: a movie, or a folder of pictures; each file whole or not at all."""
+
+import itertools
+import os
+import shutil
+import signal
+import sys
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import bpy
+
+from ...core import whole
+from ...core.messages import UserError
+from ...media.written import is_whole_movie, is_whole_picture, whole_pictures, why_short
+from ..data import strips
+from . import render_job
+
+INTERRUPTED = 130
+
+# Ending: container, codec, audio codec (Blender's names).
+MOVIES = {
+    ".mp4": ("MPEG4", "H264", "AAC"),
+    ".mov": ("QUICKTIME", "H264", "AAC"),
+    ".mkv": ("MKV", "H264", "AAC"),
+    ".webm": ("WEBM", "WEBM", "OPUS"),
+    ".avi": ("AVI", "MPEG4", "MP3"),
+}
+# Name: Blender's name, bits per channel.
+FORMATS = {"png": ("PNG", "16"), "exr": ("OPEN_EXR", "32")}
+
+
+# What Blender would write into a picture about its making.
+_STAMPS = (
+    *("use_stamp_date", "use_stamp_time", "use_stamp_render_time", "use_stamp_memory", "use_stamp_hostname"),
+    *("use_stamp_filename", "use_stamp_sequencer_strip"),
+)
+_LONGEST = 1000  # bytes of a path, a frame's number included: Blender has room for 1023 and cuts off the rest
+
+
+class OutputError(UserError, ValueError):
+    """This cannot be written; the message is one sentence for the user."""
+
+
+class InterruptedRenderError(OutputError):
+    """Stopped by the user or a farm; the message says what is left."""
+
+
+def is_movie(path: Path) -> bool:
+    return path.suffix.lower() in MOVIES
+
+
+def check(path: Path, file_format: str | None, size) -> None:
+    """OutputError: Blender cannot write a film of this size there. A new folder is made on the way."""
+    width, height = size
+    if width < 4 or height < 4:
+        raise OutputError(f"the source has {width}×{height} pixels; Blender renders no picture smaller than 4×4")
+    if is_movie(path):
+        if path.is_dir():
+            raise OutputError(f"{path}: is a folder, not a movie")
+        if file_format is not None:
+            raise OutputError(f"{path}: --format is for a folder of pictures, not for a movie")
+        if width % 2 or height % 2:
+            raise OutputError(f"{path}: a movie has even sizes, not {width}×{height}; render to a folder of pictures")
+    elif path.suffix.strip(".") and not path.is_dir() and file_format is None:
+        raise OutputError(f"{path}: neither a folder nor one of {', '.join(MOVIES)}")
+
+
+def spare(written, read) -> None:
+    """OutputError: a file that would be written is one that is read, whatever link leads to it, or is written twice."""
+    taken = {os.path.realpath(path): path for path in read}
+    taken |= {found: path for path in read if (found := _identity(path)) is not None}
+    places = set()
+    for path in written:
+        place = os.path.realpath(path)
+        if place in places:
+            raise OutputError(f"{path}: two files cannot have the same place")
+        places.add(place)
+        if (other := taken.get(place) or taken.get(_identity(path))) is not None:
+            raise OutputError(f"{path}: would be written over {other}, which is read; choose another place")
+
+
+def _identity(path):
+    """Equal for all paths of a file; None: there is none."""
+    try:
+        status = os.stat(path)
+    except OSError:
+        return None
+    return status.st_dev, status.st_ino
+
+
+def pictures_of(folder: Path, ending: str, frames: tuple[int, int]) -> list[Path]:
+    """The files of these frames, first and last, in a folder."""
+    return [folder / f"{frame:04d}.{ending}" for frame in range(frames[0], frames[1] + 1)]
+
+
+def for_blender(path: str) -> str:
+    """The path as Blender takes it for a name: it has templates in braces. OutputError: no name of Blender's."""
+    for sign in "\\" if os.sep == "/" else "":
+        if sign in path:
+            raise OutputError(f"{path}: Blender cannot write to a path with {sign}")
+    if len(os.fsencode(path)) > _LONGEST:
+        raise OutputError(f"{path}: Blender cannot write to a path of more than {_LONGEST} bytes")
+    return path.replace("{", "{{").replace("}", "}}")
+
+
+def set_output(edit, path: Path, file_format: str, *, alpha: bool) -> None:
+    """Where and how the edit's render goes: a movie by its ending, else a folder of pictures named by frame.
+
+    alpha: pictures keep the source's transparency. OutputError: Blender cannot write there."""
+    settings, render = edit.render.image_settings, edit.render
+    render.use_file_extension = not is_movie(path)
+    for name in _STAMPS:  # no time or place of the render: equal pixels are equal files
+        setattr(render, name, False)
+    render.filepath = for_blender(str(path) if is_movie(path) else f"{path}{os.sep}")
+    if is_movie(path):
+        container, codec, audio = MOVIES[path.suffix.lower()]
+        settings.media_type = "VIDEO"
+        settings.color_mode = "RGB"
+        render.ffmpeg.format, render.ffmpeg.codec = container, codec
+        has_sound = any(strip.type == "SOUND" for strip in edit.sequence_editor.strips_all)
+        render.ffmpeg.audio_codec = audio if has_sound else "NONE"
+        render.ffmpeg.constant_rate_factor = "HIGH"
+        return
+    settings.file_format, settings.color_depth = FORMATS[file_format]
+    settings.color_mode = "RGBA" if alpha else "RGB"
+
+
+def film(edit, output: Path) -> None:
+    """Renders an edit of edits.make_edit to a movie or a folder. Blender writes into a folder beside the output, and
+    what is finished moves out of it.
+
+    OutputError: it cannot be rendered or written; finished pictures stay, and of a movie what was finished, under a
+    name of its own. InterruptedRenderError: the same, by Ctrl-C or a farm's TERM."""
+    folder = output.parent if is_movie(output) else output
+    folder.mkdir(parents=True, exist_ok=True)
+    clear_up(folder)
+    kept = edit.render.filepath
+    faults: list[str] = []
+    with whole.part_folder(folder) as part:
+        part_film = part / f"film{output.suffix}"
+        try:
+            edit.render.filepath = for_blender(str(part_film) if is_movie(output) else f"{part}{os.sep}")
+            with _told(faults), _stoppable() as stopped, quiet(), _lean(edit), _moved(part, output, edit) as missing:
+                bpy.ops.render.render(animation=True, scene=edit.name)
+            if is_movie(output) and not faults and not stopped:
+                _finish(part_film, output, edit.frame_end - edit.frame_start + 1)
+            elif missing and not faults and not stopped:
+                raise OutputError(f"{output}: {len(missing)} frames were not written; {why_short(part)}")
+        except RuntimeError as error:
+            raise OutputError(f"{output}: {message(error)}") from None
+        finally:
+            edit.render.filepath = kept
+        if faults or stopped:
+            rescued = _rescued(part_film, output) if is_movie(output) else ""
+            if faults:
+                raise OutputError(faults[0] + rescued)
+            raise InterruptedRenderError(f"{output}: stopped{rescued}")
+
+
+def clear_up(folder: Path) -> None:
+    """Removes what killed renders left half-written in a folder."""
+    with suppress(OSError):
+        for left in whole.left_behind(folder):
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _finish(part: Path, output: Path, count: int) -> None:
+    if not is_whole_movie(part, count):
+        raise OutputError(f"{output}: could not be written whole ({why_short(part.parent)})")
+    part.replace(output)
+
+
+def _rescued(part: Path, output: Path) -> str:
+    """Keeps what was finished of a movie, beside its output; how a sentence ends that says so."""
+    count = whole_pictures(part)
+    if count == 0:
+        return ""
+    numbers = (f"-{number}" if number > 1 else "" for number in itertools.count(1))
+    names = (output.with_name(f"{output.stem}.part{number}{output.suffix}") for number in numbers)
+    kept = next(path for path in names if not os.path.lexists(path))
+    try:
+        part.replace(kept)
+    except OSError:  # the sentence is about something else
+        return ""
+    return f"; its first {count} frames are in {kept.name}"
+
+
+def message(error: RuntimeError) -> str:
+    """What Blender reported, without its "Error: ", in one line."""
+    return " ".join(str(error).removeprefix("Error: ").split())
+
+
+@contextmanager
+def _moved(part: Path, output: Path, edit):
+    """Moves each finished picture from `part` to `output`, and a progress bar on. Gives the pictures that are missing
+    so far, by name; none of a movie's."""
+    frames = edit.frame_start, edit.frame_end
+    ending = next((name for name, kind in FORMATS.items() if edit.render.image_settings.file_format == kind[0]), "")
+    missing = {path.name: path for path in pictures_of(output, ending, frames)} if ending else {}
+    with progress(frames[1] - frames[0] + 1, "frame") as update:
+
+        def moved(*_):
+            update()
+            try:
+                os.utime(part)  # a movie's encoder may not write for long: nobody shall take it for left behind
+                for name in [path.name for path in part.iterdir() if path.name in missing]:
+                    if not is_whole_picture(part / name):
+                        raise OutputError(f"{output / name}: could not be written whole; {why_short(part)}")
+                    (part / name).replace(missing.pop(name))
+            except (OutputError, OSError) as error:
+                render_job.fail(in_words(error, output))
+
+        bpy.app.handlers.render_write.append(moved)
+        try:
+            yield missing
+        finally:
+            bpy.app.handlers.render_write.remove(moved)
+
+
+def in_words(error: Exception, place) -> str:
+    """A fault as a sentence, the place first. place: where there is none in an OSError."""
+    if isinstance(error, OSError):
+        return f"{os.fsdecode(error.filename or place)}: {error.strerror or error}"
+    return str(error)
+
+
+@contextmanager
+def progress(count: int, unit: str):
+    """A progress bar on a terminal; gives what moves it on by one."""
+    try:
+        from tqdm import tqdm
+    except ImportError:  # a Blender that the extension was copied into without its wheels
+        yield lambda: None
+        return
+    with tqdm(total=count, unit=unit, disable=None) as bar:
+        yield bar.update
+
+
+@contextmanager
+def _told(faults: list[str]):
+    """Collects the sentence that ends a render, in place of stderr."""
+    render_job.tell, before = faults.append, render_job.tell
+    try:
+        yield
+    finally:
+        render_job.tell = before
+
+
+@contextmanager
+def _stoppable():
+    """Ctrl-C and a farm's TERM end the render after its frame, so that an open movie is finished; a second time, at
+    once. Gives a list with the signal that came, if any.
+
+    No exception gets through Blender: it prints it and renders on."""
+    came: list[int] = []
+
+    def stop(number, _frame):
+        if came:
+            render_job.leave(INTERRUPTED)
+        came.append(number)
+        render_job.stop()
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield came
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler or signal.SIG_DFL)  # None: Blender's own, which Python cannot put back
+
+
+@contextmanager
+def _lean(edit):
+    """Spares Blender what no frame shows.
+
+    Each frame is rendered once: finished ones would fill gigabytes. And the source lies wholly below its effect, but
+    Blender takes any Scene strip for transparent: it would decode the source and blend the two, 2/5 of all its work.
+    """
+    editor = edit.sequence_editor
+    kept = editor.use_cache_raw, editor.use_cache_final
+    shown = [strip for name in strips.shown_sources(edit) if not (strip := editor.strips_all[name]).mute]
+    editor.use_cache_raw = editor.use_cache_final = False
+    for strip in shown:
+        strip.mute = True
+    try:
+        yield
+    finally:
+        editor.use_cache_raw, editor.use_cache_final = kept
+        for strip in shown:
+            strip.mute = False
+
+
+@contextmanager
+def quiet():
+    """Keeps Blender's log of every saved frame off the terminal; what goes wrong comes as an exception."""
+    if sys.stdout is not None:
+        with suppress(OSError):  # nobody reads it
+            sys.stdout.flush()
+    terminal, nothing = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nothing, 1)
+    try:
+        yield
+    finally:
+        os.dup2(terminal, 1)
+        os.close(terminal)
+        os.close(nothing)

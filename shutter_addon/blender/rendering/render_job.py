@@ -1,0 +1,177 @@
+"""A render as it goes: which film it is, what went wrong in it, and how it ends early.
+
+Blender writes a frame whose engine failed without it, so a picture that is missing has to end the whole render. Then
+Blender finishes an open movie, up to the frame before, and calls `render_cancel`.
+"""
+
+import os
+import sys
+import threading
+import time
+from contextlib import suppress
+
+import bpy
+
+from ...core.messages import sentence, signed
+from ..data.strips import ENGINE
+
+BAD_INPUT = 2
+_PATIENCE = 0.1  # seconds between two looks at whether a render has ended
+_LONG = 10.0  # seconds
+
+
+def _to_stderr(text: str) -> None:
+    with suppress(OSError, AttributeError):  # nobody reads it, or there is no stderr
+        print(signed(text), file=sys.stderr, flush=True)
+
+
+tell = _to_stderr  # what is done with the sentence that ends a render in the background
+failure: str | None = None  # that sentence, of the render that runs or ran last
+_stopping = False
+_cancelling = False
+_spent: list[tuple[str, str]] = []  # names of the scenes and cameras of small renders, see _cancel
+_film: int | None = None  # session_uid of the scene whose render runs; neither of those that its Scene strips show, nor
+# of what a preview shows
+_begun = False
+
+
+def begin(scene) -> None:
+    """A render begins: of a film, of a scene in one, or of a preview."""
+    global _film, _begun, failure, _stopping
+    is_effect = scene.render.engine == ENGINE
+    in_film = _film is not None and (_begun or is_effect)
+    in_preview = is_effect and not (bpy.app.background or _in_job())
+    if not (in_film or in_preview):
+        _film, _begun, failure, _stopping = scene.session_uid, False, None, False
+
+
+def runs() -> bool:
+    """Whether a film, or a single picture of it, is rendered."""
+    return _film is not None
+
+
+def is_film(scene) -> bool:
+    """Whether this scene's frames are what is rendered; called before each of them."""
+    global _begun
+    if scene.session_uid != _film:
+        return False
+    _begun = True
+    return True
+
+
+def end(scene, alone: bool) -> None:
+    """A render has ended. alone: no Python waits for it, Blender itself renders, and would go on or end with exit code
+    1."""
+    global _film
+    if scene.session_uid == _film:
+        _film = None
+        if bpy.app.background:
+            _remove_spent()
+        else:  # what Blender keeps belongs to its main thread
+            bpy.app.timers.register(lambda: _PATIENCE if bpy.app.is_job_running("RENDER") else _remove_spent())
+        if failure is not None and alone and bpy.app.background:
+            leave(BAD_INPUT)
+
+
+def ends_films() -> bool:
+    """Whether what fails here and now is a film: in the background, in a job of the window, or in a script there. Else
+    it is a preview, on the main thread."""
+    return bpy.app.background or _in_job() or (_film is not None and not bpy.app.is_job_running("RENDER"))
+
+
+def _in_job() -> bool:
+    return not bpy.app.background and threading.current_thread() is not threading.main_thread()
+
+
+def stop() -> None:
+    """Has the render end with the frame that is made, as at Ctrl-C."""
+    global _stopping
+    _stopping = True
+
+
+def stopping() -> bool:
+    """Whether the film that this picture or frame belongs to was stopped, or has failed."""
+    return _film is not None and ends_films() and (_stopping or failure is not None)
+
+
+def fail(text: str) -> None:
+    """Says why the render that runs has to end; only the first sentence counts."""
+    global failure
+    if failure is None:
+        failure = text
+        tell(text)
+
+
+def cancel(ended=None) -> None:
+    """Ends the render that runs, as soon as this returns to Blender: from a picture, or from what comes before a frame.
+    (After one Blender would go on with the next, and crash.)
+
+    ended: whether the window has ended it meanwhile; without it, the window is not waited for long."""
+    if not _in_job():
+        _cancel()
+        return
+    done, deadline = threading.Event(), time.monotonic() + _LONG
+    ended = ended or (lambda: time.monotonic() > deadline)
+
+    def on_main_thread():
+        if not done.is_set():
+            _cancel()
+            _show()
+            done.set()
+
+    bpy.app.timers.register(on_main_thread)  # as Blender's operators belong to the main thread
+    while not done.wait(_PATIENCE):
+        if ended():
+            done.set()
+
+
+def _cancel() -> None:
+    """An engine's error that reaches an operator is all that breaks Blender's renders from Python. Errors from within
+    the sequencer reach none; those of a small render beside it do."""
+    global _cancelling
+    if _cancelling:
+        return
+    _cancelling = True
+    scene = bpy.data.scenes.new("Cancelled")
+    camera = bpy.data.objects.new("Cancelled", None)
+    _spent.append((scene.name, camera.name))
+    try:
+        scene.render.engine = ENGINE
+        scene.render.resolution_x = scene.render.resolution_y = 4
+        scene.collection.objects.link(camera)
+        scene.camera = camera
+        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]), suppress(RuntimeError):
+            bpy.ops.render.render(scene=scene.name)
+    finally:
+        _cancelling = False
+
+
+def _remove_spent() -> None:
+    """Removes what the small renders were of. Not before the film has ended: other effects of the same frame would be
+    rendered with what Blender frees along with them, and crash."""
+    while _spent:
+        scene, camera = _spent.pop()
+        found = (bpy.data.scenes.get(scene), bpy.data.objects.get(camera))
+        bpy.data.batch_remove([item for item in found if item is not None])
+
+
+def cancelling() -> bool:
+    """Whether the small render runs whose error ends the other one."""
+    return _cancelling
+
+
+def _show() -> None:
+    """Says in the window what failed: reports of an engine within the sequencer reach nobody."""
+    if failure is not None:
+        text = sentence(failure)
+        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+            bpy.context.window_manager.popup_menu(
+                lambda menu, _context: menu.layout.label(text=text), title="Virtual Shutter", icon="ERROR"
+            )
+
+
+def leave(code: int) -> None:
+    """Ends the process from inside Blender; after sys.exit it would complain about its memory."""
+    with suppress(OSError, AttributeError):
+        sys.stdout.flush()
+    os._exit(code)
