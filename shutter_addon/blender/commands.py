@@ -17,14 +17,14 @@ from typing import get_args
 
 import bpy
 
-from ..compute.errors import NoDeviceError
+from ..compute.device import NoDeviceError
 from ..compute.renderer import DEVICES
-from ..core import recipe, whole
+from ..core import atomic_write, recipe
 from ..core.messages import sentence, signed
 from ..media import MediaError, open_source
+from ..media.completeness import is_whole_blend, why_short
 from ..media.files import check_name
 from ..media.sequence import by_number
-from ..media.written import is_whole_blend, why_short
 from . import edits, effects, inbetweens, outputs, pictures, sources, strips
 
 BAD_INPUT = 2
@@ -238,7 +238,7 @@ def _save(edit, path: Path) -> None:
 
 
 def _save_whole(edit, path: Path) -> None:
-    with whole.part_folder(path.parent) as folder:
+    with atomic_write.part_folder(path.parent) as folder:
         part = folder / "edit.blend"
         try:
             with outputs.quiet(), edits.paths_relative(edit, path.parent):

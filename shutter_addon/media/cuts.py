@@ -153,11 +153,11 @@ def _most(a: Signature, b: Signature) -> float:
     return float(np.abs(a - b).max())
 
 
-class Shots:
+class ShotSource:
     """A source that knows where its shots end: a source itself. Where PySceneDetect is missing it has one.
 
     step: every step-th frame is one that was filmed. Cuts are looked for in these alone; those between two of them
-    belong to the nearer, the middle one to the first, as Inbetween has it.
+    belong to the nearer, the middle one to the first, as InbetweenSource has it.
     Filmed frames get their signatures when a cut is first looked for, and wait for the next `read` then, as far as
     there is room for them, so that none is decoded twice. Cuts are remembered, and depend on the frames alone;
     what is decided without a frame that cannot be read is decided again.

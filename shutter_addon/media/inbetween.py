@@ -12,17 +12,17 @@ from pathlib import Path
 import numpy as np
 
 from . import cuts
-from .cache import Cache, State, pair_line, write_picture
+from .completeness import why_short
 from .errors import MediaError
 from .files import check_index
-from .written import why_short
+from .inbetween_cache import InbetweenCache, State, pair_line, write_picture
 
 MEMORY = 4 << 30  # bytes that pairs at work may take together, with the frames that are read ahead
 AHEAD = 640 << 20  # of these: enough for 16 bits in 4K, of which no frame is read twice
 LAYERS = 26  # of a frame as float32, for a pair at work: 9 to 17 measured for "quick", 15 to 24.3 for "good"
 
 
-class Inbetween:
+class InbetweenSource:
     """A source with its in-between frames: a source itself, with `factor` times its rate.
 
     Frame i·factor is the source's frame i, those in between come from the cache in `folder`. Across a cut the nearer
@@ -30,7 +30,7 @@ class Inbetween:
 
     def __init__(self, source, folder, factor, method):
         self._source, self.factor = source, factor
-        self._cache = Cache(source, folder, factor, method)
+        self._cache = InbetweenCache(source, folder, factor, method)
         self._cache.load()
         self.count = (source.count - 1) * factor + 1
         self.fps = None if source.fps is None else source.fps * factor
@@ -113,7 +113,7 @@ def build(
         )
     if between is None:
         from .flow import between
-    cache, pairs = Cache(source, folder, factor, method), _pairs(source, frames)
+    cache, pairs = InbetweenCache(source, folder, factor, method), _pairs(source, frames)
     cache.prepare()
     cache.load()
     done = 0

@@ -7,7 +7,7 @@ import numpy as np
 from .errors import MediaError
 
 
-class Ahead:
+class PrefetchSource:
     """A source's frames, decoded ahead: a source itself, whose decoder belongs to one thread.
 
     What is wanted is kept until other frames are wanted: the last `want` bounds the memory. Its frames are read-only.
