@@ -37,6 +37,7 @@ from shutter_addon.compute.passes import LOCAL_ROW, Image, Pass
 from shutter_addon.compute.tables import table as table_of
 from shutter_addon.compute.window import Frames
 from shutter_addon.core import compositor, light, presets, scribbles, shutters
+from shutter_addon.core.frame_source import FrameSource
 from shutter_addon.core.frame_state import FrameState, Options
 
 HERE = Path(__file__).resolve().with_suffix("")
@@ -50,8 +51,8 @@ BARS = {
 }
 
 
-class Noise:
-    """A clip of random frames, every one another cut of the same noise; as a source of shutter_addon.media."""
+class Noise(FrameSource):
+    """A clip of random frames, every one another cut of the same noise."""
 
     transfer, alpha, dtype, count = "srgb", "opaque", np.uint8, 100_000
 

@@ -164,7 +164,7 @@ def _files(medium) -> list[Path]:
 def _opened(path: Path):
     """The source, with a word on stderr of files that were left out."""
     medium = open_source(path)
-    if left_out := getattr(medium, "left_out", ""):
+    if left_out := medium.left_out:
         print(signed(left_out), file=sys.stderr)
     return medium
 

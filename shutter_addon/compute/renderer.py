@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core import compositor, scribbles, shutters
+from ..core.frame_source import FrameSource
 from ..core.frame_state import FrameState
 from .cpu import CPUCompositor
 from .device import NoDeviceError
@@ -33,12 +34,11 @@ def open_compositor(device: str = "auto"):
 class Renderer:
     """Pictures of one source; keeps the window's frames and the last coefficients.
 
-    Windows end at cuts (Options.stop_at_cuts) of a source that knows its shots: a media.cuts.ShotSource.
+    Windows end at cuts (Options.stop_at_cuts) of a source that knows them (FrameSource.shots).
     """
 
-    def __init__(self, compositor, source):
+    def __init__(self, compositor, source: FrameSource):
         self.compositor, self.source = compositor, source
-        self._knows_shots = hasattr(source, "around")
         self._solver = compositor.solver()
         self._window = None
         self._labelled = self._solved = self._drawn = None
@@ -105,12 +105,12 @@ class Renderer:
         if not self._stops(state):
             return range(self.source.count)
         low, high = self._reach(index, direction, state)
-        shot = self.source.around(index, low, high, known=known)
+        shot = self.source.shots.around(index, low, high, known=known)
         last = shot.stop - 1
         if state.options.edges == "mirror" and (last < high) != (shot.start > low):
             # What is mirrored at one end may reach beyond the other.
             low, high = (min(low, 2 * last - high), high) if last < high else (low, max(high, 2 * shot.start - low))
-            shot = self.source.around(index, low, high, known=known)
+            shot = self.source.shots.around(index, low, high, known=known)
         return shot
 
     def positions(self, index: int, direction: int, state: FrameState, shot: range) -> np.ndarray:
@@ -132,12 +132,12 @@ class Renderer:
         held = self._window.held if self._window and self._window.capacity == state.options.window else ()
         missing = self.needed(index, direction, state).difference(held)
         if self._stops(state):
-            missing |= self.source.lacking(index, *self._reach(index, direction, state))
-            missing -= self.source.handed()
+            missing |= self.source.shots.lacking(index, *self._reach(index, direction, state))
+            missing -= self.source.shots.handed()
         return missing
 
     def _stops(self, state: FrameState) -> bool:
-        return state.options.stop_at_cuts and self._knows_shots
+        return state.options.stop_at_cuts and self.source.shots is not None
 
     @staticmethod
     def _reach(index: int, direction: int, state: FrameState) -> tuple[int, int]:
@@ -193,8 +193,8 @@ class Renderer:
         if self._window is not None:
             self._window.release()
             self._window = self._drawn = None
-        if self._knows_shots:
-            self.source.release()
+        if self.source.shots is not None:
+            self.source.shots.release()
 
     def close(self) -> None:
         """Frees everything on the device and closes the source."""

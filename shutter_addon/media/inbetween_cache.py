@@ -230,7 +230,7 @@ def identity(source) -> dict:
 
     MediaError: a file is gone."""
     content = hashlib.sha256()
-    for path in getattr(source, "files", [source.path]):
+    for path in source.files:
         try:
             status = path.stat()
             if not stat.S_ISREG(status.st_mode):  # a pipe would never end

@@ -9,13 +9,14 @@ from shutter_addon.compute.device import NoDeviceError
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.core import compositor, light, presets
+from shutter_addon.core.frame_source import FrameSource
 from shutter_addon.core.frame_state import FrameState, Options
 from shutter_addon.core.scribbles import Shape, rasterise
 
 LEVEL = 1 / 255
 
 
-class Footage:
+class Footage(FrameSource):
     """Frames in memory, as a source of shutter_addon.media."""
 
     def __init__(self, frames, transfer="srgb", alpha="opaque"):

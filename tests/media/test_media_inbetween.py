@@ -19,6 +19,7 @@ from footage import picture, save_image, see_through
 from shutter_addon.core import atomic_write
 from shutter_addon.media import MediaError, inbetween, inbetween_cache, open_source
 from shutter_addon.media.folder import Folder
+from shutter_addon.media.source import SourceWrapper
 
 ROOT = Path(__file__).parents[2]
 FACTOR, COUNT = 4, 6
@@ -426,14 +427,12 @@ def test_pairs_at_work_fit_into_memory(monkeypatch, processors, size, samples):
     assert workers == processors or (workers + 1) * pair + beyond > 4 << 30
 
 
-class Counting:
+class Counting(SourceWrapper):
     """A source that counts what is read of it, and how many of its frames are held at the same time."""
 
     def __init__(self, source):
-        self._source, self.reads, self.most, self._given = source, [], 0, []
-
-    def __getattr__(self, name):
-        return getattr(self._source, name)
+        super().__init__(source)
+        self.reads, self.most, self._given = [], 0, []
 
     def read(self, index):
         frame = self._source.read(index)
@@ -552,15 +551,9 @@ def test_two_processes_at_once_do_no_damage(tmp_path, folder):
 
 
 def test_estimate_is_near_what_is_built(bunny, folder):
-    class Short:  # a movie's first frames
-        def __init__(self, source):
-            self._source, self.count = source, 4
-
-        def __getattr__(self, name):
-            return getattr(self._source, name)
-
     with open_source(bunny) as movie:
-        source = Short(movie)
+        source = SourceWrapper(movie)
+        source.count = 4  # the first frames alone
         build(source, folder)
         size = sum(path.stat().st_size for path in pictures(folder))
         assert 0.7 * size < inbetween.estimate(source, FACTOR) < 1.5 * size
