@@ -11,7 +11,7 @@ import numpy as np
 
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.core import light, recipe, scribbles
-from shutter_addon.core.instant import Instant
+from shutter_addon.core.frame_state import FrameState
 from shutter_addon.media import open_source
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -111,5 +111,5 @@ class Shot:
     def _index(self, shutter: str) -> int:
         return [each.name for each in self.effect.shutters].index(shutter)
 
-    def _at(self, frame: int) -> Instant:
+    def _at(self, frame: int) -> FrameState:
         return self.effect.at(frame, self._source.width / self._source.height)

@@ -37,7 +37,8 @@ from shutter_addon.compute.passes import LOCAL_ROW, Image, Pass
 from shutter_addon.compute.tables import table as table_of
 from shutter_addon.compute.window import Frames
 from shutter_addon.core import compositor, light, presets, scribbles, shutters
-from shutter_addon.core.instant import Instant, Options
+from shutter_addon.core.frame_source import FrameSource
+from shutter_addon.core.frame_state import FrameState, Options
 
 HERE = Path(__file__).resolve().with_suffix("")
 METHODS = ("ours", "paper", "average")
@@ -50,8 +51,8 @@ BARS = {
 }
 
 
-class Noise:
-    """A clip of random frames, every one another cut of the same noise; as a source of shutter_addon.media."""
+class Noise(FrameSource):
+    """A clip of random frames, every one another cut of the same noise."""
 
     transfer, alpha, dtype, count = "srgb", "opaque", np.uint8, 100_000
 
@@ -95,16 +96,16 @@ class Case:
 
     device: Device
     source: Noise
-    instant: Instant
+    state: FrameState
     kind: str
     index: int = 0
     shared: bool = True
 
     def __post_init__(self):
-        count, block = len(self.instant.bars), self.instant.options.aggregate
-        self._open(self.instant.options.window)
+        count, block = len(self.state.bars), self.state.options.aggregate
+        self._open(self.state.options.window)
         width, height = -(-self.source.width // block), -(-self.source.height // block)
-        self.labels = scribbles.rasterise(self.instant.shapes, width, height)
+        self.labels = scribbles.rasterise(self.state.shapes, width, height)
         self.moved = np.roll(self.labels, max(1, width // 640), axis=(0, 1))  # three pixels of 1920
         self.solver = self.compositor.solver()
         self.handle = self.solver.solve(self.labels, count)
@@ -115,25 +116,25 @@ class Case:
         # What the other methods read.
         plain = isinstance(self.window, Frames)
         self.frames = self.window if plain else Frames(self.device, self.source, window)
-        accumulations = np.stack([shutters.accumulation(b) for b in self.instant.bars])
+        accumulations = np.stack([shutters.accumulation(b) for b in self.state.bars])
         self.sums = self.device.texture(accumulations.shape[1], len(accumulations), 1, "r32f")
         self.device.write(self.sums, np.ascontiguousarray(accumulations[..., None], dtype=np.float32))
 
     @property
     def _wanted(self) -> np.ndarray:
-        return np.arange(self.index, self.index + self.instant.options.window)
+        return np.arange(self.index, self.index + self.state.options.window)
 
     def load(self, *windows) -> None:
         for window in windows or (self.window, self.frames):
-            window.load(self._wanted, self.instant.options, range(self.source.count))
+            window.load(self._wanted, self.state.options, range(self.source.count))
 
     def compose(self, method: str) -> None:
         if method == "ours":
-            block = self.instant.options.aggregate
-            self.compositor.draw(self.window, self.index, 1, self.instant, self.handle, block)
+            block = self.state.options.aggregate
+            self.compositor.draw(self.window, self.index, 1, self.state, self.handle, block)
             return
-        block = self.instant.options.aggregate if method == "paper" else 1
-        program = _appendix_a(self.instant, self.shared) if method == "paper" else _average(self.instant)
+        block = self.state.options.aggregate if method == "paper" else 1
+        program = _appendix_a(self.state, self.shared) if method == "paper" else _average(self.state)
         for top, height, frames in self.frames.bands():
             extent = (-(-self.source.width // block), -(-height // block))
             textures = {"frames": frames, "coefficients": self.handle, "sums": self.sums}
@@ -153,11 +154,11 @@ class Case:
         self.load(self.window if method == "ours" else self.frames)
 
     def diffuse(self, method: str) -> None:
-        self.handle = self.solver.solve(self.labels, len(self.instant.bars))
+        self.handle = self.solver.solve(self.labels, len(self.state.bars))
 
     def diffuse_moved(self, method: str) -> None:
         self.labels, self.moved = self.moved, self.labels
-        self.solver.solve(self.labels, len(self.instant.bars), warm=True)
+        self.solver.solve(self.labels, len(self.state.bars), warm=True)
 
     def readback(self, method: str) -> np.ndarray:
         return self.compositor.read(self.window.picture)
@@ -169,20 +170,20 @@ class Case:
 
     def must_move(self, name: str, method: str) -> int | None:
         """Bytes that a pass must move: all it has to read or write, once each. None: what counts is computing."""
-        options, pixels = self.instant.options, self.source.width * self.source.height
+        options, pixels = self.state.options, self.source.width * self.source.height
         if name == "accumulate":
             return pixels * (8 if isinstance(self.window, Frames) or method == "average" else 28)
         if name == "compose" and method == "average":
             return pixels * (4 * options.window + 16)
         if name != "compose" or method != "ours":
             return None
-        values, span = table_of(self.instant), shutters.open_span(self.instant.bars)
+        values, span = table_of(self.state), shutters.open_span(self.state.bars)
         rows, open_frames = len(values) - 1, np.ptp(span)
         way = gpu.way_of(self.window, options, values, span, False)
         read = {"sums": 32 * rows, "pieces": 4 * open_frames}.get(way, 8 * (open_frames + 1))
         if isinstance(self.window, Frames):
             read = 4 * open_frames
-        return int(pixels * (read + 16 + 16 * -(-len(self.instant.bars) // 4) / options.aggregate**2))
+        return int(pixels * (read + 16 + 16 * -(-len(self.state.bars) // 4) / options.aggregate**2))
 
     def error(self, name: str, method: str, pixels: int) -> float | None:
         """The largest error of what a pass just made."""
@@ -200,25 +201,25 @@ class Case:
 
     def _reference(self, y, x, method: str) -> np.ndarray:
         """float64 colours (P, 3) of pixels; a few at a time, for their weights are large in between."""
-        options, block = self.instant.options, self.instant.options.aggregate
+        options, block = self.state.options, self.state.options.aggregate
         codes = np.stack([self.source.read(k)[y, x] for k in self._wanted]) / 255.0
         frames = light.premultiplied(codes, light.to_linear)[:, None]
         if method == "average":
             codes = codes if options.light == "encoded" else frames[:, 0]
             mean = codes[..., :3].mean(axis=0)
             return light.to_linear(mean) if options.light == "encoded" else mean
-        c = self.compositor.coefficients(self.handle, len(self.instant.bars))[:, y // block, x // block][
-            :, None
-        ].astype(np.float64)
-        present, step = np.ones(len(frames), dtype=bool), max(1, (1 << 21) // self.instant.bars.size // len(frames))
+        c = self.compositor.coefficients(self.handle, len(self.state.bars))[:, y // block, x // block][:, None].astype(
+            np.float64
+        )
+        present, step = np.ones(len(frames), dtype=bool), max(1, (1 << 21) // self.state.bars.size // len(frames))
         parts = (slice(start, start + step) for start in range(0, len(y), step))
         return np.concatenate(
-            [compositor.compose(self.instant, frames[:, :, p], present, c[..., p])[0, :, :3] for p in parts]
+            [compositor.compose(self.state, frames[:, :, p], present, c[..., p])[0, :, :3] for p in parts]
         )
 
     def _diffusion_error(self) -> float:
         """Of what was solved last."""
-        count, exact = len(self.instant.bars), self.compositor.solver()
+        count, exact = len(self.state.bars), self.compositor.solver()
         usual = diffusion_gpu.CYCLES, diffusion_gpu.WHOLE
         try:
             diffusion_gpu.CYCLES, diffusion_gpu.WHOLE = 12, max(self.labels.shape)
@@ -270,10 +271,10 @@ class HostCase(Case):
 
     def compose(self, method: str) -> None:
         if method == "ours":
-            block = self.instant.options.aggregate
-            self.picture = self.compositor.draw(self.window, self.index, 1, self.instant, self.handle, block)
+            block = self.state.options.aggregate
+            self.picture = self.compositor.draw(self.window, self.index, 1, self.state, self.handle, block)
             return
-        encoded = self.instant.options.light == "encoded"
+        encoded = self.state.options.light == "encoded"
         values = np.arange(256, dtype=np.float32) / np.float32(255)
         curve = values if encoded else light.to_linear(values)
         total = np.zeros((self.source.height, self.source.width, 3), dtype=np.float32)
@@ -289,7 +290,7 @@ class HostCase(Case):
         return None
 
     def _diffusion_error(self) -> float:
-        usual, count = diffusion.CYCLES, len(self.instant.bars)
+        usual, count = diffusion.CYCLES, len(self.state.bars)
         try:
             diffusion.CYCLES = 12
             expected = self.solver.solve(self.labels, count)
@@ -319,24 +320,24 @@ def copied(device) -> dict:
     return {"pass": "copy", "method": "ours", "bars": "", **nothing, "device": device.name, "ms": ms, "error": error}
 
 
-def _program(name: str, samplers, instant: Instant, **defines) -> Pass:
+def _program(name: str, samplers, state: FrameState, **defines) -> Pass:
     return Pass(
         str(HERE / name),
         dict.fromkeys(samplers, "sampler2DArray"),
         {"picture": Image("rgba32f")},
         {"size": "ivec2", "top": "int", "height": "int", "first_layer": "int"},
-        {"LAST": instant.options.window, "DECODE": int(instant.options.light == "linear"), **defines},
+        {"LAST": state.options.window, "DECODE": int(state.options.light == "linear"), **defines},
         local_size=LOCAL_ROW,
     )
 
 
-def _appendix_a(instant: Instant, shared: bool) -> Pass:
-    defines = {"SHUTTERS": len(instant.bars), "AGGREGATE": instant.options.aggregate, "SHARED": int(shared)}
-    return _program("appendix_a", ("frames", "coefficients", "sums"), instant, **defines)
+def _appendix_a(state: FrameState, shared: bool) -> Pass:
+    defines = {"SHUTTERS": len(state.bars), "AGGREGATE": state.options.aggregate, "SHARED": int(shared)}
+    return _program("appendix_a", ("frames", "coefficients", "sums"), state, **defines)
 
 
-def _average(instant: Instant) -> Pass:
-    return _program("average", ("frames",), instant)
+def _average(state: FrameState) -> Pass:
+    return _program("average", ("frames",), state)
 
 
 def jobs(case: Case, passes, methods):
@@ -345,7 +346,7 @@ def jobs(case: Case, passes, methods):
         has = {"ours": PASSES, "paper": ("compose",), "average": ("compose", "accumulate", "frame")}
         if isinstance(case, HostCase):
             has |= {"ours": [p for p in PASSES if p not in ("diffuse_moved", "readback")], "paper": ()}
-        if name in has[method] and (method != "average" or case.instant.options.aggregate == 1):
+        if name in has[method] and (method != "average" or case.state.options.aggregate == 1):
             yield name, method
 
 
@@ -360,12 +361,12 @@ def measure(case: Case, args) -> list[tuple[dict, int | None]]:
         for name, method in todo:
             if sum(times[name, method]) < args.patience:
                 times[name, method].append(timed(case, name, method))
-    options = case.instant.options
+    options = case.state.options
     common = {
         "bars": case.kind,
         "width": case.source.width,
         "height": case.source.height,
-        "shutters": len(case.instant.bars),
+        "shutters": len(case.state.bars),
         "window": options.window,
         "aggregate": options.aggregate,
         "device": case.device.name,
@@ -397,8 +398,8 @@ def run(args) -> list[dict]:
                 args.windows, args.shutters, args.bars, args.aggregates
             ):
                 options = Options(window, light=args.light, aggregate=block)
-                instant = Instant(options, bars(kind, count, window), shapes(count))
-                case = made_for(device, source, instant, kind, shared=args.sums == "shared")
+                state = FrameState(options, bars(kind, count, window), shapes(count))
+                case = made_for(device, source, state, kind, shared=args.sums == "shared")
                 made = measure(case, args)
                 case.release()
                 for row, moved in made:

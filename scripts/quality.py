@@ -24,7 +24,7 @@ from benchmark import BARS, bars, shapes
 
 from shutter_addon.compute.renderer import DEVICES, Renderer, open_compositor
 from shutter_addon.core import light
-from shutter_addon.core.instant import Instant, Options
+from shutter_addon.core.frame_state import FrameState, Options
 from shutter_addon.media import MediaError, open_source
 
 ASSETS = Path(__file__).resolve().parents[1] / "assets"
@@ -42,7 +42,7 @@ def similarities(compositor, film, kind: str, count: int, window: int, block: in
     source = open_source(film)
     # Full resolution, then blocks.
     renderers = [Renderer(compositor, source) for _ in range(2)]
-    moments = [Instant(Options(window, aggregate=b), bars(kind, count, window), shapes(count)) for b in (1, block)]
+    moments = [FrameState(Options(window, aggregate=b), bars(kind, count, window), shapes(count)) for b in (1, block)]
     result = []
     for index in np.linspace(0, source.count - window, frames).astype(int).tolist():
         pictures = [_codes(r.picture(index, moment)) for r, moment in zip(renderers, moments, strict=True)]

@@ -38,7 +38,7 @@ from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.core import light, presets, recipe
 from shutter_addon.media import MediaError, open_source
-from shutter_addon.media.cuts import Shots
+from shutter_addon.media.cuts import ShotSource
 
 ROOT = Path(__file__).resolve().parents[1]
 WAYS = ("ours", "constant", "average")
@@ -125,7 +125,7 @@ def _composed(edit, source, indices) -> dict[int, np.ndarray]:
     """What the effect shows of source frames, in levels; composed by NumPy."""
     strip = strips.effect_strips(edit)[0]
     effect = strips.effect_of(edit, strip.scene)
-    renderer = Renderer(CPUCompositor(), Shots(source))
+    renderer = Renderer(CPUCompositor(), ShotSource(source))
     return {
         index: 255 * light.to_encoded(renderer.picture(index, effects.instant(edit, effect, strip, index + 1)))[..., :3]
         for index in indices

@@ -37,6 +37,11 @@ def test_no_leak(layer):
             assert not any(name.startswith(f"{f}.") for f in FORBIDDEN[layer] if f.startswith("."))
 
 
+def test_no_two_modules_have_the_same_name():
+    names = [path.stem for layer in FORBIDDEN for path in (PACKAGE / layer).rglob("*.py") if path.stem != "__init__"]
+    assert sorted({name for name in names if names.count(name) > 1}) == []
+
+
 def test_no_absolute_import_of_the_package():
     """An installed extension has another name."""
     for path in PACKAGE.rglob("*.py"):

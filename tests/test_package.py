@@ -167,7 +167,7 @@ except recipe.RecipeError as error:
 
 def test_without_moderngl_numpy_composes():
     code = """
-from shutter_addon.compute.errors import NoDeviceError
+from shutter_addon.compute.device import NoDeviceError
 from shutter_addon.compute.renderer import open_compositor
 print(open_compositor()[1])
 try:

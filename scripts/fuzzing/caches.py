@@ -26,7 +26,7 @@ def make(random, folder):
         save_image(folder / "in" / f"f{i + 1:04d}.{ending}", ramp, samples)
     with open_source(folder / "in" / f"f0001.{ending}") as source:
         inbetween.build(source, folder / "cache", *SETTINGS)
-        frames = inbetween.Inbetween(source, folder / "cache", *SETTINGS)
+        frames = inbetween.InbetweenSource(source, folder / "cache", *SETTINGS)
         frames = [_hash(frames.read(index)) for index in range(frames.count)]
     cache = next((folder / "cache").iterdir())
     strangers = [cache / name for name in random.sample(STRANGERS, random.choice((0, 0, 1, 3)))]
@@ -105,11 +105,11 @@ def run(folder):
 
 
 def _take(folder, plan, steps):
-    from shutter_addon.media import MediaError, cache, inbetween, open_source
+    from shutter_addon.media import MediaError, inbetween, inbetween_cache, open_source
 
     def read(must=False):
         """Every frame is the right one, or there is a sentence."""
-        frames = inbetween.Inbetween(source, place, *SETTINGS)
+        frames = inbetween.InbetweenSource(source, place, *SETTINGS)
         for index, expected in enumerate(plan["frames"]):
             try:
                 found = _hash(frames.read(index))
@@ -122,12 +122,12 @@ def _take(folder, plan, steps):
                 raise trial.Fault(f"frame {index} is another one")
 
     does = {
-        "state": lambda: cache.state(source, place, *SETTINGS),
-        "size": lambda: (cache.size(place, source), cache.size(place)),
+        "state": lambda: inbetween_cache.state(source, place, *SETTINGS),
+        "size": lambda: (inbetween_cache.size(place, source), inbetween_cache.size(place)),
         "estimate": lambda: inbetween.estimate(source, SETTINGS[0]),
         "read": read,
         "build": lambda: inbetween.build(source, place, *SETTINGS),
-        "remove": lambda: cache.purge(place, source),
+        "remove": lambda: inbetween_cache.purge(place, source),
         "whole": lambda: read(must=inbetween.build(source, place, *SETTINGS).name == "ready"),
     }
     place = folder / "cache"

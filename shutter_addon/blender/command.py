@@ -17,14 +17,14 @@ from typing import get_args
 
 import bpy
 
-from ..compute.errors import NoDeviceError
+from ..compute.device import NoDeviceError
 from ..compute.renderer import DEVICES
-from ..core import recipe, whole
+from ..core import atomic_write, recipe
 from ..core.messages import sentence, signed
 from ..media import MediaError, open_source
+from ..media.completeness import is_whole_blend, why_short
 from ..media.files import check_name
 from ..media.sequence import by_number
-from ..media.written import is_whole_blend, why_short
 from .data import effects, inbetween_settings, source_media, strips
 from .editing import new_edit
 from .rendering import film_output, session
@@ -166,7 +166,7 @@ def _files(medium) -> list[Path]:
 def _opened(path: Path):
     """The source, with a word on stderr of files that were left out."""
     medium = open_source(path)
-    if left_out := getattr(medium, "left_out", ""):
+    if left_out := medium.left_out:
         print(signed(left_out), file=sys.stderr)
     return medium
 
@@ -240,7 +240,7 @@ def _save(edit, path: Path) -> None:
 
 
 def _save_whole(edit, path: Path) -> None:
-    with whole.part_folder(path.parent) as folder:
+    with atomic_write.part_folder(path.parent) as folder:
         part = folder / "edit.blend"
         try:
             with film_output.quiet(), new_edit.paths_relative(edit, path.parent):

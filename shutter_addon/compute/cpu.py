@@ -12,9 +12,9 @@ from functools import partial
 import numpy as np
 
 from ..core import compositor, light, shutters
-from ..core.instant import Instant, Options
+from ..core.frame_state import FrameState, Options
 from .diffusion import diffuse
-from .running import Running, summable
+from .running_sums import RunningSums, summable
 
 # A tile's rows and columns, multiples of every block: its arrays stay within the processor's cache, and coefficients
 # differ little across it.
@@ -76,7 +76,7 @@ class Frames:
         return self.frames.keys()
 
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
-        """As Running.load."""
+        """As RunningSums.load."""
         self.shot = shot
         frames = compositor.source_frames(options, positions, shot).tolist()
         self._at, wanted = dict(zip(positions.tolist(), frames, strict=True)), set(frames)
@@ -94,7 +94,7 @@ class Frames:
         self.frames = {}
 
 
-class Sums(Running):
+class Sums(RunningSums):
     """Running sums of opaque 8-bit frames, uint32 for each of the three colours: 12 bytes a pixel and layer."""
 
     unit = 1 / WHITE
@@ -191,12 +191,12 @@ class CPUCompositor:
     def read(self, drawn: np.ndarray) -> np.ndarray:
         return drawn
 
-    def draw(self, window, index: int, direction: int, instant: Instant, handle, block: int) -> np.ndarray:
+    def draw(self, window, index: int, direction: int, state: FrameState, handle, block: int) -> np.ndarray:
         """The picture (H, W, 4) float32, top row first; arguments as for GPUCompositor.draw."""
-        source, options = window.source, instant.options
+        source, options = window.source, state.options
         picture = np.empty((source.height, source.width, 4), dtype=np.float32)
         # Backwards in time is forwards with the shutters reversed.
-        bars = instant.bars[:, ::direction]
+        bars = state.bars[:, ::direction]
         origin = int(compositor.window_positions(options, index, direction).min())
         present = compositor.source_frames(options, origin + np.arange(options.window), window.shot) >= 0
         expose = _way(window, options, bars, origin, present, direction)
@@ -206,7 +206,7 @@ class CPUCompositor:
             planes *= np.float32(window.unit)
             if options.light == "encoded":
                 planes = _linear(planes)
-            planes[:3] *= tile.pixels(_mixed(instant.gains[None], c)[0], block)
+            planes[:3] *= tile.pixels(_mixed(state.gains[None], c)[0], block)
             pixels = tile.of(picture)
             pixels[..., 3] = 1
             for k, plane in enumerate(planes):

@@ -10,12 +10,12 @@ from functools import cache
 import moderngl
 import numpy as np
 
-from .errors import NoDeviceError
+from .device import NoDeviceError
 from .passes import Pass, source
 
 _EGL = sys.platform == "linux"
 
-# Format (as in GLSL): components, moderngl's type, NumPy's type of what is written and read.
+# Format as in GLSL: (components, moderngl's type, NumPy's type of the arrays that are written and read).
 FORMATS = {
     "rgba8": (4, "f1", np.uint8),
     "rgba16": (4, "nu2", np.uint16),
@@ -29,7 +29,7 @@ FORMATS = {
 
 @contextmanager
 def _kept_context():
-    """Leaves the thread's current context as it was, where moderngl leaves none: on EGL."""
+    """Restores the thread's current context at the end. On EGL moderngl would leave the thread without one."""
     if not _EGL:
         yield
         return
@@ -54,17 +54,17 @@ def _egl():
 
 @cache
 def _gl(name: str):
-    """A function of GL that returns nothing. Called through ctypes, it lets Python's other threads run meanwhile."""
+    """An OpenGL function without a result. ctypes releases Python's lock while it runs: other threads go on."""
     find = _egl().eglGetProcAddress
     find.restype, find.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
     return ctypes.CFUNCTYPE(None)(find(name.encode()))
 
 
 class GLDevice:
-    """Textures and compute passes. Calls belong inside `with device.current():`, on whatever thread renders.
+    """A Device on an OpenGL 4.3 context of its own; see Device. NoDeviceError: there is no OpenGL 4.3.
 
-    Not on one where a context of GLX is current, as Blender's is in a window of X11: EGL makes none current beside it,
-    and the calls would go to that one.
+    Do not use it on a thread where a GLX context is current, as Blender's is in a window on X11: EGL does not replace
+    that context, so the calls would go to it.
     """
 
     def __init__(self):
@@ -72,7 +72,7 @@ class GLDevice:
         try:
             with _kept_context():
                 self._context = moderngl.create_context(standalone=True, require=430, **backend)
-                with self._context:  # and not afterwards, so that another thread may have it
+                with self._context:  # not current afterwards, so that another thread can use it
                     info = self._context.info
         except Exception as error:  # moderngl raises whatever its platform raises
             raise NoDeviceError(f"no OpenGL 4.3: {error}") from None
@@ -84,15 +84,15 @@ class GLDevice:
 
     @contextmanager
     def current(self):
-        """Makes the context current on this thread, and the previous one afterwards."""
+        """See Device. Afterwards the thread's previous context is current again."""
         with _kept_context(), self._context:
             yield self
 
     def texture(self, width: int, height: int, layers: int, kind: str) -> moderngl.TextureArray:
-        """A texture array of `kind` in FORMATS, without filtering. NoDeviceError: the device has no room for it."""
+        """See Device."""
         components, dtype, _ = FORMATS[kind]
         texture = self._context.texture_array((width, height, layers), components, dtype=dtype)
-        # moderngl does not look: a texture without memory reads as black.
+        # moderngl does not check this: a texture that got no memory would read as black.
         if (fault := self._context.error) != "GL_NO_ERROR":
             texture.release()
             raise NoDeviceError(f"{self.name} has no room for {layers} layers of {width}×{height}: {fault}")
@@ -101,15 +101,12 @@ class GLDevice:
         return texture
 
     def write(self, texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
-        """Fills a layer, or its first rows, from a C-contiguous array (rows, width[, 4]) of the format's type.
-
-        opaque: the array's alpha is full everywhere, so that a device may save itself sending it.
-        """
+        """See Device. `opaque` changes nothing here."""
         height, width = array.shape[:2]
         texture.write(array, viewport=(0, 0, layer, width, height, 1), alignment=1)
 
     def read(self, texture) -> np.ndarray:
-        """The texture as an array (layers, height, width, components)."""
+        """See Device."""
         components, _, dtype = FORMATS[texture.extra]
         width, height, layers = texture.size
         array = np.empty((layers, height, width, components), dtype=dtype)
@@ -120,8 +117,7 @@ class GLDevice:
     def run(
         self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, blocks=None, **constants
     ) -> None:
-        """Runs a pass over `extent` invocations (x, y[, z]); textures, images and blocks (contiguous
-        float32 arrays (length, 4)) by name, constants by keyword."""
+        """See Device."""
         if program not in self._programs:
             shader = self._context.compute_shader(source(program))
             self._programs[program] = shader, {name: shader[name] for name in shader}
@@ -133,13 +129,14 @@ class GLDevice:
         for unit, name in enumerate(program.blocks):
             self._block(unit, blocks[name])
         for name, value in constants.items():
-            if name in used:  # the compiler drops what a source does not use
+            if name in used:  # the compiler removes constants that a source does not use
                 used[name].value = value
         self._dispatch(shader, *program.groups(extent))
         self._context.memory_barrier()
 
     def _dispatch(self, shader, *groups: int) -> None:
-        """Software renderers are not back before the pass is done: Python's other threads run meanwhile."""
+        """Dispatches the shader. A software renderer returns only when the pass is done; on EGL the call goes through
+        ctypes, so that Python's other threads run meanwhile."""
         if _EGL:
             _gl("glUseProgram")(ctypes.c_uint(shader.glo))
             _gl("glDispatchCompute")(*map(ctypes.c_uint, groups))
@@ -154,8 +151,9 @@ class GLDevice:
         buffer.bind_to_uniform_block(unit)
 
     def finish(self) -> None:
-        """Waits until all that was run is done; Python's other threads run meanwhile."""
+        """Waits until all passes are done. On EGL Python's other threads run meanwhile."""
         _gl("glFinish")() if _EGL else self._context.finish()
 
     def release(self) -> None:
+        """See Device."""
         self._context.release()

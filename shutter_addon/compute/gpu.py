@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from ..core import compositor, shutters
-from ..core.instant import Instant, Options
+from ..core.frame_state import FrameState, Options
 from .diffusion_gpu import Diffusion
 from .passes import LOCAL_ROW, Image, Pass
 from .tables import padded, table
@@ -119,13 +119,13 @@ def _extent(window: Sums) -> dict:
     return {"layers": window.layers, "held": window.stop - window.start, "unit": 1 / window.whole}
 
 
-def _from_sums(window: Sums, instant: Instant, values: np.ndarray, origin: int, direction: int):
+def _from_sums(window: Sums, state: FrameState, values: np.ndarray, origin: int, direction: int):
     """The pass that composes the pieces of a table from running sums, and what it is given besides its place."""
     rows = _filled_rows(len(values) - 1)
     filled = np.zeros((1 + rows, *values.shape[1:]), np.float32)
     filled[: len(values)] = values
-    back, encoded = direction < 0, instant.options.light == "encoded"
-    return composition_of_sums(rows, -(-len(instant.bars) // 4), back, window.tiled, encoded), {
+    back, encoded = direction < 0, state.options.light == "encoded"
+    return composition_of_sums(rows, -(-len(state.bars) // 4), back, window.tiled, encoded), {
         "images": {},
         "blocks": {"table": filled.reshape(-1, 4)},
         **_extent(window),
@@ -134,11 +134,11 @@ def _from_sums(window: Sums, instant: Instant, values: np.ndarray, origin: int, 
     }
 
 
-def _from_frames(way: str, window, instant: Instant, rows: int, origin: int, direction: int, shortened: bool):
+def _from_frames(way: str, window, state: FrameState, rows: int, origin: int, direction: int, shortened: bool):
     """As _from_sums: the pass that goes through the frames."""
-    options, source, summed = instant.options, window.source, isinstance(window, Sums)
+    options, source, summed = state.options, window.source, isinstance(window, Sums)
     given = {"images": {}, "textures": {}, "rows": rows, "direction": direction}
-    given["first"], given["last"] = shutters.open_span(instant.bars)
+    given["first"], given["last"] = shutters.open_span(state.bars)
     if summed:
         lowest, decode, edges = window.start, 0, 2 if shortened else 0
         given |= _extent(window)
@@ -152,7 +152,7 @@ def _from_frames(way: str, window, instant: Instant, rows: int, origin: int, dir
     given |= {"layers": window.layers, "lowest_layer": lowest % window.layers}
     # Shaders count from the shot's first frame.
     given |= {"count": len(window.shot), "origin": origin - window.shot.start, "lowest": lowest - window.shot.start}
-    groups, premultiplied = -(-len(instant.bars) // 4), source.alpha == "premultiplied"
+    groups, premultiplied = -(-len(state.bars) // 4), source.alpha == "premultiplied"
     stored = "frames" if not summed else "tiles" if window.tiled else "sums"
     return composition(way, groups, stored, decode, edges, premultiplied, options.light == "encoded"), given
 
@@ -193,23 +193,23 @@ class GPUCompositor:
         """What `draw` gave, as an array (H, W, 4) float32, top row first."""
         return self.device.read(drawn)[0, ::-1]
 
-    def draw(self, window, index: int, direction: int, instant: Instant, handle, block: int):
+    def draw(self, window, index: int, direction: int, state: FrameState, handle, block: int):
         """The picture on the device, the window's until it is drawn into again: a texture array rgba32f of one layer,
         scene-linear and premultiplied, bottom row first.
 
         index, direction: as for core.compositor.window_positions; what is needed of the window is loaded.
         handle: coefficients, of which `block` × `block` pixels share one.
         """
-        options, values = instant.options, table(instant)
-        first, last = shutters.open_span(instant.bars)
+        options, values = state.options, table(state)
+        first, last = shutters.open_span(state.bars)
         origin = int(compositor.window_positions(options, index, direction)[0])
         reach = sorted((origin + direction * first, origin + direction * (last - 1)))
         shortened = options.edges == "shorten" and (reach[0] < window.shot.start or reach[1] >= window.shot.stop)
         way = way_of(window, options, values, (first, last), shortened)
         if way == "sums":
-            program, given = _from_sums(window, instant, values, origin, direction)
+            program, given = _from_sums(window, state, values, origin, direction)
         else:
-            program, given = _from_frames(way, window, instant, len(values) - 1, origin, direction, shortened)
+            program, given = _from_frames(way, window, state, len(values) - 1, origin, direction, shortened)
             given["images"]["table"] = self._filled("table", values[None], "rgba32f")
         given["images"] |= {"picture": window.picture, "coefficients": handle}
         lines = _LINES.get(way, BLOCK)

@@ -12,14 +12,15 @@ from functools import cache
 from pathlib import Path
 
 SHADERS = Path(__file__).resolve().parents[2] / "shaders"
-# For passes that look at a pixel's neighbours, and for those that do not: rows of pixels lie one after the other.
+# Invocations of a workgroup (x, y, z): a square for passes that read a pixel's neighbours, else part of a row.
 LOCAL_SIZE = (8, 8, 1)
 LOCAL_ROW = (64, 1, 1)
 
 
 @dataclass(frozen=True)
 class Image:
-    """An image: its format (as in GLSL), and whether the pass loads from it and stores in it."""
+    """An image array that a pass binds. format: as in GLSL; reads, writes: whether the pass loads from it and stores
+    to it."""
 
     format: str
     reads: bool = False
@@ -28,9 +29,16 @@ class Image:
 
 @dataclass(frozen=True)
 class Pass:
-    """A compute pass. samplers: name → GLSL type; images: name → Image (arrays); constants: name → GLSL type;
-    defines: name → value, for what is known before it is compiled; blocks: name → length of an array of vec4;
-    local_size: a workgroup."""
+    """A compute pass: a source in shaders/, and the interface that it is compiled with.
+
+    name: of the source, shaders/NAME.glsl
+    samplers: {name: GLSL type}
+    images: {name: Image}
+    constants: {name: GLSL type} of its uniforms
+    defines: {name: value} of its preprocessor macros
+    blocks: {name: length} of its uniform blocks, each an array of vec4
+    local_size: invocations of a workgroup (x, y, z)
+    """
 
     name: str
     samplers: dict[str, str] = field(default_factory=dict)

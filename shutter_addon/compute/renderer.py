@@ -1,13 +1,14 @@
-"""From a source and an instant to a picture: rasterise, diffuse, load the window, compose."""
+"""From a source and an state to a picture: rasterise, diffuse, load the window, compose."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..core import compositor, scribbles, shutters
-from ..core.instant import Instant
+from ..core.frame_source import FrameSource
+from ..core.frame_state import FrameState
 from .cpu import CPUCompositor
-from .errors import NoDeviceError
+from .device import NoDeviceError
 
 DEVICES = ("auto", "gpu", "cpu")
 
@@ -33,117 +34,116 @@ def open_compositor(device: str = "auto"):
 class Renderer:
     """Pictures of one source; keeps the window's frames and the last coefficients.
 
-    Windows end at cuts (Options.stop_at_cuts) of a source that knows its shots: a media.cuts.Shots.
+    Windows end at cuts (Options.stop_at_cuts) of a source that knows them (FrameSource.shots).
     """
 
-    def __init__(self, compositor, source):
+    def __init__(self, compositor, source: FrameSource):
         self.compositor, self.source = compositor, source
-        self._knows_shots = hasattr(source, "around")
         self._solver = compositor.solver()
         self._window = None
         self._labelled = self._solved = self._drawn = None
 
-    def picture(self, index: int, instant: Instant, direction: int = 1) -> np.ndarray:
+    def picture(self, index: int, state: FrameState, direction: int = 1) -> np.ndarray:
         """The picture (H, W, 4) float32 at source frame `index`: scene-linear, premultiplied, top row first.
 
         direction: −1 where the source plays in reverse, and the window's next frames are those before `index`.
         """
         with self.compositor.current():
-            return self.compositor.read(self.draw(index, instant, direction))
+            return self.compositor.read(self.draw(index, state, direction))
 
-    def draw(self, index: int, instant: Instant, direction: int = 1, *, quick: bool = False):
+    def draw(self, index: int, state: FrameState, direction: int = 1, *, quick: bool = False):
         """The same on the device: a texture array rgba32f of one layer, bottom row first (with NumPy: as `picture`).
 
         It stays until the next one of this renderer; the same picture is not composed twice. quick: coefficients may
         start from the last ones, where scribbles moved; the picture then depends a little on what was drawn before.
         """
-        key = index, direction, instant.key
+        key = index, direction, state.key
         if self._drawn is None or self._drawn[0] != key or not (quick or self._drawn[1]):
             with self.compositor.current():
-                picture = self.compositor.draw(*self._parts(index, instant, direction, quick))
+                picture = self.compositor.draw(*self._parts(index, state, direction, quick))
             self._drawn = key, not quick, picture
         return self._drawn[2]
 
-    def coefficients(self, instant: Instant) -> np.ndarray:
-        """Coefficients (N, h, w) float32 at an instant, one per pixel or per block that shares a shutter."""
-        count, (width, height) = len(instant.bars), self._grid(instant)
+    def coefficients(self, state: FrameState) -> np.ndarray:
+        """Coefficients (N, h, w) float32 at an state, one per pixel or per block that shares a shutter."""
+        count, (width, height) = len(state.bars), self._grid(state)
         with self.compositor.current():
-            labels = self.labels(instant)
+            labels = self.labels(state)
             if (values := _uniform(labels, count)) is not None:
                 return np.broadcast_to(values.astype(np.float32)[:, None, None], (count, height, width))
             return self.compositor.coefficients(self._diffused(labels, count), count)
 
-    def drawn_coefficients(self, instant: Instant):
+    def drawn_coefficients(self, state: FrameState):
         """Coefficients on the device, which must be a GPU: (texture array rgba32f of four shutters a layer, top row
         first; the pixels along each side of a texel; the number of shutters). They are those of a quick `draw`.
 
         The texture is one texel where they are the same everywhere. It stays until the next call of any method.
         """
-        labels, count = self.labels(instant), len(instant.bars)
+        labels, count = self.labels(state), len(state.bars)
         with self.compositor.current():
             if (values := _uniform(labels, count)) is not None:
                 return self.compositor.constant(values), self._everywhere, count
-            return self._diffused(labels, count, quick=True), instant.options.aggregate, count
+            return self._diffused(labels, count, quick=True), state.options.aggregate, count
 
-    def drawn_labels(self, instant: Instant):
+    def drawn_labels(self, state: FrameState):
         """Labels on the device, which must be a GPU: (texture array r16ui, top row first; the pixels along each side of
         a texel). The texture stays until the next call."""
         with self.compositor.current():
-            return self.compositor.labels(self.labels(instant)), instant.options.aggregate
+            return self.compositor.labels(self.labels(state)), state.options.aggregate
 
-    def labels(self, instant: Instant) -> np.ndarray:
+    def labels(self, state: FrameState) -> np.ndarray:
         """Labels (h, w) uint16 of the pixels, or of the blocks that share a shutter: 0 free, 1 + shutter scribbled."""
-        key = self._grid(instant), instant.options.border, instant.key[-1]
+        key = self._grid(state), state.options.border, state.key[-1]
         if self._labelled is None or self._labelled[0] != key:
-            self._labelled = key, scribbles.rasterise(instant.shapes, *key[0], border=key[1])
+            self._labelled = key, scribbles.rasterise(state.shapes, *key[0], border=key[1])
         return self._labelled[1]
 
-    def shot(self, index: int, direction: int, instant: Instant, *, known: bool = False) -> range:
+    def shot(self, index: int, direction: int, state: FrameState, *, known: bool = False) -> range:
         """The source frames that the window may show: those of the shot around `index`, as far as the window tells.
 
         It reads what it must to find cuts; known: nothing, and where it does not know there is no cut."""
-        if not self._stops(instant):
+        if not self._stops(state):
             return range(self.source.count)
-        low, high = self._reach(index, direction, instant)
-        shot = self.source.around(index, low, high, known=known)
+        low, high = self._reach(index, direction, state)
+        shot = self.source.shots.around(index, low, high, known=known)
         last = shot.stop - 1
-        if instant.options.edges == "mirror" and (last < high) != (shot.start > low):
+        if state.options.edges == "mirror" and (last < high) != (shot.start > low):
             # What is mirrored at one end may reach beyond the other.
             low, high = (min(low, 2 * last - high), high) if last < high else (low, max(high, 2 * shot.start - low))
-            shot = self.source.around(index, low, high, known=known)
+            shot = self.source.shots.around(index, low, high, known=known)
         return shot
 
-    def positions(self, index: int, direction: int, instant: Instant, shot: range) -> np.ndarray:
+    def positions(self, index: int, direction: int, state: FrameState, shot: range) -> np.ndarray:
         """Where the frames lie that some shutter exposes, on the picture or not (core.compositor.window_positions);
         all of the window's that are there, where a shutter may lose all of its own."""
-        positions = compositor.window_positions(instant.options, index, direction)
-        frames = compositor.source_frames(instant.options, positions, shot)
-        low, high = shutters.open_span(instant.bars)
+        positions = compositor.window_positions(state.options, index, direction)
+        frames = compositor.source_frames(state.options, positions, shot)
+        low, high = shutters.open_span(state.bars)
         return positions[low:high] if (frames[low:high] >= 0).all() else positions[frames >= 0]
 
-    def needed(self, index: int, direction: int, instant: Instant, *, known: bool = True) -> set[int]:
+    def needed(self, index: int, direction: int, state: FrameState, *, known: bool = True) -> set[int]:
         """The source frames at those positions, as far as cuts are known; known as for `shot`."""
-        shot = self.shot(index, direction, instant, known=known)
-        positions = self.positions(index, direction, instant, shot)
-        return set(compositor.source_frames(instant.options, positions, shot).tolist())
+        shot = self.shot(index, direction, state, known=known)
+        positions = self.positions(index, direction, state, shot)
+        return set(compositor.source_frames(state.options, positions, shot).tolist())
 
-    def missing(self, index: int, direction: int, instant: Instant) -> set[int]:
+    def missing(self, index: int, direction: int, state: FrameState) -> set[int]:
         """Those of the needed source frames that still must be read, and those that cuts are looked for in."""
-        held = self._window.held if self._window and self._window.capacity == instant.options.window else ()
-        missing = self.needed(index, direction, instant).difference(held)
-        if self._stops(instant):
-            missing |= self.source.lacking(index, *self._reach(index, direction, instant))
-            missing -= self.source.handed()
+        held = self._window.held if self._window and self._window.capacity == state.options.window else ()
+        missing = self.needed(index, direction, state).difference(held)
+        if self._stops(state):
+            missing |= self.source.shots.lacking(index, *self._reach(index, direction, state))
+            missing -= self.source.shots.handed()
         return missing
 
-    def _stops(self, instant: Instant) -> bool:
-        return instant.options.stop_at_cuts and self._knows_shots
+    def _stops(self, state: FrameState) -> bool:
+        return state.options.stop_at_cuts and self.source.shots is not None
 
     @staticmethod
-    def _reach(index: int, direction: int, instant: Instant) -> tuple[int, int]:
+    def _reach(index: int, direction: int, state: FrameState) -> tuple[int, int]:
         """The first and the last position from the frame that is shown to all that some shutter exposes."""
-        positions = compositor.window_positions(instant.options, index, direction)
-        reach = [index, *positions[slice(*shutters.open_span(instant.bars))].tolist()]
+        positions = compositor.window_positions(state.options, index, direction)
+        reach = [index, *positions[slice(*shutters.open_span(state.bars))].tolist()]
         return min(reach), max(reach)
 
     @property
@@ -151,29 +151,29 @@ class Renderer:
         """The block that holds the whole picture."""
         return max(self.source.width, self.source.height)
 
-    def _grid(self, instant: Instant) -> tuple[int, int]:
-        block = instant.options.aggregate
+    def _grid(self, state: FrameState) -> tuple[int, int]:
+        block = state.options.aggregate
         return -(-self.source.width // block), -(-self.source.height // block)
 
-    def _parts(self, index: int, instant: Instant, direction: int, quick: bool):
+    def _parts(self, index: int, state: FrameState, direction: int, quick: bool):
         """What the compositor needs, its window loaded."""
-        handle, instant, block = self._coefficients(instant, quick)
-        window = self._window_for(instant.options.window)
-        shot = self.shot(index, direction, instant)
-        window.load(self.positions(index, direction, instant, shot), instant.options, shot)
-        return window, index, direction, instant, handle, block
+        handle, state, block = self._coefficients(state, quick)
+        window = self._window_for(state.options.window)
+        shot = self.shot(index, direction, state)
+        window.load(self.positions(index, direction, state, shot), state.options, shot)
+        return window, index, direction, state, handle, block
 
-    def _coefficients(self, instant: Instant, quick: bool):
-        """The coefficients on the device, the instant to compose with them, and the block that shares one.
+    def _coefficients(self, state: FrameState, quick: bool):
+        """The coefficients on the device, the state to compose with them, and the block that shares one.
 
         Where one mix of shutters holds for the whole picture, that mix is the only shutter.
         """
-        labels = self.labels(instant)
-        values = _uniform(labels, len(instant.bars))
+        labels = self.labels(state)
+        values = _uniform(labels, len(state.bars))
         if values is None:
-            return self._diffused(labels, len(instant.bars), quick), instant, instant.options.aggregate
+            return self._diffused(labels, len(state.bars), quick), state, state.options.aggregate
         chosen = int(values.argmax())
-        return self.compositor.constant(np.ones(1)), instant.alone(chosen), self._everywhere
+        return self.compositor.constant(np.ones(1)), state.alone(chosen), self._everywhere
 
     def _diffused(self, labels: np.ndarray, count: int, quick: bool = False):
         """Solves anew only when a scribble moved, or where a quick solution stands and is not enough."""
@@ -193,8 +193,8 @@ class Renderer:
         if self._window is not None:
             self._window.release()
             self._window = self._drawn = None
-        if self._knows_shots:
-            self.source.release()
+        if self.source.shots is not None:
+            self.source.shots.release()
 
     def close(self) -> None:
         """Frees everything on the device and closes the source."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core import shutters
-from ..core.instant import Instant
+from ..core.frame_state import FrameState
 
 
 def padded(values: np.ndarray) -> np.ndarray:
@@ -16,15 +16,15 @@ def padded(values: np.ndarray) -> np.ndarray:
     return result.reshape(*values.shape[:-1], groups, 4)
 
 
-def table(instant: Instant) -> np.ndarray:
+def table(state: FrameState) -> np.ndarray:
     """The table (1 + rows, columns, 4) float32 that shaders/include/compose.glsl describes.
 
     Row 0: the gains. Displacement: a row per piece of the quantiles: starts, ends, then dz and the time by which the
     shutters differ at most at either. Value: a row per frame of the shutters' open span, its normalised bars.
     """
-    rows = _pieces(instant.bars) if instant.options.interpolation == "displacement" else _bars(instant.bars)
+    rows = _pieces(state.bars) if state.options.interpolation == "displacement" else _bars(state.bars)
     result = np.zeros((1 + len(rows), rows.shape[1], 4), dtype=np.float32)
-    gains = padded(instant.gains)
+    gains = padded(state.gains)
     result[0, : len(gains)] = gains
     result[1:] = rows
     return result

@@ -7,10 +7,10 @@ from functools import cache
 import numpy as np
 
 from ..core import compositor, light
-from ..core.instant import Options
-from .errors import NoDeviceError
+from ..core.frame_state import Options
+from .device import NoDeviceError
 from .passes import Image, Pass
-from .running import Running, summable
+from .running_sums import RunningSums, summable
 
 # A layered texture over 2 GiB reads wrongly on Mesa's software renderer, without any error.
 BAND_BYTES = 1 << 30
@@ -110,7 +110,7 @@ class Frames(Window):
         return self._held.values()
 
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
-        """As Running.load."""
+        """As RunningSums.load."""
         self.shot = shot
         for index in sorted(set(compositor.source_frames(options, positions, shot).tolist())):
             layer = index % self.capacity
@@ -184,12 +184,12 @@ def accumulation(decode: int, again: bool, back: bool, tiled: bool) -> Pass:
     )
 
 
-class Sums(Running, Window):
+class Sums(RunningSums, Window):
     """Running sums of opaque 8-bit frames."""
 
     def __init__(self, device, source, capacity: int):
         Window.__init__(self, device, source, capacity)
-        Running.__init__(self, source, capacity)
+        RunningSums.__init__(self, source, capacity)
         # Three fields of 21 bits: as many of them for white as leave room for the sum of a whole window.
         self.whole = (1 << min(16, 21 - (capacity - 1).bit_length())) - 1
         # Neighbours look up other layers; in tiles, what a workgroup reads of a layer lies in one run of memory.
@@ -220,7 +220,7 @@ class Sums(Running, Window):
             self.device.run(program, size, images={"sums": sums}, size=size, top=top, **given)
 
     def release(self) -> None:
-        Running.release(self)
+        RunningSums.release(self)
         Window.release(self)
         if self._sent is not None:
             self._sent.release()

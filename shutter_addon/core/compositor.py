@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from . import light, shutters
-from .instant import Instant, Options
+from .frame_state import FrameState, Options
 
 # By how much of a frame the window's earlier ones are preferred, where the nearest frame is shown: of two that are as
 # near, rounding must not choose, for devices round differently.
@@ -44,20 +44,20 @@ def window_indices(options: Options, index: int, shot: range, direction: int = 1
     return source_frames(options, window_positions(options, index, direction), shot)
 
 
-def compose(instant: Instant, frames, present, coefficients) -> np.ndarray:
+def compose(state: FrameState, frames, present, coefficients) -> np.ndarray:
     """The picture (H, W, 4) float64, scene-linear and premultiplied: F = e(q) · ∫ V(t + ⌊Q⁻¹(z)⌋) dz (§3.1, §3.4.1).
 
     frames: L pictures (H, W, 4), scene-linear, premultiplied; present: (L,) bool, False for frames left out, whose
     share goes to the others (if none has a share: to the nearest present frame, of two the window's earlier one).
     coefficients: (N, H, W), Σ = 1.
     """
-    between = shutters.INTERPOLATIONS[instant.options.interpolation]
-    normalised = instant.bars / instant.bars.sum(axis=1, keepdims=True)
+    between = shutters.INTERPOLATIONS[state.options.interpolation]
+    normalised = state.bars / state.bars.sum(axis=1, keepdims=True)
     q = between(normalised, np.moveaxis(np.asarray(coefficients, dtype=np.float64), 0, -1))
     q = _without_absent(q, np.asarray(present))
-    encoded = instant.options.light == "encoded"
+    encoded = state.options.light == "encoded"
     total = sum(q[..., k, None] * (_encode(frame) if encoded else frame) for k, frame in enumerate(frames))
-    gain = np.einsum("n,nhw->hw", instant.gains, coefficients)
+    gain = np.einsum("n,nhw->hw", state.gains, coefficients)
     return (_decode(total) if encoded else total) * np.concatenate(
         [np.repeat(gain[..., None], 3, axis=-1), np.ones_like(gain)[..., None]], axis=-1
     )

@@ -17,8 +17,8 @@ from typing import Literal, get_args, get_origin
 
 import numpy as np
 
-from . import keyframes, limits, scribbles, shutters, whole
-from .instant import Edges, Exposure, Instant, Interpolation, Light, Options, Position
+from . import atomic_write, keyframes, limits, scribbles, shutters
+from .frame_state import Edges, Exposure, FrameState, Interpolation, Light, Options, Position
 from .messages import UserError, sentence
 
 Point = tuple[float, float]
@@ -143,10 +143,10 @@ class Recipe:
         names = Options.__dataclass_fields__.keys() - {"step"}
         return Options(**{name: getattr(self, name) for name in names}, step=self.inbetween)
 
-    def at(self, frame: float, aspect: float) -> Instant:
+    def at(self, frame: float, aspect: float) -> FrameState:
         """The effect at a timeline frame (1 = the strip's first), for a picture of width / height = aspect."""
         order = {shutter.name: i for i, shutter in enumerate(self.shutters)}
-        return Instant(
+        return FrameState(
             self.options,
             np.stack([shutter.at(frame, self.interpolation) for shutter in self.shutters]),
             tuple(
@@ -247,7 +247,7 @@ def _on_one_line(found: re.Match) -> str:
 
 def save(recipe: Recipe, path: str | Path) -> None:
     """Writes a recipe whole or not at all. OSError: it cannot be written."""
-    with whole.writing(Path(path)) as part:
+    with atomic_write.writing(Path(path)) as part:
         part.write_text(dump(recipe), encoding="utf-8")
 
 

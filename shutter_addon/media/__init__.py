@@ -1,8 +1,9 @@
 """Frames of a source: movies by PyAV, image sequences by OpenImageIO. No bpy."""
 
-from .ahead import Ahead
+from ..core.frame_source import FrameSource
 from .errors import MediaError
+from .opening import open_source
+from .prefetch import PrefetchSource
 from .sequence import SequenceSource
-from .source import Source, open_source
 
-__all__ = ["Ahead", "MediaError", "SequenceSource", "Source", "open_source"]
+__all__ = ["FrameSource", "MediaError", "PrefetchSource", "SequenceSource", "open_source"]

@@ -4,6 +4,7 @@ import numpy as np
 from OpenImageIO import FLOAT, ColorConfig, ImageBuf, ImageBufAlgo
 
 from .errors import MediaError
+from .source import SourceWrapper
 
 SCENE_LINEAR = "Linear Rec.709"  # of Blender's own configuration
 TRANSFERS = {"sRGB": "srgb", SCENE_LINEAR: "linear", "Non-Color": "linear"}
@@ -19,7 +20,7 @@ def in_colorspace(source, name, config):
     return ColorSource(source, name, config)
 
 
-class ColorSource:
+class ColorSource(SourceWrapper):
     """Another source's frames, converted to scene linear float32."""
 
     transfer, dtype = "linear", np.dtype(np.float32)
@@ -27,11 +28,9 @@ class ColorSource:
     def __init__(self, source, name, config):
         if config is None or name not in ColorConfig(str(config)).getColorSpaceNames():
             raise MediaError(f"{source.path.name}: unknown colour space {name}")
-        self._source, self._name, self._config = source, name, str(config)
+        super().__init__(source)
+        self._name, self._config = name, str(config)
         self.options = {**source.options, "colorspace": name}
-
-    def __getattr__(self, name):
-        return getattr(self._source, name)
 
     def read(self, index):
         """The frame as the source has it, but scene linear."""
@@ -43,9 +42,3 @@ class ColorSource:
         if linear.has_error:
             raise MediaError(f"{self._source.path.name}: no conversion from {self._name} ({linear.geterror()})")
         return linear.get_pixels(FLOAT)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self._source.close()

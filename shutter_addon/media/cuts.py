@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core import light
 from .errors import MediaError
+from .source import SourceWrapper
 
 # The frames on each side of two neighbours that have a say in whether there is a cut between them: in so many, a film
 # animated on threes shows as many pictures as PySceneDetect compares.
@@ -153,25 +154,27 @@ def _most(a: Signature, b: Signature) -> float:
     return float(np.abs(a - b).max())
 
 
-class Shots:
+class ShotSource(SourceWrapper):
     """A source that knows where its shots end: a source itself. Where PySceneDetect is missing it has one.
 
     step: every step-th frame is one that was filmed. Cuts are looked for in these alone; those between two of them
-    belong to the nearer, the middle one to the first, as Inbetween has it.
+    belong to the nearer, the middle one to the first, as InbetweenSource has it.
     Filmed frames get their signatures when a cut is first looked for, and wait for the next `read` then, as far as
     there is room for them, so that none is decoded twice. Cuts are remembered, and depend on the frames alone;
     what is decided without a frame that cannot be read is decided again.
     """
 
     def __init__(self, source, step: int = 1):
-        self._source, self.step = source, step
+        super().__init__(source)
+        self.step = step
         self.filmed = (source.count - 1) // step + 1  # how many frames are
         self._cuts: dict[int, bool] = {}  # by filmed frame: whether there is a cut before it
         self._signatures: dict[int, Signature] = {}  # likewise
         self._handed: dict[int, np.ndarray] = {}
 
-    def __getattr__(self, name):
-        return getattr(self._source, name)
+    @property
+    def shots(self) -> "ShotSource":  # an attribute would keep its frames until Python looks for cycles
+        return self
 
     def read(self, index: int) -> np.ndarray:
         """The frame as the source gives it."""
@@ -271,12 +274,6 @@ class Shots:
         self._handed[index] = frame
         while len(self._handed) > 1 and len(self._handed) * frame.nbytes > _HANDED_BYTES:
             del self._handed[next(iter(self._handed))]
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.close()
 
 
 def _run(signatures: dict, start: int, step: int) -> list[Signature]:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO
 
-from ..core import whole
+from ..core import atomic_write
 from .errors import MediaError
 from .files import check_name
 
@@ -20,7 +20,7 @@ def write_exr(path: Path, values: np.ndarray, names: list[str]) -> None:
     spec["compression"] = "zip"
     spec["DateTime"] = "1970:01:01 00:00:00"  # else the time of writing: equal samples are equal files
     try:
-        with whole.writing(path) as part:
+        with atomic_write.writing(path) as part:
             name = check_name(part)
             output = OpenImageIO.ImageOutput.create(name)
             written = output.open(name, spec) and output.write_image(np.ascontiguousarray(values, np.float32))

@@ -30,9 +30,9 @@ def between(first, second, factor: int, method="quick", transfer="srgb", alpha="
     """The frames at the times 1/factor … (factor-1)/factor between two frames, one by one: a function of the two alone,
     the same bits whatever the number of cores.
 
-    first, second: arrays (height, width, 4) of a Source's dtype; no cut may lie between them
+    first, second: arrays (height, width, 4) of a FrameSource's dtype; no cut may lie between them
     method: of METHODS
-    transfer, alpha: how samples are encoded, as Source says; the new frames are encoded alike
+    transfer, alpha: how samples are encoded, as FrameSource says; the new frames are encoded alike
 
     What only one of the frames shows is taken from it, all else is mixed in linear light.
     Raises MediaError at the first frame where OpenCV is missing, or has no contributed modules."""
@@ -166,7 +166,7 @@ def _grid(height: int, width: int) -> np.ndarray:
 
 
 def _encoded(frame, transfer, alpha) -> np.ndarray:
-    """A Source's frame as that: (H, W, 3) where it is opaque, in its own whole numbers or as float32."""
+    """A FrameSource's frame as that: (H, W, 3) where it is opaque, in its own whole numbers or as float32."""
     if alpha == "opaque" and transfer == "srgb" and frame.dtype.kind == "u":
         return np.ascontiguousarray(frame[..., :3])
     white = np.iinfo(frame.dtype).max if frame.dtype.kind == "u" else 1
@@ -205,7 +205,7 @@ def _table(dtype) -> np.ndarray:
 
 
 def _decoded(frame, dtype, transfer, alpha) -> np.ndarray:
-    """Linear, premultiplied light as a Source's frame."""
+    """Linear, premultiplied light as a FrameSource's frame."""
     convert = light.to_encoded if transfer == "srgb" else np.asarray
     if alpha == "opaque":
         frame = np.dstack([convert(frame), np.ones(frame.shape[:2], np.float32)])

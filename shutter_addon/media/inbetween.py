@@ -11,36 +11,36 @@ from pathlib import Path
 
 import numpy as np
 
+from ..core.frame_source import FrameSource
 from . import cuts
-from .cache import Cache, State, pair_line, write_picture
+from .completeness import why_short
 from .errors import MediaError
 from .files import check_index
-from .written import why_short
+from .inbetween_cache import InbetweenCache, State, pair_line, write_picture
+from .source import SourceWrapper
 
 MEMORY = 4 << 30  # bytes that pairs at work may take together, with the frames that are read ahead
 AHEAD = 640 << 20  # of these: enough for 16 bits in 4K, of which no frame is read twice
 LAYERS = 26  # of a frame as float32, for a pair at work: 9 to 17 measured for "quick", 15 to 24.3 for "good"
 
 
-class Inbetween:
-    """A source with its in-between frames: a source itself, with `factor` times its rate.
+class InbetweenSource(SourceWrapper):
+    """A source with its in-between frames, at `factor` times its rate.
 
-    Frame i·factor is the source's frame i, those in between come from the cache in `folder`. Across a cut the nearer
-    source frame takes their place, and between two equal frames the first."""
+    Frame i·factor is the source's frame i. Those between come from the cache in `folder`; where the pair is a cut, they
+    are the nearer source frame, and where it is two equal frames, the first."""
 
-    def __init__(self, source, folder, factor, method):
-        self._source, self.factor = source, factor
-        self._cache = Cache(source, folder, factor, method)
+    def __init__(self, source: FrameSource, folder, factor: int, method: str):
+        super().__init__(source)
+        self.factor = factor
+        self._cache = InbetweenCache(source, folder, factor, method)
         self._cache.load()
         self.count = (source.count - 1) * factor + 1
         self.fps = None if source.fps is None else source.fps * factor
         self.options = {**source.options, "inbetween": [factor, method]}
 
-    def __getattr__(self, name):
-        return getattr(self._source, name)
-
     def has(self, index: int) -> bool:
-        """Whether the frame is there, built meanwhile perhaps; its file is not opened."""
+        """Whether the frame is built, by now; its file is not opened."""
         if not self._is_there(index):
             self._cache.load()
         return self._is_there(index)
@@ -62,10 +62,6 @@ class Inbetween:
         real = self._real(index)
         return self._cache.read(index) if real is None else self._source.read(real)
 
-    def close(self) -> None:
-        """Lets go of the source's file; a later read opens it again."""
-        self._source.close()
-
     def _is_there(self, index):
         return self._cache.has(index) or self._real(index) is not None
 
@@ -76,12 +72,6 @@ class Inbetween:
         if kind is None:
             return None
         return pair + (kind == "cut" and 2 * step > self.factor)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.close()
 
 
 def build(
@@ -113,7 +103,7 @@ def build(
         )
     if between is None:
         from .flow import between
-    cache, pairs = Cache(source, folder, factor, method), _pairs(source, frames)
+    cache, pairs = InbetweenCache(source, folder, factor, method), _pairs(source, frames)
     cache.prepare()
     cache.load()
     done = 0

@@ -7,6 +7,7 @@ from fractions import Fraction
 import av
 import numpy as np
 
+from ..core.frame_source import FrameSource
 from .decode import FrameReader, fraction, reason
 from .deinterlace import blur_rows, has_fields, interpolate_fields
 from .errors import MediaError
@@ -16,7 +17,7 @@ from .files import check_file, check_index
 SCALER = "neighbor+accurate_rnd+full_chroma_int"
 
 
-class MovieSource:
+class MovieSource(FrameSource):
     """A movie's frames.
 
     Frame i is the one on screen at the stream's start + i / fps: the last whose time stamp is not later, or the first
@@ -106,12 +107,6 @@ class MovieSource:
             if isinstance(held, dict):
                 held.clear()
         self._graph = self._graph_key = None
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.close()
 
 
 def _round(x):

@@ -11,6 +11,7 @@ from stat import S_ISREG
 import numpy as np
 from OpenImageIO import ImageInput, ImageSpec, geterror
 
+from ..core.frame_source import FrameSource
 from .errors import MediaError
 from .files import FOREIGN, check_file, check_index, check_name, check_size
 
@@ -28,7 +29,7 @@ MISSING = 100  # numbers in a row; what lies beyond a wider gap is another seque
 LONGEST = 1_048_574  # Blender's last frame
 
 
-class SequenceSource:
+class SequenceSource(FrameSource):
     """Images as frames.
 
     Found beside its first file, frame i is the file whose number is i above the first's; where a number is missing,
@@ -106,12 +107,6 @@ class SequenceSource:
 
     def close(self):
         """Nothing stays open between frames."""
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.close()
 
 
 def _numbered(path):

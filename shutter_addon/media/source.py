@@ -1,81 +1,51 @@
-"""Opens a movie or an image sequence; both give their frames by index, as Blender's strips count them."""
-
-from fractions import Fraction
-from pathlib import Path
-from typing import Protocol
+"""A source around another one: what every wrapper shares."""
 
 import numpy as np
 
-from .color import in_colorspace
-from .errors import MediaError
-from .files import check_file
-from .sequence import IMAGE_SUFFIXES, SequenceSource
+from ..core.frame_source import FrameSource
 
 
-class Source(Protocol):
-    """The frames of a movie or of an image sequence; close it, or use it in a `with`.
+class _Forwarded:
+    """An attribute of the wrapped source, unless the wrapper sets its own."""
 
-    width, height: pixels
-    count: frames as Blender's strip counts them (its content_duration)
-    fps: frames per second, None for an image sequence
-    dtype: uint8, uint16, float16 or float32, the samples' type; whole numbers stand for 0 … 1
-    transfer: "srgb" (sRGB display values) or "linear" (scene linear, Rec.709 primaries)
-    alpha: "opaque", "straight" or "premultiplied"
-    options: what else its samples depend on but its files, by name; plain values
-    """
+    def __set_name__(self, _owner, name):
+        self._name = name
 
-    path: Path
-    width: int
-    height: int
-    count: int
-    fps: Fraction | None
-    dtype: np.dtype
-    transfer: str
-    alpha: str
-    options: dict
+    def __get__(self, wrapper, _owner=None):
+        return self if wrapper is None else getattr(wrapper._source, self._name)
+
+
+class SourceWrapper(FrameSource):
+    """A source around another one. It has the other's attributes and frames, but for those that a subclass sets."""
+
+    path = _Forwarded()
+    files = _Forwarded()
+    width = _Forwarded()
+    height = _Forwarded()
+    count = _Forwarded()
+    fps = _Forwarded()
+    dtype = _Forwarded()
+    transfer = _Forwarded()
+    alpha = _Forwarded()
+    options = _Forwarded()
+    has_audio = _Forwarded()
+    left_out = _Forwarded()
+    shots = _Forwarded()
+
+    def __init__(self, source: FrameSource):
+        self._source = source
 
     def read(self, index: int) -> np.ndarray:
-        """The frame as a new array (height, width, 4), RGBA, top row first, in any order; onwards is fastest.
+        return self._source.read(index)
 
-        Raises MediaError where the frame cannot be decoded, IndexError outside 0 … count-1."""
+    def want(self, indices) -> None:
+        self._source.want(indices)
+
+    def has(self, index: int) -> bool:
+        return self._source.has(index)
+
+    def check(self, index: int) -> None:
+        self._source.check(index)
 
     def close(self) -> None:
-        """Lets go of the file; a later read opens it again."""
-
-
-def open_source(
-    path, *, stream=0, fps=None, files=None, colorspace=None, config=None, alpha=None, deinterlace=False
-) -> Source:
-    """Opens a movie, or the image sequence that starts with the file `path`.
-
-    stream: which of a movie's video streams
-    fps: what an image sequence, which has no rate of its own, shall report
-    files: an image strip's files, one per frame, in place of those found beside `path`
-    colorspace: the strip's, by Blender's name (default: what Blender assumes of such a file)
-    alpha: "straight" or "premultiplied", an image strip's alpha mode (default: likewise); a movie strip's has no effect
-    config: path of the OpenColorIO configuration; colour spaces other than sRGB and Linear Rec.709 need it
-    deinterlace: as a movie strip's option
-
-    Raises MediaError when there is nothing to be read."""
-    path = Path(path)
-    if files is None and path.suffix.lower() not in IMAGE_SUFFIXES:
-        source = _open_movie(path, stream=stream, deinterlace=deinterlace)
-    else:
-        source = SequenceSource(path, files=files, fps=fps, alpha=alpha)
-    try:
-        return source if colorspace is None else in_colorspace(source, colorspace, config)
-    except MediaError:
-        source.close()
-        raise
-
-
-def _open_movie(path, **options):
-    try:
-        from .movie import MovieSource
-    except ImportError as error:  # a package without wheels, or one for another system
-        check_file(path)
-        raise MediaError(
-            f"{path.name}: movies need the Python package PyAV ({error}); "
-            "install the zip of Virtual Shutter that is made for your system, or use an image sequence"
-        ) from None
-    return MovieSource(path, **options)
+        self._source.close()

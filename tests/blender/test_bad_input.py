@@ -15,7 +15,7 @@ import pytest
 from support import read_picture, recipe, write_frames
 
 from shutter_addon.media import MediaError, open_source
-from shutter_addon.media.written import whole_pictures
+from shutter_addon.media.completeness import whole_pictures
 
 STILL = recipe(4, [1, 0, 0, 0])
 

@@ -31,7 +31,7 @@ def film(tmp_path, monkeypatch):
     monkeypatch.setattr(inbetween_settings, "given", tmp_path / "cache")
     with open_source(first) as source:
         build(source, tmp_path / "cache")
-        with inbetween.Inbetween(source, tmp_path / "cache", FACTOR, "quick") as every:
+        with inbetween.InbetweenSource(source, tmp_path / "cache", FACTOR, "quick") as every:
             frames = np.stack([every.read(i)[..., :3] for i in range(every.count)])
     return first, light.to_linear(frames / 255)
 
@@ -115,13 +115,13 @@ def test_a_slow_strip_shows_in_betweens(film, add, edit, render, same_pixels):
 def test_what_is_missing_is_said_and_what_is_built_is_shown(film, add, edit, render, tmp_path, same_pixels):
     from shutter_addon.blender.data import inbetween_settings
     from shutter_addon.blender.rendering import session
-    from shutter_addon.media import MediaError, cache
+    from shutter_addon.media import MediaError, inbetween_cache
 
     first, frames = film
     *_, effect = add(first, COUNT, np.ones(6))
     picture = partial(session.picture, effect.scene, 2)
     picture()
-    cache.purge(inbetween_settings.given)
+    inbetween_cache.purge(inbetween_settings.given)
     for way in (picture, session.moment(*session.strips.find_edit(effect.scene), 2).check):
         with pytest.raises(MediaError, match=r"in-between frames of frame 2 are missing"):
             way()
@@ -154,7 +154,7 @@ def test_in_betweens_of_a_file_that_was_replaced_are_not_shown(film, add, edit, 
 def test_finished_frames_are_dropped_when_in_betweens_come_and_go(film, add, edit):
     from shutter_addon.blender.data import inbetween_settings
     from shutter_addon.blender.rendering import invalidation
-    from shutter_addon.media.cache import purge
+    from shutter_addon.media.inbetween_cache import purge
 
     first, _ = film
     add(first, COUNT, np.ones(6))

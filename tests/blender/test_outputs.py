@@ -14,7 +14,7 @@ import pytest
 from support import read_picture, recipe, write_frames
 
 from shutter_addon.media import open_source
-from shutter_addon.media.written import whole_pictures
+from shutter_addon.media.completeness import whole_pictures
 
 ROOT = Path(__file__).parents[2]
 STILL = recipe(1, [1])

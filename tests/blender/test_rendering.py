@@ -10,7 +10,7 @@ import pytest
 from support import read_picture, recipe, write_frames
 
 from shutter_addon.core import recipe as recipes
-from shutter_addon.media.written import whole_pictures
+from shutter_addon.media.completeness import whole_pictures
 
 ROOT = Path(__file__).parents[2]
 BROKEN = 4

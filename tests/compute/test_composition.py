@@ -5,17 +5,18 @@ import pytest
 
 from shutter_addon.compute import cpu, gpu, window
 from shutter_addon.compute.cpu import CPUCompositor
-from shutter_addon.compute.errors import NoDeviceError
+from shutter_addon.compute.device import NoDeviceError
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.core import compositor, light, presets
-from shutter_addon.core.instant import Instant, Options
+from shutter_addon.core.frame_source import FrameSource
+from shutter_addon.core.frame_state import FrameState, Options
 from shutter_addon.core.scribbles import Shape, rasterise
 
 LEVEL = 1 / 255
 
 
-class Footage:
+class Footage(FrameSource):
     """Frames in memory, as a source of shutter_addon.media."""
 
     def __init__(self, frames, transfer="srgb", alpha="opaque"):
@@ -58,10 +59,10 @@ SHAPES = (
 )
 
 
-def instant(rng, window=16, shapes=SHAPES, count=3, **options):
+def state(rng, window=16, shapes=SHAPES, count=3, **options):
     bars = rng.random((count, window)) * (rng.random((count, window)) > 0.3)
     bars[:, 0] += 0.01
-    return Instant(Options(window, **options), bars, shapes)
+    return FrameState(Options(window, **options), bars, shapes)
 
 
 @pytest.fixture(params=["gpu", "cpu", "blender"], scope="module")
@@ -100,12 +101,12 @@ def check(device, source, moment, index, direction=1, shot=None):
 @pytest.mark.parametrize("exposure", ["normalized", "weighted"])
 def test_random_bars(device, interpolation, light_, exposure):
     rng = np.random.default_rng(1)
-    check(device, footage(rng), instant(rng, interpolation=interpolation, light=light_, exposure=exposure), 2)
+    check(device, footage(rng), state(rng, interpolation=interpolation, light=light_, exposure=exposure), 2)
 
 
 def few_pieces(rng, window=16, **options):
     """Boxes, deltas and cuts, which are composed from running sums, or piece by piece."""
-    moment = instant(rng, window, **options)
+    moment = state(rng, window, **options)
     moment.bars[:] = np.stack([presets.bars(name, window) for name in ("ANGLE_360", "STILL", "CUTS")])
     return moment
 
@@ -137,22 +138,22 @@ def test_few_pieces_of_any_length(device, window, dtype):
 @pytest.mark.parametrize("direction", [1, -1])
 def test_edges(device, edges, position, index, direction):
     rng = np.random.default_rng(2)
-    check(device, footage(rng), instant(rng, edges=edges, position=position), index, direction)
+    check(device, footage(rng), state(rng, edges=edges, position=position), index, direction)
 
 
 @pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
 def test_window_longer_than_clip(device, edges):
     rng = np.random.default_rng(3)
-    check(device, footage(rng, count=3), instant(rng, window=50, edges=edges, position="center"), 1)
+    check(device, footage(rng, count=3), state(rng, window=50, edges=edges, position="center"), 1)
 
 
 def test_shortened_to_nothing_shows_the_nearest_frame(device):
     rng = np.random.default_rng(4)
     bars = np.zeros((2, 8))
     bars[0, 0] = bars[1, 7] = 1
-    moment = Instant(Options(8, edges="shorten"), bars, SHAPES[:1] + SHAPES[2:])
+    moment = FrameState(Options(8, edges="shorten"), bars, SHAPES[:1] + SHAPES[2:])
     check(device, footage(rng), moment, 19)
-    late = Instant(Options(8, edges="shorten"), bars[1:])
+    late = FrameState(Options(8, edges="shorten"), bars[1:])
     picture, _ = check(device, source := footage(rng), late, 19)
     assert np.abs(picture - source.linear()[19]).max() < 2e-5
 
@@ -163,7 +164,7 @@ def test_shortened_to_nothing_shows_the_nearest_frame(device):
 def test_of_two_frames_that_are_as_near_the_windows_earlier_is_shown(device, bars, shapes, direction):
     """On every device: where all that there is of a clip lies midway between two cuts."""
     source = footage(np.random.default_rng(4), count=2)
-    moment = Instant(Options(len(bars), edges="shorten", position="center"), np.array([bars] * 3, float), shapes)
+    moment = FrameState(Options(len(bars), edges="shorten", position="center"), np.array([bars] * 3, float), shapes)
     index = {1: 0, -1: 1}[direction]
     picture, _ = check(device, source, moment, index, direction)
     assert np.abs(picture - source.linear()[index]).max() < 2e-5
@@ -179,7 +180,7 @@ def test_stored_types(device, dtype, alpha, transfer):
         top = source.frames[..., 3:]
         source.frames[..., :3] = np.minimum(source.frames[..., :3], top)
     for light_ in ("linear", "encoded"):
-        check(device, source, instant(rng, light=light_), 1)
+        check(device, source, state(rng, light=light_), 1)
 
 
 def soft_edges(rng, dtype, **kind):
@@ -200,8 +201,8 @@ def soft_edges(rng, dtype, **kind):
 def test_colours_of_any_range(device, dtype, transfer, light_):
     rng = np.random.default_rng(31)
     source = soft_edges(rng, dtype, transfer=transfer)
-    ways = [instant(rng, window=3, light=light_), few_pieces(rng, 8, light=light_)]
-    ways += [instant(rng, light=light_, interpolation="value"), instant(rng, light=light_, edges="shorten")]
+    ways = [state(rng, window=3, light=light_), few_pieces(rng, 8, light=light_)]
+    ways += [state(rng, light=light_, interpolation="value"), state(rng, light=light_, edges="shorten")]
     for moment in ways:
         picture, expected = composed(device, source, moment, 17)
         # A weight is as exact as float32: what is far brighter in one frame than in the others differs by that.
@@ -216,7 +217,7 @@ def test_light_without_cover_is_kept(device, dtype):
     frames[..., :3] = np.iinfo(dtype).max // 2 if np.dtype(dtype).kind == "u" else 0.5
     for transfer, lit in (("srgb", 0.2140), ("linear", 0.5)):
         picture = Renderer(device, Footage(frames, transfer, "premultiplied")).picture(
-            0, Instant(Options(4), np.ones((1, 4)))
+            0, FrameState(Options(4), np.ones((1, 4)))
         )
         np.testing.assert_allclose(picture[..., :3], lit, atol=2e-4)
         assert (picture[..., 3] == 0).all()
@@ -225,12 +226,12 @@ def test_light_without_cover_is_kept(device, dtype):
 @pytest.mark.parametrize("block", [2, 4])
 def test_aggregation(device, block):
     rng = np.random.default_rng(6)
-    check(device, footage(rng), instant(rng, aggregate=block), 0)
+    check(device, footage(rng), state(rng, aggregate=block), 0)
     check(device, footage(rng), few_pieces(rng, aggregate=block), 0)
 
 
 @pytest.mark.parametrize("tile", [(4, 4), (8, 12), (16, 128)])
-@pytest.mark.parametrize("made", [instant, few_pieces])
+@pytest.mark.parametrize("made", [state, few_pieces])
 @pytest.mark.parametrize("block", [1, 2, 4])
 def test_tiles(monkeypatch, tile, made, block):
     rng = np.random.default_rng(29)
@@ -239,7 +240,7 @@ def test_tiles(monkeypatch, tile, made, block):
         check(CPUCompositor(), footage(rng), made(rng, aggregate=block, exposure="weighted", **options), 12)
 
 
-@pytest.mark.parametrize("made", [instant, few_pieces])
+@pytest.mark.parametrize("made", [state, few_pieces])
 def test_sums_over_the_budget_are_not_made(monkeypatch, made):
     rng = np.random.default_rng(30)
     source, moment = footage(rng), made(rng)
@@ -255,19 +256,19 @@ def test_sums_over_the_budget_are_not_made(monkeypatch, made):
 def test_number_of_shutters(device, count):
     rng = np.random.default_rng(7)
     shapes = tuple(Shape(i, "line", 0.05, (np.array([[i / count, 0.1], [i / count, 0.8]]),)) for i in range(count))
-    check(device, footage(rng, size=(64, 40)), instant(rng, count=count, shapes=shapes), 0)
+    check(device, footage(rng, size=(64, 40)), state(rng, count=count, shapes=shapes), 0)
 
 
 @pytest.mark.parametrize("window", [1, 2, 64, 256])
 def test_window_lengths(device, window):
     rng = np.random.default_rng(8)
-    check(device, footage(rng, count=40), instant(rng, window=window), 3)
+    check(device, footage(rng, count=40), state(rng, window=window), 3)
 
 
 def far_apart(rng, count, window, **options):
     """Shutters that open at one end of the window or at the other, scribbled closely."""
     shapes = [Shape(i, "line", 0.0, (np.array([[x, 0.05], [x, 0.95]]),)) for i, x in enumerate(rng.random(count))]
-    moment = instant(rng, window, tuple(shapes), count, **options)
+    moment = state(rng, window, tuple(shapes), count, **options)
     moment.bars[:] = (rng.random((count, window)) + 0.01) * [
         np.linspace(i % 2, 1 - i % 2, window) ** 4 + 0.01 for i in range(count)
     ]
@@ -293,7 +294,7 @@ def test_walks_through_pieces(gpu_device, monkeypatch, edges, stored):
 @pytest.mark.parametrize("size", [(1, 1), (33, 17), (2, 100)])
 def test_odd_sizes(device, size):
     rng = np.random.default_rng(9)
-    check(device, footage(rng, size=size), instant(rng), 3)
+    check(device, footage(rng, size=size), state(rng), 3)
 
 
 def test_still_frame_is_exact_to_the_bit_at_8_bits(device):
@@ -302,7 +303,7 @@ def test_still_frame_is_exact_to_the_bit_at_8_bits(device):
     bars = np.zeros((1, 8))
     bars[0, 2] = 0.3
     for index in (5, 0, 19):
-        picture = Renderer(device, source).picture(index, Instant(Options(8), bars))
+        picture = Renderer(device, source).picture(index, FrameState(Options(8), bars))
         codes = np.rint(light.to_encoded(picture[..., :3].astype(np.float64)) * 255)
         assert np.array_equal(codes, source.frames[min(index + 2, 19), ..., :3])
 
@@ -311,7 +312,7 @@ def test_a_window_that_slides_reads_one_frame(device):
     rng = np.random.default_rng(11)
     source = footage(rng)
     renderer = Renderer(device, source)
-    moment = instant(rng)
+    moment = state(rng)
     moment.bars[:, -1] = 1
     renderer.picture(0, moment)
     assert source.reads == list(range(16))
@@ -327,13 +328,13 @@ def test_frames_that_no_shutter_exposes_are_not_read(device):
     source = footage(rng)
     bars = np.zeros((1, 16))
     bars[0, 5:7] = 1
-    Renderer(device, source).picture(3, Instant(Options(16), bars))
+    Renderer(device, source).picture(3, FrameState(Options(16), bars))
     assert source.reads == [8, 9]
 
 
 def test_a_picture_stays_on_the_device(gpu_device):
     rng = np.random.default_rng(18)
-    source, moment = footage(rng), instant(rng)
+    source, moment = footage(rng), state(rng)
     one, other = (Renderer(GPUCompositor(gpu_device), source) for _ in range(2))
     drawn = one.draw(3, moment)
     with gpu_device.current():
@@ -347,7 +348,7 @@ def test_a_picture_stays_on_the_device(gpu_device):
 @pytest.mark.parametrize("block", [1, 2])
 def test_coefficients_stay_on_the_device(gpu_device, shapes, block):
     rng = np.random.default_rng(19)
-    source, moment = footage(rng), instant(rng, shapes=shapes, count=6, aggregate=block)
+    source, moment = footage(rng), state(rng, shapes=shapes, count=6, aggregate=block)
     renderer = Renderer(GPUCompositor(gpu_device), source)
     texture, size, count = renderer.drawn_coefficients(moment)
     assert count == 6
@@ -364,7 +365,7 @@ def test_labels_are_those_of_the_shapes(device):
     renderer = Renderer(device, footage(rng))
     for shapes in (SHAPES, SHAPES[:1], (), SHAPES[::-1], SHAPES):
         for options in ({}, {"aggregate": 4}, {"border": True}):
-            moment = instant(rng, shapes=shapes, **options)
+            moment = state(rng, shapes=shapes, **options)
             size = (10, 6) if "aggregate" in options else (37, 23)
             expected = rasterise(shapes, *size, border="border" in options)
             assert np.array_equal(renderer.labels(moment), expected)
@@ -375,7 +376,7 @@ def test_what_is_needed_is_what_is_read(device):
     for edges in ("hold", "mirror", "shorten"):
         for index, direction in ((0, 1), (18, 1), (2, -1)):
             source = footage(rng)
-            moment = instant(rng, edges=edges, position="center")
+            moment = state(rng, edges=edges, position="center")
             renderer = Renderer(device, source)
             needed = renderer.needed(index, direction, moment)
             renderer.picture(index, moment, direction)
@@ -388,12 +389,12 @@ def test_no_new_solve_when_nothing_moved(device, monkeypatch):
     solver = type(device.solver())
     solve = solver.solve
     monkeypatch.setattr(solver, "solve", lambda self, *a, **k: solves.append(1) or solve(self, *a, **k))
-    renderer, moment = Renderer(device, footage(rng)), instant(rng)
+    renderer, moment = Renderer(device, footage(rng)), state(rng)
     first = renderer.picture(0, moment)
     assert np.array_equal(first, renderer.picture(0, moment))
     renderer.picture(1, moment)
     assert len(solves) == 1
-    moved = instant(rng, shapes=SHAPES[1:])
+    moved = state(rng, shapes=SHAPES[1:])
     renderer.picture(0, moved)
     assert len(solves) == 2
 
@@ -401,7 +402,7 @@ def test_no_new_solve_when_nothing_moved(device, monkeypatch):
 @pytest.mark.parametrize("resident", [True, False])
 def test_bands_and_streaming_change_nothing(monkeypatch, resident):
     rng = np.random.default_rng(14)
-    source, moment = footage(rng), instant(rng)
+    source, moment = footage(rng), state(rng)
     device = open_compositor("gpu")[0]
     whole = Renderer(device, source).picture(0, moment)
     monkeypatch.setattr(window, "BAND_BYTES", source.width * 4 * 16)
@@ -424,11 +425,11 @@ def test_sums_lie_in_tiles_only_where_textures_are_rows(monkeypatch, rows, size)
     with device.current():
         assert device.window(source, 16).tiled == rows
     moments = [
-        instant(rng, edges=edges, light=light_) for edges in ("hold", "shorten") for light_ in ("linear", "encoded")
+        state(rng, edges=edges, light=light_) for edges in ("hold", "shorten") for light_ in ("linear", "encoded")
     ]
-    moments += [few_pieces(rng, edges="mirror"), instant(rng, interpolation="value"), instant(rng, count=5)]
+    moments += [few_pieces(rng, edges="mirror"), state(rng, interpolation="value"), state(rng, count=5)]
     late = np.array([[0, 0, 1, 1], [0, 0, 0, 1.0]])  # which nothing of the shot is left for at its end
-    moments += [Instant(Options(4, edges="shorten"), late, SHAPES[:1])]
+    moments += [FrameState(Options(4, edges="shorten"), late, SHAPES[:1])]
     for moment in moments:
         for index, direction in ((3, 1), (4, 1), (19, 1), (2, -1)):
             check(device, source, moment, index, direction)
@@ -466,7 +467,7 @@ def test_a_device_too_small_for_the_window_streams_it(monkeypatch):
     from shutter_addon.compute.gl import GLDevice
 
     rng = np.random.default_rng(17)
-    source, moment = footage(rng), instant(rng)
+    source, moment = footage(rng), state(rng)
     device = open_compositor("gpu")[0]
     whole = Renderer(device, source).picture(0, moment)
     texture = GLDevice.texture
@@ -483,7 +484,7 @@ def test_a_device_too_small_for_the_window_streams_it(monkeypatch):
 
 def test_history_leaves_no_trace(device):
     rng = np.random.default_rng(15)
-    source, moment = footage(rng), instant(rng)
+    source, moment = footage(rng), state(rng)
     renderer = Renderer(device, source)
     in_order = [renderer.picture(index, moment) for index in range(6)]
     for index in (4, 1, 5, 0, 3, 2):
@@ -569,7 +570,7 @@ def test_a_frame_that_cannot_be_read_spoils_no_other(device):
 
 def test_quick_pictures_leave_no_trace_in_others(device):
     rng = np.random.default_rng(17)
-    source, moment, moved = footage(rng), instant(rng), instant(rng, shapes=SHAPES[1:])
+    source, moment, moved = footage(rng), state(rng), state(rng, shapes=SHAPES[1:])
     renderer = Renderer(device, source)
     expected = Renderer(device, source).picture(0, moment)
     for other in (moved, moment, moved):
@@ -582,7 +583,7 @@ def test_quick_pictures_leave_no_trace_in_others(device):
 
 def test_two_effects_share_a_device(device):
     rng = np.random.default_rng(16)
-    source, first, second = footage(rng), instant(rng), instant(rng, shapes=SHAPES[:2])
+    source, first, second = footage(rng), state(rng), state(rng, shapes=SHAPES[:2])
     one, other = Renderer(device, source), Renderer(device, source)
     expected = one.picture(0, first), other.picture(0, second)
     assert np.array_equal(one.picture(0, first), expected[0])

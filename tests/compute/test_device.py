@@ -1,9 +1,11 @@
 """What is written to a device is what it holds, to the bit."""
 
+import inspect
+
 import numpy as np
 import pytest
 
-from shutter_addon.compute.errors import NoDeviceError
+from shutter_addon.compute.device import Device, NoDeviceError
 
 KINDS = {
     "rgba8": np.uint8,
@@ -70,6 +72,16 @@ def test_pairs_of_whole_numbers_are_exact_or_refused(gpu_device):
                 gpu_device.write(texture, values, layer)
             assert np.array_equal(gpu_device.read(texture), pairs)
         texture.release()
+
+
+def test_it_has_the_methods_and_attributes_of_the_protocol(gpu_device):
+    for name in Device.__annotations__:
+        assert hasattr(gpu_device, name), name
+    methods = {name: method for name, method in vars(Device).items() if inspect.isfunction(method) and name[0] != "_"}
+    assert methods.keys() == {"current", "texture", "write", "read", "run", "release"}
+    for name, method in methods.items():
+        wanted, given = (list(inspect.signature(f).parameters.values()) for f in (method, vars(type(gpu_device))[name]))
+        assert [(p.name, p.kind, p.default) for p in given] == [(p.name, p.kind, p.default) for p in wanted], name
 
 
 def test_there_are_limits(gpu_device):

@@ -4,12 +4,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from test_composition import Footage, check, few_pieces, instant
+from test_composition import Footage, check, few_pieces, state
 
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.core import presets
-from shutter_addon.core.instant import Instant, Options
-from shutter_addon.media.cuts import NEIGHBOURS, Shots
+from shutter_addon.core.frame_state import FrameState, Options
+from shutter_addon.media.cuts import NEIGHBOURS, ShotSource
 
 LENGTHS = 7, 6, 9
 ENDS = np.cumsum((0, *LENGTHS))
@@ -45,23 +45,23 @@ def test_a_window_shows_its_own_shot_alone(device, edges, position, direction, d
     rng = np.random.default_rng(41)
     for index in (0, 6, 7, 9, 21):
         for moment in (
-            instant(rng, edges=edges, position=position),
+            state(rng, edges=edges, position=position),
             few_pieces(rng, 8, edges=edges, position=position, light="encoded"),
         ):
-            check(device, Shots(film(dtype)), moment, index, direction, SHOTS[index])
+            check(device, ShotSource(film(dtype)), moment, index, direction, SHOTS[index])
 
 
 @pytest.mark.parametrize("preset", sorted(presets.PRESETS))
 def test_presets(device, preset):
     bars = np.stack([presets.bars(preset, 12), presets.bars("STILL", 12)])
-    moment = Instant(Options(12, edges="shorten"), bars, instant(np.random.default_rng(42)).shapes[:1])
-    check(device, Shots(film()), moment, 4, 1, SHOTS[4])
+    moment = FrameState(Options(12, edges="shorten"), bars, state(np.random.default_rng(42)).shapes[:1])
+    check(device, ShotSource(film()), moment, 4, 1, SHOTS[4])
 
 
 def test_off_the_whole_clip_is_seen_and_nothing_looked_at(device):
-    moment = instant(np.random.default_rng(43), stop_at_cuts=False)
+    moment = state(np.random.default_rng(43), stop_at_cuts=False)
     plain, source = film(), film()
-    one, other = Renderer(device, plain), Renderer(device, Shots(source))
+    one, other = Renderer(device, plain), Renderer(device, ShotSource(source))
     for index in (2, 3, 9, 5):
         assert np.array_equal(one.picture(index, moment), other.picture(index, moment))
     assert source.reads == plain.reads
@@ -70,7 +70,7 @@ def test_off_the_whole_clip_is_seen_and_nothing_looked_at(device):
 def test_what_was_shown_before_leaves_no_trace(device):
     """Windows that go on, go back, jump, grow and turn around, with the option on and off."""
     rng = np.random.default_rng(44)
-    renderer = Renderer(device, Shots(film(size=(17, 9))))
+    renderer = Renderer(device, ShotSource(film(size=(17, 9))))
     index = 4
     for _ in range(60):
         index = int(np.clip(index + rng.choice([1, 1, 1, -1, -2, 6, -9]), 0, 21))
@@ -78,7 +78,7 @@ def test_what_was_shown_before_leaves_no_trace(device):
         moment = few_pieces(rng, edges=edges, position=position, stop_at_cuts=bool(rng.random() < 0.8))
         moment.bars[:, rng.integers(4, 16) :] = 0
         direction = 1 if rng.random() > 0.3 else -1
-        fresh = Renderer(device, Shots(film(size=(17, 9))))
+        fresh = Renderer(device, ShotSource(film(size=(17, 9))))
         assert np.array_equal(renderer.picture(index, moment, direction), fresh.picture(index, moment, direction))
         fresh.release_window()
 
@@ -87,20 +87,20 @@ def test_within_a_shot_every_frame_is_decoded_once(device):
     """And a still frame needs no other."""
     rng, source = np.random.default_rng(45), film()
     source.frames = np.stack([np.roll(source.frames[0], k, axis=1) for k in range(22)])
-    renderer, moment = Renderer(device, Shots(source)), few_pieces(rng, 6)
+    renderer, moment = Renderer(device, ShotSource(source)), few_pieces(rng, 6)
     for index in range(12):
         renderer.picture(index, moment)
     assert sorted(source.reads) == list(range(max(source.reads) + 1))
     assert max(source.reads) <= 11 + 5 + NEIGHBOURS  # and those that have a say in a cut
-    still = Instant(Options(6), presets.bars("STILL", 6)[None])
+    still = FrameState(Options(6), presets.bars("STILL", 6)[None])
     source.reads.clear()
-    Renderer(device, Shots(source)).picture(9, still)
+    Renderer(device, ShotSource(source)).picture(9, still)
     assert source.reads == [9]
 
 
 def test_around_a_cut_no_frame_is_decoded_more_than_twice(device):
     source = film()
-    renderer, moment = Renderer(device, Shots(source)), few_pieces(np.random.default_rng(46), 5)
+    renderer, moment = Renderer(device, ShotSource(source)), few_pieces(np.random.default_rng(46), 5)
     for index in range(22):
         renderer.picture(index, moment)
     counts = np.bincount(source.reads, minlength=22)
@@ -130,13 +130,13 @@ def test_in_betweens_are_of_the_shot_of_the_nearer_filmed_frame(device, edges, p
     rng = np.random.default_rng(49)
     for first, stop in pairwise(BETWEEN):
         for index, direction in ((first, 1), (first + 9, -1), (stop - 1, 1)):
-            moment = instant(rng, edges=edges, position=position)
-            check(device, Shots(with_between(dtype), STEP), moment, index, direction, range(first, stop))
+            moment = state(rng, edges=edges, position=position)
+            check(device, ShotSource(with_between(dtype), STEP), moment, index, direction, range(first, stop))
 
 
 def test_cuts_are_looked_for_in_filmed_frames_alone():
     source = with_between()
-    shots = Shots(source, STEP)
+    shots = ShotSource(source, STEP)
     assert shots.lacking(20, 20, 40) == {20, 24, 28, 32, 36, 40}
     assert shots.around(20, 20, 40) == range(27)
     assert shots.around(20, 20, 26, known=True) == range(85)
@@ -148,8 +148,8 @@ def test_cuts_are_looked_for_in_filmed_frames_alone():
 @pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
 def test_what_is_missing_is_what_is_read(device, edges):
     """Once cuts are known: as prefetching has it."""
-    source, rng = Shots(film()), np.random.default_rng(47)
-    moment = instant(rng, 5, edges=edges, position="center")
+    source, rng = ShotSource(film()), np.random.default_rng(47)
+    moment = state(rng, 5, edges=edges, position="center")
     renderer = Renderer(device, source)
     for index in range(22):
         renderer.picture(index, moment)
@@ -174,8 +174,8 @@ def test_a_frame_that_cannot_be_read_is_missed_only_where_it_is_shown(device):
         return read(index)
 
     source.read = fail
-    last = Instant(Options(5), np.eye(5)[4:])
-    renderer = Renderer(device, Shots(source))
+    last = FrameState(Options(5), np.eye(5)[4:])
+    renderer = Renderer(device, ShotSource(source))
     renderer.picture(2, last)
     with pytest.raises(MediaError, match="broken"):
         renderer.picture(1, last)

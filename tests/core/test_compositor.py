@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from shutter_addon.core import compositor, light, shutters
-from shutter_addon.core.instant import Instant, Options
+from shutter_addon.core.frame_state import FrameState, Options
 
 
-def instant(bars, **options):
+def state(bars, **options):
     bars = np.asarray(bars, dtype=np.float64)
-    return Instant(Options(bars.shape[1], **options), bars)
+    return FrameState(Options(bars.shape[1], **options), bars)
 
 
 def frames(count, seed=0, size=(3, 4)):
@@ -57,13 +57,13 @@ def test_a_clip_of_one_frame():
 
 def test_equal_bars_are_the_mean_of_light():
     pictures = frames(8)
-    result = compositor.compose(instant(np.ones((1, 8))), pictures, np.ones(8, bool), everywhere([1]))
+    result = compositor.compose(state(np.ones((1, 8))), pictures, np.ones(8, bool), everywhere([1]))
     assert result == pytest.approx(pictures.mean(axis=0))
 
 
 def test_encoded_is_the_mean_of_code_values():
     pictures = frames(8)
-    moment = instant(np.ones((1, 8)), light="encoded")
+    moment = state(np.ones((1, 8)), light="encoded")
     result = compositor.compose(moment, pictures, np.ones(8, bool), everywhere([1]))
     assert light.to_encoded(result[..., :3]) == pytest.approx(light.to_encoded(pictures[..., :3]).mean(axis=0))
 
@@ -73,7 +73,7 @@ def test_each_pixel_has_its_own_shutter():
     pictures, bars = frames(6), rng.random((3, 6))
     c = rng.dirichlet(np.ones(3), (3, 4))
     for interpolation, between in shutters.INTERPOLATIONS.items():
-        moment = instant(bars / bars.sum(axis=1, keepdims=True), interpolation=interpolation)
+        moment = state(bars / bars.sum(axis=1, keepdims=True), interpolation=interpolation)
         result = compositor.compose(moment, pictures, np.ones(6, bool), np.moveaxis(c, -1, 0))
         q = between(moment.bars, c[1, 2])
         assert result[1, 2] == pytest.approx(sum(w * p[1, 2] for w, p in zip(q, pictures, strict=True)))
@@ -81,7 +81,7 @@ def test_each_pixel_has_its_own_shutter():
 
 def test_weighted_exposure_is_relative_to_the_default_shutter():
     pictures, bars = frames(4), np.array([[1.0, 1, 1, 1], [1, 0, 0, 0]])
-    moment = instant(bars, exposure="weighted")
+    moment = state(bars, exposure="weighted")
     result = compositor.compose(moment, pictures, np.ones(4, bool), everywhere([0, 1]))
     assert result[..., :3] == pytest.approx(pictures[0][..., :3] / 4)
     assert result[..., 3] == pytest.approx(1)
@@ -91,7 +91,7 @@ def test_weighted_exposure_is_relative_to_the_default_shutter():
 
 def test_alpha_is_premultiplied():
     clear, solid = np.zeros((1, 1, 4)), np.array([[[0.8, 0.2, 0.1, 1.0]]])
-    moment = instant([[1, 1]])
+    moment = state([[1, 1]])
     result = compositor.compose(moment, [clear, solid], np.ones(2, bool), np.ones((1, 1, 1)))
     assert result[0, 0] == pytest.approx([0.4, 0.1, 0.05, 0.5])
 
@@ -99,10 +99,10 @@ def test_alpha_is_premultiplied():
 def test_what_is_left_out_goes_to_the_others():
     pictures = frames(4)
     present = np.array([True, True, False, False])
-    moment = instant([[1, 3, 2, 2]], edges="shorten")
+    moment = state([[1, 3, 2, 2]], edges="shorten")
     result = compositor.compose(moment, pictures, present, everywhere([1]))
     assert result == pytest.approx((pictures[0] + 3 * pictures[1]) / 4)
-    late = instant([[0, 0, 0, 1]], edges="shorten")
+    late = state([[0, 0, 0, 1]], edges="shorten")
     assert compositor.compose(late, pictures, present, everywhere([1])) == pytest.approx(pictures[1])
 
 

@@ -60,10 +60,10 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
             index, direction = shown(recipe, case.frame, source.count)
             if abs(parsed.time_at(case.frame) - time_at(recipe, case.frame)) > 1e-9:
                 raise DifferenceError(f"{told(case)}: another source time")
-        instant = parsed.at(case.frame, source.width / source.height)
+        state = parsed.at(case.frame, source.width / source.height)
         for name, device in devices.items():
             renderer = Renderer(device, source)
-            made, mix = renderer.picture(index, instant, direction), renderer.coefficients(instant)
+            made, mix = renderer.picture(index, state, direction), renderer.coefficients(state)
             with device.current():
                 renderer.release_window()
             right = picture(recipe, case.frame, footage, index, direction, mix)

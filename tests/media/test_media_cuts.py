@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.media import MediaError, open_source
-from shutter_addon.media.cuts import NEIGHBOURS, Shots, is_cut, is_duplicate, signature
+from shutter_addon.media.cuts import NEIGHBOURS, ShotSource, is_cut, is_duplicate, signature
 
 ROOT = Path(__file__).parents[2]
 
@@ -133,16 +133,16 @@ class Frames:
 
 def test_shots_end_at_cuts_and_at_the_clips_ends(film):
     frames = [*film[:10], *noise(8, 10), *film[90:100, :, ::-1]]
-    shots = Shots(Frames(frames))
+    shots = ShotSource(Frames(frames))
     for index, shot in ((0, range(10)), (9, range(10)), (10, range(10, 18)), (17, range(10, 18)), (27, range(18, 28))):
         assert shots.around(index, -5, 40) == shot
-        assert Shots(Frames(frames)).around(index, index - 11, index + 11) == shot
+        assert ShotSource(Frames(frames)).around(index, index - 11, index + 11) == shot
         assert shots.around(index, index, index) == range(28)
 
 
 def test_a_read_frame_is_handed_over(film):
     source = Frames(film[:20])
-    shots = Shots(source)
+    shots = ShotSource(source)
     assert shots.lacking(3, 3, 8) == set(range(3, 9))
     assert shots.around(3, 3, 8) == range(20)
     assert source.reads == list(range(3, 9))
@@ -158,9 +158,9 @@ def test_a_read_frame_is_handed_over(film):
 def test_where_a_frame_cannot_be_read_there_is_no_cut(film):
     frames = [*film[:10], *noise(8, 11)]
     frames[4] = None
-    assert Shots(Frames(frames)).around(2, 0, 17) == range(10)
+    assert ShotSource(Frames(frames)).around(2, 0, 17) == range(10)
     frames[9] = None
-    assert Shots(Frames(frames)).around(2, 0, 17) == range(18)
+    assert ShotSource(Frames(frames)).around(2, 0, 17) == range(18)
 
 
 @pytest.mark.parametrize("lost", [9, 10, 4])
@@ -168,7 +168,7 @@ def test_what_a_lost_frame_hid_is_found_when_it_is_back(film, lost):
     """Whether it lay at the cut or beside it, and though the same object looked for the cut before."""
     frames = [*film[:10], *noise(8, 11)]
     source = Frames([None if i == lost else frame for i, frame in enumerate(frames)])
-    shots = Shots(source)
+    shots = ShotSource(source)
     shots.around(2, 0, 17)
     source.frames = frames
     assert shots.around(2, 0, 17) == range(10)
@@ -178,7 +178,7 @@ def test_what_a_lost_frame_hid_is_found_when_it_is_back(film, lost):
 def test_frames_that_nobody_reads_are_let_go(film):
     """A look through a whole film, as for what its in-between frames lack, keeps those around the last window."""
     for step in (1, 8):
-        shots = Shots(Frames(film.repeat(step, 0)[: 131 * step + 1]), step)
+        shots = ShotSource(Frames(film.repeat(step, 0)[: 131 * step + 1]), step)
         for index in range(shots.count):
             shots.around(index, index, index + 3)
             low, high = index - NEIGHBOURS * step, index + 3 + NEIGHBOURS * step
@@ -193,7 +193,7 @@ import numpy as np
 from shutter_addon.media import MediaError, cuts, inbetween
 class Frames:
     count, transfer, alpha = 20, "srgb", "opaque"
-shots = cuts.Shots(Frames())
+shots = cuts.ShotSource(Frames())
 print(cuts.missing_package(), shots.around(3, 0, 19), shots.lacking(3, 0, 19))
 try:
     inbetween.build(Frames(), "nowhere", 4, "quick")

@@ -16,9 +16,10 @@ import numpy as np
 import pytest
 from footage import picture, save_image, see_through
 
-from shutter_addon.core import whole
-from shutter_addon.media import MediaError, cache, inbetween, open_source
+from shutter_addon.core import atomic_write
+from shutter_addon.media import MediaError, inbetween, inbetween_cache, open_source
 from shutter_addon.media.folder import Folder
+from shutter_addon.media.source import SourceWrapper
 
 ROOT = Path(__file__).parents[2]
 FACTOR, COUNT = 4, 6
@@ -37,11 +38,11 @@ def build(source, folder, **more):
 
 
 def state(source, folder):
-    return cache.state(source, folder, FACTOR, "quick")
+    return inbetween_cache.state(source, folder, FACTOR, "quick")
 
 
 def opened(source, folder):
-    return inbetween.Inbetween(source, folder, FACTOR, "quick")
+    return inbetween.InbetweenSource(source, folder, FACTOR, "quick")
 
 
 def kept(folder):
@@ -99,7 +100,7 @@ def test_equal_pictures_are_equal_files(tmp_path, name):
     frame = see_through(3) if name == "a.png" else see_through(3).astype(np.float16)
     path, written = tmp_path / name, []
     for _ in range(2):
-        cache.write_picture(path, frame, "straight")
+        inbetween_cache.write_picture(path, frame, "straight")
         written.append(path.read_bytes())
         time.sleep(1.01)  # time stamps in EXR files are seconds
     assert written[0] == written[1]
@@ -308,8 +309,8 @@ def test_stale_after_a_retouch_that_keeps_the_size(tmp_path, folder):
 
 def test_another_factor_or_reading_is_another_cache(source, folder):
     build(source, folder)
-    assert cache.state(source, folder, 8, "quick").name == "missing"
-    assert cache.state(source, folder, FACTOR, "good").name == "missing"
+    assert inbetween_cache.state(source, folder, 8, "quick").name == "missing"
+    assert inbetween_cache.state(source, folder, FACTOR, "good").name == "missing"
     source.transfer = "linear"
     assert state(source, folder).name == "stale"
     source.transfer, source.options = "srgb", {"deinterlace": True}
@@ -325,10 +326,10 @@ def test_purge_takes_only_what_was_built(source, folder, tmp_path):
     with open_source(footage(tmp_path / "second", 2)) as second:
         build(second, folder)
         size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file() and path not in own)
-        freed = cache.purge(folder, source)
+        freed = inbetween_cache.purge(folder, source)
         assert state(second, folder).name == "ready"
     assert state(source, folder).name == "missing"
-    freed += cache.purge(folder)
+    freed += inbetween_cache.purge(folder)
     assert freed == size
     assert sorted(path for path in folder.rglob("*") if path.is_file()) == sorted(own)
 
@@ -344,9 +345,9 @@ def test_what_could_not_be_removed_is_found_again(source, folder, monkeypatch):
         with monkeypatch.context() as patch:
             patch.setattr(Folder, "remove", partialmethod(refusing, busy=busy))
             with pytest.raises(MediaError, match=r"cannot be removed \(Permission denied\)"):
-                cache.purge(folder)
-        assert cache.size(folder) > 0
-        assert cache.purge(folder) > 0
+                inbetween_cache.purge(folder)
+        assert inbetween_cache.size(folder) > 0
+        assert inbetween_cache.purge(folder) > 0
         assert not list(folder.iterdir())
         build(source, folder)
 
@@ -426,14 +427,12 @@ def test_pairs_at_work_fit_into_memory(monkeypatch, processors, size, samples):
     assert workers == processors or (workers + 1) * pair + beyond > 4 << 30
 
 
-class Counting:
+class Counting(SourceWrapper):
     """A source that counts what is read of it, and how many of its frames are held at the same time."""
 
     def __init__(self, source):
-        self._source, self.reads, self.most, self._given = source, [], 0, []
-
-    def __getattr__(self, name):
-        return getattr(self._source, name)
+        super().__init__(source)
+        self.reads, self.most, self._given = [], 0, []
 
     def read(self, index):
         frame = self._source.read(index)
@@ -532,9 +531,9 @@ def test_killed_anywhere_it_goes_on_to_the_same_files(tmp_path, folder, monkeypa
         assert killed == [-signal.SIGKILL] * 10
         assert 0 < state(source, folder).done < 39
         shutil.copytree(folder, folder.with_name("killed"))
-        cache.purge(folder.with_name("killed"))
+        inbetween_cache.purge(folder.with_name("killed"))
         assert not list(folder.with_name("killed").iterdir())
-        monkeypatch.setattr(whole, "LEFT_BEHIND", 0)
+        monkeypatch.setattr(atomic_write, "LEFT_BEHIND", 0)
         build(source, folder)
         assert kept(folder) == kept(folder.with_name("whole"))
 
@@ -552,15 +551,9 @@ def test_two_processes_at_once_do_no_damage(tmp_path, folder):
 
 
 def test_estimate_is_near_what_is_built(bunny, folder):
-    class Short:  # a movie's first frames
-        def __init__(self, source):
-            self._source, self.count = source, 4
-
-        def __getattr__(self, name):
-            return getattr(self._source, name)
-
     with open_source(bunny) as movie:
-        source = Short(movie)
+        source = SourceWrapper(movie)
+        source.count = 4  # the first frames alone
         build(source, folder)
         size = sum(path.stat().st_size for path in pictures(folder))
         assert 0.7 * size < inbetween.estimate(source, FACTOR) < 1.5 * size

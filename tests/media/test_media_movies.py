@@ -193,7 +193,7 @@ def test_streams_are_counted_without_cover_pictures(tmp_path):
 THREADS = """
 import gc, sys
 from pathlib import Path
-from shutter_addon.media import Ahead, MediaError, open_source
+from shutter_addon.media import PrefetchSource, MediaError, open_source
 gc.disable()
 
 def threads():
@@ -201,7 +201,7 @@ def threads():
 
 def use(path):
     try:
-        with Ahead(open_source(path)) as ahead, open_source(path) as source:
+        with PrefetchSource(open_source(path)) as ahead, open_source(path) as source:
             for index in (0, source.count - 1, 9, 2):
                 try:
                     ahead.read(index), source.read(index)

@@ -5,7 +5,7 @@ import OpenImageIO
 import pytest
 from telling import linked, needs_window, tell
 
-from shutter_addon.media.written import whole_pictures
+from shutter_addon.media.completeness import whole_pictures
 
 TOLERANCE = 2
 

@@ -11,7 +11,7 @@ from .validation import EffectError
 OPTIONS = ("position", "interpolation", "light", "exposure", "edges")
 
 
-def instant(edit, effect, strip, frame: float) -> recipe.Instant:
+def instant(edit, effect, strip, frame: float) -> recipe.FrameState:
     """The effect at a timeline frame of its edit; strip: the effect strip that shows it. EffectError: no shutter
     at all, one that never opens, or a value that no effect can have."""
     check_counts(effect)
@@ -21,7 +21,7 @@ def instant(edit, effect, strip, frame: float) -> recipe.Instant:
         checked(shutter.name, bars_at(curves, f"{path}.shutters[{i}]", shutter, chosen, frame), frame)
         for i, shutter in enumerate(effect.shutters)
     ]
-    return recipe.Instant(chosen, np.stack(bars), tuple(_shapes_at(edit, effect, strip, curves, frame)))
+    return recipe.FrameState(chosen, np.stack(bars), tuple(_shapes_at(edit, effect, strip, curves, frame)))
 
 
 def check_counts(effect) -> None:

@@ -48,9 +48,9 @@ def settings(effect) -> tuple[Path, int, str]:
 
 
 def source(medium, effect):
-    """The medium itself, or an Inbetween over it. EffectError, MediaError: there can be none."""
-    from ...media.inbetween import Inbetween
+    """The medium itself, or an InbetweenSource over it. EffectError, MediaError: there can be none."""
+    from ...media.inbetween import InbetweenSource
 
     if factor(effect) == 1:
         return medium
-    return Inbetween(medium, *settings(effect))
+    return InbetweenSource(medium, *settings(effect))

@@ -28,7 +28,7 @@ class RetimingKey:
 
 
 def source_frame(strip, frame: float, medium, scene_fps: float) -> int:
-    """Frame of the medium that a source strip shows at a timeline frame; medium: its opened medium, as Shots has it.
+    """Frame of the medium that a source strip shows at a timeline frame; medium: it, opened, as a ShotSource.
 
     Trims, cuts, playback rate, retiming keys, reversed frames and strobe as Blender's sequencer applies them. Where
     there are frames between filmed ones, it is the nearest of all, which Blender knows nothing of. EffectError: how the

@@ -12,7 +12,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Operator
 
 from ...core import messages
-from ...media import MediaError, cache
+from ...media import MediaError, inbetween_cache
 from ...media.inbetween import build, estimate
 from ..data import effects, inbetween_settings, selection, source_media, strips
 from ..rendering import invalidation as finished
@@ -31,13 +31,13 @@ class Look(NamedTuple):
     size: bytes that the source's take, of all factors and methods
     estimate: bytes that they will take about; None while that is being found out, 0 if it cannot be"""
 
-    state: cache.State
+    state: inbetween_cache.State
     size: int
     estimate: int | None
 
 
 _media: dict[tuple, tuple] = {}  # by source_media.media_key: the medium, its file not open; bytes for a factor of 2
-_looks: dict[tuple, tuple[float, cache.State, int]] = {}  # when it was looked, and what was found
+_looks: dict[tuple, tuple[float, inbetween_cache.State, int]] = {}  # when it was looked, and what was found
 _running: "Build | None" = None
 _timer = None
 
@@ -50,7 +50,7 @@ def look(edit, effect, strip) -> Look:
     key = source_media.media_key(source), *settings
     when, *found = _looks.get(key, (0.0,))
     if not when or time.monotonic() - when > _FRESH:
-        found = cache.state(medium, *settings), cache.size(settings[0], medium)
+        found = inbetween_cache.state(medium, *settings), inbetween_cache.size(settings[0], medium)
         _looks[key] = time.monotonic(), *found
         _trim(_looks)
     return Look(*found, doubled.result() * (settings[1] - 1) if doubled.done() else None)
@@ -90,7 +90,7 @@ class Build:
     """In-between frames of an effect that are being built, by a thread that touches no bpy.
 
     scene: session_uid of the effect's scene; done, total: pairs of neighbouring source frames
-    future: how far it came, a cache.State; or MediaError"""
+    future: how far it came, an inbetween_cache.State; or MediaError"""
 
     def __init__(self, edit, effect, strip):
         """EffectError, MediaError: it cannot begin."""
@@ -130,7 +130,7 @@ def stop() -> None:
     wait([doubled for _medium, doubled in _media.values()])
     _media.clear()
     _looks.clear()
-    cache.forget()
+    inbetween_cache.forget()
 
 
 def _started(context, build: Build) -> None:
@@ -280,7 +280,7 @@ class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
         left = []
         try:
             folder, (medium, _) = inbetween_settings.folder(effect), _known(strips.source_of(edit, effect, strip))
-            freed = cache.purge(folder, medium, lambda *place: left.append(place))
+            freed = inbetween_cache.purge(folder, medium, lambda *place: left.append(place))
         except FAULTS as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -11,7 +11,7 @@ from bpy.types import PropertyGroup
 from gpu_extras.batch import batch_for_shader
 
 from ...compute.passes import body
-from ...core.recipe import Instant
+from ...core.frame_state import FrameState
 from ...media import MediaError
 from ..data import annotations, effects, geometry, selection, strips
 from ..data.properties import CONTEXT
@@ -213,7 +213,7 @@ def _show_source(quad, found: Shown, moment, right: float) -> None:
     options = replace(moment.instant.options, step=1)  # no in-between frames come first in reverse
     still = np.zeros((1, options.window))
     still[0, options.before] = 1
-    plain = replace(moment, instant=Instant(options, still))
+    plain = replace(moment, instant=FrameState(options, still))
     plain.prefetch()
     texture = moment.renderer.draw(plain.index, plain.instant, plain.direction)
     quad.draw("show_picture", {"picture": texture}, 0.0, right, opacity=found.strip.blend_alpha)

@@ -16,7 +16,7 @@ import bpy
 import gpu
 import numpy as np
 
-from ...compute.errors import NoDeviceError
+from ...compute.device import NoDeviceError
 from ...compute.passes import LOCAL_ROW, Image, Pass, body
 
 _TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
@@ -46,7 +46,7 @@ class Texture:
 
 
 class BlenderDevice:
-    """As compute.gl.GLDevice, wherever Blender's GPU context is current: in draw handlers, or after gpu.init()."""
+    """A compute.device.Device, wherever Blender's GPU context is current: in draw handlers, or after gpu.init()."""
 
     def __init__(self):
         self._shaders: dict[Pass, gpu.types.GPUShader] = {}
@@ -81,7 +81,7 @@ class BlenderDevice:
         )
 
     def read(self, texture: Texture) -> np.ndarray:
-        """As GLDevice.read; by framebuffers, for GPUTexture.read() gives a first layer alone."""
+        """See Device. By framebuffers, for GPUTexture.read() gives a first layer alone."""
         width, height, layers = texture.size
         dtype, _, packing = _exchanged(texture)
         components = 4 if texture.kind.startswith("rgba") else 1

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import bpy
 
-from ...core import whole
+from ...core import atomic_write
 from ...core.messages import UserError
-from ...media.written import is_whole_movie, is_whole_picture, whole_pictures, why_short
+from ...media.completeness import is_whole_movie, is_whole_picture, whole_pictures, why_short
 from ..data import strips
 from . import render_job
 
@@ -137,7 +137,7 @@ def film(edit, output: Path) -> None:
     clear_up(folder)
     kept = edit.render.filepath
     faults: list[str] = []
-    with whole.part_folder(folder) as part:
+    with atomic_write.part_folder(folder) as part:
         part_film = part / f"film{output.suffix}"
         try:
             edit.render.filepath = for_blender(str(part_film) if is_movie(output) else f"{part}{os.sep}")
@@ -161,7 +161,7 @@ def film(edit, output: Path) -> None:
 def clear_up(folder: Path) -> None:
     """Removes what killed renders left half-written in a folder."""
     with suppress(OSError):
-        for left in whole.left_behind(folder):
+        for left in atomic_write.left_behind(folder):
             shutil.rmtree(left, ignore_errors=True)
 
 

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ...media import MediaError
-from ...media import cache as files
+from ...media import inbetween_cache as files
 from ..data import effects, fcurves, inbetween_settings, source_media, strips
 
 _signatures: dict = {}  # by effect scenes

@@ -11,14 +11,14 @@ import bpy
 import numpy as np
 import OpenImageIO
 
-from ...compute.errors import NoDeviceError
+from ...compute.device import NoDeviceError
 from ...compute.gpu import GPUCompositor
 from ...compute.renderer import Renderer, open_compositor
-from ...core.instant import Instant
+from ...core.frame_state import FrameState
 from ...media import MediaError, cuts
-from ...media.ahead import Ahead
-from ...media.cuts import Shots
+from ...media.cuts import ShotSource
 from ...media.exr import write_exr
+from ...media.prefetch import PrefetchSource
 from ..data import effects, inbetween_settings, retiming, source_media, strips
 from . import invalidation
 from .blender_gpu import BlenderDevice, opens_in_background
@@ -63,7 +63,7 @@ class Moment:
 
     renderer: Renderer
     index: int
-    instant: Instant
+    instant: FrameState
     direction: int
 
     @property
@@ -276,11 +276,11 @@ def pairs(edit, effect, strip, frames) -> set[int]:
     return found
 
 
-def _open(effect, source_strip) -> Shots:
+def _open(effect, source_strip) -> ShotSource:
     """An effect's source, in-between frames included. EffectError, MediaError: there is none."""
     medium = source_media.open_media(source_strip)
     try:
-        return Shots(Ahead(inbetween_settings.source(medium, effect)), inbetween_settings.factor(effect))
+        return ShotSource(PrefetchSource(inbetween_settings.source(medium, effect)), inbetween_settings.factor(effect))
     except FAULTS:
         medium.close()
         raise

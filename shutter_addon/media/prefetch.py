@@ -1,45 +1,45 @@
-"""Frames of a source before they are asked for, decoded by a thread of their own."""
+"""Frames of a source, decoded ahead of time by a thread."""
 
 import threading
 
 import numpy as np
 
+from ..core.frame_source import FrameSource
 from .errors import MediaError
+from .source import SourceWrapper
 
 
-class Ahead:
-    """A source's frames, decoded ahead: a source itself, whose decoder belongs to one thread.
+class PrefetchSource(SourceWrapper):
+    """A source whose wanted frames are decoded ahead, all by one thread. Its frames are read-only.
 
-    What is wanted is kept until other frames are wanted: the last `want` bounds the memory. Its frames are read-only.
+    The frames of the last `want` are kept until the next one: they are what it holds in memory.
     """
 
-    def __init__(self, source):
-        self._source = source
+    def __init__(self, source: FrameSource):
+        super().__init__(source)
         self._wanted: list[int] = []  # in the order of decoding
         self._asked: list[int] = []  # by reads that wait
         self._done: dict[int, np.ndarray | Exception] = {}
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
 
-    def __getattr__(self, name):
-        return getattr(self._source, name)
-
     def want(self, indices) -> None:
-        """Decodes these frames, in this order, and drops all others."""
+        """Decodes these frames, in this order, and frees all others."""
         with self._changed:
             self._wanted = list(dict.fromkeys(indices))
             self._drop()
             self._wake()
 
     def ready(self, indices) -> bool:
-        """Whether `read` would wait for none of these frames."""
+        """Whether all these frames are decoded, so that `read` does not wait."""
         with self._changed:
             return self._done.keys() >= set(indices)
 
     def read(self, index: int) -> np.ndarray:
-        """The frame as the source gives it, but read-only; waits for it, ahead of all that is wanted.
+        """The source's frame, read-only. One that is not decoded yet is decoded next, before all wanted ones.
 
-        Raises what the source raises, once: it is tried again then. And MediaError if it is closed meanwhile."""
+        An error of the source's `read` is raised here once; the next call decodes the frame again. MediaError as well
+        if `close` is called meanwhile."""
         with self._changed:
             self._asked.append(index)
             self._wake()
@@ -58,7 +58,7 @@ class Ahead:
         return frame
 
     def close(self) -> None:
-        """Ends the thread and lets go of the file and of all frames; a later read starts anew."""
+        """Ends the thread, closes the file and frees all frames; a later read starts again."""
         with self._changed:
             thread, self._thread = self._thread, None
             self._wanted, self._done = [], {}
@@ -100,11 +100,5 @@ class Ahead:
             frame = self._source.read(index)
             frame.flags.writeable = False
             return frame
-        except Exception as error:  # whoever reads the frame learns of it
+        except Exception as error:  # raised to whoever reads the frame
             return error
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.close()

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from ..core import compositor
-from ..core.instant import Options
+from ..core.frame_state import Options
 
 
 def summable(source) -> bool:
@@ -15,7 +15,7 @@ def summable(source) -> bool:
     return np.dtype(source.dtype) == np.uint8 and source.alpha == "opaque"
 
 
-class Running(ABC):
+class RunningSums(ABC):
     """A window of running sums of a source's frames, in the light that is summed (Options.light).
 
     The layer of position p, p mod `layers`, holds the sum of the frames before p: positions `start` to `stop`, both

@@ -6,7 +6,7 @@ from threading import Barrier
 
 import pytest
 
-from shutter_addon.core import whole
+from shutter_addon.core import atomic_write
 
 
 def listed(folder):
@@ -16,7 +16,7 @@ def listed(folder):
 def test_a_file_is_there_once_it_is_whole(tmp_path):
     path = tmp_path / "a.txt"
     path.write_text("old")
-    with whole.writing(path) as part:
+    with atomic_write.writing(path) as part:
         part.write_text("new")
         assert path.read_text() == "old"
         assert part.name == path.name
@@ -26,7 +26,7 @@ def test_a_file_is_there_once_it_is_whole(tmp_path):
 
 def test_what_fails_leaves_nothing(tmp_path):
     def stopped():
-        with whole.writing(tmp_path / "a.txt") as part:
+        with atomic_write.writing(tmp_path / "a.txt") as part:
             part.write_text("half")
             part.with_name("more").mkdir()
             raise KeyboardInterrupt
@@ -34,14 +34,14 @@ def test_what_fails_leaves_nothing(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         stopped()
     assert listed(tmp_path) == []
-    with pytest.raises(FileNotFoundError), whole.writing(tmp_path / "a.txt"):
+    with pytest.raises(FileNotFoundError), atomic_write.writing(tmp_path / "a.txt"):
         pass
     assert listed(tmp_path) == []
 
 
 @pytest.mark.parametrize("name", ["a.txt", "a" * 255, "ä" * 127])
 def test_any_name_that_a_file_may_have(tmp_path, name):
-    with whole.writing(tmp_path / name) as part:
+    with atomic_write.writing(tmp_path / name) as part:
         part.write_text(name)
     assert (tmp_path / name).read_text() == name
 
@@ -49,7 +49,7 @@ def test_any_name_that_a_file_may_have(tmp_path, name):
 def test_a_link_is_replaced_and_not_followed(tmp_path):
     (tmp_path / "others").write_text("others'")
     (tmp_path / "a.txt").symlink_to("others")
-    with whole.writing(tmp_path / "a.txt") as part:
+    with atomic_write.writing(tmp_path / "a.txt") as part:
         part.write_text("own")
     assert (tmp_path / "others").read_text() == "others'"
     assert not (tmp_path / "a.txt").is_symlink()
@@ -57,7 +57,7 @@ def test_a_link_is_replaced_and_not_followed(tmp_path):
 
 def test_it_is_for_whom_any_new_file_is(tmp_path):
     (tmp_path / "plain").write_text("")
-    with whole.writing(tmp_path / "a.txt") as part:
+    with atomic_write.writing(tmp_path / "a.txt") as part:
         part.write_text("")
     assert (tmp_path / "a.txt").stat().st_mode == (tmp_path / "plain").stat().st_mode
 
@@ -66,7 +66,7 @@ def test_many_write_the_same_file_at_once(tmp_path):
     together = Barrier(8, timeout=20)
 
     def write(number):
-        with whole.writing(tmp_path / "a.txt") as part:
+        with atomic_write.writing(tmp_path / "a.txt") as part:
             together.wait()
             part.write_text(f"{number}" * 9999)
             together.wait()
@@ -87,4 +87,4 @@ def test_what_was_left_behind_is_known_by_name_kind_and_age(tmp_path):
     for name in ("", *names[:3], f"{names[0]}/a.txt", f"{names[1]}/a.txt"):
         os.utime(tmp_path / name, (0, 0))
     os.utime(tmp_path / names[3] / "a.txt", (0, 0))
-    assert [path.name for path in whole.left_behind(tmp_path)] == names[:2]
+    assert [path.name for path in atomic_write.left_behind(tmp_path)] == names[:2]

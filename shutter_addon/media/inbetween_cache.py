@@ -18,11 +18,11 @@ from typing import NamedTuple
 import numpy as np
 from OpenImageIO import ImageInput, ImageOutput, ImageSpec, geterror
 
-from ..core import whole
+from ..core import atomic_write
+from .completeness import is_whole_picture, why_short
 from .errors import MediaError
 from .files import check_name
 from .folder import Folder
-from .written import is_whole_picture, why_short
 
 VERSION = 2  # raise it when the same frames give other in-betweens, or the folder changes: what there is gets stale
 MANIFEST, CHECKS = "manifest.json", "checks"
@@ -58,7 +58,7 @@ class State(NamedTuple):
     total: int
 
 
-class Cache:
+class InbetweenCache:
     """The in-between frames of one source, factor and method, in a folder of their own under `folder`.
 
     manifest.json: what they are made of. The folder's name ends in a hash of that, so nothing in it ever gets stale.
@@ -158,9 +158,9 @@ class Cache:
             self.folder.mkdir(parents=True, exist_ok=True)
             with Folder(self.folder) as folder, folder.make(CHECKS):
                 if _content_of(folder, MANIFEST) != text:
-                    with whole.writing(self.folder / MANIFEST) as part:
+                    with atomic_write.writing(self.folder / MANIFEST) as part:
                         part.write_bytes(text)
-                for part in whole.left_behind(self.folder):
+                for part in atomic_write.left_behind(self.folder):
                     with suppress(OSError):  # another user's, or cleared by others meanwhile
                         _remove_part(folder, part.name)
         except OSError as error:
@@ -172,7 +172,7 @@ class Cache:
         MediaError: it cannot be written."""
         path = self.picture(frame)
         try:
-            with whole.writing(path) as part:
+            with atomic_write.writing(path) as part:
                 if not write_picture(part, picture, self.source.alpha):
                     reason = why_short(part.parent)
                     raise MediaError(f"{self.folder}: an in-between frame could not be written whole ({reason})")
@@ -230,7 +230,7 @@ def identity(source) -> dict:
 
     MediaError: a file is gone."""
     content = hashlib.sha256()
-    for path in getattr(source, "files", [source.path]):
+    for path in source.files:
         try:
             status = path.stat()
             if not stat.S_ISREG(status.st_mode):  # a pipe would never end
@@ -254,7 +254,7 @@ def state(source, folder, factor, method) -> State:
 
     Quick while nothing changes: it asks for the time stamps of the source's files and of the folder.
     MediaError: a file of the source is gone."""
-    cache, total = Cache(source, folder, factor, method), source.count - 1
+    cache, total = InbetweenCache(source, folder, factor, method), source.count - 1
 
     def finished():
         cache.load()
@@ -330,7 +330,7 @@ def _spec(width, height, dtype, alpha) -> ImageSpec:
 
 
 def pair_line(pair: int, kind: str) -> str:
-    """What `Cache.note` takes down of a pair that needs no pictures; kind: "same" or "cut"."""
+    """What `InbetweenCache.note` takes down of a pair that needs no pictures; kind: "same" or "cut"."""
     text = f"{pair} {kind}"
     return f"# {text} {zlib.crc32(text.encode()):08x}"
 
@@ -462,7 +462,7 @@ def _other_files(cache: Folder, checks: _Checks) -> Iterator[tuple[Folder, str]]
     """What else was made in a cache's folder, as (folder, name), in the order in which it may go: the manifest last,
     for without it what is left would never be found again."""
     for entry in cache.entries():
-        if whole.is_part(entry.name):
+        if atomic_write.is_part(entry.name):
             with suppress(OSError), cache.folder(entry.name) as part:
                 yield from ((part, file.name) for file in part.files() if _HALF.fullmatch(file.name))
     if checks.own:
@@ -493,7 +493,7 @@ def _remove(top: Folder, name: str, left) -> int:
                 freed = sum(pool.map(partial(_remove_picture, cache, checks), names))
             freed += sum(place.remove(file) for place, file in _other_files(cache, checks))
             for entry in cache.entries():
-                if entry.name == CHECKS or whole.is_part(entry.name):
+                if entry.name == CHECKS or atomic_write.is_part(entry.name):
                     with suppress(OSError):  # others' things are in it
                         cache.remove_folder(entry.name)
             count = len(cache.entries())

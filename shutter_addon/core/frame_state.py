@@ -42,7 +42,7 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Instant:
+class FrameState:
     """The effect at one frame: bars (N, L) float64, the first shutter is the default; moved shapes in order.
 
     reference: the exposure that counts as full brightness where exposure is "weighted"; the default shutter's.
@@ -65,10 +65,10 @@ class Instant:
 
     @property
     def key(self) -> tuple:
-        """Equal for instants that give the same picture; hashable."""
+        """Equal for states that give the same picture; hashable."""
         shapes = ((s.shutter, s.kind, s.width, *(stroke.tobytes() for stroke in s.strokes)) for s in self.shapes)
         return self.options, self.bars.shape, self.bars.tobytes(), self.reference, tuple(shapes)
 
-    def alone(self, chosen: int) -> Instant:
+    def alone(self, chosen: int) -> FrameState:
         """The same where one shutter alone holds for the whole picture."""
-        return Instant(self.options, self.bars[chosen, None], (), self.reference or float(self.bars[0].sum()))
+        return FrameState(self.options, self.bars[chosen, None], (), self.reference or float(self.bars[0].sum()))

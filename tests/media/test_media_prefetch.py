@@ -1,4 +1,4 @@
-"""Ahead gives a source's own frames, in any order of wants, and keeps no more than is wanted."""
+"""PrefetchSource gives a source's own frames, in any order of wants, and keeps no more than is wanted."""
 
 import threading
 import time
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shutter_addon.media import Ahead, MediaError, open_source
+from shutter_addon.media import MediaError, PrefetchSource, open_source
 
 
 class Footage:
@@ -43,7 +43,7 @@ def source():
 
 @pytest.fixture
 def ahead(source):
-    with Ahead(source) as ahead:
+    with PrefetchSource(source) as ahead:
         yield ahead
         source.gate.set()
 
@@ -172,7 +172,7 @@ def test_closing_ends_a_read_that_waits(ahead, source):
 
 
 def test_it_is_a_source_of_the_same_kind(bunny):
-    with open_source(bunny) as plain, Ahead(open_source(bunny)) as ahead:
+    with open_source(bunny) as plain, PrefetchSource(open_source(bunny)) as ahead:
         for name in ("path", "width", "height", "count", "fps", "dtype", "transfer", "alpha"):
             assert getattr(ahead, name) == getattr(plain, name)
         ahead.want(range(30, 34))

@@ -1,0 +1,69 @@
+"""What compositing needs of a GPU, whatever it is reached by."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from typing import Protocol
+
+import numpy as np
+
+from .passes import Pass
+
+
+class NoDeviceError(RuntimeError):
+    """The device cannot be used, or has no room; the message is one sentence for the user."""
+
+
+class Texture(Protocol):
+    """A texture array on a device. size: (width, height, layers), in texels."""
+
+    size: tuple[int, int, int]
+
+    def release(self) -> None:
+        """Frees its memory."""
+
+
+class Device(Protocol):
+    """Texture arrays and compute passes, on a GPU or on a software renderer. Call the other methods inside
+    `with device.current():`, on any one thread.
+
+    name: the renderer, as it calls itself
+    max_size: texels along a texture's side, at most
+    max_layers: layers of a texture array, at most
+    """
+
+    name: str
+    max_size: int
+    max_layers: int
+
+    def current(self) -> AbstractContextManager:
+        """Makes the device usable on this thread until the `with` block ends."""
+
+    def texture(self, width: int, height: int, layers: int, kind: str) -> Texture:
+        """A texture array of undefined content. NoDeviceError: the device has no room for it.
+
+        kind: the format as in GLSL: rgba8, rgba16, rgba16f, rgba32f, r32f, r16ui or rg32ui. Passes read rgba8 and
+        rgba16 as 0 … 1, all others as they are, and none with filtering."""
+
+    def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
+        """Fills a layer, or its first rows, with a C-contiguous array (rows, width[, components]) of the format's type.
+
+        opaque: every alpha in the array is full; a device may then send the colours alone.
+        TypeError: the device neither writes nor reads this format, only passes do (rg32ui on Blender's GPU)."""
+
+    def read(self, texture: Texture) -> np.ndarray:
+        """A copy of the texture (layers, height, width, components) in the format's type, after all passes that were
+        run. TypeError: as for `write`."""
+
+    def run(
+        self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, blocks=None, **constants
+    ) -> None:
+        """Runs a pass over `extent` invocations (x, y[, z]). Later passes read what it stored.
+
+        textures, images: {name: Texture} for the samplers and the images that the pass declares
+        blocks: {name: C-contiguous float32 array (length, 4)} for its blocks
+        constants: {name: number or tuple of numbers} for its constants, by keyword
+        """
+
+    def release(self) -> None:
+        """Frees the device, but not its textures: each has its own `release`."""

@@ -1,0 +1,93 @@
+"""What every source of frames offers: movies, image sequences, and what wraps them."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterable
+from fractions import Fraction
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+
+class ShotFinder(Protocol):
+    """Where the shots of a source end. It may have to read frames for that; those wait for their `read`.
+
+    Frames are counted as the source counts them, from 0.
+    """
+
+    def around(self, index: int, low: int, high: int, *, known: bool = False) -> range:
+        """The frames of the shot around frame `index`, for a window of the frames from `low` to `high`.
+
+        Ends beyond the window are not looked for: the clip's ends take their place. known: it reads nothing; where it
+        does not know whether there is a cut, it takes it that there is none."""
+
+    def lacking(self, index: int, low: int, high: int) -> set[int]:
+        """The frames that `around` would read for these arguments, if it found no more cuts."""
+
+    def handed(self) -> set[int]:
+        """The frames that were read and wait for `read`."""
+
+    def release(self) -> None:
+        """Frees the frames that wait for `read`."""
+
+
+class FrameSource(Protocol):
+    """The frames of a movie or of an image sequence; close it, or use it in a `with`.
+
+    path: the movie, or the first file of the sequence
+    width, height: pixels
+    count: frames as Blender's strip counts them (its content_duration)
+    fps: frames per second, None for an image sequence
+    dtype: uint8, uint16, float16 or float32, the samples' type; whole numbers stand for 0 … 1
+    transfer: "srgb" (sRGB display values) or "linear" (scene linear, Rec.709 primaries)
+    alpha: "opaque", "straight" or "premultiplied"
+    options: what the samples depend on besides the files, {name: plain value}
+    has_audio: whether the file has sound
+    left_out: a sentence for the user about files beside the sequence that do not belong to it; "" if there are none
+    shots: what knows where its shots end; None: it is one shot
+    """
+
+    path: Path
+    width: int
+    height: int
+    count: int
+    fps: Fraction | None
+    dtype: np.dtype
+    transfer: str
+    alpha: str
+    options: dict
+    has_audio: bool = False
+    left_out: str = ""
+    shots: ShotFinder | None = None
+
+    @property
+    def files(self) -> list[Path]:
+        """The files that hold the frames: the movie, or one for each frame of a sequence."""
+        return [self.path]
+
+    @abstractmethod
+    def read(self, index: int) -> np.ndarray:
+        """The frame as an array (height, width, 4), RGBA, top row first. Any order; ascending is fastest.
+
+        MediaError: the frame cannot be decoded. IndexError: it is outside 0 … count-1."""
+
+    def want(self, indices: Iterable[int]) -> None:
+        """Says which frames will be read next, in this order; others will not. A source may decode them ahead."""
+
+    def has(self, index: int) -> bool:
+        """Whether the frame exists; in-between frames may not be built yet. It is not decoded."""
+        return True
+
+    def check(self, index: int) -> None:
+        """MediaError: the frame does not exist (see `has`)."""
+
+    def close(self) -> None:
+        """Closes the file; a later read opens it again."""
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()

@@ -1,0 +1,46 @@
+"""Opens a movie or an image sequence; both give their frames by index, as Blender's strips count them."""
+
+from pathlib import Path
+
+from ..core.frame_source import FrameSource
+from .color import in_colorspace
+from .errors import MediaError
+from .files import check_file
+from .sequence import IMAGE_SUFFIXES, SequenceSource
+
+
+def open_source(
+    path, *, stream=0, fps=None, files=None, colorspace=None, config=None, alpha=None, deinterlace=False
+) -> FrameSource:
+    """Opens a movie, or the image sequence that starts with the file `path`. MediaError: it cannot be read.
+
+    stream: which of a movie's video streams, from 0
+    fps: frames per second that an image sequence shall report; its files have none
+    files: the names of an image strip's files, one per frame, in place of those found beside `path`
+    colorspace: the strip's colour space, by Blender's name (default: what Blender assumes for such a file)
+    config: path of the OpenColorIO configuration; colour spaces other than sRGB and Linear Rec.709 need it
+    alpha: an image strip's alpha mode, "straight" or "premultiplied" (default: what Blender assumes); not a movie's
+    deinterlace: a movie strip's option of that name
+    """
+    path = Path(path)
+    if files is None and path.suffix.lower() not in IMAGE_SUFFIXES:
+        source = _open_movie(path, stream=stream, deinterlace=deinterlace)
+    else:
+        source = SequenceSource(path, files=files, fps=fps, alpha=alpha)
+    try:
+        return source if colorspace is None else in_colorspace(source, colorspace, config)
+    except MediaError:
+        source.close()
+        raise
+
+
+def _open_movie(path, **options):
+    try:
+        from .movie import MovieSource
+    except ImportError as error:  # a package without wheels, or one for another system
+        check_file(path)
+        raise MediaError(
+            f"{path.name}: movies need the Python package PyAV ({error}); "
+            "install the zip of Virtual Shutter that is made for your system, or use an image sequence"
+        ) from None
+    return MovieSource(path, **options)

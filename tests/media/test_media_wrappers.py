@@ -1,0 +1,38 @@
+"""Wrappers of sources hand on all that a source has."""
+
+import numpy as np
+import pytest
+
+from shutter_addon.core.frame_source import FrameSource
+from shutter_addon.media import MediaError, PrefetchSource, open_source
+from shutter_addon.media.cuts import ShotSource
+from shutter_addon.media.inbetween import InbetweenSource
+from shutter_addon.media.source import SourceWrapper
+
+MEMBERS = {name for name in {*FrameSource.__annotations__, *vars(FrameSource)} if not name.startswith("_")}
+
+
+def test_a_wrapper_forwards_every_member():
+    assert {"path", "files", "shots", "read", "want", "has", "check", "close"} <= MEMBERS
+    assert vars(SourceWrapper).keys() >= MEMBERS
+
+
+def test_through_all_wrappers(bunny, tmp_path):
+    movie = open_source(bunny)
+    source = ShotSource(PrefetchSource(InbetweenSource(movie, tmp_path, 2, "quick")), 2)
+    with source:
+        assert (source.count, source.fps) == (2 * movie.count - 1, 2 * movie.fps)
+        assert source.options == {**movie.options, "inbetween": [2, "quick"]}
+        for name in FrameSource.__annotations__.keys() - {"count", "fps", "options", "shots"}:
+            assert getattr(source, name) == getattr(movie, name), name
+        assert source.files == [bunny]
+        assert source.has_audio
+        assert source.shots is source
+        assert movie.shots is None
+        assert source.has(6)
+        assert not source.has(7)
+        source.check(6)
+        source.want([6])
+        assert np.array_equal(source.read(6), movie.read(3))
+        with pytest.raises(MediaError, match="in-between frames of frame 4 are missing"):
+            source.check(7)
