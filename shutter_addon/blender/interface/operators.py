@@ -9,7 +9,7 @@ from bpy.types import Operator
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ...core import presets, recipe
-from ..data import consistency, effects, recipe_export, recipe_import, selection, strips, validation
+from ..data import annotations, consistency, effects, recipe_export, recipe_import, selection, strips, validation
 from ..data.properties import CONTEXT, KINDS
 from ..editing import add_effect, bar_edits, collection_edits, region_edits, shutter_edits
 from ..rendering.session import FAULTS
@@ -338,7 +338,7 @@ class SHUTTER_OT_erase(_OfRegion, Operator):
 
 def drawing_tool(context, effect, region, tool: str) -> bool:
     """Makes the region's layer the active annotation of every preview, and the tool theirs; whether there is one."""
-    if shutter_edits.layer_of(effect, region) is None:
+    if annotations.layer_of(effect, region) is None:
         region_edits.new_layer(effect, region)
     consistency.aim_pen(effect)
     annotation = effect.scene.annotation

@@ -6,8 +6,8 @@ from bpy.app.translations import pgettext_n as n_
 from bpy.types import Menu, Panel, UIList
 
 from ...media import cuts
-from ..data import selection, strips, validation
-from ..editing import bar_edits, shutter_edits
+from ..data import annotations, selection, strips, validation
+from ..editing import bar_edits
 from ..rendering.session import FAULTS
 from . import inbetween_build
 
@@ -33,7 +33,7 @@ class SHUTTER_UL_regions(UIList):
         row = layout.row(align=True)
         row.label(text="", icon="IPO_LINEAR" if region.kind == "LINE" else "MESH_CIRCLE")
         row.prop(region, "name", text="", emboss=False)
-        layer = shutter_edits.layer_of(effect, region)
+        layer = annotations.layer_of(effect, region)
         if layer is None or not any(drawing.strokes for drawing in layer.frames):
             row.label(text="", icon="ERROR")
         if layer is not None:

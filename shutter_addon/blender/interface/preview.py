@@ -15,7 +15,6 @@ from ...core.frame_state import FrameState
 from ...media import MediaError
 from ..data import annotations, effects, geometry, selection, strips
 from ..data.properties import CONTEXT
-from ..editing import shutter_edits
 from ..rendering import invalidation, session
 from ..rendering.blender_gpu import Texture
 from . import drawing, preview_areas
@@ -200,7 +199,7 @@ def _show_strokes(context, quad, effect, moment) -> None:
     if not (space.show_overlays and space.preview_overlay.show_annotation):
         return
     for region, shape in zip(effects.drawn_regions(effect), moment.instant.shapes, strict=True):
-        layer = shutter_edits.layer_of(effect, region)
+        layer = annotations.layer_of(effect, region)
         if layer is not None and layer.annotation_hide:
             continue
         color = (*effect.shutters[shape.shutter].color, 1.0)
