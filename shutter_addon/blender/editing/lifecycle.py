@@ -4,9 +4,10 @@ import uuid
 
 import bpy
 
-from ..data import fcurves, strips
+from ..data import fcurves, requirements, strips
 from ..rendering import invalidation, session
-from . import copies, requirements, undelete
+from . import copies, undelete
+from .add_effect import add_camera
 
 EFFECTS = "virtual_shutter.effects"
 
@@ -40,7 +41,15 @@ def mend() -> None:
     for edit in _edits():
         for strip in strips.own_strips(edit):
             if strip.scene is not None and strip.scene.library is None:
-                requirements.mend(strip)
+                _mend(strip)
+
+
+def _mend(strip) -> None:
+    for owner, name, value in requirements.settings(strip):
+        if getattr(owner, name) != value:
+            setattr(owner, name, value)
+    if requirements.camera(strip) is None:
+        add_camera(strip.scene)
 
 
 def forget() -> None:

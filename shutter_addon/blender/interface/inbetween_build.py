@@ -14,7 +14,7 @@ from bpy.types import Operator
 from ...core import messages
 from ...media import MediaError, inbetween_cache
 from ...media.inbetween import build, estimate
-from ..data import effects, inbetween_settings, selection, source_media, strips
+from ..data import inbetween_settings, selection, source_media, strips, validation
 from ..rendering import invalidation as finished
 from ..rendering.session import FAULTS
 from .operators import _OfEffect, redraw, refused
@@ -182,7 +182,7 @@ class _OfInbetweens(_OfEffect):
             return refused(cls, rpt_("In-between frames are being built; Esc stops that"))
         try:
             inbetween_settings.settings(effect)
-        except effects.EffectError as error:
+        except validation.EffectError as error:
             return refused(cls, str(error))
         return True
 

@@ -103,7 +103,7 @@ class _Shutters:
         layout.use_property_split = True
         layout.prop(effect, "window")
         try:
-            bars = bar_edits.bars_now(effect, effect.active_shutter)
+            bars = bar_edits.shown(effect, effect.active_shutter).bars
         except validation.EffectError as error:
             layout.label(text=str(error), icon="ERROR", translate=False)
             return
