@@ -9,13 +9,13 @@ from bpy.app.handlers import persistent
 
 from .data import inbetween_settings, revision, selection, source_media, strips
 from .editing import copies, lifecycle, undelete
-from .interface import inbetween_build, preview_areas
+from .interface import inbetween_operators, preview_areas
 from .rendering import invalidation, job_snapshots, render_job, session
 
 
 @persistent
 def _before_load(*_):
-    inbetween_build.stop()
+    inbetween_operators.stop()
     session.forget()
     invalidation.forget()
     inbetween_settings.built.forget()

@@ -16,7 +16,7 @@ FACTOR, COUNT = 4, 6
 
 @pytest.fixture
 def inbetween_build(bpy):
-    from shutter_addon.blender.interface import inbetween_build
+    from shutter_addon.blender.rendering import inbetween_build
 
     yield inbetween_build
     inbetween_build.stop()
@@ -116,7 +116,7 @@ def test_a_build_reopens_its_source_once_and_no_other(bpy, inbetween_build, edit
     begun = selection.active(bpy.context)
     ready = edit, strips.effect_of(edit, first.scene), first
     opened, asked, go = [], threading.Semaphore(0), threading.Semaphore(0)
-    monkeypatch.setattr(session, "_open", lambda shown, usual=session._open: opened.append(shown.scene) or usual(shown))
+    monkeypatch.setattr(session, "_open", lambda shown, usual=session._open: opened.append(shown.timing.name) or usual(shown))
 
     def draw():
         for shown in (ready, begun):
@@ -125,8 +125,7 @@ def test_a_build_reopens_its_source_once_and_no_other(bpy, inbetween_build, edit
 
     draw()
     assert len(opened) == 2
-    build = inbetween_build.Build(*begun)
-    inbetween_build._started(bpy.context, build)
+    build = inbetween_build.start(*begun)
     flow += [asked.release, lambda: go.acquire(timeout=5)]
     for _ in range(COUNT - 1):
         assert asked.acquire(timeout=20)
@@ -135,7 +134,7 @@ def test_a_build_reopens_its_source_once_and_no_other(bpy, inbetween_build, edit
     wait([build.future], timeout=20)
     assert not draw()
     assert len(opened) == 2
-    inbetween_build._ended()
+    inbetween_build.ended()
     assert draw()
     assert not draw()
     assert opened[2:] == [strips.source_of(*begun).name]
@@ -284,8 +283,7 @@ def test_a_file_is_closed_in_the_midst_of_a_build(bpy, inbetween_build, flow):
     from shutter_addon.blender.data import selection
 
     flow.append(lambda: time.sleep(0.05))
-    build = inbetween_build.Build(*selection.active(bpy.context))
-    inbetween_build._started(bpy.context, build)
+    build = inbetween_build.start(*selection.active(bpy.context))
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     assert inbetween_build.running() is None
     assert build.future.done()

@@ -118,8 +118,9 @@ def test_a_slow_strip_shows_in_betweens(film, add, edit, render, same_pixels):
         assert abs(found[frame] - (frame - 1)) <= 1
 
 
-def test_what_is_missing_is_said_and_what_is_built_is_shown(film, add, edit, render, tmp_path, same_pixels):
+def test_what_is_missing_is_said_and_what_is_built_is_shown(cache, film, add, edit, render, tmp_path, same_pixels):
     from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.data import strips
     from shutter_addon.media import MediaError, inbetween_cache
 
     first, frames = film
@@ -127,7 +128,7 @@ def test_what_is_missing_is_said_and_what_is_built_is_shown(film, add, edit, ren
     picture = partial(picture_of, effect.scene, 2)
     picture()
     inbetween_cache.purge(cache)
-    for way in (picture, request(*session.strips.find_edit(effect.scene), 2).check):
+    for way in (picture, request(*strips.find_edit(effect.scene), 2).check):
         with pytest.raises(MediaError, match=r"in-between frames of frame 2 are missing"):
             way()
     with open_source(first) as source:
@@ -137,7 +138,7 @@ def test_what_is_missing_is_said_and_what_is_built_is_shown(film, add, edit, ren
     same_pixels(light.to_encoded(picture()[..., :3]) * 255, shown(frames, (4, 4, 8)), 1)
 
 
-def test_in_betweens_of_a_file_that_was_replaced_are_not_shown(film, add, edit, monkeypatch):
+def test_in_betweens_of_a_file_that_was_replaced_are_not_shown(cache, film, add, edit, monkeypatch):
     from shutter_addon.blender.data import source_media
     from shutter_addon.blender.rendering import invalidation
     from shutter_addon.media import MediaError
@@ -156,7 +157,7 @@ def test_in_betweens_of_a_file_that_was_replaced_are_not_shown(film, add, edit, 
     assert not np.allclose(picture_of(effect.scene, 2), before)
 
 
-def test_finished_frames_are_dropped_when_in_betweens_come_and_go(film, add, edit):
+def test_finished_frames_are_dropped_when_in_betweens_come_and_go(cache, film, add, edit):
     from shutter_addon.blender.rendering import invalidation
     from shutter_addon.media.inbetween_cache import purge
 

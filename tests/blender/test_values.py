@@ -408,7 +408,7 @@ def show(bpy, edit):
     from shutter_addon.blender.editing import lifecycle
     from shutter_addon.blender.interface import (
         bar_editor,
-        inbetween_build,
+        inbetween_operators,
         operators,
         panels,
         preview,
@@ -427,7 +427,7 @@ def show(bpy, edit):
             preview.shown(context)
             bar_editor.bar_under(context, 30, 30)
             region_gizmo.place(context)
-            for cls in (*operators.classes, *inbetween_build.classes, *bar_editor.classes, *region_gizmo.classes):
+            for cls in (*operators.classes, *inbetween_operators.classes, *bar_editor.classes, *region_gizmo.classes):
                 if hasattr(cls, "poll"):
                     cls.poll(context)
             split_gizmo.SHUTTER_GGT_split.poll(context)
