@@ -22,9 +22,7 @@ from .inbetween_cache import InbetweenCache, State, pair_line, write_picture
 from .source import SourceWrapper
 
 MEMORY = 4 << 30  # bytes of all pairs that are built at the same time, and of the frames that are read ahead
-AHEAD = (
-    640 << 20
-)  # bytes of frames that are read ahead, of MEMORY; enough for 16 bits in 4K, so that none is read twice
+AHEAD = 640 << 20  # bytes of them for frames that are read ahead; enough to read none of 16 bits in 4K twice
 # Memory for building a pair, in RGBA frames of float32. Measured: 9 to 17 for "quick", 15 to 24.3 for "good".
 LAYERS = 26
 
