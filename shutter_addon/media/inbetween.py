@@ -78,7 +78,7 @@ class InbetweenSource(SourceWrapper):
 
 
 def build(
-    source,
+    source: FrameSource,
     folder,
     factor: int,
     method: str,
@@ -117,7 +117,7 @@ def build(
     return State("ready" if done == len(pairs) else "partial", done, len(pairs))
 
 
-def estimate(source, factor: int) -> int:
+def estimate(source: FrameSource, factor: int) -> int:
     """About how many bytes the files of all in-between frames of a source will have: the mean of three source frames,
     written as in-between frames are, times their number. MediaError: these frames cannot be read or written."""
     samples = {source.count * part // 6 for part in (1, 3, 5)}
@@ -131,7 +131,7 @@ def estimate(source, factor: int) -> int:
     return (source.count - 1) * (factor - 1) * sum(sizes) // len(sizes)
 
 
-def _pairs(source, frames) -> range:
+def _pairs(source: FrameSource, frames: tuple[int, int] | None) -> range:
     """The pairs whose first frame is in the chunk. MediaError: the source has no such frames."""
     first, last = frames or (0, source.count - 1)
     if not 0 <= first <= last < source.count:
@@ -139,7 +139,7 @@ def _pairs(source, frames) -> range:
     return range(first, min(last + 1, source.count - 1))
 
 
-def _tasks(cache, pairs, between, cancelled) -> Iterator[Callable[[], bool]]:
+def _tasks(cache: InbetweenCache, pairs: range, between, cancelled) -> Iterator[Callable[[], bool]]:
     """Yields a function for each pair that builds it and returns whether it is finished. Frames are read here, in the
     caller's thread; the functions may run in any."""
     near = _Near(cache.source)
@@ -161,7 +161,7 @@ class _Near:
 
     The latter are kept for their own pair, as far as AHEAD allows; the rest are read again."""
 
-    def __init__(self, source):
+    def __init__(self, source: FrameSource):
         self._source = source
         self._most = 2 + _ahead(source)
         self._frames: dict[int, np.ndarray] = {}  # the pair's frames, and those that are kept for their pair
@@ -234,18 +234,18 @@ def _in_parallel(tasks, workers) -> Iterator[bool]:
         yield from (future.result() for future in as_completed(running))
 
 
-def _workers(source) -> int:
+def _workers(source: FrameSource) -> int:
     """How many pairs to build at the same time: one per processor, as far as MEMORY allows."""
     pair = source.width * source.height * 16 * LAYERS
     processors = getattr(os, "process_cpu_count", os.cpu_count)() or 1
     return max(1, min(processors, (MEMORY - _ahead(source) * _size(source)) // pair))
 
 
-def _ahead(source) -> int:
+def _ahead(source: FrameSource) -> int:
     """How many frames beyond a pair may be kept: all that decide its kind, as far as AHEAD allows."""
     return min(cuts.NEIGHBOURS - 1, AHEAD // _size(source))
 
 
-def _size(source) -> int:
+def _size(source: FrameSource) -> int:
     """Bytes of a frame."""
     return source.width * source.height * 4 * source.dtype.itemsize

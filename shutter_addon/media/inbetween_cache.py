@@ -19,6 +19,7 @@ import numpy as np
 from OpenImageIO import ImageInput, ImageOutput, ImageSpec, geterror
 
 from ..core import atomic_write
+from ..core.frame_source import FrameSource
 from .completeness import is_whole_picture, why_short
 from .errors import MediaError
 from .files import check_name
@@ -77,7 +78,7 @@ class InbetweenCache:
     kinds: {pair: "same" or "cut"} of pairs without pictures
     """
 
-    def __init__(self, source, folder, factor, method):
+    def __init__(self, source: FrameSource, folder, factor: int, method: str):
         self.source, self.factor, self.method = source, factor, method
         made_of = {
             "maker": MAKER,
@@ -229,7 +230,7 @@ class InbetweenCache:
         return None
 
 
-def identity(source) -> dict:
+def identity(source: FrameSource) -> dict:
     """What tells a source from others, wherever its files lie: their content, and how they are read. A change in a
     file larger than 8 MiB goes unnoticed if it keeps the size and 16 blocks of 4 KiB.
 
@@ -254,7 +255,7 @@ def identity(source) -> dict:
     }
 
 
-def state(source, folder, factor, method) -> State:
+def state(source: FrameSource, folder, factor: int, method: str) -> State:
     """How far a source's in-between frames are built, as the names of their files tell. Only a build or a read opens
     these files.
 
@@ -275,7 +276,7 @@ def state(source, folder, factor, method) -> State:
     return State("stale" if stale else "missing", 0, total)
 
 
-def size(folder, source=None) -> int:
+def size(folder, source: FrameSource | None = None) -> int:
     """The bytes that `purge` would free. Pictures that have changed count as well, though it does not remove them.
 
     While nothing changes it is fast. MediaError: a file of the source is gone."""
@@ -283,7 +284,9 @@ def size(folder, source=None) -> int:
     return sum(_remembered(_sizes, folder / name, partial(_size, folder / name)) for name in _chosen(folder, source))
 
 
-def purge(folder, source=None, left: Callable[[Path, int], None] = lambda path, count: None) -> int:
+def purge(
+    folder, source: FrameSource | None = None, left: Callable[[Path, int], None] = lambda path, count: None
+) -> int:
     """Removes in-between frames in `folder`, of one source or of all, stale ones included. Returns the bytes freed.
 
     It removes nothing else: pictures are read, and removed if they match their digests.
@@ -399,7 +402,7 @@ def _content_of(cache: Folder, name: str) -> bytes | None:
     return None
 
 
-def _chosen(folder, source) -> list[str]:
+def _chosen(folder, source: FrameSource | None) -> list[str]:
     """The names of the caches in `folder`: of one source, stale ones included, or of all."""
     path, made_of = (None, None) if source is None else (_relative(source.path, folder), identity(source))
     return [
