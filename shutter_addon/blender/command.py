@@ -156,9 +156,9 @@ def _written(arguments, file_format: str, frames: tuple[int, int]) -> list[Path]
 
 
 def _files(medium) -> list[Path]:
-    """The files of an image sequence, also those that are missing in it: it would show them, were they there."""
-    files = getattr(medium, "files", [])
-    beside = by_number(files[0]) if files else None
+    """The source's files, also those that are missing in an image sequence: it would show them, were they there."""
+    files = medium.files
+    beside = by_number(files[0]) if len(files) > 1 else None
     return [*files, *(map(beside, range(len(files))) if beside else ())]
 
 
