@@ -116,7 +116,9 @@ def test_a_build_reopens_its_source_once_and_no_other(bpy, inbetween_build, edit
     begun = selection.active(bpy.context)
     ready = edit, strips.effect_of(edit, first.scene), first
     opened, asked, go = [], threading.Semaphore(0), threading.Semaphore(0)
-    monkeypatch.setattr(session, "_open", lambda shown, usual=session._open: opened.append(shown.timing.name) or usual(shown))
+    monkeypatch.setattr(
+        session, "_open", lambda shown, usual=session._open: opened.append(shown.timing.name) or usual(shown)
+    )
 
     def draw():
         for shown in (ready, begun):

@@ -119,7 +119,6 @@ def test_a_slow_strip_shows_in_betweens(film, add, edit, render, same_pixels):
 
 
 def test_what_is_missing_is_said_and_what_is_built_is_shown(cache, film, add, edit, render, tmp_path, same_pixels):
-    from shutter_addon.blender.rendering import session
     from shutter_addon.blender.data import strips
     from shutter_addon.media import MediaError, inbetween_cache
 

@@ -362,7 +362,7 @@ from shutter_addon import __main__
 from shutter_addon.blender.editing import new_edit
 def make_edit(*_):
     raise {fault}
-edits.make_edit = make_edit
+new_edit.make_edit = make_edit
 sys.argv[1:] = ["render", {str(frames)!r}, "--recipe", {str(tmp_path / "recipe.json")!r}, "--output", "out"]
 sys.exit(__main__.main())
 """

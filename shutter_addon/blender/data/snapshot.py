@@ -143,7 +143,7 @@ def strokes_at(edit, effect, strip, index: int, frame: float) -> list[np.ndarray
         return _region(curves, path, effect, region, 0, placement, frames).unmoved(frame)
 
 
-class translated:  # noqa: N801
+class translated:
     """Context in which sentences of core are passed on in the user's language."""
 
     def __enter__(self):
