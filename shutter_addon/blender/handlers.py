@@ -62,6 +62,7 @@ def _before_render(scene, *_):
     if bpy.app.background:  # in a window the render has a thread of its own, and the last update has seen to copies
         lifecycle.mend()
         copies.adopt()
+        lifecycle.follow_sources()
     for edit in bpy.data.scenes:
         invalidation.invalidate_changed(edit)
 

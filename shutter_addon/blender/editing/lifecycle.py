@@ -6,7 +6,7 @@ import bpy
 
 from ..data import fcurves, strips
 from ..rendering import invalidation, session
-from . import copies, requirements, undelete
+from . import copies, match_source, requirements, undelete
 
 EFFECTS = "virtual_shutter.effects"
 
@@ -31,6 +31,7 @@ def update(updated=None) -> None:
     _follow_layers(edits)
     _remove_scenes(updated)
     _identify()
+    follow_sources()
     for edit in _edits():
         invalidation.invalidate_changed(edit)
 
@@ -43,9 +44,16 @@ def mend() -> None:
                 requirements.mend(strip)
 
 
+def follow_sources() -> None:
+    """What of an effect can only be as its source and its edit have it, is so."""
+    for edit in _edits():
+        match_source.follow(edit)
+
+
 def forget() -> None:
-    """Forgets what the annotations of a file were, before another one is loaded."""
+    """Forgets what the annotations and the media of a file were, before another one is loaded."""
     _layer_names.clear()
+    match_source.forget()
 
 
 def _edits() -> list:
