@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support import recipe, sequencer
 
-from shutter_addon.blender.data import annotations, fcurves, selection
+from shutter_addon.blender.data import annotations, fcurves, geometry, selection
 from shutter_addon.blender.editing import match_source
 from shutter_addon.core import recipe as recipes
 
@@ -204,16 +204,19 @@ def test_refused_where_nothing_differs(bpy, edit, made):
 
 @pytest.mark.parametrize("change", [transform, flip])
 def test_scribbles_stay_on_the_picture(bpy, edit, made, change):
-    from shutter_addon.blender.data import effects
-
     strip, source = made(SCRIBBLED)
     effect = edit.virtual_shutter.effects[0]
     before = strokes(effect)
     change(source)
     match(bpy)
     assert strokes(effect) != before
-    (on_picture,) = effects.strokes_at(edit, effect, strip, 0, 1)
-    assert on_picture == pytest.approx(np.array(TRIANGLE[0]), abs=1e-5)
+    assert on_picture(effect, strip) == pytest.approx(np.array(TRIANGLE[0]), abs=1e-5)
+
+
+def on_picture(effect, strip) -> np.ndarray:
+    """The strokes' points, as fractions of the strip's picture."""
+    to_image = geometry.picture_to_image(strip, annotations.picture_size(effect))
+    return geometry.mapped(np.linalg.inv(to_image), np.array(strokes(effect))[:, :2])
 
 
 def test_keys_of_the_transform_are_copied(bpy, edit, made, shown):
@@ -314,10 +317,7 @@ def test_a_larger_file_of_another_aspect_is_followed_by_itself(bpy, edit, made, 
     assert annotations.picture_size(effect) == (40, 40)
     assert words() == []
     if scribbled:
-        from shutter_addon.blender.data import effects
-
-        (on_picture,) = effects.strokes_at(edit, effect, strip, 0, 1)
-        assert on_picture == pytest.approx(np.array(TRIANGLE[0]), abs=1e-5)
+        assert on_picture(effect, strip) == pytest.approx(np.array(TRIANGLE[0]), abs=1e-5)
         before = strokes(effect)
         bpy.context.view_layer.update()
         assert strokes(effect) == before
