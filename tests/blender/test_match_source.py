@@ -267,7 +267,7 @@ def disconnect(bpy, edit, strip):
         bpy.ops.sequencer.disconnect()
 
 
-def test_parts_of_a_cut_effect_match_their_own_part(bpy, edit, made, shown):
+def test_parts_of_a_cut_effect_match_their_own_part(bpy, edit, made, shown, capfd):
     strip, source = made()
     disconnect(bpy, edit, source)
     right = strip.split(21, "SOFT")
@@ -277,6 +277,7 @@ def test_parts_of_a_cut_effect_match_their_own_part(bpy, edit, made, shown):
     plain = shown(source, frames)
     match(bpy)
     assert [(s.left_handle, s.right_handle) for s in (strip, right)] == [(-4, 21), (21, 51)]
+    assert "in the way" not in capfd.readouterr().out
     assert apart(shown(strip, frames[:2]), {f: plain[f] for f in frames[:2]}) <= LEVELS
     assert apart(shown(right, frames[2:]), {f: plain[f] for f in frames[2:]}) <= LEVELS
     assert len(edit.virtual_shutter.effects) == 1
@@ -339,6 +340,19 @@ def test_a_file_that_changes_its_size_in_place_is_followed_and_undo_as_well(bpy,
         effect = bpy.context.scene.virtual_shutter.effects[0]
         assert annotations.picture_size(effect) == size
         assert np.array(strokes(effect)) == pytest.approx(np.array(expected), abs=1e-4)
+
+
+def test_a_render_without_a_window_follows_a_file_that_was_replaced(edit, made, render, large_movie):
+    from shutter_addon.blender import handlers
+
+    strip, source = made()
+    updates = handlers.bpy.app.handlers.depsgraph_update_post
+    updates.remove(handlers.HANDLERS["depsgraph_update_post"])
+    source.filepath, source.mute = str(large_movie), True
+    picture = render(edit, [5])[5]
+    updates.append(handlers.HANDLERS["depsgraph_update_post"])
+    assert (picture[24, :, 3] > 0).sum() == 40
+    assert strip.scene.render.resolution_y == 40
 
 
 def test_headers_are_read_once_and_never_for_a_panel(bpy, made, monkeypatch):

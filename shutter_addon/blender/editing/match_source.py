@@ -56,7 +56,6 @@ def _follow_size(effect) -> None:
     if size is not None and size != annotations.picture_size(effect):
         with _scribbles_kept(effect):
             effect.scene.render.resolution_x, effect.scene.render.resolution_y = size
-        strips.invalidate(effect.id_data, effect.scene)
 
 
 def _size(source) -> tuple[int, int] | None:
