@@ -85,7 +85,8 @@ def parts(effect) -> list[tuple]:
 def differences(effect) -> list[str]:
     """What match would change, in words to be translated."""
     found = parts(effect)
-    words = [word for word, names in _LOOK.items() if any(_look(part, names) != _look(s, names) for part, s in found)]
+    looks = [(_looks(part), _looks(source)) for part, source in found]
+    words = [word for word in _LOOK if any(part[word] != source[word] for part, source in looks)]
     if any((goal.left, goal.right) != _range(goal.part) for goal in _goals(effect, found)):
         words.append(_RANGE)
     return words
@@ -110,9 +111,14 @@ def match(effect) -> list[tuple]:
     return [(goal.part, goal.neighbor) for goal in goals if goal.neighbor is not None]
 
 
-def _look(strip, names) -> str:
-    """Values and keys of a strip's properties, as words: "not a number" is never the same again."""
-    return repr([(_plain(getattr(strip, name)), _curves(strip, f"{strip.path_from_id()}.{name}")) for name in names])
+def _looks(strip) -> dict[str, str]:
+    """What a strip looks like: values and keys, as words: "not a number" is never the same again."""
+    path = f"{strip.path_from_id()}."
+    curves = [curve for curve in fcurves.curves_under(strip.id_data, path) if not curve.mute]
+    return {
+        word: repr([(_plain(getattr(strip, name)), _keyed(curves, path + name)) for name in names])
+        for word, names in _LOOK.items()
+    }
 
 
 def _plain(value):
@@ -122,14 +128,14 @@ def _plain(value):
     return tuple(value) if isinstance(value, bpy.types.bpy_prop_array | mathutils.Vector) else value
 
 
-def _curves(strip, path: str) -> list:
-    curves = [curve for curve in fcurves.curves_under(strip.id_data, path) if not curve.mute]
+def _keyed(curves, path: str) -> list:
     return sorted(
         (
             (curve.data_path.removeprefix(path), curve.array_index, curve.extrapolation),
             [(*key.handle_left, *key.co, *key.handle_right, key.interpolation) for key in curve.keyframe_points],
         )
         for curve in curves
+        if curve.data_path.startswith(path)
     )
 
 
@@ -270,8 +276,5 @@ def copy_modifiers(effect) -> None:
 
 def effects_on(edit, source) -> list:
     """The effect strips of Blender's that have a source as input: what they make of it, the engine does not see."""
-    return [strip for strip in edit.sequence_editor.strips_all if source in _inputs(strip)]
-
-
-def _inputs(strip) -> list:
-    return [getattr(strip, name) for name in ("input_1", "input_2") if hasattr(strip, name)]
+    inputs = ("input_1", "input_2")
+    return [s for s in edit.sequence_editor.strips_all if any(getattr(s, name, None) == source for name in inputs)]
