@@ -8,7 +8,7 @@ import pytest
 from support import recipe, sequencer
 
 from shutter_addon.blender.data import annotations, fcurves, geometry, selection
-from shutter_addon.blender.editing import match_source
+from shutter_addon.blender.editing import lifecycle, match_source
 from shutter_addon.core import recipe as recipes
 
 LEVELS = 1
@@ -326,7 +326,7 @@ def test_a_larger_file_of_another_aspect_is_followed_by_itself(bpy, edit, made, 
         assert apart(shown(strip, [1, 20, 40]), shown(source, [1, 20, 40])) <= LEVELS
 
 
-def test_a_file_that_changes_its_size_in_place_is_followed_and_undo_as_well(bpy, edit, made, movie, large_movie):
+def test_undo_takes_size_and_scribbles_along(bpy, edit, made, large_movie):
     _strip, source = made(SCRIBBLED)
     bpy.ops.ed.undo_push(message="before")
     before = strokes(edit.virtual_shutter.effects[0])
@@ -353,6 +353,19 @@ def test_a_render_without_a_window_follows_a_file_that_was_replaced(edit, made, 
     updates.append(handlers.HANDLERS["depsgraph_update_post"])
     assert (picture[24, :, 3] > 0).sum() == 40
     assert strip.scene.render.resolution_y == 40
+
+
+def test_a_film_keeps_its_size(bpy, edit, made, large_movie, monkeypatch):
+    from shutter_addon.blender.data import source_media
+
+    _strip, source = made()
+    monkeypatch.setattr(source_media, "filming", True)
+    source.filepath = str(large_movie)
+    bpy.context.view_layer.update()
+    assert annotations.picture_size(edit.virtual_shutter.effects[0]) == (32, 24)
+    monkeypatch.undo()
+    lifecycle.update()
+    assert annotations.picture_size(edit.virtual_shutter.effects[0]) == (40, 40)
 
 
 def test_headers_are_read_once_and_never_for_a_panel(bpy, made, monkeypatch):

@@ -4,7 +4,7 @@ import uuid
 
 import bpy
 
-from ..data import fcurves, strips
+from ..data import fcurves, source_media, strips
 from ..rendering import invalidation, session
 from . import copies, match_source, requirements, undelete
 
@@ -31,7 +31,8 @@ def update(updated=None) -> None:
     _follow_layers(edits)
     _remove_scenes(updated)
     _identify()
-    follow_sources()
+    if not source_media.filming:  # a film keeps its size
+        follow_sources()
     for edit in _edits():
         invalidation.invalidate_changed(edit)
 
