@@ -21,7 +21,7 @@ def main() -> int:
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(NAMES)}; or all")
     where = "instead of out/gallery; scripts/gallery takes it from the project's folder"
     parser.add_argument("--output", type=Path, default=ROOT / "out" / "gallery", metavar="DIR", help=where)
-    parser.add_argument("--docs", action="store_true", help="renew the README's pictures, docs/gallery/NAME.jpg")
+    parser.add_argument("--docs", action="store_true", help="renew the manual's pictures, docs/gallery/NAME.jpg")
     arguments = parser.parse_args()
     names = NAMES if arguments.names == ["all"] else arguments.names
     if unknown := [name for name in names if name not in NAMES]:

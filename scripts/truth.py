@@ -259,7 +259,7 @@ def parse(arguments=None):
     add("--json", type=Path, metavar="FILE", help="where the rows are written")
     add("--size", type=size, default=(640, 360), metavar="WIDTHxHEIGHT")
     add("--samples", type=int, default=1024, help="for each pixel, of Cycles' picture and of all sub-frames together")
-    add("--docs", action="store_true", help="renew the README's picture, docs/truth.jpg")
+    add("--docs", action="store_true", help="renew the picture of docs/developers.md, docs/truth.jpg")
     args = parser.parse_args(arguments)
     if args.samples < 1 or args.samples % SUBFRAMES:
         parser.error(f"--samples: {args.samples} is not a multiple of {SUBFRAMES}: each sub-frame has as many")

@@ -122,7 +122,8 @@ def test_the_version_is_the_same_everywhere():
     version = tomllib.loads((ROOT / "blender_manifest.toml").read_text())["version"]
     assert tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"] == version
     assert re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)[1] == version
-    assert set(re.findall(r"virtual_shutter-([\d.]+)-", (ROOT / "README.md").read_text())) == {version}
+    for page in ("README.md", "docs/farms.md"):
+        assert set(re.findall(r"virtual_shutter-([\d.]+)-", (ROOT / page).read_text())) == {version}
 
 
 def test_the_wheels_are_what_the_code_needs_and_blender_lacks():

@@ -5,7 +5,7 @@ from .data import properties
 from .interface import (
     bar_editor,
     icons,
-    inbetween_build,
+    inbetween_operators,
     operators,
     panels,
     preview,
@@ -22,7 +22,7 @@ _modules = (
     icons,
     preview,
     operators,
-    inbetween_build,
+    inbetween_operators,
     panels,
     bar_editor,
     region_gizmo,

@@ -25,14 +25,14 @@ from ..media import MediaError, open_source
 from ..media.completeness import is_whole_blend, why_short
 from ..media.files import check_name
 from ..media.sequence import by_number
-from .data import effects, inbetween_settings, source_media, strips
+from .data import inbetween_settings, snapshot, source_media, strips, validation
 from .editing import new_edit
 from .rendering import film_output, session
 
 BAD_INPUT = 2
 FACTORS = get_args(recipe.Factor)  # 1: none
 METHODS = tuple(inbetween_settings.METHODS.values())
-FAULTS = (recipe.RecipeError, MediaError, film_output.OutputError, effects.EffectError, NoDeviceError)
+FAULTS = (recipe.RecipeError, MediaError, film_output.OutputError, validation.EffectError, NoDeviceError)
 
 
 def main(argv: list[str]) -> int:
@@ -132,16 +132,15 @@ def _render(arguments) -> None:
         film_output.set_output(edit, output, file_format, alpha=medium.alpha != "opaque")
     if arguments.save:
         _save(edit, arguments.save)
-    session.device = arguments.device
-    if source_recipe.inbetween > 1:
-        inbetween_settings.given = _cache(arguments)
-        _build_lacking(edit)
-    if output:
-        session.weights_folder = arguments.weights
-        if arguments.weights:
+    folder = _cache(arguments) if source_recipe.inbetween > 1 else None
+    with session.using(session.RenderSettings(arguments.device, arguments.weights if output else None, folder)):
+        if folder:
+            _build_lacking(edit, folder)
+        if output and arguments.weights:
             arguments.weights.mkdir(parents=True, exist_ok=True)
             film_output.clear_up(arguments.weights)
-        film_output.film(edit, output)
+        if output:
+            film_output.film(edit, output)
 
 
 def _written(arguments, file_format: str, frames: tuple[int, int]) -> list[Path]:
@@ -157,9 +156,9 @@ def _written(arguments, file_format: str, frames: tuple[int, int]) -> list[Path]
 
 
 def _files(medium) -> list[Path]:
-    """The files of an image sequence, also those that are missing in it: it would show them, were they there."""
-    files = getattr(medium, "files", [])
-    beside = by_number(files[0]) if files else None
+    """The source's files, also those that are missing in an image sequence: it would show them, were they there."""
+    files = medium.files
+    beside = by_number(files[0]) if len(files) > 1 else None
     return [*files, *(map(beside, range(len(files))) if beside else ())]
 
 
@@ -184,13 +183,13 @@ def _cache(arguments) -> Path:
     return arguments.cache or (arguments.save or arguments.output).parent / inbetween_settings.FOLDER
 
 
-def _build_lacking(edit) -> None:
+def _build_lacking(edit, folder: Path) -> None:
     """Builds the in-between frames that the edit's frames need."""
     strip = strips.effect_strips(edit)[0]
     effect = strips.effect_of(edit, strip.scene)
-    pairs = session.pairs(edit, effect, strip, range(edit.frame_start, edit.frame_end + 1))
-    with source_media.open_media(strips.source_of(edit, effect, strip)) as medium:
-        _build(medium, *inbetween_settings.settings(effect), sorted(pairs))
+    shown = snapshot.take(edit, effect, strip, range(edit.frame_start, edit.frame_end + 1), folder=folder)
+    with shown.source.open() as medium:
+        _build(medium, *shown.inbetween, sorted(session.pairs(shown)))
 
 
 def _build_alone(arguments) -> None:

@@ -2,21 +2,23 @@
 an effect ends."""
 
 import sys
+from functools import partial
 
 import bpy
 from bpy.app.handlers import persistent
 
-from .data import selection, source_media, strips
-from .editing import copies, lifecycle, requirements, undelete
-from .interface import inbetween_build, preview_areas
-from .rendering import invalidation, render_job, session
+from .data import inbetween_settings, revision, selection, source_media, strips
+from .editing import copies, lifecycle, undelete
+from .interface import inbetween_operators, preview_areas
+from .rendering import invalidation, job_snapshots, render_job, session
 
 
 @persistent
 def _before_load(*_):
-    inbetween_build.stop()
+    inbetween_operators.stop()
     session.forget()
     invalidation.forget()
+    inbetween_settings.built.forget()
     source_media.forget()
     lifecycle.forget()
 
@@ -29,12 +31,16 @@ def _after_load(*_):
 
 @persistent
 def _update(scene=None, *_):
+    revision.changed()
+    if render_job.runs() and bpy.app.is_job_running("RENDER"):
+        job_snapshots.look(render_job.film())
     if not render_job.cancelling():
         lifecycle.update(scene)
 
 
 @persistent
 def _after_undo(*_):
+    revision.changed()
     for edit in bpy.data.scenes:
         strips.invalidate(edit)
     session.drop_removed()
@@ -54,23 +60,33 @@ def _before_render(scene, *_):
     if render_job.cancelling():
         return
     render_job.begin(scene)
-    invalidation.drop_spoilt()
     if scene.render.engine == strips.ENGINE:
+        if not render_job.in_job():
+            invalidation.drop_spoilt()
         return
+    film = scene.session_uid
+    render_job.on_main_thread(partial(_prepare, film, render_job.in_job()))
+
+
+def _prepare(film: int, in_job: bool) -> None:
+    """On the main thread, whatever thread renders."""
+    invalidation.drop_spoilt()
     source_media.look_again()
-    source_media.filming = render_job.runs()
-    if bpy.app.background:  # in a window the render has a thread of its own, and the last update has seen to copies
+    source_media.rest(render_job.runs())
+    if bpy.app.background:  # in a window the last update has seen to it
         lifecycle.mend()
         copies.adopt()
         lifecycle.follow_sources()
     for edit in bpy.data.scenes:
         invalidation.invalidate_changed(edit)
+    if in_job:
+        job_snapshots.begin(film)
 
 
 @persistent
 def _before_frame(scene, *_):
     if render_job.is_film(scene):
-        if (sentence := requirements.left_out(scene)) is not None:
+        if (sentence := job_snapshots.left_out(scene)) is not None:
             render_job.fail(sentence)
         if render_job.stopping():
             render_job.cancel()
@@ -79,9 +95,10 @@ def _before_frame(scene, *_):
 @persistent
 def _after_render(scene, *_):
     if render_job.is_film(scene):
-        invalidation.drop_spoilt()
+        invalidation.drop_spoilt_later()
+        job_snapshots.end()
     render_job.end(scene, alone=sys._getframe().f_back is None)
-    source_media.filming = render_job.runs()
+    source_media.rest(render_job.runs())
 
 
 HANDLERS = {

@@ -12,19 +12,21 @@ from functools import partial
 import numpy as np
 
 from ..core import compositor, light, shutters
+from ..core.frame_source import FrameSource
 from ..core.frame_state import FrameState, Options
 from .diffusion import diffuse
 from .running_sums import RunningSums, summable
 
-# A tile's rows and columns, multiples of every block: its arrays stay within the processor's cache, and coefficients
-# differ little across it.
+# A tile's rows and columns, multiples of every block. So small that its arrays stay in the processor's cache, and that
+# coefficients differ little across it.
 TILE = 128, 128
-# Pieces of a quantile that are looked at together.
+# Pieces of a quantile that are computed in one step.
 TOGETHER = 3
-# Running sums above this are not made, but composed from the frames themselves, which take a third of it. It is enough
-# for 64 frames of 1080p, or 20 of 4K.
+# Bytes of running sums, at most: enough for windows of 64 frames of 1080p, or 20 of 4K. Larger windows are composed
+# from the frames, which take a third as much.
 SUMS_BYTES = 2 << 30
-# White in the running sums: the most of which 256 are exact in a float32. Every 8-bit value is, in encoded light.
+# White in the running sums: the largest of which the sum over 256 frames is exact in a float32. In encoded light every
+# 8-bit value is exact as well.
 WHITE = (1 << 16) - 1
 
 
@@ -59,11 +61,11 @@ def _tiles(source) -> list[Tile]:
 
 
 class Frames:
-    """The frames of a source that a window needs, on the host."""
+    """A window of the frames as they are, on the host."""
 
     unit = 1.0
 
-    def __init__(self, source, capacity: int):
+    def __init__(self, source: FrameSource, capacity: int):
         self.source, self.capacity = source, capacity
         self.shot = range(source.count)
         self.tiles = _tiles(source)
@@ -76,7 +78,7 @@ class Frames:
         return self.frames.keys()
 
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
-        """As RunningSums.load."""
+        """See RunningSums.load."""
         self.shot = shot
         frames = compositor.source_frames(options, positions, shot).tolist()
         self._at, wanted = dict(zip(positions.tolist(), frames, strict=True)), set(frames)
@@ -95,19 +97,19 @@ class Frames:
 
 
 class Sums(RunningSums):
-    """Running sums of opaque 8-bit frames, uint32 for each of the three colours: 12 bytes a pixel and layer."""
+    """A window of running sums of opaque 8-bit frames, on the host: three uint32 for each pixel and layer."""
 
     unit = 1 / WHITE
 
-    def __init__(self, source, capacity: int):
+    def __init__(self, source: FrameSource, capacity: int):
         super().__init__(source, capacity)
         self.tiles = _tiles(source)
         # What a sum begins with is arbitrary.
         self._sums = [np.zeros((3, self.layers, *tile.shape), np.uint32) for tile in self.tiles]
 
     @staticmethod
-    def fit(source, capacity: int) -> bool:
-        """Whether they can be made of a source, and are within the budget."""
+    def fit(source: FrameSource, capacity: int) -> bool:
+        """Whether running sums can be made of a source, in at most SUMS_BYTES."""
         return summable(source) and 12 * source.width * source.height * (capacity + 1) <= SUMS_BYTES
 
     def _add(self, frame: int, same: int | None, known: int, next_: int) -> None:
@@ -159,7 +161,7 @@ def _difference(late: np.ndarray, early: np.ndarray) -> np.ndarray:
 
 
 class Solver:
-    """compute.diffusion as compute.diffusion_gpu's class Diffusion; it never starts from the last solution."""
+    """compute.diffusion, with the methods of compute.diffusion_gpu.Diffusion. It ignores `warm`."""
 
     def solve(self, labels: np.ndarray, count: int, *, warm: bool = False) -> np.ndarray:
         return diffuse(labels, count)
@@ -176,7 +178,7 @@ class CPUCompositor:
     def current(self):
         return nullcontext(self)
 
-    def window(self, source, capacity: int) -> Frames | Sums:
+    def window(self, source: FrameSource, capacity: int) -> Frames | Sums:
         return (Sums if Sums.fit(source, capacity) else Frames)(source, capacity)
 
     def solver(self) -> Solver:
@@ -218,7 +220,7 @@ class CPUCompositor:
 
 
 def _few(pieces: int, frames: int) -> bool:
-    """Whether it is quicker to go through the pieces of a quantile than through the frames that any shutter exposes.
+    """Whether to go through the pieces of a quantile, because that is faster than through the frames that are exposed.
 
     Measured at 720p for 4 shutters over 8 to 64 frames, in milliseconds: 30 + 12 · pieces, 20 + 4.4 · frames.
     """
@@ -226,8 +228,8 @@ def _few(pieces: int, frames: int) -> bool:
 
 
 def _way(window, options: Options, bars: np.ndarray, origin: int, present: np.ndarray, direction: int):
-    """The quickest way to expose a tile: a function of tile, coefficients and block. Times count from the first frame
-    that any shutter exposes."""
+    """The fastest function (tile, coefficients, block) → light of that tile. In it, time 0 is the first frame that any
+    shutter exposes."""
     first, last = shutters.open_span(bars)
     bars, origin, whole = bars[:, first:last], origin + first, present[first:last].all()
     if options.interpolation == "displacement":

@@ -1,15 +1,17 @@
-"""Diffusion on a device: the harmonic function of compute.diffusion, with work at full size near scribbles alone.
+"""Diffusion on a device: the harmonic function of compute.diffusion, computed at full size near scribbles alone.
 
-Far from scribbles the solution is smooth. So a grid of the multigrid, coarse cells on the even cells of the finer one,
-has cells of its own only in tiles within BAND tiles of a scribble's; elsewhere it is what the next grid makes of it,
-linearly between the cells. What is solved is the Galerkin equation on all those cells together: with U the values of a
-grid, f its right side, A its operator, P the prolongation, and W = U − P U' what it has of its own beside the next
-grid's U' (nothing, outside its tiles), the right side of the next grid is Pᵀ(f − A W), and its operator PᵀAP (nine
-points). P interpolates by the operator, as Dendy's black box multigrid does: fixed pixels are walls on all grids, and
-no scene is slow.
+The method is multigrid. The cells of grid 0 are the pixels; those of every coarser grid lie on the even cells of the
+finer one. Far from scribbles the solution is smooth. A grid therefore has cells of its own only in tiles near
+scribbles (see BAND); elsewhere its values are interpolated linearly from the next coarser grid.
 
-Nothing of earlier calls is left in a solution that did not start from one: operators depend on the labels alone, and
-are made anew where labels are near or were; W and f are nothing outside their tiles.
+For one grid, let U be its values, f its right-hand side, A its operator, P the prolongation from the next coarser grid
+and U' the values of that grid. The grid's own part W = U − P U' is zero outside its tiles. The next grid has the
+right-hand side Pᵀ(f − A W) and the Galerkin operator PᵀAP, a stencil of nine points. P follows the operator, as in
+Dendy's black box multigrid: fixed pixels are walls on every grid, so the number of cycles needed does not depend on
+the scene.
+
+A solve that starts from nothing depends on the labels alone, to the bit. For that, operators are made anew where
+scribbles are or were in the last solve, and W and f are set to zero there and outside the tiles.
 """
 
 from __future__ import annotations
@@ -20,26 +22,31 @@ import numpy as np
 
 from .passes import Image, Pass
 
-# Largest error × 255 after 1, 2, 3, 4 cycles: over the scenes of the tests 3.9, 0.67, 0.66, 0.66 (median 2.1, 0.13,
-# 0.07, 0.07), what is left then is what is linear far from scribbles; over their lattices of dots 11, 1.6, 0.25, 0.24.
+# V-cycles of a solve that starts from nothing. Largest error × 255 after 1, 2, 3, 4 cycles: 3.9, 0.67, 0.66, 0.66 over
+# the scenes of the tests (median 2.1, 0.13, 0.07, 0.07), and 11, 1.6, 0.25, 0.24 over their lattices of dots. The error
+# that remains is that of linear interpolation far from scribbles.
 CYCLES = 3
-# From the solution before scribbles moved a little: 0.66 where they moved by 3 pixels of 1920. Two cycles take twice
-# as long, and are as exact wherever scribbles come from.
+# V-cycles of a solve that starts from the last solution. One leaves an error × 255 of 0.66 where scribbles moved by 3
+# pixels of 1920. Two leave as little however far they moved, and take twice as long.
 WARM_CYCLES = 1
-# Of every grid before and after the coarser ones: at full size two, for all that a moved scribble leaves is there.
+# Smoothing sweeps over a grid before its correction by the coarser grids, and again after it. Full size has two: the
+# error that a moved scribble leaves is all there.
 SWEEPS = 1
 FINEST_SWEEPS = 2
-# A grid of so many cells along its longer side, or fewer, has cells everywhere; the first such one has two turns.
+# Cells along the longer side of a grid: with this many or fewer it has cells everywhere. The finest such grid is
+# visited twice in a cycle.
 WHOLE = 128
-# A grid of so many cells along its longer side, or fewer, is solved at once, by one invocation.
+# Cells along the longer side of a grid: with this many or fewer it is the coarsest, and one invocation solves it.
 SOLVED = 8
-# How far from a scribble's tile a larger grid has cells of its own, in tiles. Two leave 0.19 of the 0.66, in 1.7 times
-# the time.
+# A grid larger than WHOLE has cells of its own in tiles with a scribble, and in this many tiles on each side of those.
+# With two, the error × 255 falls from 0.66 to 0.19, and a solve takes 1.7 times as long.
 BAND = 1
-# How much what holds a cell beside its line of coarse cells keeps it from following them.
+# The prolongation to a cell on the line between two coarse cells: the share, 0 … 1, of what ties the cell to fixed
+# cells beside that line that counts against following the two.
 HOLD = 0.3
-# Coefficients below this are none: regions that one shutter encloses get exactly that one.
+# Coefficients below this are set to 0, so that a region enclosed by one shutter's scribble gets exactly that shutter.
 NOTHING = 1 / 4096
+# Cells (y, x) of 2 × 2 in the order of a smoothing sweep.
 _COLOURS = ((0, 0), (1, 1), (0, 1), (1, 0))
 
 _READ = Image("rgba32f", reads=True, writes=False)
@@ -52,7 +59,7 @@ _GRIDS = {**_GRID, "coarse": "ivec2"}
 
 
 def _pass(name: str, reads: tuple[str, ...], images: dict[str, Image], constants: dict[str, str]) -> Pass:
-    """A pass over tiles. All textures are images: a software renderer's texelFetch takes far longer."""
+    """A pass over a list of tiles. It reads all textures as images: texelFetch is far slower on a software renderer."""
     return Pass(f"diffuse_{name}", images={**_TILES, **dict.fromkeys(reads, _READ), **images}, constants=constants)
 
 
@@ -80,10 +87,27 @@ _EXPAND_RIM = _pass("expand_rim", ("coarser",), {"solution": _STORED}, {**_GRIDS
 
 
 class _Grid:
-    """A grid's textures: layers of four shutters each, the operator, which the finest reads from its labels, and P.
+    """The textures of a grid, and what is known of its tiles.
 
-    The last solve's tiles (rows, columns): `reached` by scribbles, of 8 × 8 cells; `touched` by them more closely, and
-    `solid`, all fixed, of 4 × 4. `ranges`: where lists of them lie in the texture of all.
+    textures, rgba32f but for the labels:
+        solution, own, right: U, W and f, four shutters per layer; the finest grid has no f
+        stencil: the operator A; the finest grid has r16ui labels in its place
+        weights: P, what each cell takes of the coarse cells around it
+
+    Tiles of the last solve, as bool arrays (rows, columns):
+        reached: tiles of 8 × 8 cells within BAND tiles of a scribble's; up to WHOLE cells, all tiles
+        touched: tiles of 4 × 4 cells with a scribble in them or beside them
+        solid: tiles of 4 × 4 cells with nothing free in them or around them
+
+    ranges: {list: (first, last)}, where each list of tiles for the passes lies in the texture of all lists. Tiles of
+    8 × 8 cells, but for the last two:
+        near: with free cells, and cells of the grid's own
+        reached: those near, and the tiles around them, where W can still have an effect
+        far: with free cells, and not reached; their values come from the next grid
+        rim: not near, and at the end of rows or columns that reach beyond the next grid's last cells
+        anew: where values of the last solve may be left
+        feeding: near tiles and those around them, as tiles of 4 × 4 cells of the next grid
+        changed: tiles of 4 × 4 cells whose operator may not be that of the last solve
     """
 
     def __init__(self, device, width: int, height: int, layers: int, finest: bool):
@@ -105,7 +129,7 @@ class _Grid:
 
 
 class Diffusion:
-    """diffuse() on a device. Textures stay until the size or the number of shutters changes."""
+    """compute.diffusion.diffuse on a device. Its textures are kept until the size or the number of shutters changes."""
 
     def __init__(self, device):
         self._device = device
@@ -114,10 +138,11 @@ class Diffusion:
         self._tiles = None
 
     def solve(self, labels: np.ndarray, count: int, *, warm: bool = False):
-        """A texture array rgba32f, shutter i in layer i // 4 and channel i % 4, from labels (H, W) uint16.
+        """Coefficients from labels (H, W) uint16, 0 free, 1 + shutter fixed: a texture array rgba32f, shutter i in
+        layer i // 4 and channel i % 4. The next call overwrites it. Nothing is read back from the device.
 
-        The next call overwrites it. Nothing is read back. warm: start from the last solution, if there is one for this
-        size and count: quicker where scribbles moved a little, but what comes out depends on what was solved before.
+        warm: start from the last solution, if that had this size and count. It is faster where scribbles moved a
+        little, and the result depends on the last solution as well, within the error.
         """
         warm = self._prepare(labels.shape, count) and warm
         finest = self._grids[0]
@@ -139,7 +164,7 @@ class Diffusion:
         self._grids, self._made_for, self._tiles = [], None, None
 
     def _prepare(self, shape, count) -> bool:
-        """Makes the grids; whether they have been solved for this size and count."""
+        """Makes the grids for a size (H, W) and a number of shutters. Whether they were there, with a solution."""
         height, width = shape
         if self._made_for == (width, height, count):
             return True
@@ -155,7 +180,7 @@ class Diffusion:
         return False
 
     def _list_tiles(self, labels: np.ndarray) -> None:
-        """For every grid: what tiles have cells of their own, and whose operator and values are to be made anew."""
+        """Sends the lists of tiles of all grids to the device, and notes their places (_Grid.ranges)."""
         held, free = _in_fours(labels != 0)
         listed, end = [], 0
         for grid in self._grids:
@@ -163,14 +188,15 @@ class Diffusion:
             solid = ~_grown(free, 1 if grid.finest else 2)
             changed = (touched | grid.touched) & ~(solid & grid.solid)
             held, free = _halved(held), _halved(free)
-            # Cells of a coarser grid that lie in a scribble may still follow free ones beside it.
+            # A coarse cell inside a scribble may still have a value: it stands for free cells beside the scribble.
             live = free if grid.finest else _grown(free)
             reached = _grown(held, BAND) if max(grid.size) > WHOLE else np.ones_like(held)
             near = reached & live
             feeding = _grown(near)
             around = feeding & live
             stale = (reached | grid.reached) & _grown(live)
-            # What lies around is read as having nothing of its own; what is all fixed has labels, at full size alone.
+            # Passes read W in the tiles around those near, so it must be zero there. At full size, tiles that are all
+            # fixed must hold the values of their labels.
             anew = stale | around | ~live if grid.finest else stale | around
             rim = ~near & live & _last_ones(grid)
             eights, fours = grid.codes
@@ -194,14 +220,14 @@ class Diffusion:
         self._device.write(self._tiles, rows)
 
     def _start(self, warm: int) -> None:
-        """Values to start from, and nothing of what was there for other scribbles."""
+        """The values to start from; whatever else other scribbles left is set to zero."""
         finest = self._grids[0]
         self._run(_START, finest, "anew", 64, finest.layers, warm=warm)
         for fine, grid in pairwise(self._grids):
             self._run(_CLEAR, grid, "anew", 64, grid.layers, finer=fine.textures["solution"], warm=warm)
 
     def _coarsen(self) -> None:
-        """The operators, and what cells take of the next grid's."""
+        """Makes each grid's prolongation P, and from it the next grid's operator."""
         for fine, coarse in pairwise(self._grids):
             self._run(_WEIGHTS_FINEST if fine.finest else _WEIGHTS, fine, "changed", 8, hold=HOLD)
             coarsen = _COARSEN_FINEST if fine.finest else _COARSEN
@@ -209,10 +235,10 @@ class Diffusion:
             self._run(coarsen, coarse, "changed", 16, **fine.textures, **to)
 
     def _cycle(self, index: int) -> None:
-        """A V-cycle from a grid on down."""
+        """A V-cycle over the grid of this index and all coarser ones."""
         grid, *coarser = self._grids[index : index + 2]
         if not coarser:
-            self._run(_SOLVE, grid, "near", 1, grid.layers)  # its one tile
+            self._run(_SOLVE, grid, "near", 1, grid.layers)  # the coarsest grid has one tile
             return
         sweeps = FINEST_SWEEPS if grid.finest else SWEEPS
         self._smooth(grid, sweeps)
@@ -220,7 +246,7 @@ class Diffusion:
         self._smooth(grid, sweeps)
 
     def _correct(self, index: int, grid: _Grid, coarse: _Grid) -> None:
-        """What the grid has of its own stays; the rest comes from the coarser grids anew."""
+        """Solves the coarser grids for this grid's right-hand side: W stays, and U becomes W + P U' with the new U'."""
         values, own = grid.textures["solution"], grid.textures["own"]
         prolong = {"coarse": coarse.size, "coarser": coarse.textures["solution"]}
         self._run(_PROLONG, grid, "near", 16, grid.layers, **prolong, **{"from": values}, to=own, amount=-1.0)
@@ -232,6 +258,7 @@ class Diffusion:
         self._run(_PROLONG, grid, "reached", 16, grid.layers, **prolong, **{"from": own}, to=values, amount=1.0)
 
     def _smooth(self, grid: _Grid, sweeps: int) -> None:
+        """Gauss-Seidel sweeps: red-black at full size, where cells have four neighbours, and else in four colours."""
         for _ in range(sweeps):
             if grid.finest:
                 for colour in (0, 1):
@@ -242,7 +269,7 @@ class Diffusion:
                         self._run(_SMOOTH, grid, "near", 16, grid.layers, colour=(x, y))
 
     def _finish(self) -> None:
-        """Coefficients everywhere, from the coarsest grid on."""
+        """Makes coefficients of the solution, on all cells of all grids, from the coarsest to the finest."""
         for index, grid in reversed(list(enumerate(self._grids))):
             self._run(_FINISH, grid, "near", 64, nothing=NOTHING)
             if index + 1 < len(self._grids):
@@ -253,19 +280,24 @@ class Diffusion:
                 self._run(_EXPAND_RIM, grid, "rim", 16, **below, beyond=beyond)
 
     def _margin(self, index: int) -> list[float]:
-        """From the centres of the last cells of a grid to the frame's edge, in cells (x, y)."""
+        """How far the picture's edge lies beyond the centres of the grid's last cells, [x, y] in the grid's cells."""
         sizes = zip(self._grids[0].size, self._grids[index].size, strict=True)
         return [(pixels - 0.5) / 2**index - (cells - 1) for pixels, cells in sizes]
 
     def _run(self, program: Pass, grid: _Grid, tiles: str, cells: int, layers: int = 1, **extra) -> None:
-        """Runs a pass over so many cells of each of a grid's tiles; `extra` names textures and constants besides the
-        grid's own."""
+        """Runs a pass over a list of the grid's tiles.
+
+        tiles: the list, a key of grid.ranges
+        cells: invocations for each tile
+        layers: layers of four shutters
+        extra: textures and constants besides the grid's own, by name
+        """
         first, last = grid.ranges[tiles]
         if first == last:
             return
         own = {"size": grid.size, "layers": grid.layers, "first": first, "last": last, "tiles": self._tiles}
         given = {**own, **grid.textures, **extra}
-        # Tiles of four invocations go two to a row.
+        # These passes have four invocations for each tile, and take two tiles to a row of eight.
         rows = -(-(last - first) // 2) if program in (_WEIGHTS, _WEIGHTS_FINEST) else last - first
         self._device.run(
             program,
@@ -276,23 +308,25 @@ class Diffusion:
 
 
 def _in_fours(fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which tiles (rows, columns) of 4 × 4 have any fixed cells of (H, W) bool, and which have any free ones."""
+    """Which tiles (rows, columns) of 4 × 4 cells have fixed cells, and which have free ones. fixed: (H, W) bool."""
     height, width = fixed.shape
     if height % 4 or width % 4:
         fixed = np.pad(fixed, ((0, -height % 4), (0, -width % 4)), mode="edge")
-    fours = np.ascontiguousarray(fixed).view(np.uint32)  # a row of a tile at once
+    fours = np.ascontiguousarray(fixed).view(np.uint32)  # four bools, a row of a tile, as one number
     any_of = fours[0::4] | fours[1::4] | fours[2::4] | fours[3::4]
     all_of = fours[0::4] & fours[1::4] & fours[2::4] & fours[3::4]
     return any_of != 0, all_of != 0x01010101
 
 
 def _codes(rows: int, columns: int, fours: int) -> np.ndarray:
-    """Tiles (rows, columns), each so many times four cells wide, as shaders have them."""
+    """The code of each tile (rows, columns) float32 for the shaders: x + 4096 · y of its first cell, counted in fours.
+
+    fours: the side of a tile, in fours of cells."""
     return (fours * (np.arange(columns) + 4096 * np.arange(rows)[:, None])).astype(np.float32)
 
 
 def _last_ones(grid: _Grid) -> np.ndarray:
-    """The tiles (rows, columns) with cells beyond the last ones of the next grid."""
+    """The tiles (rows, columns) with cells beyond the next grid's last ones: the last tiles where a side is even."""
     width, height = grid.size
     last = np.zeros_like(grid.reached)
     last[:, -1] = width % 2 == 0
@@ -301,7 +335,7 @@ def _last_ones(grid: _Grid) -> np.ndarray:
 
 
 def _grown(tiles: np.ndarray, times: int = 1) -> np.ndarray:
-    """Tiles (rows, columns) bool and those around them."""
+    """Tiles (rows, columns) bool, and all within so many tiles of them."""
     for _ in range(times):
         rows = tiles.copy()
         rows[1:] |= tiles[:-1]
@@ -313,10 +347,10 @@ def _grown(tiles: np.ndarray, times: int = 1) -> np.ndarray:
 
 
 def _halved(tiles: np.ndarray) -> np.ndarray:
-    """The tiles of the coarser grid that any of these lie in."""
+    """Tiles (rows, columns) bool, 2 × 2 of them made one: True if any of them is."""
     height, width = tiles.shape
     if height % 2 or width % 2:
-        whole = np.zeros((height + height % 2, width + width % 2), bool)  # np.pad takes far longer
+        whole = np.zeros((height + height % 2, width + width % 2), bool)  # np.pad is far slower
         whole[:height, :width] = tiles
         tiles = whole
-    return (tiles[::2] | tiles[1::2]).view(np.uint16) != 0  # pairs of columns at once
+    return (tiles[::2] | tiles[1::2]).view(np.uint16) != 0  # two bools, a pair of columns, as one number

@@ -1,4 +1,4 @@
-"""Compositing on a device with compute shaders: one pass per picture, over the window's frames or their sums."""
+"""Compositing on a device: one compute pass per picture and band of rows, over the window's frames or running sums."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from functools import cache
 import numpy as np
 
 from ..core import compositor, shutters
+from ..core.frame_source import FrameSource
 from ..core.frame_state import FrameState, Options
+from .device import Device
 from .diffusion_gpu import Diffusion
 from .passes import LOCAL_ROW, Image, Pass
 from .tables import padded, table
 from .window import BLOCK, TILE, Frames, Sums, decoding, open_window
 
-# Pixels above one another that one invocation composes from sums.
+# Rows of pixels that one invocation of compose_sums composes.
 PAIR = 2
 
 _EDGES = {"hold": 0, "mirror": 1, "shorten": 2}
@@ -23,22 +25,29 @@ _PLACE = {"size": "ivec2"} | dict.fromkeys(("top", "height", "block_bits"), "int
 _LAYERS = dict.fromkeys(("origin", "direction", "layers", "lowest", "lowest_layer"), "int")
 _OF_SUMS = {"sums": Image("rg32ui", reads=True, writes=False)}
 _UNIT = {"held": "int", "unit": "float"}
-# Blender knows only of constants that a source uses.
+# Constants that only some passes use: Blender's `gpu` has no others.
 _OF_WAY = {"pieces": ("rows",), "value": ("first", "last")} | dict.fromkeys(
     ("frames", "walk"), ("rows", "first", "last")
 )
-# Pixels above one another that one invocation composes.
+# Rows of pixels that one invocation composes, by the pass; BLOCK for all others.
 _LINES = {"sums": PAIR, "walk": 4}
-# Mesa's software renderer ends all loops of an invocation after 65,535 turns in all, without a word.
-_MOST_TURNS = 60_000
-# Pieces to compose from running sums, which a shader is compiled for; tables are filled up with pieces of nothing.
+# Loop iterations of an invocation. Mesa's software renderer ends its loops after 65,535 in all, without an error.
+_MOST_ITERATIONS = 60_000
+# The numbers of pieces for which compose_sums is compiled. A table with another number is filled up with empty pieces.
 _ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 
 
 @cache
 def composition(way: str, groups: int, stored: str, decode: int, edges: int, premultiplied: bool, encoded: bool):
-    """The pass that composes in a way of `way_of`, shutters in groups of four, from "frames", from their "sums", or
-    from sums in "tiles"."""
+    """The pass compose_<way> for a way of `way_of` other than "sums".
+
+    groups: of four shutters
+    stored: what the window holds: "frames", "sums", or sums in "tiles"
+    decode: a number of window.decoding
+    edges: a number of _EDGES
+    premultiplied: whether the frames' colours are
+    encoded: whether the sums are of encoded light (Options.light)
+    """
     summed = stored != "frames"
     return Pass(
         f"compose_{way}",
@@ -64,7 +73,7 @@ def composition(way: str, groups: int, stored: str, decode: int, edges: int, pre
 
 @cache
 def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, encoded: bool) -> Pass:
-    """The pass that composes so many pieces from running sums, in time that runs forwards or back."""
+    """The pass compose_sums for `rows` pieces. back: the source plays in reverse; the others as for `composition`."""
     return Pass(
         "compose_sums",
         images=_IMAGES | _OF_SUMS,
@@ -82,11 +91,16 @@ def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, encoded
 
 
 def way_of(window, options: Options, values: np.ndarray, span: tuple[int, int], shortened: bool) -> str:
-    """The quickest pass for a table of pieces, and the span of frames that any shutter exposes.
+    """The fastest way to compose: the name of a pass, without compose_.
 
-    Measured at 1080p for 2 to 8 shutters over 16 to 64 frames, in times of the plain average of 16 frames: from the
-    sums 0.3 + 0.23 · pieces; through frames 1 + 0.1 · frames. From frames as they are, piece by piece
-    1.5 + 1.4 · pieces / frames, frame by frame 2.1 to 2.8 of the plain average.
+    values: the table of tables.table, a row of gains and a row per piece
+    span: the first frame of the window that any shutter exposes, and the one after the last
+    shortened: whether frames of that span are left out (edges "shorten")
+
+    The bounds come from times at 1080p, for 2 to 8 shutters and windows of 16 to 64 frames. From running sums, in
+    multiples of the time of a plain average of 16 frames: "sums" 0.3 + 0.23 · pieces, "frames" 1 + 0.1 · frames. From
+    frames, in multiples of the time of the window's own plain average: "pieces" 1.5 + 1.4 · pieces / frames, "frames"
+    2.1 to 2.8.
     """
     if options.interpolation == "value":
         return "value"
@@ -95,32 +109,36 @@ def way_of(window, options: Options, values: np.ndarray, span: tuple[int, int], 
         return "sums"
     if not isinstance(window, Sums) and 3 * rows < 2 * frames:
         return "pieces"
-    return "frames" if turns_of_frames(values, span) <= _MOST_TURNS else "walk"
+    return "frames" if frames_iterations(values, span) <= _MOST_ITERATIONS else "walk"
 
 
-def turns_of_frames(values: np.ndarray, span: tuple[int, int]) -> int:
-    """The most loop turns that compose_frames.glsl may take in a block, whatever its coefficients.
+def frames_iterations(values: np.ndarray, span: tuple[int, int]) -> int:
+    """An upper bound of the loop iterations of an invocation of compose_frames, for any coefficients.
 
-    There a piece is looked at from the frame on in which it may begin, to that in which all before it have ended."""
+    For each frame it goes through the pieces that may have begun and have not all ended. So each piece counts once for
+    every frame from that in which it may begin to that in which it and all before it have ended."""
     groups = values.shape[1] // 2
     start, end, apart = values[1:, :groups], values[1:, groups:-1], values[1:, -1, 1]
     until = np.maximum.accumulate(end.max(axis=(1, 2)) + apart)
-    from_ = start.max(axis=(1, 2)) - 2 * apart  # the least of the shutters, less as much again
+    from_ = start.max(axis=(1, 2)) - 2 * apart  # the earliest start of a shutter, and once more the difference
     frames = np.clip(np.ceil(until), *span) - np.clip(np.floor(from_), *span) + 1
     return int(frames.sum()) + len(start) + span[1] - span[0]
 
 
 def _filled_rows(rows: int) -> float:
+    """The number of pieces that compose_sums is compiled for, if there are `rows`; infinite: there are too many."""
     return next((filled for filled in _ROWS if filled >= rows), np.inf)
 
 
 def _extent(window: Sums) -> dict:
-    """What shaders are told of running sums, wherever they begin."""
+    """Constants about running sums that all passes over them have."""
     return {"layers": window.layers, "held": window.stop - window.start, "unit": 1 / window.whole}
 
 
 def _from_sums(window: Sums, state: FrameState, values: np.ndarray, origin: int, direction: int):
-    """The pass that composes the pieces of a table from running sums, and what it is given besides its place."""
+    """compose_sums for a table of pieces, and its arguments for Device.run but for the band's.
+
+    origin: the position of the window's first frame; direction: 1, or −1 in reverse"""
     rows = _filled_rows(len(values) - 1)
     filled = np.zeros((1 + rows, *values.shape[1:]), np.float32)
     filled[: len(values)] = values
@@ -135,7 +153,9 @@ def _from_sums(window: Sums, state: FrameState, values: np.ndarray, origin: int,
 
 
 def _from_frames(way: str, window, state: FrameState, rows: int, origin: int, direction: int, shortened: bool):
-    """As _from_sums: the pass that goes through the frames."""
+    """The pass of another way, and its arguments: as _from_sums.
+
+    rows: pieces in the table; shortened: as for way_of"""
     options, source, summed = state.options, window.source, isinstance(window, Sums)
     given = {"images": {}, "textures": {}, "rows": rows, "direction": direction}
     given["first"], given["last"] = shutters.open_span(state.bars)
@@ -150,7 +170,7 @@ def _from_frames(way: str, window, state: FrameState, rows: int, origin: int, di
             _EDGES[options.edges],
         )
     given |= {"layers": window.layers, "lowest_layer": lowest % window.layers}
-    # Shaders count from the shot's first frame.
+    # In these shaders, frame 0 is the shot's first.
     given |= {"count": len(window.shot), "origin": origin - window.shot.start, "lowest": lowest - window.shot.start}
     groups, premultiplied = -(-len(state.bars) // 4), source.alpha == "premultiplied"
     stored = "frames" if not summed else "tiles" if window.tiled else "sums"
@@ -158,47 +178,49 @@ def _from_frames(way: str, window, state: FrameState, rows: int, origin: int, di
 
 
 class GPUCompositor:
-    """Composes on a device; the same methods as CPUCompositor."""
+    """Composes on a Device; the same methods as CPUCompositor."""
 
-    def __init__(self, device):
+    def __init__(self, device: Device):
         self.name = device.name
         self.device = device
         self._textures: dict[str, object] = {}
 
     def current(self):
-        """What calls belong inside of: the device's context, on whatever thread renders."""
+        """A context manager: all other methods are called inside it, on any one thread (Device.current)."""
         return self.device.current()
 
-    def window(self, source, capacity: int) -> Frames | Sums:
+    def window(self, source: FrameSource, capacity: int) -> Frames | Sums:
+        """A window of `capacity` frames on the device."""
         return open_window(self.device, source, capacity)
 
     def solver(self) -> Diffusion:
-        """A diffusion whose solution stays valid until it solves again."""
+        """A new diffusion. Its solution is valid until its next solve."""
         return Diffusion(self.device)
 
     def constant(self, values: np.ndarray):
-        """The same coefficients (N,) everywhere, on the device."""
+        """Coefficients (N,) of the whole picture, as a texture of one texel. Valid until the next call."""
         return self._filled("constant", padded(values).astype(np.float32)[:, None, None, :], "rgba32f")
 
     def labels(self, values: np.ndarray):
-        """Labels (H, W) uint16 on the device."""
+        """Labels (H, W) uint16 as a texture r16ui. Valid until the next call."""
         return self._filled("labels", values[None, ..., None], "r16ui")
 
     def coefficients(self, handle, count: int) -> np.ndarray:
-        """Coefficients (N, h, w) float32 of what a solver or `constant` gave."""
+        """Coefficients (N, h, w) float32 of `count` shutters, read from a texture of a solver or of `constant`."""
         values = self.device.read(handle)
         return np.moveaxis(values, -1, 1).reshape(-1, *values.shape[1:3])[:count]
 
     def read(self, drawn) -> np.ndarray:
-        """What `draw` gave, as an array (H, W, 4) float32, top row first."""
+        """A picture of `draw` as an array (H, W, 4) float32, top row first."""
         return self.device.read(drawn)[0, ::-1]
 
     def draw(self, window, index: int, direction: int, state: FrameState, handle, block: int):
-        """The picture on the device, the window's until it is drawn into again: a texture array rgba32f of one layer,
-        scene-linear and premultiplied, bottom row first.
+        """The picture on the device: a texture array rgba32f of one layer, scene-linear, premultiplied, bottom row
+        first. It is window.picture, valid until the next draw with this window.
 
-        index, direction: as for core.compositor.window_positions; what is needed of the window is loaded.
-        handle: coefficients, of which `block` × `block` pixels share one.
+        window: must have loaded all frames that some shutter exposes
+        index, direction: as for core.compositor.window_positions
+        handle: coefficients, a texture of a solver or of `constant`; block: the pixels along a side of each texel
         """
         options, values = state.options, table(state)
         first, last = shutters.open_span(state.bars)

@@ -1,4 +1,4 @@
-"""From a source and an state to a picture: rasterise, diffuse, load the window, compose."""
+"""Renders pictures of a source: rasterise the scribbles, diffuse them, load the window's frames, compose."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ DEVICES = ("auto", "gpu", "cpu")
 
 
 def open_compositor(device: str = "auto"):
-    """The compositor for a device of DEVICES, and a sentence for the user where "auto" had to do without GL."""
+    """(compositor, None), or (CPUCompositor, why) where "auto" found no GL: a sentence for the user.
+
+    device: one of DEVICES. NoDeviceError: it is "gpu", and there is none."""
     if device == "cpu":
         return CPUCompositor(), None
     try:
@@ -32,9 +34,11 @@ def open_compositor(device: str = "auto"):
 
 
 class Renderer:
-    """Pictures of one source; keeps the window's frames and the last coefficients.
+    """Pictures of one source. It keeps the window's frames, the last coefficients and the last picture.
 
-    Windows end at cuts (Options.stop_at_cuts) of a source that knows them (FrameSource.shots).
+    Windows end at cuts if Options.stop_at_cuts is set and the source knows its shots (FrameSource.shots).
+    Frames are counted as the source counts them, from 0. direction, in all methods: 1, or −1 where the source plays in
+    reverse, so that the window's next frames are those before `index`.
     """
 
     def __init__(self, compositor, source: FrameSource):
@@ -44,18 +48,15 @@ class Renderer:
         self._labelled = self._solved = self._drawn = None
 
     def picture(self, index: int, state: FrameState, direction: int = 1) -> np.ndarray:
-        """The picture (H, W, 4) float32 at source frame `index`: scene-linear, premultiplied, top row first.
-
-        direction: −1 where the source plays in reverse, and the window's next frames are those before `index`.
-        """
+        """The picture (H, W, 4) float32 at source frame `index`: scene-linear, premultiplied, top row first."""
         with self.compositor.current():
             return self.compositor.read(self.draw(index, state, direction))
 
     def draw(self, index: int, state: FrameState, direction: int = 1, *, quick: bool = False):
-        """The same on the device: a texture array rgba32f of one layer, bottom row first (with NumPy: as `picture`).
+        """The picture on the device: a texture array rgba32f of one layer, bottom row first; with NumPy, an array as of
+        `picture`. It is valid until the next picture of this renderer, and composed only if it is not the last one.
 
-        It stays until the next one of this renderer; the same picture is not composed twice. quick: coefficients may
-        start from the last ones, where scribbles moved; the picture then depends a little on what was drawn before.
+        quick: the diffusion may start from the last coefficients, so the picture depends slightly on them.
         """
         key = index, direction, state.key
         if self._drawn is None or self._drawn[0] != key or not (quick or self._drawn[1]):
@@ -65,7 +66,7 @@ class Renderer:
         return self._drawn[2]
 
     def coefficients(self, state: FrameState) -> np.ndarray:
-        """Coefficients (N, h, w) float32 at an state, one per pixel or per block that shares a shutter."""
+        """Coefficients (N, h, w) float32, for each pixel, or for each block of Options.aggregate pixels a side."""
         count, (width, height) = len(state.bars), self._grid(state)
         with self.compositor.current():
             labels = self.labels(state)
@@ -74,10 +75,10 @@ class Renderer:
             return self.compositor.coefficients(self._diffused(labels, count), count)
 
     def drawn_coefficients(self, state: FrameState):
-        """Coefficients on the device, which must be a GPU: (texture array rgba32f of four shutters a layer, top row
-        first; the pixels along each side of a texel; the number of shutters). They are those of a quick `draw`.
+        """Coefficients of a quick `draw` on the device, a GPU: (texture array, block, number of shutters).
 
-        The texture is one texel where they are the same everywhere. It stays until the next call of any method.
+        The texture array is rgba32f, four shutters per layer, top row first, each texel for block × block pixels; it
+        has a single texel where coefficients are the same everywhere. It is valid until the next call of any method.
         """
         labels, count = self.labels(state), len(state.bars)
         with self.compositor.current():
@@ -86,49 +87,52 @@ class Renderer:
             return self._diffused(labels, count, quick=True), state.options.aggregate, count
 
     def drawn_labels(self, state: FrameState):
-        """Labels on the device, which must be a GPU: (texture array r16ui, top row first; the pixels along each side of
-        a texel). The texture stays until the next call."""
+        """Labels on the device, a GPU: (texture array r16ui, block), top row first, each texel for block × block
+        pixels. It is valid until the next call of any method."""
         with self.compositor.current():
             return self.compositor.labels(self.labels(state)), state.options.aggregate
 
     def labels(self, state: FrameState) -> np.ndarray:
-        """Labels (h, w) uint16 of the pixels, or of the blocks that share a shutter: 0 free, 1 + shutter scribbled."""
+        """Labels (h, w) uint16 of pixels, or of blocks as for `coefficients`: 0 free, 1 + shutter scribbled."""
         key = self._grid(state), state.options.border, state.key[-1]
         if self._labelled is None or self._labelled[0] != key:
             self._labelled = key, scribbles.rasterise(state.shapes, *key[0], border=key[1])
         return self._labelled[1]
 
     def shot(self, index: int, direction: int, state: FrameState, *, known: bool = False) -> range:
-        """The source frames that the window may show: those of the shot around `index`, as far as the window tells.
+        """The source frames that the window may show: those of the shot around `index`. Ends of the shot that the
+        window does not reach are not looked for: the clip's ends take their place.
 
-        It reads what it must to find cuts; known: nothing, and where it does not know there is no cut."""
+        It reads frames in which cuts are looked for. known: it reads none, and knows only the cuts found before."""
         if not self._stops(state):
             return range(self.source.count)
         low, high = self._reach(index, direction, state)
         shot = self.source.shots.around(index, low, high, known=known)
         last = shot.stop - 1
         if state.options.edges == "mirror" and (last < high) != (shot.start > low):
-            # What is mirrored at one end may reach beyond the other.
+            # Frames mirrored at one end of the shot may lie beyond its other end.
             low, high = (min(low, 2 * last - high), high) if last < high else (low, max(high, 2 * shot.start - low))
             shot = self.source.shots.around(index, low, high, known=known)
         return shot
 
     def positions(self, index: int, direction: int, state: FrameState, shot: range) -> np.ndarray:
-        """Where the frames lie that some shutter exposes, on the picture or not (core.compositor.window_positions);
-        all of the window's that are there, where a shutter may lose all of its own."""
+        """The positions (core.compositor.window_positions) that any shutter exposes, whether it has a scribble or not.
+        Where frames of them are left out (edges "shorten"), all positions of the window that have a frame: the nearest
+        may be needed in place of those."""
         positions = compositor.window_positions(state.options, index, direction)
         frames = compositor.source_frames(state.options, positions, shot)
         low, high = shutters.open_span(state.bars)
         return positions[low:high] if (frames[low:high] >= 0).all() else positions[frames >= 0]
 
     def needed(self, index: int, direction: int, state: FrameState, *, known: bool = True) -> set[int]:
-        """The source frames at those positions, as far as cuts are known; known as for `shot`."""
+        """The source frames at `positions`. known: as for `shot`."""
         shot = self.shot(index, direction, state, known=known)
         positions = self.positions(index, direction, state, shot)
         return set(compositor.source_frames(state.options, positions, shot).tolist())
 
     def missing(self, index: int, direction: int, state: FrameState) -> set[int]:
-        """Those of the needed source frames that still must be read, and those that cuts are looked for in."""
+        """The source frames that `draw` would read: needed ones that are not loaded, and those in which it looks for
+        cuts."""
         held = self._window.held if self._window and self._window.capacity == state.options.window else ()
         missing = self.needed(index, direction, state).difference(held)
         if self._stops(state):
@@ -137,26 +141,28 @@ class Renderer:
         return missing
 
     def _stops(self, state: FrameState) -> bool:
+        """Whether windows end at cuts."""
         return state.options.stop_at_cuts and self.source.shots is not None
 
     @staticmethod
     def _reach(index: int, direction: int, state: FrameState) -> tuple[int, int]:
-        """The first and the last position from the frame that is shown to all that some shutter exposes."""
+        """The first and the last of all positions that any shutter exposes and of `index` itself."""
         positions = compositor.window_positions(state.options, index, direction)
         reach = [index, *positions[slice(*shutters.open_span(state.bars))].tolist()]
         return min(reach), max(reach)
 
     @property
     def _everywhere(self) -> int:
-        """The block that holds the whole picture."""
+        """The side of a block as large as the picture, in pixels."""
         return max(self.source.width, self.source.height)
 
     def _grid(self, state: FrameState) -> tuple[int, int]:
+        """The size (w, h) of labels and coefficients."""
         block = state.options.aggregate
         return -(-self.source.width // block), -(-self.source.height // block)
 
     def _parts(self, index: int, state: FrameState, direction: int, quick: bool):
-        """What the compositor needs, its window loaded."""
+        """The arguments of the compositor's `draw`, with the window loaded."""
         handle, state, block = self._coefficients(state, quick)
         window = self._window_for(state.options.window)
         shot = self.shot(index, direction, state)
@@ -164,9 +170,9 @@ class Renderer:
         return window, index, direction, state, handle, block
 
     def _coefficients(self, state: FrameState, quick: bool):
-        """The coefficients on the device, the state to compose with them, and the block that shares one.
+        """(coefficients on the device, the state to compose with them, pixels along a side of their blocks).
 
-        Where one mix of shutters holds for the whole picture, that mix is the only shutter.
+        Where one shutter holds for the whole picture, the state has that shutter alone.
         """
         labels = self.labels(state)
         values = _uniform(labels, len(state.bars))
@@ -176,7 +182,8 @@ class Renderer:
         return self.compositor.constant(np.ones(1)), state.alone(chosen), self._everywhere
 
     def _diffused(self, labels: np.ndarray, count: int, quick: bool = False):
-        """Solves anew only when a scribble moved, or where a quick solution stands and is not enough."""
+        """Coefficients on the device. They are solved for only if labels changed since the last call, or if the last
+        solution was a quick one and this must not be."""
         same = self._solved and self._solved[0] == count and np.array_equal(self._solved[1], labels)
         if not same or not (quick or self._solved[2]):
             self._solved = count, labels, not quick, self._solver.solve(labels, count, warm=quick)
@@ -189,7 +196,7 @@ class Renderer:
         return self._window
 
     def release_window(self) -> None:
-        """Frees the frames; the next picture reads them again."""
+        """Frees the window's frames, and those that the search for cuts has read. The next picture reads them again."""
         if self._window is not None:
             self._window.release()
             self._window = self._drawn = None
@@ -197,7 +204,7 @@ class Renderer:
             self.source.shots.release()
 
     def close(self) -> None:
-        """Frees everything on the device and closes the source."""
+        """Frees what the renderer has on the device, and closes the source."""
         with self.compositor.current():
             self.release_window()
             self._solver.release()
@@ -205,9 +212,10 @@ class Renderer:
 
 
 def _uniform(labels: np.ndarray, count: int) -> np.ndarray | None:
-    """Coefficients (N,) where they are the same everywhere: no scribble, or those of one shutter alone."""
+    """The coefficients (N,) if they are the same everywhere, else None. They are if there is no scribble, which gives
+    the first shutter, or if all scribbles are of one shutter."""
     highest = int(labels.max())
     if highest == scribbles.FREE:
         return np.eye(count)[0]
-    lowest = int((labels - np.uint16(1)).min())  # what is free wraps around to the top
+    lowest = int((labels - np.uint16(1)).min())  # the lowest shutter: a free pixel's 0 wraps around to 65,535
     return np.eye(count)[lowest] if lowest == highest - 1 else None

@@ -1,4 +1,4 @@
-"""Running sums along time: which positions a window's layers hold, and how it gets to others; on every device."""
+"""Running sums along time, for every device: which sums a window holds, and which it makes when it moves."""
 
 from __future__ import annotations
 
@@ -7,24 +7,28 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from ..core import compositor
+from ..core.frame_source import FrameSource
 from ..core.frame_state import Options
 
 
-def summable(source) -> bool:
-    """Whether running sums are made of a source: of opaque 8-bit frames."""
+def summable(source: FrameSource) -> bool:
+    """Whether running sums can be made of a source: its frames are opaque, of 8 bits."""
     return np.dtype(source.dtype) == np.uint8 and source.alpha == "opaque"
 
 
 class RunningSums(ABC):
     """A window of running sums of a source's frames, in the light that is summed (Options.light).
 
-    The layer of position p, p mod `layers`, holds the sum of the frames before p: positions `start` to `stop`, both
-    included. Positions beyond the shot's ends count as well, with the frames that its edges show there. A window that
-    moves on, or back, adds one layer a frame. A device's sums wrap around, so that differences are exact: what was
-    held before leaves no trace.
+    Layer p mod `layers` holds the sum at position p, for the positions from `start` to `stop`, both included: the light
+    of all frames before p, counted from an arbitrary one. So sums mean something only in differences: that of
+    positions p and p + 1 is the frame at p. Positions beyond the shot's ends count, with the frames that Options.edges
+    shows there.
+
+    A window that moves by a frame, onwards or back, makes one new layer. Sums are integers that wrap around, so that
+    their differences are exact, whatever the window held before.
     """
 
-    def __init__(self, source, capacity: int):
+    def __init__(self, source: FrameSource, capacity: int):
         self.source, self.capacity, self.layers = source, capacity, capacity + 1
         self.start = self.stop = 0
         self.shot = range(source.count)
@@ -33,13 +37,15 @@ class RunningSums(ABC):
 
     @property
     def held(self):
-        """The source frames that are summed."""
+        """The source frames that are summed, a collection of their indices."""
         return self._frames.values()
 
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
-        """Reads what is missing at positions (of core.compositor.window_positions) within `capacity` of one another.
+        """Reads the frames at these positions that are not loaded.
 
-        shot: the frames that the window may show (core.compositor.source_frames)."""
+        positions: of core.compositor.window_positions; the first and the last less than `capacity` apart
+        shot: the source frames that the window may show (core.compositor.source_frames)
+        """
         self.shot = shot
         first, last = int(positions.min()), int(positions.max()) + 1
         frames = compositor.source_frames(options, np.arange(first, last), shot).tolist()
@@ -56,7 +62,8 @@ class RunningSums(ABC):
             self.start -= 1
 
     def _continues(self, first: int, frames: list[int], options: Options) -> bool:
-        """Whether what is held touches the wanted frames, and agrees with them."""
+        """Whether the sums can be moved to the positions from `first` on, which show `frames`: the two meet or overlap,
+        and show the same frames where they overlap."""
         last = first + len(frames)
         overlap = range(max(first, self.start), min(last, self.stop))
         return (
@@ -68,18 +75,21 @@ class RunningSums(ABC):
         )
 
     def _keep(self, start: int, stop: int) -> None:
+        """Gives up all positions but those from `start` to `stop`."""
         self.start, self.stop = start, stop
         self._frames = {position: frame for position, frame in self._frames.items() if start <= position < stop}
 
     def _extend(self, frame: int, known: int, next_: int) -> None:
+        """As _add; notes the frame."""
         same = next((position for position, held in self._frames.items() if held == frame), None)
         self._add(frame, same, known, next_)
         self._frames[min(known, next_)] = frame
 
     @abstractmethod
     def _add(self, frame: int, same: int | None, known: int, next_: int) -> None:
-        """The sum at position next_ from the one at `known`, its neighbour, and the frame between them, which the
-        sums may hold already, at position `same`."""
+        """Makes the sum at position next_, from that at its neighbour `known` and the source frame between the two.
+
+        same: a position that shows this frame already, so that it need not be read; None: there is none"""
 
     def release(self) -> None:
         self._frames, self._options = {}, None

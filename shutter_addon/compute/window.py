@@ -1,4 +1,4 @@
-"""The window on a device: the source frames around the one that is shown, each read once while it stays there."""
+"""The window on a device: the source frames around the shown one. Each is read once while the window contains it."""
 
 from __future__ import annotations
 
@@ -7,27 +7,28 @@ from functools import cache
 import numpy as np
 
 from ..core import compositor, light
+from ..core.frame_source import FrameSource
 from ..core.frame_state import Options
-from .device import NoDeviceError
+from .device import Device, NoDeviceError
 from .passes import Image, Pass
 from .running_sums import RunningSums, summable
 
-# A layered texture over 2 GiB reads wrongly on Mesa's software renderer, without any error.
+# Bytes of a texture array, at most. Mesa's software renderer reads wrong values, without an error, from one over 2 GiB.
 BAND_BYTES = 1 << 30
-# A window above this stays on the host, and its bands take turns on the device.
+# Bytes of a window on the device, at most. Frames of a larger one stay on the host, and are sent band by band.
 RESIDENT_BYTES = 6 << 30
 
-# Pixels above one another that one invocation composes, going through the frames.
+# Rows of pixels that one invocation of the passes through frames composes. Bands are a multiple of it high.
 BLOCK = 16
-# Of running sums, in pixels (across, down), as in shaders/include/sums.glsl.
+# A tile of running sums in pixels (across, down), as in shaders/include/sums.glsl.
 TILE = 8, 4
 
 _STORED = {np.uint8: "rgba8", np.uint16: "rgba16", np.float16: "rgba16f", np.float32: "rgba32f"}
 
 
-def open_window(device, source, capacity: int) -> Window:
-    """The window of `capacity` frames that composes fastest: running sums where 8 bits are summed and the device has
-    room for them."""
+def open_window(device: Device, source: FrameSource, capacity: int) -> Window:
+    """The fastest window of `capacity` frames: running sums if the source is `summable` and the device has room for
+    them, else the frames."""
     if summable(source):
         try:
             return Sums(device, source, capacity)
@@ -37,17 +38,23 @@ def open_window(device, source, capacity: int) -> Window:
 
 
 class Window:
-    """What both windows share: texture arrays of `layers` layers in bands of rows, each array below BAND_BYTES, and
-    `picture`, what is composed of them."""
+    """What both windows share: texture arrays of `layers` layers, one for each band of rows, so that none is over
+    BAND_BYTES; and `picture`, the texture that the compositor draws into.
 
-    def __init__(self, device, source, capacity: int):
+    capacity: the most frames in a window
+    shot: the source frames that the loaded window may show
+    rows, tops: rows of pixels in a band (the last band may have fewer), and the top row of each band
+    """
+
+    def __init__(self, device: Device, source: FrameSource, capacity: int):
         self.device, self.source, self.capacity = device, source, capacity
         self.shot = range(source.count)
         self.textures: list = []
         self.picture = None
 
     def _allocate(self, kind: str, pixel_bytes: int) -> None:
-        """NoDeviceError: no room, and nothing is kept."""
+        """Makes the texture arrays, of the format `kind`, and the picture. NoDeviceError: there is no room for all of
+        them; none is kept."""
         source, row_bytes = self.source, self.source.width * pixel_bytes * self.layers
         self.rows = min(source.height, max(1, BAND_BYTES // row_bytes // BLOCK) * BLOCK)
         self.tops = range(0, source.height, self.rows)
@@ -63,14 +70,14 @@ class Window:
             raise
 
     def _texels(self, width: int, height: int) -> tuple[int, int]:
-        """The texels (across, down) of a band's pixels."""
+        """The size (across, down) of the texture for a band of so many pixels."""
         return width, height
 
     def _height(self, top: int) -> int:
         return min(self.rows, self.source.height - top)
 
     def bands(self):
-        """Each band as (top row, height, texture array)."""
+        """Yields (top row, height in pixels, texture array) of each band; the texture is valid until the next one."""
         for top, texture in zip(self.tops, self.textures, strict=True):
             yield top, self._height(top), texture
 
@@ -81,20 +88,20 @@ class Window:
 
 
 class Frames(Window):
-    """The frames themselves: source frame i in layer i mod `layers`.
+    """A window of the frames as they are: source frame i in layer i mod `layers`.
 
-    Where the device has no room for all bands, the frames stay on the host and every picture sends them band by band.
+    Where the device has no room for all bands, the frames stay on the host, and every picture sends them band by band.
     """
 
-    def __init__(self, device, source, capacity: int):
+    def __init__(self, device: Device, source: FrameSource, capacity: int):
         super().__init__(device, source, capacity)
         self.layers = capacity
         self._held: dict[int, int] = {}  # layer: source frame
         self._host: dict[int, np.ndarray] | None = None
-        # Encoded floats may be above 1, beyond the shaders' curve.
+        # Encoded floats can exceed 1, for which the shaders' curve is not made: they are made linear on the host.
         self._linearises = source.transfer == "srgb" and np.dtype(source.dtype).kind == "f"
         self.transfer = "linear" if self._linearises else source.transfer
-        # And linear, what a half holds may be more than a half holds.
+        # The linear value of an encoded half can exceed the range of a half.
         stored = np.dtype(np.float32 if self._linearises else source.dtype)
         kind, pixel_bytes = _STORED[stored.type], 4 * stored.itemsize
         try:
@@ -106,11 +113,11 @@ class Frames(Window):
 
     @property
     def held(self):
-        """The source frames that are loaded."""
+        """The source frames that are loaded, a collection of their indices."""
         return self._held.values()
 
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
-        """As RunningSums.load."""
+        """See RunningSums.load."""
         self.shot = shot
         for index in sorted(set(compositor.source_frames(options, positions, shot).tolist())):
             layer = index % self.capacity
@@ -135,6 +142,7 @@ class Frames(Window):
             yield top, height, self.textures[0]
 
     def _read(self, index: int) -> np.ndarray:
+        """The source's frame (height, width, 4) in the samples that are stored."""
         frame = self.source.read(index)
         if self._linearises:
             frame = frame.astype(np.float32, copy=False)
@@ -152,27 +160,35 @@ class Frames(Window):
 
 
 def decoding(stored: str, options: Options) -> int:
-    """How the shaders turn frames stored as "srgb" or "linear" into the light that is summed: 0 not at all, 1 to
-    linear, 2 to encoded."""
+    """DECODE of the shaders, how samples become the light that is summed (Options.light): 0 unchanged, 1 made linear,
+    2 made encoded. stored: the samples' transfer, "srgb" or "linear"."""
     summed = "srgb" if options.light == "encoded" else "linear"
     return 0 if stored == summed else 1 if summed == "linear" else 2
 
 
-def stores_rows(device) -> bool:
-    """Whether textures lie in memory row by row, as Mesa's software renderer has them; a GPU has tiles of its own."""
+def stores_rows(device: Device) -> bool:
+    """Whether the device keeps textures in memory row by row, as Mesa's software renderer does; a GPU keeps tiles."""
     return "llvmpipe" in device.name
 
 
 def _in_tiles(width: int, height: int) -> tuple[int, int]:
-    """The texels (across, down) for pixels in tiles, with all that the last block of pixels reaches. A tile's row more
-    across, lest all rows begin in the same sets of a cache."""
+    """The size (across, down) of a texture for pixels stored tile by tile: a row of texels holds a row of tiles.
+
+    Down, it has room for whole BLOCKs. Across, it has TILE[0] texels to spare: else all rows of texels could begin in
+    the same sets of the processor's cache."""
     across, down = TILE
     return across * down * -(-width // across) + across, -(-height // BLOCK) * BLOCK // down
 
 
 @cache
 def accumulation(decode: int, again: bool, back: bool, tiled: bool) -> Pass:
-    """The pass that adds a frame to the sums, or takes it away (back); again: one that they hold already."""
+    """The pass that makes a layer of sums from its neighbour: with the frame between the two added, or subtracted.
+
+    decode: of `decoding`
+    again: the frame is taken as the difference of two layers that hold it already, not from a texture
+    back: it is subtracted
+    tiled: the sums are stored in tiles
+    """
     return Pass(
         "accumulate",
         samplers={} if again else {"frame": "sampler2DArray"},
@@ -185,14 +201,18 @@ def accumulation(decode: int, again: bool, back: bool, tiled: bool) -> Pass:
 
 
 class Sums(RunningSums, Window):
-    """Running sums of opaque 8-bit frames."""
+    """A window of running sums of opaque 8-bit frames, in textures rg32ui: three fields of 21 bits for each pixel.
 
-    def __init__(self, device, source, capacity: int):
+    whole: what white is in a field
+    tiled: whether pixels are stored tile by tile, in TILE
+    """
+
+    def __init__(self, device: Device, source: FrameSource, capacity: int):
         Window.__init__(self, device, source, capacity)
         RunningSums.__init__(self, source, capacity)
-        # Three fields of 21 bits: as many of them for white as leave room for the sum of a whole window.
+        # White is the largest 2ⁿ − 1 for which the sum of a whole window fits into 21 bits, and n is 16 at most.
         self.whole = (1 << min(16, 21 - (capacity - 1).bit_length())) - 1
-        # Neighbours look up other layers; in tiles, what a workgroup reads of a layer lies in one run of memory.
+        # Neighbouring pixels read different layers. In tiles, what a workgroup reads of a layer is one run of memory.
         self.tiled = stores_rows(device) and _in_tiles(source.width, 1)[0] <= device.max_size
         self._sent = None
         self._allocate("rg32ui", 8)

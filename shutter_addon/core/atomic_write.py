@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all: beside their place first, whatever lies there."""
+"""Files that are written whole or not at all: first in a folder beside their place, then moved there."""
 
 import math
 import os
@@ -10,15 +10,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-LEFT_BEHIND = 3600  # seconds in which whoever writes writes something, whatever the machine
+LEFT_BEHIND = 3600  # seconds without a change after which a part folder counts as abandoned
 
 _NAME = re.compile(r"\.part-[0-9a-f]{16}")
 
 
 @contextmanager
 def writing(path: Path) -> Iterator[Path]:
-    """Gives where to write the file instead, under its own name; at the block's end it takes its place, unless there
-    was an exception. A link at `path` is replaced, and never followed. OSError: it cannot be written."""
+    """Gives a path of the same name to write the file to. At the end of the block the file is moved to `path`; after an
+    exception it is removed. A link at `path` is replaced, not followed. OSError: it cannot be written."""
     with part_folder(path.parent) as folder:
         yield folder / path.name
         os.replace(folder / path.name, path)
@@ -26,10 +26,10 @@ def writing(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def part_folder(parent: Path) -> Iterator[Path]:
-    """A new folder in `parent`, for libraries that write by path: no link can have been planted there, and no two who
-    write share it. At the end it goes, with what is left in it. OSError: it cannot be made."""
+    """A new folder in `parent`, for libraries that write by path: nobody can have put a link there, and no other writer
+    uses it. At the end of the block it is removed with its content. OSError: it cannot be made."""
     folder = parent / f".part-{secrets.token_hex(8)}"
-    # Its owner's alone; but what moves out of a folder of that mode would stay its owner's alone on Windows.
+    # Only its owner may use it. Not on Windows: a file moved out of such a folder would keep that restriction.
     folder.mkdir(0o700 if os.name == "posix" else 0o777)
     try:
         yield folder
@@ -43,9 +43,7 @@ def is_part(name: str) -> bool:
 
 
 def left_behind(parent: Path) -> list[Path]:
-    """The part folders in `parent` that nobody writes into any more: those of processes that were killed.
-
-    OSError: it cannot be read."""
+    """The part folders in `parent` that processes have left behind that were killed. OSError: it cannot be read."""
     return [
         Path(entry)
         for entry in os.scandir(parent)
@@ -56,7 +54,8 @@ def left_behind(parent: Path) -> list[Path]:
 
 
 def _last_written(folder: str) -> float:
-    """When something was written in the folder; never long ago if it is gone, or another user's."""
+    """When something in the folder last changed, in seconds since 1970; infinite if the folder is gone or cannot be
+    read, so that it never counts as abandoned."""
     try:
         times = [entry.stat(follow_symlinks=False).st_mtime for entry in os.scandir(folder)]
         return max([os.lstat(folder).st_mtime, *times])

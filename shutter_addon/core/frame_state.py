@@ -1,4 +1,4 @@
-"""The effect as it stands at one frame: what a picture is composed with."""
+"""The effect's state at one frame: what a picture is composed with."""
 
 from __future__ import annotations
 
@@ -18,9 +18,11 @@ Position = Literal["start", "center", "end"]
 
 @dataclass(frozen=True)
 class Options:
-    """How a window of L frames becomes a picture; the recipe's fields of the same names.
+    """How a window of frames becomes a picture; the recipe's fields of the same names.
 
-    step: frames of the window for each that was filmed, which are more where there are in-between frames."""
+    window: L, its length in frames, in-between frames included
+    step: frames for each filmed one: 1, or the factor of in-between frames
+    """
 
     window: int
     position: Position = "start"
@@ -35,7 +37,7 @@ class Options:
 
     @property
     def before(self) -> int:
-        """How many frames of the window lie before the filmed frame itself, which is `step` of them long."""
+        """How many frames of the window lie before the shown filmed frame. That one is `step` frames long."""
         filmed = -(-self.window // self.step)
         center, end = (filmed - 1) // 2 * self.step, max(self.window - self.step, 0)
         return {"start": 0, "center": center, "end": end}[self.position]
@@ -43,9 +45,11 @@ class Options:
 
 @dataclass(frozen=True)
 class FrameState:
-    """The effect at one frame: bars (N, L) float64, the first shutter is the default; moved shapes in order.
+    """The effect at one frame.
 
-    reference: the exposure that counts as full brightness where exposure is "weighted"; the default shutter's.
+    bars: (N, L) float64, the weight of each frame of the window for each shutter; shutter 0 is the default
+    shapes: of the scribbles, where they are at this frame, the later over the earlier
+    reference: the exposure (sum of bars) of full brightness where exposure is "weighted"; None: the default shutter's
     """
 
     options: Options
@@ -57,7 +61,7 @@ class FrameState:
     def gains(self) -> np.ndarray:
         """Brightness (N,) of each shutter: all 1, or its exposure over the reference ("weighted").
 
-        It scales linear light, after decoding where encoded values are summed, as an aperture would."""
+        It scales linear light, as an aperture would: where encoded values are summed, it applies after decoding."""
         exposures = self.bars.sum(axis=1)
         if self.options.exposure == "normalized":
             return np.ones_like(exposures)
@@ -65,10 +69,10 @@ class FrameState:
 
     @property
     def key(self) -> tuple:
-        """Equal for states that give the same picture; hashable."""
+        """Hashable, and equal for states that give the same picture of the same frames."""
         shapes = ((s.shutter, s.kind, s.width, *(stroke.tobytes() for stroke in s.strokes)) for s in self.shapes)
         return self.options, self.bars.shape, self.bars.tobytes(), self.reference, tuple(shapes)
 
     def alone(self, chosen: int) -> FrameState:
-        """The same where one shutter alone holds for the whole picture."""
+        """The state of a picture in which one shutter, `chosen`, is everywhere."""
         return FrameState(self.options, self.bars[chosen, None], (), self.reference or float(self.bars[0].sum()))

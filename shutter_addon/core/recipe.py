@@ -17,7 +17,7 @@ from typing import Literal, get_args, get_origin
 
 import numpy as np
 
-from . import atomic_write, keyframes, limits, scribbles, shutters
+from . import atomic_write, effect, limits, shutters
 from .frame_state import Edges, Exposure, FrameState, Interpolation, Light, Options, Position
 from .messages import UserError, sentence
 
@@ -54,13 +54,13 @@ class Shutter:
     bars: list[float] | None = None
     keys: list[ShutterKey] = field(default_factory=list)
 
-    def at(self, frame: float, interpolation: Interpolation = "displacement") -> np.ndarray:
-        """Bars (L,) at a frame; between keys by `interpolation`."""
+    def over_time(self) -> effect.Shutter:
+        """As plain data."""
         if not self.keys:
-            return np.asarray(self.bars, dtype=np.float64)
-        a, b, u = keyframes.span([key.frame for key in self.keys], frame)
-        u = keyframes.eased(u, self.keys[a].ease)
-        return keyframes.between_bars(self.keys[a].bars, self.keys[b].bars, u, interpolation)
+            return effect.Shutter(self.name, self.color, effect.Bars(effect.Constant(np.asarray(self.bars, float))))
+        frames, bars, eases = _columns(self.keys, "frame", "bars", "ease")
+        keys = tuple(zip(frames, eases, strict=True))
+        return effect.Shutter(self.name, self.color, effect.Bars(effect.Keys(frames, bars, eases), keys))
 
 
 @dataclass(frozen=True)
@@ -94,21 +94,20 @@ class Region:
             drawn.insert(0, (self.keys[0] if self.keys else None, self.strokes))
         return drawn
 
-    def at(self, frame: float, aspect: float) -> tuple[np.ndarray, ...]:
-        """Moved strokes (n, 2) at a frame, for a picture of width / height = aspect."""
-        if not self.keys:
-            return scribbles.transform(self.strokes, (0, 0), 0, 1, aspect)
+    def over_time(self, shutter: int, aspect: float) -> effect.Region:
+        """As plain data, for a picture of width / height = aspect; shutter: the index of its shutter."""
         drawn = self.drawings()
-        a, b, u = keyframes.span([key.frame for key, _ in drawn], frame)
-        u = keyframes.eased(u, drawn[a][0].ease)
-        strokes = scribbles.between_strokes(drawn[a][1], drawn[b][1], u, aspect)
-        a, b, u = keyframes.span([key.frame for key in self.keys], frame)
-        first, second, u = self.keys[a], self.keys[b], keyframes.eased(u, self.keys[a].ease)
-        location, rotation, scale = (
-            (1 - u) * np.asarray(getattr(first, name)) + u * np.asarray(getattr(second, name))
-            for name in ("location", "rotation", "scale")
+        drawings = effect.Drawings(
+            tuple(key.frame if key else 0.0 for key, _ in drawn),
+            tuple([np.asarray(stroke, float) for stroke in strokes] for _, strokes in drawn),
+            tuple(key.ease if key else "linear" for key, _ in drawn),
+            aspect,
         )
-        return scribbles.transform(strokes, location, rotation, scale, aspect)
+        fixed = self.name, shutter, effect.Constant(self.kind), effect.Constant(self.width), drawings
+        if not self.keys:
+            return effect.Region(*fixed)
+        frames, eases, *moves = _columns(self.keys, "frame", "ease", "location", "rotation", "scale")
+        return effect.Region(*fixed, *(effect.Keys(frames, values, eases) for values in moves))
 
 
 @dataclass(frozen=True)
@@ -143,25 +142,35 @@ class Recipe:
         names = Options.__dataclass_fields__.keys() - {"step"}
         return Options(**{name: getattr(self, name) for name in names}, step=self.inbetween)
 
+    def effect(self, aspect: float) -> effect.Effect:
+        """As plain data, for a picture of width / height = aspect. Frame 1 is the strip's first."""
+        order = {shutter.name: i for i, shutter in enumerate(self.shutters)}
+        return effect.Effect(
+            tuple(shutter.over_time() for shutter in self.shutters),
+            tuple(region.over_time(order[region.shutter], aspect) for region in self.regions),
+            effect.Constant(self.options),
+            self._source_time(),
+        )
+
+    def _source_time(self) -> effect.SourceTime | None:
+        if not self.time:
+            return None
+        frames, values, eases = _columns(self.time, "frame", "value", "ease")
+        return effect.SourceTime(effect.Keys(frames, values, eases), tuple(zip(frames, eases, strict=True)))
+
     def at(self, frame: float, aspect: float) -> FrameState:
         """The effect at a timeline frame (1 = the strip's first), for a picture of width / height = aspect."""
-        order = {shutter.name: i for i, shutter in enumerate(self.shutters)}
-        return FrameState(
-            self.options,
-            np.stack([shutter.at(frame, self.interpolation) for shutter in self.shutters]),
-            tuple(
-                scribbles.Shape(order[region.shutter], region.kind, region.width, region.at(frame, aspect))
-                for region in self.regions
-            ),
-        )
+        return self.effect(aspect).at(frame)
 
     def time_at(self, frame: float) -> float | None:
         """The source frame that is shown at a timeline frame, 1 is the first; None: the strip's timing says that."""
-        if not self.time:
-            return None
-        a, b, u = keyframes.span([key.frame for key in self.time], frame)
-        u = keyframes.eased(u, self.time[a].ease)
-        return (1 - u) * self.time[a].value + u * self.time[b].value
+        time = self._source_time()
+        return None if time is None else time.at(frame)[0]
+
+
+def _columns(keys: list, *names: str) -> list[tuple]:
+    """Of keys, each of these fields as a tuple."""
+    return [tuple(getattr(key, name) for key in keys) for name in names]
 
 
 def with_inbetween(source: Recipe, factor: int) -> Recipe:

@@ -3,6 +3,7 @@
 import numpy as np
 from OpenImageIO import FLOAT, ColorConfig, ImageBuf, ImageBufAlgo
 
+from ..core.frame_source import FrameSource
 from .errors import MediaError
 from .source import SourceWrapper
 
@@ -10,10 +11,12 @@ SCENE_LINEAR = "Linear Rec.709"  # of Blender's own configuration
 TRANSFERS = {"sRGB": "srgb", SCENE_LINEAR: "linear", "Non-Color": "linear"}
 
 
-def in_colorspace(source, name, config):
-    """The source with its samples taken to be in the colour space of that name (as a strip's colour space says).
+def in_colorspace(source: FrameSource, name: str, config) -> FrameSource:
+    """The source, its samples taken as those of a colour space: the one itself, or a ColorSource around it.
 
-    config: path of the OpenColorIO configuration that has it, not needed for sRGB and scene linear."""
+    name: Blender's, as of a strip's colour space
+    config: path of the OpenColorIO configuration that defines it; not needed for sRGB and scene linear
+    MediaError: the configuration has no such colour space"""
     if name in TRANSFERS:
         source.transfer = TRANSFERS[name]
         return source
@@ -21,11 +24,11 @@ def in_colorspace(source, name, config):
 
 
 class ColorSource(SourceWrapper):
-    """Another source's frames, converted to scene linear float32."""
+    """A source converted to scene linear float32."""
 
     transfer, dtype = "linear", np.dtype(np.float32)
 
-    def __init__(self, source, name, config):
+    def __init__(self, source: FrameSource, name: str, config):
         if config is None or name not in ColorConfig(str(config)).getColorSpaceNames():
             raise MediaError(f"{source.path.name}: unknown colour space {name}")
         super().__init__(source)
@@ -33,7 +36,7 @@ class ColorSource(SourceWrapper):
         self.options = {**source.options, "colorspace": name}
 
     def read(self, index):
-        """The frame as the source has it, but scene linear."""
+        """The source's frame, scene linear. MediaError as well where it cannot be converted."""
         samples = self._source.read(index)
         scale = np.iinfo(samples.dtype).max if samples.dtype.kind == "u" else 1
         picture = ImageBuf(samples.astype(np.float32) / np.float32(scale))

@@ -1,6 +1,8 @@
-"""In-between frames of a source, built once and kept in files: full exposure from ordinary footage (appendix B).
+"""In-between frames of a source, by optical flow, built once and kept in files: full exposure from ordinary footage
+(appendix B).
 
-Between two source frames lie factor-1 frames, by optical flow. The pair i of frames i and i+1 is built as a whole."""
+factor-1 of them lie between two neighbouring source frames. Pair i is source frames i and i+1; its in-between frames
+are built together."""
 
 import os
 import tempfile
@@ -19,9 +21,10 @@ from .files import check_index
 from .inbetween_cache import InbetweenCache, State, pair_line, write_picture
 from .source import SourceWrapper
 
-MEMORY = 4 << 30  # bytes that pairs at work may take together, with the frames that are read ahead
-AHEAD = 640 << 20  # of these: enough for 16 bits in 4K, of which no frame is read twice
-LAYERS = 26  # of a frame as float32, for a pair at work: 9 to 17 measured for "quick", 15 to 24.3 for "good"
+MEMORY = 4 << 30  # bytes of all pairs that are built at the same time, and of the frames that are read ahead
+AHEAD = 640 << 20  # bytes of them for frames that are read ahead; enough to read none of 16 bits in 4K twice
+# Memory for building a pair, in RGBA frames of float32. Measured: 9 to 17 for "quick", 15 to 24.3 for "good".
+LAYERS = 26
 
 
 class InbetweenSource(SourceWrapper):
@@ -40,7 +43,7 @@ class InbetweenSource(SourceWrapper):
         self.options = {**source.options, "inbetween": [factor, method]}
 
     def has(self, index: int) -> bool:
-        """Whether the frame is built, by now; its file is not opened."""
+        """Whether the frame exists; one built since the last call counts. Its file is not opened."""
         if not self._is_there(index):
             self._cache.load()
         return self._is_there(index)
@@ -56,7 +59,7 @@ class InbetweenSource(SourceWrapper):
     def read(self, index: int) -> np.ndarray:
         """The frame as a new array (height, width, 4), RGBA, top row first.
 
-        Raises MediaError for one that is not built, or damaged, and what the source raises."""
+        MediaError: an in-between frame is not built, or damaged. And what the source's `read` raises."""
         check_index(self, index)
         self.check(index)
         real = self._real(index)
@@ -66,7 +69,7 @@ class InbetweenSource(SourceWrapper):
         return self._cache.has(index) or self._real(index) is not None
 
     def _real(self, index):
-        """The source frame that is shown, None where an in-between frame is."""
+        """The source frame that is shown at a frame; None: an in-between frame is."""
         pair, step = divmod(index, self.factor)
         kind = "same" if step == 0 else self._cache.kinds.get(pair)
         if kind is None:
@@ -75,7 +78,7 @@ class InbetweenSource(SourceWrapper):
 
 
 def build(
-    source,
+    source: FrameSource,
     folder,
     factor: int,
     method: str,
@@ -84,18 +87,19 @@ def build(
     cancelled: Callable[[], bool] = lambda: False,
     between=None,
 ) -> State:
-    """Builds in-between frames in `folder`; what is there is checked, and built again if it is damaged.
+    """Builds in-between frames in `folder`. Pictures that are there are checked, and damaged ones are built again.
 
     factor: 2 or more; method: one of flow.METHODS
-    frames: first and last source frame of a chunk (default: all); the last one's in-betweens lead out of the chunk
-    update: is called with pairs done and pairs in all
-    cancelled: is asked often, from any thread; what is finished then is kept
-    between: what makes a pair's frames, in place of flow.between
+    frames: first and last source frame of a chunk (default: all), both included; the in-between frames after the last
+        one belong to the chunk
+    update: called with the number of finished pairs and that of all
+    cancelled: called often, from several threads; True ends the build, and finished pairs are kept
+    between: makes a pair's frames, in place of flow.between
 
-    Killed, it goes on where it was; several may build in the same folder, and none harms another. Files come out the
-    same, whatever the chunks and however often it was interrupted. The source must be used by nobody else meanwhile.
-    Gives how far it came. MediaError: a package is missing, or a frame cannot be read or written; what is finished is
-    kept."""
+    After a build that was killed, the next one goes on where that was. Several processes may build in the same folder.
+    The files are the same for any chunks and any interruptions. The source must not be used elsewhere meanwhile.
+    Returns how far the build came. MediaError: a package is missing, or a frame cannot be read or written; finished
+    pairs are kept."""
     if package := cuts.missing_package():
         raise MediaError(
             f"in-between frames need the Python package {package}; "
@@ -113,9 +117,9 @@ def build(
     return State("ready" if done == len(pairs) else "partial", done, len(pairs))
 
 
-def estimate(source, factor: int) -> int:
-    """About how many bytes all in-between frames of a source will take: as if they were as large, in files, as three
-    of the source's own frames are on average. MediaError: these cannot be read."""
+def estimate(source: FrameSource, factor: int) -> int:
+    """About how many bytes the files of all in-between frames of a source will have: the mean of three source frames,
+    written as in-between frames are, times their number. MediaError: these frames cannot be read or written."""
     samples = {source.count * part // 6 for part in (1, 3, 5)}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "picture.png" if source.dtype.kind == "u" else "picture.exr")
@@ -127,16 +131,17 @@ def estimate(source, factor: int) -> int:
     return (source.count - 1) * (factor - 1) * sum(sizes) // len(sizes)
 
 
-def _pairs(source, frames) -> range:
-    """The pairs that begin in the chunk of frames."""
+def _pairs(source: FrameSource, frames: tuple[int, int] | None) -> range:
+    """The pairs whose first frame is in the chunk. MediaError: the source has no such frames."""
     first, last = frames or (0, source.count - 1)
     if not 0 <= first <= last < source.count:
         raise MediaError(f"{source.path.name}: has frames 0 to {source.count - 1}, not {first} to {last}")
     return range(first, min(last + 1, source.count - 1))
 
 
-def _tasks(cache, pairs, between, cancelled) -> Iterator[Callable[[], bool]]:
-    """What is to be done for each pair; it gives whether the pair is finished. Frames are read here, by one thread."""
+def _tasks(cache: InbetweenCache, pairs: range, between, cancelled) -> Iterator[Callable[[], bool]]:
+    """Yields a function for each pair that builds it and returns whether it is finished. Frames are read here, in the
+    caller's thread; the functions may run in any."""
     near = _Near(cache.source)
     for pair in pairs:
         if cancelled():
@@ -152,21 +157,22 @@ def _tasks(cache, pairs, between, cancelled) -> Iterator[Callable[[], bool]]:
 
 
 class _Near:
-    """A source's frames around a pair that moves onwards, and their signatures.
+    """Reads the frames of pairs, in ascending order, and those around a pair that decide what the pair is.
 
-    Frames that are read ahead for their signatures wait for their pair, as many as there is room for: those that are
-    needed last are read again."""
+    The latter are kept for their own pair, as far as AHEAD allows; the rest are read again."""
 
-    def __init__(self, source):
+    def __init__(self, source: FrameSource):
         self._source = source
         self._most = 2 + _ahead(source)
-        self._frames: dict[int, np.ndarray] = {}  # the pair's, and those that wait
+        self._frames: dict[int, np.ndarray] = {}  # the pair's frames, and those that are kept for their pair
         self._signatures: dict[int, cuts.Signature] = {}
 
     def pair(self, index: int) -> tuple[np.ndarray, np.ndarray, str | None]:
-        """Frames `index` and `index` + 1; and "same" if they are equal, "cut" if they are of two shots, else None.
+        """Frames `index` and `index` + 1, and their kind: "same" if they are equal or the second repeats the first,
+        "cut" if they are of two shots, else None.
 
-        MediaError: one of them cannot be read, or one that has a say in what they are: that is kept for good."""
+        MediaError: one of them cannot be read, or one around them that decides their kind. A kind is stored for good,
+        so it is not decided without that frame."""
         self._frames = {i: frame for i, frame in self._frames.items() if i >= index}
         first, second = (self._frames.setdefault(i, self._frame(i)) for i in (index, index + 1))
         kind = self._kind(first, second, index)
@@ -194,7 +200,7 @@ class _Near:
     def _signature(self, index):
         if index not in self._signatures:
             frame = self._frame(index)
-            if index > min(self._frames) and len(self._frames) < self._most:  # those before the pair are done with
+            if index > min(self._frames) and len(self._frames) < self._most:  # those before the pair are not needed
                 self._frames[index] = frame
             self._signatures[index] = cuts.signature(frame, self._source.transfer, self._source.alpha)
         return self._signatures[index]
@@ -216,7 +222,8 @@ def _note_kind(cache, pair, kind) -> bool:
 
 
 def _in_parallel(tasks, workers) -> Iterator[bool]:
-    """Results of tasks, run in threads; a task is asked for when there is a thread for it, which bounds the memory."""
+    """Runs tasks in threads, and yields their results. The next task is taken only when a thread is free, since a task
+    holds its frames in memory."""
     with ThreadPoolExecutor(workers) as pool:
         running = set()
         for task in tasks:
@@ -227,17 +234,18 @@ def _in_parallel(tasks, workers) -> Iterator[bool]:
         yield from (future.result() for future in as_completed(running))
 
 
-def _workers(source) -> int:
+def _workers(source: FrameSource) -> int:
+    """How many pairs to build at the same time: one per processor, as far as MEMORY allows."""
     pair = source.width * source.height * 16 * LAYERS
     processors = getattr(os, "process_cpu_count", os.cpu_count)() or 1
     return max(1, min(processors, (MEMORY - _ahead(source) * _size(source)) // pair))
 
 
-def _ahead(source) -> int:
-    """How many frames beyond a pair may be kept: all that have a say in what the pair is, if there is room."""
+def _ahead(source: FrameSource) -> int:
+    """How many frames beyond a pair may be kept: all that decide its kind, as far as AHEAD allows."""
     return min(cuts.NEIGHBOURS - 1, AHEAD // _size(source))
 
 
-def _size(source) -> int:
+def _size(source: FrameSource) -> int:
     """Bytes of a frame."""
     return source.width * source.height * 4 * source.dtype.itemsize

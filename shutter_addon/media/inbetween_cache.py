@@ -1,4 +1,4 @@
-"""The folder that keeps a source's in-between frames: pictures, what they were made of, and a check of every one."""
+"""The folder of a source's in-between frames: pictures, a manifest of what they were made of, and their checksums."""
 
 import glob
 import hashlib
@@ -19,39 +19,40 @@ import numpy as np
 from OpenImageIO import ImageInput, ImageOutput, ImageSpec, geterror
 
 from ..core import atomic_write
+from ..core.frame_source import FrameSource
 from .completeness import is_whole_picture, why_short
 from .errors import MediaError
 from .files import check_name
 from .folder import Folder
 
-VERSION = 2  # raise it when the same frames give other in-betweens, or the folder changes: what there is gets stale
+VERSION = 2  # raise it when in-betweens of the same frames change, or the folder's format does: older ones get stale
 MANIFEST, CHECKS = "manifest.json", "checks"
 MAKER = "Virtual Shutter: in-between frames"
 SAMPLES = {"uint8": "uint8", "uint16": "uint16", "float16": "half", "float32": "float"}
-WHOLE = 8 << 20  # bytes; a source's files up to this size, HD pictures of 8 bits without compression, are read whole
-BLOCKS, BLOCK = 16, 4096  # what is read of a larger one to know it again
-READERS = 4  # threads that look whether pictures are what they were, before they are removed
+WHOLE = 8 << 20  # bytes; files of a source up to this size, such as uncompressed 8-bit HD pictures, are hashed whole
+BLOCKS, BLOCK = 16, 4096  # of a larger file so many blocks, of so many bytes each, are hashed
+READERS = 4  # threads that check pictures before they are removed
 
-# What is larger, in bytes, none of our builds has made.
+# Bytes of files that a build makes, at most. Larger ones are another program's.
 LARGEST_MANIFEST = 1 << 16
 LARGEST_CHECKS = 1 << 30  # 13 million frames
 LARGEST_PICTURE = 1 << 33
-LONGEST_LINE = 128
+LONGEST_LINE = 128  # bytes of a line of checks that is looked at; no build writes a longer one
 
 _PICTURE = re.compile(r"([0-9a-f]{64})  ([0-9]{8}\.(?:png|exr))\n?")
 _PAIR = re.compile(r"# ([0-9]{1,9}) (same|cut) [0-9a-f]{8}\n?")
 _CHECKS = re.compile(r"[0-9a-f]{8}\.sha256")
-_HALF = re.compile(r"[0-9]{8}\.(?:png|exr)|" + re.escape(MANIFEST))  # in a part folder
-_KEPT = 64
-_finished: dict[Path, tuple] = {}  # (stamp, count of pairs) of folders that were asked for
-_sizes: dict[Path, tuple] = {}  # (stamp, bytes), likewise
+_HALF = re.compile(r"[0-9]{8}\.(?:png|exr)|" + re.escape(MANIFEST))  # half-written files in a part folder
+_KEPT = 64  # folders of which the following is remembered
+_finished: dict[Path, tuple] = {}  # {folder: (stamp, finished pairs)}
+_sizes: dict[Path, tuple] = {}  # {folder: (stamp, bytes)}
 
 
 class State(NamedTuple):
     """How far in-between frames are built.
 
-    name: "missing", "partial", "ready", or "stale": there are some, but of what the source was before
-    done, total: pairs of neighbouring source frames"""
+    name: "missing", "partial", "ready", or "stale": there are none of the source, but some of what it was before
+    done, total: finished pairs of neighbouring source frames, and all pairs"""
 
     name: str
     done: int
@@ -61,17 +62,23 @@ class State(NamedTuple):
 class InbetweenCache:
     """The in-between frames of one source, factor and method, in a folder of their own under `folder`.
 
-    manifest.json: what they are made of. The folder's name ends in a hash of that, so nothing in it ever gets stale.
-    00000099.png or .exr: a frame, by its number among all frames, with the source's own samples.
-    checks/*.sha256: what is finished. Each build appends to a file of its own, a picture's line before it comes to its
-    place. `sha256sum -c` reads them, run in the folder; comments are pairs of source frames that need no pictures,
-    "# 12 same" or "# 12 cut", with their CRC-32.
+    manifest.json: what they are made of. The folder's name ends in a hash of it, the path excepted, so a source that
+    changes gets another folder.
+    00000099.png or .exr: a frame, named by its index among source and in-between frames; its samples are of the
+    source's type.
+    checks/*.sha256: what is finished, in the format of `sha256sum`, which run in the folder checks it. Each build
+    appends to a file of its own. A picture's line is written before the picture is moved to its place. A pair of source
+    frames that needs no pictures is a comment, "# 12 same" or "# 12 cut", with its CRC-32.
 
-    The folder may come from a stranger: what no build makes (links, pipes, lines of other text, numbers of no frame) is
-    as if it were not there, and never followed. That lines are true, nobody can know.
+    The folder may come from a stranger. Whatever no build makes is ignored, and links are never followed: pipes, other
+    text, numbers of no frame. But a picture with a matching line is taken for what it says, whoever made it.
+
+    A frame's index counts source frames and in-between frames; a pair's is that of its first source frame.
+    digests: {frame: SHA-256 of its picture, in hexadecimal; several if builds differed}
+    kinds: {pair: "same" or "cut"} of pairs without pictures
     """
 
-    def __init__(self, source, folder, factor, method):
+    def __init__(self, source: FrameSource, folder, factor: int, method: str):
         self.source, self.factor, self.method = source, factor, method
         made_of = {
             "maker": MAKER,
@@ -89,8 +96,7 @@ class InbetweenCache:
         self.kinds: dict[int, str] = {}
 
     def load(self) -> None:
-        """Reads what is finished, if that has changed: digests {frame: those of its picture}, kinds {pair: "same" or
-        "cut"}."""
+        """Reads `digests` and `kinds` again, if the folder has changed."""
         stamp = _stamp(self.folder)
         if stamp == self._loaded:
             return
@@ -102,24 +108,24 @@ class InbetweenCache:
                 if self._is_between(frame := int(name[:8])) and name == self._name(frame):
                     digests[frame] = found
             kinds = {pair: kind for pair, kind in checks.kinds.items() if pair < self.source.count - 1}
-        self.digests, self.kinds, self._loaded = digests, kinds, stamp  # at once: others may ask from their threads
+        self.digests, self.kinds, self._loaded = digests, kinds, stamp  # together: other threads may read them
 
     def picture(self, frame: int) -> Path:
-        """The file of that frame."""
+        """The path of a frame's file."""
         return self.folder / self._name(frame)
 
     def steps(self, pair: int) -> range:
-        """The frames between source frames `pair` and `pair` + 1."""
+        """The in-between frames of a pair: those between source frames `pair` and `pair` + 1."""
         return range(pair * self.factor + 1, (pair + 1) * self.factor)
 
     def has(self, frame: int) -> bool:
-        """Whether the frame's picture is finished, as far as the names of files tell."""
+        """Whether a frame's picture is finished: it has a digest and a file, which is not opened."""
         with suppress(OSError):
             return frame in self.digests and stat.S_ISREG(self.picture(frame).lstat().st_mode)
         return False
 
     def finished(self) -> set[int]:
-        """The pairs that are finished, as far as the names of files tell."""
+        """The finished pairs: those of a kind, and those whose pictures all have digests and files. None is opened."""
         names = set()
         with suppress(OSError), Folder(self.folder) as folder:
             names = {entry.name for entry in folder.files()}
@@ -128,11 +134,11 @@ class InbetweenCache:
         return self.kinds.keys() | {pair for pair in pairs if there.issuperset(self.steps(pair))}
 
     def is_sound(self, pair: int) -> bool:
-        """Whether the pair is finished and all its pictures are as they were written; reads them."""
+        """Whether a pair is finished and all its pictures match their digests. It reads them."""
         return pair in self.kinds or all(self._is_sound(frame) for frame in self.steps(pair))
 
     def read(self, frame: int) -> np.ndarray:
-        """The frame's picture (height, width, 4), as it was given. MediaError: it is damaged or gone."""
+        """A frame's picture (height, width, 4), as `write` was given it. MediaError: it is damaged or gone."""
         path = self.picture(frame)
         if not self._is_sound(frame):
             raise MediaError(f"{path}: this in-between frame is damaged or gone; build in-between frames again")
@@ -150,9 +156,9 @@ class InbetweenCache:
         return picture
 
     def prepare(self) -> None:
-        """Makes the folder, with its manifest, and clears away what killed builds left half-written.
+        """Makes the folder and its manifest, and removes half-written files of builds that were killed.
 
-        MediaError: it cannot be written."""
+        MediaError: the folder cannot be written to."""
         text = (json.dumps(self.manifest, indent=1, sort_keys=True) + "\n").encode()
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -167,27 +173,27 @@ class InbetweenCache:
             raise _unwritable(self.folder, error) from None
 
     def write(self, frame: int, picture: np.ndarray) -> None:
-        """Writes a frame's picture (height, width, 4), whole or not at all, and takes it down.
-
-        MediaError: it cannot be written."""
+        """Writes a frame's picture (height, width, 4) whole or not at all, and its digest. MediaError: it cannot be
+        written."""
         path = self.picture(frame)
         try:
             with atomic_write.writing(path) as part:
                 if not write_picture(part, picture, self.source.alpha):
                     reason = why_short(part.parent)
                     raise MediaError(f"{self.folder}: an in-between frame could not be written whole ({reason})")
-                # Before it comes to its place: whatever kills us, each picture there can be told from others' files.
+                # Before the picture is moved to its place: then each of our pictures there has its line, even if this
+                # process is killed.
                 self.note(f"{_sha256(part)}  {path.name}")
         except OSError as error:
             raise _unwritable(self.folder, error) from None
 
     def note(self, line: str) -> None:
-        """Takes down what is finished. MediaError: it cannot be written."""
+        """Appends a line to this build's checks. MediaError: it cannot be written."""
         try:
             with Folder(self.folder) as folder, folder.folder(CHECKS) as checks:
                 checks.append(f"{self._token}.sha256", f"{line}\n".encode())
         except OSError as error:
-            self._token = secrets.token_hex(4)  # half a line may end the file
+            self._token = secrets.token_hex(4)  # that file may end in half a line: go on in another
             raise _unwritable(self.folder, error) from None
 
     def _name(self, frame):
@@ -197,7 +203,7 @@ class InbetweenCache:
         return 0 < frame < (self.source.count - 1) * self.factor and frame % self.factor != 0
 
     def _is_sound(self, frame):
-        """Whether the picture is one that was taken down, and one of this source."""
+        """Whether a frame's picture matches one of its digests, and is of the source's size and samples."""
         path, digests = self.picture(frame), self.digests.get(frame)
         try:
             with Folder(self.folder) as folder:
@@ -210,7 +216,7 @@ class InbetweenCache:
         return image is not None
 
     def _open(self, path):
-        """The file of a picture as `write_picture` makes them for this source, open; None: it is another."""
+        """The opened image file, if it is as `write_picture` makes them for this source; else None."""
         wishes = ImageSpec()
         wishes.attribute("oiio:UnassociatedAlpha", 1)  # no premultiplication on reading
         image = ImageInput.open(check_name(path), wishes)
@@ -224,9 +230,9 @@ class InbetweenCache:
         return None
 
 
-def identity(source) -> dict:
-    """What tells a source from others wherever its files lie: their content, and how they are read. In files larger
-    than 8 MiB, what keeps the size and changes none of 16 blocks of 4 kB is not noticed.
+def identity(source: FrameSource) -> dict:
+    """What tells a source from others, wherever its files lie: their content, and how they are read. A change in a
+    file larger than 8 MiB goes unnoticed if it keeps the size and 16 blocks of 4 KiB.
 
     MediaError: a file is gone."""
     content = hashlib.sha256()
@@ -249,10 +255,11 @@ def identity(source) -> dict:
     }
 
 
-def state(source, folder, factor, method) -> State:
-    """How far a source's in-between frames are built, by the names of files; a build and a read look into them.
+def state(source: FrameSource, folder, factor: int, method: str) -> State:
+    """How far a source's in-between frames are built, as the names of their files tell. Only a build or a read opens
+    these files.
 
-    Quick while nothing changes: it asks for the time stamps of the source's files and of the folder.
+    While nothing changes it is fast: it asks for the time stamps of the source's files and of the folder alone.
     MediaError: a file of the source is gone."""
     cache, total = InbetweenCache(source, folder, factor, method), source.count - 1
 
@@ -269,19 +276,21 @@ def state(source, folder, factor, method) -> State:
     return State("stale" if stale else "missing", 0, total)
 
 
-def size(folder, source=None) -> int:
-    """The bytes that `purge` would free, unless pictures have changed since they were written, which it leaves.
+def size(folder, source: FrameSource | None = None) -> int:
+    """The bytes that `purge` would free. Pictures that have changed count as well, though it does not remove them.
 
-    Quick while nothing changes. MediaError: a file of the source is gone."""
+    While nothing changes it is fast. MediaError: a file of the source is gone."""
     folder = Path(folder)
     return sum(_remembered(_sizes, folder / name, partial(_size, folder / name)) for name in _chosen(folder, source))
 
 
-def purge(folder, source=None, left: Callable[[Path, int], None] = lambda path, count: None) -> int:
-    """Removes the in-between frames in `folder`, all or one source's, stale ones as well. Gives the bytes freed.
+def purge(
+    folder, source: FrameSource | None = None, left: Callable[[Path, int], None] = lambda path, count: None
+) -> int:
+    """Removes in-between frames in `folder`, of one source or of all, stale ones included. Returns the bytes freed.
 
-    Nothing else is removed, wherever it lies: pictures are read, and go if they are those that were taken down.
-    left: is called with each folder that was not empty after that, and how many things lie in it
+    It removes nothing else: pictures are read, and removed if they match their digests.
+    left: called with each cache's folder that is not empty after that, and the number of entries in it
     MediaError: something cannot be removed, or `folder` is a link."""
     names = _chosen(folder, source)
     try:
@@ -294,23 +303,25 @@ def purge(folder, source=None, left: Callable[[Path, int], None] = lambda path, 
 
 
 def forget() -> None:
-    """Forgets what is known of sources and folders."""
+    """Forgets what is remembered of sources and folders."""
     _finished.clear()
     _sizes.clear()
     _content.cache_clear()
 
 
 def write_picture(path: Path, picture: np.ndarray, alpha: str) -> bool:
-    """Writes (height, width, 4) samples without loss, as PNG or EXR by the path's ending: RGB if alpha is "opaque",
-    else RGBA as it is, premultiplied or not. Equal samples give equal bytes. Whether it is whole.
+    """Writes samples (height, width, 4) without loss. Returns whether the file is complete. Equal samples give equal
+    bytes.
 
+    path: ends in .png or .exr
+    alpha: a source's; "opaque": RGB is written, else RGBA as it is, premultiplied or not
     OSError, MediaError: it cannot be written."""
     height, width, _ = picture.shape
     name, spec = check_name(path), _spec(width, height, picture.dtype, alpha)
     spec["oiio:UnassociatedAlpha"] = 1
-    spec["DateTime"] = "1970:01:01 00:00:00"  # of an EXR, else the time of writing
+    spec["DateTime"] = "1970:01:01 00:00:00"  # an EXR's; without it, it is the time of writing
     spec["png:compressionLevel"] = 1
-    spec["png:filter"] = 0x20  # "up" alone takes half the time of a choice for each row, and no more room
+    spec["png:filter"] = 0x20  # "up" alone: half the time of a choice for each row, and files as small
     spec["compression"] = "piz"
     output = ImageOutput.create(name)
     samples = np.ascontiguousarray(picture[..., : spec.nchannels])
@@ -325,18 +336,19 @@ _SHAPE = (
 
 
 def _spec(width, height, dtype, alpha) -> ImageSpec:
-    """What `write_picture` makes."""
+    """What `write_picture` writes: size, channels and sample type."""
     return ImageSpec(width, height, 3 if alpha == "opaque" else 4, SAMPLES[dtype.name])
 
 
 def pair_line(pair: int, kind: str) -> str:
-    """What `InbetweenCache.note` takes down of a pair that needs no pictures; kind: "same" or "cut"."""
+    """The line of checks of a pair that needs no pictures, for `InbetweenCache.note`. kind: "same" or "cut"."""
     text = f"{pair} {kind}"
     return f"# {text} {zlib.crc32(text.encode()):08x}"
 
 
 def _stamp(folder: Path) -> tuple | None:
-    """Changes with the folder's list of files and with its checks; None without a folder."""
+    """A value that changes when files are made or removed in a cache's folder, or its checks change. None: there is no
+    such folder."""
     try:
         with Folder(folder) as opened:
             changed = opened.status(".").st_mtime_ns
@@ -349,9 +361,10 @@ def _stamp(folder: Path) -> tuple | None:
 
 
 def stamp(folder, stem: str, factor: int, method: str) -> tuple:
-    """Changes with every in-between frame that is built in `folder`, or removed, of sources whose files have that stem.
+    """A value that changes when in-between frames in `folder` are built or removed, of any source with this stem of its
+    file's name.
 
-    It asks for time stamps alone, and for none of the sources'."""
+    It asks for time stamps of caches alone, not of the sources' files."""
     caches = Path(folder).glob(f"{glob.escape(stem[:40])}-{factor}x-{method}-*")
     return tuple((path.name, _stamp(path)) for path in sorted(caches))
 
@@ -368,7 +381,7 @@ def _caches(folder) -> list[tuple[str, dict]]:
 
 
 def _manifest(cache: Folder) -> dict | None:
-    """That of a cache; None for another program's folder, or if its content does not fit the folder's name."""
+    """A cache's manifest; None if it is not one of ours, or does not match the folder's name."""
     with suppress(ValueError, TypeError, KeyError, AttributeError, RecursionError):
         manifest = json.loads(_content_of(cache, MANIFEST))
         made_of = {key: value for key, value in manifest.items() if key != "path"}
@@ -383,14 +396,14 @@ def _key(made_of: dict) -> str:
 
 
 def _content_of(cache: Folder, name: str) -> bytes | None:
-    """What is in a manifest; None if it is none."""
+    """A manifest's bytes; None if there is none, or it is larger than any of ours."""
     with suppress(OSError):
         return cache.read(name, LARGEST_MANIFEST)
     return None
 
 
-def _chosen(folder, source) -> list[str]:
-    """The caches in `folder`, all or one source's."""
+def _chosen(folder, source: FrameSource | None) -> list[str]:
+    """The names of the caches in `folder`: of one source, stale ones included, or of all."""
     path, made_of = (None, None) if source is None else (_relative(source.path, folder), identity(source))
     return [
         name
@@ -402,8 +415,10 @@ def _chosen(folder, source) -> list[str]:
 class _Checks(NamedTuple):
     """What a cache's checks say.
 
-    digests: by names of pictures; kinds: by pairs; own: the files in which every line is ours
-    unreadable: why others cannot be read"""
+    digests: {name of a picture: its digests}
+    kinds: {pair: "same" or "cut"}
+    own: names of the files in which every line is of our format
+    unreadable: the errors of files that may not be read"""
 
     digests: dict[str, set[str]]
     kinds: dict[int, str]
@@ -422,21 +437,22 @@ def _read_checks(cache: Folder) -> _Checks:
                             checks.own.append(name)
                 except PermissionError as error:
                     checks.unreadable.append(error)
-                except OSError:  # removed meanwhile, or too large
+                except OSError:  # removed meanwhile, or larger than any of ours
                     continue
     except PermissionError as error:
         checks.unreadable.append(error)
-    except OSError:  # there are none
+    except OSError:  # there are no checks
         pass
     return checks
 
 
 def _read_lines(file, checks: _Checks) -> bool:
-    """Adds what a file of checks says. Whether every line is ours; on a full disk the last one may be torn."""
+    """Adds the lines of a file to the checks. Returns whether all of them are of our format; the last one may be cut
+    off, as on a full disk."""
     ours = others = 0
     for line in iter(partial(file.readline, LONGEST_LINE), b""):
         text = line.decode("ascii", "replace")
-        if match := _PICTURE.fullmatch(text):  # processes whose libraries differ may write other bytes
+        if match := _PICTURE.fullmatch(text):  # a picture can have several digests: libraries encode differently
             checks.digests.setdefault(match[2], set()).add(match[1])
         elif (match := _PAIR.fullmatch(text)) and text.rstrip("\n") == pair_line(int(match[1]), match[2]):
             checks.kinds[int(match[1])] = match[2]
@@ -450,7 +466,7 @@ def _read_lines(file, checks: _Checks) -> bool:
 
 
 def _pictures(cache: Folder, checks: _Checks) -> list[os.DirEntry]:
-    """The pictures in a cache's folder that were taken down, as far as their names tell."""
+    """The files in a cache's folder with the name of a picture that has a digest."""
     return [
         entry
         for entry in cache.files()
@@ -459,8 +475,8 @@ def _pictures(cache: Folder, checks: _Checks) -> list[os.DirEntry]:
 
 
 def _other_files(cache: Folder, checks: _Checks) -> Iterator[tuple[Folder, str]]:
-    """What else was made in a cache's folder, as (folder, name), in the order in which it may go: the manifest last,
-    for without it what is left would never be found again."""
+    """Our other files in a cache's folder, as (folder, name), in the order in which they are removed. The manifest is
+    last: without it, what is left would not be recognised as a cache again."""
     for entry in cache.entries():
         if atomic_write.is_part(entry.name):
             with suppress(OSError), cache.folder(entry.name) as part:
@@ -494,7 +510,7 @@ def _remove(top: Folder, name: str, left) -> int:
             freed += sum(place.remove(file) for place, file in _other_files(cache, checks))
             for entry in cache.entries():
                 if entry.name == CHECKS or atomic_write.is_part(entry.name):
-                    with suppress(OSError):  # others' things are in it
+                    with suppress(OSError):  # it is not empty: others' files are in it
                         cache.remove_folder(entry.name)
             count = len(cache.entries())
         if count:
@@ -520,7 +536,7 @@ def _remove_part(cache: Folder, name: str) -> None:
 
 
 def _remembered(known: dict[Path, tuple], folder: Path, find: Callable[[], int]) -> int:
-    """What `find` gives for a folder; found again once the folder has changed."""
+    """The result of `find` for a folder, from `known` unless the folder has changed. `known` keeps _KEPT folders."""
     now = _stamp(folder)
     if known.get(folder, ((),))[0] != now:
         known.pop(folder, None)
@@ -532,7 +548,7 @@ def _remembered(known: dict[Path, tuple], folder: Path, find: Callable[[], int])
 
 @lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
 def _content(path: Path, size: int, _mtime: int) -> bytes:
-    """A hash of the file, or of a large one's size and of blocks from all over it."""
+    """The SHA-256 of a file's content; of a file over WHOLE, that of its size and of blocks spread over it."""
     with path.open("rb") as file:
         if size <= WHOLE:
             return hashlib.file_digest(file, "sha256").digest()
@@ -549,7 +565,7 @@ def _sha256(path: Path) -> str:
 
 
 def _relative(path: Path, folder) -> str:
-    """The path as seen from the folder, so that both may move together."""
+    """The path relative to the folder, so that it holds after both are moved together."""
     try:
         return Path(os.path.relpath(path, folder)).as_posix()
     except ValueError:  # another drive

@@ -56,3 +56,34 @@ def sequencer(bpy):
     area.type = "SEQUENCE_EDITOR"
     with bpy.context.temp_override(window=window, area=area):
         yield area
+
+
+def state(edit, effect, strip, frame):
+    """The effect at a timeline frame, as its pictures are made with it."""
+    from shutter_addon.blender.data import snapshot
+
+    with snapshot.translated():
+        return snapshot.read(edit, effect, strip, (frame,)).at(frame)
+
+
+def source_time(edit, effect, frame):
+    """Source frame, and whether it runs backward."""
+    from shutter_addon.blender.data import snapshot, strips
+
+    return snapshot.read(*strips.find_edit(effect.scene), (frame,)).time.at(frame)
+
+
+def picture_of(scene, scene_frame, **options):
+    """The picture of an effect scene, as the engine gives it to Blender."""
+    from shutter_addon.blender.rendering import job_snapshots, session
+
+    return session.picture(*job_snapshots.of(scene, scene_frame), **options)
+
+
+def request(edit, effect, strip, frame):
+    """What is asked of the session for the picture at a timeline frame."""
+    from shutter_addon.blender.data import snapshot
+    from shutter_addon.blender.rendering import session
+
+    folder = session.settings().inbetween
+    return session.here().request(snapshot.take(edit, effect, strip, (frame,), folder=folder), frame)

@@ -117,12 +117,12 @@ def test_what_a_job_takes_away_meanwhile_is_not_missed(bpy):
             return hash(7)
 
         def __eq__(self, other):
-            for known in (studio.shown, studio._begun, studio._renderers):
+            for known in (found._shown, found._begun, found._renderers):
                 known.pop(7, None)
             return False
 
-    for name in ("shown", "_begun", "_renderers"):
-        studio = session.Studio(None)
-        getattr(studio, name)[7] = None
-        studio.keep({Job()})
-        assert getattr(studio, name) == {}
+    for name in ("_shown", "_begun", "_renderers"):
+        found = session.RenderSession(None)
+        getattr(found, name)[7] = None
+        found.keep({Job()})
+        assert getattr(found, name) == {}

@@ -9,14 +9,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support import write_frames
+from support import request, write_frames
 
 FACTOR, COUNT = 4, 6
 
 
 @pytest.fixture
 def inbetween_build(bpy):
-    from shutter_addon.blender.interface import inbetween_build
+    from shutter_addon.blender.rendering import inbetween_build
 
     yield inbetween_build
     inbetween_build.stop()
@@ -116,19 +116,16 @@ def test_a_build_reopens_its_source_once_and_no_other(bpy, inbetween_build, edit
     begun = selection.active(bpy.context)
     ready = edit, strips.effect_of(edit, first.scene), first
     opened, asked, go = [], threading.Semaphore(0), threading.Semaphore(0)
-    monkeypatch.setattr(
-        session, "_open", lambda _, strip, usual=session._open: opened.append(strip.name) or usual(_, strip)
-    )
+    monkeypatch.setattr(session, "_open", lambda shown, usual=session._open: opened.append(shown.timing.name) or usual(shown))
 
     def draw():
         for shown in (ready, begun):
-            session.moment(*shown, 1)
+            request(*shown, 1)
         return invalidation.invalidate_changed(edit)
 
     draw()
     assert len(opened) == 2
-    build = inbetween_build.Build(*begun)
-    inbetween_build._started(bpy.context, build)
+    build = inbetween_build.start(*begun)
     flow += [asked.release, lambda: go.acquire(timeout=5)]
     for _ in range(COUNT - 1):
         assert asked.acquire(timeout=20)
@@ -137,7 +134,7 @@ def test_a_build_reopens_its_source_once_and_no_other(bpy, inbetween_build, edit
     wait([build.future], timeout=20)
     assert not draw()
     assert len(opened) == 2
-    inbetween_build._ended()
+    inbetween_build.ended()
     assert draw()
     assert not draw()
     assert opened[2:] == [strips.source_of(*begun).name]
@@ -211,10 +208,10 @@ def test_a_moved_file_finds_its_frames(bpy, inbetween_build, tmp_path):
 
 
 def test_an_unsaved_file_has_no_place_for_them(bpy, inbetween_build, edit, tmp_path, flow):
-    from shutter_addon.blender.data import effects
+    from shutter_addon.blender.data import validation
 
     made(edit, tmp_path)
-    with pytest.raises(effects.EffectError, match="save it first"):
+    with pytest.raises(validation.EffectError, match="save it first"):
         look(bpy, inbetween_build)
     for operator in ("inbetween_build", "inbetween_purge"):
         with pytest.raises(RuntimeError, match="save it first"):
@@ -254,6 +251,7 @@ def test_a_folder_that_is_a_link_is_one_sentence_when_it_is_to_be_emptied(bpy, i
 
 @pytest.mark.usefixtures("effect")
 def test_what_is_known_is_forgotten_with_the_file(bpy, inbetween_build, edit):
+    from shutter_addon.blender.data import inbetween_settings
     from shutter_addon.blender.rendering import invalidation as finished
     from shutter_addon.media import inbetween_cache
 
@@ -267,7 +265,7 @@ def test_what_is_known_is_forgotten_with_the_file(bpy, inbetween_build, edit):
         inbetween_build._looks,
         inbetween_build._media,
         finished._signatures,
-        finished._built,
+        inbetween_settings.built._known,
     ]
     assert not any(known)
     assert inbetween_cache._content.cache_info().currsize == 0
@@ -285,8 +283,7 @@ def test_a_file_is_closed_in_the_midst_of_a_build(bpy, inbetween_build, flow):
     from shutter_addon.blender.data import selection
 
     flow.append(lambda: time.sleep(0.05))
-    build = inbetween_build.Build(*selection.active(bpy.context))
-    inbetween_build._started(bpy.context, build)
+    build = inbetween_build.start(*selection.active(bpy.context))
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     assert inbetween_build.running() is None
     assert build.future.done()

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support import recipe, write_frames
+from support import recipe, request, write_frames
 
 from shutter_addon.core import recipe as recipes
 
@@ -200,16 +200,15 @@ def test_what_is_known_of_effects_goes_with_them(edit, effect):
     assert not invalidation._signatures
 
 
-def test_stamps_of_in_between_frames_are_bounded(effect, tmp_path, monkeypatch):
-    from shutter_addon.blender.data import inbetween_settings, strips
-    from shutter_addon.blender.rendering import invalidation
+def test_stamps_of_in_between_frames_are_bounded(effect, tmp_path):
+    from shutter_addon.blender.data import inbetween_settings, snapshot, strips
 
     effect.inbetween = "4"
     source = strips.source_of(effect.id_data, effect, strips.effect_strips(effect.id_data)[0])
-    for number in range(2 * invalidation._KEPT):
-        monkeypatch.setattr(inbetween_settings, "given", tmp_path / f"{number}")
-        invalidation.built_key(effect, source)
-    assert len(invalidation._built) == invalidation._KEPT
+    stamps = inbetween_settings.built
+    for number in range(2 * stamps._MOST):
+        snapshot.source_files(effect, source, tmp_path / f"{number}")
+    assert len(stamps._known) == stamps._MOST
 
 
 def test_a_file_replaced_in_the_middle_is_rendered(bpy, edit, effect, render, images):
@@ -281,14 +280,14 @@ def test_replaced_files_of_a_long_sequence_are_noticed_little_by_little(edit, im
 @pytest.mark.usefixtures("clock", "long")
 def test_a_redraw_asks_the_ends_of_a_sequence_alone(edit, effect, asked):
     from shutter_addon.blender.data import strips
-    from shutter_addon.blender.rendering import invalidation, session
+    from shutter_addon.blender.rendering import invalidation
 
     (strip,) = strips.effect_strips(edit)
     invalidation.invalidate_changed(edit)
     for frame in (FRAME, FRAME + 1):
         asked.clear()
         invalidation.invalidate_changed(edit)
-        session.moment(edit, effect, strip, frame)
+        request(edit, effect, strip, frame)
         assert len(asked) == 4
 
 
@@ -297,7 +296,7 @@ def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, rend
     from shutter_addon.blender.data import source_media
     from shutter_addon.blender.rendering import session
 
-    begin, counts = session.begin_next, []
+    begin, counts = session.RenderSession.begin_next, []
 
     def begin_next(*arguments):
         counts.append(len(asked))
@@ -305,7 +304,7 @@ def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, rend
         clock(60)
         begin(*arguments)
 
-    monkeypatch.setattr(session, "begin_next", begin_next)
+    monkeypatch.setattr(session.RenderSession, "begin_next", begin_next)
     render(edit, [FRAME])
     counts.clear()
     edit.frame_start, edit.frame_end = 7, 11
@@ -313,7 +312,7 @@ def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, rend
     assert counts[0] >= len(long.elements)
     assert len(counts) >= 5
     assert 2 <= max(counts[1:]) < 10
-    assert not source_media.filming
+    assert not source_media._resting
     asked.clear()
     source_media.files_key(long)
     assert len(asked) == 102

@@ -6,7 +6,7 @@ import av
 import numpy as np
 import OpenImageIO
 import pytest
-from support import recipe, sequencer, write_frames
+from support import picture_of, recipe, sequencer, write_frames
 
 from shutter_addon.core import recipe as recipes
 
@@ -143,13 +143,13 @@ def test_what_is_not_supported_is_said(edit, clip_strip, movie):
     source = clip_strip(movie)
     strip, effect = add_effect.add_effect(edit, source)
     shutter_edits.start(effect)
-    session.picture(strip.scene, 1)
+    picture_of(strip.scene, 1)
     source.stabilize2d = True
     with pytest.raises(session.FAULTS, match='"clip": undistorted or stabilized clips are not supported'):
-        session.picture(strip.scene, 1)
+        picture_of(strip.scene, 1)
     source.stabilize2d, source.clip = False, None
     with pytest.raises(session.FAULTS, match='"clip" has no clip'):
-        session.picture(strip.scene, 1)
+        picture_of(strip.scene, 1)
 
 
 def test_a_retimed_clip_is_refused(bpy, edit, clip_strip, movie):
@@ -166,4 +166,4 @@ def test_a_retimed_clip_is_refused(bpy, edit, clip_strip, movie):
     strip, effect = add_effect.add_effect(edit, source)
     shutter_edits.start(effect)
     with pytest.raises(session.FAULTS, match='"clip" is not as long as its clip'):
-        session.picture(strip.scene, 1)
+        picture_of(strip.scene, 1)

@@ -11,14 +11,15 @@ from support import write_frames
 SCRIPT = """
 import bpy
 from shutter_addon import blender
-from shutter_addon.blender import copies, editing, strips
+from shutter_addon.blender.data import strips
+from shutter_addon.blender.editing import add_effect, copies, shutter_edits
 from shutter_addon.blender.editing import add_effect
 
 blender.register()
 edit = bpy.context.scene
 source = edit.sequence_editor_create().strips.new_image("images", {path!r}, 1, 1)
 strip, effect = add_effect.add_effect(edit, source)
-editing.start(effect)
+shutter_edits.start(effect)
 for i in range({count}):
     edit.sequence_editor.strips.new_scene("copy", effect.scene, 5, 200 + 100 * i)
 copies.adopt()

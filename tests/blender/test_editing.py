@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support import state
 
 from shutter_addon.blender.data import annotations, consistency, selection
 from shutter_addon.blender.editing import bar_edits, region_edits, shutter_edits
@@ -58,10 +59,10 @@ def draw(effect, index, points=((0, 0), (5, 5)), frame=1):
 
 def picture_bars(effect, index, frame):
     """What a picture at a frame is made with."""
-    from shutter_addon.blender.data import effects, strips
+    from shutter_addon.blender.data import strips
 
     edit, _, strip = strips.find_edit(effect.scene)
-    return effects.instant(edit, effect, strip, frame).bars[index]
+    return state(edit, effect, strip, frame).bars[index]
 
 
 # Finding
@@ -514,7 +515,7 @@ def test_only_what_renders_by_its_keys_can_be_keyed(effect):
 
 
 def test_keyed_options_hold_from_their_key_on(effect):
-    from shutter_addon.blender.data import effects, fcurves
+    from shutter_addon.blender.data import snapshot, strips
 
     edit = effect.id_data
     for frame, border, edges, aggregate in ((1, False, "HOLD", "1"), (20, True, "SHORTEN", "4")):
@@ -522,8 +523,10 @@ def test_keyed_options_hold_from_their_key_on(effect):
         effect.stop_at_cuts = not border
         for name in ("border", "edges", "aggregate", "stop_at_cuts"):
             effect.keyframe_insert(name, frame=frame)
-    curves = fcurves.Curves(edit)
-    found = [effects.options(effect, curves, frame) for frame in (1, 19, 20, 40)]
+    *_, strip = strips.find_edit(effect.scene)
+    frames = (1, 19, 20, 40)
+    read = snapshot.read(edit, effect, strip, frames)
+    found = [read.options.at(frame) for frame in frames]
     assert [(o.border, o.edges, o.aggregate) for o in found] == [(False, "hold", 1)] * 2 + [(True, "shorten", 4)] * 2
     assert [o.stop_at_cuts for o in found] == [True, True, False, False]
 

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from support import write_frames
+from support import state, write_frames
 
 from shutter_addon.core import recipe as recipes
 
@@ -64,7 +64,7 @@ def keyed_recipe(window=8):
 @pytest.fixture
 def effect_on(bpy, edit, tmp_path):
     """An image strip at frame 31 with a recipe's effect; gives a function of the strip's own frames."""
-    from shutter_addon.blender.data import effects, recipe_import
+    from shutter_addon.blender.data import recipe_import
     from shutter_addon.blender.editing import add_effect
 
     def make(data, transform=None):
@@ -75,7 +75,7 @@ def effect_on(bpy, edit, tmp_path):
             setattr(source.transform, name, value)
         strip, effect = add_effect.add_effect(edit, source)
         recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
-        return lambda frame: effects.instant(edit, effect, strip, frame + 30)
+        return lambda frame: state(edit, effect, strip, frame + 30)
 
     return make
 
@@ -125,14 +125,14 @@ def test_a_picture_point_lies_where_blender_draws_it(bpy, edit, render, tmp_path
 
 
 def test_applying_another_recipe_leaves_nothing_of_the_first(bpy, edit, effect_on):
-    from shutter_addon.blender.data import effects, recipe_import
+    from shutter_addon.blender.data import recipe_import
 
     effect_on(keyed_recipe())
     effect = edit.virtual_shutter.effects[0]
     strip = next(s for s in edit.sequence_editor.strips if s.type == "SCENE")
     plain = recipes.parse('{"version": 1, "window": 2, "shutters": [{"name": "A", "bars": [1, 0]}]}')
     recipe_import.apply(edit, effect, strip, plain)
-    check(effects.instant(edit, effect, strip, 40), plain.at(10, 40 / 24))
+    check(state(edit, effect, strip, 40), plain.at(10, 40 / 24))
     from bpy_extras import anim_utils
 
     animation = edit.animation_data

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from support import write_frames
+from support import source_time, state, write_frames
 
 from shutter_addon.core import recipe as recipes
 
@@ -262,15 +262,14 @@ CASES = [
 @pytest.mark.parametrize("change", CASES, ids=lambda change: change.__name__)
 def test_what_blender_made_agrees_at_every_frame(effect_on, change):
     """Within the tolerance that export states, and again after importing it."""
-    from shutter_addon.blender.data import effects
 
     apply(effect_on, BASE)
     change(effect_on[0], effect_on[1])
     found = export(effect_on)
-    wanted = {frame: effects.instant(*effect_on, frame) for frame in range(FIRST, LAST + 1)}
+    wanted = {frame: state(*effect_on, frame) for frame in range(FIRST, LAST + 1)}
     for frame, instant in wanted.items():
         check(found.at(frame - FIRST + 1, ASPECT), instant)
-        time, _ = effects.source_time(effect_on[0], effect_on[1], frame)
+        time, _ = source_time(effect_on[0], effect_on[1], frame)
         assert found.time_at(frame - FIRST + 1) == pytest.approx(time, abs=1e-3)
     apply(effect_on, found)
     assert export(effect_on) == found
@@ -301,9 +300,11 @@ def test_keys_of_the_source_time_lie_in_a_group_of_the_effect(effect_on):
 @pytest.mark.parametrize("ease", ["linear", "bezier"])
 def test_a_source_time_that_stands_still_keeps_its_direction(effect_on, ease):
     """At the last key of a ramp, and in a freeze behind it; a jump has none."""
-    from shutter_addon.blender.data import effects, fcurves
+    from shutter_addon.blender.data import fcurves
+    from shutter_addon.blender.editing import shutter_edits
 
     edit, effect, _ = effect_on
+    shutter_edits.add_shutter(effect)
     keys = [
         (1, 10, ease),
         (11, 20, ease),
@@ -314,10 +315,10 @@ def test_a_source_time_that_stands_still_keeps_its_direction(effect_on, ease):
     ]
     effect.use_source_time = True
     fcurves.set_keys(edit, f"{effect.path_from_id()}.source_time", 0, keys)
-    backward = {frame: effects.source_time(edit, effect, frame)[1] for frame in (1, 6, 11, 16, 26, 31, 36, 41, 51, 90)}
+    backward = {frame: source_time(edit, effect, frame)[1] for frame in (1, 6, 11, 16, 26, 31, 36, 41, 51, 90)}
     assert [frame for frame, found in backward.items() if found] == [26, 31, 36, 41, 51, 90]
     fcurves.set_keys(edit, f"{effect.path_from_id()}.source_time", 0, [(1, 10, "constant"), (11, 5, "constant")])
-    assert not effects.source_time(edit, effect, 11)[1]
+    assert not source_time(edit, effect, 11)[1]
 
 
 def test_a_source_time_without_keys_holds_a_frame(effect_on):
@@ -357,7 +358,7 @@ def test_names_are_as_long_as_recipes_have_them(effect_on, letter):
 
 @pytest.mark.parametrize("place", ["shutter", "region"])
 def test_a_longer_name_of_a_file_shows_and_is_no_recipe(effect_on, place):
-    from shutter_addon.blender.data import effects
+    from shutter_addon.blender.data import validation
 
     edit, effect, strip = effect_on
     apply(effect_on, BASE)
@@ -367,9 +368,9 @@ def test_a_longer_name_of_a_file_shows_and_is_no_recipe(effect_on, place):
             region.shutter = name if region.shutter == item.name else region.shutter
     item.bl_system_properties_get()["name"] = name
     assert item.name == name
-    assert effects.instant(edit, effect, strip, FIRST).bars.any()
+    assert state(edit, effect, strip, FIRST).bars.any()
     sentence = f'{place} "{name}": its name has 70 characters, 63 are the most'
-    with pytest.raises(effects.EffectError, match=sentence):
+    with pytest.raises(validation.EffectError, match=sentence):
         export(effect_on)
 
 
@@ -419,7 +420,6 @@ def test_keys_that_cannot_lie_there_leave_the_effect_as_it_was(effect_on, part, 
 
 def test_what_a_recipe_may_hold_at_most(effect_on):
     """It is put into Blender's data, comes back as it was, and is drawn; in seconds."""
-    from shutter_addon.blender.data import effects
 
     far = {"location": [-1000, 1000], "rotation": -360_000, "scale": -1000}
     first, last = -1_048_574 - FIRST + 1 + 2 * (FIRST - 1), 1_048_574 - FIRST + 1
@@ -434,7 +434,7 @@ def test_what_a_recipe_may_hold_at_most(effect_on):
         "time": [{"frame": first, "value": -1_048_574}, {"frame": last, "value": 1_048_574}],
     }
     apply(effect_on, data)
-    assert effects.instant(*effect_on, 40).bars.shape == (32, 256)
+    assert state(*effect_on, 40).bars.shape == (32, 256)
     found = export(effect_on)
     assert found == recipes.parse(json.dumps(data))
 

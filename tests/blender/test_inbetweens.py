@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 from standin import between
-from support import write_frames
+from support import picture_of, request, write_frames
 
 from shutter_addon.core import light, shutters
 from shutter_addon.media import inbetween, open_source
@@ -23,15 +23,22 @@ def cut_film():
 
 
 @pytest.fixture
-def film(tmp_path, monkeypatch):
+def cache(bpy, tmp_path):
+    """The folder of in-between frames."""
+    from shutter_addon.blender.rendering import session
+
+    with session.using(session.RenderSettings(inbetween=tmp_path / "cache")):
+        yield tmp_path / "cache"
+
+
+@pytest.fixture
+def film(cache, tmp_path):
     """A cut film with its in-betweens: the first file, and all frames in linear light (count, H, W, 3)."""
-    from shutter_addon.blender.data import inbetween_settings
 
     first = write_frames(tmp_path / "film", cut_film())
-    monkeypatch.setattr(inbetween_settings, "given", tmp_path / "cache")
     with open_source(first) as source:
-        build(source, tmp_path / "cache")
-        with inbetween.InbetweenSource(source, tmp_path / "cache", FACTOR, "quick") as every:
+        build(source, cache)
+        with inbetween.InbetweenSource(source, cache, FACTOR, "quick") as every:
             frames = np.stack([every.read(i)[..., :3] for i in range(every.count)])
     return first, light.to_linear(frames / 255)
 
@@ -103,56 +110,54 @@ def test_a_slow_strip_shows_in_betweens(film, add, edit, render, same_pixels):
     source.retiming_keys.add(timeline_frame=source.right_handle)
     source.retiming_keys[-1].timeline_frame = 1 + 4 * COUNT
     strip.right_handle = source.right_handle
-    from shutter_addon.blender.rendering import session
 
-    found = {frame: session.moment(edit, _effect, strip, frame).index for frame in range(1, 30)}
+    found = {frame: request(edit, _effect, strip, frame).index for frame in range(1, 30)}
     assert len(set(found.values())) > 20
     for frame, picture in render(edit, (3, 8)).items():
         same_pixels(picture[..., :3], shown(frames, [found[frame]]), 1)
         assert abs(found[frame] - (frame - 1)) <= 1
 
 
-def test_what_is_missing_is_said_and_what_is_built_is_shown(film, add, edit, render, tmp_path, same_pixels):
-    from shutter_addon.blender.data import inbetween_settings
+def test_what_is_missing_is_said_and_what_is_built_is_shown(cache, film, add, edit, render, tmp_path, same_pixels):
     from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.data import strips
     from shutter_addon.media import MediaError, inbetween_cache
 
     first, frames = film
     *_, effect = add(first, COUNT, np.ones(6))
-    picture = partial(session.picture, effect.scene, 2)
+    picture = partial(picture_of, effect.scene, 2)
     picture()
-    inbetween_cache.purge(inbetween_settings.given)
-    for way in (picture, session.moment(*session.strips.find_edit(effect.scene), 2).check):
+    inbetween_cache.purge(cache)
+    for way in (picture, request(*strips.find_edit(effect.scene), 2).check):
         with pytest.raises(MediaError, match=r"in-between frames of frame 2 are missing"):
             way()
     with open_source(first) as source:
-        build(source, inbetween_settings.given, frames=(1, 2))
+        build(source, cache, frames=(1, 2))
     same_pixels(light.to_encoded(picture()[..., :3]) * 255, shown(frames, range(4, 10)), 1)
     effect.inbetween = "1"  # a frame and a half
     same_pixels(light.to_encoded(picture()[..., :3]) * 255, shown(frames, (4, 4, 8)), 1)
 
 
-def test_in_betweens_of_a_file_that_was_replaced_are_not_shown(film, add, edit, monkeypatch):
-    from shutter_addon.blender.data import inbetween_settings, source_media
-    from shutter_addon.blender.rendering import invalidation, session
+def test_in_betweens_of_a_file_that_was_replaced_are_not_shown(cache, film, add, edit, monkeypatch):
+    from shutter_addon.blender.data import source_media
+    from shutter_addon.blender.rendering import invalidation
     from shutter_addon.media import MediaError
 
     monkeypatch.setattr(source_media, "_REST", 0.0)
     first, _ = film
     *_, effect = add(first, COUNT, np.ones(6))
-    before = session.picture(effect.scene, 2)
+    before = picture_of(effect.scene, 2)
     invalidation.invalidate_changed(edit)
     (first.parent / "f0003.png").write_bytes((first.parent / "f0009.png").read_bytes())
     assert invalidation.invalidate_changed(edit)
     with pytest.raises(MediaError, match=r"in-between frames of frame 2 are missing"):
-        session.picture(effect.scene, 2)
+        picture_of(effect.scene, 2)
     with open_source(first) as source:
-        build(source, inbetween_settings.given)
-    assert not np.allclose(session.picture(effect.scene, 2), before)
+        build(source, cache)
+    assert not np.allclose(picture_of(effect.scene, 2), before)
 
 
-def test_finished_frames_are_dropped_when_in_betweens_come_and_go(film, add, edit):
-    from shutter_addon.blender.data import inbetween_settings
+def test_finished_frames_are_dropped_when_in_betweens_come_and_go(cache, film, add, edit):
     from shutter_addon.blender.rendering import invalidation
     from shutter_addon.media.inbetween_cache import purge
 
@@ -160,11 +165,11 @@ def test_finished_frames_are_dropped_when_in_betweens_come_and_go(film, add, edi
     add(first, COUNT, np.ones(6))
     invalidation.invalidate_changed(edit)
     assert not invalidation.invalidate_changed(edit)
-    purge(inbetween_settings.given)
+    purge(cache)
     assert invalidation.invalidate_changed(edit)
     assert not invalidation.invalidate_changed(edit)
     with open_source(first) as source:
-        build(source, inbetween_settings.given, frames=(0, 0))
+        build(source, cache, frames=(0, 0))
     assert invalidation.invalidate_changed(edit)
 
 
@@ -195,10 +200,9 @@ def test_bars_stand_for_the_same_times_at_another_factor(effect, factor):
 
 
 def at(effect, index, frame):
-    from shutter_addon.blender.data import effects, fcurves
+    from shutter_addon.blender.data import snapshot
 
-    curves, path = fcurves.Curves(effect.id_data), f"{effect.path_from_id()}.shutters[{index}]"
-    return effects.bars_at(curves, path, effect.shutters[index], effects.options(effect), frame)
+    return snapshot.bars_at(effect.id_data, effect, index, frame)
 
 
 def test_a_part_of_a_source_frame_becomes_a_whole_one(effect):

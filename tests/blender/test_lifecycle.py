@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from support import recipe, sequencer, write_frames
+from support import picture_of, recipe, sequencer, state, write_frames
 
 from shutter_addon.core import recipe as recipes
 
@@ -228,13 +228,12 @@ def test_a_region_follows_its_layer(bpy, edit, add):
     layer.info = "Renamed"
     update(bpy)
     assert effect.regions[0].layer == "Renamed"
-    from shutter_addon.blender.data import effects
 
-    assert len(effects.instant(edit, effect, strip, 5).shapes[0].strokes) == 1
+    assert len(state(edit, effect, strip, 5).shapes[0].strokes) == 1
     strip.scene.annotation.layers.remove(layer)
     update(bpy)
     assert effect.regions[0].layer == "Renamed"
-    assert effects.instant(edit, effect, strip, 5).shapes[0].strokes == ()
+    assert state(edit, effect, strip, 5).shapes[0].strokes == ()
 
 
 def test_linked_scenes_stay(bpy, edit, add, tmp_path):
@@ -329,12 +328,12 @@ def test_an_edit_appended_twice_has_two_effects_of_its_own(bpy, library, render)
 
 def test_nothing_is_remembered_of_what_is_gone(bpy, edit, add):
     from shutter_addon.blender.editing import lifecycle
-    from shutter_addon.blender.rendering import invalidation, session
+    from shutter_addon.blender.rendering import invalidation
 
     first, second = add(1), add(101)
     update(bpy)
     annotation, scene = second.scene.annotation.session_uid, second.scene.session_uid
-    session.picture(second.scene, 5)
+    picture_of(second.scene, 5)
     assert annotation in lifecycle._layer_names
     assert scene in invalidation._signatures
     edit.sequence_editor.strips.remove(second)

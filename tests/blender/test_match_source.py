@@ -356,10 +356,10 @@ def test_a_render_without_a_window_follows_a_file_that_was_replaced(edit, made, 
 
 
 def test_a_film_keeps_its_size(bpy, edit, made, large_movie, monkeypatch):
-    from shutter_addon.blender.data import source_media
+    from shutter_addon.blender.rendering import render_job
 
     _strip, source = made()
-    monkeypatch.setattr(source_media, "filming", True)
+    monkeypatch.setattr(render_job, "runs", lambda: True)
     source.filepath = str(large_movie)
     bpy.context.view_layer.update()
     assert annotations.picture_size(edit.virtual_shutter.effects[0]) == (32, 24)

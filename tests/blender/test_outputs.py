@@ -359,7 +359,7 @@ def test_whatever_goes_wrong_is_one_sentence(frames, tmp_path, fault, words):
     code = f"""
 import sys
 from shutter_addon import __main__
-from shutter_addon.blender import edits
+from shutter_addon.blender.editing import new_edit
 def make_edit(*_):
     raise {fault}
 edits.make_edit = make_edit

@@ -16,7 +16,7 @@ from hypothesis.stateful import (
     rule,
     run_state_machine_as_test,
 )
-from support import recipe, sequencer, write_frames
+from support import recipe, sequencer, state, write_frames
 
 from shutter_addon.core import recipe as recipes
 
@@ -282,7 +282,7 @@ class Work(RuleBasedStateMachine):
 
     @invariant()
     def effects_and_strips_are_in_line(self):
-        from shutter_addon.blender.data import effects, strips
+        from shutter_addon.blender.data import strips, validation
 
         made = [scene for scene in self.bpy.data.scenes if scene.render.engine == strips.ENGINE]
         known = []
@@ -296,9 +296,9 @@ class Work(RuleBasedStateMachine):
             for scene, same in parts.items():
                 effect = strips.effect_of(edit, scene)
                 assert {strips.origin(strip) for strip in same} == {effect.start}
-                with contextlib.suppress(effects.EffectError):
+                with contextlib.suppress(validation.EffectError):
                     strips.source_of(edit, effect, same[0])
-                    effects.instant(edit, effect, same[0], same[0].left_handle)
+                    state(edit, effect, same[0], same[0].left_handle)
             known += parts
         assert sorted(s.name for s in known) == sorted(s.name for s in made)
         assert len({scene.virtual_shutter.identity for scene in made}) == len(made)

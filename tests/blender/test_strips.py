@@ -5,7 +5,7 @@ import ctypes
 import av
 import numpy as np
 import pytest
-from support import recipe, sequencer, write_frames
+from support import picture_of, recipe, sequencer, write_frames
 
 LEVELS = 1
 
@@ -365,7 +365,7 @@ def test_a_deleted_source_is_said(bpy, edit, effect_on, movie):
     _, effect = effect_on(source)
     edit.sequence_editor.strips.remove(source)
     with pytest.raises(session.FAULTS, match='the source strip of "Shutter" was deleted'):
-        session.picture(effect.scene, 5)
+        picture_of(effect.scene, 5)
 
 
 def test_no_shutters_and_a_closed_shutter_are_said(bpy, edit, effect_on, movie):
@@ -374,7 +374,7 @@ def test_no_shutters_and_a_closed_shutter_are_said(bpy, edit, effect_on, movie):
     _, effect = effect_on(new_movie(edit, movie))
     effect.shutters[0].bars[0].weight = 0
     with pytest.raises(session.FAULTS, match='shutter "S0" at frame 5: all bars are zero'):
-        session.picture(effect.scene, 5)
+        picture_of(effect.scene, 5)
     effect.shutters.clear()
     with pytest.raises(session.FAULTS, match='"Shutter" has no shutter'):
-        session.picture(effect.scene, 5)
+        picture_of(effect.scene, 5)

@@ -12,14 +12,14 @@ GOOD = [(0.0, 0.0), (29.0, 0.3725), (51.0, 1.0)]
 
 
 def keys_of(bpy, pairs):
-    from shutter_addon.blender.data.retiming import RetimingKey
+    from shutter_addon.core.retiming import RetimingKey
 
     return [RetimingKey(index, 0, factor) for index, factor in pairs]
 
 
 @pytest.mark.parametrize("pairs", [[], [(0.0, 0.0)], GOOD, [(0.0, 0.0), (7.2, 0.5), (7.2, 0.5), (19.6, 1.0)]])
 def test_good_keys(bpy, pairs):
-    from shutter_addon.blender.data.retiming import are_retiming_keys
+    from shutter_addon.core.retiming import are_retiming_keys
 
     assert are_retiming_keys(keys_of(bpy, pairs), [round(index) for index, _ in pairs])
 
@@ -40,20 +40,20 @@ def test_good_keys(bpy, pairs):
     ],
 )
 def test_keys_that_cannot_be(bpy, pairs):
-    from shutter_addon.blender.data.retiming import are_retiming_keys
+    from shutter_addon.core.retiming import are_retiming_keys
 
     assert not are_retiming_keys(keys_of(bpy, pairs), [0, 29, 51])
 
 
 def test_keys_out_of_order(bpy):
-    from shutter_addon.blender.data.retiming import are_retiming_keys
+    from shutter_addon.core.retiming import are_retiming_keys
 
     assert not are_retiming_keys(keys_of(bpy, [(0.0, 0.0), (30.0, 0.6), (29.0, 0.5), (51.0, 1.0)]), [0, 30, 29, 51])
 
 
 def test_another_layout_is_said(bpy, edit, tmp_path):
     """As if the numbers lay four bytes farther on."""
-    from shutter_addon.blender.data import retiming
+    from shutter_addon.blender.data import retiming_keys
     from shutter_addon.blender.data.validation import EffectError
 
     first = write_frames(tmp_path / "in", np.zeros((20, 8, 8, 3), dtype=np.uint8))
@@ -63,22 +63,24 @@ def test_another_layout_is_said(bpy, edit, tmp_path):
     source.right_handle = 21
     source.retiming_keys.add(timeline_frame=1)
     source.retiming_keys[-1].timeline_frame = 52
-    assert [key.index for key in retiming._retiming_keys(source)] == [0, 51]
+    assert [key.index for key in retiming_keys._retiming_keys(source)] == [0, 51]
     where = [SimpleNamespace(as_pointer=lambda key=key: key.as_pointer() + 4) for key in source.retiming_keys]
     for place, key in zip(where, source.retiming_keys, strict=True):
         place.timeline_frame = key.timeline_frame
     moved = SimpleNamespace(name=source.name, content_start=source.content_start, retiming_keys=where)
     with pytest.raises(EffectError, match='strip "images": its retiming keys cannot be read'):
-        retiming._retiming_keys(moved)
+        retiming_keys._retiming_keys(moved)
 
 
 def test_a_still_of_a_million_frames_takes_no_time(bpy, edit, tmp_path):
     """Blender shows one frame of it all along; where that began is not sought frame by frame."""
-    from shutter_addon.blender.data import retiming
+    from shutter_addon.blender.data import retiming_keys
+    from shutter_addon.core import retiming
 
     first = write_frames(tmp_path / "in", np.zeros((1, 8, 8, 3), dtype=np.uint8))
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
     source.right_handle = 1_000_000
     start = time.perf_counter()
-    assert retiming.source_frame(source, 999_999, SimpleNamespace(filmed=1, step=1, fps=None), 24.0) == 0
+    medium = SimpleNamespace(filmed=1, step=1, fps=None)
+    assert retiming.source_frame(retiming_keys.timing_of(source), 999_999, medium) == 0
     assert time.perf_counter() - start < 1

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import sequencer, write_frames
+from support import picture_of, sequencer, state, write_frames
 
 from shutter_addon.core.limits import MAX_REGIONS, MAX_SHUTTERS
 
@@ -30,7 +30,7 @@ def effect(bpy, edit, tmp_path, monkeypatch):
     from shutter_addon.blender.editing import add_effect, bar_edits, region_edits, shutter_edits
     from shutter_addon.blender.rendering import session
 
-    monkeypatch.setattr(session, "device", "cpu")
+    monkeypatch.setattr(session, "_settings", session.RenderSettings(device="cpu"))
     frames = np.random.default_rng(0).integers(0, 256, (12, 24, 40, 3), dtype=np.uint8)
     first = write_frames(tmp_path / "in", frames)
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
@@ -179,11 +179,11 @@ def test_one_sentence_tells_the_place(bpy, edit, effect, name):
     from shutter_addon.blender.rendering import session
 
     scene = effect.scene
-    assert session.picture(scene, 4).shape == (24, 40, 4)
+    assert picture_of(scene, 4).shape == (24, 40, 4)
     change, sentence = IMPOSSIBLE[name]
     change(effect)
     with pytest.raises(session.FAULTS) as raised:
-        session.picture(scene, 4)
+        picture_of(scene, 4)
     assert sentence in str(raised.value)
     assert len(str(raised.value)) <= 300
     exported(edit, effect)
@@ -192,14 +192,13 @@ def test_one_sentence_tells_the_place(bpy, edit, effect, name):
 
 def test_what_f_curves_give_stays_in_range(bpy, edit, effect):
     """As Blender has it: a curve that overshoots is cut off where the property ends."""
-    from shutter_addon.blender.data import effects
 
     region = effect.regions[0]
     key(region, "width", (1, -5), (9, -5))
     key(region, "scale", (1, 1e30), (9, 1e30))
     key(effect.shutters[1].bars[0], "weight", (1, 1e30), (9, 1e30))
     edit.frame_set(3)
-    found = effects.instant(edit, effect, strip_of(effect), 3)
+    found = state(edit, effect, strip_of(effect), 3)
     assert (region.width, region.scale) == (0, 1000)
     assert found.shapes[0].width == 0
     assert np.ptp(found.shapes[0].strokes[0], axis=0).max() < 1000
@@ -213,7 +212,7 @@ def test_a_strip_that_is_scaled_to_nothing(bpy, edit, effect):
 
     strip = strip_of(effect)
     strip.transform.scale_x = 0
-    assert session.picture(effect.scene, 4).shape == (24, 40, 4)
+    assert picture_of(effect.scene, 4).shape == (24, 40, 4)
     with pytest.raises(session.FAULTS, match='strip "Shutter" is too small to find its scribbles'):
         recipe_export.recipe_of(edit, effect, strip)
     show(bpy, edit)
@@ -222,9 +221,8 @@ def test_a_strip_that_is_scaled_to_nothing(bpy, edit, effect):
 def test_what_nobody_renders_does_not_matter(bpy, edit, effect):
     """Names twice, layers and shutters that there are not, places in lists beyond their ends."""
     from shutter_addon.blender.data import selection
-    from shutter_addon.blender.rendering import session
 
-    before = session.picture(effect.scene, 4)
+    before = picture_of(effect.scene, 4)
     raw(effect, "active_shutter", -3)
     raw(effect, "active_region", 99)
     raw(effect, "start", NAN)
@@ -236,7 +234,7 @@ def test_what_nobody_renders_does_not_matter(bpy, edit, effect):
     other.name = effect.name
     effect = edit.virtual_shutter.effects[0]
     assert selection.active_shutter(effect) is selection.active_region(effect) is None
-    assert np.array_equal(session.picture(effect.scene, 4), before)
+    assert np.array_equal(picture_of(effect.scene, 4), before)
     show(bpy, edit)
 
 
@@ -268,7 +266,7 @@ def test_a_copy_has_the_same_impossible_choice(bpy, edit, effect):
     assert len(edit.virtual_shutter.effects) == 2
     for scene in [effect.scene for effect in edit.virtual_shutter.effects]:
         with pytest.raises(session.FAULTS, match="Position is none of its choices"):
-            session.picture(scene, 4)
+            picture_of(scene, 4)
 
 
 def test_a_cut_strip_comes_back_with_its_impossible_choice(bpy, edit, effect):
@@ -285,7 +283,6 @@ def test_a_cut_strip_comes_back_with_its_impossible_choice(bpy, edit, effect):
 
 def test_editors_can_mend_it(bpy, edit, effect):
     """What the panel offers leads back to a picture."""
-    from shutter_addon.blender.rendering import session
 
     scene = effect.scene
     raw(effect, "window", 10**9)
@@ -299,7 +296,7 @@ def test_editors_can_mend_it(bpy, edit, effect):
         assert bpy.ops.shutter.preset(preset="ANGLE_360") == {"FINISHED"}  # of the active one
         effect.active_shutter = 0
         assert bpy.ops.shutter.preset(preset="ANGLE_360") == {"FINISHED"}
-    assert session.picture(scene, 4).shape == (24, 40, 4)
+    assert picture_of(scene, 4).shape == (24, 40, 4)
 
 
 def test_a_render_of_such_a_file_ends_with_the_sentence(bpy, edit, effect, tmp_path):
@@ -380,7 +377,7 @@ def rendered(scene):
     from shutter_addon.blender.rendering import session
 
     with suppress(session.FAULTS):
-        assert np.isfinite(session.picture(scene, 4)).all()
+        assert np.isfinite(picture_of(scene, 4)).all()
 
 
 def exported(edit, effect):
@@ -411,7 +408,7 @@ def show(bpy, edit):
     from shutter_addon.blender.editing import lifecycle
     from shutter_addon.blender.interface import (
         bar_editor,
-        inbetween_build,
+        inbetween_operators,
         operators,
         panels,
         preview,
@@ -430,7 +427,7 @@ def show(bpy, edit):
             preview.shown(context)
             bar_editor.bar_under(context, 30, 30)
             region_gizmo.place(context)
-            for cls in (*operators.classes, *inbetween_build.classes, *bar_editor.classes, *region_gizmo.classes):
+            for cls in (*operators.classes, *inbetween_operators.classes, *bar_editor.classes, *region_gizmo.classes):
                 if hasattr(cls, "poll"):
                     cls.poll(context)
             split_gizmo.SHUTTER_GGT_split.poll(context)

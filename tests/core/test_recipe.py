@@ -361,16 +361,16 @@ def test_saving_touches_no_other_file(tmp_path):
 
 
 def region(**fields):
-    return recipe.Region("A", strokes=[[(0.0, 0.0), (0.2, 0.0)]], **fields)
+    return recipe.Region("A", strokes=[[(0.0, 0.0), (0.2, 0.0)]], **fields).over_time(0, 1)
 
 
 def test_a_region_moves_with_the_ease_of_its_key():
     keys = [recipe.RegionKey(1, ease="bezier"), recipe.RegionKey(5, location=(0.4, 0.0), ease="constant")]
     keys.append(recipe.RegionKey(9, location=(0.0, 0.0)))
     moving = region(keys=keys)
-    assert moving.at(2, 1)[0][0] == pytest.approx([0.4 * 0.15625, 0])
-    assert moving.at(8.9, 1)[0][0] == pytest.approx([0.4, 0])
-    assert moving.at(9, 1)[0][0] == pytest.approx([0, 0])
+    assert moving.at(2).strokes[0][0] == pytest.approx([0.4 * 0.15625, 0])
+    assert moving.at(8.9).strokes[0][0] == pytest.approx([0.4, 0])
+    assert moving.at(9).strokes[0][0] == pytest.approx([0, 0])
 
 
 def test_redrawn_strokes_follow_one_another():
@@ -380,9 +380,9 @@ def test_redrawn_strokes_follow_one_another():
         recipe.RegionKey(5, strokes=[[(0.0, 1.0), (0.1, 1.0), (0.2, 1.0)]]),
     ]
     drawn = region(keys=keys)
-    assert drawn.at(1, 1)[0] == pytest.approx(np.array([[0, 0], [0.2, 0]]))
-    assert drawn.at(3, 1)[0] == pytest.approx(np.array([[0, 0.6], [0.1, 0.6], [0.2, 0.6]]))
-    assert drawn.at(5, 1)[0] == pytest.approx(np.array([[0, 1], [0.1, 1], [0.2, 1]]))
+    assert drawn.at(1).strokes[0] == pytest.approx(np.array([[0, 0], [0.2, 0]]))
+    assert drawn.at(3).strokes[0] == pytest.approx(np.array([[0, 0.6], [0.1, 0.6], [0.2, 0.6]]))
+    assert drawn.at(5).strokes[0] == pytest.approx(np.array([[0, 1], [0.1, 1], [0.2, 1]]))
 
 
 @given(st.floats(-5, 100))

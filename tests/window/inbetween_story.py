@@ -88,7 +88,7 @@ def opened():
 
 
 def look():
-    building = part("blender.interface.inbetween_build")
+    building = part("blender.rendering.inbetween_build")
     building._looks.clear()
     return building.look(*part("blender.data.selection").active(bpy.context))
 
@@ -108,13 +108,13 @@ def shown(name):
 def building_begun():
     with driver.override("PREVIEW"):
         assert bpy.ops.shutter.inbetween_build("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
-    running = part("blender.interface.inbetween_build").running()
+    running = part("blender.rendering.inbetween_build").running()
     yield from driver.until(lambda: running.done >= 4, "pairs are built")
     assert not bpy.ops.shutter.inbetween_build.poll()
 
 
 def ended():
-    yield from driver.until(lambda: part("blender.interface.inbetween_build").running() is None, "the build ends", 30)
+    yield from driver.until(lambda: part("blender.rendering.inbetween_build").running() is None, "the build ends", 30)
 
 
 def built():
@@ -137,7 +137,7 @@ def undone_meanwhile():
     yield from building_begun()
     driver.key("ctrl+z")
     yield from driver.until(lambda: story.effect().border, "the border is back")
-    assert part("blender.interface.inbetween_build").running() is not None
+    assert part("blender.rendering.inbetween_build").running() is not None
 
 
 def gone_stale_and_built_again():
@@ -196,7 +196,7 @@ def closed_meanwhile():
     yield from built_anew()
     bpy.ops.wm.open_mainfile(filepath=str(FILM / "film.blend"))
     yield 1.0
-    assert part("blender.interface.inbetween_build").running() is None
+    assert part("blender.rendering.inbetween_build").running() is None
     assert story.effect().inbetween == "4"
     driver.shot("opened again")
     driver.move(story.preview(), 50, 50)  # the operator that waits for an event gets one

@@ -5,8 +5,7 @@ import numpy as np
 from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import limits
-from . import geometry, validation
+from . import geometry
 from .validation import EffectError
 
 # Pixels of a strip's side on the image, below which nobody sees where its scribbles are.
@@ -18,10 +17,10 @@ def picture_size(effect) -> tuple[int, int]:
     return effect.scene.render.resolution_x, effect.scene.render.resolution_y
 
 
-def image_to_picture(effect, strip) -> np.ndarray | None:
+def image_to_picture(strip, size, **moved) -> np.ndarray | None:
     """Matrix (3, 3) from the sequencer's image to fractions of the strip's picture; None where the strip is scaled to
-    nothing that can be seen. EffectError: its transform is none."""
-    matrix = geometry.picture_to_image(strip, picture_size(effect))
+    nothing that can be seen. size, moved: as geometry.picture_to_image has them. EffectError: its transform is none."""
+    matrix = geometry.picture_to_image(strip, size, **moved)
     if not np.isfinite(matrix).all():
         raise EffectError(rpt_('strip "{strip}": a number of its transform is not finite').format(strip=strip.name))
     if np.hypot(*matrix[:2, :2]).min() < _SMALLEST:
@@ -29,22 +28,14 @@ def image_to_picture(effect, strip) -> np.ndarray | None:
     return np.linalg.inv(matrix)
 
 
-def points(region, drawing, to_picture) -> list[np.ndarray]:
-    """The strokes (n, 2) of an annotation's frame that belongs to a region, on the picture. EffectError: they lie too
-    far from it."""
-    result = []
+def strokes_of(drawing) -> list[np.ndarray]:
+    """The strokes (n, 2) float64 of an annotation's frame, in the sequencer's image space; empty ones left out."""
+    found = []
     for stroke in drawing.strokes:
         flat = np.empty(len(stroke.points) * 3, dtype=np.float32)
         stroke.points.foreach_get("co", flat)
-        if len(flat):
-            result.append(geometry.mapped(to_picture, flat.reshape(-1, 3)[:, :2].astype(np.float64)))
-            if not (np.abs(result[-1]) <= limits.MAX_DISTANCE).all():
-                raise EffectError(
-                    rpt_("{place}: a point of its strokes is nowhere near the picture").format(
-                        place=validation.place(region)
-                    )
-                )
-    return result
+        found.append(flat.reshape(-1, 3)[:, :2].astype(np.float64))
+    return [points for points in found if len(points)]
 
 
 def layer_of(effect, region):

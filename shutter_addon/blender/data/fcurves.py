@@ -10,36 +10,48 @@ import bpy
 import numpy as np
 from bpy_extras import anim_utils
 
-from ...core import keyframes
 from . import validation
+
+# Keyframe.interpolation as a number.
+_EASES = {0: "constant", 1: "linear", 2: "bezier"}
 
 
 class Curves:
-    """The F-curves of a scene, found by path."""
+    """The F-curves of a scene, found by path; each is looked through once."""
 
     def __init__(self, scene):
         self._scene = scene
         self._curves = {(c.data_path, c.array_index): c for c in curves_under(scene, "") if not (c.mute or c.is_empty)}
-        self._checked = set()
-        self._frames: dict[str, list[float]] = {}
+        self._frames: dict = {}  # by curve: the frames (n,) of its keys
 
     def find(self, path: str, index: int = 0):
         """The F-curve of a property, or None; muted and empty ones do not count. EffectError: a key of it lies where
         no timeline is."""
         curve = self._curves.get((path, index))
-        if curve is not None and curve not in self._checked:
-            beyond = validation.beyond_timeline(_frames(curve))
+        if curve is not None and curve not in self._frames:
+            frames = _frames(curve)
+            beyond = validation.beyond_timeline(frames)
             if beyond.size:
                 owner, _, name = path.rpartition(".")
                 validation.refuse_key(self._scene.path_resolve(owner), name, beyond[0])
-            self._checked.add(curve)
+            self._frames[curve] = frames
         return curve
 
-    def key_frames(self, path: str, curves) -> list[float]:
-        """As key_frames below, of the curves under a path, which are asked once."""
-        if path not in self._frames:
-            self._frames[path] = key_frames(curves)
-        return self._frames[path]
+    def of(self, owner, path: str, name: str) -> list:
+        """The F-curves of a property, or of a vector's components; path: the owner's, from the scene."""
+        length = getattr(owner.bl_rna.properties[name], "array_length", 0)
+        found = (self.find(f"{path}.{name}", index) for index in range(max(length, 1)))
+        return [curve for curve in found if curve is not None]
+
+    def keys(self, curves: list) -> tuple[tuple[float, str], ...]:
+        """Frames with a key on any of these curves, ascending, and the recipe's words for their eases: of the first
+        curve that has a key there."""
+        found: dict[float, str] = {}
+        for curve in curves:
+            frames = self._frames[curve].tolist()
+            if not found.keys() >= set(frames):
+                found = dict(zip(frames, _eases(curve), strict=True)) | found
+        return tuple(sorted(found.items()))
 
     def value(self, owner, path: str, name: str, frame: float):
         """A float property, or a float vector as a list, at a frame; path: the owner's, from the scene. EffectError:
@@ -63,38 +75,38 @@ def _frames(curve) -> np.ndarray:
     return points[::2]
 
 
+def _eases(curve) -> list[str]:
+    """The recipe's words for the eases of an F-curve's keys: those that it does not know are "bezier"."""
+    numbers = np.empty(len(curve.keyframe_points), np.int32)
+    curve.keyframe_points.foreach_get("interpolation", numbers)
+    return [_EASES.get(number, "bezier") for number in numbers.tolist()]
+
+
 def key_frames(curves) -> list[float]:
     """Frames with a key on any of the curves, ascending."""
     frames = [_frames(curve) for curve in curves]
     return np.unique(np.concatenate([np.empty(0, np.float32), *frames])).tolist()
 
 
-def progress(curves, start: float, end: float, frame: float) -> float:
-    """Share 0 to 1 of the way between two keys at a frame, with the easing of the curve that changes most."""
-    curve = max(curves, key=lambda c: abs(c.evaluate(end) - c.evaluate(start)))
-    change = curve.evaluate(end) - curve.evaluate(start)
-    if abs(change) < 1e-9:
-        return 0.0
-    return min(max((curve.evaluate(frame) - curve.evaluate(start)) / change, 0.0), 1.0)
-
-
-def ease_at(curve, frame: float) -> str:
-    """The recipe's word for the ease of the span that starts at a frame; linear where there is no key."""
-    for key in curve.keyframe_points if curve else ():
-        if key.co[0] == frame:
-            word = key.interpolation.lower()
-            return word if word in keyframes.EASES else "bezier"
-    return "linear"
-
-
 def eases(curves) -> dict[float, str]:
-    """As ease_at, for every frame with a key on any of the curves: of the first curve that has one there."""
+    """The recipe's word for the ease of every key of the curves by its frame: of the first curve that has one there."""
     found: dict[float, str] = {}
     for curve in curves:
-        for key in curve.keyframe_points:
-            word = key.interpolation.lower()
-            found.setdefault(key.co[0], word if word in keyframes.EASES else "bezier")
+        found = dict(zip(_frames(curve).tolist(), _eases(curve), strict=True)) | found
     return found
+
+
+def leading(curves, start: float, end: float):
+    """Of F-curves, the one that changes most between two frames, and its values at them: its easing is that of all."""
+    ends = [(curve, curve.evaluate(start), curve.evaluate(end)) for curve in curves]
+    return max(ends, key=lambda found: abs(found[2] - found[1]))
+
+
+def progress(curve, first: float, last: float, frame: float) -> float:
+    """Share 0 to 1 of the way that an F-curve has gone at a frame, from one value to another."""
+    if abs(last - first) < 1e-9:
+        return 0.0
+    return min(max((curve.evaluate(frame) - first) / (last - first), 0.0), 1.0)
 
 
 def set_keys(scene, path: str, index: int, keys, group: str = "") -> None:

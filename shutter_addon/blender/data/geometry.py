@@ -3,20 +3,24 @@
 import numpy as np
 
 
-@np.errstate(invalid="ignore")  # of a transform that is no number nothing is; effects.image_to_picture says so
-def picture_to_image(strip, size) -> np.ndarray:
+@np.errstate(invalid="ignore")  # of a transform that is no number nothing is; annotations.image_to_picture says so
+def picture_to_image(strip, size, **moved) -> np.ndarray:
     """Matrix (3, 3) from fractions of the strip's picture to the sequencer's image space.
 
-    Image space, as annotations have it: pixels, origin at the image's centre, y up. size: the picture's, in pixels.
+    Image space, as annotations have it: pixels, origin at the image's centre, y up. size: the picture's, in pixels;
+    moved: numbers of the strip's transform, in place of its own.
     Blender scales and turns a strip about its transform's origin, and mirrors the whole image after that.
     """
     width, height = size
-    t = strip.transform
-    cos, sin = np.cos(t.rotation), np.sin(t.rotation)
-    pivot = (np.array(t.origin) - 0.5) * (width, height)
-    linear = np.array([[cos, -sin], [sin, cos]]) * (t.scale_x, t.scale_y)
+    x, y, scale_x, scale_y, rotation = (
+        moved.get(name, getattr(strip.transform, name))
+        for name in ("offset_x", "offset_y", "scale_x", "scale_y", "rotation")
+    )
+    cos, sin = np.cos(rotation), np.sin(rotation)
+    pivot = (np.array(strip.transform.origin) - 0.5) * (width, height)
+    linear = np.array([[cos, -sin], [sin, cos]]) * (scale_x, scale_y)
     corner = -(pivot + np.array([width, height]) / 2)
-    offset = np.array([t.offset_x, t.offset_y]) + pivot + linear @ corner
+    offset = np.array([x, y]) + pivot + linear @ corner
     matrix = np.eye(3)
     matrix[:2, :2], matrix[:2, 2] = linear * (width, height), offset
     return np.diag([-1.0 if strip.use_flip_x else 1.0, -1.0 if strip.use_flip_y else 1.0, 1.0]) @ matrix

@@ -1,33 +1,39 @@
-"""In-between frames of an effect: where they lie, and its source with them."""
+"""In-between frames of an effect: where they lie, and how they are made."""
 
 from pathlib import Path
+from typing import NamedTuple
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from . import effects, validation
+from ...media import inbetween_cache
+from . import validation
 
 FOLDER = "virtual_shutter_inbetween"
 METHODS = {"QUICK": "quick", "GOOD": "good"}
 
-given: Path | None = None  # the command's: a folder for whatever effect
+
+class Settings(NamedTuple):
+    """Where in-between frames lie, how many frames there are for each of the source, and a method of media.flow."""
+
+    folder: Path
+    factor: int
+    method: str
 
 
 def folder(effect) -> Path:
     """The folder of the effect's in-between frames. EffectError: there is none, beside a file that is not saved,
     or of an extension that is not installed."""
-    if given is not None:
-        return given
     if validation.word(effect, "inbetween_place") == "USER":
         package = __package__.rpartition(".shutter_addon")[0]
         try:
             return Path(bpy.utils.extension_path_user(package, path=FOLDER))
         except ValueError:
-            raise effects.EffectError(rpt_("only an installed extension has a folder of its own")) from None
+            raise validation.EffectError(rpt_("only an installed extension has a folder of its own")) from None
     library = effect.id_data.library
     file = bpy.path.abspath(library.filepath) if library else bpy.data.filepath
     if not file:
-        raise effects.EffectError(rpt_("in-between frames lie beside the .blend file: save it first"))
+        raise validation.EffectError(rpt_("in-between frames lie beside the .blend file: save it first"))
     return Path(file).parent / FOLDER
 
 
@@ -42,15 +48,41 @@ def method(effect) -> str:
     return METHODS[validation.word(effect, "inbetween_method")]
 
 
-def settings(effect) -> tuple[Path, int, str]:
-    """Folder, factor and method, as media.inbetween takes them. EffectError: there is no folder."""
-    return folder(effect), factor(effect), method(effect)
+def settings(effect, given: Path | None = None) -> Settings:
+    """The effect's settings, as media.inbetween takes them; given: a folder in place of its own. EffectError: there is
+    no folder."""
+    return Settings(given or folder(effect), factor(effect), method(effect))
 
 
-def source(medium, effect):
-    """The medium itself, or an InbetweenSource over it. EffectError, MediaError: there can be none."""
-    from ...media.inbetween import InbetweenSource
+class BuiltStamps:
+    """Which in-between frames there are on disk, as stamps: equal ones, and none was built or removed meanwhile."""
 
-    if factor(effect) == 1:
-        return medium
-    return InbetweenSource(medium, *settings(effect))
+    _MOST = 64
+
+    def __init__(self):
+        self._known: dict[tuple, tuple] = {}
+        self._held = False
+
+    def of(self, settings: Settings, stem: str) -> tuple:
+        """The stamp of the frames of sources whose files have that stem."""
+        key = *settings, stem
+        if not (self._held and key in self._known):
+            self._known.pop(key, None)
+            while len(self._known) >= self._MOST:
+                del self._known[next(iter(self._known))]
+            self._known[key] = inbetween_cache.stamp(settings.folder, stem, settings.factor, settings.method)
+        return self._known[key]
+
+    def hold(self) -> None:
+        """While in-between frames are built stamps stay as they are: those that come count when the build has ended."""
+        self._held = True
+
+    def release(self) -> None:
+        self._held = False
+
+    def forget(self) -> None:
+        """Forgets all: before another file is loaded."""
+        self._known.clear()
+
+
+built = BuiltStamps()

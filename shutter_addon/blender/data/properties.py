@@ -22,7 +22,7 @@ from bpy.types import PropertyGroup
 
 from ...core.limits import MAX_BAR, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE
 from ...core.shutters import MAX_WINDOW
-from . import consistency, effects, selection, strips
+from . import consistency, revision, selection, strips, validation
 
 # Of labels that Blender translates in another sense ("Window" is one on the screen). Operators have a context anyway.
 CONTEXT = "Virtual Shutter"
@@ -89,6 +89,7 @@ def _changed(group, _context):
 
 
 def _renamed(shutter, new: str, old: str, _is_set) -> str:
+    revision.changed()
     return consistency.rename(selection.effect_of_item(shutter), old, new)
 
 
@@ -98,6 +99,7 @@ def _shortened(_region, new: str, _old: str, _is_set) -> str:
 
 
 def _recolored(shutter, _context):
+    revision.changed()
     consistency.color_layers(selection.effect_of_item(shutter), shutter)
 
 
@@ -113,7 +115,7 @@ def _fit(change, effect, context):
     """What a change of a property asks for; why it cannot be would only be printed from here."""
     try:
         change(effect)
-    except effects.EffectError as error:
+    except validation.EffectError as error:
         sentence = str(error)
         if bpy.app.background:
             print(sentence, file=sys.stderr)

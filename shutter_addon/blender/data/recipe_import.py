@@ -7,7 +7,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...core import limits, recipe
 from . import fcurves, geometry
 from .annotations import annotation, picture_size
-from .effects import OPTIONS
+from .snapshot import OPTIONS
 from .validation import EffectError
 
 

@@ -2,7 +2,7 @@
 
 import os
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import bpy
@@ -10,6 +10,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...media import MediaError, open_source
 from ...media.sequence import by_number
+from ...media.source import FrameSource
 
 _AT_ONCE = 100  # files of a sequence, which may be long, that one look asks, beside the first and the last
 _REST = 1.0  # seconds from one look at them to the next: on a network's drive a look takes a while
@@ -28,8 +29,9 @@ class _Look:
     key: int = 0
 
 
+_specs: dict[tuple, "SourceSpec"] = {}  # by media_key
 _looks: dict[tuple, _Look] = {}  # by edit and strip
-filming = False  # while a film is rendered, all its files have been asked before it
+_resting = False  # while a film is rendered, all its files have been asked before it
 
 
 def media_key(strip) -> tuple:
@@ -51,11 +53,17 @@ def look_again() -> None:
         look.due = len(look.known)
 
 
+def rest(resting: bool) -> None:
+    """Has the files between a sequence's first and last not asked meanwhile, but by look_again: while a film renders."""
+    global _resting
+    _resting = resting
+
+
 def forget() -> None:
     """Forgets what the files were, before another file is loaded."""
-    global filming
-    filming = False
+    rest(False)
     _looks.clear()
+    _specs.clear()
 
 
 def _between(strip, count, path) -> int:
@@ -70,7 +78,7 @@ def _between(strip, count, path) -> int:
     _looks[place] = look
     while len(_looks) > _KEPT:
         del _looks[next(iter(_looks))]
-    if not look.due and (filming or time.monotonic() - look.when < _REST):
+    if not look.due and (_resting or time.monotonic() - look.when < _REST):
         return look.key
     changed = False
     for index in range(look.next, look.next + max(look.due, min(_AT_ONCE, count))):
@@ -102,20 +110,49 @@ def reading(strip) -> tuple:
     )
 
 
-def open_media(strip):
-    """The strip's medium, as Blender would show it. MediaError: it cannot be read."""
+@dataclass(frozen=True)
+class SourceSpec:
+    """What a source strip reads, and how: plain data, equal where it gives the same frames.
+
+    files: of an image strip, one per frame; None: a movie, or what is found beside `path`
+    options: of media.open_source"""
+
+    key: tuple
+    path: Path = field(compare=False)
+    files: tuple[Path, ...] | None = field(compare=False)
+    options: dict = field(compare=False)
+
+    def open(self) -> FrameSource:
+        """The medium, as Blender would show it. MediaError: it cannot be read."""
+        return open_source(self.path, files=self.files, **self.options)
+
+
+def spec(strip, key: tuple | None = None) -> SourceSpec:
+    """What a source strip reads; key: its media_key, where that is known. MediaError: it has no files."""
+    key = key or media_key(strip)
+    if key not in _specs:
+        while len(_specs) >= _KEPT:
+            del _specs[next(iter(_specs))]
+        _specs[key] = _spec(strip, key)
+    return _specs[key]
+
+
+def _spec(strip, key: tuple) -> SourceSpec:
     count, path = _files(strip)
-    paths = [path(i) for i in range(count)]
     config = Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"), "config.ocio")  # finds folders only
-    return open_source(
-        paths[0],
-        files=None if _is_movie(strip) else paths,
-        stream=getattr(strip, "stream_index", 0),
-        colorspace=reading(strip)[0],
-        config=config,
-        alpha=_alpha(strip),
-        deinterlace=strip.type == "MOVIE" and strip.use_deinterlace,
-    )
+    options = {
+        "stream": getattr(strip, "stream_index", 0),
+        "colorspace": reading(strip)[0],
+        "config": config,
+        "alpha": _alpha(strip),
+        "deinterlace": strip.type == "MOVIE" and strip.use_deinterlace,
+    }
+    return SourceSpec(key, path(0), None if _is_movie(strip) else tuple(path(i) for i in range(count)), options)
+
+
+def open_media(strip) -> FrameSource:
+    """The strip's medium, as Blender would show it. MediaError: it cannot be read."""
+    return spec(strip).open()
 
 
 def first_frame(strip) -> int:

@@ -3,7 +3,8 @@
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from . import effects
+from . import revision
+from .validation import EffectError
 
 ENGINE = "VIRTUAL_SHUTTER"
 SOURCES = ("MOVIE", "IMAGE", "MOVIECLIP")
@@ -46,7 +47,7 @@ def find_edit(scene):
             for strip in effect_strips(edit):
                 if strip.scene == scene:
                     return edit, effect, strip
-    raise effects.EffectError(rpt_('scene "{scene}" belongs to no Shutter strip').format(scene=scene.name))
+    raise EffectError(rpt_('scene "{scene}" belongs to no Shutter strip').format(scene=scene.name))
 
 
 def origin(strip) -> float:
@@ -65,8 +66,8 @@ def source_of(edit, effect, strip):
     if (source := nearest_source(edit, effect, strip)) is None:
         if others := _with_identity(edit, effect.source):
             sentence = rpt_('the source of "{strip}", "{source}", is not a movie, image or clip strip')
-            raise effects.EffectError(sentence.format(strip=strip.name, source=others[0].name))
-        raise effects.EffectError(rpt_('the source strip of "{strip}" was deleted').format(strip=strip.name))
+            raise EffectError(sentence.format(strip=strip.name, source=others[0].name))
+        raise EffectError(rpt_('the source strip of "{strip}" was deleted').format(strip=strip.name))
     return source
 
 
@@ -95,6 +96,13 @@ def _with_identity(edit, identity: str) -> list:
 
 def invalidate(edit, scene=None) -> None:
     """Drops the finished frames of an edit's effect strips; of those that show one scene, if given."""
+    revision.changed()
     for strip in effect_strips(edit):
         if scene is None or strip.scene == scene:
             strip.invalidate_cache("RAW")  # and with them all that was composed of them
+
+
+def drawn_regions(effect) -> list:
+    """The regions that have a shutter, in order: those that an effect's state has shapes of."""
+    names = {shutter.name for shutter in effect.shutters}
+    return [region for region in effect.regions if region.shutter in names]

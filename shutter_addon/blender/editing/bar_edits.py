@@ -1,10 +1,12 @@
 """A shutter's bars: painted, keyed, and as they are at the current frame."""
 
+from typing import NamedTuple
+
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 
 from ...core import shutters
-from ..data import effects, fcurves
+from ..data import fcurves, revision, snapshot
 from ..data.consistency import bars
 
 
@@ -69,8 +71,31 @@ def _deleted(edit, path: str) -> bool:
         return False
 
 
+class BarsShown(NamedTuple):
+    """A shutter's bars (L,) float64 as the picture at the current frame is made with them, and for each of them, as
+    Blender colours its fields: "", "animated", "keyed" here, or "changed" since."""
+
+    bars: np.ndarray
+    states: list[str]
+
+
+_shown = revision.UntilChange()
+
+
+def shown(effect, index: int) -> BarsShown:
+    """What bars_now and key_state say, for what is drawn: worked out once until something changes."""
+    edit = effect.id_data
+    key = effect.scene.session_uid, index, edit.frame_current_final
+
+    def read():
+        states = key_state(effect, index)
+        return BarsShown(_bars_now(effect, index, states), states)
+
+    return _shown.get(key, read)
+
+
 def key_state(effect, index: int) -> list[str]:
-    """For each bar of a shutter, as Blender colours its fields: "", "animated", "keyed" here, or "changed" since."""
+    """See BarsShown.states."""
     edit, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
     curves = fcurves.Curves(edit)
     return [
@@ -93,10 +118,10 @@ def bars_now(effect, index: int) -> np.ndarray:
 
     Bars that were changed since, and not keyed yet, count as they stand. EffectError: the picture cannot be made.
     """
-    stored = bars(effect.shutters[index])
-    if "changed" in key_state(effect, index):
-        return stored
-    edit, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}]"
-    curves, frame = fcurves.Curves(edit), edit.frame_current_final
-    chosen = effects.options(effect, curves, frame)
-    return effects.bars_at(curves, path, effect.shutters[index], chosen, frame)
+    return _bars_now(effect, index, key_state(effect, index))
+
+
+def _bars_now(effect, index: int, states: list[str]) -> np.ndarray:
+    if "changed" in states:
+        return bars(effect.shutters[index])
+    return snapshot.bars_at(effect.id_data, effect, index, effect.id_data.frame_current_final)

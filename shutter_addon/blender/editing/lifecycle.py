@@ -4,9 +4,10 @@ import uuid
 
 import bpy
 
-from ..data import fcurves, source_media, strips
-from ..rendering import invalidation, session
-from . import copies, match_source, requirements, undelete
+from ..data import fcurves, requirements, strips
+from ..rendering import invalidation, render_job, session
+from . import copies, match_source, undelete
+from .add_effect import add_camera
 
 EFFECTS = "virtual_shutter.effects"
 
@@ -31,7 +32,7 @@ def update(updated=None) -> None:
     _follow_layers(edits)
     _remove_scenes(updated)
     _identify()
-    if not source_media.filming:  # a film keeps its size
+    if not render_job.runs():  # a film keeps its size
         follow_sources()
     for edit in _edits():
         invalidation.invalidate_changed(edit)
@@ -42,7 +43,15 @@ def mend() -> None:
     for edit in _edits():
         for strip in strips.own_strips(edit):
             if strip.scene is not None and strip.scene.library is None:
-                requirements.mend(strip)
+                _mend(strip)
+
+
+def _mend(strip) -> None:
+    for owner, name, value in requirements.settings(strip):
+        if getattr(owner, name) != value:
+            setattr(owner, name, value)
+    if requirements.camera(strip) is None:
+        add_camera(strip.scene)
 
 
 def follow_sources() -> None:

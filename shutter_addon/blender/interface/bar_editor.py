@@ -78,18 +78,18 @@ def bar_under(context, x: float, y: float) -> int | None:
     found = selection.active(context)
     if found is None or context.region is None or context.region.type != "PREVIEW":
         return None
-    if (values := _shown(found[1])) is None:
+    if (shown := _shown(found[1])) is None:
         return None
-    place = _layout(context, values)
+    place = _layout(context, shown.bars)
     return place.bar_at(x) if place.contains(x, y) else None
 
 
-def _shown(effect) -> np.ndarray | None:
-    """Bars (L,) that the editor shows; None: there is no shutter, or none that a picture can be made with."""
+def _shown(effect) -> bar_edits.BarsShown | None:
+    """Bars that the editor shows; None: there is no shutter, or none that a picture can be made with."""
     if selection.active_shutter(effect) is None:
         return None
     try:
-        return bar_edits.bars_now(effect, effect.active_shutter)
+        return bar_edits.shown(effect, effect.active_shutter)
     except EffectError:  # panels and the live preview tell it
         return None
 
@@ -109,9 +109,8 @@ class SHUTTER_GT_bars(Gizmo):
 
     def draw(self, context):
         effect = selection.active(context)[1]
-        if (values := _shown(effect)) is not None:
-            states = bar_edits.key_state(effect, effect.active_shutter)
-            _draw(_layout(context, values), selection.active_shutter(effect), values, states)
+        if (shown := _shown(effect)) is not None:
+            _draw(_layout(context, shown.bars), selection.active_shutter(effect), *shown)
 
     def test_select(self, context, location):
         return 0 if bar_under(context, *location) is not None else -1

@@ -9,7 +9,7 @@ from bpy.types import Operator
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ...core import presets, recipe
-from ..data import annotations, consistency, effects, recipe_export, recipe_import, selection, strips, validation
+from ..data import annotations, consistency, recipe_export, recipe_import, selection, strips, validation
 from ..data.properties import CONTEXT, KINDS
 from ..editing import add_effect, bar_edits, collection_edits, match_source, region_edits, shutter_edits
 from ..rendering.session import FAULTS
@@ -53,7 +53,7 @@ class _OfEffect:
     def execute(self, context):
         try:
             result = self.change(context, selection.active(context)[1])
-        except effects.EffectError as error:
+        except validation.EffectError as error:
             self.report({"ERROR"}, str(error))
             result = {"CANCELLED"}
         redraw(context)
@@ -307,7 +307,7 @@ class SHUTTER_OT_bar_set(_OfShutter, Operator):
             self.bar = place + 1
         try:
             bars = bar_edits.bars_now(effect, effect.active_shutter)
-        except effects.EffectError as error:
+        except validation.EffectError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         self.weight = bars[min(self.bar, len(bars)) - 1]
@@ -352,7 +352,7 @@ class SHUTTER_OT_draw(_OfShutter, Operator):
         region = selection.active_region(effect)
         if self.new or region is None:
             if sentence := collection_edits.why_full(effect, "regions"):  # poll() does not know what `new` is
-                raise effects.EffectError(sentence)
+                raise validation.EffectError(sentence)
             region = region_edits.add_region(effect, selection.active_shutter(effect), self.kind)
         if not drawing_tool(context, effect, region, "builtin.annotate"):
             self.report({"INFO"}, "Open a sequencer with a preview to draw")
@@ -503,7 +503,7 @@ class SHUTTER_OT_recipe_import(_OfEffect, ImportHelper, Operator):
         edit, _effect, strip = selection.active(context)
         try:
             recipe_import.apply(edit, effect, strip, recipe.load(chosen_file(self)))
-        except (recipe.RecipeError, effects.EffectError) as error:
+        except (recipe.RecipeError, validation.EffectError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return None

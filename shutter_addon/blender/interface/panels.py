@@ -8,8 +8,9 @@ from bpy.types import Menu, Panel, UIList
 from ...media import cuts
 from ..data import annotations, selection, strips, validation
 from ..editing import bar_edits, match_source
+from ..rendering import inbetween_build
 from ..rendering.session import FAULTS
-from . import inbetween_build
+from . import inbetween_operators
 
 # Beyond this a column of numbers helps nobody: the bar editor and the Graph Editor do.
 _MOST_NUMBERS = 64
@@ -104,7 +105,7 @@ class _Shutters:
         layout.use_property_split = True
         layout.prop(effect, "window")
         try:
-            bars = bar_edits.bars_now(effect, effect.active_shutter)
+            bars = bar_edits.shown(effect, effect.active_shutter).bars
         except validation.EffectError as error:
             layout.label(text=str(error), icon="ERROR", translate=False)
             return
@@ -272,11 +273,11 @@ def _draw_look(layout, look) -> None:
     column = layout.column(align=True)
     column.label(text=words, icon=icon, translate=False)
     if look.size:
-        size = inbetween_build.size_in_words(look.size)
+        size = inbetween_operators.size_in_words(look.size)
         column.label(text=iface_("{size} on disk").format(size=size), icon="DISK_DRIVE", translate=False)
     if look.state.name != "ready":
         if look.estimate:
-            size = inbetween_build.size_in_words(look.estimate)
+            size = inbetween_operators.size_in_words(look.estimate)
             column.label(text=iface_("About {size} when built").format(size=size), icon="BLANK1", translate=False)
         elif look.estimate is None:
             _redraw_later()
@@ -284,11 +285,11 @@ def _draw_look(layout, look) -> None:
 
 def _redraw_later() -> None:
     if not bpy.app.timers.is_registered(_redraw):
-        bpy.app.timers.register(_redraw, first_interval=inbetween_build.TICK)
+        bpy.app.timers.register(_redraw, first_interval=inbetween_operators.TICK)
 
 
 def _redraw() -> None:
-    inbetween_build.redraw_panels(bpy.context)
+    inbetween_operators.redraw_panels(bpy.context)
 
 
 class _InProperties:

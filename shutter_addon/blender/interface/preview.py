@@ -13,7 +13,7 @@ from gpu_extras.batch import batch_for_shader
 from ...compute.passes import body
 from ...core.frame_state import FrameState
 from ...media import MediaError
-from ..data import annotations, effects, geometry, selection, strips
+from ..data import annotations, geometry, selection, strips
 from ..data.properties import CONTEXT
 from ..rendering import invalidation, session
 from ..rendering.blender_gpu import Texture
@@ -148,7 +148,9 @@ def _draw() -> None:
 
 
 def _show(context, found: Shown, settings, say) -> None:
-    moment = session.moment(found.edit, found.effect, found.strip, found.edit.frame_current)
+    frame = found.edit.frame_current
+    snapshot = invalidation.current(found.edit, found.effect, found.strip, frame)
+    request = session.here().request(snapshot, frame)
     quad = Quad(context.region, found.strip, annotations.picture_size(found.effect))
     has_result = settings.view in ("RESULT", "SPLIT")
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
@@ -158,19 +160,19 @@ def _show(context, found: Shown, settings, say) -> None:
     if left > 0 or draws_result:
         _warn(found, say)
     if left > 0:
-        _show_source(quad, found, moment, left)
+        _show_source(quad, found, request, left)
     if has_result and not draws_result:
-        _tell_missing(moment, say)
+        _tell_missing(request, say)
     if draws_result:
-        moment.prefetch()
-        texture = moment.renderer.draw(moment.index, moment.instant, moment.direction, quick=True)
+        request.prefetch()
+        texture = request.renderer.draw(request.index, request.state, request.direction, quick=True)
         quad.draw("show_picture", {"picture": texture}, left, 1.0, opacity=found.strip.blend_alpha)
     if settings.view == "SCRIBBLES":
-        _show_scribbles(quad, found.effect, moment)
+        _show_scribbles(quad, found.effect, request)
     elif settings.view == "COEFFICIENTS":
-        _show_coefficients(quad, found.effect, moment)
+        _show_coefficients(quad, found.effect, request)
     else:
-        _show_strokes(context, quad, found.effect, moment)
+        _show_strokes(context, quad, found.effect, request)
 
 
 def _warn(found: Shown, say) -> None:
@@ -181,10 +183,10 @@ def _warn(found: Shown, say) -> None:
         say(rpt_("This view has the view transform Standard"))
 
 
-def _tell_missing(moment, say) -> None:
+def _tell_missing(request, say) -> None:
     """Says in the preview what the engine can only report."""
     try:
-        moment.check()
+        request.check()
     except MediaError as error:
         say(_fault(error))
 
@@ -193,12 +195,12 @@ def _fault(error: Exception) -> str:
     return rpt_("Shutter: {fault}").format(fault=error)
 
 
-def _show_strokes(context, quad, effect, moment) -> None:
+def _show_strokes(context, quad, effect, request) -> None:
     """The scribbles where they are by now; Blender's own annotations show where they were drawn."""
     space = context.space_data
     if not (space.show_overlays and space.preview_overlay.show_annotation):
         return
-    for region, shape in zip(effects.drawn_regions(effect), moment.instant.shapes, strict=True):
+    for region, shape in zip(strips.drawn_regions(effect), request.state.shapes, strict=True):
         layer = annotations.layer_of(effect, region)
         if layer is not None and layer.annotation_hide:
             continue
@@ -207,32 +209,32 @@ def _show_strokes(context, quad, effect, moment) -> None:
             drawing.lines(quad.on_region(points), color, closed=shape.kind == "lasso", width=2)
 
 
-def _show_source(quad, found: Shown, moment, right: float) -> None:
+def _show_source(quad, found: Shown, request, right: float) -> None:
     """The source's own frame, from the left edge on: that of a shutter that is open for it alone."""
-    options = replace(moment.instant.options, step=1)  # no in-between frames come first in reverse
+    options = replace(request.state.options, step=1)  # no in-between frames come first in reverse
     still = np.zeros((1, options.window))
     still[0, options.before] = 1
-    plain = replace(moment, instant=FrameState(options, still))
+    plain = replace(request, state=FrameState(options, still))
     plain.prefetch()
-    texture = moment.renderer.draw(plain.index, plain.instant, plain.direction)
+    texture = request.renderer.draw(plain.index, plain.state, plain.direction)
     quad.draw("show_picture", {"picture": texture}, 0.0, right, opacity=found.strip.blend_alpha)
 
 
-def _show_scribbles(quad, effect, moment) -> None:
-    labels, block = moment.renderer.drawn_labels(moment.instant)
+def _show_scribbles(quad, effect, request) -> None:
+    labels, block = request.renderer.drawn_labels(request.state)
     quad.draw(
-        "show_scribbles", {"labels": labels, "palette": _palette(effect)}, opacity=0.7, block=block, size=_size(moment)
+        "show_scribbles", {"labels": labels, "palette": _palette(effect)}, opacity=0.7, block=block, size=_size(request)
     )
 
 
-def _show_coefficients(quad, effect, moment) -> None:
-    coefficients, block, count = moment.renderer.drawn_coefficients(moment.instant)
+def _show_coefficients(quad, effect, request) -> None:
+    coefficients, block, count = request.renderer.drawn_coefficients(request.state)
     textures = {"coefficients": coefficients, "palette": _palette(effect)}
-    quad.draw("show_coefficients", textures, opacity=0.75, block=block, count=count, size=_size(moment))
+    quad.draw("show_coefficients", textures, opacity=0.75, block=block, count=count, size=_size(request))
 
 
-def _size(moment) -> tuple[int, int]:
-    return moment.renderer.source.width, moment.renderer.source.height
+def _size(request) -> tuple[int, int]:
+    return request.renderer.source.width, request.renderer.source.height
 
 
 def _palette(effect) -> Texture:

@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Gizmo, GizmoGroup
 
 from ...core import scribbles
-from ..data import annotations, effects, geometry, selection, validation
+from ..data import annotations, geometry, selection, snapshot, validation
 from ..editing import bar_edits, region_edits
 from . import drawing, keymaps
 
@@ -43,7 +43,7 @@ def place(context) -> Place | None:
         return None
     edit, effect, strip = found
     try:
-        strokes = effects.strokes_at(edit, effect, strip, effect.active_region, edit.frame_current_final)
+        strokes = snapshot.strokes_at(edit, effect, strip, effect.active_region, edit.frame_current_final)
         validation.check_region(region)
     except validation.EffectError:  # panels and the live preview tell it
         return None

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core.messages import signed
 from ..data.strips import ENGINE
-from . import invalidation, render_job, session
+from . import invalidation, job_snapshots, render_job, session
 
 
 class VirtualShutterEngine(bpy.types.RenderEngine):
@@ -31,14 +31,14 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
 
     def _render(self, depsgraph):
         scene, width, height = depsgraph.scene, self.resolution_x, self.resolution_y
-        picture = session.picture(scene, scene.frame_current, self._say, self._stopped)
-        picture = session.resized(picture, width, height)
+        shown, frame = job_snapshots.of(scene, scene.frame_current, self._stopped)
+        picture = session.resized(session.picture(shown, frame, self._say, self._stopped), width, height)
         result = self.begin_result(0, 0, width, height)
         # Blender's rows go up; composed pictures lie so in memory, and this copies nothing.
         result.layers[0].passes["Combined"].rect.foreach_set(np.ascontiguousarray(picture[::-1]).ravel())
         self.end_result(result)
         self.update_progress(1.0)
-        session.begin_next(scene, scene.frame_current)
+        session.here().begin_next(shown, frame)
 
     def _stopped(self) -> bool:
         return self.test_break() or render_job.stopping()

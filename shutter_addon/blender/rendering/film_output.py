@@ -141,7 +141,13 @@ def film(edit, output: Path) -> None:
         part_film = part / f"film{output.suffix}"
         try:
             edit.render.filepath = for_blender(str(part_film) if is_movie(output) else f"{part}{os.sep}")
-            with _told(faults), _stoppable() as stopped, quiet(), _lean(edit), _moved(part, output, edit) as missing:
+            with (
+                render_job.telling(faults.append),
+                _stoppable() as stopped,
+                quiet(),
+                _lean(edit),
+                _moved(part, output, edit) as missing,
+            ):
                 bpy.ops.render.render(animation=True, scene=edit.name)
             if is_movie(output) and not faults and not stopped:
                 _finish(part_film, output, edit.frame_end - edit.frame_start + 1)
@@ -235,16 +241,6 @@ def progress(count: int, unit: str):
         return
     with tqdm(total=count, unit=unit, disable=None) as bar:
         yield bar.update
-
-
-@contextmanager
-def _told(faults: list[str]):
-    """Collects the sentence that ends a render, in place of stderr."""
-    render_job.tell, before = faults.append, render_job.tell
-    try:
-        yield
-    finally:
-        render_job.tell = before
 
 
 @contextmanager

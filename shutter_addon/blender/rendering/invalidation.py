@@ -1,4 +1,4 @@
-"""The sequencer keeps finished frames; this drops them when what an effect depends on has changed.
+"""The sequencer keeps finished frames, and previews what they read of an effect; this drops both when it has changed.
 
 Blender knows of a strip's own properties only. Properties of the effect drop frames by their update callbacks; keys,
 strokes and the source are compared with what they were, as no callback tells of them.
@@ -8,14 +8,15 @@ import bpy
 import numpy as np
 
 from ...media import MediaError
-from ...media import inbetween_cache as files
-from ..data import effects, fcurves, inbetween_settings, source_media, strips
+from ..data import fcurves, revision, snapshot, source_media, strips
+from ..data.snapshot import Snapshot, SourceFiles
+from ..data.validation import EffectError
+from . import render_job, session
 
-_signatures: dict = {}  # by effect scenes
-_KEPT = 64
-_built: dict[tuple, tuple] = {}  # by folder, source, factor and method: the stamp of their in-between frames
+_signatures: dict[int, int] = {}  # by effect scene
+_files: dict[int, tuple[int, SourceFiles]] = {}  # by effect scene: the revision at which they were looked at, and what
+_current = revision.UntilChange()
 spoilt: set[int] = set()  # session_uids of scenes of whose frames the sequencer may keep one that failed
-building = False  # while in-between frames are built, those that come count when the build has ended
 
 # Keyframe.interpolation as a number: constant, linear, bezier, then the others.
 _BEZIER = 2
@@ -26,35 +27,33 @@ _TIMING = (
 )
 
 
-def built_key(effect, source) -> tuple:
-    """Which in-between frames an effect has of the files that its source reads; equal keys: the same, and none was
-    built or removed meanwhile. MediaError: the source strip has no files."""
-    try:
-        if inbetween_settings.factor(effect) == 1:
-            return ()
-        folder, *made = inbetween_settings.settings(effect)
-    except effects.EffectError as error:
-        return (str(error),)
-    key = folder, source_media.stem(source), *made
-    if not (building and key in _built):
-        _built.pop(key, None)
-        while len(_built) >= _KEPT:
-            del _built[next(iter(_built))]
-        _built[key] = files.stamp(*key)
-    return *key, _built[key]
+def current(edit, effect, strip, frame: float) -> Snapshot:
+    """The snapshot of an effect strip at a timeline frame, for what is drawn: taken once until something changes.
+    EffectError, MediaError: as snapshot.take."""
+    scene = effect.scene.session_uid
+
+    def take():
+        number, files = _files.get(scene, (None, None))
+        known = files if number == revision.number() else None
+        return snapshot.take(edit, effect, strip, (frame,), folder=session.settings().inbetween, files=known)
+
+    return _current.get((scene, strip.name, frame), take)
 
 
 def forget() -> None:
     """Forgets what the effects of a file were, before another one is loaded."""
     _signatures.clear()
-    _built.clear()
+    _files.clear()
+    _current.clear()
+    revision.changed()
 
 
 def drop_removed() -> None:
     """Forgets effect scenes that are gone."""
     scenes = {scene.session_uid for scene in bpy.data.scenes}
-    for uid in _signatures.keys() - scenes:
-        del _signatures[uid]
+    for known in (_signatures, _files):
+        for uid in known.keys() - scenes:
+            del known[uid]
 
 
 def drop_spoilt() -> None:
@@ -66,30 +65,39 @@ def drop_spoilt() -> None:
     spoilt.clear()
 
 
+def drop_spoilt_later() -> None:
+    """As drop_spoilt, from whatever thread."""
+    if spoilt:
+        render_job.soon(drop_spoilt)
+
+
 def invalidate_changed(edit) -> bool:
     """Drops the finished frames of the edit's effects whose keys, strokes or source have changed since the last call;
     whether there are any.
 
     The values of keyed properties do not count: they change with every frame that plays."""
-    for gone in _signatures.keys() - {scene.session_uid for scene in bpy.data.scenes}:
-        del _signatures[gone]
+    drop_removed()
     if not edit.virtual_shutter.effects:
         return False
     changed = False
     shown = {strip.scene: strip for strip in strips.effect_strips(edit)}
+    looked = {}
     for effect in edit.virtual_shutter.effects:
         if (strip := shown.get(effect.scene)) is None:
             continue
-        signature = hash(tuple(_signature(edit, effect, strip)))
-        if _signatures.setdefault(effect.scene.session_uid, signature) != signature:
-            _signatures[effect.scene.session_uid] = signature
+        scene = effect.scene.session_uid
+        signature = hash(tuple(_signature(edit, effect, strip, looked)))
+        if _signatures.setdefault(scene, signature) != signature:
+            _signatures[scene] = signature
             strips.invalidate(edit, effect.scene)
             changed = True
+    _files.update((scene, (revision.number(), files)) for scene, files in looked.items())
     return changed
 
 
-def _signature(edit, effect, strip):
-    """All that the effect's pictures depend on, but for properties with an update callback."""
+def _signature(edit, effect, strip, looked: dict):
+    """All that the effect's pictures depend on, but for properties with an update callback. looked: gets what the source
+    reads, by the effect's scene."""
     for shutter in effect.shutters:
         yield shutter.name, len(shutter.bars)
     for region in effect.regions:
@@ -108,7 +116,7 @@ def _signature(edit, effect, strip):
     yield repr([getattr(transform, name) for name in _PLACE]), repr(tuple(transform.origin))
     yield strip.use_flip_x, strip.use_flip_y  # scribbles lie mirrored with it
     if (source := strips.nearest_source(edit, effect, strip)) is not None:
-        yield from _source(effect, source)
+        yield from _source(effect, source, looked)
 
 
 def _keys(points):
@@ -129,15 +137,16 @@ def _strokes(annotation, layer: str):
             yield _bytes(stroke.points, "co", 3, np.float32)
 
 
-def _source(effect, source):
+def _source(effect, source, looked: dict):
     yield tuple(getattr(source, name) for name in _TIMING)
     yield source_media.reading(source)
     yield tuple(key.timeline_frame for key in getattr(source, "retiming_keys", ()))
     try:
-        yield source_media.files_key(source)  # a file that was missing may be there again
-        yield built_key(effect, source)
-    except MediaError as error:
-        yield str(error)
+        files = looked[effect.scene.session_uid] = snapshot.source_files(effect, source, session.settings().inbetween)
+    except (MediaError, EffectError) as error:
+        yield str(error)  # a file that was missing may be there again
+    else:
+        yield files
 
 
 def _bytes(collection, name: str, size: int, dtype) -> bytes:

@@ -8,7 +8,8 @@ import os
 import sys
 import threading
 import time
-from contextlib import suppress
+from collections.abc import Callable
+from contextlib import contextmanager, suppress
 
 import bpy
 
@@ -25,7 +26,7 @@ def _to_stderr(text: str) -> None:
         print(signed(text), file=sys.stderr, flush=True)
 
 
-tell = _to_stderr  # what is done with the sentence that ends a render in the background
+_tell = _to_stderr  # what is done with the sentence that ends a render in the background
 failure: str | None = None  # that sentence, of the render that runs or ran last
 _stopping = False
 _cancelling = False
@@ -40,7 +41,7 @@ def begin(scene) -> None:
     global _film, _begun, failure, _stopping
     is_effect = scene.render.engine == ENGINE
     in_film = _film is not None and (_begun or is_effect)
-    in_preview = is_effect and not (bpy.app.background or _in_job())
+    in_preview = is_effect and not (bpy.app.background or in_job())
     if not (in_film or in_preview):
         _film, _begun, failure, _stopping = scene.session_uid, False, None, False
 
@@ -48,6 +49,11 @@ def begin(scene) -> None:
 def runs() -> bool:
     """Whether a film, or a single picture of it, is rendered."""
     return _film is not None
+
+
+def film() -> int | None:
+    """session_uid of the scene whose render runs."""
+    return _film
 
 
 def is_film(scene) -> bool:
@@ -76,11 +82,57 @@ def end(scene, alone: bool) -> None:
 def ends_films() -> bool:
     """Whether what fails here and now is a film: in the background, in a job of the window, or in a script there. Else
     it is a preview, on the main thread."""
-    return bpy.app.background or _in_job() or (_film is not None and not bpy.app.is_job_running("RENDER"))
+    return bpy.app.background or in_job() or (_film is not None and not bpy.app.is_job_running("RENDER"))
 
 
-def _in_job() -> bool:
+def in_job() -> bool:
+    """Whether this is the thread of a job of the window."""
     return not bpy.app.background and threading.current_thread() is not threading.main_thread()
+
+
+@contextmanager
+def telling(to: Callable[[str], None]):
+    """Inside, the sentence that ends a render in the background goes there in place of stderr."""
+    global _tell
+    before, _tell = _tell, to
+    try:
+        yield
+    finally:
+        _tell = before
+
+
+def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None):
+    """What a function gives on Blender's main thread, where its data and its operators belong; None: it was not waited
+    for. ended: whether nobody waits for it any longer; without it, the window is not waited for long."""
+    if not in_job():
+        return function()
+    done, deadline, found = threading.Event(), time.monotonic() + _LONG, []
+    ended = ended or (lambda: time.monotonic() > deadline)
+
+    def call():
+        if not done.is_set():
+            try:
+                found.append((True, function()))
+            except Exception as error:
+                found.append((False, error))
+            done.set()
+
+    bpy.app.timers.register(call)
+    while not done.wait(_PATIENCE):
+        if ended():
+            done.set()
+    good, value = found[0] if found else (True, None)
+    if not good:
+        raise value
+    return value
+
+
+def soon(function: Callable[[], None]) -> None:
+    """Has a function called on the main thread: at once, if this is it."""
+    if in_job():
+        bpy.app.timers.register(function)
+    else:
+        function()
 
 
 def stop() -> None:
@@ -99,7 +151,7 @@ def fail(text: str) -> None:
     global failure
     if failure is None:
         failure = text
-        tell(text)
+        _tell(text)
 
 
 def cancel(ended=None) -> None:
@@ -107,22 +159,10 @@ def cancel(ended=None) -> None:
     (After one Blender would go on with the next, and crash.)
 
     ended: whether the window has ended it meanwhile; without it, the window is not waited for long."""
-    if not _in_job():
+    if in_job():
+        on_main_thread(lambda: (_cancel(), _show()), ended)
+    else:
         _cancel()
-        return
-    done, deadline = threading.Event(), time.monotonic() + _LONG
-    ended = ended or (lambda: time.monotonic() > deadline)
-
-    def on_main_thread():
-        if not done.is_set():
-            _cancel()
-            _show()
-            done.set()
-
-    bpy.app.timers.register(on_main_thread)  # as Blender's operators belong to the main thread
-    while not done.wait(_PATIENCE):
-        if ended():
-            done.set()
 
 
 def _cancel() -> None:

@@ -1,10 +1,6 @@
-"""In-between frames of an effect: how far they are built, the build in a thread of its own, and their removal."""
+"""Operators that build and remove in-between frames."""
 
-import threading
-import time
-from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import suppress
-from typing import NamedTuple
+from concurrent.futures import wait
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -12,138 +8,31 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Operator
 
 from ...core import messages
-from ...media import MediaError, inbetween_cache
-from ...media.inbetween import build, estimate
-from ..data import effects, inbetween_settings, selection, source_media, strips
-from ..rendering import invalidation as finished
+from ..data import inbetween_settings, selection, strips, validation
+from ..rendering import inbetween_build
 from ..rendering.session import FAULTS
 from .operators import _OfEffect, redraw, refused
 
 TICK = 0.25  # seconds
-_FRESH = 1.0  # seconds that files are not asked again, as panels are drawn often
-_KEPT = 16
 
-
-class Look(NamedTuple):
-    """What a panel shows of an effect's in-between frames.
-
-    state: how far they are built
-    size: bytes that the source's take, of all factors and methods
-    estimate: bytes that they will take about; None while that is being found out, 0 if it cannot be"""
-
-    state: inbetween_cache.State
-    size: int
-    estimate: int | None
-
-
-_media: dict[tuple, tuple] = {}  # by source_media.media_key: the medium, its file not open; bytes for a factor of 2
-_looks: dict[tuple, tuple[float, inbetween_cache.State, int]] = {}  # when it was looked, and what was found
-_running: "Build | None" = None
 _timer = None
 
 
-def look(edit, effect, strip) -> Look:
-    """How things are, or were a second ago. MediaError, EffectError: there is no source, or no place for frames."""
-    source = strips.source_of(edit, effect, strip)
-    settings = inbetween_settings.settings(effect)
-    medium, doubled = _known(source)
-    key = source_media.media_key(source), *settings
-    when, *found = _looks.get(key, (0.0,))
-    if not when or time.monotonic() - when > _FRESH:
-        found = inbetween_cache.state(medium, *settings), inbetween_cache.size(settings[0], medium)
-        _looks[key] = time.monotonic(), *found
-        _trim(_looks)
-    return Look(*found, doubled.result() * (settings[1] - 1) if doubled.done() else None)
-
-
-def _known(source) -> tuple:
-    """The source strip's medium, and a future of the bytes that its in-between frames take for a factor of 2."""
-    key = source_media.media_key(source)
-    if key not in _media:
-        medium = source_media.open_media(source)
-        medium.close()
-        _media[key] = medium, _in_thread(_estimated, medium)
-    _trim(_media)
-    return _media[key]
-
-
-def _trim(known: dict) -> None:
-    """Lets the oldest go."""
-    while len(known) > _KEPT:
-        del known[next(iter(known))]
-
-
-def _estimated(medium) -> int:
-    with medium, suppress(MediaError, OSError):  # a build says what is wrong
-        return estimate(medium, 2)
-    return 0
-
-
-def _in_thread(function, *arguments) -> Future:
-    pool = ThreadPoolExecutor(1, "Virtual Shutter")
-    future = pool.submit(function, *arguments)
-    pool.shutdown(wait=False)
-    return future
-
-
-class Build:
-    """In-between frames of an effect that are being built, by a thread that touches no bpy.
-
-    scene: session_uid of the effect's scene; done, total: pairs of neighbouring source frames
-    future: how far it came, an inbetween_cache.State; or MediaError"""
-
-    def __init__(self, edit, effect, strip):
-        """EffectError, MediaError: it cannot begin."""
-        settings, medium = (
-            inbetween_settings.settings(effect),
-            source_media.open_media(strips.source_of(edit, effect, strip)),
-        )
-        self.scene = effect.scene.session_uid
-        self.done, self.total = 0, medium.count - 1
-        self._stopped = threading.Event()
-        self.future = _in_thread(self._build, medium, *settings)
-
-    def _build(self, medium, *settings):
-        with medium:
-            return build(medium, *settings, update=self._update, cancelled=self._stopped.is_set)
-
-    def _update(self, done, _total):
-        self.done = done
-
-    def stop(self) -> None:
-        """Has it end soon; what is finished is kept."""
-        self._stopped.set()
-
-
-def running() -> Build | None:
-    """The build that runs: one at a time, as it uses the whole machine."""
-    return _running
-
-
 def stop() -> None:
-    """Ends the build that runs, if any, and forgets what is known: when a file is loaded, and when the extension
-    goes."""
-    if _running is not None:
-        _running.stop()
-        wait([_running.future])
-        _ended()
-    wait([doubled for _medium, doubled in _media.values()])
-    _media.clear()
-    _looks.clear()
-    inbetween_cache.forget()
+    """As inbetween_build.stop, and the status bar is Blender's again."""
+    inbetween_build.stop()
+    _show_end()
 
 
-def _started(context, build: Build) -> None:
-    global _running, _timer
-    _running, finished.building = build, True
+def _show_start(context) -> None:
+    global _timer
     if not bpy.app.background:
         _timer = context.window_manager.event_timer_add(TICK, window=context.window)
+    redraw_panels(context)
 
 
-def _ended() -> None:
-    global _running, _timer
-    _running, finished.building = None, False
-    _looks.clear()
+def _show_end() -> None:
+    global _timer
     _say(None)
     if _timer is not None:
         bpy.context.window_manager.event_timer_remove(_timer)
@@ -178,11 +67,11 @@ class _OfInbetweens(_OfEffect):
 
     @classmethod
     def possible(cls, effect):
-        if _running is not None:
+        if inbetween_build.running() is not None:
             return refused(cls, rpt_("In-between frames are being built; Esc stops that"))
         try:
             inbetween_settings.settings(effect)
-        except effects.EffectError as error:
+        except validation.EffectError as error:
             return refused(cls, str(error))
         return True
 
@@ -212,16 +101,15 @@ class SHUTTER_OT_inbetween_build(_OfInbetweens, Operator):
 
     def _begin(self, context) -> bool:
         try:
-            self._build = Build(*selection.active(context))
+            self._build = inbetween_build.start(*selection.active(context))
         except FAULTS as error:
             self.report({"ERROR"}, str(error))
             return False
-        _started(context, self._build)
-        redraw_panels(context)
+        _show_start(context)
         return True
 
     def modal(self, context, event):
-        if _running is not self._build:  # a file was loaded
+        if inbetween_build.running() is not self._build:  # a file was loaded
             return {"CANCELLED"}
         if event.type == "ESC" and event.value == "PRESS":
             self._build.stop()
@@ -238,12 +126,13 @@ class SHUTTER_OT_inbetween_build(_OfInbetweens, Operator):
 
     def cancel(self, _context):
         """Its window was closed."""
-        if _running is self._build:
+        if inbetween_build.running() is self._build:
             stop()
 
     def _finish(self, context):
         wait([self._build.future])
-        _ended()
+        inbetween_build.ended()
+        _show_end()
         redraw(context)
         try:
             state = self._build.future.result()
@@ -277,16 +166,11 @@ class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
 
     def change(self, context, effect):
         edit, effect, strip = selection.active(context)
-        left = []
         try:
-            folder, (medium, _) = inbetween_settings.folder(effect), _known(strips.source_of(edit, effect, strip))
-            freed = inbetween_cache.purge(folder, medium, lambda *place: left.append(place))
+            freed, left = inbetween_build.purge(effect, strips.source_of(edit, effect, strip))
         except FAULTS as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        with suppress(OSError):  # other sources' are left there, or it never was
-            folder.rmdir()
-        _looks.clear()
         self.report({"INFO"}, rpt_("Removed {size}").format(size=size_in_words(freed)))
         for place, count in left:
             sentence = rpt_('"{folder}": other files stay there ({count})')

@@ -1,16 +1,13 @@
-"""Which source frame a strip shows at a timeline frame: Blender's own answer, which its Python API does not give."""
+"""Which source frame a strip of Blender's sequencer shows at a timeline frame: trimmed, retimed, reversed, with strobe."""
 
-import ctypes
 import math
 from bisect import bisect_left
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from bpy.app.translations import pgettext_rpt as rpt_
 
-from . import source_media
-from .validation import EffectError
+from .effect import EffectError
 
 # eSeqRetimingKeyFlag: the key starts a smooth transition between two speeds.
 _TRANSITION_IN = 1 << 0
@@ -27,7 +24,29 @@ class RetimingKey:
     factor: float
 
 
-def source_frame(strip, frame: float, medium, scene_fps: float) -> int:
+@dataclass(frozen=True)
+class StripTiming:
+    """How a source strip lies on the timeline; the fields have Blender's names, and its frames of the timeline.
+
+    is_clip: whether it is a movie clip strip, whose first frame of the medium is `first`
+    scene_fps: frames per second of the edit
+    keys: the retiming keys, as Blender has them (are_retiming_keys)"""
+
+    name: str
+    is_clip: bool
+    first: int
+    scene_fps: float
+    content_start: float
+    content_end: float
+    content_trim_start: int
+    content_trim_end: int
+    left_handle: int
+    use_reverse_frames: bool
+    strobe: float
+    keys: tuple[RetimingKey, ...] = ()
+
+
+def source_frame(strip: StripTiming, frame: float, medium) -> int:
     """Frame of the medium that a source strip shows at a timeline frame; medium: it, opened, as a ShotSource.
 
     Trims, cuts, playback rate, retiming keys, reversed frames and strobe as Blender's sequencer applies them. Where
@@ -35,19 +54,19 @@ def source_frame(strip, frame: float, medium, scene_fps: float) -> int:
     strip is retimed cannot be known.
     """
     length = max(1, medium.filmed - strip.content_trim_start - strip.content_trim_end)
-    keys = _retiming_keys(strip)
-    rate = _playback_rate(strip, keys, length, float(medium.fps or 0) / medium.step / scene_fps)
-    if strip.type == "MOVIECLIP" and abs(length / rate - (strip.content_end - strip.content_start)) > 1:
-        sentence = rpt_('strip "{strip}" is not as long as its clip: retimed clips are not supported')
-        raise EffectError(sentence.format(strip=strip.name))
+    rate = _playback_rate(strip, length, float(medium.fps or 0) / medium.step / strip.scene_fps)
+    if strip.is_clip and abs(length / rate - (strip.content_end - strip.content_start)) > 1:
+        raise EffectError(
+            'strip "{strip}" is not as long as its clip: retimed clips are not supported', strip=strip.name
+        )
 
     def position(time):
-        return _position(strip, keys, rate, length, time)
+        return _position(strip, rate, length, time)
 
-    first = strip.content_trim_start + (source_media.first_frame(strip) if strip.type == "MOVIECLIP" else 0)
+    first = strip.content_trim_start + strip.first
     if medium.step > 1:
         return nearest(first + float(position(frame)), medium)
-    if strip.type == "MOVIECLIP":  # Blender takes the whole part
+    if strip.is_clip:  # Blender takes the whole part
         return first + int(position(frame))
     # Blender decodes the nearest frame, but keeps it for every position with the same whole part: of a slow strip that
     # plays forward, the first of those positions decides.
@@ -63,47 +82,27 @@ def nearest(filmed: float, medium) -> int:
     return min(max(math.floor(filmed * medium.step + 0.5), 0), medium.count - 1)
 
 
-def _position(strip, keys, rate: float, length: int, frame: float) -> np.float32:
+def _position(strip: StripTiming, rate: float, length: int, frame: float) -> np.float32:
     """Where in the strip's content a timeline frame lies, in frames; in float32 as Blender reckons, ties included."""
     end = strip.content_end - 1
     position = np.float32(max(end - frame if strip.use_reverse_frames else frame - strip.content_start, 0.0))
     position *= np.float32(rate)
-    if len(keys) > 1:
-        position = retimed(keys, position) * np.float32(length)
+    if len(strip.keys) > 1:
+        position = retimed(strip.keys, position) * np.float32(length)
     position = min(max(position, np.float32(0)), np.float32(length - 1))
     if strip.strobe > 1:
         position -= np.float32(math.fmod(position, strip.strobe))
     return position
 
 
-def _playback_rate(strip, keys, length: int, rate: float) -> float:
+def _playback_rate(strip: StripTiming, length: int, rate: float) -> float:
     """Source frames per timeline frame: 1, or the movie's rate over the scene's if the strip was added to keep its
     speed. Blender does not tell which; the strip's length does."""
     if rate <= 0:  # images
         return 1.0
     shown = strip.content_end - strip.content_start
-    natural = keys[-1].index if len(keys) > 1 else length
+    natural = strip.keys[-1].index if len(strip.keys) > 1 else length
     return rate if abs(natural / rate - shown) < abs(natural - shown) or int(natural / rate) == shown else 1.0
-
-
-def _retiming_keys(strip) -> list[RetimingKey]:
-    """The strip's retiming keys from Blender's memory: Python gets their timeline frames, but not what they show.
-
-    Of a clip strip it gets none at all.
-    SeqRetimingKey begins with double strip_frame_index, int flag, float retiming_factor. EffectError: not in this
-    Blender.
-    """
-
-    class Raw(ctypes.Structure):
-        _fields_ = (("index", ctypes.c_double), ("flag", ctypes.c_int), ("factor", ctypes.c_float))
-
-    shown = list(getattr(strip, "retiming_keys", ()))
-    raw = [Raw.from_address(key.as_pointer()) for key in shown]
-    keys = [RetimingKey(key.index, key.flag, key.factor) for key in raw]
-    if not are_retiming_keys(keys, [key.timeline_frame - strip.content_start for key in shown]):
-        sentence = rpt_('strip "{strip}": its retiming keys cannot be read in this version of Blender')
-        raise EffectError(sentence.format(strip=strip.name))
-    return keys
 
 
 def are_retiming_keys(keys: list[RetimingKey], indices: list[float]) -> bool:

@@ -1,0 +1,54 @@
+"""What an effect strip and its scene need so that Blender's sequencer asks the engine for the whole picture."""
+
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from .strips import ENGINE, own_strips
+
+
+def left_out(edit) -> list[tuple[range, str]]:
+    """The timeline frames that the sequencer leaves an effect out of, and why."""
+    found = ((_shown(edit, strip), why) for strip in own_strips(edit) if (why := _why(strip)) is not None)
+    return [(frames, why) for frames, why in found if frames]
+
+
+def _why(strip) -> str | None:
+    if strip.scene is None:
+        return rpt_('the scene of "{strip}" was deleted').format(strip=strip.name)
+    if camera(strip) is None:
+        return rpt_('the scene of "{strip}" has no camera').format(strip=strip.name)
+    for owner, name, value in settings(strip):
+        if getattr(owner, name) != value:
+            setting = owner.bl_rna.properties[name].name
+            return rpt_('the setting "{setting}" leaves "{strip}" out').format(setting=setting, strip=strip.name)
+    return None
+
+
+def settings(strip):
+    """Owner, name and value of what a strip's picture needs, besides a camera."""
+    scene = strip.scene
+    yield strip, "scene_input", "CAMERA"
+    yield scene.render, "engine", ENGINE
+    yield scene.render, "resolution_percentage", 100
+    yield scene.render, "use_border", False
+    if scene.compositing_node_group is not None:
+        yield scene.render, "use_compositing", False
+    if not any(layer.use for layer in scene.view_layers):
+        yield scene.view_layers[0], "use", True
+
+
+def camera(strip):
+    """The camera that the strip's scene is shown through, or None."""
+    bound = (marker.camera for marker in strip.scene.timeline_markers if marker.camera)
+    return strip.scene_camera or strip.scene.camera or next(bound, None)
+
+
+def _shown(edit, strip) -> range:
+    """The frames at which a strip is shown: neither muted, nor in a meta strip that is not."""
+    first, last = strip.left_handle, strip.right_handle
+    while strip is not None:
+        outer = strip.parent_meta()
+        if strip.mute or (outer or edit.sequence_editor).channels[strip.channel].mute:
+            return range(0)
+        first, last = max(first, strip.left_handle), min(last, strip.right_handle)
+        strip = outer
+    return range(first, last)

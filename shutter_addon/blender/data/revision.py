@@ -1,0 +1,48 @@
+"""A number that grows with every change that Blender tells of, and what is worked out once for each.
+
+Blender tells of properties (their update callbacks), of what its depsgraph sees (keys, strips), of undo and of files.
+It tells nobody of strokes and of files on disk: every preview looks for them when it is drawn (rendering/invalidation.py).
+"""
+
+from collections.abc import Callable, Hashable
+
+_number = 0
+
+
+def number() -> int:
+    """Grows with every change; equal numbers: nothing has changed but the current frame."""
+    return _number
+
+
+def changed() -> None:
+    """Something has changed, or may have."""
+    global _number
+    _number += 1
+
+
+class UntilChange:
+    """Values by key, each made once until something changes; a few at most.
+
+    For what is drawn: operators, which may follow a change that nobody has told of yet, read anew."""
+
+    _MOST = 64
+
+    def __init__(self):
+        self._number, self._values = -1, {}
+
+    def get(self, key: Hashable, make: Callable):
+        """The value that `make` gives for a key; what it raised, if it did."""
+        if self._number != number() or len(self._values) >= self._MOST:
+            self._number, self._values = number(), {}
+        if key not in self._values:
+            try:
+                self._values[key] = True, make()
+            except Exception as error:
+                self._values[key] = False, error
+        good, value = self._values[key]
+        if not good:
+            raise value
+        return value
+
+    def clear(self) -> None:
+        self._values = {}

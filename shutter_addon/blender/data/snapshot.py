@@ -1,0 +1,355 @@
+"""An effect strip as plain data: the one place that reads what an effect is from Blender's data.
+
+On Blender's main thread alone. What comes of it holds no Blender data, so that threads may read it, and it does not
+change when the edit does. Channels are sampled at the frames that are asked for: Blender's F-curves are evaluated by
+Blender itself. Drivers, NLA strips and further layers of an action do not count (docs/manual.md).
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...core import effect as model
+from ...core import keyframes, limits
+from ...core.effect import EffectError
+from ...core.frame_state import FrameState, Options
+from ...core.retiming import StripTiming
+from . import annotations, inbetween_settings, source_media, strips, validation
+from .fcurves import Curves, leading, progress
+from .retiming_keys import timing_of
+
+OPTIONS = ("position", "interpolation", "light", "exposure", "edges")
+_MOVED = ("offset_x", "offset_y", "scale_x", "scale_y", "rotation")  # of a strip's transform, where it is keyed
+# Sentences of core/effect.py and core/retiming.py, which are looked up where they are passed on.
+_CORE = (
+    n_('shutter "{name}" at frame {frame}: {fault}'),
+    n_('region "{name}": a point of its strokes is nowhere near the picture'),
+    n_('region "{name}": more than {most} points with those before it'),
+    n_('strip "{strip}" is not as long as its clip: retimed clips are not supported'),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """All that the pictures of an effect strip depend on; frames are timeline frames of its edit.
+
+    scene: session_uid of the effect's scene, whose frame 0 is shown at the timeline frame `origin`
+    effect: its channels are sampled at `frames`
+    source: what is read, and `timing`, when
+    inbetween: its in-between frames, None: it has none; built: the stamp of those there are
+    first: the strip's first timeline frame; film: from frame to frame of the edit's film, and its last frame"""
+
+    scene: int
+    origin: float
+    first: int
+    film: tuple[int, int]
+    frames: frozenset[float]
+    effect: model.Effect
+    source: source_media.SourceSpec
+    timing: StripTiming
+    inbetween: inbetween_settings.Settings | None
+    built: tuple
+
+    def timeline_frame(self, scene_frame: float) -> float:
+        """The timeline frame at which the effect's scene is at one of its own."""
+        return self.origin + scene_frame
+
+    def state(self, frame: float) -> FrameState:
+        """The effect at a timeline frame. EffectError: no picture can be made of it."""
+        with translated():
+            return self.effect.at(frame)
+
+
+class SourceFiles(NamedTuple):
+    """What a source strip reads, as source_media.media_key has it, and the stamp of the in-between frames made of it."""
+
+    key: tuple
+    built: tuple
+
+
+def source_files(effect, source, folder: Path | None = None) -> SourceFiles:
+    """Looks at the files of an effect's source strip. folder: where in-between frames lie, in place of the effect's own.
+    EffectError: they lie nowhere. MediaError: there are no files."""
+    key, built = source_media.media_key(source), ()
+    if inbetween_settings.factor(effect) > 1:
+        settings = inbetween_settings.settings(effect, folder)
+        built = inbetween_settings.built.of(settings, source_media.stem(source))
+    return SourceFiles(key, built)
+
+
+def take(edit, effect, strip, frames, *, folder: Path | None = None, files: SourceFiles | None = None) -> Snapshot:
+    """The snapshot of an effect strip at timeline frames; folder: as for source_files, or what that has found.
+    EffectError, MediaError: there is no source, or no picture at any frame."""
+    source = strips.source_of(edit, effect, strip)
+    files = files or source_files(effect, source, folder)
+    return Snapshot(
+        effect.scene.session_uid,
+        strips.timeline_frame(strip, 0),
+        strip.left_handle,
+        (edit.frame_step, edit.frame_end),
+        frozenset(frames),
+        read(edit, effect, strip, frames),
+        source_media.spec(source, files.key),
+        timing_of(source),
+        inbetween_settings.settings(effect, folder) if inbetween_settings.factor(effect) > 1 else None,
+        files.built,
+    )
+
+
+def read(edit, effect, strip, frames, *, thorough: bool = False) -> model.Effect:
+    """An effect, its channels sampled at timeline frames; strip: the effect strip that shows it. EffectError: it has no
+    shutter, or more of anything than an effect has. What is wrong at one frame is told at that frame.
+
+    thorough: bars are sampled both ways at every frame, displaced or not"""
+    check_counts(effect)
+    curves, path = Curves(edit), effect.path_from_id()
+    options = _options(curves, path, effect, frames)
+    names = [shutter.name for shutter in effect.shutters]
+    placement = _placement(curves, effect, strip, frames)
+    return model.Effect(
+        tuple(
+            _shutter(curves, f"{path}.shutters[{i}]", shutter, options, frames, thorough)
+            for i, shutter in enumerate(effect.shutters)
+        ),
+        tuple(
+            _region(curves, f"{path}.regions[{i}]", effect, region, names.index(region.shutter), placement, frames)
+            for i, region in enumerate(effect.regions)
+            if region.shutter in names
+        ),
+        options,
+        _source_time(curves, path, effect, frames) if effect.use_source_time else None,
+    )
+
+
+def bars_at(edit, effect, index: int, frame: float) -> np.ndarray:
+    """Bars (L,) of a shutter at a timeline frame, whether or not a picture can be made of them. EffectError: they are
+    not as many as the window is long, or one cannot be."""
+    curves, path, frames = Curves(edit), effect.path_from_id(), (frame,)
+    options = _options(curves, path, effect, frames)
+    shutter = _shutter(curves, f"{path}.shutters[{index}]", effect.shutters[index], options, frames)
+    return shutter.bars.at(frame, options.at(frame).interpolation)
+
+
+def strokes_at(edit, effect, strip, index: int, frame: float) -> list[np.ndarray]:
+    """A region's strokes (n, 2) on the picture at a timeline frame, not moved yet. EffectError: they lie nowhere."""
+    curves, region, frames = Curves(edit), effect.regions[index], (frame,)
+    path = f"{effect.path_from_id()}.regions[{index}]"
+    placement = _placement(curves, effect, strip, frames)
+    with translated():
+        return _region(curves, path, effect, region, 0, placement, frames).unmoved(frame)
+
+
+class translated:  # noqa: N801
+    """Context in which sentences of core are passed on in the user's language."""
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, _kind, error, _trace):
+        if isinstance(error, EffectError) and error.words:
+            words = error.words | ({"fault": rpt_(error.words["fault"])} if "fault" in error.words else {})
+            raise EffectError(rpt_(error.template).format(**words)) from None
+
+
+def check_counts(effect) -> None:
+    """EffectError: there are no shutters, or more of anything than an effect has."""
+    if not effect.shutters:
+        raise EffectError(rpt_('"{effect}" has no shutter').format(effect=effect.name))
+    for sentence, items, most in (
+        (rpt_("{place}: {count} shutters, {most} are the most"), effect.shutters, limits.MAX_SHUTTERS),
+        (rpt_("{place}: {count} regions, {most} are the most"), effect.regions, limits.MAX_REGIONS),
+    ):
+        if len(items) > most:
+            raise EffectError(sentence.format(place=validation.place(effect), count=len(items), most=most))
+
+
+def _tried(function, *arguments):
+    """The result, or the EffectError in its place, which is raised where the value is asked for."""
+    try:
+        return function(*arguments)
+    except EffectError as error:
+        return error
+
+
+def _channel(curves: Curves, owner, path: str, name: str, frames, change=lambda value: value) -> model.Channel:
+    """A float property or a vector, each value changed by a function."""
+
+    def at(frame):
+        return change(curves.value(owner, path, name, frame))
+
+    try:
+        keyed = curves.of(owner, path, name)
+    except EffectError as error:
+        return model.Constant(error)
+    if not keyed:
+        return model.Constant(_tried(at, 0.0))
+    return model.Samples({frame: _tried(at, frame) for frame in frames}, curves.keys(keyed))
+
+
+def _options(curves: Curves, path: str, effect, frames) -> model.Channel:
+    names = (*OPTIONS, "aggregate", "border", "stop_at_cuts")
+    found = {name: _tried(curves.find, f"{path}.{name}") for name in names}
+    if error := next((error for error in found.values() if isinstance(error, EffectError)), None):
+        return model.Constant(error)
+    if not any(found.values()):
+        return model.Constant(_tried(options_at, effect, found, 0.0))
+    return model.Samples({frame: _tried(options_at, effect, found, frame) for frame in frames})
+
+
+def options_at(effect, curves: dict, frame: float) -> Options:
+    """The effect's options in the recipe's words at a frame; curves: F-curves or None by name. EffectError: one that no
+    effect can have."""
+
+    def at(name):
+        curve = curves.get(name)
+        value = None if curve is None else curve.evaluate(frame)
+        if effect.bl_rna.properties[name].type == "ENUM":
+            return validation.word(effect, name, value)
+        return getattr(effect, name) if value is None else value >= 0.5
+
+    words = {name: at(name).lower() for name in OPTIONS}
+    return Options(
+        validation.number(effect, "window"),
+        **words,
+        aggregate=int(at("aggregate")),
+        border=at("border"),
+        stop_at_cuts=at("stop_at_cuts"),
+        step=inbetween_settings.factor(effect),
+    )
+
+
+def _shutter(curves: Curves, path: str, shutter, options: model.Channel, frames, thorough=False) -> model.Shutter:
+    bars = _tried(_bars, curves, path, shutter, options, frames, thorough)
+    if isinstance(bars, EffectError):
+        bars = model.Bars(model.Constant(bars))
+    return model.Shutter(shutter.name, tuple(shutter.color), bars)
+
+
+def _bars(curves: Curves, path: str, shutter, options: model.Channel, frames, thorough: bool) -> model.Bars:
+    """EffectError: they are not as many as the window is long."""
+    stored = np.array([bar.weight for bar in shutter.bars])
+    keyed = {i: curve for i in range(len(stored)) if (curve := curves.find(f"{path}.bars[{i}].weight"))}
+    chosen = {frame: state for frame in frames if isinstance(state := _tried(options.at, frame), Options)}
+    for window in {state.window for state in chosen.values()}:
+        check_bar_count(shutter, window)
+
+    def at(frame):
+        bars = stored.copy()
+        # No bar is below 0, a curve may be. In this order "not a number" stays what it is.
+        bars[list(keyed)] = [min(max(curve.evaluate(frame), 0.0), limits.MAX_BAR) for curve in keyed.values()]
+        validation.check(shutter.bars, "weight", bars)
+        return bars
+
+    if not keyed:
+        return model.Bars(model.Constant(_tried(at, 0.0) if len(stored) else stored))
+    keys = curves.keys(list(keyed.values()))
+    if not keys:  # curves of samples or of modifiers alone
+        return model.Bars(model.Samples({frame: _tried(at, frame) for frame in frames}))
+    return _keyed_bars(keys, list(keyed.values()), at, {f: chosen[f].interpolation for f in chosen}, thorough)
+
+
+def _keyed_bars(keys, curves: list, at, frames: dict[float, str], thorough: bool) -> model.Bars:
+    """Bars sampled where they are needed: at keys; between them the way that the curve has gone which changes most, or
+    the bars, where they are not displaced. frames: by frame the interpolation."""
+    numbers, values, shares, leaders = [frame for frame, _ in keys], {}, {}, {}
+
+    def sampled(frame):
+        if frame not in values:
+            values[frame] = _tried(at, frame)
+        return values[frame]
+
+    for frame, interpolation in frames.items():
+        before, after, _ = keyframes.span(numbers, frame)
+        ends = [sampled(numbers[index]) for index in (before, after)]
+        if before == after:
+            continue
+        displaced = interpolation != "value" and all(isinstance(bars, np.ndarray) and bars.any() for bars in ends)
+        if thorough or not displaced:
+            sampled(frame)
+        if thorough or displaced:
+            if before not in leaders:
+                leaders[before] = leading(curves, numbers[before], numbers[after])
+            shares[frame] = progress(*leaders[before], frame)
+    return model.Bars(model.Samples(values), keys, model.Samples(shares))
+
+
+def check_bar_count(shutter, window: int) -> None:
+    """EffectError: a shutter has not as many bars as the window is long."""
+    if len(shutter.bars) != window:
+        sentence = rpt_("{place}: {count} bars, the window is {window}")
+        raise EffectError(sentence.format(place=validation.place(shutter), count=len(shutter.bars), window=window))
+
+
+def _region(curves: Curves, path: str, effect, region, shutter: int, placement, frames) -> model.Region:
+    def channel(name, change=lambda value: value):
+        return _channel(curves, region, path, name, frames, change)
+
+    return model.Region(
+        region.name,
+        shutter,
+        model.Constant(_tried(lambda: validation.word(region, "kind").lower())),
+        channel("width"),
+        _drawings(curves, path, effect, region, placement, frames),
+        channel("location"),
+        channel("rotation", np.degrees),
+        channel("scale"),
+    )
+
+
+def _drawings(curves: Curves, path: str, effect, region, placement, frames) -> model.Drawings:
+    """A region's drawings: between two of them with the ease of its location's keys. Only those that the frames need
+    are read."""
+    width, height = annotations.picture_size(effect)
+    layer = annotations.layer_of(effect, region)
+    drawings = sorted(layer.frames, key=lambda drawing: drawing.frame_number) if layer else []
+    numbers = tuple(drawing.frame_number for drawing in drawings)
+    needed = {index for frame in frames for index in keyframes.span(numbers, frame)[:2]} if drawings else ()
+    timing = _tried(curves.find, f"{path}.location")
+    is_curve = timing is not None and not isinstance(timing, EffectError)
+    eases = dict(curves.keys([timing])) if is_curve and len(numbers) > 1 else {}
+    return model.Drawings(
+        numbers,
+        tuple(annotations.strokes_of(drawing) if i in needed else None for i, drawing in enumerate(drawings)),
+        tuple(eases.get(number, "linear") for number in numbers),
+        width / height,
+        placement,
+    )
+
+
+def _placement(curves: Curves, effect, strip, frames) -> model.Channel:
+    """The matrix from the sequencer's image to the strip's picture, which may be keyed."""
+    size, path = annotations.picture_size(effect), f"{strip.path_from_id()}.transform"
+    keyed = {name: curve for name in _MOVED if (curve := _tried(curves.find, f"{path}.{name}"))}
+
+    def at(frame):
+        moved = {name: curve.evaluate(frame) for name, curve in keyed.items() if not isinstance(curve, EffectError)}
+        return annotations.image_to_picture(strip, size, **moved)
+
+    if not keyed:
+        return model.Constant(_tried(at, 0.0))
+    return model.Samples({frame: _tried(at, frame) for frame in frames})
+
+
+class _Evaluated:
+    """Channel of a number that Blender evaluates: for sampling alone."""
+
+    def __init__(self, function):
+        self.at = function
+
+
+def _source_time(curves: Curves, path: str, effect, frames) -> model.Channel:
+    def value(frame):
+        return curves.value(effect, path, "source_time", frame)
+
+    keyed = _tried(curves.of, effect, path, "source_time")
+    if isinstance(keyed, EffectError):
+        return model.Constant(keyed)
+    keys = curves.keys(keyed)
+    time = model.SourceTime(_Evaluated(value), keys)
+    if not keyed:
+        return model.Constant(_tried(time.at, 0.0))
+    return model.Samples({frame: _tried(time.at, frame) for frame in frames}, keys)

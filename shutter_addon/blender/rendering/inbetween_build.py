@@ -1,0 +1,150 @@
+"""In-between frames of an effect: how far they are built, the build in a thread of its own, and their removal."""
+
+import threading
+import time
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import suppress
+from typing import NamedTuple
+
+from ...media import MediaError, inbetween_cache
+from ...media.inbetween import build, estimate
+from ..data import inbetween_settings, source_media, strips
+
+_FRESH = 1.0  # seconds that files are not asked again, as panels are drawn often
+_KEPT = 16
+
+
+class Look(NamedTuple):
+    """What a panel shows of an effect's in-between frames.
+
+    state: how far they are built
+    size: bytes that the source's take, of all factors and methods
+    estimate: bytes that they will take about; None while that is being found out, 0 if it cannot be"""
+
+    state: inbetween_cache.State
+    size: int
+    estimate: int | None
+
+
+_media: dict[tuple, tuple] = {}  # by source_media.media_key: the medium, its file not open; bytes for a factor of 2
+_looks: dict[tuple, tuple[float, inbetween_cache.State, int]] = {}  # when it was looked, and what was found
+_running: "Build | None" = None
+
+
+def look(edit, effect, strip) -> Look:
+    """How things are, or were a second ago. MediaError, EffectError: there is no source, or no place for frames."""
+    source = strips.source_of(edit, effect, strip)
+    settings = inbetween_settings.settings(effect)
+    medium, doubled = _known(source)
+    key = source_media.media_key(source), *settings
+    when, *found = _looks.get(key, (0.0,))
+    if not when or time.monotonic() - when > _FRESH:
+        found = inbetween_cache.state(medium, *settings), inbetween_cache.size(settings[0], medium)
+        _looks[key] = time.monotonic(), *found
+        _trim(_looks)
+    return Look(*found, doubled.result() * (settings[1] - 1) if doubled.done() else None)
+
+
+def _known(source) -> tuple:
+    """The source strip's medium, and a future of the bytes that its in-between frames take for a factor of 2."""
+    key = source_media.media_key(source)
+    if key not in _media:
+        medium = source_media.open_media(source)
+        medium.close()
+        _media[key] = medium, _in_thread(_estimated, medium)
+    _trim(_media)
+    return _media[key]
+
+
+def _trim(known: dict) -> None:
+    """Lets the oldest go."""
+    while len(known) > _KEPT:
+        del known[next(iter(known))]
+
+
+def _estimated(medium) -> int:
+    with medium, suppress(MediaError, OSError):  # a build says what is wrong
+        return estimate(medium, 2)
+    return 0
+
+
+def _in_thread(function, *arguments) -> Future:
+    pool = ThreadPoolExecutor(1, "Virtual Shutter")
+    future = pool.submit(function, *arguments)
+    pool.shutdown(wait=False)
+    return future
+
+
+class Build:
+    """In-between frames of an effect that are being built, by a thread that touches no bpy.
+
+    scene: session_uid of the effect's scene; done, total: pairs of neighbouring source frames
+    future: how far it came, an inbetween_cache.State; or MediaError"""
+
+    def __init__(self, edit, effect, strip):
+        """EffectError, MediaError: it cannot begin."""
+        settings, medium = (
+            inbetween_settings.settings(effect),
+            source_media.open_media(strips.source_of(edit, effect, strip)),
+        )
+        self.scene = effect.scene.session_uid
+        self.done, self.total = 0, medium.count - 1
+        self._stopped = threading.Event()
+        self.future = _in_thread(self._build, medium, *settings)
+
+    def _build(self, medium, *settings):
+        with medium:
+            return build(medium, *settings, update=self._update, cancelled=self._stopped.is_set)
+
+    def _update(self, done, _total):
+        self.done = done
+
+    def stop(self) -> None:
+        """Has it end soon; what is finished is kept."""
+        self._stopped.set()
+
+
+def running() -> Build | None:
+    """The build that runs: one at a time, as it uses the whole machine."""
+    return _running
+
+
+def start(edit, effect, strip) -> Build:
+    """Begins a build. EffectError, MediaError: it cannot begin."""
+    global _running
+    _running = Build(edit, effect, strip)
+    inbetween_settings.built.hold()
+    return _running
+
+
+def ended() -> None:
+    """What the build that has run to its end has built counts from now on."""
+    global _running
+    _running = None
+    inbetween_settings.built.release()
+    _looks.clear()
+
+
+def purge(effect, source) -> tuple[int, list[tuple]]:
+    """Removes the in-between frames of an effect's source strip, of every factor and method; the bytes that they took,
+    and the folders where other files stay, with their number. EffectError, MediaError, OSError: it cannot be done."""
+    folder, (medium, _) = inbetween_settings.folder(effect), _known(source)
+    left = []
+    freed = inbetween_cache.purge(folder, medium, lambda *place: left.append(place))
+    with suppress(OSError):  # other sources' are left there, or it never was
+        folder.rmdir()
+    _looks.clear()
+    return freed, left
+
+
+def stop() -> None:
+    """Ends the build that runs, if any, and forgets what is known: when a file is loaded, and when the extension
+    goes."""
+    if _running is not None:
+        _running.stop()
+        wait([_running.future])
+        ended()
+    wait([doubled for _medium, doubled in _media.values()])
+    _media.clear()
+    _looks.clear()
+    inbetween_cache.forget()

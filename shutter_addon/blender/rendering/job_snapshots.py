@@ -1,0 +1,110 @@
+"""The snapshots that pictures are made of.
+
+On Blender's main thread an effect is read when its picture is asked for. A job of the window renders on a thread of its
+own, while the editor goes on working: its effects are read on the main thread when it begins, at every frame of the
+film, and not again. What was not read then, as a strip that was pasted later, is read when it is asked for, and told to
+the main thread.
+"""
+
+import math
+from collections.abc import Callable
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ..data import requirements, snapshot, strips
+from ..data.snapshot import Snapshot
+from ..data.validation import EffectError
+from . import invalidation, render_job, session
+
+_taken: dict[int, Snapshot | Exception] = {}  # by effect scene: of the job that runs
+_left_out: list[tuple[range, str]] = []  # of its film, see requirements.left_out
+
+
+def begin(film: int) -> None:
+    """Reads all effects for a job, on the main thread; film: session_uid of the scene that it renders."""
+    _taken.clear()
+    for edit in bpy.data.scenes:
+        for effect, parts in _effects(edit):
+            try:
+                frames = _frames(edit, parts, edit.session_uid == film)
+                _taken[effect.scene.session_uid] = snapshot.take(edit, effect, parts[0], frames)
+            except session.FAULTS as error:
+                _taken[effect.scene.session_uid] = error
+    look(film)
+
+
+def end() -> None:
+    """Forgets what was read, after a job."""
+    _taken.clear()
+    _left_out.clear()
+
+
+def look(film: int) -> None:
+    """Looks on the main thread whether the sequencer leaves effects out of a film, by its session_uid: an editor may
+    delete a camera while it renders."""
+    scene = _scene(film)
+    _left_out[:] = requirements.left_out(scene) if scene else []
+
+
+def left_out(scene) -> str | None:
+    """Why the sequencer leaves an effect out of a film's current frame; None: it does not."""
+    found = _left_out if render_job.in_job() else requirements.left_out(scene)
+    return next((why for frames, why in found if scene.frame_current in frames), None)
+
+
+def of(scene, scene_frame: float, ended: Callable[[], bool] | None = None) -> tuple[Snapshot, float]:
+    """The snapshot of an effect scene, and the timeline frame of its edit at which it shows one of its own frames. One
+    of session.FAULTS: there is none. ended: whether nobody waits for it any longer."""
+    uid = scene.session_uid
+    if render_job.in_job():
+        found = _taken.get(uid)
+        if found is None or (isinstance(found, Snapshot) and found.timeline_frame(scene_frame) not in found.frames):
+            found = render_job.on_main_thread(lambda: _late(uid, scene_frame), ended)
+        if found is None:
+            raise session.StoppedError
+        if isinstance(found, Exception):
+            raise found
+        return found, found.timeline_frame(scene_frame)
+    edit, effect, strip = strips.find_edit(scene)
+    frame = strips.timeline_frame(strip, scene_frame)
+    if not bpy.app.background:
+        return invalidation.current(edit, effect, strip, frame), frame
+    frames = frame, frame + edit.frame_step
+    return snapshot.take(edit, effect, strip, frames, folder=session.settings().inbetween), frame
+
+
+def _late(uid: int, scene_frame: float) -> Snapshot | Exception:
+    if (scene := _scene(uid)) is None:
+        return EffectError(rpt_("the effect was deleted while it was rendered"))
+    try:
+        edit, effect, strip = strips.find_edit(scene)
+        return snapshot.take(edit, effect, strip, (strips.timeline_frame(strip, scene_frame),))
+    except session.FAULTS as error:
+        return error
+
+
+def _scene(uid: int):
+    return next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
+
+
+def _effects(edit):
+    """The edit's effects, each with the strips that show it."""
+    shown = strips.effect_strips(edit)
+    for effect in edit.virtual_shutter.effects:
+        if parts := [strip for strip in shown if strip.scene == effect.scene]:
+            yield effect, parts
+
+
+def _frames(edit, parts, is_film: bool) -> set[float]:
+    """The timeline frames at which the parts of an effect may be asked for: those of the film, or in another edit,
+    which strips show, all."""
+    first, last = edit.frame_start, edit.frame_end
+    found = set()
+    for strip in parts:
+        low, high = strip.left_handle, strip.right_handle
+        if is_film:
+            low, high = max(low, min(first, edit.frame_current)), min(high, max(last, edit.frame_current) + 1)
+        start = strips.timeline_frame(strip, 0)  # a strip may begin between frames
+        found |= {start + number for number in range(math.floor(low - start) - 1, math.ceil(high - start) + 2)}
+    return found

@@ -1,0 +1,206 @@
+"""An effect as a recipe, where its channels were sampled: the inverse of Recipe.effect.
+
+Numbers are float32 where they come from: a recipe gets the shortest decimals that give the same ones back, and points to
+a millionth of the picture. So a recipe's numbers come back as they were written, up to seven digits.
+Between two keys a recipe knows three eases. Where a channel does something else there is a key per frame: at every whole
+frame, recipe and effect agree within TOLERANCE.
+"""
+
+import math
+from dataclasses import asdict
+from decimal import Decimal
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+
+from . import keyframes, limits, recipe
+from .effect import Channel, Effect, Region, Samples
+
+# Of the largest bar, of fractions of the picture, of degrees; of the larger key's value where that is above 1.
+TOLERANCE = 1e-4
+
+
+def baked(effect: Effect, shown: range, inbetween_method: str) -> recipe.Recipe:
+    """The recipe of an effect that is shown at these frames, of which the first is the recipe's frame 1. Its channels are
+    sampled there, at their keys and at its drawings. EffectError: it cannot be rendered as it stands.
+
+    Left out are regions without strokes, drawings before the first that has strokes, and keys of widths and of options,
+    which are as at the first frame."""
+    options = effect.options.at(shown.start)
+    names = _different([shutter.name for shutter in effect.shutters])
+    regions = [_region(region, names[region.shutter], shown) for region in effect.regions]
+    found = recipe.Recipe(
+        1,
+        shutters=[_shutter(effect, i, name, options.interpolation, shown) for i, name in enumerate(names)],
+        regions=[region for region in regions if region],
+        inbetween=options.step,
+        inbetween_method=inbetween_method,
+        time=_time(effect.time, shown) if effect.time else [],
+        **{name: value for name, value in asdict(options).items() if name != "step"},
+    )
+    return recipe.parse(recipe.dump(found))
+
+
+def _different(names: list[str]) -> list[str]:
+    """The names, those that occur again with a number: regions mean the first."""
+    result = []
+    for name in names:
+        number = 1
+        while (new := _numbered(name, number)) in result:
+            number += 1
+        result.append(new)
+    return result
+
+
+def _numbered(name: str, number: int) -> str:
+    end = "" if number == 1 else f" {number}"
+    return name[: limits.MAX_NAME - len(end)] + end
+
+
+def _shutter(effect: Effect, index: int, name: str, interpolation: str, shown: range) -> recipe.Shutter:
+    shutter = effect.shutters[index]
+    color, sampled = tuple(_short(component) for component in shutter.color), shutter.bars
+
+    @cache
+    def bars(frame):
+        return effect.checked(index, frame, sampled.at(frame, interpolation))
+
+    if not isinstance(sampled.channel, Samples):
+        return recipe.Shutter(name, color, [_short(v) for v in bars(shown.start)])
+
+    def fits(first, second, frame, share):
+        ends = np.array([bars(first), bars(second)])
+        if interpolation == "value":  # every bar has an ease of its own
+            apart = np.abs(bars(frame) - keyframes.between_bars(*ends, share, "value")).max()
+        else:
+            apart = abs(sampled.share.at(frame) - share) * np.ptp(ends, axis=0).max()
+        return apart <= TOLERANCE * ends.max()
+
+    keys = _keys(fits, lambda *_: True, sampled.keys, [frame for frame, _ in sampled.keys], {}, shown)
+    return recipe.Shutter(
+        name,
+        color,
+        keys=[recipe.ShutterKey(_frame(frame, shown), [_short(v) for v in bars(frame)], ease) for frame, ease in keys],
+    )
+
+
+def _time(time: Channel, shown: range) -> list[recipe.TimeKey]:
+    def at(frame):
+        return time.at(frame)[0]
+
+    def fits(first, second, frame, share):
+        ends = np.array([at(first), at(second)])
+        apart = abs((1 - share) * ends[0] + share * ends[1] - at(frame))
+        return bool(apart <= max(TOLERANCE, 2e-6 * np.abs(ends).max()))  # of large numbers: float32 has no more digits
+
+    keys = [(shown.start, "linear")]
+    if isinstance(time, Samples):
+        frames = [frame for frame, _ in time.keys]
+        keys = _keys(fits, lambda frame, held: fits(held, held, frame, 0), time.keys, frames, {}, shown)
+    return [recipe.TimeKey(_frame(frame, shown), _short(at(frame)), ease) for frame, ease in keys]
+
+
+def _region(region: Region, shutter: str, shown: range) -> recipe.Region | None:
+    drawings = _drawings(region, shown.start)
+    if not drawings:
+        return None
+    moves = [channel for channel in (region.location, region.rotation, region.scale) if isinstance(channel, Samples)]
+    eases: dict[float, str] = {}
+    for channel in moves:
+        eases = dict(channel.keys) | eases
+    # The ease from a drawing to the next is its own.
+    words = dict(zip(region.drawings.frames, region.drawings.eases, strict=True)) if len(drawings) > 1 else {}
+    words = {number: words[number] for number in drawings if words}
+    frames = eases.keys() | words.keys()
+
+    @cache
+    def place(frame):
+        (x, y), rotation, scale = (channel.at(frame) for channel in (region.location, region.rotation, region.scale))
+        return np.array([x, y, rotation, scale])
+
+    if not frames and tuple(place(shown.start)) != (0, 0, 0, 1):
+        frames = {shown.start}
+
+    def fits(first, second, frame, share):
+        ends = np.array([place(first), place(second)])
+        apart = np.abs((1 - share) * ends[0] + share * ends[1] - place(frame))
+        return bool(np.all(apart <= TOLERANCE * np.maximum(1, np.abs(ends).max(axis=0))))
+
+    def still(frame, held):
+        return fits(held, held, frame, 0)
+
+    keys = _keys(fits, still, eases, sorted(frames), words, shown) if frames or moves else []
+    first = min(drawings)
+    redrawn = {number: strokes for number, strokes in drawings.items() if words and number != keys[0][0]}
+    return recipe.Region(
+        shutter,
+        region.name,
+        region.kind.at(shown.start),
+        _short(region.width.at(shown.start)),
+        drawings[first],
+        [_region_key(frame, place(frame), redrawn.get(frame), ease, shown) for frame, ease in keys],
+    )
+
+
+def _region_key(frame: float, place, strokes, ease: str, shown: range) -> recipe.RegionKey:
+    x, y, rotation, scale = place
+    return recipe.RegionKey(
+        _frame(frame, shown), (_short(x), _short(y)), _short_degrees(rotation), _short(scale), strokes, ease
+    )
+
+
+def _drawings(region: Region, frame: float) -> dict[int, list]:
+    """A region's strokes by the frames they were drawn at, from the first that has any, as they lie at a frame."""
+    result = {}
+    for index, number in enumerate(region.drawings.frames):
+        strokes = region.drawing(index, frame)
+        if strokes or result:
+            result[number] = [[tuple(point) for point in np.round(points, 6).tolist()] for points in strokes]
+    return result
+
+
+def _keys(fits, still, keys, frames: list, words: dict, shown: range) -> list[tuple[float, str]]:
+    """Frames and eases of the keys that give the effect at every whole frame of the strip.
+
+    fits: whether at a frame a share is right between two keys; still: whether a frame shows what another does;
+    keys: those of the channels; frames: where there has to be a key; words: the ease that a key has to have."""
+    if not frames:
+        return [(frame, "linear") for frame in shown]
+
+    def baked(outside, held):
+        return [] if all(still(frame, held) for frame in outside) else [(frame, "linear") for frame in outside]
+
+    eases = dict(keys)
+    keys = baked([frame for frame in shown if frame < frames[0]], frames[0])
+    for first, second in pairwise(frames):
+        # Keys may lie a million frames outside.
+        between = range(max(math.floor(first) + 1, shown.start), min(math.ceil(second), shown.stop))
+        shares = {frame: (frame - first) / (second - first) for frame in between}
+        candidates = [words[first]] if first in words else [eases.get(first, "linear"), *keyframes.EASES]
+        for word in candidates:
+            if all(fits(first, second, frame, keyframes.eased(share, word)) for frame, share in shares.items()):
+                keys.append((first, word))
+                break
+        else:
+            keys += [(first, candidates[0]), *((frame, "linear") for frame in shares)]
+    last = frames[-1]
+    keys.append((last, words.get(last) or eases.get(last, "linear")))
+    return keys + baked([frame for frame in shown if frame > last], last)
+
+
+def _short(value: float) -> float:
+    """The shortest decimal that is the same float32."""
+    return float(str(np.float32(value)))
+
+
+def _short_degrees(degrees: float) -> float:
+    """The shortest decimal that is the same float32 in radians."""
+    wanted = np.float32(math.radians(degrees))
+    numbers = (float(f"{degrees:.{digits}g}") for digits in range(1, 17))
+    return next((number for number in numbers if np.float32(np.radians(number)) == wanted), degrees)
+
+
+def _frame(frame: float, shown: range) -> float:
+    """A frame as the recipe counts; in decimals, where 31.1 less 30 is 1.1."""
+    return float(Decimal(str(np.float32(frame))) - (shown.start - 1))
