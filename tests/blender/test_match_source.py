@@ -296,9 +296,25 @@ def test_a_cut_source_is_matched_as_a_whole_or_part_by_part(bpy, edit, made):
     assert [(s.left_handle, s.right_handle) for s in (strip, right)] == [(1, 16), (26, 41)]
 
 
+DRAWN_TWICE = SCRIBBLED | {
+    "regions": [SCRIBBLED["regions"][0] | {"keys": [{"frame": f, "strokes": TRIANGLE} for f in (1, 31)]}]
+}
+
+
+def test_scribbles_stay_on_the_picture_of_their_own_frame(bpy, edit, made):
+    _strip, source = made(DRAWN_TWICE)
+    before = np.array(strokes(edit.virtual_shutter.effects[0]))
+    for frame, offset in ((1, -4), (31, 8)):
+        source.transform.offset_x = offset
+        source.transform.keyframe_insert("offset_x", frame=frame)
+    edit.frame_set(12)
+    match(bpy)
+    moved = np.array(strokes(edit.virtual_shutter.effects[0])) - before
+    assert moved == pytest.approx(np.array([[-4, 0, 0]] * 3 + [[8, 0, 0]] * 3), abs=1e-4)
+
+
 def test_scribbles_stay_on_the_part_that_they_were_drawn_on(bpy, edit, made):
-    keyed = SCRIBBLED["regions"][0] | {"keys": [{"frame": 1, "strokes": TRIANGLE}, {"frame": 31, "strokes": TRIANGLE}]}
-    strip, source = made(SCRIBBLED | {"regions": [keyed]})
+    strip, source = made(DRAWN_TWICE)
     effect = edit.virtual_shutter.effects[0]
     disconnect(bpy, edit, source)
     strip.split(21, "SOFT")

@@ -216,23 +216,30 @@ def _selected(edit, chosen):
 
 @contextmanager
 def _scribbles_kept(effect):
-    """Has scribbles stay on the effect's picture while it is laid elsewhere: every drawing on that of the part that
-    shows its frame, or the nearest to it."""
-    found = [part for part, _source in parts(effect)]
-    before, ranges = [_place(effect, part) for part in found], [_range(part) for part in found]
-    yield
-    after = [_place(effect, part) for part in found]
+    """Has scribbles stay on the effect's picture while it is laid elsewhere: every drawing at its own frame, on the
+    part that shows it, or the nearest to it."""
     layers = {region.layer: annotations.layer_of(effect, region) for region in effect.regions}
-    for drawing in (drawing for layer in layers.values() if layer for drawing in layer.frames):
-        frame = drawing.frame_number
-        apart = [max(left - frame, frame - right + 1, 0) for left, right in ranges]
-        old, new = (places[apart.index(min(apart))] for places in (before, after))
+    drawings = [drawing for layer in layers.values() if layer for drawing in layer.frames]
+    found = [part for part, _source in parts(effect)]
+    shown = [min(found, key=lambda part: _apart(part, drawing.frame_number)) for drawing in drawings]
+    before = [_place(effect, part, drawing.frame_number) for part, drawing in zip(shown, drawings, strict=True)]
+    yield
+    for part, drawing, old in zip(shown, drawings, before, strict=True):
+        new = _place(effect, part, drawing.frame_number)
         if geometry.is_invertible(old) and geometry.is_invertible(new) and not np.array_equal(old, new):
             _move(drawing, new @ np.linalg.inv(old))
 
 
-def _place(effect, part) -> np.ndarray:
-    return geometry.picture_to_image(part, annotations.picture_size(effect))
+def _apart(strip, frame: int) -> int:
+    return max(strip.left_handle - frame, frame - strip.right_handle + 1, 0)
+
+
+def _place(effect, part, frame: int) -> np.ndarray:
+    """Where a part's picture lies on the image at a frame, as geometry.picture_to_image has it."""
+    path = f"{part.path_from_id()}.transform."
+    curves = [curve for curve in fcurves.curves_under(effect.id_data, path) if not (curve.mute or curve.is_empty)]
+    moved = {curve.data_path.removeprefix(path): curve.evaluate(frame) for curve in curves}
+    return geometry.picture_to_image(part, annotations.picture_size(effect), **moved)
 
 
 def _move(drawing, change: np.ndarray) -> None:
