@@ -76,6 +76,7 @@ def _prepare(film: int, in_job: bool) -> None:
     if bpy.app.background:  # in a window the last update has seen to it
         lifecycle.mend()
         copies.adopt()
+        lifecycle.follow_sources()
     for edit in bpy.data.scenes:
         invalidation.invalidate_changed(edit)
     if in_job:

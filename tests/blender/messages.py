@@ -9,10 +9,10 @@ import pytest
 from _bl_i18n_utils import bl_extract_messages, settings
 
 from shutter_addon import blender
-from shutter_addon.blender.interface import translations
+from shutter_addon.blender.data.properties import CONTEXT
 from shutter_addon.core import presets, shutters
 
-SOURCES = sorted(Path(blender.__file__).parent.glob("*.py"))
+SOURCES = sorted(Path(blender.__file__).parent.rglob("*.py"))
 
 
 def of_classes() -> set:
@@ -25,7 +25,7 @@ def of_presets() -> set:
     return {
         (context, words)
         for label, description, *_ in presets.PRESETS.values()
-        for context, words in ((translations.CONTEXT, label), ("*", description))
+        for context, words in ((CONTEXT, label), ("*", description))
     }
 
 

@@ -355,6 +355,10 @@ NO_REGION = "The shutter has no region: draw one"
 NO_LAYER = "The preview shows no annotation layer that is not a region yet"
 LINKED = "The edit is linked from another file"
 ANY_EFFECT = ("shutter_add", "recipe_import", "recipe_export")  # need nothing in it
+ALIKE = {
+    "match_source": "The Shutter strip is like its source",
+    "copy_modifiers": "The Shutter strip has the modifiers of its source",
+}
 REGION_NEEDED = dict.fromkeys(("erase", "region_assign", "region_remove", "region_move", "region_key"), NO_REGION)
 
 
@@ -408,8 +412,8 @@ SITUATIONS = {
     color: (SELECT, {"add_effect": NO_SOURCE}),
     plain: (SELECT, {"add_effect": None}),
     linked: (LINKED, {}),
-    no_shutter: (NO_SHUTTER, {"add_effect": NO_SOURCE, **dict.fromkeys(ANY_EFFECT), **REGION_NEEDED}),
-    no_region: (None, {"add_effect": NO_SOURCE, "region_take": NO_LAYER, **REGION_NEEDED}),
+    no_shutter: (NO_SHUTTER, {"add_effect": NO_SOURCE, **dict.fromkeys(ANY_EFFECT), **ALIKE, **REGION_NEEDED}),
+    no_region: (None, {"add_effect": NO_SOURCE, "region_take": NO_LAYER, **ALIKE, **REGION_NEEDED}),
 }
 
 

@@ -60,7 +60,7 @@ def test_texts_are_in_blenders_style(bpy):
     for context, message in messages.of_classes() | messages.of_presets():
         assert not message.endswith("."), message
         assert message[0] == message[0].upper(), message
-        if context in {"Operator", messages.translations.CONTEXT}:
+        if context in {"Operator", messages.CONTEXT}:
             words = message.split()
             assert all(word[0] == word[0].upper() or word in {"to", "from"} for word in words), message
 

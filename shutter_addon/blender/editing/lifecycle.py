@@ -5,8 +5,8 @@ import uuid
 import bpy
 
 from ..data import fcurves, requirements, strips
-from ..rendering import invalidation, session
-from . import copies, undelete
+from ..rendering import invalidation, render_job, session
+from . import copies, match_source, undelete
 from .add_effect import add_camera
 
 EFFECTS = "virtual_shutter.effects"
@@ -32,6 +32,8 @@ def update(updated=None) -> None:
     _follow_layers(edits)
     _remove_scenes(updated)
     _identify()
+    if not render_job.runs():  # a film keeps its size
+        follow_sources()
     for edit in _edits():
         invalidation.invalidate_changed(edit)
 
@@ -52,9 +54,16 @@ def _mend(strip) -> None:
         add_camera(strip.scene)
 
 
+def follow_sources() -> None:
+    """What of an effect can only be as its source and its edit have it, is so."""
+    for edit in _edits():
+        match_source.follow(edit)
+
+
 def forget() -> None:
-    """Forgets what the annotations of a file were, before another one is loaded."""
+    """Forgets what the annotations and the media of a file were, before another one is loaded."""
     _layer_names.clear()
+    match_source.forget()
 
 
 def _edits() -> list:

@@ -11,7 +11,7 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 from ...core import presets, recipe
 from ..data import annotations, consistency, recipe_export, recipe_import, selection, strips, validation
 from ..data.properties import CONTEXT, KINDS
-from ..editing import add_effect, bar_edits, collection_edits, region_edits, shutter_edits
+from ..editing import add_effect, bar_edits, collection_edits, match_source, region_edits, shutter_edits
 from ..rendering.session import FAULTS
 from . import icons, preview_areas
 
@@ -113,6 +113,39 @@ class SHUTTER_OT_add_effect(Operator):
             show_panel(context)
         redraw(context)
         return {"FINISHED"}
+
+
+class SHUTTER_OT_match_source(_OfEffect, Operator):
+    """Give the Shutter strip transform, crop, flip, color and range of its source (scribbles stay on the picture)"""
+
+    bl_idname = "shutter.match_source"
+    bl_label = "Match Source"
+
+    @classmethod
+    def possible(cls, effect):
+        if not match_source.parts(effect):
+            return refused(cls, rpt_("The Shutter strip has no source any more"))
+        return bool(match_source.differences(effect)) or refused(cls, rpt_("The Shutter strip is like its source"))
+
+    def change(self, _context, effect):
+        for strip, neighbor in match_source.match(effect):
+            sentence = rpt_('"{neighbor}" is in the way: "{strip}" has not the whole range of its source')
+            self.report({"WARNING"}, sentence.format(neighbor=neighbor.name, strip=strip.name))
+
+
+class SHUTTER_OT_copy_modifiers(_OfEffect, Operator):
+    """Copy the modifiers of the source to the Shutter strip, which shows the source's file as it is"""
+
+    bl_idname = "shutter.copy_modifiers"
+    bl_label = "Copy Modifiers"
+
+    @classmethod
+    def possible(cls, effect):
+        lacks = any(match_source.missing_modifiers(*pair) for pair in match_source.parts(effect))
+        return lacks or refused(cls, rpt_("The Shutter strip has the modifiers of its source"))
+
+    def change(self, _context, effect):
+        match_source.copy_modifiers(effect)
 
 
 def show_panel(context) -> None:
@@ -503,6 +536,8 @@ class SHUTTER_OT_recipe_export(_OfEffect, ExportHelper, Operator):
 
 classes = (
     SHUTTER_OT_add_effect,
+    SHUTTER_OT_match_source,
+    SHUTTER_OT_copy_modifiers,
     SHUTTER_OT_shutter_add,
     SHUTTER_OT_shutter_duplicate,
     SHUTTER_OT_shutter_remove,

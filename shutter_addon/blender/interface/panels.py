@@ -7,7 +7,7 @@ from bpy.types import Menu, Panel, UIList
 
 from ...media import cuts
 from ..data import annotations, selection, strips, validation
-from ..editing import bar_edits
+from ..editing import bar_edits, match_source
 from ..rendering import inbetween_build
 from ..rendering.session import FAULTS
 from . import inbetween_operators
@@ -91,6 +91,7 @@ class _Shutters:
             return
         effect = found[1]
         _draw_live(layout, context)
+        _draw_source(layout, effect)
         row = layout.row()
         row.template_list("SHUTTER_UL_shutters", "", effect, "shutters", effect, "active_shutter", rows=4)
         _list_buttons(row, "shutter", "SHUTTER_MT_shutters")
@@ -122,6 +123,25 @@ def _draw_live(layout, context):
     view = row.row(align=True)
     view.active = live.live
     view.prop(live, "view", text="")
+
+
+def _draw_source(layout, effect):
+    """What the effect does not have from its source, and the way to it."""
+    if words := match_source.differences(effect):
+        what = ", ".join(iface_(word) for word in words)
+        column = layout.column(align=True)
+        text = iface_("Differs from its source: {what}").format(what=what)
+        column.label(text=text, icon="INFO", translate=False)
+        column.operator("shutter.match_source")
+    found = match_source.parts(effect)
+    if any(match_source.missing_modifiers(part, source) for part, source in found):
+        column = layout.column(align=True)
+        column.label(text="Modifiers of the source do not reach the effect", icon="INFO")
+        column.operator("shutter.copy_modifiers")
+    if any(match_source.effects_on(effect.id_data, source) for _part, source in found):
+        column = layout.column(align=True)
+        column.label(text="Effect strips on the source do not reach the effect", icon="INFO")
+        column.label(text="Make the Shutter strip their input", icon="BLANK1")
 
 
 class _WithEffect:

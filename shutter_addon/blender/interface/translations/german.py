@@ -125,6 +125,40 @@ MESSAGES = {
         "*",
         'strip "{strip}": undistorted or stabilized clips are not supported',
     ): "Streifen „{strip}“: entzerrte oder stabilisierte Clips werden nicht unterstützt",
+    # The effect and its source
+    ("Operator", "Match Source"): "An Quelle angleichen",
+    (
+        "*",
+        "Give the Shutter strip transform, crop, flip, color and range of its source (scribbles stay on the picture)",
+    ): "Dem Verschlussstreifen Transformation, Beschnitt, Spiegelung, Farbe und Bereich seiner Quelle geben "
+    "(Markierungen bleiben auf dem Bild)",
+    ("*", "Differs from its source: {what}"): "Weicht von der Quelle ab: {what}",
+    ("*", "transform"): "Transformation",
+    ("*", "crop"): "Beschnitt",
+    ("*", "flip"): "Spiegelung",
+    ("*", "color"): "Farbe",
+    ("*", "range"): "Bereich",
+    ("*", "The Shutter strip is like its source"): "Der Verschlussstreifen ist wie seine Quelle",
+    ("*", "The Shutter strip has no source any more"): "Der Verschlussstreifen hat keine Quelle mehr",
+    (
+        "*",
+        '"{neighbor}" is in the way: "{strip}" has not the whole range of its source',
+    ): "„{neighbor}“ ist im Weg: „{strip}“ hat nicht den ganzen Bereich seiner Quelle",
+    ("Operator", "Copy Modifiers"): "Modifikatoren kopieren",
+    (
+        "*",
+        "Copy the modifiers of the source to the Shutter strip, which shows the source's file as it is",
+    ): "Die Modifikatoren der Quelle auf den Verschlussstreifen kopieren, der die Datei der Quelle zeigt, wie sie ist",
+    ("*", "Modifiers of the source do not reach the effect"): "Modifikatoren der Quelle erreichen den Effekt nicht",
+    (
+        "*",
+        "The Shutter strip has the modifiers of its source",
+    ): "Der Verschlussstreifen hat die Modifikatoren seiner Quelle",
+    (
+        "*",
+        "Effect strips on the source do not reach the effect",
+    ): "Effektstreifen auf der Quelle erreichen den Effekt nicht",
+    ("*", "Make the Shutter strip their input"): "Den Verschlussstreifen zu ihrer Eingabe machen",
     # Shutters
     ("Operator", "Add Shutter"): "Verschluss hinzufügen",
     ("*", "Add a shutter that is fully open"): "Einen Verschluss hinzufügen, der ganz offen ist",

@@ -1,0 +1,483 @@
+"""An effect goes along with its source, by itself or by Match Source: a still shutter shows what the source shows."""
+
+import json
+
+import av
+import numpy as np
+import pytest
+from support import recipe, sequencer
+
+from shutter_addon.blender.data import annotations, fcurves, geometry, selection
+from shutter_addon.blender.editing import lifecycle, match_source
+from shutter_addon.core import recipe as recipes
+
+LEVELS = 1
+STILL = recipe(4, [1, 0, 0, 0])
+TRIANGLE = [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]
+SCRIBBLED = recipe(
+    4,
+    [1, 0, 0, 0],
+    [0, 0, 0, 1],
+    regions=[{"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": TRIANGLE}],
+)
+
+
+@pytest.fixture(autouse=True)
+def _no_exception(capfd):
+    """Blender prints what a handler raises, and goes on."""
+    yield
+    assert "Traceback" not in capfd.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def movie(tmp_path_factory):
+    return make_movie(tmp_path_factory.mktemp("movie") / "small.mkv", 32, 24)
+
+
+@pytest.fixture(scope="module")
+def large_movie(tmp_path_factory):
+    """The same number of frames, larger and of another aspect."""
+    return make_movie(tmp_path_factory.mktemp("movie") / "large.mkv", 40, 40)
+
+
+def make_movie(path, width, height, count=40):
+    """Frames that differ, each of four coloured quarters; 24 fps."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("ffv1", rate=24)
+        stream.width, stream.height, stream.pix_fmt = width, height, "bgr0"
+        for i in range(count):
+            picture = np.full((height, width, 3), 4 * i + 40, dtype=np.uint8)
+            picture[: height // 2, : width // 2, 0] = 255
+            picture[height // 2 :, : width // 2, 1] = 255
+            picture[height // 2 :, width // 2 :, 2] = 250 - 4 * i
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        container.mux(stream.encode())
+    return path
+
+
+@pytest.fixture
+def made(bpy, edit, movie):
+    """A movie strip from frame 1 to 40 with a still effect, or that of a recipe; effect strip and source."""
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import add_effect
+
+    edit.render.resolution_x, edit.render.resolution_y = 48, 48
+    edit.frame_start, edit.frame_end = -100, 300
+
+    def make(data=STILL):
+        source = edit.sequence_editor.strips.new_movie("movie", str(movie), 1, 1)
+        strip, effect = add_effect.add_effect(edit, source)
+        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
+        selection.choose(edit, strip)
+        bpy.context.view_layer.update()
+        return strip, source
+
+    return make
+
+
+@pytest.fixture
+def shown(edit, render):
+    """The pictures of a strip when the other ones are muted: {frame: (H, W, 4)}."""
+
+    def pictures(strip, frames):
+        muted = [(other, other.mute) for other in edit.sequence_editor.strips]
+        for other, _ in muted:
+            other.mute = other != strip
+        result = render(edit, frames)
+        for other, mute in muted:
+            other.mute = mute
+        return result
+
+    return pictures
+
+
+def match(bpy):
+    """As a button does it, with its step of undo."""
+    assert bpy.ops.shutter.match_source("EXEC_DEFAULT", True) == {"FINISHED"}
+    bpy.context.view_layer.update()
+
+
+def words():
+    import bpy
+
+    return match_source.differences(bpy.context.scene.virtual_shutter.effects[0])
+
+
+def apart(some, others) -> float:
+    return max(np.abs(some[frame] - others[frame]).max() for frame in some)
+
+
+def transform(source):
+    source.transform.scale_x, source.transform.scale_y = 0.75, 1.5
+    source.transform.offset_x, source.transform.rotation = 5, 0.4
+    source.transform.origin = 0.25, 0.75
+    source.transform.filter = (
+        "NEAREST"  # others mix colours, of a movie as they are encoded, of a scene in linear light
+    )
+
+
+def crop(source):
+    source.crop.min_x, source.crop.max_y = 6, 4
+
+
+def flip(source):
+    source.use_flip_x = True
+
+
+def color(source):
+    source.color_multiply, source.color_saturation = 0.5, 0.5
+
+
+def slow_down(source):
+    source.retiming_keys.add(timeline_frame=1)
+    source.retiming_keys[-1].timeline_frame = 81
+
+
+def lengthen(source):
+    source.left_handle, source.right_handle = -4, 51
+
+
+def trim(source):
+    source.left_handle, source.right_handle = 11, 31
+
+
+CHANGES = {
+    transform: ["transform"],
+    crop: ["crop"],
+    flip: ["flip"],
+    color: ["color"],
+    slow_down: ["range"],
+    lengthen: ["range"],
+    trim: ["range"],
+}
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=lambda change: change.__name__)
+def test_matched_it_shows_what_its_source_shows(bpy, edit, made, shown, change):
+    strip, source = made()
+    assert words() == []
+    change(source)
+    assert words() == CHANGES[change]
+    frames = range(min(source.left_handle, 1), max(source.right_handle, 41))  # in order: see test_strips.check
+    plain = shown(source, frames)
+    assert apart(shown(strip, frames), plain) > 20
+    match(bpy)
+    assert words() == []
+    assert apart(shown(strip, frames), plain) <= LEVELS
+
+
+def test_undone_in_one_step(bpy, made):
+    _strip, source = made(SCRIBBLED)
+    transform(source), lengthen(source)
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="before")
+    before = state(bpy)
+    match(bpy)
+    after = state(bpy)
+    assert after != before
+    bpy.ops.ed.undo()
+    assert state(bpy) == before
+    bpy.ops.ed.redo()
+    assert state(bpy) == after
+
+
+def state(bpy):
+    edit = bpy.context.scene
+    effect = edit.virtual_shutter.effects[0]
+    (strip, _source), *_ = match_source.parts(effect)
+    return match_source.differences(effect), strip.left_handle, strip.right_handle, strokes(effect)
+
+
+def strokes(effect) -> list:
+    layer = annotations.layer_of(effect, effect.regions[0])
+    return [tuple(point.co) for drawing in layer.frames for stroke in drawing.strokes for point in stroke.points]
+
+
+def test_refused_where_nothing_differs(bpy, edit, made):
+    _strip, source = made()
+    with pytest.raises(RuntimeError, match="The Shutter strip is like its source"):
+        bpy.ops.shutter.match_source()
+    edit.sequence_editor.strips.remove(source)
+    with pytest.raises(RuntimeError, match="The Shutter strip has no source any more"):
+        bpy.ops.shutter.match_source()
+
+
+@pytest.mark.parametrize("change", [transform, flip])
+def test_scribbles_stay_on_the_picture(bpy, edit, made, change):
+    strip, source = made(SCRIBBLED)
+    effect = edit.virtual_shutter.effects[0]
+    before = strokes(effect)
+    change(source)
+    match(bpy)
+    assert strokes(effect) != before
+    assert on_picture(effect, strip) == pytest.approx(np.array(TRIANGLE[0]), abs=1e-5)
+
+
+def on_picture(effect, strip) -> np.ndarray:
+    """The strokes' points, as fractions of the strip's picture."""
+    to_image = geometry.picture_to_image(strip, annotations.picture_size(effect))
+    return geometry.mapped(np.linalg.inv(to_image), np.array(strokes(effect))[:, :2])
+
+
+def test_keys_of_the_transform_are_copied(bpy, edit, made, shown):
+    strip, source = made()
+    strip.transform.keyframe_insert("rotation", frame=1)
+    for frame, offset in ((1, -10), (21, 10)):
+        source.transform.offset_x = offset
+        source.transform.keyframe_insert("offset_x", frame=frame)
+    assert words() == ["transform"]
+    match(bpy)
+    assert words() == []
+    plain = shown(source, [1, 11, 21])
+    assert apart(plain, {1: plain[1], 11: plain[1], 21: plain[1]}) > 20
+    assert apart(shown(strip, [1, 11, 21]), plain) <= LEVELS
+    assert not fcurves.curves_under(edit, f"{strip.path_from_id()}.transform.rotation")
+    fcurves.curves_under(edit, f"{source.path_from_id()}.")[0].keyframe_points[1].co[1] = 11
+    assert words() == ["transform"]
+
+
+def test_a_source_that_was_moved_alone_takes_keys_along(bpy, edit, made, shown):
+    keyed = recipe(4, {1: [1, 0, 0, 0], 2: [1, 0, 0, 0], 31: [0, 0, 0, 1]})
+    strip, source = made(keyed)
+    before = shown(strip, [5, 25])
+    source.content_start -= 50
+    match(bpy)
+    after = shown(strip, [-45, -25])
+    assert (strip.left_handle, strip.right_handle) == (-49, -9)
+    assert np.array_equal(after[-45], before[5])
+    assert np.array_equal(after[-25], before[25])
+
+
+def test_never_over_a_neighbor(bpy, edit, made, capfd):
+    strip, source = made()
+    neighbor = edit.sequence_editor.strips.new_effect("Title", "TEXT", strip.channel, 45, length=10)
+    source.left_handle, source.right_handle = -4, 61
+    match(bpy)
+    assert (strip.left_handle, strip.right_handle) == (-4, 45)
+    assert (neighbor.left_handle, neighbor.right_handle) == (45, 55)
+    assert '"Title" is in the way: "Shutter" has not the whole range of its source' in capfd.readouterr().out
+    assert words() == []
+
+
+def disconnect(bpy, edit, strip):
+    """Blender cuts connected strips together."""
+    for other in edit.sequence_editor.strips:
+        other.select = other == strip
+    with bpy.context.temp_override(sequencer_scene=edit):
+        bpy.ops.sequencer.disconnect()
+
+
+def test_parts_of_a_cut_effect_match_their_own_part(bpy, edit, made, shown, capfd):
+    strip, source = made()
+    disconnect(bpy, edit, source)
+    right = strip.split(21, "SOFT")
+    assert words() == []
+    lengthen(source), transform(source)
+    frames = [-4, 5, 25, 50]
+    plain = shown(source, frames)
+    match(bpy)
+    assert [(s.left_handle, s.right_handle) for s in (strip, right)] == [(-4, 21), (21, 51)]
+    assert "in the way" not in capfd.readouterr().out
+    assert apart(shown(strip, frames[:2]), {f: plain[f] for f in frames[:2]}) <= LEVELS
+    assert apart(shown(right, frames[2:]), {f: plain[f] for f in frames[2:]}) <= LEVELS
+    assert len(edit.virtual_shutter.effects) == 1
+
+
+def test_a_cut_source_is_matched_as_a_whole_or_part_by_part(bpy, edit, made):
+    strip, source = made()
+    disconnect(bpy, edit, source)
+    end = source.split(21, "HARD")
+    assert words() == []
+    right = strip.split(21, "SOFT")
+    assert words() == []
+    source.right_handle, end.left_handle = 16, 26
+    assert words() == ["range"]
+    match(bpy)
+    assert [(s.left_handle, s.right_handle) for s in (strip, right)] == [(1, 16), (26, 41)]
+
+
+DRAWN_TWICE = SCRIBBLED | {
+    "regions": [SCRIBBLED["regions"][0] | {"keys": [{"frame": f, "strokes": TRIANGLE} for f in (1, 31)]}]
+}
+
+
+def test_scribbles_stay_on_the_picture_of_their_own_frame(bpy, edit, made):
+    _strip, source = made(DRAWN_TWICE)
+    before = np.array(strokes(edit.virtual_shutter.effects[0]))
+    for frame, offset in ((1, -4), (31, 8)):
+        source.transform.offset_x = offset
+        source.transform.keyframe_insert("offset_x", frame=frame)
+    edit.frame_set(12)
+    match(bpy)
+    moved = np.array(strokes(edit.virtual_shutter.effects[0])) - before
+    assert moved == pytest.approx(np.array([[-4, 0, 0]] * 3 + [[8, 0, 0]] * 3), abs=1e-4)
+
+
+def test_scribbles_stay_on_the_part_that_they_were_drawn_on(bpy, edit, made):
+    strip, source = made(DRAWN_TWICE)
+    effect = edit.virtual_shutter.effects[0]
+    disconnect(bpy, edit, source)
+    strip.split(21, "SOFT")
+    source.split(21, "SOFT").transform.offset_x = 8
+    before = np.array(strokes(effect))
+    match(bpy)
+    moved = np.array(strokes(effect)) - before
+    assert moved == pytest.approx(np.array([[0, 0, 0]] * 3 + [[8, 0, 0]] * 3), abs=1e-4)
+
+
+@pytest.mark.parametrize("scribbled", [False, True])
+def test_a_larger_file_of_another_aspect_is_followed_by_itself(bpy, edit, made, shown, large_movie, scribbled):
+    strip, source = made(SCRIBBLED if scribbled else STILL)
+    effect = edit.virtual_shutter.effects[0]
+    source.filepath = str(large_movie)
+    bpy.context.view_layer.update()
+    assert annotations.picture_size(effect) == (40, 40)
+    assert words() == []
+    if scribbled:
+        assert on_picture(effect, strip) == pytest.approx(np.array(TRIANGLE[0]), abs=1e-5)
+        before = strokes(effect)
+        bpy.context.view_layer.update()
+        assert strokes(effect) == before
+    else:
+        assert apart(shown(strip, [1, 20, 40]), shown(source, [1, 20, 40])) <= LEVELS
+
+
+def test_undo_takes_size_and_scribbles_along(bpy, edit, made, large_movie):
+    _strip, source = made(SCRIBBLED)
+    bpy.ops.ed.undo_push(message="before")
+    before = strokes(edit.virtual_shutter.effects[0])
+    source.filepath = str(large_movie)
+    bpy.ops.ed.undo_push(message="replaced, before it is followed")
+    bpy.context.view_layer.update()
+    after = strokes(edit.virtual_shutter.effects[0])
+    for operator, size, expected in ((bpy.ops.ed.undo, (32, 24), before), (bpy.ops.ed.redo, (40, 40), after)):
+        operator()
+        bpy.context.view_layer.update()
+        effect = bpy.context.scene.virtual_shutter.effects[0]
+        assert annotations.picture_size(effect) == size
+        assert np.array(strokes(effect)) == pytest.approx(np.array(expected), abs=1e-4)
+
+
+def test_a_render_without_a_window_follows_a_file_that_was_replaced(edit, made, render, large_movie):
+    from shutter_addon.blender import handlers
+
+    strip, source = made()
+    updates = handlers.bpy.app.handlers.depsgraph_update_post
+    updates.remove(handlers.HANDLERS["depsgraph_update_post"])
+    source.filepath, source.mute = str(large_movie), True
+    picture = render(edit, [5])[5]
+    updates.append(handlers.HANDLERS["depsgraph_update_post"])
+    assert (picture[24, :, 3] > 0).sum() == 40
+    assert strip.scene.render.resolution_y == 40
+
+
+def test_a_film_keeps_its_size(bpy, edit, made, large_movie, monkeypatch):
+    from shutter_addon.blender.rendering import render_job
+
+    _strip, source = made()
+    monkeypatch.setattr(render_job, "runs", lambda: True)
+    source.filepath = str(large_movie)
+    bpy.context.view_layer.update()
+    assert annotations.picture_size(edit.virtual_shutter.effects[0]) == (32, 24)
+    monkeypatch.undo()
+    lifecycle.update()
+    assert annotations.picture_size(edit.virtual_shutter.effects[0]) == (40, 40)
+
+
+def test_headers_are_read_once_and_never_for_a_panel(bpy, made, monkeypatch):
+    made()
+    monkeypatch.setattr(match_source.source_media, "open_media", lambda _strip: pytest.fail("a file was opened"))
+    bpy.context.view_layer.update()
+    match_source.follow(bpy.context.scene)
+    match_source.forget()
+    assert words() == []
+
+
+def test_a_missing_file_leaves_the_size(bpy, edit, made, tmp_path):
+    _strip, source = made()
+    source.filepath = str(tmp_path / "gone.mkv")
+    bpy.context.view_layer.update()
+    assert annotations.picture_size(edit.virtual_shutter.effects[0]) == (32, 24)
+
+
+def test_another_rate_of_the_edit(bpy, edit, made, shown):
+    strip, source = made()
+    edit.render.fps, edit.render.fps_base = 30, 1.001
+    bpy.context.view_layer.update()
+    assert (strip.scene.render.fps, strip.scene.render.fps_base) == (edit.render.fps, edit.render.fps_base)
+    assert words() == []
+    assert apart(shown(strip, [1, 20, 40]), shown(source, [1, 20, 40])) <= LEVELS
+
+
+def test_another_rate_of_the_edit_where_the_source_keeps_its_speed(bpy, edit, movie, shown):
+    """Blender makes the source longer."""
+    from shutter_addon.blender.editing import add_effect, shutter_edits
+
+    edit.render.resolution_x = edit.render.resolution_y = 48
+    with sequencer(bpy):
+        bpy.ops.sequencer.movie_strip_add(
+            filepath=str(movie), frame_start=1, channel=1, sound=False, adjust_playback_rate=True, use_framerate=False
+        )
+    (source,) = edit.sequence_editor.strips
+    source.transform.filter = "NEAREST"
+    strip, effect = add_effect.add_effect(edit, source)
+    shutter_edits.start(effect)
+    for i, bar in enumerate(effect.shutters[0].bars):
+        bar.weight = float(i == 0)
+    selection.choose(edit, strip)
+    edit.render.fps = 48
+    bpy.context.view_layer.update()
+    assert source.right_handle == 81
+    assert words() == ["range"]
+    match(bpy)
+    frames = range(1, 81)
+    assert apart(shown(strip, frames), shown(source, frames)) <= LEVELS
+
+
+def test_another_size_of_the_edit(bpy, edit, made, shown):
+    """Blender scales no strip: picture and scribbles stay about the image's centre."""
+    strip, _source = made(SCRIBBLED)
+    effect = edit.virtual_shutter.effects[0]
+    before, drawn = shown(strip, [5])[5], strokes(effect)
+    edit.render.resolution_x, edit.render.resolution_y = 96, 64
+    bpy.context.view_layer.update()
+    assert words() == []
+    assert strokes(effect) == drawn
+    after = shown(strip, [5])[5]
+    assert after.shape[:2] == (64, 96)
+    assert np.abs(after[8:56, 24:72] - before).max() <= LEVELS
+
+
+def test_modifiers_of_the_source_are_copied_where_they_lack(bpy, edit, made, shown):
+    strip, source = made()
+    effect = edit.virtual_shutter.effects[0]
+    with pytest.raises(RuntimeError, match="The Shutter strip has the modifiers of its source"):
+        bpy.ops.shutter.copy_modifiers()
+    strip.modifiers.new("Own", "BRIGHT_CONTRAST")
+    source.modifiers.new("Same", "BRIGHT_CONTRAST").bright = 5
+    source.modifiers.new("Off", "MASK").mute = True
+    balance = source.modifiers.new("Own", "COLOR_BALANCE")
+    for frame, factor in ((1, 0.3), (31, 1.0)):
+        balance.color_multiply = factor
+        balance.keyframe_insert("color_multiply", frame=frame)
+    assert [m.name for m in match_source.missing_modifiers(strip, source)] == ["Own"]
+    assert bpy.ops.shutter.copy_modifiers("EXEC_DEFAULT", True) == {"FINISHED"}
+    assert [m.type for m in strip.modifiers] == ["BRIGHT_CONTRAST", "COLOR_BALANCE"]
+    assert match_source.missing_modifiers(strip, source) == []
+    assert edit.sequence_editor.active_strip == strip
+    source.modifiers["Same"].bright = 0
+    frames = [1, 16, 31]
+    plain = shown(source, frames)
+    assert apart(shown(strip, frames), plain) <= LEVELS
+    strip.modifiers[1].mute = True
+    assert apart(shown(strip, frames), plain) > 20
+    assert effect == edit.virtual_shutter.effects[0]
+
+
+def test_effects_on_the_source_are_found(edit, made):
+    strip, source = made()
+    assert match_source.effects_on(edit, source) == []
+    speed = edit.sequence_editor.strips.new_effect("Speed", "SPEED", 5, 1, input1=source)
+    assert match_source.effects_on(edit, source) == [speed]
+    speed.input_1 = strip
+    assert match_source.effects_on(edit, source) == []
