@@ -100,7 +100,8 @@ def _parser() -> argparse.ArgumentParser:
         "--cache",
         type=_place,
         metavar="DIR",
-        help=f'where in-between frames lie (default: "{inbetween_settings.FOLDER}" beside the output, or beside FILE.blend)',
+        help="where in-between frames lie"
+        f' (default: "{inbetween_settings.FOLDER}" beside the output, or beside FILE.blend)',
     )
     build = commands.add_parser("inbetween", help="build a source's in-between frames")
     build.add_argument("source", type=_place, help="a movie, or the first file of an image sequence")

@@ -1,9 +1,9 @@
 """An effect as a recipe, where its channels were sampled: the inverse of Recipe.effect.
 
-Numbers are float32 where they come from: a recipe gets the shortest decimals that give the same ones back, and points to
-a millionth of the picture. So a recipe's numbers come back as they were written, up to seven digits.
-Between two keys a recipe knows three eases. Where a channel does something else there is a key per frame: at every whole
-frame, recipe and effect agree within TOLERANCE.
+Numbers are float32 where they come from: a recipe gets the shortest decimals that give the same ones back, and points
+to a millionth of the picture. So a recipe's numbers come back as they were written, up to seven digits.
+Between two keys a recipe knows three eases. Where a channel does something else there is a key per frame: at every
+whole frame, recipe and effect agree within TOLERANCE.
 """
 
 import math
@@ -22,8 +22,8 @@ TOLERANCE = 1e-4
 
 
 def baked(effect: Effect, shown: range, inbetween_method: str) -> recipe.Recipe:
-    """The recipe of an effect that is shown at these frames, of which the first is the recipe's frame 1. Its channels are
-    sampled there, at their keys and at its drawings. EffectError: it cannot be rendered as it stands.
+    """The recipe of an effect that is shown at these frames, of which the first is the recipe's frame 1. Its channels
+    are sampled there, at their keys and at its drawings. EffectError: it cannot be rendered as it stands.
 
     Left out are regions without strokes, drawings before the first that has strokes, and keys of widths and of options,
     which are as at the first frame."""

@@ -67,8 +67,8 @@ class Keys:
 
 @dataclass(frozen=True)
 class Samples:
-    """Values at frames where they were sampled, and nowhere else: an EffectError among them is raised where the value is
-    asked for.
+    """Values at frames where they were sampled, and nowhere else. An EffectError among them is raised where the value
+    is asked for.
 
     keys: frames and eases of the keys of the curve that was sampled, ascending; none where it is no curve of keys."""
 
@@ -84,7 +84,8 @@ class Samples:
 class SourceTime:
     """Channel of (source frame, whether it runs backward from there), made of a channel of numbers.
 
-    Where time stands still it runs as it came to the last of its `keys`, unless it stood still before; a jump is no way.
+    Where time stands still it runs as it came to the last of its `keys`, unless it stood still before. A jump is no
+    way.
     """
 
     numbers: Channel
@@ -116,8 +117,8 @@ class Bars:
     share: Channel | None = None
 
     def at(self, frame: float, interpolation: str) -> np.ndarray:
-        """Between keys by displacement (paper §3.4.1 over time), or by `channel`: where interpolation is "value", and on
-        the way to and from a closed shutter, which is no displacement."""
+        """Between keys by displacement (paper §3.4.1, over time), or by `channel`: where interpolation is "value", and
+        on the way to and from a closed shutter, which is no displacement."""
         if not self.keys:
             return self.channel.at(frame)
         frames = [key for key, _ in self.keys]
@@ -229,8 +230,8 @@ class Effect:
     shutters: the first is the default
     regions: later ones lie over earlier ones
     options: channel of frame_state.Options
-    time: channel of (source frame, whether it runs backward), the source's first frame is 1; None: the strip's own timing
-    tells what is shown"""
+    time: channel of (source frame, whether it runs backward), the source's first frame is 1; None: the strip's own
+    timing tells what is shown"""
 
     shutters: tuple[Shutter, ...]
     regions: tuple[Region, ...]

@@ -1,4 +1,4 @@
-"""Which source frame a strip of Blender's sequencer shows at a timeline frame: trimmed, retimed, reversed, with strobe."""
+"""Which source frame a strip of Blender's sequencer shows at a timeline frame: trimmed, retimed, reversed, strobed."""
 
 import math
 from bisect import bisect_left

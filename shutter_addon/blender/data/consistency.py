@@ -1,4 +1,4 @@
-"""What has to change along with a property of an effect: bars with the window, regions with names, scribbles with colors."""
+"""What changes along with a property of an effect: bars with the window, regions with names, scribbles with colors."""
 
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_

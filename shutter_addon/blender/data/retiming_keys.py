@@ -1,4 +1,4 @@
-"""How a source strip lies on the timeline, its retiming keys included, which Blender's Python API gives in part alone."""
+"""How a source strip lies on the timeline, with its retiming keys, of which Blender's Python API gives a part."""
 
 import ctypes
 

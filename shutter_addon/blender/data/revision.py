@@ -1,7 +1,7 @@
 """A number that grows with every change that Blender tells of, and what is worked out once for each.
 
 Blender tells of properties (their update callbacks), of what its depsgraph sees (keys, strips), of undo and of files.
-It tells nobody of strokes and of files on disk: every preview looks for them when it is drawn (rendering/invalidation.py).
+It tells nobody of strokes and of files on disk: previews look for them when they are drawn (rendering/invalidation.py).
 """
 
 from collections.abc import Callable, Hashable

@@ -5,6 +5,7 @@ change when the edit does. Channels are sampled at the frames that are asked for
 Blender itself. Drivers, NLA strips and further layers of an action do not count (docs/manual.md).
 """
 
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -65,15 +66,15 @@ class Snapshot:
 
 
 class SourceFiles(NamedTuple):
-    """What a source strip reads, as source_media.media_key has it, and the stamp of the in-between frames made of it."""
+    """What a source strip reads (source_media.media_key), and the stamp of the in-between frames made of it."""
 
     key: tuple
     built: tuple
 
 
 def source_files(effect, source, folder: Path | None = None) -> SourceFiles:
-    """Looks at the files of an effect's source strip. folder: where in-between frames lie, in place of the effect's own.
-    EffectError: they lie nowhere. MediaError: there are no files."""
+    """Looks at the files of an effect's source strip. folder: where in-between frames lie, in place of the effect's
+    own. EffectError: they lie nowhere. MediaError: there are no files."""
     key, built = source_media.media_key(source), ()
     if inbetween_settings.factor(effect) > 1:
         settings = inbetween_settings.settings(effect, folder)
@@ -143,16 +144,18 @@ def strokes_at(edit, effect, strip, index: int, frame: float) -> list[np.ndarray
         return _region(curves, path, effect, region, 0, placement, frames).unmoved(frame)
 
 
-class translated:
+@contextmanager
+def translated():
     """Context in which sentences of core are passed on in the user's language."""
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, _kind, error, _trace):
-        if isinstance(error, EffectError) and error.words:
-            words = error.words | ({"fault": rpt_(error.words["fault"])} if "fault" in error.words else {})
-            raise EffectError(rpt_(error.template).format(**words)) from None
+    try:
+        yield
+    except EffectError as error:
+        if not error.words:
+            raise
+        words = dict(error.words)
+        if fault := words.get("fault"):
+            words["fault"] = rpt_(fault)
+        raise EffectError(rpt_(error.template).format(**words)) from None
 
 
 def check_counts(effect) -> None:

@@ -54,7 +54,7 @@ def look_again() -> None:
 
 
 def rest(resting: bool) -> None:
-    """Has the files between a sequence's first and last not asked meanwhile, but by look_again: while a film renders."""
+    """While a film renders, the files between a sequence's first and last are asked after look_again alone."""
     global _resting
     _resting = resting
 

@@ -96,8 +96,8 @@ def invalidate_changed(edit) -> bool:
 
 
 def _signature(edit, effect, strip, looked: dict):
-    """All that the effect's pictures depend on, but for properties with an update callback. looked: gets what the source
-    reads, by the effect's scene."""
+    """All that the effect's pictures depend on, but for properties with an update callback. looked: gets what the
+    source reads, by the effect's scene."""
     for shutter in effect.shutters:
         yield shutter.name, len(shutter.bars)
     for region in effect.regions:

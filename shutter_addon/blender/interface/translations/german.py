@@ -56,6 +56,7 @@ MESSAGES = {
     ("*", '"{effect}" has no shutter'): "„{effect}“ hat keinen Verschluss",
     ("*", 'scene "{scene}" belongs to no Shutter strip'): "Szene „{scene}“ gehört zu keinem Verschlussstreifen",
     ("*", 'the source strip of "{strip}" was deleted'): "der Quellstreifen von „{strip}“ wurde gelöscht",
+    ("*", "the effect was deleted while it was rendered"): "der Effekt wurde gelöscht, während er gerendert wurde",
     ("*", 'the scene of "{strip}" was deleted'): "die Szene von „{strip}“ wurde gelöscht",
     ("*", 'the scene of "{strip}" has no camera'): "die Szene von „{strip}“ hat keine Kamera",
     ("*", 'the setting "{setting}" leaves "{strip}" out'): "die Einstellung „{setting}“ lässt „{strip}“ weg",
@@ -93,12 +94,12 @@ MESSAGES = {
     ("*", "An effect has {most} regions at most"): "Ein Effekt hat höchstens {most} Regionen",
     (
         "*",
-        "{place}: more than {most} points with those before it",
-    ): "{place}: mehr als {most} Punkte mit denen davor",
+        'region "{name}": more than {most} points with those before it',
+    ): "Region „{name}“: mehr als {most} Punkte mit denen davor",
     (
         "*",
-        "{place}: a point of its strokes is nowhere near the picture",
-    ): "{place}: ein Punkt ihrer Striche liegt weit weg vom Bild",
+        'region "{name}": a point of its strokes is nowhere near the picture',
+    ): "Region „{name}“: ein Punkt ihrer Striche liegt weit weg vom Bild",
     (
         "*",
         'strip "{strip}": a number of its transform is not finite',
