@@ -1,6 +1,7 @@
 """The layers: core, media and compute never import bpy, and core needs no GL and no media libraries."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -37,8 +38,26 @@ def test_no_leak(layer):
             assert not any(name.startswith(f"{f}.") for f in FORBIDDEN[layer] if f.startswith("."))
 
 
+# The rooms of blender/, and which others each may use. Beside them are the command and the handlers, which use all.
+ROOMS = {
+    "data": set(),
+    "rendering": {"data"},
+    "editing": {"data", "rendering"},
+    "interface": {"data", "rendering", "editing"},
+}
+
+
+def test_rooms_use_those_below_them_alone():
+    folders = {path.name for path in (PACKAGE / "blender").iterdir() if path.is_dir() and path.name != "__pycache__"}
+    assert folders == ROOMS.keys()
+    for room, below in ROOMS.items():
+        for path in (PACKAGE / "blender" / room).glob("*.py"):
+            used = {name.split(".")[2] for name in imported(path) if re.match(r"\.\.\w", name)}
+            assert used <= below, f"{room}/{path.name} uses {used - below}"
+
+
 def test_no_two_modules_have_the_same_name():
-    names = [path.stem for layer in FORBIDDEN for path in (PACKAGE / layer).rglob("*.py") if path.stem != "__init__"]
+    names = [path.stem for path in PACKAGE.rglob("*.py") if path.stem != "__init__"]
     assert sorted({name for name in names if names.count(name) > 1}) == []
 
 
