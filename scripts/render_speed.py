@@ -30,7 +30,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from shutter_addon import blender
-from shutter_addon.blender.data import effects, strips
+from shutter_addon.blender.data import snapshot, strips
 from shutter_addon.blender.editing import new_edit
 from shutter_addon.blender.rendering import film_output, session
 from shutter_addon.blender.rendering.engine import VirtualShutterEngine
@@ -125,11 +125,9 @@ def _composed(edit, source, indices) -> dict[int, np.ndarray]:
     """What the effect shows of source frames, in levels; composed by NumPy."""
     strip = strips.effect_strips(edit)[0]
     effect = strips.effect_of(edit, strip.scene)
+    shown = snapshot.read(edit, effect, strip, [index + 1 for index in indices])
     renderer = Renderer(CPUCompositor(), ShotSource(source))
-    return {
-        index: 255 * light.to_encoded(renderer.picture(index, effects.instant(edit, effect, strip, index + 1)))[..., :3]
-        for index in indices
-    }
+    return {index: 255 * light.to_encoded(renderer.picture(index, shown.at(index + 1)))[..., :3] for index in indices}
 
 
 def measure(args) -> list[dict]:

@@ -230,7 +230,7 @@ class _Layout:
 
 def _draw(bpy):
     """What panels and lists do when they are drawn."""
-    from shutter_addon.blender.data import effects, selection
+    from shutter_addon.blender.data import selection, validation
     from shutter_addon.blender.editing import bar_edits
     from shutter_addon.blender.interface import panels
 
@@ -241,7 +241,7 @@ def _draw(bpy):
         effect = found[1]
         for i, shutter in enumerate(effect.shutters):
             panels.SHUTTER_UL_shutters.draw_item(None, None, _Layout(), effect, shutter, 0, effect, "", i)
-            with trial.only(effects.EffectError):
+            with trial.only(validation.EffectError):
                 bar_edits.bars_now(effect, i)
         for region in effect.regions:
             panels.SHUTTER_UL_regions.draw_item(None, None, _Layout(), effect, region, 0, effect, "", 0)
@@ -249,12 +249,12 @@ def _draw(bpy):
 
 
 def _export(bpy):
-    from shutter_addon.blender.data import effects, recipe_export, selection
+    from shutter_addon.blender.data import recipe_export, selection, validation
     from shutter_addon.core.recipe import RecipeError
     from shutter_addon.media import MediaError
 
     if found := selection.active(bpy.context):
-        with trial.only(effects.EffectError, RecipeError, MediaError):
+        with trial.only(validation.EffectError, RecipeError, MediaError):
             recipe_export.recipe_of(*found)
 
 
