@@ -131,12 +131,17 @@ class Work(RuleBasedStateMachine):
         self.history[self.now + 1 :] = [snapshot(self.bpy)]
         self.now += 1
 
+    def update_edits(self):
+        """As a window does after undo, again and again: of a depsgraph that is new the first update tells nobody."""
+        for edit in edits(self.bpy):
+            edit.view_layers[0].update()
+
     @precondition(lambda self: self.now > 0)
     @rule()
     def undo(self):
         self.bpy.ops.ed.undo()
         self.now -= 1
-        self.bpy.context.view_layer.update()
+        self.update_edits()
         assert snapshot(self.bpy) == self.history[self.now]
 
     @precondition(lambda self: self.now + 1 < len(self.history))
@@ -144,7 +149,7 @@ class Work(RuleBasedStateMachine):
     def redo(self):
         self.bpy.ops.ed.redo()
         self.now += 1
-        self.bpy.context.view_layer.update()
+        self.update_edits()
         assert snapshot(self.bpy) == self.history[self.now]
 
     # Work
