@@ -1,5 +1,7 @@
-"""What was removed last, kept in memory: a strip that is cut and pasted gets its effect back, in another file as well,
-as Blender's clipboard outlives the one it was cut from."""
+"""Removed effects, kept in memory so that a strip which is cut and pasted gets its effect back.
+
+Blender's clipboard holds a Scene strip without its scene, and outlives the file that the strip was cut from.
+"""
 
 from ..data import fcurves, property_copy
 from . import add_effect
@@ -9,7 +11,7 @@ _effects: dict = {}
 
 
 def keep(edit, effect) -> None:
-    """Keeps all that belongs to an effect, by its scene's identity."""
+    """Keeps an effect that is about to be removed, under its scene's identity: properties, F-curves, annotations."""
     scene, path = effect.scene, effect.path_from_id()
     if scene is None or not scene.virtual_shutter.identity:
         return
@@ -33,7 +35,7 @@ def forget() -> None:
 
 
 def restore(edit, identity: str):
-    """Makes a kept effect again in an edit; its scene, or None when nothing was kept."""
+    """Makes a kept effect again in an edit. Returns its scene, or None where none was kept under this identity."""
     if (data := _effects.get(identity)) is None:
         return None
     scene = add_effect.new_scene(edit, *data["scene"])
