@@ -68,8 +68,8 @@ def source_frame(strip: StripTiming, frame: float, medium) -> int:
         return nearest(first + float(position(frame)), medium)
     if strip.is_clip:  # Blender takes the whole part
         return first + int(position(frame))
-    # Blender rounds a position to the nearest frame, but caches the result by the position's whole part. So a slow strip
-    # that plays forward shows, for all positions with one whole part, the frame nearest to the first of them.
+    # Blender rounds a position to the nearest frame, but caches the result by the position's whole part. So a slow
+    # strip that plays forward shows, for all positions with one whole part, the frame nearest to the first of them.
     whole = int(position(frame))
     earlier = range(1, max(math.floor(frame - strip.left_handle), 0) + 1)
     frame -= bisect_left(earlier, True, key=lambda back: int(position(frame - back)) != whole)

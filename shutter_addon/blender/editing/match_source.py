@@ -15,7 +15,7 @@ import numpy as np
 from bpy.app.translations import pgettext_n as n_
 
 from ...media import MediaError
-from ..data import annotations, fcurves, geometry, source_media, strips
+from ..data import annotations, fcurves, geometry, revision, source_media, strips
 from . import add_effect
 
 # What a strip looks like: what it is called, and the names of the strip's properties and groups.
@@ -27,6 +27,7 @@ _LOOK = {
 }
 _RANGE = n_("range")
 _KEPT = 256
+_differences = revision.UntilChange()
 _sizes: dict[tuple, tuple[int, int] | None] = {}  # of media, by their keys: their headers are read once
 
 
@@ -80,6 +81,11 @@ def parts(effect) -> list[tuple]:
     own = [strip for strip in strips.effect_strips(edit) if strip.scene == effect.scene]
     pairs = [(strip, strips.nearest_source(edit, effect, strip)) for strip in own]
     return [(strip, source) for strip, source in pairs if source is not None]
+
+
+def differences_shown(effect) -> list[str]:
+    """As differences, for what is drawn: worked out once until something changes."""
+    return _differences.get(effect.scene.session_uid, lambda: differences(effect))
 
 
 def differences(effect) -> list[str]:

@@ -125,7 +125,9 @@ class SHUTTER_OT_match_source(_OfEffect, Operator):
     def possible(cls, effect):
         if not match_source.parts(effect):
             return refused(cls, rpt_("The Shutter strip has no source any more"))
-        return bool(match_source.differences(effect)) or refused(cls, rpt_("The Shutter strip is like its source"))
+        if not match_source.differences_shown(effect):
+            return refused(cls, rpt_("The Shutter strip is like its source"))
+        return True
 
     def change(self, _context, effect):
         for strip, neighbor in match_source.match(effect):

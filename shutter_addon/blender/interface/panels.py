@@ -127,7 +127,7 @@ def _draw_live(layout, context):
 
 def _draw_source(layout, effect):
     """What the effect does not have from its source, and the way to it."""
-    if words := match_source.differences(effect):
+    if words := match_source.differences_shown(effect):
         what = ", ".join(iface_(word) for word in words)
         column = layout.column(align=True)
         text = iface_("Differs from its source: {what}").format(what=what)

@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Gizmo, GizmoGroup
 
 from ...core import scribbles
-from ..data import annotations, geometry, selection, snapshot, validation
+from ..data import annotations, geometry, revision, selection, snapshot, validation
 from ..editing import bar_edits, region_edits
 from . import drawing, keymaps
 
@@ -35,6 +35,16 @@ class Place:
         return geometry.mapped(np.linalg.inv(self.to_region), np.array([point], dtype=np.float64))[0]
 
 
+_strokes = revision.UntilChange()
+
+
+def _strokes_now(edit, effect, strip) -> list[np.ndarray]:
+    """The active region's strokes, not moved yet: read once until something changes."""
+    index, frame = effect.active_region, edit.frame_current_final
+    key = effect.scene.session_uid, index, frame
+    return _strokes.get(key, lambda: snapshot.strokes_at(edit, effect, strip, index, frame))
+
+
 def place(context) -> Place | None:
     """The place of the active region's handles, or None where there is no region, or nothing of it is drawn."""
     found = selection.active(context)
@@ -43,7 +53,7 @@ def place(context) -> Place | None:
         return None
     edit, effect, strip = found
     try:
-        strokes = snapshot.strokes_at(edit, effect, strip, effect.active_region, edit.frame_current_final)
+        strokes = _strokes_now(edit, effect, strip)
         validation.check_region(region)
     except validation.EffectError:  # panels and the live preview tell it
         return None
