@@ -6,9 +6,9 @@ parts of themselves and to the mirrored film, in long shots and short ones, at t
 
     .venv/bin/python scripts/cut_quality.py [--rounds 10] [--seed 0]
 
-With --seed 1: in 800 clips without a cut 6 are found, where the camera jumps by a twentieth of the width in every frame
-(1) or does so and lacks frames (2), and where a large object leaves (1) or jumps (2). Of 250 cuts 1 is missed; besides,
-18 of 40 around shots of 1 and 2 frames, 1 of 20 in animation on twos and threes, and 10 of 20 between pans.
+With --seed 1: in 800 clips without a cut 2 are found, where a large object jumps. Of 250 cuts none is missed; besides,
+12 of 40 around shots of 1 and 2 frames. With --seed 1 to 4 together 8 are found in 3200 clips (in pans that lack frames
+2, hand-held 2, objects 3, a shake 1), and 1 of 1000 cuts is missed.
 """
 
 import argparse

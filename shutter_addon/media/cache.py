@@ -24,7 +24,7 @@ from .files import check_name
 from .folder import Folder
 from .written import is_whole_picture, why_short
 
-VERSION = 2  # raise it when the same frames give other in-betweens, or the folder changes: what there is gets stale
+VERSION = 3  # raise it when the same frames give other in-betweens, or the folder changes: what there is gets stale
 MANIFEST, CHECKS = "manifest.json", "checks"
 MAKER = "Virtual Shutter: in-between frames"
 SAMPLES = {"uint8": "uint8", "uint16": "uint16", "float16": "half", "float32": "float"}

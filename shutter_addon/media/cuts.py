@@ -14,14 +14,16 @@ from .errors import MediaError
 NEIGHBOURS = 9
 # What is back after so many frames, or was there so many before, was a flash, or something that passed.
 PASSING = 3
-# The share of bits by which hashes of pictures differ that have nothing in common, PySceneDetect's own; and from
-# which on a picture is not the one from before a flash that has moved on.
-APART, BACK = 0.395, 0.35
-# PySceneDetect's own: neighbours on each side whose mean change a cut must exceed, and by how much.
-WINDOW, RATIO = 2, 3.0
-# Levels of 255 by which a cut changes brightness, its own for pictures that are GREY on average; darker ones need less,
-# in proportion, but for noise. A title that appears changes about 5.
-CHANGE, GREY, NOISE = 15.0, 90.0, 2.0
+# The bits of a hash in each direction, and the share of all that differs at a cut. The fewer, the coarser is what they
+# stand for: of 64, a jump of the camera by a twentieth of the picture mostly changes less than 0.3, of PySceneDetect's
+# 256 as many as a cut.
+BITS, APART = 8, 0.3
+# Neighbours on each side whose mean change a cut must exceed, PySceneDetect's own, and by how much: a little less than
+# its own 3, for cuts between pans and around short shots.
+WINDOW, RATIO = 2, 2.8
+# Levels of 255 by which a cut changes brightness, ContentDetector's own for pictures that are GREY on average; darker
+# ones need less, in proportion, but for noise. A title that appears changes about 5, a large object that jumps 25.
+CHANGE, GREY, NOISE = 27.0, 90.0, 2.0
 # The frames on each side that have a say in whether a frame repeats the one before: films animated on threes, or with a
 # 3:2 pulldown, move twice in so many.
 BESIDE = 4
@@ -74,25 +76,23 @@ def is_cut(before: list[Signature], after: list[Signature]) -> bool:
     There is one where PySceneDetect's HashDetector finds that the pictures have nothing in common, its ContentDetector
     that brightness changes, and its AdaptiveDetector that it changes by far more than between neighbours. The first two
     are asked as well about what comes a little later or came a little earlier: what passes is no cut. Not found are
-    cuts between much the same pictures, into the midst of fast motion, and many of those to shots of one or two
-    frames; taken for one is what changes most of a still picture at once, and stays."""
+    cuts between much the same pictures, and some of those to shots of one or two frames; taken for one is what changes
+    most of a still picture at once, and stays, and a jump of the camera by a tenth of the picture."""
     if not may_be_cut(before[-1], after[0]):
         return False
     passing = [(earlier, after[0]) for earlier in before[-PASSING - 1 : -1]]
     passing += [(before[-1], later) for later in after[1 : PASSING + 1]]
-    if not all(may_be_cut(*pair, BACK) for pair in passing):
-        return False
-    return _stands_out(_moving(before[::-1]), _moving(after))
+    return all(may_be_cut(*pair) for pair in passing) and _stands_out(_moving(before[::-1]), _moving(after))
 
 
-def may_be_cut(before: Signature, after: Signature, apart: float = APART) -> bool:
-    """Whether `is_cut` can be true of these two neighbours, as far as they alone tell. apart: how far their hashes must
-    be from each other."""
+def may_be_cut(before: Signature, after: Signature) -> bool:
+    """Whether `is_cut` can be true of these two neighbours, as far as they alone tell."""
     from scenedetect.detectors import ContentDetector, HashDetector
 
     threshold = max(CHANGE * min(max(before.mean(), after.mean()) / GREY, 1.0), NOISE)
     differs = ContentDetector(threshold, min_scene_len=0, luma_only=True)
-    return _finds(differs, [before, after], 1) and _finds(HashDetector(apart, min_scene_len=0), [before, after], 1)
+    unlike = HashDetector(APART, BITS, min_scene_len=0)
+    return _finds(differs, [before, after], 1) and _finds(unlike, [before, after], 1)
 
 
 def _stands_out(before: list[Signature], after: list[Signature]) -> bool:
