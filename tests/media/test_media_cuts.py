@@ -93,19 +93,27 @@ def test_pans_are_no_cuts(pace):
 
 @pytest.mark.parametrize("first", [0, 20, 60, 100])
 def test_a_camera_that_jumps_is_no_cut(film, first):
-    """By a twentieth of the picture, as where a frame was dropped from a pan."""
-    for pace in (2, 4):
-        lefts = pace * np.arange(20) + 16 * (np.arange(20) >= 10)
+    """By a twentieth of the picture, as where a frame was dropped from a pan, to a fifth."""
+    for pace, jump in ((2, 16), (4, 16), (2, 32), (4, 32), (0, 50)):
+        lefts = pace * np.arange(20) + jump * (np.arange(20) >= 10)
         right = 320 - lefts[-1]
         assert cuts(np.stack([frame[:, x : x + right] for frame, x in zip(film[first:], lefts, strict=False)])) == []
 
 
-def test_a_large_object_that_jumps_is_no_cut(film):
+@pytest.mark.parametrize(("top", "width", "jump"), [(72, 128, 64), (36, 128, 96), (36, 160, 64), (54, 180, 80)])
+def test_a_large_object_that_jumps_is_no_cut(film, top, width, jump):
     frames = film[:20].copy()
     for k, frame in enumerate(frames):
-        left = 32 + 3 * k + 64 * (k >= 10)
-        frame[72:, left : left + 128] = film[66, 36:144, 100:228]
+        left = 10 + 2 * k + jump * (k >= 10)
+        frame[top:, left : left + width] = film[66, : 180 - top, 100 : 100 + width]
     assert cuts(frames) == []
+
+
+@pytest.mark.parametrize("black", [np.s_[:, :22], np.s_[:, :, :40], np.s_[:, :90, :160]])
+def test_cuts_between_pictures_that_are_black_in_part(film, black):
+    frames = np.concatenate([film[:10], film[60:70, :, ::-1]])
+    frames[black] = 0
+    assert cuts(frames) == [10]
 
 
 @pytest.mark.parametrize("length", [1, 2, 3])
