@@ -6,9 +6,11 @@ parts of themselves and to the mirrored film, in long shots and short ones, at t
 
     .venv/bin/python scripts/cut_quality.py [--rounds 10] [--seed 0]
 
-With --seed 1: in 800 clips without a cut 6 are found, where the camera jumps by a twentieth of the width in every frame
-(1) or does so and lacks frames (2), and where a large object leaves (1) or jumps (2). Of 250 cuts 1 is missed; besides,
-18 of 40 around shots of 1 and 2 frames, 1 of 20 in animation on twos and threes, and 10 of 20 between pans.
+With --seed 1: in 800 clips without a cut none is found. Of 250 cuts none is missed; besides, 12 of 40 around shots of 1
+and 2 frames.
+So it is with --seed 2 to 4, on which the rule was chosen, and 11 to 18, of which 13 alone had a say in it: in 9600
+clips none is found, and of 3000 cuts none missed; besides, up to 18 of 40 around shots of 1 and 2 frames, and up to 3
+of 20 in films on twos and threes.
 """
 
 import argparse

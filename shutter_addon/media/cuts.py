@@ -2,7 +2,7 @@
 frames, made of a small picture of each; and a source that knows where its shots end."""
 
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -15,14 +15,22 @@ from .source import SourceWrapper
 NEIGHBOURS = 9
 # What is back after so many frames, or was there so many before, was a flash, or something that passed.
 PASSING = 3
-# The share of bits by which hashes of pictures differ that have nothing in common, PySceneDetect's own; and from
-# which on a picture is not the one from before a flash that has moved on.
-APART, BACK = 0.395, 0.35
-# PySceneDetect's own: neighbours on each side whose mean change a cut must exceed, and by how much.
-WINDOW, RATIO = 2, 3.0
-# Levels of 255 by which a cut changes brightness, its own for pictures that are GREY on average; darker ones need less,
-# in proportion, but for noise. A title that appears changes about 5.
-CHANGE, GREY, NOISE = 15.0, 90.0, 2.0
+# The bits of a hash in each direction, and the share of all that differs at a cut. The fewer, the coarser is what they
+# stand for: of 64, a jump of the camera by a twentieth of the picture mostly changes less, of
+# PySceneDetect's 256 as many as a cut.
+BITS, APART = 8, 0.27
+# The share that differs at a cut wherever the camera may have jumped, by up to 1 / REACH of the picture to any side:
+# where it has, what the pictures share differs by up to 0.16 (mostly 0.1), at cuts by 0.19 or more.
+REACH, MOVED = 4, 0.16
+# Neighbours on each side whose mean change a cut must exceed, PySceneDetect's own, and by how much: a little less than
+# its own 3, for cuts between pans and around short shots.
+WINDOW, RATIO = 2, 2.8
+# Levels of 255 by which a cut changes brightness, ContentDetector's own for pictures that are GREY on average; darker
+# ones need less, in proportion, but for noise. A title that appears changes about 5, a large object that jumps 25.
+CHANGE, GREY, NOISE = 27.0, 90.0, 2.0
+# The share of it by which a cut changes each part of the picture, of so many across and down: 0.36 or more. Where an
+# object jumps or leaves, one part hardly changes.
+PARTS, PART = 4, 0.2
 # The frames on each side that have a say in whether a frame repeats the one before: films animated on threes, or with a
 # 3:2 pulldown, move twice in so many.
 BESIDE = 4
@@ -73,27 +81,56 @@ def is_cut(before: list[Signature], after: list[Signature]) -> bool:
 
     before, after: signatures of up to NEIGHBOURS successive frames on each side, fewer at the clip's ends alone.
     There is one where PySceneDetect's HashDetector finds that the pictures have nothing in common, its ContentDetector
-    that brightness changes, and its AdaptiveDetector that it changes by far more than between neighbours. The first two
-    are asked as well about what comes a little later or came a little earlier: what passes is no cut. Not found are
-    cuts between much the same pictures, into the midst of fast motion, and many of those to shots of one or two
-    frames; taken for one is what changes most of a still picture at once, and stays."""
+    that brightness changes, and its AdaptiveDetector that it changes by far more than between neighbours. The first
+    two are asked as well about what comes a little later or came a little earlier, for what passes is no cut; then
+    ContentDetector about each part, and HashDetector about what the pictures share if the camera has jumped. Not
+    found are cuts between much the same pictures, and some of those to shots of one or two frames; taken for one is
+    what changes all of a still picture at once, and stays, and a jump of the camera by more than 1 / REACH."""
     if not may_be_cut(before[-1], after[0]):
         return False
     passing = [(earlier, after[0]) for earlier in before[-PASSING - 1 : -1]]
     passing += [(before[-1], later) for later in after[1 : PASSING + 1]]
-    if not all(may_be_cut(*pair, BACK) for pair in passing):
-        return False
-    return _stands_out(_moving(before[::-1]), _moving(after))
+    stands_out = all(may_be_cut(*pair) for pair in passing) and _stands_out(_moving(before[::-1]), _moving(after))
+    return stands_out and _all_changes(before[-1], after[0])
 
 
-def may_be_cut(before: Signature, after: Signature, apart: float = APART) -> bool:
-    """Whether `is_cut` can be true of these two neighbours, as far as they alone tell. apart: how far their hashes must
-    be from each other."""
-    from scenedetect.detectors import ContentDetector, HashDetector
+def may_be_cut(before: Signature, after: Signature) -> bool:
+    """Whether `is_cut` can be true of these two neighbours, as far as they alone tell."""
+    return _differ(before, after, NOISE) and _unlike(before, after, APART)
 
-    threshold = max(CHANGE * min(max(before.mean(), after.mean()) / GREY, 1.0), NOISE)
-    differs = ContentDetector(threshold, min_scene_len=0, luma_only=True)
-    return _finds(differs, [before, after], 1) and _finds(HashDetector(apart, min_scene_len=0), [before, after], 1)
+
+def _all_changes(before: Signature, after: Signature) -> bool:
+    """Whether brightness changes in every part of the picture, but where both are black, and the pictures have nothing
+    in common wherever the camera may have jumped."""
+    jumps = product(*(range(-(length // REACH), length // REACH + 1) for length in before.shape[:2]))
+    return all(_differ(*parts, 0.0, PART) for parts in zip(_parts(before), _parts(after), strict=True)) and all(
+        _unlike(_shared(before, y, x), _shared(after, -y, -x), MOVED) for y, x in jumps
+    )
+
+
+def _parts(picture: Signature) -> list[Signature]:
+    split = (np.array_split(rows, PARTS, axis=1) for rows in np.array_split(picture, PARTS))
+    return [part for parts in split for part in parts if part.size]
+
+
+def _shared(picture: Signature, down: int, right: int) -> Signature:
+    """The part of a picture that lies in its frame moved by so many blocks as well."""
+    height, width = picture.shape[:2]
+    return picture[max(down, 0) : height + min(down, 0), max(right, 0) : width + min(right, 0)]
+
+
+def _differ(before: Signature, after: Signature, least: float, share: float = 1.0) -> bool:
+    """Whether brightness changes by that share of what a cut changes, and by no fewer levels than `least`."""
+    from scenedetect.detectors import ContentDetector
+
+    threshold = max(share * CHANGE * min(max(before.mean(), after.mean()) / GREY, 1.0), least)
+    return _finds(ContentDetector(threshold, min_scene_len=0, luma_only=True), [before, after], 1)
+
+
+def _unlike(before: Signature, after: Signature, apart: float) -> bool:
+    from scenedetect.detectors import HashDetector
+
+    return _finds(HashDetector(apart, BITS, min_scene_len=0), [before, after], 1)
 
 
 def _stands_out(before: list[Signature], after: list[Signature]) -> bool:

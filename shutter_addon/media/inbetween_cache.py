@@ -25,7 +25,7 @@ from .errors import MediaError
 from .files import check_name
 from .folder import Folder
 
-VERSION = 2  # raise it when in-betweens of the same frames change, or the folder's format does: older ones get stale
+VERSION = 3  # raise it when in-betweens of the same frames change, or the folder's format does: older ones get stale
 MANIFEST, CHECKS = "manifest.json", "checks"
 MAKER = "Virtual Shutter: in-between frames"
 SAMPLES = {"uint8": "uint8", "uint16": "uint16", "float16": "half", "float32": "float"}
