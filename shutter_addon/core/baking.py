@@ -15,7 +15,8 @@ from itertools import pairwise
 import numpy as np
 
 from . import keyframes, limits, recipe
-from .effect import Channel, Effect, Region, Samples
+from .effect import Effect, Region
+from .keyframes import Channel, Samples
 
 # Of the largest bar, of fractions of the picture, of degrees; of the larger key's value where that is above 1.
 TOLERANCE = 1e-4

@@ -8,134 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 
 from . import keyframes, limits, scribbles, shutters
 from .frame_state import FrameState
-from .messages import UserError
+from .keyframes import Bars, Channel
+from .messages import EffectError
 
 _CLOSED = 'shutter "{name}" at frame {frame}: {fault}'
 _TOO_MANY = 'region "{name}": more than {most} points with those before it'
 _FAR = 'region "{name}": a point of its strokes is nowhere near the picture'
 
 
-class EffectError(UserError, RuntimeError):
-    """The effect cannot be rendered as it stands; the message is one sentence for the user.
-
-    words: what the sentence's braces stand for, so that an interface can translate the sentence (`template`)."""
-
-    def __init__(self, template: str, **words):
-        super().__init__(template.format(**words) if words else template)
-        self.template, self.words = template, words
-
-
 class FarStrokeError(ValueError):
     """A point of a stroke is farther from the picture than any effect has it (limits.MAX_DISTANCE)."""
-
-
-class Channel(Protocol):
-    """A value over time."""
-
-    def at(self, frame: float) -> Any:
-        """The value at a frame. EffectError: there is none that an effect can have."""
-
-
-@dataclass(frozen=True)
-class Constant:
-    """The same value at every frame; an EffectError is raised where the value is asked for."""
-
-    value: Any
-
-    def at(self, _frame: float) -> Any:
-        return _given(self.value)
-
-
-@dataclass(frozen=True)
-class Keys:
-    """Numbers or arrays at ascending frames, linear in between after the ease of the span (keyframes.eased)."""
-
-    frames: tuple[float, ...]
-    values: tuple
-    eases: tuple[str, ...]
-
-    def at(self, frame: float) -> np.ndarray:
-        before, after, share = eased_span(self.frames, self.eases, frame)
-        return (1 - share) * np.asarray(self.values[before]) + share * np.asarray(self.values[after])
-
-
-@dataclass(frozen=True)
-class Samples:
-    """Values at frames where they were sampled, and nowhere else. An EffectError among them is raised where the value
-    is asked for.
-
-    keys: frames and eases of the keys of the curve that was sampled, ascending; none where it is no curve of keys."""
-
-    values: dict[float, Any]
-    keys: tuple[tuple[float, str], ...] = ()
-
-    def at(self, frame: float) -> Any:
-        """KeyError: the frame was not sampled."""
-        return _given(self.values[frame])
-
-
-@dataclass(frozen=True)
-class SourceTime:
-    """Channel of (source frame, whether it runs backward from there), made of a channel of numbers.
-
-    Where time stands still it runs as it came to the last of its `keys`, unless it stood still before. A jump is no
-    way.
-    """
-
-    numbers: Channel
-    keys: tuple[tuple[float, str], ...]
-
-    def at(self, frame: float) -> tuple[float, bool]:
-        time, later = float(self.numbers.at(frame)), float(self.numbers.at(frame + 0.5))
-        return time, self._came_backward(frame) if later == time else later < time
-
-    def _came_backward(self, frame: float) -> bool:
-        for key, _ in reversed(self.keys):
-            if key <= frame:
-                earlier, later = self.numbers.at(key - 0.5), self.numbers.at(key - 0.25)
-                if earlier != later:
-                    return bool(later < earlier)
-        return False
-
-
-@dataclass(frozen=True)
-class Bars:
-    """A shutter's bars (L,) float64 over time.
-
-    channel: the bars where they are not displaced: on keys, outside of them, and between keys by value
-    keys: frames and eases of the keys, ascending; without any, `channel` alone counts
-    share: channel of the share 0 to 1 of the way from the key before a frame to the key after it; None: by the eases"""
-
-    channel: Channel
-    keys: tuple[tuple[float, str], ...] = ()
-    share: Channel | None = None
-
-    def at(self, frame: float, interpolation: str) -> np.ndarray:
-        """Between keys by displacement (paper §3.4.1, over time), or by `channel`: where interpolation is "value", and
-        on the way to and from a closed shutter, which is no displacement."""
-        if not self.keys:
-            return self.channel.at(frame)
-        frames = [key for key, _ in self.keys]
-        before, after, _ = keyframes.span(frames, frame)
-        if before == after:
-            return self.channel.at(frames[before])
-        if interpolation == "value":
-            return self.channel.at(frame)
-        first, second = self.channel.at(frames[before]), self.channel.at(frames[after])
-        if not (first.any() and second.any()):
-            return self.channel.at(frame)
-        return keyframes.between_bars(first, second, self._share_at(frame, frames))
-
-    def _share_at(self, frame: float, frames: list[float]) -> float:
-        if self.share is not None:
-            return self.share.at(frame)
-        return eased_span(frames, [ease for _, ease in self.keys], frame)[2]
 
 
 @dataclass(frozen=True)
@@ -167,7 +54,7 @@ class Drawings:
         placement = self.placement and self.placement.at(frame)
         if not self.frames or (self.placement and placement is None):
             return []
-        before, after, share = eased_span(self.frames, self.eases, frame)
+        before, after, share = keyframes.eased_span(self.frames, self.eases, frame)
         first, second = (self._on_picture(index, placement) for index in (before, after))
         return scribbles.between_strokes(first, second, share, self.aspect)
 
@@ -198,9 +85,9 @@ class Region:
     kind: Channel
     width: Channel
     drawings: Drawings
-    location: Channel = Constant((0.0, 0.0))
-    rotation: Channel = Constant(0.0)
-    scale: Channel = Constant(1.0)
+    location: Channel
+    rotation: Channel
+    scale: Channel
 
     def at(self, frame: float) -> scribbles.Shape:
         location, rotation, scale = (channel.at(frame) for channel in (self.location, self.rotation, self.scale))
@@ -265,15 +152,3 @@ class Effect:
         except shutters.ShutterError as error:
             name = self.shutters[index].name
             raise EffectError(_CLOSED, name=name, frame=f"{frame:g}", fault=str(error)) from None
-
-
-def eased_span(frames, eases, frame: float) -> tuple[int, int, float]:
-    """As keyframes.span, the share with the ease of the span: eases are of the keys that begin them."""
-    before, after, share = keyframes.span(frames, frame)
-    return before, after, keyframes.eased(share, eases[before])
-
-
-def _given(value):
-    if isinstance(value, EffectError):
-        raise value
-    return value

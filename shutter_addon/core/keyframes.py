@@ -1,12 +1,15 @@
-"""Keys on the timeline: which two surround a frame, how far between them, and with which ease."""
+"""Values over time: constant, at keys with their eases, or sampled; and how a shutter's bars go from key to key."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
 from . import shutters
+from .messages import EffectError
 
 EASES = ("linear", "bezier", "constant")
 
@@ -42,3 +45,118 @@ def between_bars(first, second, u: float, interpolation: str = "displacement") -
     if interpolation == "value":
         return (1 - u) * np.asarray(first, dtype=np.float64) + u * np.asarray(second, dtype=np.float64)
     return shutters.displace([first, second], [1 - u, u])
+
+
+class Channel(Protocol):
+    """A value over time."""
+
+    def at(self, frame: float) -> Any:
+        """The value at a frame. EffectError: there is none that an effect can have."""
+
+
+@dataclass(frozen=True)
+class Constant:
+    """The same value at every frame; an EffectError is raised where the value is asked for."""
+
+    value: Any
+
+    def at(self, _frame: float) -> Any:
+        return _given(self.value)
+
+
+@dataclass(frozen=True)
+class Keys:
+    """Numbers or arrays at ascending frames, linear in between after the ease of the span (eased)."""
+
+    frames: tuple[float, ...]
+    values: tuple
+    eases: tuple[str, ...]
+
+    def at(self, frame: float) -> np.ndarray:
+        before, after, share = eased_span(self.frames, self.eases, frame)
+        return (1 - share) * np.asarray(self.values[before]) + share * np.asarray(self.values[after])
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Values at frames where they were sampled, and nowhere else. An EffectError among them is raised where the value
+    is asked for.
+
+    keys: frames and eases of the keys of the curve that was sampled, ascending; none where it is no curve of keys."""
+
+    values: dict[float, Any]
+    keys: tuple[tuple[float, str], ...] = ()
+
+    def at(self, frame: float) -> Any:
+        """KeyError: the frame was not sampled."""
+        return _given(self.values[frame])
+
+
+@dataclass(frozen=True)
+class SourceTime:
+    """Channel of (source frame, whether it runs backward from there), made of a channel of numbers.
+
+    Where time stands still it runs as it came to the last of its `keys`, unless it stood still before. A jump is no
+    way.
+    """
+
+    numbers: Channel
+    keys: tuple[tuple[float, str], ...]
+
+    def at(self, frame: float) -> tuple[float, bool]:
+        time, later = float(self.numbers.at(frame)), float(self.numbers.at(frame + 0.5))
+        return time, self._came_backward(frame) if later == time else later < time
+
+    def _came_backward(self, frame: float) -> bool:
+        for key, _ in reversed(self.keys):
+            if key <= frame:
+                earlier, later = self.numbers.at(key - 0.5), self.numbers.at(key - 0.25)
+                if earlier != later:
+                    return bool(later < earlier)
+        return False
+
+
+@dataclass(frozen=True)
+class Bars:
+    """A shutter's bars (L,) float64 over time.
+
+    channel: the bars where they are not displaced: on keys, outside of them, and between keys by value
+    keys: frames and eases of the keys, ascending; without any, `channel` alone counts
+    share: channel of the share 0 to 1 of the way from the key before a frame to the key after it; None: by the eases"""
+
+    channel: Channel
+    keys: tuple[tuple[float, str], ...] = ()
+    share: Channel | None = None
+
+    def at(self, frame: float, interpolation: str) -> np.ndarray:
+        """Between keys by displacement (paper §3.4.1, over time), or by `channel`: where interpolation is "value", and
+        on the way to and from a closed shutter, which is no displacement."""
+        if not self.keys:
+            return self.channel.at(frame)
+        frames = [key for key, _ in self.keys]
+        before, after, _ = span(frames, frame)
+        if before == after:
+            return self.channel.at(frames[before])
+        if interpolation == "value":
+            return self.channel.at(frame)
+        first, second = self.channel.at(frames[before]), self.channel.at(frames[after])
+        if not (first.any() and second.any()):
+            return self.channel.at(frame)
+        return between_bars(first, second, self._share_at(frame, frames))
+
+    def _share_at(self, frame: float, frames: list[float]) -> float:
+        if self.share is not None:
+            return self.share.at(frame)
+        return eased_span(frames, [ease for _, ease in self.keys], frame)[2]
+
+
+def eased_span(frames, eases, frame: float) -> tuple[int, int, float]:
+    """As span, the share with the ease of the span: eases are of the keys that begin them."""
+    before, after, share = span(frames, frame)
+    return before, after, eased(share, eases[before])
+
+
+def _given(value):
+    if isinstance(value, EffectError):
+        raise value
+    return value

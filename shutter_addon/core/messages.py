@@ -12,6 +12,16 @@ class UserError(Exception):
         return sentence(super().__str__())
 
 
+class EffectError(UserError, RuntimeError):
+    """The effect cannot be rendered as it stands; the message is one sentence for the user.
+
+    words: what the sentence's braces stand for, so that an interface can translate the sentence (`template`)."""
+
+    def __init__(self, template: str, **words):
+        super().__init__(template.format(**words) if words else template)
+        self.template, self.words = template, words
+
+
 def sentence(text: object, longest: int = LONGEST) -> str:
     """The text on one line of at most `longest` characters; where it is longer, its middle is left out, for it begins
     with the place and ends with the reason. What cannot be shown (control characters, names of files that are not

@@ -17,7 +17,7 @@ from typing import Literal, get_args, get_origin
 
 import numpy as np
 
-from . import atomic_write, effect, limits, shutters
+from . import atomic_write, effect, keyframes, limits, shutters
 from .frame_state import Edges, Exposure, FrameState, Interpolation, Light, Options, Position
 from .messages import UserError, sentence
 
@@ -57,10 +57,11 @@ class Shutter:
     def over_time(self) -> effect.Shutter:
         """As plain data."""
         if not self.keys:
-            return effect.Shutter(self.name, self.color, effect.Bars(effect.Constant(np.asarray(self.bars, float))))
+            constant = keyframes.Constant(np.asarray(self.bars, float))
+            return effect.Shutter(self.name, self.color, keyframes.Bars(constant))
         frames, bars, eases = _columns(self.keys, "frame", "bars", "ease")
         keys = tuple(zip(frames, eases, strict=True))
-        return effect.Shutter(self.name, self.color, effect.Bars(effect.Keys(frames, bars, eases), keys))
+        return effect.Shutter(self.name, self.color, keyframes.Bars(keyframes.Keys(frames, bars, eases), keys))
 
 
 @dataclass(frozen=True)
@@ -103,11 +104,11 @@ class Region:
             tuple(key.ease if key else "linear" for key, _ in drawn),
             aspect,
         )
-        fixed = self.name, shutter, effect.Constant(self.kind), effect.Constant(self.width), drawings
+        fixed = self.name, shutter, keyframes.Constant(self.kind), keyframes.Constant(self.width), drawings
         if not self.keys:
-            return effect.Region(*fixed)
+            return effect.Region(*fixed, *map(keyframes.Constant, ((0.0, 0.0), 0.0, 1.0)))
         frames, eases, *moves = _columns(self.keys, "frame", "ease", "location", "rotation", "scale")
-        return effect.Region(*fixed, *(effect.Keys(frames, values, eases) for values in moves))
+        return effect.Region(*fixed, *(keyframes.Keys(frames, values, eases) for values in moves))
 
 
 @dataclass(frozen=True)
@@ -148,15 +149,15 @@ class Recipe:
         return effect.Effect(
             tuple(shutter.over_time() for shutter in self.shutters),
             tuple(region.over_time(order[region.shutter], aspect) for region in self.regions),
-            effect.Constant(self.options),
+            keyframes.Constant(self.options),
             self._source_time(),
         )
 
-    def _source_time(self) -> effect.SourceTime | None:
+    def _source_time(self) -> keyframes.SourceTime | None:
         if not self.time:
             return None
         frames, values, eases = _columns(self.time, "frame", "value", "ease")
-        return effect.SourceTime(effect.Keys(frames, values, eases), tuple(zip(frames, eases, strict=True)))
+        return keyframes.SourceTime(keyframes.Keys(frames, values, eases), tuple(zip(frames, eases, strict=True)))
 
     def at(self, frame: float, aspect: float) -> FrameState:
         """The effect at a timeline frame (1 = the strip's first), for a picture of width / height = aspect."""

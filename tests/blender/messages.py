@@ -30,7 +30,7 @@ def of_presets() -> set:
 
 
 def of_core() -> set:
-    """Sentences of core that effects.py passes on in the user's language."""
+    """Sentences of core that data/snapshot.py passes on in the user's language."""
     return {("*", _fault(bars)) for bars in ([0], [-1], [math.inf], [1e7], [1e-7])}
 
 

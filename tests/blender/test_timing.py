@@ -53,7 +53,7 @@ def test_keys_out_of_order(bpy):
 
 def test_another_layout_is_said(bpy, edit, tmp_path):
     """As if the numbers lay four bytes farther on."""
-    from shutter_addon.blender.data import retiming_keys
+    from shutter_addon.blender.data import strip_timing
     from shutter_addon.blender.data.validation import EffectError
 
     first = write_frames(tmp_path / "in", np.zeros((20, 8, 8, 3), dtype=np.uint8))
@@ -63,18 +63,18 @@ def test_another_layout_is_said(bpy, edit, tmp_path):
     source.right_handle = 21
     source.retiming_keys.add(timeline_frame=1)
     source.retiming_keys[-1].timeline_frame = 52
-    assert [key.index for key in retiming_keys._retiming_keys(source)] == [0, 51]
+    assert [key.index for key in strip_timing._retiming_keys(source)] == [0, 51]
     where = [SimpleNamespace(as_pointer=lambda key=key: key.as_pointer() + 4) for key in source.retiming_keys]
     for place, key in zip(where, source.retiming_keys, strict=True):
         place.timeline_frame = key.timeline_frame
     moved = SimpleNamespace(name=source.name, content_start=source.content_start, retiming_keys=where)
     with pytest.raises(EffectError, match='strip "images": its retiming keys cannot be read'):
-        retiming_keys._retiming_keys(moved)
+        strip_timing._retiming_keys(moved)
 
 
 def test_a_still_of_a_million_frames_takes_no_time(bpy, edit, tmp_path):
     """Blender shows one frame of it all along; where that began is not sought frame by frame."""
-    from shutter_addon.blender.data import retiming_keys
+    from shutter_addon.blender.data import strip_timing
     from shutter_addon.core import retiming
 
     first = write_frames(tmp_path / "in", np.zeros((1, 8, 8, 3), dtype=np.uint8))
@@ -82,5 +82,5 @@ def test_a_still_of_a_million_frames_takes_no_time(bpy, edit, tmp_path):
     source.right_handle = 1_000_000
     start = time.perf_counter()
     medium = SimpleNamespace(filmed=1, step=1, fps=None)
-    assert retiming.source_frame(retiming_keys.timing_of(source), 999_999, medium) == 0
+    assert retiming.source_frame(strip_timing.timing_of(source), 999_999, medium) == 0
     assert time.perf_counter() - start < 1

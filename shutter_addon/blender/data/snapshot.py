@@ -16,12 +16,12 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core import effect as model
 from ...core import keyframes, limits
-from ...core.effect import EffectError
 from ...core.frame_state import FrameState, Options
+from ...core.messages import EffectError
 from ...core.retiming import StripTiming
 from . import annotations, inbetween_settings, source_media, strips, validation
 from .fcurves import Curves, leading, progress
-from .retiming_keys import timing_of
+from .strip_timing import timing_of
 
 OPTIONS = ("position", "interpolation", "light", "exposure", "edges")
 _MOVED = ("offset_x", "offset_y", "scale_x", "scale_y", "rotation")  # of a strip's transform, where it is keyed
@@ -178,7 +178,7 @@ def _tried(function, *arguments):
         return error
 
 
-def _channel(curves: Curves, owner, path: str, name: str, frames, change=lambda value: value) -> model.Channel:
+def _channel(curves: Curves, owner, path: str, name: str, frames, change=lambda value: value) -> keyframes.Channel:
     """A float property or a vector, each value changed by a function."""
 
     def at(frame):
@@ -187,20 +187,20 @@ def _channel(curves: Curves, owner, path: str, name: str, frames, change=lambda 
     try:
         keyed = curves.of(owner, path, name)
     except EffectError as error:
-        return model.Constant(error)
+        return keyframes.Constant(error)
     if not keyed:
-        return model.Constant(_tried(at, 0.0))
-    return model.Samples({frame: _tried(at, frame) for frame in frames}, curves.keys(keyed))
+        return keyframes.Constant(_tried(at, 0.0))
+    return keyframes.Samples({frame: _tried(at, frame) for frame in frames}, curves.keys(keyed))
 
 
-def _options(curves: Curves, path: str, effect, frames) -> model.Channel:
+def _options(curves: Curves, path: str, effect, frames) -> keyframes.Channel:
     names = (*OPTIONS, "aggregate", "border", "stop_at_cuts")
     found = {name: _tried(curves.find, f"{path}.{name}") for name in names}
     if error := next((error for error in found.values() if isinstance(error, EffectError)), None):
-        return model.Constant(error)
+        return keyframes.Constant(error)
     if not any(found.values()):
-        return model.Constant(_tried(options_at, effect, found, 0.0))
-    return model.Samples({frame: _tried(options_at, effect, found, frame) for frame in frames})
+        return keyframes.Constant(_tried(options_at, effect, found, 0.0))
+    return keyframes.Samples({frame: _tried(options_at, effect, found, frame) for frame in frames})
 
 
 def options_at(effect, curves: dict, frame: float) -> Options:
@@ -225,14 +225,14 @@ def options_at(effect, curves: dict, frame: float) -> Options:
     )
 
 
-def _shutter(curves: Curves, path: str, shutter, options: model.Channel, frames, thorough=False) -> model.Shutter:
+def _shutter(curves: Curves, path: str, shutter, options: keyframes.Channel, frames, thorough=False) -> model.Shutter:
     bars = _tried(_bars, curves, path, shutter, options, frames, thorough)
     if isinstance(bars, EffectError):
-        bars = model.Bars(model.Constant(bars))
+        bars = keyframes.Bars(keyframes.Constant(bars))
     return model.Shutter(shutter.name, tuple(shutter.color), bars)
 
 
-def _bars(curves: Curves, path: str, shutter, options: model.Channel, frames, thorough: bool) -> model.Bars:
+def _bars(curves: Curves, path: str, shutter, options: keyframes.Channel, frames, thorough: bool) -> keyframes.Bars:
     """EffectError: they are not as many as the window is long."""
     stored = np.array([bar.weight for bar in shutter.bars])
     keyed = {i: curve for i in range(len(stored)) if (curve := curves.find(f"{path}.bars[{i}].weight"))}
@@ -248,14 +248,14 @@ def _bars(curves: Curves, path: str, shutter, options: model.Channel, frames, th
         return bars
 
     if not keyed:
-        return model.Bars(model.Constant(_tried(at, 0.0) if len(stored) else stored))
+        return keyframes.Bars(keyframes.Constant(_tried(at, 0.0) if len(stored) else stored))
     keys = curves.keys(list(keyed.values()))
     if not keys:  # curves of samples or of modifiers alone
-        return model.Bars(model.Samples({frame: _tried(at, frame) for frame in frames}))
+        return keyframes.Bars(keyframes.Samples({frame: _tried(at, frame) for frame in frames}))
     return _keyed_bars(keys, list(keyed.values()), at, {f: chosen[f].interpolation for f in chosen}, thorough)
 
 
-def _keyed_bars(keys, curves: list, at, frames: dict[float, str], thorough: bool) -> model.Bars:
+def _keyed_bars(keys, curves: list, at, frames: dict[float, str], thorough: bool) -> keyframes.Bars:
     """Bars sampled where they are needed: at keys; between them the way that the curve has gone which changes most, or
     the bars, where they are not displaced. frames: by frame the interpolation."""
     numbers, values, shares, leaders = [frame for frame, _ in keys], {}, {}, {}
@@ -277,7 +277,7 @@ def _keyed_bars(keys, curves: list, at, frames: dict[float, str], thorough: bool
             if before not in leaders:
                 leaders[before] = leading(curves, numbers[before], numbers[after])
             shares[frame] = progress(*leaders[before], frame)
-    return model.Bars(model.Samples(values), keys, model.Samples(shares))
+    return keyframes.Bars(keyframes.Samples(values), keys, keyframes.Samples(shares))
 
 
 def check_bar_count(shutter, window: int) -> None:
@@ -294,7 +294,7 @@ def _region(curves: Curves, path: str, effect, region, shutter: int, placement, 
     return model.Region(
         region.name,
         shutter,
-        model.Constant(_tried(lambda: validation.word(region, "kind").lower())),
+        keyframes.Constant(_tried(lambda: validation.word(region, "kind").lower())),
         channel("width"),
         _drawings(curves, path, effect, region, placement, frames),
         channel("location"),
@@ -323,7 +323,7 @@ def _drawings(curves: Curves, path: str, effect, region, placement, frames) -> m
     )
 
 
-def _placement(curves: Curves, effect, strip, frames) -> model.Channel:
+def _placement(curves: Curves, effect, strip, frames) -> keyframes.Channel:
     """The matrix from the sequencer's image to the strip's picture, which may be keyed."""
     size, path = annotations.picture_size(effect), f"{strip.path_from_id()}.transform"
     keyed = {name: curve for name in _MOVED if (curve := _tried(curves.find, f"{path}.{name}"))}
@@ -333,8 +333,8 @@ def _placement(curves: Curves, effect, strip, frames) -> model.Channel:
         return annotations.image_to_picture(strip, size, **moved)
 
     if not keyed:
-        return model.Constant(_tried(at, 0.0))
-    return model.Samples({frame: _tried(at, frame) for frame in frames})
+        return keyframes.Constant(_tried(at, 0.0))
+    return keyframes.Samples({frame: _tried(at, frame) for frame in frames})
 
 
 class _Evaluated:
@@ -344,15 +344,15 @@ class _Evaluated:
         self.at = function
 
 
-def _source_time(curves: Curves, path: str, effect, frames) -> model.Channel:
+def _source_time(curves: Curves, path: str, effect, frames) -> keyframes.Channel:
     def value(frame):
         return curves.value(effect, path, "source_time", frame)
 
     keyed = _tried(curves.of, effect, path, "source_time")
     if isinstance(keyed, EffectError):
-        return model.Constant(keyed)
+        return keyframes.Constant(keyed)
     keys = curves.keys(keyed)
-    time = model.SourceTime(_Evaluated(value), keys)
+    time = keyframes.SourceTime(_Evaluated(value), keys)
     if not keyed:
-        return model.Constant(_tried(time.at, 0.0))
-    return model.Samples({frame: _tried(time.at, frame) for frame in frames}, keys)
+        return keyframes.Constant(_tried(time.at, 0.0))
+    return keyframes.Samples({frame: _tried(time.at, frame) for frame in frames}, keys)

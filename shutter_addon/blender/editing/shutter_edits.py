@@ -1,7 +1,4 @@
-"""Changes to an effect: its shutters, their bars and keys, and its regions. Operators and gizmos call these.
-
-Shutters and regions are items of collections: where one goes or moves, its F-curves go and move with it.
-"""
+"""An effect's shutters: added, duplicated, removed, moved."""
 
 import numpy as np
 from bpy.app.translations import pgettext_data as data_

@@ -11,7 +11,7 @@ from bpy.types import Gizmo, GizmoGroup
 from ..data import consistency, selection
 from ..data.validation import EffectError
 from ..editing import bar_edits
-from . import drawing, keymaps
+from . import drawing, gizmo_keymaps
 
 _MARGIN, _HEIGHT, _BAR = 16, 96, 16  # in units of the interface
 _PAD, _HEADER = 8, 18
@@ -198,7 +198,7 @@ class SHUTTER_GGT_bars(GizmoGroup):
 
     @classmethod
     def setup_keymap(cls, keyconfig):
-        keymap = keymaps.new(cls, keyconfig)
+        keymap = gizmo_keymaps.new(cls, keyconfig)
         keymap.keymap_items.new("shutter.bar_set", "LEFTMOUSE", "DOUBLE_CLICK")
         keymap.keymap_items.new("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", any=True)
         keymap.keymap_items.new("shutter.bars_key", "I", "PRESS")
@@ -220,4 +220,4 @@ def register():
 def unregister():
     for cls in reversed(classes):
         bpy.utils.unregister_class(cls)
-    keymaps.remove(SHUTTER_GGT_bars)
+    gizmo_keymaps.remove(SHUTTER_GGT_bars)

@@ -11,7 +11,7 @@ from bpy.types import Gizmo, GizmoGroup
 from ...core import scribbles
 from ..data import annotations, geometry, revision, selection, snapshot, validation
 from ..editing import bar_edits, region_edits
-from . import drawing, keymaps
+from . import drawing, gizmo_keymaps
 
 _RADIUS = 7  # of a handle, in units of the interface
 _NEAREST = 0.03  # of the corner's handle to the centre's, in parts of the picture
@@ -161,7 +161,7 @@ class SHUTTER_GGT_region(GizmoGroup):
 
     @classmethod
     def setup_keymap(cls, keyconfig):
-        keymap = keymaps.new(cls, keyconfig)
+        keymap = gizmo_keymaps.new(cls, keyconfig)
         keymap.keymap_items.new("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", any=True)
         keymap.keymap_items.new("shutter.region_key", "I", "PRESS")
         return keymap
@@ -182,4 +182,4 @@ def register():
 def unregister():
     for cls in reversed(classes):
         bpy.utils.unregister_class(cls)
-    keymaps.remove(SHUTTER_GGT_region)
+    gizmo_keymaps.remove(SHUTTER_GGT_region)

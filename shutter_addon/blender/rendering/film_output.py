@@ -127,7 +127,7 @@ def set_output(edit, path: Path, file_format: str, *, alpha: bool) -> None:
 
 
 def film(edit, output: Path) -> None:
-    """Renders an edit of edits.make_edit to a movie or a folder. Blender writes into a folder beside the output, and
+    """Renders an edit of new_edit.make_edit to a movie or a folder. Blender writes into a folder beside the output, and
     what is finished moves out of it.
 
     OutputError: it cannot be rendered or written; finished pictures stay, and of a movie what was finished, under a

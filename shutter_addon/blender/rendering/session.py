@@ -16,8 +16,8 @@ from ...compute.device import NoDeviceError
 from ...compute.gpu import GPUCompositor
 from ...compute.renderer import Renderer, open_compositor
 from ...core import retiming
-from ...core.effect import EffectError
 from ...core.frame_state import FrameState
+from ...core.messages import EffectError
 from ...media import MediaError, cuts
 from ...media.cuts import ShotSource
 from ...media.exr import write_exr

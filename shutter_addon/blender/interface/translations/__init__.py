@@ -5,7 +5,7 @@ to read it, and a line is a message, so that changes are easy to compare. To add
 tests/blender/test_translations.py says what a language lacks.
 
 What core, media, compute and the command say is English everywhere: it names files, fields and devices, and is looked
-for in logs. Only what core says of a shutter's bars is looked up, where effects.py passes it on.
+for in logs. Only what core says of a shutter's bars is looked up, where data/snapshot.py passes it on.
 """
 
 import bpy

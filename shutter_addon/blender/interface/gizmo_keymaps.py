@@ -1,4 +1,4 @@
-"""Keymaps of gizmo groups, which Blender makes with the group and leaves behind without it."""
+"""Keymaps of gizmo groups, made and removed: Blender leaves them behind. The keys are in each group's setup_keymap."""
 
 import bpy
 
