@@ -96,8 +96,8 @@ class Samples:
 class SourceTime:
     """Channel of (source frame, whether it runs backward from there), made of a channel of numbers.
 
-    Where time stands still it runs as it came to the last of its `keys`, unless it stood still before. A jump is no
-    way.
+    Where time stands still it keeps the direction in which it last moved towards one of its `keys`; forward, if it only
+    jumped.
     """
 
     numbers: Channel

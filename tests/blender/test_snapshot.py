@@ -1,0 +1,123 @@
+"""Snapshots: all that an effect strip's pictures depend on, as plain data that no later edit changes."""
+
+import pickle
+
+import numpy as np
+import pytest
+from support import write_frames
+
+FRAMES = range(1, 25)
+
+
+@pytest.fixture
+def found(bpy, edit, tmp_path):
+    """Edit, effect and strip; shutters keyed by bars and by value, a region keyed and drawn twice, options keyed."""
+    from shutter_addon.blender.data import annotations
+    from shutter_addon.blender.editing import add_effect, bar_edits, region_edits, shutter_edits
+
+    frames = np.random.default_rng(0).integers(0, 256, (24, 24, 40, 3), dtype=np.uint8)
+    first = write_frames(tmp_path / "in", frames)
+    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
+    for file in sorted(first.parent.iterdir())[1:]:
+        source.elements.append(file.name)
+    strip, effect = add_effect.add_effect(edit, source)
+    effect.window = 4
+    shutter_edits.start(effect)
+    for frame, bars in ((1, [1, 0, 0, 0]), (20, [0, 0, 0, 1])):
+        edit.frame_set(frame)
+        bar_edits.paint(effect, 1, bars, key=True)
+    region = region_edits.add_region(effect, effect.shutters[1])
+    for frame in (1, 12):
+        stroke = annotations.layer_of(effect, region).frames.new(frame).strokes.new()
+        stroke.points.add(2)
+        stroke.points.foreach_set("co", [-5.0 - frame, 2, 0, 8, 3, 0])
+        region.location[0] = frame / 100
+        region.keyframe_insert("location", frame=frame)
+        effect.position = "START" if frame == 1 else "END"
+        effect.keyframe_insert("position", frame=frame)
+    return edit, effect, strip
+
+
+def states(snapshot) -> list:
+    return [snapshot.state(frame).key for frame in FRAMES]
+
+
+def test_it_holds_no_blender_data_and_does_not_change(found):
+    """What a pickle holds is plain."""
+    from shutter_addon.blender.data import snapshot
+    from shutter_addon.blender.editing import bar_edits, region_edits, shutter_edits
+
+    edit, effect, strip = found
+    taken = snapshot.take(edit, effect, strip, FRAMES)
+    before, plain = states(taken), pickle.dumps(taken)
+    assert len(set(before)) == len(before) - 4  # the last keys hold from frame 20 on
+    bar_edits.paint(effect, 0, [0, 1, 1, 0])
+    region_edits.remove_region(effect, 0)
+    shutter_edits.remove_shutter(effect, 1)
+    effect.light = "ENCODED"
+    strip.transform.offset_x = 9
+    edit.sequence_editor.strips.remove(strip)
+    assert states(taken) == before == states(pickle.loads(plain))
+
+
+def test_many_frames_are_those_of_each(found):
+    """However many are sampled at once, and in whatever way bars are interpolated."""
+    from shutter_addon.blender.data import snapshot
+
+    for interpolation in ("DISPLACEMENT", "VALUE"):
+        found[1].interpolation = interpolation
+        single = [snapshot.take(*found, (frame,)).state(frame).key for frame in FRAMES]
+        assert states(snapshot.take(*found, FRAMES)) == single
+
+
+def test_what_is_wrong_at_one_frame_is_told_there(found):
+    from shutter_addon.blender.data import fcurves, snapshot
+    from shutter_addon.blender.data.validation import EffectError
+
+    edit, effect, _ = found
+    path = f"{effect.path_from_id()}.shutters[0].bars"
+    for i in range(4):  # closes at frame 9 alone
+        fcurves.set_keys(edit, f"{path}[{i}].weight", 0, [(8, 1, "linear"), (9, 0, "linear"), (10, 1, "linear")])
+    taken = snapshot.take(*found, FRAMES)
+    assert taken.state(8).bars[0].tolist() == taken.state(10).bars[0].tolist() == [1] * 4
+    with pytest.raises(EffectError, match='shutter "Long" at frame 9: all bars are zero'):
+        taken.state(9)
+
+
+def test_scribbles_follow_a_keyed_transform(found):
+    from shutter_addon.blender.data import snapshot
+
+    *_, strip = found
+    still = snapshot.take(*found, FRAMES)
+    for frame, offset in ((1, 0), (12, 10)):
+        strip.transform.offset_x = offset
+        strip.transform.keyframe_insert("offset_x", frame=frame)
+    moving = snapshot.take(*found, FRAMES)
+    for frame, pixels in ((1, 0), (12, 10), (24, 10)):
+        apart = still.state(frame).shapes[0].strokes[0] - moving.state(frame).shapes[0].strokes[0]
+        assert apart[:, 0] * 40 == pytest.approx([pixels] * 2, abs=1e-4)
+
+
+def test_what_is_drawn_is_read_once_until_something_changes(bpy, found, monkeypatch):
+    from shutter_addon.blender.data import snapshot
+    from shutter_addon.blender.rendering import invalidation
+
+    edit, effect, strip = found
+    asked, take, look = [], snapshot.take, snapshot.source_files
+    monkeypatch.setattr(snapshot, "take", lambda *a, **k: asked.append("take") or take(*a, **k))
+    monkeypatch.setattr(snapshot, "source_files", lambda *a: asked.append("files") or look(*a))
+    invalidation.invalidate_changed(edit)
+
+    def drawn():
+        asked.clear()
+        invalidation.invalidate_changed(edit)
+        return {id(invalidation.current(edit, effect, strip, 5)) for _ in range(3)}
+
+    assert len(drawn()) == 1
+    assert asked == ["files", "take"]
+    kept = drawn()
+    assert asked == ["files"]
+    assert drawn() == kept
+    effect.shutters[0].bars[0].weight = 0.5
+    assert drawn() != kept
+    assert asked == ["files", "take"]

@@ -1,0 +1,82 @@
+"""The effect as plain data: channels, and what is wrong at one frame alone."""
+
+import numpy as np
+import pytest
+
+from shutter_addon.core import effect, keyframes, limits
+from shutter_addon.core.frame_state import Options
+from shutter_addon.core.keyframes import Bars, Constant, Keys, Samples, SourceTime
+from shutter_addon.core.messages import EffectError
+
+FIRST, LAST = np.array([1.0, 0, 0, 0]), np.array([0, 0, 0, 1.0])
+
+
+def made(bars, regions=(), **options) -> effect.Effect:
+    shutter = effect.Shutter("Sharp", (1, 1, 1), bars)
+    return effect.Effect((shutter,), tuple(regions), Constant(Options(4, **options)))
+
+
+def region(strokes, placement=None, name="Face") -> effect.Region:
+    drawings = effect.Drawings((1.0,), (strokes,), ("linear",), 1.0, placement)
+    return effect.Region(name, 0, *map(Constant, ("line", 0.1)), drawings, *map(Constant, ((0, 0), 0.0, 1.0)))
+
+
+def test_an_error_among_samples_is_raised_at_its_frame_alone():
+    bars = Bars(Samples({1: FIRST, 2: EffectError("broken at two")}))
+    assert made(bars).at(1).bars.tolist() == [FIRST.tolist()]
+    with pytest.raises(EffectError, match="broken at two"):
+        made(bars).at(2)
+    with pytest.raises(KeyError):
+        made(bars).at(3)
+
+
+def test_bars_move_between_keys_by_their_share():
+    keys = ((1.0, "linear"), (4.0, "constant"))
+    by_eases = Bars(Keys((1.0, 4.0), (FIRST, LAST), ("linear", "constant")), keys)
+    assert by_eases.at(2, "displacement").tolist() == [0, 1, 0, 0]
+    assert by_eases.at(2, "value") == pytest.approx([2 / 3, 0, 0, 1 / 3])
+    sampled = Bars(by_eases.channel, keys, Samples({2: 2 / 3}))
+    assert sampled.at(2, "displacement").tolist() == [0, 0, 1, 0]
+    assert sampled.at(-5, "displacement").tolist() == FIRST.tolist()
+    assert sampled.at(9, "displacement").tolist() == LAST.tolist()
+
+
+def test_the_way_to_a_closed_shutter_is_no_displacement():
+    keys = ((1.0, "linear"), (5.0, "linear"))
+    closing = Bars(Keys((1.0, 5.0), (FIRST, 0 * FIRST), ("linear", "linear")), keys)
+    assert closing.at(2, "displacement").tolist() == [0.75, 0, 0, 0]
+    with pytest.raises(EffectError, match='shutter "Sharp" at frame 5: all bars are zero'):
+        made(closing).at(5)
+
+
+def test_time_that_stands_still_runs_as_it_came():
+    frames, values = (1.0, 11.0, 21.0), (10.0, 5.0, 5.0)
+    eases = ("linear",) * 3
+    time = SourceTime(Keys(frames, values, eases), tuple(zip(frames, eases, strict=True)))
+    assert time.at(6) == (7.5, True)
+    assert time.at(11) == (5, True)
+    assert time.at(40) == (5, True)
+    jump = SourceTime(Keys((1.0, 11.0), (10.0, 5.0), ("constant",) * 2), ((1.0, "constant"), (11.0, "constant")))
+    assert jump.at(20) == (5, False)
+
+
+def test_strokes_lie_where_their_placement_has_them():
+    matrix = np.array([[0.5, 0, 0.1], [0, 0.5, 0.2], [0, 0, 1]])
+    (stroke,) = made(Bars(Constant(FIRST)), [region([np.ones((2, 2))], Constant(matrix))]).at(1).shapes[0].strokes
+    assert stroke == pytest.approx(np.array([[0.6, 0.7]] * 2))
+    assert made(Bars(Constant(FIRST)), [region([np.ones((2, 2))], Constant(None))]).at(1).shapes[0].strokes == ()
+
+
+def test_strokes_far_off_and_too_many_points_are_refused():
+    far = region([np.full((2, 2), 10 * limits.MAX_DISTANCE)], Constant(np.eye(3)))
+    with pytest.raises(EffectError, match='region "Face": a point of its strokes is nowhere near the picture'):
+        made(Bars(Constant(FIRST)), [far]).at(1)
+    half = [np.zeros((limits.MAX_POINTS // 2 + 1, 2))]
+    assert len(made(Bars(Constant(FIRST)), [region(half)]).at(1).shapes) == 1
+    with pytest.raises(EffectError, match='region "Second": more than'):
+        made(Bars(Constant(FIRST)), [region(half), region(half, name="Second")]).at(1)
+
+
+def test_eases_are_those_that_begin_a_span():
+    assert keyframes.eased_span((1.0, 3.0, 5.0), ("linear", "constant", "linear"), 4.9) == (1, 2, 0.0)
+    assert keyframes.eased_span((1.0, 3.0), ("bezier", "linear"), 2.0) == (0, 1, 0.5)
