@@ -375,7 +375,7 @@ def test_a_longer_name_of_a_file_shows_and_is_no_recipe(effect_on, place):
 
 
 def test_what_no_recipe_can_hold(effect_on):
-    from shutter_addon.blender.data.effects import EffectError
+    from shutter_addon.core.messages import EffectError
 
     edit, effect, _ = effect_on
     with pytest.raises(EffectError, match='"Shutter" has no shutter'):
@@ -402,7 +402,7 @@ def test_what_no_recipe_can_hold(effect_on):
 @pytest.mark.parametrize("part", ["time", "shutters", "regions"])
 def test_keys_that_cannot_lie_there_leave_the_effect_as_it_was(effect_on, part, keys, sentence):
     """The strip begins at frame 31, and Blender counts frames in float32."""
-    from shutter_addon.blender.data.effects import EffectError
+    from shutter_addon.core.messages import EffectError
 
     apply(effect_on, BASE)
     before = export(effect_on)
