@@ -3,11 +3,11 @@
 Frames of each film go to a folder of its name in SHUTTER_PICTURES; what they have to be is test_window.py's."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folders)
-import contextlib
 import json
 import random
 import sys
 import threading
+import time
 from functools import partial
 from pathlib import Path
 
@@ -17,12 +17,11 @@ import bpy
 import numpy as np
 import support
 import traces
-from driver import OUT, enable, key, move, override, play, region_of, saw, until, area_of
+from driver import OUT, enable, override, play, saw, until
 
 FRAMES, ACTIONS, PER_FRAME, SIZE = 90, 200, 3, (64, 96)
-DELETED_AT = -(-ACTIONS // PER_FRAME)
 rendering = partial(bpy.app.is_job_running, "RENDER")
-random_ = random.Random(14)
+random_ = random.Random(int(__import__("os").environ.get("SHUTTER_SEED","14")))
 
 
 def part(name):
@@ -241,26 +240,23 @@ def strip_deleted(name):
 
 
 class Film:
-    """A film as a job of the window. Every frame waits for a step of the story; when there are no more, the rest is
-    made at once.
+    """A film as a job of the window, whose frames wait for a story: each before it begins, and once more when its
+    picture is made, before Blender gets it.
 
-    A step is a function of one that lets the frame be made: what comes after is done beside it."""
+    So Blender's own code does not run where data is changed: it crashes, without the extension as well, where strips
+    or keys are removed while it looks at them on a job's thread."""
 
     def __init__(self, name):
-        self.name, self.ended, self.asked = name, None, 0
-        self._steps = threading.Semaphore(0)
+        self.name, self.ended = name, None
+        self.begun = self.asked = 0  # the last frame that began, and of which a picture is asked for
+        self._gate = threading.Condition()
+        self._free = self._finished = 0  # the last frame that may begin, and that may be finished
 
-    def _before_frame(self, scene, *_):
-        if scene.name == "Edit":
-            self.asked += 1
-            self._steps.acquire()
-
-    def _end(self, how, scene, *_):
-        if scene.name == "Edit":
-            self.ended = how
-
-    def story(self, steps=(), **options):
-        """options: of the operator that renders."""
+    def story(self, steps=(), film=True):
+        """steps: generator functions of a film, each while a frame waits; the other frames do not.
+        film: or else the picture of the current frame alone."""
+        session, self._picture = part("rendering.session"), part("rendering.session").picture
+        session.picture = self._waiting
         handlers = {
             "render_pre": self._before_frame,
             "render_cancel": partial(self._end, "cancelled"),
@@ -268,40 +264,111 @@ class Film:
         }
         for name, function in handlers.items():
             getattr(bpy.app.handlers, name).append(function)
-        edit().render.filepath = str(OUT / self.name) + "/"
+        edit().render.filepath = str(OUT / self.name) + ("/" if film else f"/{edit().frame_current:04d}.png")
         with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], scene=edit()):
-            bpy.ops.render.render("INVOKE_DEFAULT", **({"animation": True} | options))
+            bpy.ops.render.render("INVOKE_DEFAULT", animation=film, write_still=not film)
         for number, step in enumerate(steps, start=1):
-            while self.asked < number and not self.ended:
-                yield 0.01
-            step(self._steps.release)
-        self._steps.release(FRAMES)
+            yield from self._until(lambda number=number: self.begun == number)
+            yield from step(self) or ()
+            self.let(number, number)
+        self.let(FRAMES, FRAMES)
         yield from until(lambda: self.ended and not rendering(), "the render ends", 100)
         for name, function in handlers.items():
             getattr(bpy.app.handlers, name).remove(function)
-        saw(film=self.name, ended=self.ended, begun=self.asked)
+        session.picture = self._picture
+        saw(film=self.name, ended=self.ended, begun=self.begun)
+
+    def picture_asked(self):
+        """Lets the frame that waits begin, until its picture is asked for, or the next one waits, as the sequencer has
+        kept its picture; generator: yield from it."""
+        number = self.begun
+        self.let(number, number - 1)
+        yield from self._until(lambda: self.asked == number or self.begun > number)
+
+    def let(self, free: int, finished: int):
+        """Lets frames begin, and be finished, up to these."""
+        with self._gate:
+            self._free, self._finished = free, finished
+            self._gate.notify_all()
+
+    def _until(self, condition):
+        return until(lambda: condition() or self.ended, "the film goes on", 60, wait=0.01)
+
+    def _before_frame(self, scene, *_):
+        if scene.name == "Edit":
+            self.begun += 1
+            with self._gate:
+                self._gate.wait_for(lambda: self._free >= self.begun)
+
+    def _waiting(self, *arguments):
+        self.asked = self.begun
+        picture = self._picture(*arguments)
+        with self._gate:
+            self._gate.wait_for(lambda: self._finished >= self.asked)
+        return picture
+
+    def _end(self, how, scene, *_):
+        if scene.name == "Edit":
+            self.ended = how
 
 
-def work(go):
-    go()
+def worked(film):
+    """Beside a picture that is made."""
+    yield from film.picture_asked()
     for _ in range(PER_FRAME):
         random_.choice(WORK)()
 
 
-def deleted(name, go):
-    """Between two frames: Blender crashes by itself, without the extension, where a strip that it renders is deleted."""
+def deleted(name, _film):
     strip_deleted(name)
-    go()
+
+
+def effect_added(_film):
+    """Another effect on the film's source, which is read as it is shown."""
+    edit().sequence_editor.active_strip = strip("Source")
+    with override("SEQUENCER"):
+        assert bpy.ops.shutter.add_effect("EXEC_DEFAULT", True) == {"FINISHED"}
+
+
+def undone(film):
+    """It ends the render; Blender's main thread waits for that."""
+    yield from film.picture_asked()
+    film.let(FRAMES, FRAMES)
+    bpy.ops.ed.undo()
+
+
+def undone_as_it_asks(film):
+    """The main thread waits for the job's, which asks the main one to read an effect."""
+    film.let(FRAMES, FRAMES)
+    while not asks():
+        time.sleep(0.01)
+    bpy.ops.ed.undo()
+
+
+def asks():
+    """Whether another thread waits for this one."""
+    for frame in sys._current_frames().values():
+        while frame is not None:
+            if frame.f_code.co_name == "on_main_thread":
+                return True
+            frame = frame.f_back
+    return False
 
 
 def story():
     yield from opened()
     yield from Film("alone").story()
     yield from again()
-    yield from Film("stressed").story([*[work] * DELETED_AT, partial(deleted, "Shutter")])
+    yield from Film("stressed").story([*[worked] * -(-ACTIONS // PER_FRAME), partial(deleted, "Shutter")])
     yield from Film("after").story()
     yield from again()
-    yield from Film("source").story([work, partial(deleted, "Source"), work, work])
+    yield from Film("source").story([worked, partial(deleted, "Source"), worked, worked])
+    yield from again()
+    edit().frame_set(20)
+    yield from Film("picture").story([worked], film=False)
+    for name, last in (("undone", [undone]), ("asking", [effect_added, undone_as_it_asks])):
+        yield from again()
+        yield from Film(name).story([worked, *last])
 
 
 play(story)
