@@ -21,7 +21,7 @@ from driver import OUT, enable, override, play, saw, until
 
 FRAMES, ACTIONS, PER_FRAME, SIZE = 90, 200, 3, (64, 96)
 rendering = partial(bpy.app.is_job_running, "RENDER")
-random_ = random.Random(int(__import__("os").environ.get("SHUTTER_SEED","14")))
+random_ = random.Random(14)
 
 
 def part(name):
@@ -243,8 +243,8 @@ class Film:
     """A film as a job of the window, whose frames wait for a story: each before it begins, and once more when its
     picture is made, before Blender gets it.
 
-    So Blender's own code does not run where data is changed: it crashes, without the extension as well, where strips
-    or keys are removed while it looks at them on a job's thread."""
+    So Blender's own code does not run on the job's thread where data is changed: without the extension as well it
+    crashes where strips, keys or scenes are removed while it reads them there."""
 
     def __init__(self, name):
         self.name, self.ended = name, None
@@ -270,6 +270,7 @@ class Film:
         for number, step in enumerate(steps, start=1):
             yield from self._until(lambda number=number: self.begun == number)
             yield from step(self) or ()
+            update()
             self.let(number, number)
         self.let(FRAMES, FRAMES)
         yield from until(lambda: self.ended and not rendering(), "the render ends", 100)
@@ -323,26 +324,42 @@ def deleted(name, _film):
     strip_deleted(name)
 
 
+def update():
+    """What Blender would do by itself, when it comes to it: it reads what was changed."""
+    for scene in (bpy.context.window_manager.windows[0].scene, edit()):
+        scene.view_layers[0].update()
+
+
+def scene_deleted(_film):
+    bpy.data.scenes.remove(effect().scene)
+
+
 def effect_added(_film):
     """Another effect on the film's source, which is read as it is shown."""
     edit().sequence_editor.active_strip = strip("Source")
     with override("SEQUENCER"):
         assert bpy.ops.shutter.add_effect("EXEC_DEFAULT", True) == {"FINISHED"}
+    edit().sequence_editor.active_strip.channel = 9  # over the other
 
 
 def undone(film):
     """It ends the render; Blender's main thread waits for that."""
     yield from film.picture_asked()
     film.let(FRAMES, FRAMES)
-    bpy.ops.ed.undo()
+    undo()
 
 
 def undone_as_it_asks(film):
     """The main thread waits for the job's, which asks the main one to read an effect."""
     film.let(FRAMES, FRAMES)
-    while not asks():
+    while not asks() and not film.ended:
         time.sleep(0.01)
-    bpy.ops.ed.undo()
+    undo()
+
+
+def undo():
+    with override("SEQUENCER"):
+        bpy.ops.ed.undo()
 
 
 def asks():
@@ -366,9 +383,13 @@ def story():
     yield from again()
     edit().frame_set(20)
     yield from Film("picture").story([worked], film=False)
-    for name, last in (("undone", [undone]), ("asking", [effect_added, undone_as_it_asks])):
+    for name, steps in (
+        ("scene", [worked, scene_deleted]),
+        ("undone", [worked, undone]),
+        ("asking", [effect_added, undone_as_it_asks]),
+    ):
         yield from again()
-        yield from Film(name).story([worked, *last])
+        yield from Film(name).story(steps)
 
 
 play(story)
