@@ -126,14 +126,15 @@ def drag(region, points, hold=()):
     yield
 
 
-def until(condition, what, seconds=10, again=None):
-    """Waits for a condition; generator: yield from it. again: called now and every two seconds until it comes about."""
-    for step in range(int(seconds / STEP)):
+def until(condition, what, seconds=10, again=None, wait=STEP):
+    """Waits for a condition; generator: yield from it. again: called now and every two seconds until it comes about.
+    wait: seconds from one look to the next."""
+    for step in range(int(seconds / wait)):
         if condition():
             return
-        if again and step % int(2 / STEP) == 0:
+        if again and step % int(2 / wait) == 0:
             again()
-        yield STEP
+        yield wait
     raise AssertionError(f"it did not come about that {what}")
 
 

@@ -147,3 +147,33 @@ def test_renders_that_end_early(tmp_path):
     (scenes,) = (entry["scenes"] for entry in seen if "scenes" in entry)
     assert len(scenes) == 2
     assert [entry["shown"][0] for entry in seen if "shown" in entry] == [[360, 640, 4]]
+
+
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_a_film_shows_what_was_when_it_began(backend, tmp_path):
+    """200 changes while a film renders, at the end the strip deleted: no frame is another one before, and then the
+    frames are those without it. So with the source deleted, and a single picture. A film ends where the effect's scene
+    is deleted, and by undo, even while it waits for Blender's main thread."""
+    seen, console = tell("stress.py", backend, linked(tmp_path))
+    assert "Traceback" not in console
+    films = {entry["film"]: entry for entry in seen}
+    ended = {name: film["ended"] for name, film in films.items()}
+    assert ended == dict.fromkeys(("alone", "stressed", "after", "source", "picture"), "complete") | dict.fromkeys(
+        ("scene", "undone", "asking"), "cancelled"
+    )
+    assert console.count('Virtual Shutter: the scene of "Shutter" was deleted') == 1
+    pictures = {name: {p.name: pixels(p) for p in (tmp_path / name).iterdir()} for name in films}
+    alone, stressed, after = (pictures[name] for name in ("alone", "stressed", "after"))
+    assert len(alone) == len(stressed) == len(after) == 90
+    names = sorted(alone)
+    assert_same(pictures["source"], alone, names)
+    assert_same(pictures["picture"], alone, ["0020.png"])
+    assert_same(stressed, alone, names[:67])
+    assert_same(stressed, after, names[67:])
+    assert not any(np.array_equal(alone[name], after[name]) for name in names)
+
+
+def assert_same(film, expected, names):
+    """These frames are there and are the expected ones, bit for bit."""
+    different = [name for name in names if not np.array_equal(film[name], expected[name])]
+    assert not different

@@ -103,14 +103,15 @@ def telling(to: Callable[[str], None]):
 
 def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None):
     """What a function gives on Blender's main thread, where its data and its operators belong; None: it was not waited
-    for. ended: whether nobody waits for it any longer; without it, the window is not waited for long."""
+    for, and is not called any more. ended: whether nobody waits for it any longer; without it, the window is not waited
+    for long. Once it is called, its end is waited for."""
     if not in_job():
         return function()
-    done, deadline, found = threading.Event(), time.monotonic() + _LONG, []
+    chance, done, deadline, found = threading.Lock(), threading.Event(), time.monotonic() + _LONG, []
     ended = ended or (lambda: time.monotonic() > deadline)
 
     def call():
-        if not done.is_set():
+        if chance.acquire(blocking=False):
             try:
                 found.append((True, function()))
             except Exception as error:
@@ -119,9 +120,9 @@ def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None):
 
     bpy.app.timers.register(call)
     while not done.wait(_PATIENCE):
-        if ended():
-            done.set()
-    good, value = found[0] if found else (True, None)
+        if ended() and chance.acquire(blocking=False):
+            return None
+    good, value = found[0]
     if not good:
         raise value
     return value
