@@ -51,8 +51,9 @@ def test_rooms_use_those_below_them_alone():
     folders = {path.name for path in (PACKAGE / "blender").iterdir() if path.is_dir() and path.name != "__pycache__"}
     assert folders == ROOMS.keys()
     for room, below in ROOMS.items():
-        for path in (PACKAGE / "blender" / room).glob("*.py"):
-            used = {name.split(".")[2] for name in imported(path) if re.match(r"\.\.\w", name)}
+        for path in (PACKAGE / "blender" / room).rglob("*.py"):
+            up = "." * len(path.relative_to(PACKAGE / "blender").parts)
+            used = {name.lstrip(".").split(".")[0] for name in imported(path) if re.match(re.escape(up) + r"\w", name)}
             assert used <= below, f"{room}/{path.name} uses {used - below}"
 
 

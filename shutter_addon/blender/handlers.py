@@ -59,17 +59,17 @@ def _show_scribbles():
 def _before_render(scene, *_):
     if render_job.cancelling():
         return
-    render_job.begin(scene)
-    if scene.render.engine == strips.ENGINE:
-        if not render_job.in_job():
-            invalidation.drop_spoilt()
-        return
-    film = scene.session_uid
-    render_job.on_main_thread(partial(_prepare, film, render_job.in_job()))
+    is_film = render_job.begin(scene)
+    if scene.render.engine == strips.ENGINE and not render_job.in_job():
+        invalidation.drop_spoilt()
+    if is_film and scene.render.engine != strips.ENGINE:
+        film = scene.session_uid
+        if not render_job.on_main_thread(partial(_prepare, film, render_job.in_job())):
+            render_job.fail("Blender's window did not answer, and the effects could not be read")
 
 
-def _prepare(film: int, in_job: bool) -> None:
-    """On the main thread, whatever thread renders."""
+def _prepare(film: int, in_job: bool) -> bool:
+    """On the main thread, whatever thread renders. True: it has been done."""
     invalidation.drop_spoilt()
     source_media.look_again()
     source_media.rest(render_job.runs())
@@ -81,6 +81,7 @@ def _prepare(film: int, in_job: bool) -> None:
         invalidation.invalidate_changed(edit)
     if in_job:
         job_snapshots.begin(film)
+    return True
 
 
 @persistent

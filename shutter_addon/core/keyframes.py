@@ -158,5 +158,5 @@ def eased_span(frames, eases, frame: float) -> tuple[int, int, float]:
 
 def _given(value):
     if isinstance(value, EffectError):
-        raise value
+        raise value.with_traceback(None)  # which would grow with every raise
     return value

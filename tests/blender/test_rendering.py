@@ -312,3 +312,24 @@ def test_blender_itself_renders_an_effect_without_its_camera(bpy, film, blender,
     assert done.returncode == 0, done.stdout + done.stderr
     expected = read_picture(tmp_path / "in" / "f0003.png")
     assert np.abs(read_picture(tmp_path / "out" / "0002.png")[..., :3] - expected).max() <= 1
+
+
+def test_a_scene_within_a_film_does_not_begin_it_again(bpy, film, monkeypatch):
+    """Blender tells of a render's beginning for every Scene strip, at every frame."""
+    from shutter_addon.blender import handlers
+
+    shown = bpy.data.scenes.new("Shown")
+    shown.render.engine, shown.render.resolution_x, shown.render.resolution_y = "CYCLES", 8, 8
+    shown.cycles.samples = 1
+    shown.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    shown.collection.objects.link(shown.camera)
+    film.sequence_editor.strips.new_scene("Shown", shown, 7, 1)
+    told, begun, prepare = [], [], handlers._prepare
+    monkeypatch.setattr(handlers, "_prepare", lambda *arguments: begun.append(arguments) or prepare(*arguments))
+    bpy.app.handlers.render_init.append(lambda scene, *_: told.append(scene.name))
+    try:
+        bpy.ops.render.render(animation=True)
+    finally:
+        bpy.app.handlers.render_init.pop()
+    assert told.count("Shown") > 1
+    assert begun == [(film.session_uid, False)]

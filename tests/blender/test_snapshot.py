@@ -4,7 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
-from support import write_frames
+from support import sequencer, write_frames
 
 FRAMES = range(1, 25)
 
@@ -121,3 +121,40 @@ def test_what_is_drawn_is_read_once_until_something_changes(bpy, found, monkeypa
     effect.shutters[0].bars[0].weight = 0.5
     assert drawn() != kept
     assert asked == ["files", "take"]
+
+
+def test_a_part_of_a_cut_source_is_read_as_itself(bpy, found):
+    """Though the files of another part were looked at last."""
+    from shutter_addon.blender.data import snapshot, strips
+    from shutter_addon.blender.rendering import invalidation
+
+    edit, effect, strip = found
+    source = strips.source_of(edit, effect, strip)
+    right = source.split(12, "SOFT")
+    right.colorspace_settings.name = "Non-Color"
+    with sequencer(bpy):
+        for other in edit.sequence_editor.strips_all:
+            other.select = other == strip
+        bpy.ops.sequencer.split(frame=12, type="SOFT", side="RIGHT")
+    (later,) = (s for s in strips.effect_strips(edit) if s != strip)
+    invalidation.invalidate_changed(edit)
+    for part, own in ((strip, source), (later, right), (strip, source)):
+        taken = invalidation.current(edit, effect, part, part.left_handle)
+        assert taken.timing.name == own.name
+        assert taken.source.options["colorspace"] == own.colorspace_settings.name
+        assert snapshot.take(edit, effect, part, (part.left_handle,)).source == taken.source
+
+
+def test_another_factor_is_another_source_though_nothing_is_built(found, tmp_path):
+    from support import request
+
+    from shutter_addon.blender.rendering import session
+
+    edit, effect, strip = found
+    with session.using(session.RenderSettings("cpu", inbetween=tmp_path / "none")):
+        sources = []
+        for factor, method in (("1", "QUICK"), ("4", "QUICK"), ("4", "GOOD"), ("1", "GOOD")):
+            effect.inbetween, effect.inbetween_method = factor, method
+            sources.append(request(edit, effect, strip, 3).renderer.source)
+            assert sources[-1].step == int(factor)
+    assert len(set(map(id, sources))) == 4

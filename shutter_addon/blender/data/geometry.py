@@ -3,7 +3,7 @@
 import numpy as np
 
 
-@np.errstate(invalid="ignore")  # of a transform that is no number nothing is; annotations.image_to_picture says so
+@np.errstate(invalid="ignore")  # the result is then not finite, which annotations.image_to_picture reports
 def picture_to_image(strip, size, **moved) -> np.ndarray:
     """Matrix (3, 3) from fractions of the strip's picture to the sequencer's image space.
 

@@ -15,7 +15,8 @@ def recipe_of(edit, effect, strip) -> recipe.Recipe:
     if not -limits.MAX_FRAME <= shown.start <= shown.stop <= limits.MAX_FRAME:
         sentence = rpt_('strip "{strip}" lies at frames {first} to {last}, where no timeline is')
         raise EffectError(sentence.format(strip=strip.name, first=shown.start, last=shown.stop - 1))
-    for item in (*effect.shutters, *strips.drawn_regions(effect)):
+    drawn = [region for region in strips.drawn_regions(effect) if annotations.layer_of(effect, region)]
+    for item in (*effect.shutters, *drawn):
         _check_name(item)
     for shutter in effect.shutters:
         for component in shutter.color:

@@ -1,4 +1,4 @@
-"""A number that grows with every change that Blender tells of, and what is worked out once for each.
+"""A number that grows with every change that Blender tells of, and values that are kept until it does.
 
 Blender tells of properties (their update callbacks), of what its depsgraph sees (keys, strips), of undo and of files.
 It tells nobody of strokes and of files on disk: previews look for them when they are drawn (rendering/invalidation.py).
@@ -38,10 +38,10 @@ class UntilChange:
             try:
                 self._values[key] = True, make()
             except Exception as error:
-                self._values[key] = False, error
+                self._values[key] = False, error.with_traceback(None)
         good, value = self._values[key]
         if not good:
-            raise value
+            raise value.with_traceback(None)  # which would grow with every raise
         return value
 
     def clear(self) -> None:

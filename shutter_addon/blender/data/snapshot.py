@@ -40,7 +40,7 @@ class Snapshot:
 
     scene: session_uid of the effect's scene, whose frame 0 is shown at the timeline frame `origin`
     effect: its channels are sampled at `frames`
-    source: what is read, and `timing`, when
+    source: what is read, and `timing`, when; None: the effect's own source time says that
     inbetween: its in-between frames, None: it has none; built: the stamp of those there are
     first: the strip's first timeline frame; film: from frame to frame of the edit's film, and its last frame"""
 
@@ -51,7 +51,7 @@ class Snapshot:
     frames: frozenset[float]
     effect: model.Effect
     source: source_media.SourceSpec
-    timing: StripTiming
+    timing: StripTiming | None
     inbetween: inbetween_settings.Settings | None
     built: tuple
 
@@ -82,11 +82,14 @@ def source_files(effect, source, folder: Path | None = None) -> SourceFiles:
     return SourceFiles(key, built)
 
 
-def take(edit, effect, strip, frames, *, folder: Path | None = None, files: SourceFiles | None = None) -> Snapshot:
-    """The snapshot of an effect strip at timeline frames; folder: as for source_files, or what that has found.
+def take(
+    edit, effect, strip, frames, *, folder: Path | None = None, files: dict[str, SourceFiles] | None = None
+) -> Snapshot:
+    """The snapshot of an effect strip at timeline frames; folder: as for source_files; files: what that has
+    found, by source strip.
     EffectError, MediaError: there is no source, or no picture at any frame."""
     source = strips.source_of(edit, effect, strip)
-    files = files or source_files(effect, source, folder)
+    found = (files or {}).get(source.name) or source_files(effect, source, folder)
     return Snapshot(
         effect.scene.session_uid,
         strips.timeline_frame(strip, 0),
@@ -94,10 +97,10 @@ def take(edit, effect, strip, frames, *, folder: Path | None = None, files: Sour
         (edit.frame_step, edit.frame_end),
         frozenset(frames),
         read(edit, effect, strip, frames),
-        source_media.spec(source, files.key),
-        timing_of(source),
+        source_media.spec(source, found.key),
+        None if effect.use_source_time else timing_of(source),
         inbetween_settings.settings(effect, folder) if inbetween_settings.factor(effect) > 1 else None,
-        files.built,
+        found.built,
     )
 
 
@@ -247,12 +250,15 @@ def _bars(curves: Curves, path: str, shutter, options: keyframes.Channel, frames
         validation.check(shutter.bars, "weight", bars)
         return bars
 
+    ways = {frame: state.interpolation for frame, state in chosen.items()}
+    if thorough:  # whatever the options are there
+        ways = dict.fromkeys(frames, "displacement") | ways
     if not keyed:
         return keyframes.Bars(keyframes.Constant(_tried(at, 0.0) if len(stored) else stored))
     keys = curves.keys(list(keyed.values()))
     if not keys:  # curves of samples or of modifiers alone
         return keyframes.Bars(keyframes.Samples({frame: _tried(at, frame) for frame in frames}))
-    return _keyed_bars(keys, list(keyed.values()), at, {f: chosen[f].interpolation for f in chosen}, thorough)
+    return _keyed_bars(keys, list(keyed.values()), at, ways, thorough)
 
 
 def _keyed_bars(keys, curves: list, at, frames: dict[float, str], thorough: bool) -> keyframes.Bars:

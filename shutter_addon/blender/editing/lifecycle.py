@@ -55,7 +55,7 @@ def _mend(strip) -> None:
 
 
 def follow_sources() -> None:
-    """What of an effect can only be as its source and its edit have it, is so."""
+    """Gives the scene of each effect its edit's rate and its source's size."""
     for edit in _edits():
         match_source.follow(edit)
 

@@ -41,7 +41,7 @@ _strokes = revision.UntilChange()
 def _strokes_now(edit, effect, strip) -> list[np.ndarray]:
     """The active region's strokes, not moved yet: read once until something changes."""
     index, frame = effect.active_region, edit.frame_current_final
-    key = effect.scene.session_uid, index, frame
+    key = effect.scene.session_uid, strip.name, index, frame
     return _strokes.get(key, lambda: snapshot.strokes_at(edit, effect, strip, index, frame))
 
 

@@ -23,7 +23,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         try:
             self._render(depsgraph)
         except BaseException as error:  # Blender would print it, and render the frame without the effect
-            invalidation.spoilt.add(depsgraph.scene.session_uid)
+            invalidation.spoil(depsgraph.scene.session_uid)
             if not isinstance(error, session.StoppedError):
                 fail(self, _in_words(error))
             elif not self.test_break():

@@ -14,9 +14,9 @@ from ..data.validation import EffectError
 from . import render_job, session
 
 _signatures: dict[int, int] = {}  # by effect scene
-_files: dict[int, tuple[int, SourceFiles]] = {}  # by effect scene: the revision at which they were looked at, and what
+_files: dict[int, tuple[int, dict[str, SourceFiles]]] = {}  # by effect scene: the revision of the look, files by source
 _current = revision.UntilChange()
-spoilt: set[int] = set()  # session_uids of scenes of whose frames the sequencer may keep one that failed
+_spoilt: set[int] = set()  # session_uids of scenes of whose frames the sequencer may keep one that failed
 
 # Keyframe.interpolation as a number: constant, linear, bezier, then the others.
 _BEZIER = 2
@@ -56,18 +56,23 @@ def drop_removed() -> None:
             del known[uid]
 
 
+def spoil(scene: int) -> None:
+    """A picture of an effect scene, by its session_uid, failed."""
+    _spoilt.add(scene)
+
+
 def drop_spoilt() -> None:
     """Drops what the sequencer keeps of pictures that failed: it would show them again without asking."""
-    for edit in bpy.data.scenes if spoilt else ():
+    failed = {_spoilt.pop() for _ in range(len(_spoilt))}
+    for edit in bpy.data.scenes if failed else ():
         for strip in strips.effect_strips(edit):
-            if strip.scene.session_uid in spoilt:
+            if strip.scene.session_uid in failed:
                 strip.invalidate_cache("RAW")
-    spoilt.clear()
 
 
 def drop_spoilt_later() -> None:
     """As drop_spoilt, from whatever thread."""
-    if spoilt:
+    if _spoilt:
         render_job.soon(drop_spoilt)
 
 
@@ -142,10 +147,11 @@ def _source(effect, source, looked: dict):
     yield source_media.reading(source)
     yield tuple(key.timeline_frame for key in getattr(source, "retiming_keys", ()))
     try:
-        files = looked[effect.scene.session_uid] = snapshot.source_files(effect, source, session.settings().inbetween)
+        files = snapshot.source_files(effect, source, session.settings().inbetween)
     except (MediaError, EffectError) as error:
         yield str(error)  # a file that was missing may be there again
     else:
+        looked[effect.scene.session_uid] = {source.name: files}
         yield files
 
 

@@ -2,8 +2,8 @@
 
 On Blender's main thread an effect is read when its picture is asked for. A job of the window renders on a thread of its
 own, while the editor goes on working: its effects are read on the main thread when it begins, at every frame of the
-film, and not again. What was not read then, as a strip that was pasted later, is read when it is asked for, and told to
-the main thread.
+film, and not again. What was not read then (a strip that was pasted later, frames that a retimed effect strip skips to)
+is read on the main thread when it is asked for.
 """
 
 import math
@@ -24,8 +24,10 @@ _left_out: list[tuple[range, str]] = []  # of its film, see requirements.left_ou
 def begin(film: int) -> None:
     """Reads all effects for a job, on the main thread; film: session_uid of the scene that it renders."""
     _taken.clear()
-    for edit in bpy.data.scenes:
+    for edit in _shown(film):
         for effect, parts in _effects(edit):
+            if effect.scene.session_uid in _taken:  # of a copied edit: the first counts, as for strips.find_edit
+                continue
             try:
                 frames = _frames(edit, parts, edit.session_uid == film)
                 _taken[effect.scene.session_uid] = snapshot.take(edit, effect, parts[0], frames)
@@ -38,6 +40,7 @@ def end() -> None:
     """Forgets what was read, after a job."""
     _taken.clear()
     _left_out.clear()
+    session.end_job()
 
 
 def look(film: int) -> None:
@@ -64,7 +67,7 @@ def of(scene, scene_frame: float, ended: Callable[[], bool] | None = None) -> tu
         if found is None:
             raise session.StoppedError
         if isinstance(found, Exception):
-            raise found
+            raise found.with_traceback(None)
         return found, found.timeline_frame(scene_frame)
     edit, effect, strip = strips.find_edit(scene)
     frame = strips.timeline_frame(strip, scene_frame)
@@ -82,6 +85,17 @@ def _late(uid: int, scene_frame: float) -> Snapshot | Exception:
         return snapshot.take(edit, effect, strip, (strips.timeline_frame(strip, scene_frame),))
     except session.FAULTS as error:
         return error
+
+
+def _shown(film: int) -> list:
+    """The edits that a film shows: its own, and those of its Scene strips."""
+    found, new = [], [_scene(film)]
+    while new:
+        scene = new.pop()
+        if scene is not None and scene not in found and scene.sequence_editor:
+            found.append(scene)
+            new += [strip.scene for strip in scene.sequence_editor.strips_all if strip.type == "SCENE"]
+    return found
 
 
 def _scene(uid: int):

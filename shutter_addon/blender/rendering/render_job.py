@@ -36,14 +36,16 @@ _film: int | None = None  # session_uid of the scene whose render runs; neither 
 _begun = False
 
 
-def begin(scene) -> None:
-    """A render begins: of a film, of a scene in one, or of a preview."""
+def begin(scene) -> bool:
+    """A render begins. True: that of a film or a picture; not of a scene in one, nor of a preview."""
     global _film, _begun, failure, _stopping
     is_effect = scene.render.engine == ENGINE
     in_film = _film is not None and (_begun or is_effect)
     in_preview = is_effect and not (bpy.app.background or in_job())
-    if not (in_film or in_preview):
-        _film, _begun, failure, _stopping = scene.session_uid, False, None, False
+    if in_film or in_preview:
+        return False
+    _film, _begun, failure, _stopping = scene.session_uid, False, None, False
+    return True
 
 
 def runs() -> bool:

@@ -185,7 +185,7 @@ class RenderSession:
             self._compositor, message = self.run(self._open)
             if message:
                 say(message)
-        key = snapshot.source, snapshot.built
+        key = snapshot.source, snapshot.inbetween, snapshot.built
         old_key, renderer = self._renderers.pop(snapshot.scene, (None, None))
         if old_key != key:
             if renderer is not None:
@@ -195,6 +195,10 @@ class RenderSession:
         while len(self._renderers) > _KEPT:
             self.run(self._renderers.pop(next(iter(self._renderers)))[1].close)
         return renderer
+
+    def forget_requests(self) -> None:
+        """Lets go of the last requests, and of their snapshots."""
+        self._requests.clear()
 
     def keep(self, scenes: set[int]) -> None:
         """Closes what belongs to other scenes than those of these session_uids. A render job may take them away
@@ -279,6 +283,8 @@ def picture(snapshot: Snapshot, frame: float, say: Callable[[str], None] = print
     One of FAULTS: there is none, in one sentence. say: called with a sentence when the device is a lesser one, or cuts
     cannot be found. stopped: asked whether the picture is not wanted any longer; StoppedError: it is not.
     """
+    if stopped():
+        raise StoppedError
     request = here().request(snapshot, frame, say)
     if request.state.options.stop_at_cuts:
         _say_of_cuts(say)
@@ -319,6 +325,11 @@ def _open(snapshot: Snapshot) -> ShotSource:
     except FAULTS:
         medium.close()
         raise
+
+
+def end_job() -> None:
+    """Lets go of the snapshots of a job of the window."""
+    _offscreen.forget_requests()
 
 
 def drop_removed() -> None:
