@@ -35,8 +35,8 @@ def look(edit, effect, strip) -> Look:
     """How things are, or were a second ago. MediaError, EffectError: there is no source, or no place for frames."""
     source = strips.source_of(edit, effect, strip)
     settings = inbetween_settings.settings(effect)
-    medium, doubled = _known(source)
-    key = source_media.media_key(source), *settings
+    medium, doubled = _known(spec := source_media.spec(source))
+    key = spec.key, *settings
     when, *found = _looks.get(key, (0.0,))
     if not when or time.monotonic() - when > _FRESH:
         found = inbetween_cache.state(medium, *settings), inbetween_cache.size(settings[0], medium)
@@ -45,15 +45,14 @@ def look(edit, effect, strip) -> Look:
     return Look(*found, doubled.result() * (settings[1] - 1) if doubled.done() else None)
 
 
-def _known(source) -> tuple:
-    """The source strip's medium, and a future of the bytes that its in-between frames take for a factor of 2."""
-    key = source_media.media_key(source)
-    if key not in _media:
-        medium = source_media.open_media(source)
+def _known(spec: source_media.SourceSpec) -> tuple:
+    """A source's medium, and a future of the bytes that its in-between frames take for a factor of 2."""
+    if spec.key not in _media:
+        medium = spec.open()
         medium.close()
-        _media[key] = medium, _in_thread(_estimated, medium)
+        _media[spec.key] = medium, _in_thread(_estimated, medium)
     _trim(_media)
-    return _media[key]
+    return _media[spec.key]
 
 
 def _trim(known: dict) -> None:
@@ -128,7 +127,7 @@ def ended() -> None:
 def purge(effect, source) -> tuple[int, list[tuple]]:
     """Removes the in-between frames of an effect's source strip, of every factor and method; the bytes that they took,
     and the folders where other files stay, with their number. EffectError, MediaError, OSError: it cannot be done."""
-    folder, (medium, _) = inbetween_settings.folder(effect), _known(source)
+    folder, (medium, _) = inbetween_settings.folder(effect), _known(source_media.spec(source))
     left = []
     freed = inbetween_cache.purge(folder, medium, lambda *place: left.append(place))
     with suppress(OSError):  # other sources' are left there, or it never was
