@@ -8,6 +8,7 @@ Scribbles stay where they lie on the picture.
 from collections import Counter
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import bpy
 import mathutils
@@ -27,7 +28,7 @@ _LOOK = {
 }
 _RANGE = n_("range")
 _KEPT = 256
-_differences = revision.UntilChange()
+_shown = revision.UntilChange()
 _sizes: dict[tuple, tuple[int, int] | None] = {}  # of media, by their keys: their headers are read once
 
 
@@ -83,9 +84,25 @@ def parts(effect) -> list[tuple]:
     return [(strip, source) for strip, source in pairs if source is not None]
 
 
-def differences_shown(effect) -> list[str]:
-    """As differences, for what is drawn: worked out once until something changes."""
-    return _differences.get(effect.scene.session_uid, lambda: differences(effect))
+class Shown(NamedTuple):
+    """What panels say of an effect beside its source: what `match` would change, in words to be translated; whether it
+    lacks modifiers of its source, and whether effect strips of Blender's are on that; None: it has no source."""
+
+    differences: list[str]
+    lacks_modifiers: bool
+    has_effects: bool
+
+
+def shown(effect) -> Shown | None:
+    """For what is drawn: worked out once until something changes."""
+    return _shown.get(effect.scene.session_uid, lambda: _compare(effect))
+
+
+def _compare(effect) -> Shown | None:
+    if not (found := parts(effect)):
+        return None
+    lacks = any(missing_modifiers(part, source) for part, source in found)
+    return Shown(differences(effect), lacks, any(effects_on(effect.id_data, source) for _part, source in found))
 
 
 def differences(effect) -> list[str]:

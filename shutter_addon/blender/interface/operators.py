@@ -123,9 +123,9 @@ class SHUTTER_OT_match_source(_OfEffect, Operator):
 
     @classmethod
     def possible(cls, effect):
-        if not match_source.parts(effect):
+        if (shown := match_source.shown(effect)) is None:
             return refused(cls, rpt_("The Shutter strip has no source any more"))
-        if not match_source.differences_shown(effect):
+        if not shown.differences:
             return refused(cls, rpt_("The Shutter strip is like its source"))
         return True
 
@@ -143,8 +143,10 @@ class SHUTTER_OT_copy_modifiers(_OfEffect, Operator):
 
     @classmethod
     def possible(cls, effect):
-        lacks = any(match_source.missing_modifiers(*pair) for pair in match_source.parts(effect))
-        return lacks or refused(cls, rpt_("The Shutter strip has the modifiers of its source"))
+        shown = match_source.shown(effect)
+        if shown is None or not shown.lacks_modifiers:
+            return refused(cls, rpt_("The Shutter strip has the modifiers of its source"))
+        return True
 
     def change(self, _context, effect):
         match_source.copy_modifiers(effect)

@@ -127,18 +127,19 @@ def _draw_live(layout, context):
 
 def _draw_source(layout, effect):
     """What the effect does not have from its source, and the way to it."""
-    if words := match_source.differences_shown(effect):
-        what = ", ".join(iface_(word) for word in words)
+    if (shown := match_source.shown(effect)) is None:
+        return
+    if shown.differences:
+        what = ", ".join(iface_(word) for word in shown.differences)
         column = layout.column(align=True)
         text = iface_("Differs from its source: {what}").format(what=what)
         column.label(text=text, icon="INFO", translate=False)
         column.operator("shutter.match_source")
-    found = match_source.parts(effect)
-    if any(match_source.missing_modifiers(part, source) for part, source in found):
+    if shown.lacks_modifiers:
         column = layout.column(align=True)
         column.label(text="Modifiers of the source do not reach the effect", icon="INFO")
         column.operator("shutter.copy_modifiers")
-    if any(match_source.effects_on(effect.id_data, source) for _part, source in found):
+    if shown.has_effects:
         column = layout.column(align=True)
         column.label(text="Effect strips on the source do not reach the effect", icon="INFO")
         column.label(text="Make the Shutter strip their input", icon="BLANK1")
