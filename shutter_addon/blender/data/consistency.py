@@ -97,7 +97,7 @@ def _change_bars(effect, index: int, change) -> None:
     curves = fcurves.Curves(edit)
     old = bars(shutter)
     keyed = {k: curve for k in range(len(old)) if (curve := curves.find(f"{path}[{k}].weight"))}
-    words = sorted(fcurves.eases(keyed.values()).items())
+    words = curves.keys(list(keyed.values()))
     keys = [(frame, change(_bars_keyed(old, keyed, frame)), ease) for frame, ease in words]
     fcurves.remove_curves(edit, f"{path}[")
     shutter.bars.clear()

@@ -88,14 +88,6 @@ def key_frames(curves) -> list[float]:
     return np.unique(np.concatenate([np.empty(0, np.float32), *frames])).tolist()
 
 
-def eases(curves) -> dict[float, str]:
-    """The recipe's word for the ease of every key of the curves by its frame: of the first curve that has one there."""
-    found: dict[float, str] = {}
-    for curve in curves:
-        found = dict(zip(_frames(curve).tolist(), _eases(curve), strict=True)) | found
-    return found
-
-
 def leading(curves, start: float, end: float):
     """Of F-curves, the one that changes most between two frames, and its values at them: its easing is that of all."""
     ends = [(curve, curve.evaluate(start), curve.evaluate(end)) for curve in curves]

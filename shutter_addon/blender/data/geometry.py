@@ -2,6 +2,9 @@
 
 import numpy as np
 
+# The numbers of a strip's transform that can be keyed.
+TRANSFORM = ("offset_x", "offset_y", "scale_x", "scale_y", "rotation")
+
 
 @np.errstate(invalid="ignore")  # the result is then not finite, which annotations.image_to_picture reports
 def picture_to_image(strip, size, **moved) -> np.ndarray:
@@ -12,10 +15,7 @@ def picture_to_image(strip, size, **moved) -> np.ndarray:
     Blender scales and turns a strip about its transform's origin, and mirrors the whole image after that.
     """
     width, height = size
-    x, y, scale_x, scale_y, rotation = (
-        moved.get(name, getattr(strip.transform, name))
-        for name in ("offset_x", "offset_y", "scale_x", "scale_y", "rotation")
-    )
+    x, y, scale_x, scale_y, rotation = (moved.get(name, getattr(strip.transform, name)) for name in TRANSFORM)
     cos, sin = np.cos(rotation), np.sin(rotation)
     pivot = (np.array(strip.transform.origin) - 0.5) * (width, height)
     linear = np.array([[cos, -sin], [sin, cos]]) * (scale_x, scale_y)

@@ -19,12 +19,11 @@ from ...core import keyframes, limits
 from ...core.frame_state import FrameState, Options
 from ...core.messages import EffectError
 from ...core.retiming import StripTiming
-from . import annotations, inbetween_settings, source_media, strips, validation
+from . import annotations, geometry, inbetween_settings, source_media, strips, validation
 from .fcurves import Curves, leading, progress
 from .strip_timing import timing_of
 
 OPTIONS = ("position", "interpolation", "light", "exposure", "edges")
-_MOVED = ("offset_x", "offset_y", "scale_x", "scale_y", "rotation")  # of a strip's transform, where it is keyed
 # Sentences of core/effect.py and core/retiming.py, which are looked up where they are passed on.
 _CORE = (
     n_('shutter "{name}" at frame {frame}: {fault}'),
@@ -202,11 +201,11 @@ def _options(curves: Curves, path: str, effect, frames) -> keyframes.Channel:
     if error := next((error for error in found.values() if isinstance(error, EffectError)), None):
         return keyframes.Constant(error)
     if not any(found.values()):
-        return keyframes.Constant(_tried(options_at, effect, found, 0.0))
-    return keyframes.Samples({frame: _tried(options_at, effect, found, frame) for frame in frames})
+        return keyframes.Constant(_tried(_options_at, effect, found, 0.0))
+    return keyframes.Samples({frame: _tried(_options_at, effect, found, frame) for frame in frames})
 
 
-def options_at(effect, curves: dict, frame: float) -> Options:
+def _options_at(effect, curves: dict, frame: float) -> Options:
     """The effect's options in the recipe's words at a frame; curves: F-curves or None by name. EffectError: one that no
     effect can have."""
 
@@ -332,7 +331,7 @@ def _drawings(curves: Curves, path: str, effect, region, placement, frames) -> m
 def _placement(curves: Curves, effect, strip, frames) -> keyframes.Channel:
     """The matrix from the sequencer's image to the strip's picture, which may be keyed."""
     size, path = annotations.picture_size(effect), f"{strip.path_from_id()}.transform"
-    keyed = {name: curve for name in _MOVED if (curve := _tried(curves.find, f"{path}.{name}"))}
+    keyed = {name: curve for name in geometry.TRANSFORM if (curve := _tried(curves.find, f"{path}.{name}"))}
 
     def at(frame):
         moved = {name: curve.evaluate(frame) for name, curve in keyed.items() if not isinstance(curve, EffectError)}

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ...media import MediaError
-from ..data import fcurves, revision, snapshot, source_media, strips
+from ..data import fcurves, geometry, revision, snapshot, source_media, strips
 from ..data.snapshot import Snapshot, SourceFiles
 from ..data.validation import EffectError
 from . import render_job, session
@@ -20,7 +20,6 @@ _spoilt: set[int] = set()  # session_uids of scenes of whose frames the sequence
 
 # Keyframe.interpolation as a number: constant, linear, bezier, then the others.
 _BEZIER = 2
-_PLACE = ("offset_x", "offset_y", "scale_x", "scale_y", "rotation")
 _TIMING = (
     *("content_start", "content_end", "content_trim_start", "content_trim_end", "left_handle", "right_handle"),
     *("use_reverse_frames", "strobe"),
@@ -118,7 +117,7 @@ def _signature(edit, effect, strip, looked: dict):
             )
     transform = strip.transform
     # As words: "not a number" is never the same again.
-    yield repr([getattr(transform, name) for name in _PLACE]), repr(tuple(transform.origin))
+    yield repr([getattr(transform, name) for name in geometry.TRANSFORM]), repr(tuple(transform.origin))
     yield strip.use_flip_x, strip.use_flip_y  # scribbles lie mirrored with it
     if (source := strips.nearest_source(edit, effect, strip)) is not None:
         yield from _source(effect, source, looked)
