@@ -11,6 +11,7 @@ from .interface import (
     preview,
     region_gizmo,
     split_gizmo,
+    track_operators,
     translations,
 )
 from .rendering import engine
@@ -23,6 +24,7 @@ _modules = (
     preview,
     operators,
     inbetween_operators,
+    track_operators,
     panels,
     bar_editor,
     region_gizmo,

@@ -29,7 +29,7 @@ class Curves:
         no timeline is."""
         curve = self._curves.get((path, index))
         if curve is not None and curve not in self._frames:
-            frames = _frames(curve)
+            frames = frames_of(curve)
             beyond = validation.beyond_timeline(frames)
             if beyond.size:
                 owner, _, name = path.rpartition(".")
@@ -68,7 +68,7 @@ class Curves:
         return validation.curved(owner, name, curve, frame)
 
 
-def _frames(curve) -> np.ndarray:
+def frames_of(curve) -> np.ndarray:
     """Frames (n,) of an F-curve's keys."""
     points = np.empty(2 * len(curve.keyframe_points), np.float32)
     curve.keyframe_points.foreach_get("co", points)
@@ -84,7 +84,7 @@ def _eases(curve) -> list[str]:
 
 def key_frames(curves) -> list[float]:
     """Frames with a key on any of the curves, ascending."""
-    frames = [_frames(curve) for curve in curves]
+    frames = [frames_of(curve) for curve in curves]
     return np.unique(np.concatenate([np.empty(0, np.float32), *frames])).tolist()
 
 
@@ -122,6 +122,16 @@ def new_curve(scene, path: str, index: int = 0, group: str = ""):
     if (old := bag.fcurves.find(path, index=index)) is not None:
         bag.fcurves.remove(old)
     return bag.fcurves.new(path, index=index, group_name=group)
+
+
+def ensure_curve(scene, path: str, index: int = 0, group: str = ""):
+    """The F-curve of a property; a new one, in a group of that name, where there is none."""
+    return _channelbag(scene).fcurves.ensure(path, index=index, group_name=group)
+
+
+def find_curve(scene, path: str, index: int = 0):
+    """The F-curve of a property as it is, muted or not; or None."""
+    return next((c for c in curves_under(scene, path) if (c.data_path, c.array_index) == (path, index)), None)
 
 
 def _channelbag(scene):

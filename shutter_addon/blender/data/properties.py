@@ -79,6 +79,17 @@ KINDS = (
     ("LASSO", "Lasso", "All that the strokes enclose"),
 )
 
+MOTIONS = (
+    ("LOCATION", "Location", "The region is moved"),
+    ("ROTATION", "Location, Rotation", "The region is moved and turned"),
+    ("SCALE", "Location, Rotation, Scale", "The region is moved, turned and scaled"),
+)
+FOLLOWED = (
+    ("TRACK", "Track", "A single track, which moves the region and does not turn it"),
+    ("PLANE", "Plane Track", "The corners of a plane track"),
+    ("OBJECT", "Object", "All tracks of an object, or of the camera"),
+)
+
 # The renderer asks the F-curves itself: keys on these would show, and not render.
 _UNKEYED = set()
 
@@ -162,6 +173,16 @@ class Shutter(PropertyGroup):
     bars: CollectionProperty(type=ShutterBar)
 
 
+class TrackStop(PropertyGroup):
+    """Where tracking of a region stopped before it was to.
+
+    frame: counts from the effect's start, so that it moves with its strips"""
+
+    frame: FloatProperty()
+    forward: BoolProperty()
+    fault: StringProperty()
+
+
 class ShutterRegion(PropertyGroup):
     name: StringProperty(name="Name", description="Name of the region", default="Region", set_transform=_shortened)
     shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=_changed)
@@ -207,6 +228,49 @@ class ShutterRegion(PropertyGroup):
         max=MAX_SCALE,
         update=_changed,
     )
+    confidence: FloatProperty(
+        name="Confidence",
+        description="How sure tracking was of where the region is",
+        subtype="PERCENTAGE",
+        default=100.0,
+        min=0.0,
+        max=100.0,
+    )
+    stops: CollectionProperty(type=TrackStop)
+    motion: EnumProperty(
+        name="Motion",
+        description="What tracking and following key",
+        items=MOTIONS,
+        default="SCALE",
+        options=_UNKEYED,
+        translation_context=CONTEXT,
+    )
+    track_until: IntProperty(
+        name="Until",
+        description="Timeline frame at which tracking stops; 0 is the end of the strip",
+        options=_UNKEYED,
+        translation_context=CONTEXT,
+    )
+    track_all_keys: BoolProperty(
+        name="All Keys",
+        description="Keep a key at every tracked frame, in place of those that the motion needs within a pixel",
+        options=_UNKEYED,
+    )
+    follow_clip: PointerProperty(
+        name="Clip",
+        description="Movie clip of the source's footage, in which something is tracked",
+        type=bpy.types.MovieClip,
+    )
+    follow_kind: EnumProperty(
+        name="Follow", description="What the region follows", items=FOLLOWED, default="TRACK", options=_UNKEYED
+    )
+    follow_object: StringProperty(
+        name="Object", description="Tracking object that has the tracks; without one, the camera"
+    )
+    follow_track: StringProperty(name="Track", description="Name of the track or plane track that is followed")
+    # Where the region's own place counts, from the effect's start; and of what the keys were made.
+    follow_frame: FloatProperty(options={"HIDDEN"})
+    follow_stamp: StringProperty(options={"HIDDEN"})
 
 
 class ShutterEffect(PropertyGroup):
@@ -313,7 +377,7 @@ class ShutterScene(PropertyGroup):
     identity: StringProperty()
 
 
-classes = (ShutterBar, Shutter, ShutterRegion, ShutterEffect, ShutterScene)
+classes = (ShutterBar, Shutter, TrackStop, ShutterRegion, ShutterEffect, ShutterScene)
 
 
 def register():

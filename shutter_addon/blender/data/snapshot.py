@@ -139,11 +139,16 @@ def bars_at(edit, effect, index: int, frame: float) -> np.ndarray:
 
 def strokes_at(edit, effect, strip, index: int, frame: float) -> list[np.ndarray]:
     """A region's strokes (n, 2) on the picture at a timeline frame, not moved yet. EffectError: they lie nowhere."""
-    curves, region, frames = Curves(edit), effect.regions[index], (frame,)
-    path = f"{effect.path_from_id()}.regions[{index}]"
-    placement = _placement(curves, effect, strip, frames)
     with translated():
-        return _region(curves, path, effect, region, 0, placement, frames).unmoved(frame)
+        return region_at(edit, effect, strip, index, (frame,)).unmoved(frame)
+
+
+def region_at(edit, effect, strip, index: int, frames) -> model.Region:
+    """A region as plain data, its channels sampled at timeline frames. What is wrong at one frame is told at that
+    frame."""
+    curves, path = Curves(edit), f"{effect.path_from_id()}.regions[{index}]"
+    placement = _placement(curves, effect, strip, frames)
+    return _region(curves, path, effect, effect.regions[index], 0, placement, frames)
 
 
 @contextmanager

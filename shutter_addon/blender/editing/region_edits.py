@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..data import fcurves
 from ..data.annotations import annotation, layer_of
 from ..data.consistency import choose_region, color_layers, unique
 from . import collection_edits
@@ -79,8 +80,13 @@ def free_layers(effect, annotation) -> list:
     return [layer for layer in annotation.layers if layer.info not in taken] if annotation else []
 
 
-def key_region(effect, index: int) -> None:
-    """Keys a region's location, rotation and scale at the current frame."""
-    path = f"{effect.path_from_id()}.regions[{index}]"
-    for name in CHANNELS:
-        effect.id_data.keyframe_insert(f"{path}.{name}", group=effect.regions[index].name)
+def key_region(effect, index: int, channels=CHANNELS) -> None:
+    """Keys a region's location, rotation and scale at the current frame; where tracking has made a key, it is the
+    editor's from now on."""
+    edit, path = effect.id_data, f"{effect.path_from_id()}.regions[{index}]"
+    for name in channels:
+        edit.keyframe_insert(f"{path}.{name}", group=effect.regions[index].name)
+        for curve in fcurves.curves_under(edit, f"{path}.{name}"):
+            for key in curve.keyframe_points:
+                if key.co[0] == edit.frame_current_final:
+                    key.type = "KEYFRAME"

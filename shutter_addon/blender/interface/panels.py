@@ -6,11 +6,13 @@ from bpy.app.translations import pgettext_n as n_
 from bpy.types import Menu, Panel, UIList
 
 from ...media import cuts
+from ...media.tracking import SURE
 from ..data import annotations, selection, strips, validation
-from ..editing import bar_edits, match_source
+from ..data.properties import CONTEXT
+from ..editing import bar_edits, follow_track, match_source, track_region
 from ..rendering import inbetween_build
 from ..rendering.session import FAULTS
-from . import inbetween_operators
+from . import inbetween_operators, track_operators
 
 # Beyond this a column of numbers helps nobody: the bar editor and the Graph Editor do.
 _MOST_NUMBERS = 64
@@ -186,6 +188,70 @@ class _Regions(_WithEffect):
         layout.operator("shutter.region_key", text="Insert Keyframes", icon="KEY_HLT")
 
 
+class _WithRegion(_WithEffect):
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and selection.active_region(selection.active(context)[1]) is not None
+
+
+class _Track(_WithRegion):
+    bl_label = "Track"
+    bl_translation_context = CONTEXT
+
+    def draw(self, context):
+        layout = self.layout
+        edit, effect, _strip = selection.active(context)
+        region, index = selection.active_region(effect), effect.active_region
+        row = layout.row(align=True)
+        for direction, name, _description, icon, _number in track_operators.DIRECTIONS:
+            button = row.operator("shutter.track", text=iface_(name, CONTEXT), icon=icon, translate=False)
+            button.direction, button.motion = direction, region.motion
+            button.until, button.all_keys = region.track_until, region.track_all_keys
+        layout.use_property_split = True
+        layout.prop(region, "motion")
+        layout.prop(region, "track_until")
+        layout.prop(region, "track_all_keys")
+        confidence = track_region.confidence_at(effect, index, edit.frame_current)
+        if confidence is not None:
+            row = layout.row(align=True)
+            text = iface_("Confidence here: {percent} %").format(percent=f"{100 * confidence:.0f}")
+            row.label(text=text, icon="CHECKMARK" if confidence >= SURE else "ERROR", translate=False)
+            row.operator("shutter.track_look", text="", icon="NEXT_KEYFRAME")
+        for frame, fault in track_region.stops(effect, index):
+            row = layout.row(align=True)
+            row.label(text=fault, icon="ERROR", translate=False)
+            text = iface_("Frame {number}").format(number=frame)
+            row.operator("shutter.track_look", text=text, translate=False).frame = frame
+
+
+class _Follow(_WithRegion):
+    bl_label = "Follow"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        region = selection.active_region(selection.active(context)[1])
+        layout.prop(region, "follow_clip")
+        layout.prop(region, "follow_kind")
+        if region.follow_clip is not None:
+            _draw_tracks(layout, region, region.follow_clip.tracking)
+        if follow_track.is_changed(region):
+            layout.label(text="The track has changed", icon="ERROR")
+        row = layout.row(align=True)
+        row.operator("shutter.follow", icon="TRACKER")
+        row.operator("shutter.follow_update", icon="FILE_REFRESH")
+
+
+def _draw_tracks(layout, region, tracking) -> None:
+    layout.prop_search(region, "follow_object", tracking, "objects")
+    objects = tracking.objects
+    holder = objects.get(region.follow_object) if region.follow_object else objects[0]
+    if region.follow_kind != "OBJECT" and holder is not None:
+        kind = "plane_tracks" if region.follow_kind == "PLANE" else "tracks"
+        layout.prop_search(region, "follow_track", holder, kind)
+
+
 class _Bars(_WithEffect):
     bl_label = "Bars"
     bl_options = {"DEFAULT_CLOSED"}
@@ -322,6 +388,14 @@ class STRIP_PT_shutter_regions(_Regions, _InProperties, Panel):
     bl_parent_id = "STRIP_PT_shutter"
 
 
+class STRIP_PT_shutter_track(_Track, _InProperties, Panel):
+    bl_parent_id = "STRIP_PT_shutter"
+
+
+class STRIP_PT_shutter_follow(_Follow, _InProperties, Panel):
+    bl_parent_id = "STRIP_PT_shutter"
+
+
 class STRIP_PT_shutter_bars(_Bars, _InProperties, Panel):
     bl_parent_id = "STRIP_PT_shutter"
 
@@ -339,6 +413,14 @@ class SEQUENCER_PT_shutter(_Shutters, _InSidebar, Panel):
 
 
 class SEQUENCER_PT_shutter_regions(_Regions, _InSidebar, Panel):
+    bl_parent_id = "SEQUENCER_PT_shutter"
+
+
+class SEQUENCER_PT_shutter_track(_Track, _InSidebar, Panel):
+    bl_parent_id = "SEQUENCER_PT_shutter"
+
+
+class SEQUENCER_PT_shutter_follow(_Follow, _InSidebar, Panel):
     bl_parent_id = "SEQUENCER_PT_shutter"
 
 
@@ -379,11 +461,15 @@ classes = (
     SHUTTER_MT_shutters,
     STRIP_PT_shutter,
     STRIP_PT_shutter_regions,
+    STRIP_PT_shutter_track,
+    STRIP_PT_shutter_follow,
     STRIP_PT_shutter_bars,
     STRIP_PT_shutter_options,
     STRIP_PT_shutter_inbetween,
     SEQUENCER_PT_shutter,
     SEQUENCER_PT_shutter_regions,
+    SEQUENCER_PT_shutter_track,
+    SEQUENCER_PT_shutter_follow,
     SEQUENCER_PT_shutter_bars,
     SEQUENCER_PT_shutter_options,
     SEQUENCER_PT_shutter_inbetween,

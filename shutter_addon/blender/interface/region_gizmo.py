@@ -11,6 +11,7 @@ from bpy.types import Gizmo, GizmoGroup
 from ...core import scribbles
 from ..data import annotations, geometry, revision, selection, snapshot, validation
 from ..editing import bar_edits, region_edits
+from ..editing.motion_keys import MotionKeys
 from . import drawing, gizmo_keymaps
 
 _RADIUS = 7  # of a handle, in units of the interface
@@ -142,8 +143,9 @@ class SHUTTER_GT_region(Gizmo):
         if cancel:
             region.location, region.rotation, region.scale = self.before
             return
-        if bar_edits.auto_key(context):
-            region_edits.key_region(found[1], found[1].active_region)
+        effect, index = found[1], found[1].active_region
+        if bar_edits.auto_key(context) or MotionKeys(effect, index, region.motion).are_made():
+            region_edits.key_region(effect, index)
         bpy.ops.ed.undo_push(message=iface_("Transform Region", contexts.operator_default))
 
 

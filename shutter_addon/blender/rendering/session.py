@@ -142,13 +142,7 @@ class RenderSession:
         if known is not None and known[0] is snapshot and known[1] == frame and known[2].renderer is renderer:
             return known[2]
         state = snapshot.state(frame)
-        if snapshot.effect.time is not None:
-            time, backward = snapshot.effect.time.at(frame)
-            index = retiming.nearest(time - 1, renderer.source)
-        else:
-            with translated():
-                index = retiming.source_frame(snapshot.timing, frame, renderer.source)
-            backward = snapshot.timing.use_reverse_frames
+        index, backward = source_index(snapshot, frame, renderer.source)
         found = FrameRequest(renderer, index, state, -1 if backward else 1)
         self._requests[snapshot.scene] = snapshot, frame, found
         return found
@@ -190,7 +184,7 @@ class RenderSession:
         if old_key != key:
             if renderer is not None:
                 self.run(renderer.close)
-            renderer = Renderer(self._compositor, _open(snapshot))
+            renderer = Renderer(self._compositor, open_source(snapshot))
         self._renderers[snapshot.scene] = key, renderer
         while len(self._renderers) > _KEPT:
             self.run(self._renderers.pop(next(iter(self._renderers)))[1].close)
@@ -315,7 +309,17 @@ def pairs(snapshot: Snapshot) -> set[int]:
     return found
 
 
-def _open(snapshot: Snapshot) -> ShotSource:
+def source_index(snapshot: Snapshot, frame: float, source: ShotSource) -> tuple[int, bool]:
+    """Which frame of an effect's source is shown at a timeline frame, in-between frames counted, and whether the source
+    runs backward there. EffectError: it cannot be known."""
+    if snapshot.effect.time is not None:
+        time, backward = snapshot.effect.time.at(frame)
+        return retiming.nearest(time - 1, source), backward
+    with translated():
+        return retiming.source_frame(snapshot.timing, frame, source), snapshot.timing.use_reverse_frames
+
+
+def open_source(snapshot: Snapshot) -> ShotSource:
     """An effect's source, in-between frames included. EffectError, MediaError: there is none."""
     medium = snapshot.source.open()
     try:

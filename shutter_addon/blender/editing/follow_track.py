@@ -1,0 +1,239 @@
+"""A region that follows what Blender has tracked in a movie clip: a track, a plane track, or all tracks of an object.
+
+Markers lie at frames of the clip, 1 is its first, in fractions of its picture. A region is moved as they are, from
+where it is at one frame of the timeline, and from the editor's other keys; it gets keys as tracking makes them.
+"""
+
+import hashlib
+from bisect import bisect_left, bisect_right
+
+import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...core import motions
+from ...core.motions import Placement, Similarity
+from ..data import annotations, revision, snapshot, source_media, strips
+from ..data.validation import EffectError
+from ..rendering import session
+from . import region_edits
+from .motion_keys import MotionKeys
+
+# From the middle of a pixel, at which motions.Similarity has whole numbers, to its corner.
+_CORNER = 0.5 + 0.5j
+
+Points = dict[str, complex]  # where markers are in the picture, in pixels as motions.Similarity counts them
+
+
+def follow(edit, effect, strip, index: int) -> None:
+    """Keys a region by what it is set to follow, from where it is now, at the current frame. EffectError, MediaError:
+    it cannot be followed, and nothing has changed."""
+    start = edit.frame_current
+    points = _points(edit, effect, strip, index, start)
+    region_edits.key_region(effect, index)
+    effect.regions[index].follow_frame = start - effect.start
+    _key(edit, effect, strip, index, points)
+
+
+def update(edit, effect, strip, index: int) -> None:
+    """Keys a region anew by what it follows, from where it is at the frame at which it began to. EffectError,
+    MediaError: it cannot be followed, and nothing has changed."""
+    _key(edit, effect, strip, index, _points(edit, effect, strip, index, _start(effect, index)))
+
+
+def _start(effect, index: int) -> int:
+    return round(effect.start + effect.regions[index].follow_frame)
+
+
+def _key(edit, effect, strip, index: int, points: dict[int, Points]) -> None:
+    region, start, size = effect.regions[index], _start(effect, index), annotations.picture_size(effect)
+    keys = MotionKeys(effect, index, "LOCATION" if region.follow_kind == "TRACK" else region.motion)
+    known = sorted({start, *(frame for frame in keys.edited(range(min(points), max(points) + 1)) if frame in points)})
+    shape = snapshot.region_at(edit, effect, strip, index, points)
+    placements = _followed(shape, points, known, start, size)
+    kept = motions.thinned(placements, motions.offsets(shape.unmoved(start)), size, known)
+    frames = range(min(placements), max(placements) + 1)
+    confidence = {frame: float(frame in placements) for frame in frames}
+    keys.write({frame: placements[frame] for frame in kept}, confidence)
+    region.follow_stamp = stamp(region)
+    region.stops.clear()
+
+
+def is_changed(region) -> bool:
+    """Whether a region follows what has changed since; for what is drawn."""
+    if not region.follow_stamp:
+        return False
+    key = region.id_data.session_uid, region.path_from_id()
+    return region.follow_stamp != _stamps.get(key, lambda: stamp(region))
+
+
+_stamps = revision.UntilChange()
+
+
+def stamp(region) -> str:
+    """Changes with the markers that a region follows; empty where there are none."""
+    try:
+        found = _markers(region)
+    except EffectError:
+        return ""
+    digest = hashlib.sha256()
+    for name, frames, places in found:
+        digest.update(b"".join((name.encode(errors="surrogateescape"), frames.tobytes(), places.tobytes())))
+    return digest.hexdigest()
+
+
+def _markers(region) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Of each point that a region follows its name, the clip's frames (n,) at which it has a marker, ascending, and
+    where that is (n, 2), in fractions of the picture. EffectError: the clip has nothing of that name."""
+    clip = region.follow_clip
+    if clip is None:
+        raise EffectError(rpt_("Choose a clip first"))
+    holder = clip.tracking.objects.get(region.follow_object) if region.follow_object else clip.tracking.objects[0]
+    if holder is None:
+        raise EffectError(_missing(clip, region.follow_object))
+    if region.follow_kind == "OBJECT":
+        return [_track_markers(track) for track in holder.tracks]
+    named = (holder.plane_tracks if region.follow_kind == "PLANE" else holder.tracks).get(region.follow_track)
+    if named is None:
+        raise EffectError(_missing(clip, region.follow_track))
+    return _corners(named) if region.follow_kind == "PLANE" else [_track_markers(named)]
+
+
+def _missing(clip, name: str) -> str:
+    return rpt_('clip "{clip}" has no track "{track}"').format(clip=clip.name, track=name)
+
+
+def _track_markers(track) -> tuple[str, np.ndarray, np.ndarray]:
+    frames, shown = _frames(track.markers)
+    places = np.empty(2 * len(frames), np.float32)
+    track.markers.foreach_get("co", places)
+    return track.name, frames[shown], places.reshape(-1, 2)[shown] + np.array(track.offset, np.float32)
+
+
+def _corners(plane) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    frames, shown = _frames(plane.markers)
+    places = np.array([[tuple(corner) for corner in marker.corners] for marker in plane.markers], np.float32)
+    return [(str(k), frames[shown], places[shown, k]) for k in range(4)]
+
+
+def _frames(markers) -> tuple[np.ndarray, np.ndarray]:
+    frames, muted = np.empty(len(markers), np.int32), np.empty(len(markers), bool)
+    markers.foreach_get("frame", frames)
+    markers.foreach_get("mute", muted)
+    return frames, ~muted
+
+
+def _points(edit, effect, strip, index: int, start: int) -> dict[int, Points]:
+    """By timeline frame of the strip the points that a region follows, as the strip shows them. EffectError,
+    MediaError: there is nothing that it can follow from the frame `start` on."""
+    region = effect.regions[index]
+    tracks, size = _markers(region), annotations.picture_size(effect)
+    times = _clip_times(edit, effect, strip, region.follow_clip)
+    found = {frame: _points_at(tracks, time, size) for frame, time in times.items()}
+    found = {frame: points for frame, points in found.items() if points}
+    if start not in found:
+        sentence = rpt_('"{track}" of clip "{clip}" has no marker at frame {frame}')
+        name = region.follow_object if region.follow_kind == "OBJECT" else region.follow_track
+        raise EffectError(sentence.format(track=name, clip=region.follow_clip.name, frame=start))
+    with snapshot.translated():
+        shape = snapshot.region_at(edit, effect, strip, index, found)
+        if not all(shape.unmoved(frame) for frame in found):
+            raise EffectError(rpt_('region "{name}" has no strokes').format(name=region.name))
+    return found
+
+
+def _clip_times(edit, effect, strip, clip) -> dict[int, float]:
+    """By timeline frame of the strip what it shows, in the clip's frames: in-between frames lie between two of them."""
+    frames = range(strip.left_handle, strip.right_handle)
+    shown, first = snapshot.take(edit, effect, strip, frames), _first_frame(strips.source_of(edit, effect, strip), clip)
+    with session.open_source(shown) as source:
+        return {frame: session.source_index(shown, frame, source)[0] / source.step + first for frame in frames}
+
+
+def _points_at(tracks, time: float, size) -> Points:
+    """Of the markers (see _markers) those that there are at a time in the clip's frames."""
+    width, height = size
+    found = {name: _place_at(frames, places, time) for name, frames, places in tracks}
+    return {
+        name: complex(place[0] * width, (1 - place[1]) * height) - _CORNER
+        for name, place in found.items()
+        if place is not None
+    }
+
+
+def _first_frame(source, clip) -> int:
+    """The clip's frame that the first frame of a strip's medium is."""
+    if source.type == "MOVIECLIP" and not source_media.first_frame(source):
+        return 1
+    return 1 - clip.frame_offset
+
+
+def _place_at(frames: np.ndarray, places: np.ndarray, time: float) -> np.ndarray | None:
+    """Where a marker is at a time in the clip's frames: between two frames on the way from one to the other."""
+    ends = [np.flatnonzero(frames == end) for end in (np.floor(time), np.ceil(time))]
+    if not all(map(len, ends)):
+        return None
+    before, after = (places[end[0]].astype(np.float64) for end in ends)
+    return before + (time - np.floor(time)) * (after - before)
+
+
+def _followed(shape, points: dict[int, Points], known: list[int], start: int, size) -> dict[int, Placement]:
+    """By frame the placement of a region that is moved as the points are, from those at known frames; between two of
+    these, blended from both.
+
+    shape: a core.effect.Region"""
+    centres = {frame: motions.centre(shape.unmoved(frame)) for frame in points}
+    moves = {frame: _motions(points, frame) for frame in known}
+
+    def carried(origin, frame):
+        motion = moves[origin].get(frame)
+        return motion and motions.carried(_placement(shape, origin), motion, centres[origin], centres[frame], size)
+
+    def placed(frame, near):
+        origins = known[max(bisect_right(known, frame) - 1, 0)], known[min(bisect_left(known, frame), len(known) - 1)]
+        first, second = (
+            motions.unwound(found, near) if (found := carried(origin, frame)) else None for origin in origins
+        )
+        if first is None or second is None or origins[0] == origins[1]:
+            return first or second
+        return motions.between(first, second, (frame - origins[0]) / (origins[1] - origins[0]))
+
+    result = {start: _placement(shape, start)}
+    frames = sorted(points)
+    for way in ([f for f in frames if f > start], [f for f in reversed(frames) if f < start]):
+        near = result[start]
+        for frame in way:
+            if (found := placed(frame, near)) is not None:
+                near = result[frame] = found
+    return dict(sorted(result.items()))
+
+
+def _placement(shape, frame: int) -> Placement:
+    x, y = shape.location.at(frame)
+    return Placement((x, y), float(shape.rotation.at(frame)), shape.scale.at(frame))
+
+
+def _motions(points: dict[int, Points], origin: int) -> dict[int, Similarity]:
+    """By frame the motion from the points of one frame; where too few of these are left, by way of the frame before."""
+    found = {origin: Similarity()}
+    enough = min(2, len(points[origin]))
+    frames = sorted(points)
+    for way in ([f for f in frames if f > origin], [f for f in reversed(frames) if f < origin]):
+        before = origin
+        for frame in way:
+            for base in (origin, before):
+                shared = sorted(points[base].keys() & points[frame].keys())
+                if len(shared) >= enough:
+                    ends = ([points[end][name] for name in shared] for end in (base, frame))
+                    found[frame] = _similarity(*ends).after(found[base])
+                    before = frame
+                    break
+    return found
+
+
+def _similarity(before: list[complex], after: list[complex]) -> Similarity:
+    """The motion that takes points to others with the least squared error; a single one is shifted alone."""
+    first, second = np.array(before), np.array(after)
+    apart = first - first.mean()
+    spread = np.vdot(apart, apart).real
+    turn = complex(np.vdot(apart, second - second.mean()) / spread) if spread else 1 + 0j
+    return Similarity(turn, complex(second.mean() - turn * first.mean()))

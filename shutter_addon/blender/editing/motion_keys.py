@@ -1,0 +1,101 @@
+"""Keys of a region's motion: those that tracking has made, among those of the editor, who mends it by more of them.
+
+What was made has Blender's key type Generated, which editors show in a colour of its own. All other keys are the
+editor's: they keep frame and value, and are linear where a made key follows.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...core.motions import Placement
+from ..data import fcurves
+
+MADE = "GENERATED"
+_MADE = bpy.types.Keyframe.bl_rna.properties["type"].enum_items[MADE].value
+# The region's channels, and how many of their components a motion has.
+_COMPONENTS = (("location", 0), ("location", 1), ("rotation", 0), ("scale", 0))
+_COUNTS = {"LOCATION": 2, "ROTATION": 3, "SCALE": 4}
+
+
+@dataclass(frozen=True)
+class MotionKeys:
+    """The keys of an effect's region for a motion (properties.MOTIONS); frames are timeline frames of the edit."""
+
+    effect: bpy.types.PropertyGroup
+    index: int
+    motion: str
+
+    def edited(self, frames: range) -> list[int]:
+        """The whole frames, among these, at which the editor has set a key."""
+        curves = (self._curve(name, component) for name, component in _COMPONENTS[: _COUNTS[self.motion]])
+        found = {frame for curve in curves if curve for frame in fcurves.frames_of(curve)[~_are_made(curve)].tolist()}
+        return sorted(int(frame) for frame in found if frame in frames)
+
+    def are_made(self) -> bool:
+        """Whether any key of the region's location was made."""
+        curve = self._curve("location")
+        return curve is not None and bool(_are_made(curve).any())
+
+    def write(self, placements: Mapping[int, Placement], confidence: Mapping[int, float]) -> None:
+        """Makes keys at these frames, in place of all that were made from the first frame of the confidence to its
+        last, of the channels that are not keyed as well.
+
+        confidence: 0 to 1 by frame"""
+        within = min(confidence), max(confidence)
+        for k, (name, component) in enumerate(_COMPONENTS):
+            is_keyed = k < _COUNTS[self.motion]
+            values = {frame: _values(placement)[k] for frame, placement in placements.items()} if is_keyed else {}
+            if (curve := self._curve(name, component, new=is_keyed)) is not None:
+                _replace(curve, values, *within)
+        _replace(self._curve("confidence", new=True), {f: 100 * share for f, share in confidence.items()}, *within)
+
+    def confidence(self) -> tuple[np.ndarray, np.ndarray]:
+        """The frames (n,) that have a confidence, ascending, and what it is, 0 to 1."""
+        curve = self._curve("confidence")
+        points = np.array([key.co for key in curve.keyframe_points]) if curve else np.empty((0, 2))
+        return points[:, 0], points[:, 1] / 100
+
+    def _curve(self, name: str, component: int = 0, *, new: bool = False):
+        edit, path = self.effect.id_data, f"{self.effect.path_from_id()}.regions[{self.index}].{name}"
+        if new:
+            return fcurves.ensure_curve(edit, path, component, self.effect.regions[self.index].name)
+        return fcurves.find_curve(edit, path, component)
+
+
+def placement_now(region) -> Placement:
+    """Where a region is as its properties stand: at the current frame, keyed or not."""
+    return Placement(tuple(region.location), float(np.degrees(region.rotation)), region.scale)
+
+
+def _values(placement: Placement) -> tuple[float, ...]:
+    """In the order of _COMPONENTS, as Blender has them."""
+    return *placement.location, np.radians(placement.rotation), placement.scale
+
+
+def _replace(curve, values: dict[int, float], first: int, last: int) -> None:
+    """Makes keys of these values by frame, in place of those that were made from the first frame to the last."""
+    points = curve.keyframe_points
+    for i in np.flatnonzero(_within(curve, first, last) & _are_made(curve))[::-1].tolist():
+        points.remove(points[i], fast=True)
+    edited = set(fcurves.frames_of(curve).tolist())
+    for frame in sorted(values.keys() - edited):
+        points.insert(frame, values[frame], options={"FAST"}, keyframe_type=MADE)
+    if values:
+        begins_span = fcurves.frames_of(curve) < last
+        for i in np.flatnonzero(_within(curve, first, last) & (begins_span | _are_made(curve))).tolist():
+            points[i].interpolation = "LINEAR"
+    curve.update()
+
+
+def _within(curve, first: int, last: int) -> np.ndarray:
+    frames = fcurves.frames_of(curve)
+    return (frames >= first) & (frames <= last)
+
+
+def _are_made(curve) -> np.ndarray:
+    types = np.empty(len(curve.keyframe_points), np.int32)
+    curve.keyframe_points.foreach_get("type", types)
+    return types == _MADE

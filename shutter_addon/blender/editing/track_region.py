@@ -1,0 +1,152 @@
+"""A region that is tracked through what its strip shows, from where it is at the current frame on.
+
+A key comes with every frame that is tracked, so that the preview can go along; at the end they are thinned to those
+that the motion needs within a pixel of the picture.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...core import motions
+from ...core.effect import Region
+from ...core.keyframes import Samples
+from ...media import tracking
+from ...media.tracking import Tracked
+from ..data import annotations, snapshot
+from ..data.validation import EffectError
+from ..rendering import session
+from . import region_edits
+from .motion_keys import MotionKeys, placement_now
+
+# Sentences of media/tracking.py, which are looked up where they are shown.
+_FAULTS = (
+    n_("the shot ends here"),
+    n_("the subject is covered, or looks too different"),
+    n_("the subject has left the picture"),
+    n_("there are too few corners to follow"),
+    n_("the region has no strokes to follow"),
+    n_("the region lies outside the picture"),
+    n_("there is no other frame to track"),
+)
+
+
+def frames_to_track(edit, strip, direction: str, until: int = 0) -> range:
+    """The timeline frames from the current one FORWARD, BACKWARD or in BOTH directions: as far as the strip goes, and
+    not beyond the frame `until`, unless that is 0. EffectError: the current one is none of the strip's."""
+    current, first, last = edit.frame_current, strip.left_handle, strip.right_handle - 1
+    if not first <= current <= last:
+        raise EffectError(rpt_("the current frame is outside of the Shutter strip"))
+    if until and until < current:
+        first = max(first, until)
+    elif until:
+        last = min(last, until)
+    return range(current if direction == "FORWARD" else first, (current if direction == "BACKWARD" else last) + 1)
+
+
+def track(edit, effect, strip, index: int, frames: range, motion: str, *, all_keys: bool = False) -> Iterator[int]:
+    """Tracks a region from the current frame through timeline frames (frames_to_track). Gives each frame once it is
+    keyed. Closed early, it keeps what it has.
+
+    motion: one of properties.MOTIONS; all_keys: keys are not thinned
+    EffectError, MediaError: it cannot be tracked; where no frame has come yet, nothing has changed."""
+    start, keys = edit.frame_current, MotionKeys(effect, index, motion)
+    anchors = [frame for frame in keys.edited(frames) if frame != start]
+    here = Tracked(start, placement_now(effect.regions[index]), 1.0)
+    shape = _standing(_region(edit, effect, strip, index, [start, *anchors]), here)
+    found, stops = {start: here}, []
+    shown = snapshot.take(edit, effect, strip, frames)
+    with session.open_source(shown) as source:
+        try:
+            for tracked in _followed(shape, shown, source, start, frames, motion, anchors):
+                if tracked.fault:
+                    stops.append(tracked)
+                elif tracked.frame != start:
+                    if len(found) == 1:
+                        region_edits.key_region(effect, index)
+                    found[tracked.frame] = tracked
+                    beside = found.get(tracked.frame + (-1 if tracked.frame > start else 1), tracked)
+                    _write(keys, [beside, tracked], [beside, tracked])
+                    yield tracked.frame
+        finally:
+            if len(found) > 1:
+                kept = found if all_keys else _thinned(effect, shape, found, {start, *anchors})
+                _write(keys, [found[frame] for frame in kept], found.values())
+                _mark(effect, index, frames, found, stops)
+    if len(found) == 1:
+        raise EffectError(rpt_(stops[0].fault))
+
+
+def stops(effect, index: int) -> list[tuple[int, str]]:
+    """The timeline frames at which tracking of a region stopped, ascending, and why, in the user's language."""
+    return sorted((round(effect.start + stop.frame), rpt_(stop.fault)) for stop in effect.regions[index].stops)
+
+
+def confidence_at(effect, index: int, frame: float) -> float | None:
+    """How sure tracking was of a region at a timeline frame, 0 to 1; None: it was not tracked there."""
+    frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
+    return next(iter(confidence[frames == frame].tolist()), None)
+
+
+def next_unsure(effect, index: int, frame: float) -> int | None:
+    """The first timeline frame after another one of which tracking was not sure, or None."""
+    frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
+    unsure = frames[(frames > frame) & (confidence < tracking.SURE)]
+    return int(unsure[0]) if len(unsure) else None
+
+
+def _region(edit, effect, strip, index: int, frames: list[int]) -> Region:
+    """The region as the tracker asks for it."""
+    layer = annotations.layer_of(effect, effect.regions[index])
+    drawn = [drawing.frame_number for drawing in layer.frames] if layer else []
+    return snapshot.region_at(edit, effect, strip, index, [*frames, *drawn])
+
+
+def _standing(region: Region, here: Tracked) -> Region:
+    """The region, which is where the editor has put it, keyed or not."""
+    x, y = here.placement.location
+    values = {"location": (x, y), "rotation": here.placement.rotation, "scale": here.placement.scale}
+    channels = {name: getattr(region, name) for name in values}
+    return replace(
+        region,
+        **{
+            name: replace(channel, values=channel.values | {here.frame: values[name]})
+            for name, channel in channels.items()
+            if isinstance(channel, Samples)
+        },
+    )
+
+
+def _followed(shape: Region, shown, source, start: int, frames: range, motion: str, anchors) -> Iterator[Tracked]:
+    """As tracking.follow, its sentences in the user's language."""
+    with snapshot.translated():
+        try:
+            footage = tracking.Footage(source, lambda frame: session.source_index(shown, frame, source)[0])
+            yield from tracking.follow(shape, footage, start, frames, motion=motion.lower(), anchors=anchors)
+        except tracking.TrackingError as error:
+            raise EffectError(rpt_(str(error))) from None
+
+
+def _thinned(effect, shape: Region, found: dict[int, Tracked], kept: set[int]) -> list[int]:
+    points = motions.offsets(shape.unmoved(next(iter(found))))
+    placements = {frame: tracked.placement for frame, tracked in found.items()}
+    return motions.thinned(placements, points, annotations.picture_size(effect), kept)
+
+
+def _write(keys: MotionKeys, kept: Iterable[Tracked], found: Iterable[Tracked]) -> None:
+    keys.write({t.frame: t.placement for t in kept}, {t.frame: t.confidence for t in found})
+
+
+def _mark(effect, index: int, frames: range, found: dict[int, Tracked], stops: list[Tracked]) -> None:
+    """Notes where tracking stopped, in place of what was noted of the frames that it went through since."""
+    region, start = effect.regions[index], next(iter(found))
+    for i in reversed(range(len(region.stops))):
+        frame = effect.start + region.stops[i].frame
+        is_passed = min(found) <= frame <= max(found)
+        if is_passed or (frames[-1] > start if region.stops[i].forward else frames[0] < start):
+            region.stops.remove(i)
+    for tracked in stops:
+        stop = region.stops.add()
+        stop.frame, stop.forward, stop.fault = tracked.frame - effect.start, tracked.frame > start, tracked.fault

@@ -1,0 +1,223 @@
+"""Operators that key a region by the footage: as what it covers moves, or as something tracked in a movie clip does."""
+
+import time
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import BoolProperty, EnumProperty, IntProperty
+from bpy.types import Operator
+
+from ..data import selection
+from ..data.properties import CONTEXT, MOTIONS
+from ..editing import follow_track, track_region
+from ..rendering.session import FAULTS
+from .operators import _OfRegion, redraw, refused
+
+# Seconds of work, at least, from one look at the window to the next.
+_TICK = 0.05
+
+DIRECTIONS = (
+    ("BACKWARD", "Backward", "Towards the strip's first frame", "TRACKING_BACKWARDS", 0),
+    ("BOTH", "Both", "Towards both ends of the strip", "ARROW_LEFTRIGHT", 1),
+    ("FORWARD", "Forward", "Towards the strip's last frame", "TRACKING_FORWARDS", 2),
+)
+
+
+class SHUTTER_OT_track(_OfRegion, Operator):
+    """Key the active region by what it covers at this frame, up to your own keys (Esc keeps what is done)"""
+
+    bl_idname = "shutter.track"
+    bl_label = "Track Region"
+    bl_options = {"UNDO"}
+
+    direction: EnumProperty(
+        name="Direction",
+        description="Where tracking goes from the current frame",
+        items=DIRECTIONS,
+        default="BOTH",
+        translation_context=CONTEXT,
+    )
+    motion: EnumProperty(
+        name="Motion",
+        description="What tracking and following key",
+        items=MOTIONS,
+        default="SCALE",
+        translation_context=CONTEXT,
+    )
+    until: IntProperty(
+        name="Until",
+        description="Timeline frame at which tracking stops; 0 is the end of the strip",
+        translation_context=CONTEXT,
+    )
+    all_keys: BoolProperty(
+        name="All Keys",
+        description="Keep a key at every tracked frame, in place of those that the motion needs within a pixel",
+    )
+
+    def invoke(self, context, _event):
+        if bpy.app.background:
+            return self.execute(context)
+        try:
+            self._begin(context)
+            self._go_on(_TICK)
+        except FAULTS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        context.window_manager.progress_begin(0, len(self._frames))
+        context.window_manager.modal_handler_add(self)
+        self._show(context)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context):
+        try:
+            self._begin(context)
+            self._go_on(float("inf"))
+        except FAULTS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self._tell(selection.active(context)[1])
+        redraw(context)
+        return {"FINISHED"}
+
+    def modal(self, context, event):
+        is_stopped = event.type == "ESC" and event.value == "PRESS"
+        if event.type == "TIMER":
+            # What it takes to draw a frame, tracking takes at least as well.
+            is_stopped = not self._go_on(max(_TICK, time.perf_counter() - self._shown))
+            self._show(context)
+        if not is_stopped:
+            return {"RUNNING_MODAL"}
+        self.cancel(context)
+        if self.direction == "BOTH":
+            self._edit.frame_set(self._start)
+        self._tell(selection.active(context)[1])
+        redraw(context)
+        return {"FINISHED"}
+
+    def cancel(self, context):
+        """It has ended, or its window was closed."""
+        self._steps.close()
+        context.window_manager.event_timer_remove(self._timer)
+        context.window_manager.progress_end()
+        context.workspace.status_text_set(None)
+
+    def _begin(self, context):
+        edit, effect, strip = selection.active(context)
+        index = effect.active_region
+        self._edit, self._start, self._done = edit, edit.frame_current, set()
+        self._frames = track_region.frames_to_track(edit, strip, self.direction, self.until)
+        self._steps = track_region.track(edit, effect, strip, index, self._frames, self.motion, all_keys=self.all_keys)
+
+    def _go_on(self, seconds: float) -> bool:
+        """Tracks for a while; whether there is more to track. One of FAULTS: there is nothing to track at all."""
+        end = time.perf_counter() + seconds
+        try:
+            for frame in self._steps:
+                self._frame = frame
+                self._done.add(frame)
+                if time.perf_counter() >= end:
+                    return True
+        except FAULTS as error:
+            if not self._done:
+                raise
+            self.report({"WARNING"}, str(error))
+        return False
+
+    def _show(self, context):
+        self._edit.frame_set(self._frame)
+        done, total = len(self._done), len(self._frames) - 1
+        context.window_manager.progress_update(done)
+        sentence = rpt_("Tracking: {done} of {total} frames, Esc to stop")
+        context.workspace.status_text_set(sentence.format(done=done, total=total))
+        redraw(context)
+        self._shown = time.perf_counter()
+
+    def _tell(self, effect):
+        for frame, fault in track_region.stops(effect, effect.active_region):
+            if frame in self._frames:
+                sentence = rpt_("Tracking stopped at frame {frame}: {fault}")
+                self.report({"WARNING"}, sentence.format(frame=frame, fault=fault))
+
+
+class SHUTTER_OT_track_look(_OfRegion, Operator):
+    """Go to a frame that tracking is not sure of"""
+
+    bl_idname = "shutter.track_look"
+    bl_label = "Next Unsure Frame"
+    bl_options = {"REGISTER"}
+
+    frame: IntProperty(
+        name="Frame",
+        description="Timeline frame; without one, the next that is unsure",
+        options={"SKIP_SAVE"},
+    )
+
+    def change(self, _context, effect):
+        edit = effect.id_data
+        if self.properties.is_property_set("frame"):
+            edit.frame_set(self.frame)
+            return {"FINISHED"}
+        frame = track_region.next_unsure(effect, effect.active_region, edit.frame_current)
+        if frame is None:
+            self.report({"INFO"}, "Tracking is sure of all frames from here on")
+            return {"CANCELLED"}
+        edit.frame_set(frame)
+        return {"FINISHED"}
+
+
+class _Follows(_OfRegion):
+    """Keys the region by what it is set to follow."""
+
+    def change(self, context, effect):
+        try:
+            self.key(*selection.active(context), effect.active_region)
+        except FAULTS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return None
+
+
+class SHUTTER_OT_follow(_Follows, Operator):
+    """Key the active region by a track of a movie clip, from where the region is at this frame"""
+
+    bl_idname = "shutter.follow"
+    bl_label = "Follow"
+
+    key = staticmethod(follow_track.follow)
+
+    @classmethod
+    def possible(cls, effect):
+        if not super().possible(effect):
+            return False
+        return selection.active_region(effect).follow_clip is not None or refused(cls, rpt_("Choose a clip first"))
+
+
+class SHUTTER_OT_follow_update(_Follows, Operator):
+    """Key the active region anew by what it follows, after the track has changed"""
+
+    bl_idname = "shutter.follow_update"
+    bl_label = "Update"
+
+    key = staticmethod(follow_track.update)
+
+    @classmethod
+    def possible(cls, effect):
+        if not super().possible(effect):
+            return False
+        return bool(selection.active_region(effect).follow_stamp) or refused(
+            cls, rpt_("The region follows no track yet")
+        )
+
+
+classes = (SHUTTER_OT_track, SHUTTER_OT_track_look, SHUTTER_OT_follow, SHUTTER_OT_follow_update)
+
+
+def register():
+    for cls in classes:
+        bpy.utils.register_class(cls)
+
+
+def unregister():
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)
