@@ -30,11 +30,13 @@ class SHUTTER_OT_track(_OfRegion, Operator):
     bl_label = "Track Region"
     bl_options = {"UNDO"}
 
+    # Blender would use again what a button was pressed with before.
     direction: EnumProperty(
         name="Direction",
         description="Where tracking goes from the current frame",
         items=DIRECTIONS,
         default="BOTH",
+        options={"SKIP_SAVE"},
         translation_context=CONTEXT,
     )
     motion: EnumProperty(
@@ -42,16 +44,19 @@ class SHUTTER_OT_track(_OfRegion, Operator):
         description="What tracking and following key",
         items=MOTIONS,
         default="SCALE",
+        options={"SKIP_SAVE"},
         translation_context=CONTEXT,
     )
     until: IntProperty(
         name="Until",
         description="Timeline frame at which tracking stops; 0 is the end of the strip",
+        options={"SKIP_SAVE"},
         translation_context=CONTEXT,
     )
     all_keys: BoolProperty(
         name="All Keys",
         description="Keep a key at every tracked frame, in place of those that the motion needs within a pixel",
+        options={"SKIP_SAVE"},
     )
 
     def invoke(self, context, _event):

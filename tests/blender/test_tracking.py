@@ -1,0 +1,545 @@
+"""Regions that are tracked, and that follow tracks of movie clips: their keys, what was the editor's, and what is said."""
+
+import numpy as np
+import pytest
+from support import write_frames
+
+from shutter_addon.blender.data import annotations, fcurves, selection, strips
+from shutter_addon.blender.editing import add_effect, follow_track, region_edits, shutter_edits, track_region
+from shutter_addon.blender.editing.motion_keys import MotionKeys
+
+SIZE = np.array([240, 160])
+COUNT = 20
+RNG = np.random.default_rng(3)
+
+
+def texture(height, width):
+    """Smooth noise, full of corners."""
+    import cv2
+
+    noise = RNG.random((height, width, 3)).astype(np.float32)
+    return (255 * np.clip(cv2.GaussianBlur(noise, (0, 0), 2) * 4 - 1.5, 0, 1)).astype(np.uint8)
+
+
+BEHIND, SUBJECT = texture(*SIZE[::-1]), texture(60, 60)
+
+
+def centre(index):
+    """Of the subject in a source frame, in pixels, y down."""
+    return np.array([50.5 + 6 * index, 60.5 + 20 * np.sin(index / 6)])
+
+
+def turned(index):
+    """Degrees counter-clockwise, and the scale."""
+    return 1.5 * index, 1 + 0.01 * index
+
+
+def picture(index, covered=()):
+    import cv2
+
+    (x, y), (angle, scale) = centre(index), turned(index)
+    matrix = cv2.getRotationMatrix2D((29.5, 29.5), angle, scale)
+    matrix[:, 2] += (x - 30, y - 30)
+    size = SIZE.tolist()
+    moved = cv2.warpAffine(SUBJECT, matrix, size, flags=cv2.INTER_CUBIC)
+    mask = cv2.warpAffine(np.ones((60, 60), np.uint8), matrix, size, flags=cv2.INTER_NEAREST)
+    frame = np.where(mask[..., None], moved, BEHIND)
+    if index in covered:
+        frame[:, 60:] = 128
+    return frame
+
+
+@pytest.fixture(scope="module")
+def frames(tmp_path_factory):
+    return write_frames(tmp_path_factory.mktemp("moving"), [picture(i) for i in range(COUNT)])
+
+
+@pytest.fixture
+def region(bpy, edit, frames):
+    """A region, drawn around the subject where it is at the first frame of the strip, frame 11."""
+    return drawn(edit, new_source(edit, frames))
+
+
+def new_source(edit, first):
+    edit.render.resolution_x, edit.render.resolution_y = SIZE.tolist()
+    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 11)
+    for path in sorted(first.parent.iterdir())[1:]:
+        source.elements.append(path.name)
+    return source
+
+
+def drawn(edit, source, at=None):
+    strip, effect = add_effect.add_effect(edit, source)
+    shutter_edits.start(effect)
+    selection.choose(edit, strip)
+    edit.frame_set(11)
+    region = region_edits.add_region(effect, effect.shutters[1], "LASSO")
+    stroke = annotations.layer_of(effect, region).frames.new(11).strokes.new()
+    stroke.display_mode = "2DSPACE"
+    middle = (centre(0) if at is None else np.array(at)) - SIZE / 2
+    points = [(middle[0] + x, -middle[1] + y) for x, y in ((-20, -20), (20, -20), (20, 20), (-20, 20))]
+    stroke.points.add(len(points))
+    stroke.points.foreach_set("co", [value for x, y in points for value in (x, y, 0.0)])
+    return region
+
+
+def active(bpy):
+    return selection.active(bpy.context)
+
+
+def track(bpy, direction="BOTH", motion="SCALE", **options):
+    edit, effect, strip = active(bpy)
+    frames = track_region.frames_to_track(edit, strip, direction)
+    return list(track_region.track(edit, effect, strip, 0, frames, motion, **options))
+
+
+def apart(bpy, frame, index, *, of=0):
+    """Pixels between the corners of the region at a frame, and those of the subject in a source frame; `of`: the frame
+    of the source in which it was drawn."""
+    from shutter_addon.blender.data import snapshot
+
+    edit, effect, strip = active(bpy)
+    (stroke,) = snapshot.region_at(edit, effect, strip, 0, (frame,)).at(frame).strokes
+    (angle, scale), (angle_drawn, scale_drawn) = turned(index), turned(of)
+    turn = scale / scale_drawn * np.exp(1j * np.radians(angle - angle_drawn))
+    offsets = turn * np.array([-20 - 20j, 20 - 20j, 20 + 20j, -20 + 20j])
+    expected = centre(index) * (1, -1) + np.stack([offsets.real, offsets.imag], axis=1) + (0, SIZE[1])
+    return np.abs(stroke * SIZE - expected).max()
+
+
+def keys(bpy, channel="location"):
+    """By F-curve of a channel: (frame, value, type, interpolation) of its keys."""
+    edit, effect, _strip = active(bpy)
+    return [
+        [(*key.co, key.type, key.interpolation) for key in curve.keyframe_points]
+        for curve in fcurves.curves_under(edit, f"{effect.path_from_id()}.regions[0].{channel}")
+    ]
+
+
+def types(bpy):
+    """Of the keys of the location by their frames."""
+    return {frame: kind for frame, _value, kind, _ease in keys(bpy)[0]}
+
+
+def move(bpy, frame, index, *, of=0):
+    """The editor's key at a frame: where the subject is in a source frame."""
+    edit, effect, _strip = active(bpy)
+    edit.frame_set(frame)
+    region, (angle, scale), (angle_drawn, scale_drawn) = effect.regions[0], turned(index), turned(of)
+    region.location = (centre(index) - centre(of)) * (1, -1) / SIZE
+    region.rotation, region.scale = np.radians(angle - angle_drawn), scale / scale_drawn
+    region_edits.key_region(effect, 0)
+
+
+def test_a_region_is_tracked_to_both_ends(bpy, region):
+    bpy.context.scene.frame_set(20)
+    move(bpy, 20, 9)
+    assert set(track(bpy)) == set(range(11, 31)) - {20}
+    assert max(apart(bpy, frame, frame - 11) for frame in range(11, 31)) < 1.5
+    found = types(bpy)
+    assert found.pop(20) == "KEYFRAME"
+    assert set(found.values()) == {"GENERATED"}
+    assert {11, 30} <= found.keys()
+    assert len(found) < 15, "they are thinned"
+    assert {ease for curve in keys(bpy) for *_, ease in curve} == {"LINEAR"}
+    assert len(keys(bpy, "confidence")[0]) == 20
+    assert all(track_region.confidence_at(active(bpy)[1], 0, frame) > 0.5 for frame in range(11, 31))
+    assert list(region.stops) == []
+
+
+def test_all_keys_are_kept_if_one_wants(bpy, region):
+    track(bpy, all_keys=True)
+    assert types(bpy).keys() == set(range(11, 31))
+
+
+@pytest.mark.parametrize(("motion", "channels"), [("LOCATION", {"location"}), ("ROTATION", {"location", "rotation"})])
+def test_the_motion_says_what_is_keyed(bpy, region, motion, channels):
+    track(bpy, motion=motion)
+    made = {c for c in ("location", "rotation", "scale") if any(key[2] == "GENERATED" for key in keys(bpy, c)[0])}
+    assert made == channels
+
+
+def test_only_what_was_asked_for_is_tracked(bpy, edit, region):
+    move(bpy, 20, 9)
+    _edit, effect, strip = active(bpy)
+    assert track_region.frames_to_track(edit, strip, "FORWARD") == range(20, 31)
+    assert track_region.frames_to_track(edit, strip, "BACKWARD") == range(11, 21)
+    assert track_region.frames_to_track(edit, strip, "BOTH") == range(11, 31)
+    assert track_region.frames_to_track(edit, strip, "BOTH", 25) == range(11, 26)
+    assert track_region.frames_to_track(edit, strip, "BACKWARD", 15) == range(15, 21)
+    assert track(bpy, "FORWARD") == list(range(21, 31))
+    assert min(types(bpy)) == 20
+
+
+def test_a_wrong_frame_is_mended_by_a_key_and_tracking_again(bpy, edit, region):
+    """The editor's keys stay as they are, and the track goes through them."""
+    track(bpy)
+    move(bpy, 25, 14)
+    wrong = np.array(active(bpy)[1].regions[0].location) + (0, 12 / SIZE[1])
+    active(bpy)[1].regions[0].location = wrong
+    region_edits.key_region(active(bpy)[1], 0)
+    values = {frame: value for frame, value, kind, _ in keys(bpy)[1] if kind == "KEYFRAME"}
+    assert values.keys() == {11, 25}
+    track(bpy)
+    assert {frame: value for frame, value, kind, _ in keys(bpy)[1] if kind == "KEYFRAME"} == pytest.approx(values)
+    assert apart(bpy, 12, 1) < 2
+    assert apart(bpy, 25, 14) == pytest.approx(12, abs=0.1)
+    assert 3 < apart(bpy, 18, 7) < 9, "half of both"
+
+
+def test_keys_outside_of_what_was_tracked_stay(bpy, edit, region):
+    move(bpy, 40, 5)
+    before = [curve[-1] for curve in keys(bpy)]
+    edit.frame_set(11)
+    move(bpy, 11, 0)
+    track(bpy)
+    assert [curve[-1] for curve in keys(bpy)] == before
+    assert len(keys(bpy)[0]) > 3
+
+
+def test_a_region_that_was_moved_and_not_keyed_is_tracked_from_where_it_is(bpy, edit, region):
+    move(bpy, 11, 3)
+    bpy.context.scene.frame_set(20)
+    region.location = (centre(9) - centre(0)) * (1, -1) / SIZE
+    region.rotation, region.scale = np.radians(turned(9)[0]), turned(9)[1]
+    track(bpy, "FORWARD")
+    assert apart(bpy, 20, 9) < 0.01
+    assert apart(bpy, 22, 11) < 2
+
+
+def test_closed_early_it_keeps_what_it_has(bpy, edit, region):
+    _edit, effect, strip = active(bpy)
+    steps = track_region.track(edit, effect, strip, 0, range(11, 31), "SCALE")
+    for frame in steps:
+        if frame == 20:
+            break
+    steps.close()
+    assert max(types(bpy)) == 20
+    assert len(types(bpy)) < 8, "they are thinned"
+    assert max(apart(bpy, frame, frame - 11) for frame in range(11, 21)) < 1.5
+    assert track_region.confidence_at(effect, 0, 20) > 0.5
+    assert track_region.confidence_at(effect, 0, 21) is None
+
+
+def test_it_tracks_what_a_reversed_strip_shows(bpy, edit, frames):
+    source = new_source(edit, frames)
+    source.use_reverse_frames = True
+    drawn(edit, source, at=centre(COUNT - 1))
+    track(bpy)
+    assert max(apart(bpy, frame, 30 - frame, of=COUNT - 1) for frame in range(11, 31)) < 2
+
+
+def test_it_tracks_what_a_retimed_strip_shows(bpy, edit, frames):
+    from support import request
+
+    source = new_source(edit, frames)
+    source.retiming_keys.add(timeline_frame=11)
+    source.retiming_keys[-1].timeline_frame = 49
+    drawn(edit, source)
+    track(bpy)
+    shown = {frame: request(*active(bpy), frame).index for frame in range(11, 49)}
+    assert set(shown.values()) == set(range(COUNT))
+    assert max(apart(bpy, frame, index) for frame, index in shown.items()) < 2
+
+
+def test_where_the_subject_is_covered_it_stops_and_says_why(bpy, edit, tmp_path):
+    first = write_frames(tmp_path / "c", [picture(min(i, COUNT - 1), range(5, COUNT)) for i in range(COUNT + 15)])
+    region = drawn(edit, new_source(edit, first))
+    effect = active(bpy)[1]
+    track(bpy)
+    ((frame, fault),) = track_region.stops(effect, 0)
+    assert max(types(bpy)) < frame <= 16
+    assert fault in {"the subject is covered, or looks too different", "the subject has left the picture"}
+    edit.frame_set(12)
+    track(bpy, "BACKWARD")
+    assert len(region.stops) == 1, "that way it has gone nowhere"
+    track(bpy, "FORWARD")
+    assert len(region.stops) == 1, "it is the same one"
+
+
+def test_the_next_unsure_frame(bpy, region):
+    _edit, effect, _strip = active(bpy)
+    placement = {11: 1.0, 12: 0.9, 13: 0.4, 14: 0.6, 15: 0.0}
+    from shutter_addon.core.motions import Placement
+
+    MotionKeys(effect, 0, "SCALE").write({11: Placement(), 15: Placement()}, placement)
+    assert track_region.next_unsure(effect, 0, 11) == 13
+    assert track_region.next_unsure(effect, 0, 13) == 15
+    assert track_region.next_unsure(effect, 0, 15) is None
+
+
+# The operators
+
+
+def call(bpy, name, **settings):
+    """Calls an operator as a menu does, with its step of undo."""
+    return getattr(bpy.ops.shutter, name)("EXEC_DEFAULT", True, **settings)
+
+
+def everything(bpy):
+    """All that tracking changes."""
+    edit = bpy.context.scene
+    region = edit.virtual_shutter.effects[0].regions[0]
+    stops = [(stop.frame, stop.forward, stop.fault) for stop in region.stops]
+    numbers = tuple(region.location), region.rotation, region.scale, region.confidence, region.follow_stamp
+    return numbers, stops, [keys(bpy, channel) for channel in ("location", "rotation", "scale", "confidence")]
+
+
+@pytest.fixture
+def does(bpy):
+    """Calls an operator, which changes something; undone and done again, nothing else than that."""
+
+    def check(name, **settings):
+        bpy.context.view_layer.update()
+        bpy.ops.ed.undo_push(message="before")
+        before = everything(bpy)
+        assert call(bpy, name, **settings) == {"FINISHED"}
+        after = everything(bpy)
+        assert after != before
+        bpy.ops.ed.undo()
+        assert everything(bpy) == before
+        bpy.ops.ed.redo()
+        assert everything(bpy) == after
+
+    return check
+
+
+def refuses(bpy, name, sentence, **settings):
+    """An operator says that, and changes nothing."""
+    before = everything(bpy)
+    with pytest.raises(RuntimeError, match=sentence):
+        call(bpy, name, **settings)
+    assert everything(bpy) == before
+
+
+def test_tracking_is_one_step_of_undo(bpy, region, does):
+    move(bpy, 14, 3)
+    does("track", direction="FORWARD", until=18, all_keys=True)
+    assert types(bpy).keys() == set(range(14, 19))
+    does("track", direction="BOTH", motion="ROTATION")
+    assert types(bpy).keys() >= {11, 30}
+
+
+def test_what_cannot_be_tracked_is_said(bpy, edit, region):
+    effect = active(bpy)[1]
+    layer = annotations.layer_of(effect, region)
+    edit.frame_set(5)
+    refuses(bpy, "track", "the current frame is outside of the Shutter strip")
+    edit.frame_set(30)
+    refuses(bpy, "track", "there is no other frame to track", direction="FORWARD")
+    edit.frame_set(11)
+    region.location = 3, 0
+    refuses(bpy, "track", "the region lies outside the picture")
+    region.location = 0, 0
+    layer.frames.remove(layer.frames[0])
+    refuses(bpy, "track", "the region has no strokes to follow")
+    strips.source_of(*active(bpy)).directory = "/nowhere/"
+    refuses(bpy, "track", "no such file")
+
+
+def test_a_flat_wall_cannot_be_tracked(bpy, edit, tmp_path):
+    first = write_frames(tmp_path / "wall", np.full((4, *SIZE[::-1], 3), 90, np.uint8))
+    drawn(edit, new_source(edit, first))
+    refuses(bpy, "track", "there are too few corners to follow")
+
+
+def test_it_stops_at_a_cut(bpy, edit, tmp_path):
+    """Where the next frame is another shot already, there is nothing to track."""
+    other = texture(*SIZE[::-1]) // 4
+    shots = [*(picture(i) for i in range(10)), *(np.roll(other, i, axis=1) for i in range(10))]
+    drawn(edit, new_source(edit, write_frames(tmp_path / "cut", shots)))
+    assert call(bpy, "track") == {"FINISHED"}
+    assert max(types(bpy)) == 20
+    assert track_region.stops(active(bpy)[1], 0) == [(21, "the shot ends here")]
+    edit.frame_set(20)
+    refuses(bpy, "track", "the shot ends here", direction="FORWARD")
+
+
+def test_a_button_goes_to_the_frames_that_need_a_look(bpy, edit, region):
+    from shutter_addon.core.motions import Placement
+
+    keys = MotionKeys(active(bpy)[1], 0, "SCALE")
+    keys.write({11: Placement(), 15: Placement()}, {11: 1.0, 12: 0.9, 13: 0.4, 14: 0.6, 15: 0.0})
+    call(bpy, "track_look")
+    assert edit.frame_current == 13
+    call(bpy, "track_look")
+    assert edit.frame_current == 15
+    call(bpy, "track_look", frame=12)
+    assert edit.frame_current == 12
+
+
+# Following
+
+
+@pytest.fixture
+def clip(bpy, frames):
+    """A clip of the same footage, whose tracks are where the subject's corners and its middle are."""
+    clip = bpy.data.movieclips.load(str(frames))
+    for name, offset in (("a", 20 + 20j), ("b", 20 - 20j), ("c", -20 - 20j), ("d", -20 + 20j), ("middle", 0)):
+        mark(clip.tracking.objects[0].tracks.new(name=name, frame=1), offset)
+    return clip
+
+
+def mark(track, offset, frames=range(1, COUNT + 1)):
+    """Puts a track's markers on a point of the subject, from its middle on, y up."""
+    for frame in frames:
+        angle, scale = turned(frame - 1)
+        place = offset * scale * np.exp(1j * np.radians(angle))
+        x, y = centre(frame - 1) * (1, -1) + (place.real, SIZE[1] + place.imag)
+        track.markers.insert_frame(frame, co=(x / SIZE[0], y / SIZE[1]))
+
+
+def set_up(region, clip, kind, track="", holder=""):
+    region.follow_clip, region.follow_kind, region.follow_track, region.follow_object = clip, kind, track, holder
+
+
+def plane_track(bpy, clip):
+    """A plane track of the four corners; only an editor of clips makes one."""
+    holder = clip.tracking.objects[0]
+    for track in holder.tracks:
+        track.select = track.name != "middle"
+    window = bpy.data.window_managers[0].windows[0]
+    area = window.screen.areas[0]
+    before, area.type = area.type, "CLIP_EDITOR"
+    area.spaces.active.clip = clip
+    with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
+        assert bpy.ops.clip.create_plane_track() == {"FINISHED"}
+    area.type = before
+    return holder.plane_tracks[0]
+
+
+def test_a_region_follows_a_track(bpy, edit, region, clip, does):
+    set_up(region, clip, "TRACK", "middle")
+    move(bpy, 15, 4)
+    does("follow")
+    shown = [np.array(key) for key in keys(bpy)[0]]
+    assert types(bpy)[15] == "KEYFRAME"
+    assert {kind for frame, kind in types(bpy).items() if frame != 15} == {"GENERATED"}
+    assert len(shown) < 15
+    middles = [centre(frame - 11) - centre(0) for frame in range(11, 31)]
+    x = fcurves.find_curve(bpy.context.scene, "virtual_shutter.effects[0].regions[0].location", 0)
+    assert max(abs(x.evaluate(11 + i) * SIZE[0] - middle[0]) for i, middle in enumerate(middles)) < 1
+    assert len(keys(bpy, "rotation")[0]) == 1, "a single track does not turn"
+
+
+@pytest.mark.parametrize("kind", ["OBJECT", "PLANE"])
+def test_a_region_follows_several_points(bpy, edit, region, clip, kind):
+    if kind == "PLANE":
+        set_up(region, clip, "PLANE", plane_track(bpy, clip).name)
+    else:
+        set_up(region, clip, "OBJECT")
+    move(bpy, 15, 4)
+    call(bpy, "follow")
+    assert max(apart(bpy, frame, frame - 11) for frame in range(11, 31)) < 1
+
+
+def test_a_region_follows_an_objects_own_tracks(bpy, edit, region, clip):
+    holder = clip.tracking.objects.new("Cup")
+    for name, offset in (("left", -20), ("right", 20)):
+        mark(holder.tracks.new(name=name, frame=1), offset)
+    for track in clip.tracking.objects[0].tracks:
+        track.markers[0].co = (0.9, 0.9)
+    set_up(region, clip, "OBJECT", holder="Cup")
+    call(bpy, "follow")
+    assert max(apart(bpy, frame, frame - 11) for frame in range(11, 31)) < 1
+
+
+def test_tracks_that_end_are_followed_by_way_of_others(bpy, edit, region, clip):
+    """None of those at the last frame is there at the first one."""
+    tracks = clip.tracking.objects[0].tracks
+    for k, track in enumerate(tracks):
+        for frame in range(1, COUNT + 1):
+            if frame > 12 if k < 2 else frame < 8:
+                track.markers.find_frame(frame).mute = True
+    set_up(region, clip, "OBJECT")
+    call(bpy, "follow")
+    assert max(apart(bpy, frame, frame - 11) for frame in range(11, 31)) < 1
+
+
+def test_a_gap_in_a_track_is_bridged_and_unsure(bpy, edit, region, clip):
+    track = clip.tracking.objects[0].tracks["middle"]
+    for frame in (8, 9):
+        track.markers.find_frame(frame).mute = True
+    set_up(region, clip, "TRACK", "middle")
+    call(bpy, "follow")
+    effect = active(bpy)[1]
+    assert track_region.next_unsure(effect, 0, 11) == 18
+    assert track_region.next_unsure(effect, 0, 18) == 19
+    assert track_region.next_unsure(effect, 0, 19) is None
+
+
+def test_a_changed_track_is_followed_anew(bpy, edit, region, clip, does):
+    set_up(region, clip, "TRACK", "middle")
+    call(bpy, "follow")
+    assert not follow_track.is_changed(region)
+    before = keys(bpy)
+    clip.tracking.objects[0].tracks["middle"].markers.find_frame(10).co[1] += 0.2
+    bpy.context.view_layer.update()
+    edit.frame_set(25)
+    does("follow_update")
+    assert not follow_track.is_changed(active(bpy)[1].regions[0])
+    after = keys(bpy)
+    assert after[1][0] == before[1][0], "it follows from the same place"
+    y = fcurves.find_curve(bpy.context.scene, "virtual_shutter.effects[0].regions[0].location", 1)
+    expected = (centre(0) - centre(9))[1] / SIZE[1] + 0.2
+    assert y.evaluate(20) == pytest.approx(expected, abs=1 / SIZE[1])
+
+
+def test_it_says_that_the_track_has_changed(bpy, edit, region, clip):
+    from shutter_addon.blender.data import revision
+
+    set_up(region, clip, "TRACK", "middle")
+    call(bpy, "follow")
+    clip.tracking.objects[0].tracks["middle"].markers.find_frame(10).mute = True
+    revision.changed()
+    assert follow_track.is_changed(region)
+
+
+def test_an_editors_key_mends_what_is_followed(bpy, edit, region, clip):
+    set_up(region, clip, "TRACK", "middle")
+    call(bpy, "follow")
+    edit.frame_set(21)
+    active(bpy)[1].regions[0].location[1] += 0.1
+    region_edits.key_region(active(bpy)[1], 0)
+    call(bpy, "follow_update")
+    y = fcurves.find_curve(bpy.context.scene, "virtual_shutter.effects[0].regions[0].location", 1)
+    off = {frame: y.evaluate(frame) - (centre(0) - centre(frame - 11))[1] / SIZE[1] for frame in (11, 16, 21, 28)}
+    assert off == pytest.approx({11: 0, 16: 0.05, 21: 0.1, 28: 0.1}, abs=1 / SIZE[1])
+
+
+def test_a_trimmed_reversed_and_retimed_strip_follows_what_it_shows(bpy, edit, frames, clip):
+    from support import request
+
+    source = new_source(edit, frames)
+    source.use_reverse_frames = True
+    source.retiming_keys.add(timeline_frame=11)
+    source.retiming_keys[-1].timeline_frame = 49
+    source.left_handle = 15
+    region = drawn(edit, source, at=centre(COUNT - 1))
+    set_up(region, clip, "OBJECT")
+    shown = {frame: request(*active(bpy), frame).index for frame in range(15, 49)}
+    edit.frame_set(15)
+    move(bpy, 15, shown[15], of=COUNT - 1)
+    call(bpy, "follow")
+    assert len(set(shown.values())) > 15
+    assert max(apart(bpy, frame, index, of=COUNT - 1) for frame, index in shown.items()) < 1.2
+
+
+def test_what_cannot_be_followed_is_said(bpy, edit, region, clip):
+    refuses(bpy, "follow", "Choose a clip first")
+    refuses(bpy, "follow_update", "The region follows no track yet")
+    set_up(region, clip, "TRACK", "none")
+    refuses(bpy, "follow", 'clip "f0001.png" has no track "none"')
+    set_up(region, clip, "PLANE", "middle")
+    refuses(bpy, "follow", 'clip "f0001.png" has no track "middle"')
+    set_up(region, clip, "OBJECT", holder="Cup")
+    refuses(bpy, "follow", 'clip "f0001.png" has no track "Cup"')
+    set_up(region, clip, "TRACK", "middle")
+    clip.tracking.objects[0].tracks["middle"].markers.find_frame(1).mute = True
+    refuses(bpy, "follow", '"middle" of clip "f0001.png" has no marker at frame 11')
+    edit.frame_set(5)
+    refuses(bpy, "follow", '"middle" of clip "f0001.png" has no marker at frame 5')
+    edit.frame_set(12)
+    layer = annotations.layer_of(active(bpy)[1], region)
+    layer.frames.remove(layer.frames[0])
+    refuses(bpy, "follow", 'region "Sharp" has no strokes')
