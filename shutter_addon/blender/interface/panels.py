@@ -169,6 +169,7 @@ class _Regions(_WithEffect):
         region = selection.active_region(effect)
         if region is None:
             return
+        _draw_tracking(layout, effect, region)
         layout.use_property_split = True
         row = layout.split(factor=0.4)
         row.alignment = "RIGHT"
@@ -188,6 +189,28 @@ class _Regions(_WithEffect):
         layout.operator("shutter.region_key", text="Insert Keyframes", icon="KEY_HLT")
 
 
+def _draw_tracking(layout, effect, region) -> None:
+    """The buttons; how sure tracking was of the current frame, and where it stopped."""
+    row = layout.row(align=True)
+    for direction, _name, _description, icon, _number in track_operators.DIRECTIONS:
+        button = row.operator("shutter.track", text="Track" if direction == "BOTH" else "", icon=icon)
+        button.direction, button.motion = direction, region.motion
+        button.until, button.all_keys = region.track_until, region.track_all_keys
+    index = effect.active_region
+    confidence = track_region.confidence_at(effect, index, effect.id_data.frame_current)
+    if confidence is not None:
+        row = layout.row(align=True)
+        text = iface_("Confidence: {percent} %").format(percent=f"{100 * confidence:.0f}")
+        row.label(text=text, icon="CHECKMARK" if confidence >= SURE else "ERROR", translate=False)
+        row.operator("shutter.track_look")
+    for frame, fault in track_region.stops(effect, index):
+        row = layout.row(align=True)
+        row.label(text=fault, icon="ERROR", translate=False)
+        place = row.row()
+        place.ui_units_x = 2.5
+        place.operator("shutter.track_look", text=str(frame), translate=False).frame = frame
+
+
 class _WithRegion(_WithEffect):
     @classmethod
     def poll(cls, context):
@@ -197,31 +220,14 @@ class _WithRegion(_WithEffect):
 class _Track(_WithRegion):
     bl_label = "Track"
     bl_translation_context = CONTEXT
+    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
         layout = self.layout
-        edit, effect, _strip = selection.active(context)
-        region, index = selection.active_region(effect), effect.active_region
-        row = layout.row(align=True)
-        for direction, name, _description, icon, _number in track_operators.DIRECTIONS:
-            button = row.operator("shutter.track", text=iface_(name, CONTEXT), icon=icon, translate=False)
-            button.direction, button.motion = direction, region.motion
-            button.until, button.all_keys = region.track_until, region.track_all_keys
         layout.use_property_split = True
-        layout.prop(region, "motion")
-        layout.prop(region, "track_until")
-        layout.prop(region, "track_all_keys")
-        confidence = track_region.confidence_at(effect, index, edit.frame_current)
-        if confidence is not None:
-            row = layout.row(align=True)
-            text = iface_("Confidence here: {percent} %").format(percent=f"{100 * confidence:.0f}")
-            row.label(text=text, icon="CHECKMARK" if confidence >= SURE else "ERROR", translate=False)
-            row.operator("shutter.track_look", text="", icon="NEXT_KEYFRAME")
-        for frame, fault in track_region.stops(effect, index):
-            row = layout.row(align=True)
-            row.label(text=fault, icon="ERROR", translate=False)
-            text = iface_("Frame {number}").format(number=frame)
-            row.operator("shutter.track_look", text=text, translate=False).frame = frame
+        region = selection.active_region(selection.active(context)[1])
+        for name in ("motion", "track_until", "track_all_keys"):
+            layout.prop(region, name)
 
 
 class _Follow(_WithRegion):

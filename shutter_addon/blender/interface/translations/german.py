@@ -546,6 +546,7 @@ MESSAGES = {
     ("*", "This view has the view transform Standard"): "Diese Ansicht hat die Anzeigetransformation Standard",
     # Tracking and following
     ("Virtual Shutter", "Track"): "Verfolgen",
+    ("Operator", "Track"): "Verfolgen",
     ("Operator", "Track Region"): "Region verfolgen",
     (
         "*",
@@ -582,7 +583,7 @@ MESSAGES = {
     ("*", "Tracking stopped at frame {frame}: {fault}"): "Das Verfolgen hielt bei Bild {frame} an: {fault}",
     ("*", "Confidence"): "Sicherheit",
     ("*", "How sure tracking was of where the region is"): "Wie sicher beim Verfolgen war, wo die Region ist",
-    ("*", "Confidence here: {percent} %"): "Sicherheit hier: {percent} %",
+    ("*", "Confidence: {percent} %"): "Sicherheit: {percent} %",
     ("Operator", "Next Unsure Frame"): "Nächstes unsicheres Bild",
     ("*", "Go to a frame that tracking is not sure of"): "Zu einem Bild gehen, das beim Verfolgen unsicher ist",
     ("*", "Frame"): "Bild",

@@ -1,0 +1,157 @@
+"""One stroke is enough: drawn, tracked, mended where it is wrong, and rendered, by mouse. Run inside Blender, by
+test_window.py."""
+
+# ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
+import os
+import sys
+from pathlib import Path
+
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
+sys.path.append(os.environ["SHUTTER_PACKAGES"])  # OpenCV, which a Blender of a distribution need not have
+
+import bpy
+import driver
+import story
+import traces
+
+# Of the footage's frame 70, in fractions of the picture: down a woman's back.
+FRAME, STROKE = 70, ((0.462, 0.65), (0.465, 0.62), (0.467, 0.59), (0.468, 0.565))
+MENDED = 85
+TRACK_BUTTON = 425  # pixels below the sidebar's upper edge
+
+
+def part(name):
+    return sys.modules[f"{traces.NAME}.shutter_addon.{name}"]
+
+
+def region():
+    return story.effect().regions[0]
+
+
+def on_preview(x, y):
+    """Pixels of the preview's region, of a point in fractions of the picture."""
+    view, render = story.preview().view2d, story.edit().render
+    return view.view_to_region((x - 0.5) * render.resolution_x, (y - 0.5) * render.resolution_y, clip=False)
+
+
+def kinds():
+    """Of the keys of the location by frame."""
+    from bpy_extras.anim_utils import action_get_channelbag_for_slot as bag_of
+
+    data = story.edit().animation_data
+    curve = bag_of(data.action, data.action_slot).fcurves.find("virtual_shutter.effects[0].regions[0].location")
+    return {int(key.co[0]): key.type for key in curve.keyframe_points}
+
+
+def roomier():
+    """A low timeline leaves room for the panel."""
+    area = driver.area_of("SEQUENCE_EDITOR", "SEQUENCER")
+    window = bpy.context.window_manager.windows[0]
+    edge = {"x": area.x + area.width // 2, "y": area.y + area.height}
+    driver.xdotool("mousemove", edge["x"], window.height - 1 - edge["y"])  # where no region is active
+    yield 0.5
+    with bpy.context.temp_override(window=window):
+        bpy.ops.screen.area_move(**edge, delta=200 - area.height)
+    yield 0.5
+
+
+def drawn():
+    with driver.override("PREVIEW"):
+        bpy.ops.shutter.draw("INVOKE_DEFAULT", True, new=True)
+    yield 0.5
+    yield from driver.drag(story.preview(), [on_preview(*point) for point in STROKE])
+    assert len(story.effect().regions) == 1
+    with driver.override("PREVIEW"):
+        bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+    yield
+
+
+def tracked():
+    """By the button in the sidebar."""
+    sidebar = driver.region_of(driver.area_of("SEQUENCE_EDITOR", "PREVIEW"), "UI")
+    driver.click(sidebar, sidebar.width * 0.45, sidebar.height - TRACK_BUTTON)
+    yield from driver.until(is_tracking, "tracking begins")
+
+
+def is_tracking():
+    return "SHUTTER_OT_track" in [operator.bl_idname for operator in bpy.context.window.modal_operators]
+
+
+def ended():
+    yield from driver.until(lambda: not is_tracking(), "tracking ends", 90)
+
+
+def mended():
+    """The handle is dragged at a frame, which keys the region there by itself; tracking goes through that key."""
+    story.edit().frame_set(MENDED)
+    yield 1.0
+    with driver.override("PREVIEW"):
+        x, y = part("blender.interface.region_gizmo").place(bpy.context).centre
+    before = tuple(region().location)
+    yield from driver.drag(story.preview(), [(x, y), (x + 4, y + 3), (x + 8, y + 6)])
+    assert tuple(region().location) != before
+    assert kinds()[MENDED] == "KEYFRAME"
+    driver.shot("4_mended")
+    keyed = story.curves()
+    yield from tracked()
+    yield from ended()
+    assert [frame for frame, kind in kinds().items() if kind == "KEYFRAME"] == [FRAME, MENDED]
+    driver.saw(mended=kinds())
+    yield from driver.until(lambda: story.edit().frame_current == MENDED, "the frame is where it was")
+    driver.shot("5_tracked_again")
+    after = story.curves()
+    driver.move(story.preview(), 50, story.preview().height - 50)
+    yield
+    driver.key("ctrl+z")
+    yield from driver.until(lambda: story.curves() == keyed, "one undo takes the second track back")
+    driver.key("ctrl+shift+z")
+    yield from driver.until(lambda: story.curves() == after, "and redo brings it again")
+
+
+def escaped():
+    """What is tracked until Esc stays."""
+    story.edit().frame_set(FRAME)
+    yield 1.0
+    yield from tracked()
+    yield from driver.until(lambda: story.edit().frame_current > FRAME + 3, "the preview goes along", 60)
+    driver.shot("6_tracking")
+    driver.key("Escape")
+    yield from ended()
+    driver.saw(escaped=kinds(), frame=story.edit().frame_current)
+
+
+def rendered():
+    render = story.edit().render
+    render.image_settings.media_type = "IMAGE"
+    render.image_settings.file_format = "PNG"
+    render.filepath = str(driver.OUT / "final_")
+    story.edit().frame_start, story.edit().frame_end, story.edit().frame_step = 40, 90, 10
+    done = []
+    bpy.app.handlers.render_complete.append(lambda *_: done.append(True))
+    with driver.override("PREVIEW"):
+        bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
+    yield from driver.until(lambda: done, "the render ends", 60)
+
+
+def told():
+    yield from story.opened()
+    story.edit().render.resolution_x, story.edit().render.resolution_y, story.edit().frame_end = 768, 576, 100
+    yield from roomier()
+    yield from story.movie_added()
+    story.edit().frame_set(FRAME)
+    yield from story.effect_added()
+    story.effect().active_shutter = 1
+    yield from drawn()
+    driver.shot("1_stroke")
+    yield from tracked()
+    driver.shot("2_tracking")
+    yield from ended()
+    driver.shot("3_tracked")
+    driver.saw(tracked=kinds(), frame=story.edit().frame_current)
+    yield from mended()
+    yield from escaped()
+    yield from rendered()
+
+
+if __name__ == "__main__":
+    driver.play(told)
