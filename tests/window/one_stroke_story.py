@@ -91,6 +91,7 @@ def mended():
     yield from driver.drag(story.preview(), [(x, y), (x + 4, y + 3), (x + 8, y + 6)])
     assert tuple(region().location) != before
     assert kinds()[MENDED] == "KEYFRAME"
+    yield 1.0
     driver.shot("4_mended")
     keyed = story.curves()
     yield from tracked()
@@ -98,6 +99,7 @@ def mended():
     assert [frame for frame, kind in kinds().items() if kind == "KEYFRAME"] == [FRAME, MENDED]
     driver.saw(mended=kinds())
     yield from driver.until(lambda: story.edit().frame_current == MENDED, "the frame is where it was")
+    yield 1.0
     driver.shot("5_tracked_again")
     after = story.curves()
     driver.move(story.preview(), 50, story.preview().height - 50)
@@ -114,7 +116,7 @@ def escaped():
     yield 1.0
     yield from tracked()
     yield from driver.until(lambda: story.edit().frame_current > FRAME + 3, "the preview goes along", 60)
-    driver.shot("6_tracking")
+    driver.shot("3_tracking")
     driver.key("Escape")
     yield from ended()
     driver.saw(escaped=kinds(), frame=story.edit().frame_current)
@@ -144,9 +146,9 @@ def told():
     yield from drawn()
     driver.shot("1_stroke")
     yield from tracked()
-    driver.shot("2_tracking")
     yield from ended()
-    driver.shot("3_tracked")
+    yield 1.0
+    driver.shot("2_tracked")
     driver.saw(tracked=kinds(), frame=story.edit().frame_current)
     yield from mended()
     yield from escaped()

@@ -74,7 +74,7 @@ def track(edit, effect, strip, index: int, frames: range, motion: str, *, all_ke
             if len(found) > 1:
                 kept = found if all_keys else _thinned(effect, shape, found, {start, *anchors})
                 _write(keys, [found[frame] for frame in kept], found.values())
-                _mark(effect, index, frames, found, stops)
+                _mark(effect, index, found, stops)
     if len(found) == 1:
         raise EffectError(rpt_(stops[0].fault))
 
@@ -139,14 +139,14 @@ def _write(keys: MotionKeys, kept: Iterable[Tracked], found: Iterable[Tracked]) 
     keys.write({t.frame: t.placement for t in kept}, {t.frame: t.confidence for t in found})
 
 
-def _mark(effect, index: int, frames: range, found: dict[int, Tracked], stops: list[Tracked]) -> None:
-    """Notes where tracking stopped, in place of what was noted of the frames that it went through since."""
+def _mark(effect, index: int, found: dict[int, Tracked], stops: list[Tracked]) -> None:
+    """Notes where tracking stopped, in place of what was noted of a direction, and of frames that it came through."""
     region, start = effect.regions[index], next(iter(found))
+    ways = {stop.frame > start for stop in stops}
     for i in reversed(range(len(region.stops))):
-        frame = effect.start + region.stops[i].frame
-        is_passed = min(found) <= frame <= max(found)
-        if is_passed or (frames[-1] > start if region.stops[i].forward else frames[0] < start):
+        old = region.stops[i]
+        if old.forward in ways or min(found) <= effect.start + old.frame <= max(found):
             region.stops.remove(i)
-    for tracked in stops:
-        stop = region.stops.add()
-        stop.frame, stop.forward, stop.fault = tracked.frame - effect.start, tracked.frame > start, tracked.fault
+    for stop in stops:
+        new = region.stops.add()
+        new.frame, new.forward, new.fault = stop.frame - effect.start, stop.frame > start, stop.fault
