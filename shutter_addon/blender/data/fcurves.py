@@ -29,7 +29,7 @@ class Curves:
         no timeline is."""
         curve = self._curves.get((path, index))
         if curve is not None and curve not in self._frames:
-            frames = frames_of(curve)
+            frames = points_of(curve)[:, 0]
             beyond = validation.beyond_timeline(frames)
             if beyond.size:
                 owner, _, name = path.rpartition(".")
@@ -68,11 +68,11 @@ class Curves:
         return validation.curved(owner, name, curve, frame)
 
 
-def frames_of(curve) -> np.ndarray:
-    """Frames (n,) of an F-curve's keys."""
+def points_of(curve) -> np.ndarray:
+    """Frames and values (n, 2) of an F-curve's keys."""
     points = np.empty(2 * len(curve.keyframe_points), np.float32)
     curve.keyframe_points.foreach_get("co", points)
-    return points[::2]
+    return points.reshape(-1, 2)
 
 
 def _eases(curve) -> list[str]:
@@ -84,7 +84,7 @@ def _eases(curve) -> list[str]:
 
 def key_frames(curves) -> list[float]:
     """Frames with a key on any of the curves, ascending."""
-    frames = [frames_of(curve) for curve in curves]
+    frames = [points_of(curve)[:, 0] for curve in curves]
     return np.unique(np.concatenate([np.empty(0, np.float32), *frames])).tolist()
 
 

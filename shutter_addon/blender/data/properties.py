@@ -178,7 +178,7 @@ class TrackStop(PropertyGroup):
 
     frame: counts from the effect's start, so that it moves with its strips"""
 
-    frame: FloatProperty()
+    frame: FloatProperty(min=-2 * MAX_FRAME, max=2 * MAX_FRAME)
     forward: BoolProperty()
     fault: StringProperty()
 
@@ -269,7 +269,7 @@ class ShutterRegion(PropertyGroup):
     )
     follow_track: StringProperty(name="Track", description="Name of the track or plane track that is followed")
     # Where the region's own place counts, from the effect's start; and of what the keys were made.
-    follow_frame: FloatProperty(options={"HIDDEN"})
+    follow_frame: FloatProperty(name="Follow From", min=-2 * MAX_FRAME, max=2 * MAX_FRAME, options={"HIDDEN"})
     follow_stamp: StringProperty(options={"HIDDEN"})
 
 

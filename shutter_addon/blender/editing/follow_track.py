@@ -12,7 +12,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core import motions
 from ...core.motions import Placement, Similarity
-from ..data import annotations, revision, snapshot, source_media, strips
+from ..data import annotations, revision, snapshot, source_media, strips, validation
 from ..data.validation import EffectError
 from ..rendering import session
 from . import region_edits
@@ -41,7 +41,7 @@ def update(edit, effect, strip, index: int) -> None:
 
 
 def _start(effect, index: int) -> int:
-    return round(effect.start + effect.regions[index].follow_frame)
+    return round(effect.start + validation.number(effect.regions[index], "follow_frame"))
 
 
 def _key(edit, effect, strip, index: int, points: dict[int, Points]) -> None:
@@ -126,6 +126,8 @@ def _points(edit, effect, strip, index: int, start: int) -> dict[int, Points]:
     """By timeline frame of the strip the points that a region follows, as the strip shows them. EffectError,
     MediaError: there is nothing that it can follow from the frame `start` on."""
     region = effect.regions[index]
+    validation.check_region(region)
+    validation.word(region, "motion")
     tracks, size = _markers(region), annotations.picture_size(effect)
     times = _clip_times(edit, effect, strip, region.follow_clip)
     found = {frame: _points_at(tracks, time, size) for frame, time in times.items()}

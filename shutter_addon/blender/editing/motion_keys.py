@@ -31,7 +31,9 @@ class MotionKeys:
     def edited(self, frames: range) -> list[int]:
         """The whole frames, among these, at which the editor has set a key."""
         curves = (self._curve(name, component) for name, component in _COMPONENTS[: _COUNTS[self.motion]])
-        found = {frame for curve in curves if curve for frame in fcurves.frames_of(curve)[~_are_made(curve)].tolist()}
+        found = {
+            frame for curve in curves if curve for frame in fcurves.points_of(curve)[:, 0][~_are_made(curve)].tolist()
+        }
         return sorted(int(frame) for frame in found if frame in frames)
 
     def are_made(self) -> bool:
@@ -55,7 +57,7 @@ class MotionKeys:
     def confidence(self) -> tuple[np.ndarray, np.ndarray]:
         """The frames (n,) that have a confidence, ascending, and what it is, 0 to 1."""
         curve = self._curve("confidence")
-        points = np.array([key.co for key in curve.keyframe_points]) if curve else np.empty((0, 2))
+        points = fcurves.points_of(curve) if curve else np.empty((0, 2))
         return points[:, 0], points[:, 1] / 100
 
     def _curve(self, name: str, component: int = 0, *, new: bool = False):
@@ -80,18 +82,18 @@ def _replace(curve, values: dict[int, float], first: int, last: int) -> None:
     points = curve.keyframe_points
     for i in np.flatnonzero(_within(curve, first, last) & _are_made(curve))[::-1].tolist():
         points.remove(points[i], fast=True)
-    edited = set(fcurves.frames_of(curve).tolist())
+    edited = set(fcurves.points_of(curve)[:, 0].tolist())
     for frame in sorted(values.keys() - edited):
         points.insert(frame, values[frame], options={"FAST"}, keyframe_type=MADE)
     if values:
-        begins_span = fcurves.frames_of(curve) < last
+        begins_span = fcurves.points_of(curve)[:, 0] < last
         for i in np.flatnonzero(_within(curve, first, last) & (begins_span | _are_made(curve))).tolist():
             points[i].interpolation = "LINEAR"
     curve.update()
 
 
 def _within(curve, first: int, last: int) -> np.ndarray:
-    frames = fcurves.frames_of(curve)
+    frames = fcurves.points_of(curve)[:, 0]
     return (frames >= first) & (frames <= last)
 
 

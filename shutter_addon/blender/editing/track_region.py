@@ -4,18 +4,19 @@ A key comes with every frame that is tracked, so that the preview can go along; 
 that the motion needs within a pixel of the picture.
 """
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import motions
+from ...core import limits, motions
 from ...core.effect import Region
 from ...core.keyframes import Samples
 from ...media import tracking
 from ...media.tracking import Tracked
-from ..data import annotations, snapshot
+from ..data import annotations, snapshot, validation
 from ..data.validation import EffectError
 from ..rendering import session
 from . import region_edits
@@ -52,6 +53,7 @@ def track(edit, effect, strip, index: int, frames: range, motion: str, *, all_ke
 
     motion: one of properties.MOTIONS; all_keys: keys are not thinned
     EffectError, MediaError: it cannot be tracked; where no frame has come yet, nothing has changed."""
+    validation.check_region(effect.regions[index])
     start, keys = edit.frame_current, MotionKeys(effect, index, motion)
     anchors = [frame for frame in keys.edited(frames) if frame != start]
     here = Tracked(start, placement_now(effect.regions[index]), 1.0)
@@ -81,7 +83,8 @@ def track(edit, effect, strip, index: int, frames: range, motion: str, *, all_ke
 
 def stops(effect, index: int) -> list[tuple[int, str]]:
     """The timeline frames at which tracking of a region stopped, ascending, and why, in the user's language."""
-    return sorted((round(effect.start + stop.frame), rpt_(stop.fault)) for stop in effect.regions[index].stops)
+    known = [stop for stop in effect.regions[index].stops if math.isfinite(effect.start + stop.frame)]
+    return sorted((round(effect.start + stop.frame), rpt_(stop.fault)) for stop in known)
 
 
 def confidence_at(effect, index: int, frame: float) -> float | None:
@@ -93,7 +96,7 @@ def confidence_at(effect, index: int, frame: float) -> float | None:
 def next_unsure(effect, index: int, frame: float) -> int | None:
     """The first timeline frame after another one of which tracking was not sure, or None."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
-    unsure = frames[(frames > frame) & (confidence < tracking.SURE)]
+    unsure = frames[(frames > frame) & (frames <= limits.MAX_FRAME) & (confidence < tracking.SURE)]
     return int(unsure[0]) if len(unsure) else None
 
 

@@ -191,10 +191,15 @@ class _Regions(_WithEffect):
 
 def _draw_tracking(layout, effect, region) -> None:
     """The buttons; how sure tracking was of the current frame, and where it stopped."""
+    try:
+        motion = validation.word(region, "motion")
+    except validation.EffectError as error:
+        layout.label(text=str(error), icon="ERROR", translate=False)
+        return
     row = layout.row(align=True)
     for direction, _name, _description, icon, _number in track_operators.DIRECTIONS:
         button = row.operator("shutter.track", text="Track" if direction == "BOTH" else "", icon=icon)
-        button.direction, button.motion = direction, region.motion
+        button.direction, button.motion = direction, motion
         button.until, button.all_keys = region.track_until, region.track_all_keys
     index = effect.active_region
     confidence = track_region.confidence_at(effect, index, effect.id_data.frame_current)

@@ -643,6 +643,7 @@ MESSAGES = {
         "*",
         "Name of the track or plane track that is followed",
     ): "Name der Spur oder Flächenspur, der gefolgt wird",
+    ("*", "Follow From"): "Folgen ab",
     ("*", "The track has changed"): "Die Spur hat sich geändert",
     ("*", "Choose a clip first"): "Zuerst einen Clip wählen",
     ("*", "The region follows no track yet"): "Die Region folgt noch keiner Spur",
