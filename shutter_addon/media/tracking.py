@@ -267,7 +267,8 @@ class _Pursuit:
         found = None if missed else self._found(picture, self._speed.after(self._known))
         found = found or self._found_elsewhere(picture, missed)
         if found is None:
-            self.reason = COVERED if self._share_inside(picture) > 0.5 else LEFT
+            if not missed:
+                self.reason = LEFT if self._leaves(picture) else COVERED
             return None
         self._speed = found[0].after(self._known.inverse()) if not missed else Similarity()
         self._known, self._seen = found[0], (picture, *found)
@@ -319,12 +320,12 @@ class _Pursuit:
                     found.append((match.motion.after(look.motion), look.worth * sure))
         return max(found, key=lambda each: each[1], default=None)
 
-    def _share_inside(self, picture) -> float:
-        """How much of the part would lie in the picture by now."""
-        places = self._speed.after(self._known)(self._first.points)
+    def _leaves(self, picture) -> bool:
+        """Whether most of the part would lie outside of the picture if it went on."""
+        places = self._speed.after(self._speed).after(self._known)(self._first.points)
         height, width = picture.shape
         inside = (places.real >= 0) & (places.real < width) & (places.imag >= 0) & (places.imag < height)
-        return float(inside.mean())
+        return inside.mean() < 0.5
 
 
 @dataclass(frozen=True)
@@ -347,13 +348,14 @@ class _Look:
 
 
 def confidence(match: Match | None, picture: np.ndarray) -> float:
-    """How sure a match is, 0 to 1."""
+    """How sure a match is, 0 to 1: by its expected error, how many corners agree, and how like the pixels are: the more
+    alike, the fewer corners have to agree."""
     if match is None:
         return 0.0
     error = match.error * 640 / max(picture.shape)
-    precise = 1 / (1 + (error / 0.7) ** 2)
-    alike = min(max(match.likeness, 0.0) / 0.6, 1.0)
-    return precise * alike * min(match.share / 0.6, 1.0) * min(match.visible / 0.6, 1.0)
+    likeness = max(match.likeness, 0.0)
+    factors = likeness / 0.6, match.share / (0.9 - 0.6 * likeness), match.visible / 0.6
+    return float(np.prod([min(factor, 1.0) for factor in factors])) / (1 + (error / 0.7) ** 2)
 
 
 def _weights(covered: np.ndarray, kind: str) -> Iterator[np.ndarray]:
