@@ -39,6 +39,7 @@ NOT_SHOWN = "the frame lies outside what can be tracked"
 SURE = 0.5  # from here on a frame is within about a pixel of 640
 _LOST = 0.12  # below it nothing was found
 _AGAIN = 0.3  # below it nothing was found where it might be anywhere
+_DOUBTFUL = 0.2  # below it, it may as well be anywhere
 _DRIFT, _LEAST = 0.95, 0.1  # what a later look is worth beside the one before it, and at least
 _SHIFTED = 0.6  # what a location is worth where rotation and scale could not be found
 _FADING = 0.6  # below it another frame is taken to compare with beside the first
@@ -265,7 +266,11 @@ class _Pursuit:
         """The motion from the first picture, and its confidence; None: it is not there. missed: for how many pictures
         before this one it was not."""
         found = None if missed else self._found(picture, self._speed.after(self._known))
-        found = found or self._found_elsewhere(picture, missed)
+        if found is None:
+            self._look_anew()
+            found = self._found_elsewhere(picture, missed, self._look)
+        elif found[1] < _DOUBTFUL:
+            found = self._found_elsewhere(picture, missed) or found
         if found is None:
             if not missed:
                 self.reason = LEFT if self._leaves(picture) else COVERED
@@ -307,12 +312,11 @@ class _Pursuit:
         if (weight > 0).any():
             self._look = _Look(Part(picture, weight), motion, max(_DRIFT * worth, _LEAST))
 
-    def _found_elsewhere(self, picture, missed: int) -> tuple[Similarity, float] | None:
-        """As `_found`, of all places where it may be by now; only if it looks as it did first, or as it did last."""
-        self._look_anew()
+    def _found_elsewhere(self, picture, missed: int, *looks: _Look) -> tuple[Similarity, float] | None:
+        """As `_found`, of all places where it may be by now; only if it looks as it did first, or as in other looks."""
         radius = 0.05 * picture.shape[1] * (1 + missed / 4)
         found = []
-        for look in (_Look(self._first, Similarity(), 1.0), self._look):
+        for look in (_Look(self._first, Similarity(), 1.0), *looks):
             from_there = self._known.after(look.motion.inverse())
             for guess in (from_there, look.part.seek(picture, from_there, radius)):
                 match = guess and look.part.find(picture, guess, self._motion)
