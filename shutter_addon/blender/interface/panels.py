@@ -166,11 +166,12 @@ class _Regions(_WithEffect):
         row.operator("shutter.draw", icon="GREASEPENCIL")
         row.operator("shutter.erase")
         row.operator_menu_enum("shutter.region_take", "layer", text="", icon="DOWNARROW_HLT")
+        layout.use_property_split = True
+        layout.prop(effect, "edge_aware")
         region = selection.active_region(effect)
         if region is None:
             return
         _draw_tracking(layout, effect, region)
-        layout.use_property_split = True
         row = layout.split(factor=0.4)
         row.alignment = "RIGHT"
         row.label(text="Shutter")
