@@ -17,7 +17,8 @@ import traces
 # Of the footage's frame 70, in fractions of the picture: down a woman's back.
 FRAME, STROKE = 70, ((0.462, 0.65), (0.465, 0.62), (0.467, 0.59), (0.468, 0.565))
 MENDED = 85
-TRACK_BUTTON = 425  # pixels below the sidebar's upper edge
+SHOWN = range(55, 96)
+FOLLOW_EDGES, TRACK = 425, 451  # where they stand in the sidebar, in pixels below its upper edge
 
 
 def part(name):
@@ -68,9 +69,12 @@ def drawn():
 
 def tracked():
     """By the button in the sidebar."""
-    sidebar = driver.region_of(driver.area_of("SEQUENCE_EDITOR", "PREVIEW"), "UI")
-    driver.click(sidebar, sidebar.width * 0.45, sidebar.height - TRACK_BUTTON)
+    driver.click(sidebar(), sidebar().width * 0.45, sidebar().height - TRACK)
     yield from driver.until(is_tracking, "tracking begins")
+
+
+def sidebar():
+    return driver.region_of(driver.area_of("SEQUENCE_EDITOR", "PREVIEW"), "UI")
 
 
 def is_tracking():
@@ -79,6 +83,20 @@ def is_tracking():
 
 def ended():
     yield from driver.until(lambda: not is_tracking(), "tracking ends", 90)
+
+
+def edges_followed():
+    """The slider is dragged to its end."""
+    region = sidebar()
+    height = region.height - FOLLOW_EDGES
+    yield from driver.drag(region, [(region.width * share, height) for share in (0.45, 0.5, 0.6, 0.7, 0.8, 0.95)])
+    yield 2.0
+    driver.saw(edge_aware=story.effect().edge_aware)
+    driver.shot("5_edges")
+    for view in ("COEFFICIENTS", "RESULT"):
+        bpy.context.window_manager.virtual_shutter.view = view
+        yield 2.0
+        driver.shot(f"5_edges_{view.lower()}")
 
 
 def mended():
@@ -92,7 +110,7 @@ def mended():
     assert tuple(region().location) != before
     assert kinds()[MENDED] == "KEYFRAME"
     yield 1.0
-    driver.shot("4_mended")
+    driver.shot("3_mended")
     keyed = story.curves()
     yield from tracked()
     yield from ended()
@@ -100,7 +118,7 @@ def mended():
     driver.saw(mended=kinds())
     yield from driver.until(lambda: story.edit().frame_current == MENDED, "the frame is where it was")
     yield 1.0
-    driver.shot("5_tracked_again")
+    driver.shot("3_tracked_again")
     after = story.curves()
     driver.move(story.preview(), 50, story.preview().height - 50)
     yield
@@ -116,7 +134,7 @@ def escaped():
     yield 1.0
     yield from tracked()
     yield from driver.until(lambda: story.edit().frame_current > FRAME + 3, "the preview goes along", 60)
-    driver.shot("3_tracking")
+    driver.shot("4_escaping")
     driver.key("Escape")
     yield from ended()
     driver.saw(escaped=kinds(), frame=story.edit().frame_current)
@@ -127,12 +145,12 @@ def rendered():
     render.image_settings.media_type = "IMAGE"
     render.image_settings.file_format = "PNG"
     render.filepath = str(driver.OUT / "final_")
-    story.edit().frame_start, story.edit().frame_end, story.edit().frame_step = 40, 90, 10
+    story.edit().frame_start, story.edit().frame_end, story.edit().frame_step = 60, 90, 15
     done = []
     bpy.app.handlers.render_complete.append(lambda *_: done.append(True))
     with driver.override("PREVIEW"):
         bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
-    yield from driver.until(lambda: done, "the render ends", 60)
+    yield from driver.until(lambda: done, "the render ends", 120)
 
 
 def told():
@@ -140,6 +158,8 @@ def told():
     story.edit().render.resolution_x, story.edit().render.resolution_y, story.edit().frame_end = 768, 576, 100
     yield from roomier()
     yield from story.movie_added()
+    movie = story.edit().sequence_editor.strips_all[0]
+    movie.left_handle, movie.right_handle = SHOWN.start, SHOWN.stop
     story.edit().frame_set(FRAME)
     yield from story.effect_added()
     story.effect().active_shutter = 1
@@ -152,6 +172,7 @@ def told():
     driver.saw(tracked=kinds(), frame=story.edit().frame_current)
     yield from mended()
     yield from escaped()
+    yield from edges_followed()
     yield from rendered()
 
 

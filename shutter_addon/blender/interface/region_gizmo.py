@@ -146,6 +146,7 @@ class SHUTTER_GT_region(Gizmo):
         effect, index = found[1], found[1].active_region
         if bar_edits.auto_key(context) or MotionKeys(effect, index, region.motion).are_made():
             region_edits.key_region(effect, index)
+            context.area.tag_redraw()  # panels show keys
         bpy.ops.ed.undo_push(message=iface_("Transform Region", contexts.operator_default))
 
 
