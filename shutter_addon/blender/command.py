@@ -1,10 +1,11 @@
 """The command: from a source and a recipe to a finished film, through Blender's sequencer.
 
 `python -m shutter_addon render …`, and `blender -c shutter render …` in an installed Blender. `inbetween` in place of
-`render` builds in-between frames alone.
+`render` builds in-between frames alone, `track` has a recipe's region follow what it covers.
 """
 
 import argparse
+import json
 import os
 import re
 import sys
@@ -19,10 +20,11 @@ import bpy
 
 from ..compute.device import NoDeviceError
 from ..compute.renderer import DEVICES
-from ..core import atomic_write, recipe
+from ..core import atomic_write, recipe, region_keys, retiming
 from ..core.messages import sentence, signed
-from ..media import MediaError, open_source
+from ..media import MediaError, PrefetchSource, open_source, registration, tracking
 from ..media.completeness import is_whole_blend, why_short
+from ..media.cuts import ShotSource
 from ..media.files import check_name
 from ..media.sequence import by_number
 from .data import inbetween_settings, snapshot, source_media, strips, validation
@@ -43,7 +45,7 @@ def main(argv: list[str]) -> int:
         for path in vars(arguments).values():
             if isinstance(path, Path):
                 check_name(path)
-        (_render if arguments.command == "render" else _build_alone)(arguments)
+        _COMMANDS[arguments.command](arguments)
     except SystemExit as stop:  # argparse: --help, or what it has said on stderr
         return stop.code
     except KeyboardInterrupt:  # while in-between frames are built; those that are finished stay
@@ -55,7 +57,7 @@ def main(argv: list[str]) -> int:
     except MemoryError as error:
         return _refuse(str(error) or "not enough memory")
     except OSError as error:
-        place = getattr(arguments, "output", None) or getattr(arguments, "save", None) or arguments.cache
+        place = next(filter(None, (getattr(arguments, name, None) for name in ("output", "save", "cache"))))
         return _refuse(film_output.in_words(error, place))
     except RuntimeError as error:  # from Blender
         return _refuse(film_output.message(error))
@@ -111,6 +113,20 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument("--method", choices=METHODS, default="quick", help="of optical flow")
     build.add_argument("--frames", metavar="A:B", help="source frames A to B, and up to the one behind; 1 is the first")
     build.add_argument("--cache", type=_place, metavar="DIR", required=True, help="where in-between frames shall lie")
+    track = commands.add_parser("track", help="have a recipe's region follow what it covers")
+    track.add_argument("source", type=_place, help="a movie, or the first file of an image sequence")
+    track.add_argument("--recipe", type=_place, required=True, help="the effect, a JSON file")
+    track.add_argument("--region", required=True, metavar="NAME", help="the region that is to follow")
+    track.add_argument("--frame", type=int, required=True, metavar="F", help="the frame at which it lies right")
+    track.add_argument(
+        "--frames", metavar="A:B", help="timeline frames A to B, both ways from F; 1 is the strip's first"
+    )
+    track.add_argument(
+        "--motion", choices=registration.MOTIONS, default="scale", help="location; rotation too; or scale as well"
+    )
+    track.add_argument("--all-keys", action="store_true", help="a key at every frame, needed or not")
+    track.add_argument("--output", type=_place, required=True, metavar="R2.json", help="the recipe with the keys")
+    track.add_argument("--report", type=_place, metavar="FILE.json", help="how sure each frame is, and where it ended")
     return parser
 
 
@@ -204,6 +220,72 @@ def _build_alone(arguments) -> None:
         _build(medium, arguments.cache, arguments.factor, arguments.method, pairs)
 
 
+def _track(arguments) -> None:
+    source_recipe = recipe.load(arguments.recipe)
+    names = [region.name for region in source_recipe.regions]
+    if arguments.region not in names:
+        raise recipe.RecipeError(f'{arguments.recipe}: there is no region "{arguments.region}"')
+    index = names.index(arguments.region)
+    with _opened(arguments.source) as medium:
+        film_output.spare(
+            filter(None, (arguments.output, arguments.report)), [arguments.source, *_files(medium), arguments.recipe]
+        )
+        first, last = _frames(arguments.frames, new_edit.length(medium, source_recipe))
+        if not first <= arguments.frame <= last:
+            raise film_output.OutputError(f"--frame: {arguments.frame} is not within the frames {first}:{last}")
+        tracked, stops = _followed(arguments, source_recipe, index, medium, range(first, last + 1))
+        size = medium.width, medium.height
+    placements = {frame: found.placement for frame, found in tracked.items()}
+    region = region_keys.with_placements(
+        source_recipe.regions[index], placements, {arguments.frame}, size, thin=not arguments.all_keys
+    )
+    regions = [*source_recipe.regions[:index], region, *source_recipe.regions[index + 1 :]]
+    _write_track(arguments, replace(source_recipe, regions=regions), tracked, stops)
+    for stop in stops:
+        print(signed(f"{arguments.region}: not tracked from frame {stop.frame} on: {stop.fault}"), file=sys.stderr)
+
+
+def _followed(arguments, source_recipe, index: int, medium, frames: range) -> tuple[dict, list]:
+    """What tracking found, by frame, and where it ended before the last frame. TrackingError: at once."""
+    region = source_recipe.effect(medium.width / medium.height).regions[index]
+    tracked, stops = {}, []
+    with ShotSource(PrefetchSource(medium)) as shots, film_output.progress(len(frames) - 1, "frame") as moved:
+
+        def shown(frame):
+            time = source_recipe.time_at(frame)
+            return retiming.nearest(frame - 1 if time is None else time - 1, shots)
+
+        footage = tracking.Footage(shots, shown)
+        for found in tracking.follow(region, footage, arguments.frame, frames, motion=arguments.motion):
+            if found.fault:
+                stops.append(found)
+            else:
+                tracked[found.frame] = found
+                moved()
+    if len(tracked) < 2:
+        raise tracking.TrackingError(f"{arguments.region}: {stops[0].fault}")
+    return tracked, stops
+
+
+def _write_track(arguments, result, tracked: dict, stops: list) -> None:
+    """Writes the recipe, and the report of it, both whole or neither."""
+    report = {
+        "region": arguments.region,
+        "frame": arguments.frame,
+        "motion": arguments.motion,
+        "frames": [{"frame": n, "confidence": round(tracked[n].confidence, 3)} for n in sorted(tracked)],
+        "stops": [{"frame": stop.frame, "reason": stop.fault} for stop in stops],
+    }
+    for path in filter(None, (arguments.output, arguments.report)):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        film_output.clear_up(path.parent)
+    with atomic_write.writing(arguments.output) as part:
+        part.write_text(recipe.dump(result), encoding="utf-8")
+        if arguments.report:
+            with atomic_write.writing(arguments.report) as other:
+                other.write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
 def _build(medium, folder: Path, factor: int, method: str, pairs) -> None:
     """Builds the in-betweens of these pairs of source frames, each given by its first, in ascending order."""
     from ..media.inbetween import build
@@ -263,3 +345,6 @@ def _is_whole(path: Path, scene: str) -> bool:
             return scene in found.scenes
     except OSError:
         return False
+
+
+_COMMANDS = {"render": _render, "inbetween": _build_alone, "track": _track}

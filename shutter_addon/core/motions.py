@@ -1,0 +1,142 @@
+"""How a region moves: its keyed numbers, what a motion of the picture makes of them, and which keys say so."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+# Of the directions in which a shape's farthest points are looked for: the others are farther by 1/2 % at most.
+_DIRECTIONS = np.exp(1j * np.linspace(0, 2 * np.pi, 32, endpoint=False))
+
+# From a pixel's corner to its middle.
+_CORNER = 0.5 + 0.5j
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A region's keyed numbers at a frame, which act about its shape's centre (see scribbles.transform).
+
+    location: x, y in fractions of the picture, y up; rotation: degrees counter-clockwise"""
+
+    location: tuple[float, float] = (0.0, 0.0)
+    rotation: float = 0.0
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class Similarity:
+    """A motion of the picture that turns, scales and shifts it: z → turn·z + shift, where z = x + iy in pixels, y down,
+    whole numbers in the middle of a pixel."""
+
+    turn: complex = 1 + 0j
+    shift: complex = 0j
+
+    def __call__(self, points):
+        """Where a point, or an array of points, goes."""
+        return self.turn * points + self.shift
+
+    def after(self, first: Similarity) -> Similarity:
+        """The motion of the first one and then this one."""
+        return Similarity(self.turn * first.turn, self(first.shift))
+
+    def inverse(self) -> Similarity:
+        return Similarity(1 / self.turn, -self.shift / self.turn)
+
+
+def centre(strokes: Iterable) -> np.ndarray:
+    """The centre (2,) of the strokes' common bounding box, about which they are scaled and turned."""
+    points = np.concatenate([np.asarray(stroke, dtype=np.float64) for stroke in strokes])
+    return (points.min(axis=0) + points.max(axis=0)) / 2
+
+
+def offsets(strokes: Iterable) -> np.ndarray:
+    """The strokes' points (n, 2) from their centre on, in fractions of the picture."""
+    points = np.concatenate([np.asarray(stroke, dtype=np.float64) for stroke in strokes])
+    return points - (points.min(axis=0) + points.max(axis=0)) / 2
+
+
+def carried(placement: Placement, motion: Similarity, before, after, size) -> Placement:
+    """The placement of a shape after a motion of the picture.
+
+    before, after: centres (2,) of the shape as it is drawn when the motion begins and when it ends, fractions
+    size: width and height of the picture whose pixels the motion counts"""
+    width, height = size
+    x, y = np.add(before, placement.location)
+    moved = motion(complex(x * width, (1 - y) * height) - _CORNER) + _CORNER
+    location = moved.real / width - float(after[0]), 1 - moved.imag / height - float(after[1])
+    rotation = placement.rotation - math.degrees(cmath.phase(motion.turn))
+    return Placement(location, rotation, placement.scale * abs(motion.turn))
+
+
+def unwound(placement: Placement, near: Placement) -> Placement:
+    """The same placement, its rotation less than half a turn from another's: keys between them do not spin."""
+    turns = round((near.rotation - placement.rotation) / 360)
+    return replace(placement, rotation=placement.rotation + 360 * turns)
+
+
+def between(first: Placement, second: Placement, share: float) -> Placement:
+    """A share 0 to 1 of the way from one placement to another, each number by itself, as between linear keys."""
+    numbers = (1 - share) * _numbers([first]) + share * _numbers([second])
+    x, y, rotation, scale = (float(number) for number in numbers[0])
+    return Placement((x, y), rotation, scale)
+
+
+def thinned(
+    placements: Mapping[int, Placement], points, size, kept: Collection[int] = (), tolerance: float = 1.0
+) -> list[int]:
+    """The frames, ascending, whose keys say the motion: with linear eases between these, no point of the shape is
+    farther than the tolerance from where it was.
+
+    Ramer, Douglas and Peucker's: where a span is off, it is split at the frame that is off most.
+    placements: by frame; points: (n, 2) of the shape from its centre on (offsets)
+    size: width and height of the picture in pixels, which the tolerance counts; kept: frames that stay in any case"""
+    frames = sorted(placements)
+    if len(frames) < 3:
+        return frames
+    numbers = _numbers([placements[frame] for frame in frames])
+    far = _farthest(np.asarray(points, dtype=np.float64) * size)
+    ends = [i for i, frame in enumerate(frames) if frame in kept or i in (0, len(frames) - 1)]
+    chosen, spans = set(ends), list(pairwise(ends))
+    while spans:
+        first, last = spans.pop()
+        if last - first < 2:
+            continue
+        off = _distances(np.array(frames[first : last + 1]), numbers[first : last + 1], far, size)
+        worst = int(off.argmax())
+        if off[worst] > tolerance:
+            middle = first + worst
+            chosen.add(middle)
+            spans += [(first, middle), (middle, last)]
+    return [frames[i] for i in sorted(chosen)]
+
+
+def _numbers(placements: list[Placement]) -> np.ndarray:
+    """Location, rotation and scale as an array (n, 4)."""
+    return np.array([(*p.location, p.rotation, p.scale) for p in placements], dtype=np.float64)
+
+
+def _farthest(points: np.ndarray) -> np.ndarray:
+    """Those of the points (n, 2) that are farthest in some direction, as complex numbers: no other moves more by a
+    change of the shape's placement."""
+    plane = points[:, 0] + 1j * points[:, 1]
+    if len(plane) <= len(_DIRECTIONS):
+        return plane
+    return plane[np.unique((plane[:, None] * _DIRECTIONS.conj()).real.argmax(axis=0))]
+
+
+def _distances(frames: np.ndarray, numbers: np.ndarray, points: np.ndarray, size) -> np.ndarray:
+    """How far in pixels a shape's points lie at most, at each frame, from where linear keys at the first and the last
+    frame put them."""
+    share = ((frames - frames[0]) / (frames[-1] - frames[0]))[:, None]
+    straight = (1 - share) * numbers[0] + share * numbers[-1]
+    (x, y), (turn, other) = ((numbers - straight)[:, :2] * size).T, (_turns(numbers), _turns(straight))
+    return np.abs((turn - other)[:, None] * points + (x + 1j * y)[:, None]).max(axis=1)
+
+
+def _turns(numbers: np.ndarray) -> np.ndarray:
+    return numbers[:, 3] * np.exp(1j * np.radians(numbers[:, 2]))

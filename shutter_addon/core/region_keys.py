@@ -1,0 +1,52 @@
+"""A recipe's region with keys of how it moves."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from . import motions
+from .motions import Placement
+from .recipe import Region, RegionKey
+
+_DIGITS = 6  # of what was measured: far below a pixel
+
+
+def with_placements(
+    region: Region, placements: Mapping[int, Placement], exact: Collection[int], size, *, thin: bool = True
+) -> Region:
+    """The region with these placements as its keys, in place of those that it has from the first of these frames to the
+    last. Its drawings stay where and as they are.
+
+    placements: by frame; exact: those frames among them whose keys are kept in any case, and as they are given
+    size: width and height of the picture; thin: no more keys than the motion needs within a pixel"""
+    drawn = {key.frame if key else None: strokes for key, strokes in region.drawings()}
+    eases = {key.frame: key.ease for key in region.keys if key.frame in drawn and len(drawn) > 1}
+    first, last = min(placements), max(placements)
+    chosen = sorted(placements)
+    if thin:
+        # behind a drawing with an ease of its own the motion is to go straight
+        kept = {*exact, *drawn, *(frame + 1 for frame, ease in eases.items() if ease != "linear")}
+        shape = np.concatenate([motions.offsets(strokes) for strokes in drawn.values()])
+        chosen = motions.thinned(placements, shape, size, kept)
+    keys = [key for key in region.keys if not first <= key.frame <= last]
+    for frame in chosen:
+        placement = placements[frame] if frame in exact else _rounded(placements[frame])
+        ease = eases.get(frame, "linear")
+        keys.append(RegionKey(frame, placement.location, placement.rotation, placement.scale, ease=ease))
+    return _redrawn(replace(region, keys=sorted(keys, key=lambda key: key.frame)), drawn)
+
+
+def _redrawn(region: Region, drawn: dict) -> Region:
+    """The region with its drawings, by frame, on its keys: the first one is its own as well."""
+    strokes = next(iter(drawn.values()))
+    if len(drawn) == 1:
+        return replace(region, strokes=strokes, keys=[replace(key, strokes=None) for key in region.keys])
+    return replace(region, strokes=strokes, keys=[replace(key, strokes=drawn.get(key.frame)) for key in region.keys])
+
+
+def _rounded(placement: Placement) -> Placement:
+    x, y = (round(number, _DIGITS) for number in placement.location)
+    return Placement((x, y), round(placement.rotation, _DIGITS), round(placement.scale, _DIGITS))

@@ -1,0 +1,289 @@
+"""How a part of a picture has moved in another one: corners, Lucas and Kanade's optical flow, RANSAC.
+
+Pictures are grey, (H, W) uint8; points are complex, x + iy in pixels, y down, whole numbers in the middle of a pixel.
+Equal pictures give equal results, whatever the number of threads.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from ..core.motions import Similarity
+from .errors import MediaError
+
+try:
+    import cv2
+except ImportError:  # a package without wheels; the extension registers without it
+    cv2 = None
+
+# What may change beside the location, each with what comes before it.
+Motion = Literal["location", "rotation", "scale"]
+MOTIONS = get_args(Motion)
+
+MOST_CORNERS = 200
+FEWEST = {"location": 4, "rotation": 5, "scale": 5}  # corners that have to agree
+_QUALITY = 0.01  # of a corner, as a share of the best one's
+_WEAKEST = 2e-4  # the same, whatever the best one is: noise of some levels has less
+_LEVELS = 3  # a motion between two frames is found up to about 2 ** _LEVELS half windows
+_WINDOWS = 9, 21  # sides of the windows that are compared, in pixels: for small and for large parts
+_THERE_AND_BACK = 0.7  # pixels from where a corner started that it may come back to
+_HYPOTHESES = 300
+_NOISE = 16.0  # levels² of contrast that count for nothing
+# Beyond these the motion between two pictures is none that a film has.
+_MOST_SCALE, _MOST_TURN = 1.5, 0.8
+
+
+def check() -> None:
+    """MediaError: OpenCV is missing."""
+    if cv2 is None:
+        raise MediaError(
+            "tracking needs the Python package opencv-contrib-python-headless; "
+            "install the zip of Virtual Shutter that is made for your system"
+        )
+
+
+@dataclass(frozen=True)
+class Match:
+    """Where a part of a picture is in another one.
+
+    motion: from its picture to the other; agreeing: which of its corners move so (n,) bool, of those `seen` (n,) bool
+    share: of the corners' weight, of those that lie in the picture, that moves so
+    visible: share of the corners' weight that lies in the picture
+    error: pixels by which the part's farthest point is expected to be off
+    likeness: correlation of its pixels with those found, −1 to 1"""
+
+    motion: Similarity
+    agreeing: np.ndarray
+    seen: np.ndarray
+    share: float
+    visible: float
+    error: float
+    likeness: float
+
+
+class Part:
+    """What is looked for: a part of a picture, and its corners.
+
+    Weights of the corners say how much each one counts; `learn` lowers those of corners that move otherwise, as
+    those of the background do."""
+
+    def __init__(self, picture: np.ndarray, weight: np.ndarray):
+        """weight: (H, W) float32, 0 to 1: how much each pixel belongs to it; there has to be one above 0."""
+        self.weight, self._whole = weight, picture
+        x, y, width, height = cv2.boundingRect((weight > 0).astype(np.uint8))
+        self.box = x, y, width, height
+        side = int(np.clip(max(width, height) / 4, *_WINDOWS)) // 2 * 2 + 1
+        self._window = side, side
+        margin = side * 2
+        self._left, self._top = max(x - margin, 0), max(y - margin, 0)
+        right, bottom = min(x + width + margin, picture.shape[1]), min(y + height + margin, picture.shape[0])
+        crop = np.s_[self._top : bottom, self._left : right]
+        self._picture, self._mask = np.ascontiguousarray(picture[crop]), np.ascontiguousarray(weight[crop])
+        self._origin = complex(self._left, self._top)
+        self.points = _corners(self._picture, self._mask) + self._origin
+        columns, rows = (self.points - self._origin).real.astype(int), (self.points - self._origin).imag.astype(int)
+        self._believed = self._mask[rows, columns].astype(np.float64)
+        self._weights = self._believed.copy()
+        self._ends = np.array([complex(a, b) for a in (x, x + width) for b in (y, y + height)])
+
+    def find(self, picture: np.ndarray, guess: Similarity, motion: Motion) -> Match | None:
+        """Where it is in a picture, near to a guess. None: its corners are not found there, or do not agree."""
+        found = None
+        for _ in range(3):  # where the guess was far off, what was found is a better one
+            found = self._match(picture, guess, motion)
+            if found is None:
+                return None
+            moved = np.abs(found.motion(self._ends) - guess(self._ends)).max()
+            guess = found.motion
+            if moved < 2:
+                break
+        return found
+
+    def seek(self, picture: np.ndarray, known: Similarity, radius: float) -> Similarity | None:
+        """Where in a picture its pixels are most alike, within a radius in pixels of a known place; a guess for `find`.
+        None: no place is large enough for all of it."""
+        left, top, width, height = self.box
+        corner = known(complex(left + width / 2, top + height / 2))
+        # its look in the picture's own turn and size
+        turned = Similarity(known.turn)
+        side = max(8, round(abs(known.turn) * max(width, height)))
+        middle = turned(complex(left + width / 2, top + height / 2))
+        place = Similarity(known.turn, complex(side / 2, side / 2) - middle)
+        size = side, side
+        look = cv2.warpAffine(self._whole, matrix(place), size, flags=cv2.INTER_LINEAR)
+        mask = cv2.warpAffine(self.weight, matrix(place), size, flags=cv2.INTER_LINEAR)
+        x, y = (round(corner.real - side / 2 - radius), round(corner.imag - side / 2 - radius))
+        right, bottom = (round(corner.real + side / 2 + radius), round(corner.imag + side / 2 + radius))
+        x, y, right, bottom = max(x, 0), max(y, 0), min(right, picture.shape[1]), min(bottom, picture.shape[0])
+        if right - x < side or bottom - y < side:
+            return None
+        scores = cv2.matchTemplate(picture[y:bottom, x:right], look, cv2.TM_CCOEFF_NORMED, mask=mask)
+        _, _, _, best = cv2.minMaxLoc(np.nan_to_num(scores, posinf=-1, neginf=-1))
+        return Similarity(1, complex(*best) + complex(x, y)).after(place)
+
+    def learn(self, match: Match) -> None:
+        """Takes in which corners move with the part, and which do not."""
+        wanted = self._weights * np.where(match.agreeing, 1.0, 0.05)
+        self._believed += np.where(match.seen, 0.2 * (wanted - self._believed), 0)
+
+    def _match(self, picture, guess, motion) -> Match | None:
+        size = self._picture.shape[::-1]
+        back = cv2.warpAffine(picture, matrix(guess, self._origin), size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
+        there = guess(self.points)
+        seen = (there.real >= 2) & (there.real < picture.shape[1] - 2)
+        seen &= (there.imag >= 2) & (there.imag < picture.shape[0] - 2)
+        total, weights = self._believed.sum(), np.where(seen, self._believed, 0)
+        if seen.sum() < FEWEST[motion] or weights.sum() <= 0.02 * total:
+            return None
+        found, good = self._flow(back)
+        good &= seen
+        tolerance = max(0.75, max(picture.shape) / 640)
+        fitted = fit(self.points, found, np.where(good, weights, 0), motion, tolerance)
+        if fitted is None:
+            return None
+        change, agreeing = fitted
+        off = np.abs(change(self.points) - found)
+        error = _expected_error(self.points[agreeing], off[agreeing], weights[agreeing], self._ends, motion)
+        return Match(
+            guess.after(change),
+            agreeing,
+            seen,
+            float(weights[agreeing].sum() / weights.sum()),
+            float(weights.sum() / total),
+            error,
+            self._likeness(picture, guess.after(change)),
+        )
+
+    def _flow(self, picture) -> tuple[np.ndarray, np.ndarray]:
+        """Where each corner is in a picture, and whether it comes back from there."""
+        options = {"winSize": self._window, "maxLevel": _LEVELS}
+        options["criteria"] = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 0.01)
+        start = _pairs(self.points - self._origin)
+        there, found, _ = cv2.calcOpticalFlowPyrLK(self._picture, picture, start, None, **options)
+        again, back, _ = cv2.calcOpticalFlowPyrLK(picture, self._picture, there, None, **options)
+        close = np.hypot(*(again - start).T) < _THERE_AND_BACK
+        return _plane(there) + self._origin, found.ravel().astype(bool) & back.ravel().astype(bool) & close.ravel()
+
+    def _likeness(self, picture, motion) -> float:
+        """Correlation of the part's pixels with those in another picture, as far as they lie in it."""
+        size = self._picture.shape[::-1]
+        back_from = matrix(motion, self._origin)
+        back = cv2.warpAffine(picture, back_from, size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
+        inside = np.ones(picture.shape, np.uint8)
+        inside = cv2.warpAffine(inside, back_from, size, flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP)
+        return correlation(self._picture, back, self._mask * inside)
+
+
+def correlation(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> float:
+    """Correlation of two pictures, −1 to 1, each pixel by its weight; contrast that noise may have counts for none."""
+    total = float(weight.sum(dtype=np.float64))
+    if total <= 0:
+        return 0.0
+    first, second = first.astype(np.float32), second.astype(np.float32)
+    first -= float((first * weight).sum(dtype=np.float64)) / total
+    second -= float((second * weight).sum(dtype=np.float64)) / total
+    cross, *powers = (
+        float((weight * a * b).sum(dtype=np.float64)) / total for a, b in ((first, second), (first,) * 2, (second,) * 2)
+    )
+    return (cross + _NOISE) / (np.sqrt((powers[0] + _NOISE) * (powers[1] + _NOISE)))
+
+
+def fit(source: np.ndarray, target: np.ndarray, weights: np.ndarray, motion: Motion, tolerance: float):
+    """The similarity close to none that takes most weight of the source's points to the target's within a tolerance in
+    pixels, and which points (n,) bool; None: too few agree. By RANSAC, then by least squares."""
+    usable = np.flatnonzero(weights > 0)
+    if len(usable) < FEWEST[motion]:
+        return None
+    p, q, w = source[usable], target[usable], weights[usable]
+    turns, shifts = _hypotheses(p, q, motion)
+    off = np.abs(turns[:, None] * p + shifts[:, None] - q)
+    scores = (w * np.maximum(0, 1 - (off / tolerance) ** 2)).sum(axis=1)
+    best = int(scores.argmax())
+    found = Similarity(complex(turns[best]), complex(shifts[best]))
+    for _ in range(4):
+        off = np.abs(found(p) - q)
+        close = off < tolerance
+        if close.sum() < FEWEST[motion]:
+            return None
+        found = _least_squares(p[close], q[close], (w * (1 - (off / tolerance) ** 2))[close], motion)
+    agreeing = np.zeros(len(source), bool)
+    agreeing[usable[np.abs(found(p) - q) < tolerance]] = True
+    return (found, agreeing) if agreeing.sum() >= FEWEST[motion] else None
+
+
+def _hypotheses(p, q, motion) -> tuple[np.ndarray, np.ndarray]:
+    """Turns and shifts (k,) of similarities, each by one or two pairs of points."""
+    count = len(p)
+    if motion == "location":
+        return np.ones(count, complex), q - p
+    random = np.random.default_rng(0)
+    first = random.integers(count, size=_HYPOTHESES)
+    second = (first + random.integers(1, count, size=_HYPOTHESES)) % count
+    apart = np.abs(p[second] - p[first]) > 2
+    if not apart.any():
+        return np.ones(count, complex), q - p
+    first, second = first[apart], second[apart]
+    turns = (q[second] - q[first]) / (p[second] - p[first])
+    size = np.abs(turns)
+    likely = (size > 1 / _MOST_SCALE) & (size < _MOST_SCALE) & (np.abs(np.angle(turns)) < _MOST_TURN)
+    turns = np.where(likely, turns, 1)
+    if motion == "rotation":
+        turns = turns / np.abs(turns)
+    return turns, (q[first] + q[second] - turns * (p[first] + p[second])) / 2
+
+
+def _least_squares(p, q, weights, motion) -> Similarity:
+    """The best similarity between points, by complex regression."""
+    total = weights.sum()
+    middle, target = (weights * p).sum() / total, (weights * q).sum() / total
+    turn = 1 + 0j
+    if motion != "location":
+        turn = (weights * (p - middle).conj() * (q - target)).sum()
+        spread = (weights * np.abs(p - middle) ** 2).sum()
+        if motion == "rotation":
+            turn, spread = turn, np.abs(turn)
+        turn = complex(turn / spread) if spread > 0 else 1 + 0j
+    return Similarity(turn, complex(target - turn * middle))
+
+
+def _expected_error(points, off, weights, ends, motion) -> float:
+    """Standard error in pixels, where it is largest, of a motion that was fitted to points which it leaves off by so
+    much. Corners beside one another err alike: only every fourth counts as one by itself."""
+    count = max(len(points) / 4, 1.0)
+    variance = float((weights * off**2).sum() / weights.sum()) / count
+    if motion == "location":
+        return float(np.sqrt(variance))
+    middle = (weights * points).sum() / weights.sum()
+    spread = float((weights * np.abs(points - middle) ** 2).sum() / weights.sum())
+    lever = float((np.abs(ends - middle) ** 2).max()) / max(spread, 1e-9)
+    return float(np.sqrt(variance * (1 + lever)))
+
+
+def _corners(picture, weight) -> np.ndarray:
+    """The corners (n,) in the part of a picture whose weight is above 0, more than noise and apart from one another."""
+    mask = (weight > 0).astype(np.uint8)
+    apart = max(3.0, np.sqrt(mask.sum() / MOST_CORNERS) * 0.6)
+    strength = cv2.cornerMinEigenVal(picture, 5)
+    mask &= (strength > _WEAKEST).astype(np.uint8)
+    found = cv2.goodFeaturesToTrack(picture, MOST_CORNERS, _QUALITY, apart, mask=mask, blockSize=5)
+    return np.zeros(0, complex) if found is None else _plane(found)
+
+
+def _plane(pairs) -> np.ndarray:
+    """Points (n, 1, 2) as complex numbers."""
+    pairs = pairs.reshape(-1, 2).astype(np.float64)
+    return pairs[:, 0] + 1j * pairs[:, 1]
+
+
+def _pairs(points) -> np.ndarray:
+    return np.stack([points.real, points.imag], axis=-1).astype(np.float32)[:, None]
+
+
+def matrix(motion: Similarity, origin: complex = 0) -> np.ndarray:
+    """OpenCV's (2, 3) of a motion that begins in a picture cropped to `origin`."""
+    shift = motion(origin)
+    turn = motion.turn
+    return np.array([[turn.real, -turn.imag, shift.real], [turn.imag, turn.real, shift.imag]])
