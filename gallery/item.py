@@ -79,7 +79,7 @@ class Shot:
     def coefficients(self, frame: int) -> np.ndarray:
         """How much of each shutter a pixel gets, in the shutters' colours."""
         moment = self._at(frame)
-        mixed = np.tensordot(self._renderer.coefficients(moment), self._colors, axes=(0, 0))
+        mixed = np.tensordot(self._renderer.coefficients(frame - 1, moment), self._colors, axes=(0, 0))
         block = moment.options.aggregate
         return mixed.repeat(block, 0).repeat(block, 1)[: self._source.height, : self._source.width]
 

@@ -110,7 +110,7 @@ def compose(found, plan: dict):
     keys = [key.frame for owner in (*found.shutters, *found.regions) for key in owner.keys]
     for frame in (1, 2.5, *keys[:2]):
         moment = found.at(frame, SIZE[0] / SIZE[1])
-        first, second = (Renderer(device, source).coefficients(moment).astype(float) for device in devices.values())
+        first, second = (Renderer(device, source).coefficients(3, moment).astype(float) for device in devices.values())
         if not (apart := np.abs(first - second).max()) <= 1 / 255:
             raise trial.Fault(f"coefficients are {255 * apart:.3g}/255 apart at frame {frame:g}")
         for name, device in devices.items():

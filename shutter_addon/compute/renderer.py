@@ -9,6 +9,7 @@ from ..core.frame_source import FrameSource
 from ..core.frame_state import FrameState
 from .cpu import CPUCompositor
 from .device import NoDeviceError
+from .guide import BESIDE, Guides, NotedSource, guiding
 
 DEVICES = ("auto", "gpu", "cpu")
 
@@ -44,6 +45,7 @@ class Renderer:
     def __init__(self, compositor, source: FrameSource):
         self.compositor, self.source = compositor, source
         self._solver = compositor.solver()
+        self._guides = Guides(source)
         self._window = None
         self._labelled = self._solved = self._drawn = None
 
@@ -65,26 +67,27 @@ class Renderer:
             self._drawn = key, not quick, picture
         return self._drawn[2]
 
-    def coefficients(self, state: FrameState) -> np.ndarray:
-        """Coefficients (N, h, w) float32, for each pixel, or for each block of Options.aggregate pixels a side."""
+    def coefficients(self, index: int, state: FrameState, direction: int = 1) -> np.ndarray:
+        """Coefficients (N, h, w) float32 of `picture`, for each pixel, or for each block of Options.aggregate pixels a
+        side."""
         count, (width, height) = len(state.bars), self._grid(state)
         with self.compositor.current():
-            labels = self.labels(state)
-            if (values := _uniform(labels, count)) is not None:
-                return np.broadcast_to(values.astype(np.float32)[:, None, None], (count, height, width))
-            return self.compositor.coefficients(self._diffused(labels, count), count)
+            if (sole := self._sole(state)) is not None:
+                values = np.eye(count, dtype=np.float32)[sole]
+                return np.broadcast_to(values[:, None, None], (count, height, width))
+            return self.compositor.coefficients(self._diffused(index, state, direction), count)
 
-    def drawn_coefficients(self, state: FrameState):
+    def drawn_coefficients(self, index: int, state: FrameState, direction: int = 1):
         """Coefficients of a quick `draw` on the device, a GPU: (texture array, block, number of shutters).
 
         The texture array is rgba32f, four shutters per layer, top row first, each texel for block × block pixels; it
         has a single texel where coefficients are the same everywhere. It is valid until the next call of any method.
         """
-        labels, count = self.labels(state), len(state.bars)
+        count = len(state.bars)
         with self.compositor.current():
-            if (values := _uniform(labels, count)) is not None:
-                return self.compositor.constant(values), self._everywhere, count
-            return self._diffused(labels, count, quick=True), state.options.aggregate, count
+            if (sole := self._sole(state)) is not None:
+                return self.compositor.constant(np.eye(count)[sole]), self._everywhere, count
+            return self._diffused(index, state, direction, quick=True), state.options.aggregate, count
 
     def drawn_labels(self, state: FrameState):
         """Labels on the device, a GPU: (texture array r16ui, block), top row first, each texel for block × block
@@ -94,9 +97,17 @@ class Renderer:
 
     def labels(self, state: FrameState) -> np.ndarray:
         """Labels (h, w) uint16 of pixels, or of blocks as for `coefficients`: 0 free, 1 + shutter scribbled."""
+        return self._labelling(state)[0]
+
+    def _sole(self, state: FrameState) -> int | None:
+        """The shutter that holds for the whole picture, if one does."""
+        return self._labelling(state)[1]
+
+    def _labelling(self, state: FrameState) -> tuple[np.ndarray, int | None]:
         key = self._grid(state), state.options.border, state.key[-1]
         if self._labelled is None or self._labelled[0] != key:
-            self._labelled = key, scribbles.rasterise(state.shapes, *key[0], border=key[1])
+            labels = scribbles.rasterise(state.shapes, *key[0], border=key[1])
+            self._labelled = key, (labels, _sole(labels))
         return self._labelled[1]
 
     def shot(self, index: int, direction: int, state: FrameState, *, known: bool = False) -> range:
@@ -125,30 +136,46 @@ class Renderer:
         return positions[low:high] if (frames[low:high] >= 0).all() else positions[frames >= 0]
 
     def needed(self, index: int, direction: int, state: FrameState, *, known: bool = True) -> set[int]:
-        """The source frames at `positions`. known: as for `shot`."""
-        shot = self.shot(index, direction, state, known=known)
-        positions = self.positions(index, direction, state, shot)
-        return set(compositor.source_frames(state.options, positions, shot).tolist())
+        """The source frames at `positions`, and those that guide the diffusion. known: as for `shot`."""
+        shown, beside = self._needed(index, direction, state, known=known)
+        return shown.union(beside)
 
     def missing(self, index: int, direction: int, state: FrameState) -> set[int]:
         """The source frames that `draw` would read: needed ones that are not loaded, and those in which it looks for
         cuts."""
         held = self._window.held if self._window and self._window.capacity == state.options.window else ()
-        missing = self.needed(index, direction, state).difference(held)
+        shown, beside = self._needed(index, direction, state, known=True)
+        missing = shown.difference(held) | self._guides.lacking(beside)
         if self._stops(state):
             missing |= self.source.shots.lacking(index, *self._reach(index, direction, state))
             missing -= self.source.shots.handed()
         return missing
 
+    def _needed(self, index: int, direction: int, state: FrameState, *, known: bool) -> tuple[set[int], tuple]:
+        """The source frames at `positions`, and those of `_guiding`."""
+        shot = self.shot(index, direction, state, known=known)
+        positions = self.positions(index, direction, state, shot)
+        shown = set(compositor.source_frames(state.options, positions, shot).tolist())
+        return shown, self._guiding(index, state, shot)
+
+    def _guiding(self, index: int, state: FrameState, shot: range) -> tuple[int, ...]:
+        """The source frames that guide the diffusion (guide.guiding), the shown one first; none where nothing does."""
+        return guiding(index, state.options.step, shot) if self._is_guided(state) else ()
+
+    def _is_guided(self, state: FrameState) -> bool:
+        """Whether coefficients depend on the shown frame."""
+        return state.options.edge_aware > 0 and self._sole(state) is None
+
     def _stops(self, state: FrameState) -> bool:
         """Whether windows end at cuts."""
         return state.options.stop_at_cuts and self.source.shots is not None
 
-    @staticmethod
-    def _reach(index: int, direction: int, state: FrameState) -> tuple[int, int]:
-        """The first and the last of all positions that any shutter exposes and of `index` itself."""
+    def _reach(self, index: int, direction: int, state: FrameState) -> tuple[int, int]:
+        """The first and the last of all positions that any shutter exposes, and of `index` itself with the frames that
+        guide the diffusion."""
         positions = compositor.window_positions(state.options, index, direction)
-        reach = [index, *positions[slice(*shutters.open_span(state.bars))].tolist()]
+        beside = BESIDE * state.options.step if self._is_guided(state) else 0
+        reach = [index - beside, index + beside, *positions[slice(*shutters.open_span(state.bars))].tolist()]
         return min(reach), max(reach)
 
     @property
@@ -163,36 +190,49 @@ class Renderer:
 
     def _parts(self, index: int, state: FrameState, direction: int, quick: bool):
         """The arguments of the compositor's `draw`, with the window loaded."""
-        handle, state, block = self._coefficients(state, quick)
+        if (sole := self._sole(state)) is None:
+            window = self._loaded(index, direction, state)
+            handle, block = self._diffused(index, state, direction, quick), state.options.aggregate
+        else:
+            state = state.alone(sole)
+            window = self._loaded(index, direction, state)
+            handle, block = self.compositor.constant(np.ones(1)), self._everywhere
+        return window, index, direction, state, handle, block
+
+    def _loaded(self, index: int, direction: int, state: FrameState):
+        """The window with its frames. Those that will guide the diffusion are noted as they are read."""
+        self._keep_guides(index, direction, state)
         window = self._window_for(state.options.window)
         shot = self.shot(index, direction, state)
         window.load(self.positions(index, direction, state, shot), state.options, shot)
-        return window, index, direction, state, handle, block
+        return window
 
-    def _coefficients(self, state: FrameState, quick: bool):
-        """(coefficients on the device, the state to compose with them, pixels along a side of their blocks).
+    def _keep_guides(self, index: int, direction: int, state: FrameState) -> None:
+        """Keeps what guides the diffusion of this picture, and will guide that of the next ones."""
+        if not self._is_guided(state):
+            return
+        step, (low, high) = state.options.step, self._reach(index, direction, state)
+        beside = BESIDE * step
+        onwards = range(index - beside, high + 1) if direction > 0 else range(low, index + beside + 1)
+        self._guides.keep(i for i in onwards if i % step == 0 or i == index)
 
-        Where one shutter holds for the whole picture, the state has that shutter alone.
-        """
-        labels = self.labels(state)
-        values = _uniform(labels, len(state.bars))
-        if values is None:
-            return self._diffused(labels, len(state.bars), quick), state, state.options.aggregate
-        chosen = int(values.argmax())
-        return self.compositor.constant(np.ones(1)), state.alone(chosen), self._everywhere
-
-    def _diffused(self, labels: np.ndarray, count: int, quick: bool = False):
-        """Coefficients on the device. They are solved for only if labels changed since the last call, or if the last
-        solution was a quick one and this must not be."""
-        same = self._solved and self._solved[0] == count and np.array_equal(self._solved[1], labels)
+    def _diffused(self, index: int, state: FrameState, direction: int, quick: bool = False):
+        """Coefficients on the device. They are solved for only if labels or what guides them changed since the last
+        call, or if the last solution was a quick one and this must not be."""
+        labels, options, count = self.labels(state), state.options, len(state.bars)
+        frames = self._guiding(index, state, self.shot(index, direction, state)) if options.edge_aware else ()
+        key = count, frames and (frames, options.edge_aware)
+        same = self._solved and self._solved[0] == key and np.array_equal(self._solved[1], labels)
         if not same or not (quick or self._solved[2]):
-            self._solved = count, labels, not quick, self._solver.solve(labels, count, warm=quick)
+            self._keep_guides(index, direction, state)
+            guided = (self._guides.guide(frames, options.aggregate), options.edge_aware) if frames else ()
+            self._solved = key, labels, not quick, self._solver.solve(labels, count, *guided, warm=quick)
         return self._solved[3]
 
     def _window_for(self, length: int):
         if self._window is None or self._window.capacity != length:
             self.release_window()
-            self._window = self.compositor.window(self.source, length)
+            self._window = self.compositor.window(NotedSource(self.source, self._guides), length)
         return self._window
 
     def release_window(self) -> None:
@@ -200,6 +240,7 @@ class Renderer:
         if self._window is not None:
             self._window.release()
             self._window = self._drawn = None
+        self._guides.keep(())
         if self.source.shots is not None:
             self.source.shots.release()
 
@@ -211,11 +252,10 @@ class Renderer:
         self.source.close()
 
 
-def _uniform(labels: np.ndarray, count: int) -> np.ndarray | None:
-    """The coefficients (N,) if they are the same everywhere, else None. They are if there is no scribble, which gives
-    the first shutter, or if all scribbles are of one shutter."""
+def _sole(labels: np.ndarray) -> int | None:
+    """The shutter of all scribbles, if it is one; the first where there is no scribble. It holds everywhere."""
     highest = int(labels.max())
     if highest == scribbles.FREE:
-        return np.eye(count)[0]
+        return 0
     lowest = int((labels - np.uint16(1)).min())  # the lowest shutter: a free pixel's 0 wraps around to 65,535
-    return np.eye(count)[lowest] if lowest == highest - 1 else None
+    return lowest if lowest == highest - 1 else None

@@ -7,6 +7,7 @@ whole frame, recipe and effect agree within TOLERANCE.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import asdict
 from decimal import Decimal
 from functools import cache
@@ -37,8 +38,9 @@ def baked(effect: Effect, shown: range, inbetween_method: str) -> recipe.Recipe:
         regions=[region for region in regions if region],
         inbetween=options.step,
         inbetween_method=inbetween_method,
+        edge_aware=_edge_aware(effect.edge_aware, shown),
         time=_time(effect.time, shown) if effect.time else [],
-        **{name: value for name, value in asdict(options).items() if name != "step"},
+        **{name: value for name, value in asdict(options).items() if name not in ("step", "edge_aware")},
     )
     return recipe.parse(recipe.dump(found))
 
@@ -86,9 +88,18 @@ def _shutter(effect: Effect, index: int, name: str, interpolation: str, shown: r
     )
 
 
-def _time(time: Channel, shown: range) -> list[recipe.TimeKey]:
-    def at(frame):
-        return time.at(frame)[0]
+def _edge_aware(channel: Channel, shown: range) -> recipe.Keyable:
+    if isinstance(channel, Samples):
+        return _value_keys(channel.at, channel, shown)
+    return _short(channel.at(shown.start))
+
+
+def _time(time: Channel, shown: range) -> list[recipe.ValueKey]:
+    return _value_keys(lambda frame: time.at(frame)[0], time, shown)
+
+
+def _value_keys(at: Callable[[float], float], channel: Channel, shown: range) -> list[recipe.ValueKey]:
+    """The keys of a number; at: its values, channel: where it was sampled."""
 
     def fits(first, second, frame, share):
         ends = np.array([at(first), at(second)])
@@ -96,10 +107,10 @@ def _time(time: Channel, shown: range) -> list[recipe.TimeKey]:
         return bool(apart <= max(TOLERANCE, 2e-6 * np.abs(ends).max()))  # of large numbers: float32 has no more digits
 
     keys = [(shown.start, "linear")]
-    if isinstance(time, Samples):
-        frames = [frame for frame, _ in time.keys]
-        keys = _keys(fits, lambda frame, held: fits(held, held, frame, 0), time.keys, frames, {}, shown)
-    return [recipe.TimeKey(_frame(frame, shown), _short(at(frame)), ease) for frame, ease in keys]
+    if isinstance(channel, Samples):
+        frames = [frame for frame, _ in channel.keys]
+        keys = _keys(fits, lambda frame, held: fits(held, held, frame, 0), channel.keys, frames, {}, shown)
+    return [recipe.ValueKey(_frame(frame, shown), _short(at(frame)), ease) for frame, ease in keys]
 
 
 def _region(region: Region, shutter: str, shown: range) -> recipe.Region | None:

@@ -7,7 +7,7 @@ of whoever made it: a recipe's count from 1, Blender's are the edit's timeline f
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -116,7 +116,8 @@ class Effect:
 
     shutters: the first is the default
     regions: later ones lie over earlier ones
-    options: channel of frame_state.Options
+    options: channel of frame_state.Options, but for
+    edge_aware: channel of its own, as its keys are numbers
     time: channel of (source frame, whether it runs backward), the source's first frame is 1; None: the strip's own
     timing tells what is shown"""
 
@@ -124,10 +125,11 @@ class Effect:
     regions: tuple[Region, ...]
     options: Channel
     time: Channel | None = None
+    edge_aware: Channel = field(default=keyframes.Constant(0.0))
 
     def at(self, frame: float) -> FrameState:
         """The effect at a frame. EffectError: no picture can be made of it."""
-        options = self.options.at(frame)
+        options = replace(self.options.at(frame), edge_aware=float(self.edge_aware.at(frame)))
         bars = [self.bars_at(index, frame) for index in range(len(self.shutters))]
         return FrameState(options, np.stack(bars), tuple(self._shapes_at(frame)))
 

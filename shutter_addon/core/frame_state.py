@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -21,6 +21,7 @@ class Options:
     """How a window of frames becomes a picture; the recipe's fields of the same names.
 
     window: L, its length in frames, in-between frames included
+    edge_aware: 0 to 1, how much coefficients stop at the edges of the shown frame (core.conductances)
     step: frames for each filmed one: 1, or the factor of in-between frames
     """
 
@@ -33,6 +34,7 @@ class Options:
     aggregate: Literal[1, 2, 4] = 1
     border: bool = False
     stop_at_cuts: bool = True
+    edge_aware: float = 0.0
     step: int = 1
 
     @property
@@ -75,4 +77,5 @@ class FrameState:
 
     def alone(self, chosen: int) -> FrameState:
         """The state of a picture in which one shutter, `chosen`, is everywhere."""
-        return FrameState(self.options, self.bars[chosen, None], (), self.reference or float(self.bars[0].sum()))
+        options = replace(self.options, edge_aware=0.0)  # there is nothing to diffuse
+        return FrameState(options, self.bars[chosen, None], (), self.reference or float(self.bars[0].sum()))

@@ -10,7 +10,7 @@ import math
 import re
 from collections import Counter
 from dataclasses import dataclass, field, is_dataclass, replace
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal, get_args, get_origin
@@ -112,16 +112,21 @@ class Region:
 
 
 @dataclass(frozen=True)
-class TimeKey:
-    """Which source frame is shown at a frame; 1 is the source's first."""
+class ValueKey:
+    """A number at a frame."""
 
     frame: float
     value: float
     ease: Ease = "linear"
 
 
+Keyable = float | list[ValueKey]
+
+
 @dataclass(frozen=True)
 class Recipe:
+    """time: keys of the source frame that is shown, 1 is the source's first; none: the strip's own timing says it."""
+
     version: Literal[1]
     window: int
     shutters: list[Shutter]
@@ -134,13 +139,15 @@ class Recipe:
     aggregate: Literal[1, 2, 4] = 1
     border: bool = False
     stop_at_cuts: bool = True
+    edge_aware: Keyable = 0.0
     inbetween: Factor = 1
     inbetween_method: Literal["quick", "good"] = "quick"
-    time: list[TimeKey] = field(default_factory=list)
+    time: list[ValueKey] = field(default_factory=list)
 
     @property
     def options(self) -> Options:
-        names = Options.__dataclass_fields__.keys() - {"step"}
+        """The options that have no keys."""
+        names = Options.__dataclass_fields__.keys() - {"step", "edge_aware"}
         return Options(**{name: getattr(self, name) for name in names}, step=self.inbetween)
 
     def effect(self, aspect: float) -> effect.Effect:
@@ -151,13 +158,14 @@ class Recipe:
             tuple(region.over_time(order[region.shutter], aspect) for region in self.regions),
             keyframes.Constant(self.options),
             self._source_time(),
+            _numbers(self.edge_aware),
         )
 
     def _source_time(self) -> keyframes.SourceTime | None:
         if not self.time:
             return None
-        frames, values, eases = _columns(self.time, "frame", "value", "ease")
-        return keyframes.SourceTime(keyframes.Keys(frames, values, eases), tuple(zip(frames, eases, strict=True)))
+        keys = tuple((key.frame, key.ease) for key in self.time)
+        return keyframes.SourceTime(_numbers(self.time), keys)
 
     def at(self, frame: float, aspect: float) -> FrameState:
         """The effect at a timeline frame (1 = the strip's first), for a picture of width / height = aspect."""
@@ -167,6 +175,12 @@ class Recipe:
         """The source frame that is shown at a timeline frame, 1 is the first; None: the strip's timing says that."""
         time = self._source_time()
         return None if time is None else time.at(frame)[0]
+
+
+def _numbers(value: Keyable) -> keyframes.Channel:
+    if not isinstance(value, list):
+        return keyframes.Constant(value)
+    return keyframes.Keys(*_columns(value, "frame", "value", "ease"))
 
 
 def _columns(keys: list, *names: str) -> list[tuple]:
@@ -294,6 +308,15 @@ def _number(value, _kind) -> float:
     return float(value)
 
 
+def _keyable(converter, value, kind):
+    if isinstance(value, list):
+        return converter.structure(value, list[ValueKey])
+    try:
+        return _number(value, kind)
+    except ValueError as error:
+        raise ValueError(f"{error}, nor a list of keys") from None
+
+
 def _exactly(wanted: type, name: str):
     def structure(value, _kind):
         if type(value) is not wanted:
@@ -375,6 +398,7 @@ def _converter():
     converter.register_structure_hook(str, _exactly(str, "a text"))
     converter.register_structure_hook(bool, _exactly(bool, "true or false"))
     converter.register_structure_hook_func(lambda kind: get_origin(kind) is Literal, _choice)
+    converter.register_structure_hook_func(lambda kind: kind == Keyable, partial(_keyable, converter))
     converter.register_structure_hook_factory(lambda kind: get_origin(kind) is tuple, _tuple)
     converter.register_structure_hook_factory(lambda kind: get_origin(kind) is list, _list)
     converter.register_structure_hook_factory(is_dataclass, _dataclass)
@@ -440,9 +464,12 @@ def _check(recipe: Recipe) -> None:
         taken = places.setdefault(shutter.name, i)
         _require(taken == i, f"shutters[{i}].name", f"{_shown(shutter.name)} is taken by shutters[{taken}]")
         _check_shutter(shutter, recipe.window, f"shutters[{i}]")
-    _check_frames(recipe.time, "time")
-    for k, key in enumerate(recipe.time):
-        _require_within(key.value, limits.MAX_FRAME, f"time[{k}].value")
+    _check_values(recipe.time, "time", limits.MAX_FRAME)
+    if isinstance(recipe.edge_aware, list):
+        _require(recipe.edge_aware, "edge_aware", "empty: there is no key")
+        _check_values(recipe.edge_aware, "edge_aware", 1, 0)
+    else:
+        _require_within(recipe.edge_aware, 1, "edge_aware", 0)
     for i, region in enumerate(recipe.regions):
         there_is_none = f"there is no shutter {_shown(region.shutter)}"
         _require(region.shutter in places, f"regions[{i}].shutter", there_is_none)
@@ -509,6 +536,12 @@ def _check_name(name: str, place: str) -> None:
     _require(len(name) <= limits.MAX_NAME, place, f"{len(name)} characters, the most are {limits.MAX_NAME}")
     wrong = next((c for c in name if c == "\0" or "\ud800" <= c <= "\udfff"), "")
     _require(not wrong, place, f"U+{ord(wrong or ' '):04X} is no character of a name")
+
+
+def _check_values(keys: list[ValueKey], place: str, most: float, least: float | None = None) -> None:
+    _check_frames(keys, place)
+    for k, key in enumerate(keys):
+        _require_within(key.value, most, f"{place}[{k}].value", least)
 
 
 def _check_frames(keys: list, place: str) -> None:

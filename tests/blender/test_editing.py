@@ -510,7 +510,7 @@ def test_only_what_renders_by_its_keys_can_be_keyed(effect):
         ("ShutterBar", "weight"),
         *(("ShutterRegion", name) for name in ("width", "location", "rotation", "scale")),
         *(("ShutterEffect", name) for name in ("position", "interpolation", "light", "exposure", "edges")),
-        *(("ShutterEffect", name) for name in ("aggregate", "border", "stop_at_cuts", "source_time")),
+        *(("ShutterEffect", name) for name in ("aggregate", "border", "stop_at_cuts", "edge_aware", "source_time")),
     }
 
 

@@ -56,6 +56,11 @@ def regions(draw, names):
 
 
 @st.composite
+def value_keys(draw, low, high):
+    return [recipes.ValueKey(frame, draw(numbers(low, high)), draw(eases)) for frame in draw(frames)]
+
+
+@st.composite
 def valid_recipes(draw, longest=6):
     window = draw(st.integers(1, longest))
     names = draw(st.lists(text, min_size=1, max_size=3, unique=True))
@@ -72,9 +77,10 @@ def valid_recipes(draw, longest=6):
         draw(st.sampled_from([1, 2, 4])),
         draw(st.booleans()),
         draw(st.booleans()),
+        draw(numbers(0, 1) | value_keys(0, 1)),
         draw(st.sampled_from([1, 2, 4, 8, 16])),
         draw(st.sampled_from(["quick", "good"])),
-        [recipes.TimeKey(frame, draw(numbers(-10, 10000)), draw(eases)) for frame in draw(st.just([]) | frames)],
+        draw(st.just([]) | value_keys(-10, 10000)),
     )
 
 
@@ -143,6 +149,7 @@ BASE = {
     "version": 1,
     "window": 4,
     "inbetween": 2,
+    "edge_aware": [{"frame": 4, "value": 0.25, "ease": "bezier"}, {"frame": 24, "value": 1}],
     "time": [{"frame": 2, "value": 1}, {"frame": 20, "value": 9.5, "ease": "bezier"}, {"frame": 31, "value": 3}],
     "shutters": [
         {"name": "Plain", "bars": [1, 1, 1, 1]},
@@ -178,7 +185,7 @@ def curve(edit, name, index=0):
 
 
 def blenders_own_handles(edit, effect):
-    for name in ("location", "rotation", "scale", "shutters[1].bars[2].weight", "source_time"):
+    for name in ("location", "rotation", "scale", "shutters[1].bars[2].weight", "source_time", "edge_aware"):
         for key in curve(edit, name).keyframe_points:
             key.interpolation, key.handle_left_type, key.handle_right_type = "BEZIER", "AUTO_CLAMPED", "AUTO_CLAMPED"
         curve(edit, name).update()
@@ -213,10 +220,11 @@ def modifiers(edit, effect):
     curve(edit, "location").modifiers.new("CYCLES")
     curve(edit, "rotation").modifiers.new("NOISE")
     curve(edit, "source_time").modifiers.new("NOISE")
+    curve(edit, "edge_aware").modifiers.new("NOISE")
 
 
 def extrapolated(edit, effect):
-    for name in ("location", "source_time"):
+    for name in ("location", "source_time", "edge_aware"):
         curve(edit, name).extrapolation = "LINEAR"
 
 
@@ -276,7 +284,9 @@ def test_what_blender_made_agrees_at_every_frame(effect_on, change):
 
 
 def check(instant, wanted):
-    assert instant.options == wanted.options
+    assert instant.options.edge_aware == pytest.approx(wanted.options.edge_aware, abs=1e-4)
+    options = dataclasses.replace(instant.options, edge_aware=wanted.options.edge_aware)
+    assert options == wanted.options
     assert instant.bars == pytest.approx(wanted.bars, abs=1e-4)
     for shape, other in zip(instant.shapes, wanted.shapes, strict=True):
         assert (shape.shutter, shape.kind, shape.width) == (other.shutter, other.kind, pytest.approx(other.width))
@@ -325,7 +335,7 @@ def test_a_source_time_without_keys_holds_a_frame(effect_on):
     plain = {"version": 1, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
     apply(effect_on, plain)
     effect_on[1].use_source_time, effect_on[1].source_time = True, 3.5
-    assert export(effect_on).time == [recipes.TimeKey(1, 3.5)]
+    assert export(effect_on).time == [recipes.ValueKey(1, 3.5)]
     effect_on[1].use_source_time = False
     assert export(effect_on).time == []
     apply(effect_on, plain | {"time": [{"frame": 1, "value": 3.5}]})

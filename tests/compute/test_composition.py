@@ -77,7 +77,7 @@ def composed(device, source, moment, index, direction=1, shot=None):
     """A device's picture, and the reference's with the same coefficients."""
     renderer = Renderer(device, source)
     picture = renderer.picture(index, moment, direction)
-    c = renderer.coefficients(moment)
+    c = renderer.coefficients(index, moment, direction)
     block = moment.options.aggregate
     c = c.repeat(block, 1).repeat(block, 2)[:, : source.height, : source.width].astype(np.float64)
     c /= c.sum(axis=0)
@@ -350,13 +350,13 @@ def test_coefficients_stay_on_the_device(gpu_device, shapes, block):
     rng = np.random.default_rng(19)
     source, moment = footage(rng), state(rng, shapes=shapes, count=6, aggregate=block)
     renderer = Renderer(GPUCompositor(gpu_device), source)
-    texture, size, count = renderer.drawn_coefficients(moment)
+    texture, size, count = renderer.drawn_coefficients(0, moment)
     assert count == 6
     with gpu_device.current():
         layers = gpu_device.read(texture)
     values = np.moveaxis(layers, -1, 1).reshape(-1, *layers.shape[1:3])[:count]
     y, x = np.mgrid[: source.height, : source.width]
-    expected = renderer.coefficients(moment)[:, y // block, x // block]
+    expected = renderer.coefficients(0, moment)[:, y // block, x // block]
     assert np.array_equal(values[:, y // size, x // size], expected)
 
 

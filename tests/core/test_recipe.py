@@ -156,6 +156,16 @@ def broken(change):
             lambda d: d.update(time=[{"frame": 1048575, "value": 1}]),
             "time[0].frame: 1048575 is not -1048574 to 1048574",
         ),
+        (lambda d: d.update(edge_aware=1.5), "edge_aware: 1.5 is not 0 to 1"),
+        (lambda d: d.update(edge_aware=True), "edge_aware: true is not a number, nor a list of keys"),
+        (lambda d: d.update(edge_aware={"keys": []}), 'edge_aware: {"keys": []} is not a number, nor a list of keys'),
+        (lambda d: d.update(edge_aware=[]), "edge_aware: empty: there is no key"),
+        (lambda d: d.update(edge_aware=[{"frame": 1, "value": -0.1}]), "edge_aware[0].value: -0.1 is not 0 to 1"),
+        (lambda d: d.update(edge_aware=[{"frame": 1, "value": "1"}]), 'edge_aware[0].value: "1" is not a number'),
+        (
+            lambda d: d.update(edge_aware=[{"frame": 2, "value": 1}, {"frame": 2, "value": 0}]),
+            "edge_aware[1].frame: 2 does not follow 2",
+        ),
         (lambda d: d.update(time=[{"frame": 1, "value": 1e308}]), "time[0].value: 1e+308 is not -1048574 to 1048574"),
         (
             lambda d: d.update(time=[{"frame": k, "value": 1} for k in range(100_001)]),
@@ -460,3 +470,17 @@ def test_time_between_its_keys():
     found = recipe.parse(json.dumps(source | {"time": keys}))
     assert [found.time_at(frame) for frame in (-3, 2, 5, 8.9, 9, 40)] == [5, 6, 9, 9, 1, 1]
     assert recipe.parse(recipe.dump(found)) == found
+
+
+def test_edge_aware_between_its_keys():
+    source = {"version": 1, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
+
+    def strengths(value, *frames):
+        found = recipe.parse(json.dumps(source | {"edge_aware": value}))
+        assert recipe.parse(recipe.dump(found)) == found
+        return [found.at(frame, 1).options.edge_aware for frame in frames]
+
+    assert recipe.parse(json.dumps(source)).at(1, 1).options.edge_aware == 0
+    assert strengths(0.5, -3, 9) == [0.5, 0.5]
+    keys = [{"frame": 2, "value": 0.2}, {"frame": 6, "value": 1, "ease": "constant"}, {"frame": 9, "value": 0}]
+    assert strengths(keys, 1, 4, 6, 8.5, 40) == pytest.approx([0.2, 0.6, 1, 1, 0])

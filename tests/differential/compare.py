@@ -63,7 +63,7 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
         state = parsed.at(case.frame, source.width / source.height)
         for name, device in devices.items():
             renderer = Renderer(device, source)
-            made, mix = renderer.picture(index, state, direction), renderer.coefficients(state)
+            made, mix = renderer.picture(index, state, direction), renderer.coefficients(index, state, direction)
             with device.current():
                 renderer.release_window()
             right = picture(recipe, case.frame, footage, index, direction, mix)

@@ -265,6 +265,14 @@ class ShutterEffect(PropertyGroup):
         description="Make the picture's edge a scribble of the default shutter",
         update=_changed,
     )
+    edge_aware: FloatProperty(
+        name="Follow Edges",
+        description="How much shutters keep to the edges of the shown frame: at 1 a scribble fills what it lies in",
+        subtype="FACTOR",
+        min=0.0,
+        max=1.0,
+        update=_changed,
+    )
     bars_per_frame: IntProperty(
         name="Bars per Frame",
         description="How many bars of the window stand for a source frame",

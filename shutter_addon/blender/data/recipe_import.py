@@ -28,9 +28,8 @@ def apply(edit, effect, strip, source: recipe.Recipe) -> None:
     path = effect.path_from_id()
     effect.use_source_time = bool(source.time)
     if source.time:
-        keys = [(key.frame + first, key.value, key.ease) for key in source.time]
-        effect.source_time = source.time[0].value
-        fcurves.set_keys(edit, f"{path}.source_time", 0, keys, group=effect.name)
+        _set_number(edit, effect, "source_time", source.time, first)
+    _set_number(edit, effect, "edge_aware", source.edge_aware, first)
     for i, shutter in enumerate(source.shutters):
         _add_shutter(edit, effect, f"{path}.shutters[{i}]", shutter, first)
     colors = {shutter.name: shutter.color for shutter in source.shutters}
@@ -38,9 +37,19 @@ def apply(edit, effect, strip, source: recipe.Recipe) -> None:
         _add_region(edit, effect, strip, f"{path}.regions[{i}]", region, colors[region.shutter], first)
 
 
+def _set_number(edit, effect, name: str, value: recipe.Keyable, first: float) -> None:
+    if not isinstance(value, list):
+        setattr(effect, name, value)
+        return
+    setattr(effect, name, value[0].value)
+    keys = [(key.frame + first, key.value, key.ease) for key in value]
+    fcurves.set_keys(edit, f"{effect.path_from_id()}.{name}", 0, keys, group=effect.name)
+
+
 def _check_keys(source: recipe.Recipe, first: float) -> None:
     """EffectError: keys would lie beyond Blender's timeline, or on the same frame, as it counts in float32."""
-    for keys in (source.time, *(part.keys for part in (*source.shutters, *source.regions))):
+    edge_aware = source.edge_aware if isinstance(source.edge_aware, list) else []
+    for keys in (source.time, edge_aware, *(part.keys for part in (*source.shutters, *source.regions))):
         frames = np.array([key.frame + first for key in keys], dtype=np.float32)
         if (wrong := np.flatnonzero(np.abs(frames) > limits.MAX_FRAME)).size:
             sentence = rpt_("frame {frame} of the recipe: a key cannot lie beyond Blender's timeline")

@@ -125,6 +125,7 @@ def read(edit, effect, strip, frames, *, thorough: bool = False) -> model.Effect
         ),
         options,
         _source_time(curves, path, effect, frames) if effect.use_source_time else None,
+        _channel(curves, effect, path, "edge_aware", frames),
     )
 
 

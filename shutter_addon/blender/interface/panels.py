@@ -165,10 +165,11 @@ class _Regions(_WithEffect):
         row.operator("shutter.draw", icon="GREASEPENCIL")
         row.operator("shutter.erase")
         row.operator_menu_enum("shutter.region_take", "layer", text="", icon="DOWNARROW_HLT")
+        layout.use_property_split = True
+        layout.prop(effect, "edge_aware")
         region = selection.active_region(effect)
         if region is None:
             return
-        layout.use_property_split = True
         row = layout.split(factor=0.4)
         row.alignment = "RIGHT"
         row.label(text="Shutter")

@@ -245,7 +245,7 @@ def _show_scribbles(quad, effect, request) -> None:
 
 
 def _show_coefficients(quad, effect, request) -> None:
-    coefficients, block, count = request.renderer.drawn_coefficients(request.state)
+    coefficients, block, count = request.renderer.drawn_coefficients(request.index, request.state, request.direction)
     textures = {"coefficients": coefficients, "palette": _palette(effect)}
     quad.draw("show_coefficients", textures, opacity=0.75, block=block, count=count, size=_size(request))
 

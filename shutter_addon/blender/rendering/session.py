@@ -90,6 +90,11 @@ class FrameRequest:
         self.prefetch()  # and lets go of what is on the device by now
         return result
 
+    def coefficients(self) -> np.ndarray:
+        """As Renderer.coefficients; frames are decoded as for `picture`, which will read them as well."""
+        self.prefetch()
+        return self.renderer.coefficients(self.index, self.state, self.direction)
+
     def check(self) -> None:
         """MediaError: an in-between frame that the picture needs is missing. No frame is read."""
         if self.renderer.source.step > 1:
@@ -178,7 +183,7 @@ class RenderSession:
 
     def coefficients(self, request: FrameRequest, stopped=_never) -> np.ndarray:
         """As Renderer.coefficients."""
-        return self.run(request.renderer.coefficients, request.state, stopped=stopped)
+        return self.run(request.coefficients, stopped=stopped)
 
     def _renderer(self, snapshot: Snapshot, say) -> Renderer:
         if self._compositor is None:

@@ -428,6 +428,11 @@ MESSAGES = {
         "*",
         "Make the picture's edge a scribble of the default shutter",
     ): "Den Bildrand zu einer Markierung des Standardverschlusses machen",
+    ("*", "Follow Edges"): "Kanten folgen",
+    (
+        "*",
+        "How much shutters keep to the edges of the shown frame: at 1 a scribble fills what it lies in",
+    ): "Wie sehr Verschlüsse den Kanten des gezeigten Bildes folgen: bei 1 füllt eine Markierung, worin sie liegt",
     # In-between frames
     ("*", "In-Between Frames"): "Zwischenbilder",
     (
