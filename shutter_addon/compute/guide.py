@@ -32,9 +32,13 @@ def guiding(index: int, step: int, shot: range) -> tuple[int, ...]:
     """The frames that the guide of frame `index` is made of: that one, and the filmed ones beside it in its shot.
 
     step: every step-th frame is one that was filmed"""
-    reach = BESIDE * step
-    near = range(max(index - reach, shot.start), min(index + reach + 1, shot.stop))
+    near = range(max(index - reach(step), shot.start), min(index + reach(step) + 1, shot.stop))
     return index, *(i for i in near if i % step == 0 and i != index)
+
+
+def reach(step: int) -> int:
+    """How far those frames lie from the shown one at most."""
+    return BESIDE * step
 
 
 class Guides:
@@ -74,20 +78,20 @@ class Guides:
             for index in sorted(self.lacking(frames)):
                 self._reduced[index] = self._reduce(self._source.read(index))
             shown, *beside = (self._reduced[index] for index in frames)
-            self._made = key, self._on_blocks(_steadied(shown, beside), block)
+            self._made = key, self._on_blocks(_opencv().merge(_steadied(shown, beside)), block)
         return self._made[1]
 
     def _reduce(self, frame: np.ndarray) -> np.ndarray:
-        """A frame's display values (h, w, 3) uint16 in cells, smoothed."""
+        """A frame's display values (3, h, w) uint16 in cells, smoothed."""
         cv2 = _opencv()
-        small = _averaged(_prepared(frame, self._source.alpha), self._cell)
+        small = cv2.cvtColor(_averaged(_prepared(frame, self._source.alpha), self._cell), cv2.COLOR_RGBA2RGB)
         white = np.iinfo(small.dtype).max if small.dtype.kind == "u" else 1
-        colours = cv2.cvtColor(small, cv2.COLOR_RGBA2RGB).astype(np.float32) / np.float32(white)
         if self._source.transfer == "linear":
-            colours = light.to_encoded(colours)
+            small, white = light.to_encoded(small / np.float32(white)), 1
+        codes = np.rint(small * np.float32(_WHITE / white)).astype(np.uint16)
         sigma = BLUR * self._short / (ROWS * self._cell)
-        whole = np.rint(colours * np.float32(_WHITE)).astype(np.uint16)
-        return cv2.GaussianBlur(whole, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE)
+        smooth = cv2.GaussianBlur(codes, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE)
+        return np.ascontiguousarray(np.moveaxis(smooth, -1, 0))
 
     def _on_blocks(self, picture: np.ndarray, block: int) -> np.ndarray:
         cv2 = _opencv()
@@ -140,16 +144,16 @@ def _averaged(picture: np.ndarray, size: int) -> np.ndarray:
 
 
 def _steadied(shown: np.ndarray, beside: list[np.ndarray]) -> np.ndarray:
-    """The mean (h, w, 3) float32, in whole numbers, of pictures uint16 where they are like `shown`."""
-    total, weights = shown.astype(np.float32), np.float32(1)
+    """The mean (3, h, w) float32, in whole numbers, of pictures uint16 where they are like `shown`."""
+    total, weights = shown.astype(np.float32), np.ones(shown.shape[1:], np.float32)
     for other in beside:
-        apart = _opencv().absdiff(other, shown)
-        largest = np.maximum(np.maximum(apart[..., 0], apart[..., 1]), apart[..., 2])
+        largest = _opencv().absdiff(other, shown).max(axis=0)
         share = largest * np.float32(1 / (ALIKE * _WHITE))
         weight = np.maximum(1 - share * share, 0) ** 2  # Tukey's biweight
-        total += weight[..., None] * other
-        weights = weights + weight
-    return np.rint(total / np.reshape(weights, (*np.shape(weights), 1)))
+        weights += weight
+        for plane, other_plane in zip(total, other, strict=True):
+            plane += weight * other_plane
+    return np.rint(total / weights)
 
 
 def _opencv():

@@ -7,9 +7,9 @@ import numpy as np
 from ..core import compositor, scribbles, shutters
 from ..core.frame_source import FrameSource
 from ..core.frame_state import FrameState
+from . import guide
 from .cpu import CPUCompositor
 from .device import NoDeviceError
-from .guide import BESIDE, Guides, NotedSource, guiding
 
 DEVICES = ("auto", "gpu", "cpu")
 
@@ -45,7 +45,7 @@ class Renderer:
     def __init__(self, compositor, source: FrameSource):
         self.compositor, self.source = compositor, source
         self._solver = compositor.solver()
-        self._guides = Guides(source)
+        self._guides = guide.Guides(source)
         self._window = None
         self._labelled = self._solved = self._drawn = None
 
@@ -160,7 +160,7 @@ class Renderer:
 
     def _guiding(self, index: int, state: FrameState, shot: range) -> tuple[int, ...]:
         """The source frames that guide the diffusion (guide.guiding), the shown one first; none where nothing does."""
-        return guiding(index, state.options.step, shot) if self._is_guided(state) else ()
+        return guide.guiding(index, state.options.step, shot) if self._is_guided(state) else ()
 
     def _is_guided(self, state: FrameState) -> bool:
         """Whether coefficients depend on the shown frame."""
@@ -174,7 +174,7 @@ class Renderer:
         """The first and the last of all positions that any shutter exposes, and of `index` itself with the frames that
         guide the diffusion."""
         positions = compositor.window_positions(state.options, index, direction)
-        beside = BESIDE * state.options.step if self._is_guided(state) else 0
+        beside = guide.reach(state.options.step) if self._is_guided(state) else 0
         reach = [index - beside, index + beside, *positions[slice(*shutters.open_span(state.bars))].tolist()]
         return min(reach), max(reach)
 
@@ -190,29 +190,29 @@ class Renderer:
 
     def _parts(self, index: int, state: FrameState, direction: int, quick: bool):
         """The arguments of the compositor's `draw`, with the window loaded."""
+        window = self._window_for(state.options.window)
+        self._keep_guides(index, direction, state)
         if (sole := self._sole(state)) is None:
-            window = self._loaded(index, direction, state)
+            self._load(window, index, direction, state)
             handle, block = self._diffused(index, state, direction, quick), state.options.aggregate
         else:
             state = state.alone(sole)
-            window = self._loaded(index, direction, state)
+            self._load(window, index, direction, state)
             handle, block = self.compositor.constant(np.ones(1)), self._everywhere
         return window, index, direction, state, handle, block
 
-    def _loaded(self, index: int, direction: int, state: FrameState):
-        """The window with its frames. Those that will guide the diffusion are noted as they are read."""
-        self._keep_guides(index, direction, state)
-        window = self._window_for(state.options.window)
+    def _load(self, window, index: int, direction: int, state: FrameState) -> None:
         shot = self.shot(index, direction, state)
         window.load(self.positions(index, direction, state, shot), state.options, shot)
-        return window
 
     def _keep_guides(self, index: int, direction: int, state: FrameState) -> None:
-        """Keeps what guides the diffusion of this picture, and will guide that of the next ones."""
-        if not self._is_guided(state):
+        """Keeps what guides the diffusion of this picture and will guide that of the next ones, as it is read."""
+        if not state.options.edge_aware:
+            self._guides.keep(())
+        if not self._is_guided(state):  # perhaps a still frame between two pictures that are
             return
         step, (low, high) = state.options.step, self._reach(index, direction, state)
-        beside = BESIDE * step
+        beside = guide.reach(step)
         onwards = range(index - beside, high + 1) if direction > 0 else range(low, index + beside + 1)
         self._guides.keep(i for i in onwards if i % step == 0 or i == index)
 
@@ -232,7 +232,7 @@ class Renderer:
     def _window_for(self, length: int):
         if self._window is None or self._window.capacity != length:
             self.release_window()
-            self._window = self.compositor.window(NotedSource(self.source, self._guides), length)
+            self._window = self.compositor.window(guide.NotedSource(self.source, self._guides), length)
         return self._window
 
     def release_window(self) -> None:

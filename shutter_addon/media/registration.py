@@ -31,6 +31,7 @@ _LEVELS = 3  # a motion between two frames is found up to about 2 ** _LEVELS hal
 _WINDOWS = 9, 21  # sides of the windows that are compared, in pixels: for small and for large parts
 _THERE_AND_BACK = 0.7  # pixels from where a corner started that it may come back to
 _HYPOTHESES = 300
+_SOUGHT = 64  # pixels to which a part is made smaller to be sought
 _NOISE = 16.0  # levels² of contrast that count for nothing
 # Beyond these the motion between two pictures is none that a film has.
 _MOST_SCALE, _MOST_TURN = 1.5, 0.8
@@ -103,26 +104,29 @@ class Part:
         return found
 
     def seek(self, picture: np.ndarray, known: Similarity, radius: float) -> Similarity | None:
-        """Where in a picture its pixels are most alike, within a radius in pixels of a known place; a guess for `find`.
-        None: no place is large enough for all of it."""
-        left, top, width, height = self.box
-        corner = known(complex(left + width / 2, top + height / 2))
-        # its look in the picture's own turn and size
-        turned = Similarity(known.turn)
-        side = max(8, round(abs(known.turn) * max(width, height)))
-        middle = turned(complex(left + width / 2, top + height / 2))
-        place = Similarity(known.turn, complex(side / 2, side / 2) - middle)
-        size = side, side
-        look = cv2.warpAffine(self._whole, matrix(place), size, flags=cv2.INTER_LINEAR)
-        mask = cv2.warpAffine(self.weight, matrix(place), size, flags=cv2.INTER_LINEAR)
-        x, y = (round(corner.real - side / 2 - radius), round(corner.imag - side / 2 - radius))
-        right, bottom = (round(corner.real + side / 2 + radius), round(corner.imag + side / 2 + radius))
-        x, y, right, bottom = max(x, 0), max(y, 0), min(right, picture.shape[1]), min(bottom, picture.shape[0])
-        if right - x < side or bottom - y < side:
+        """Where in a picture its pixels are most alike, turned and scaled as in `known`, within a radius of pixels of
+        where that puts it: a guess for `find`. None: there is no room for it in the picture."""
+        x, y, width, height = self.box
+        middle = complex(x + width / 2, y + height / 2)
+        extent = abs(known.turn) * max(width, height)
+        share = min(1.0, _SOUGHT / extent)
+        side = max(8, round(share * extent))
+        # the part by itself, and around its known place, both made smaller
+        half = complex(side, side) / 2
+        alone = Similarity(share * known.turn, half - share * known.turn * middle)
+        room = int(side + 2 * share * radius)
+        around = Similarity(share, complex(room, room) / 2 - share * known(middle))
+        look, weight = (cv2.warpAffine(each, matrix(alone), (side, side)) for each in (self._whole, self.weight))
+        place, inside = (
+            cv2.warpAffine(each, matrix(around), (room, room)) for each in (picture, np.ones(picture.shape, np.uint8))
+        )
+        scores = cv2.matchTemplate(place, look, cv2.TM_CCOEFF_NORMED, mask=weight)
+        fits = cv2.erode(inside, np.ones((side, side), np.uint8), anchor=(0, 0), borderValue=0)
+        fits = fits[: scores.shape[0], : scores.shape[1]].astype(bool) & np.isfinite(scores)
+        if not fits.any():
             return None
-        scores = cv2.matchTemplate(picture[y:bottom, x:right], look, cv2.TM_CCOEFF_NORMED, mask=mask)
-        _, _, _, best = cv2.minMaxLoc(np.nan_to_num(scores, posinf=-1, neginf=-1))
-        return Similarity(1, complex(*best) + complex(x, y)).after(place)
+        _, _, _, best = cv2.minMaxLoc(np.where(fits, scores, -1))
+        return around.inverse().after(Similarity(1, complex(*best))).after(alone)
 
     def learn(self, match: Match) -> None:
         """Takes in which corners move with the part, and which do not."""

@@ -39,8 +39,10 @@ NOT_SHOWN = "the frame lies outside what can be tracked"
 SURE = 0.5  # from here on a frame is within about a pixel of 640
 _LOST = 0.12  # below it nothing was found
 _AGAIN = 0.3  # below it nothing was found where it might be anywhere
+_DRIFT, _LEAST = 0.95, 0.1  # what a later look is worth beside the one before it, and at least
+_SHIFTED = 0.6  # what a location is worth where rotation and scale could not be found
 _FADING = 0.6  # below it another frame is taken to compare with beside the first
-_REACHES = 0.015, 0.03, 0.06, 0.12  # heights of the picture around a line within which corners are looked for
+_REACHES = 0.015, 0.03, 0.06, 0.12, 0.24  # heights of the picture around a line within which corners are looked for
 _ENOUGH = 14  # corners, where a shorter reach is enough
 
 
@@ -254,83 +256,68 @@ class _Pursuit:
 
     def __init__(self, part: Part, picture: np.ndarray, motion: Motion):
         self._first, self._motion, self.reason = part, motion, COVERED
-        self._known = self._speed = (
-            Similarity()
-        )  # the motion up to the last picture in which it was found, and its last step
-        self._recent: tuple[Part, Similarity, float] | None = (
-            None  # as it looked later, the motion up to there, its worth
-        )
-        self._seen: tuple[np.ndarray, Similarity, float] = picture, Similarity(), 1.0  # the last picture, likewise
+        # the motion up to the last picture in which it was found, and its last step
+        self._known = self._speed = Similarity()
+        self._look = _Look(part, Similarity(), 1.0)  # how it looked later, if it is no longer like the first
+        self._seen = picture, Similarity(), 1.0  # the last picture in which it was found, the motion, its confidence
 
     def next(self, picture: np.ndarray, missed: int) -> tuple[Similarity, float] | None:
         """The motion from the first picture, and its confidence; None: it is not there. missed: for how many pictures
         before this one it was not."""
-        tried = None if missed else self._found(picture, self._speed.after(self._known))
-        tried = tried or self._found_elsewhere(picture, missed)
-        if tried is None:
+        found = None if missed else self._found(picture, self._speed.after(self._known))
+        found = found or self._found_elsewhere(picture, missed)
+        if found is None:
             self.reason = COVERED if self._share_inside(picture) > 0.5 else LEFT
             return None
-        motion, confidence = tried
-        self._speed = motion.after(self._known.inverse()) if not missed else Similarity()
-        self._known, self._seen = motion, (picture, motion, confidence)
-        return motion, confidence
+        self._speed = found[0].after(self._known.inverse()) if not missed else Similarity()
+        self._known, self._seen = found[0], (picture, *found)
+        return found
 
     def _found(self, picture, guess: Similarity) -> tuple[Similarity, float] | None:
         """As `next`, near to a guess: as it looked first or, if that is not sure, as it looked later."""
         match = self._first.find(picture, guess, self._motion)
-        sure = _confidence(match, picture)
+        sure = confidence(match, picture)
         if sure >= SURE:
             self._first.learn(match)
         if sure >= _FADING:
             return match.motion, sure
-        found = self._by_recent(picture, guess)
-        if found is not None and sure < SURE and found[1] > _LOST:
-            # from there the first look may be near enough
-            again = self._first.find(picture, found[0], self._motion)
-            if (better := _confidence(again, picture)) > sure:
-                match, sure = again, better
-        if found is None or (match is not None and sure >= max(found[1], SURE / 2)):
-            found = (match.motion, sure) if match is not None else None
-        return found if found is not None and found[1] > _LOST else None
+        later = self._by_later_look(picture, guess)
+        if later is None:
+            return (match.motion, sure) if sure >= _LOST else None
+        if sure < SURE:  # from there the first look may be near enough
+            again = self._first.find(picture, later[0], self._motion)
+            if confidence(again, picture) > sure:
+                match, sure = again, confidence(again, picture)
+        return (match.motion, sure) if sure >= min(SURE, later[1]) else later
 
-    def _by_recent(self, picture, guess: Similarity) -> tuple[Similarity, float] | None:
-        found = self._compared(picture, guess)
-        if found is None or found[1] < SURE * self._recent[2]:
+    def _by_later_look(self, picture, guess: Similarity) -> tuple[Similarity, float] | None:
+        if self._look.part is self._first:
             self._look_anew()
-            again = self._compared(picture, guess)
-            found = max((each for each in (found, again) if each), key=lambda each: each[1], default=None)
+        found = self._look.find(picture, guess, self._motion)
+        if found is None or found[1] < SURE * self._look.worth:
+            self._look_anew()
+            found = self._look.find(picture, guess, self._motion) or found
         return found
 
-    def _compared(self, picture, guess: Similarity) -> tuple[Similarity, float] | None:
-        if self._recent is None:
-            return None
-        part, motion, worth = self._recent
-        match = part.find(picture, guess.after(motion.inverse()), self._motion)
-        return match and (match.motion.after(motion), worth * _confidence(match, picture))
-
     def _look_anew(self) -> None:
-        """Takes the look of the last picture in which it was found."""
+        """Takes the look that it had when it was found last."""
         picture, motion, worth = self._seen
-        size = picture.shape[::-1]
-        matrix = registration.matrix(motion)
-        weight = cv2.warpAffine(self._first.weight, matrix, size, flags=cv2.INTER_LINEAR)
+        weight = cv2.warpAffine(self._first.weight, registration.matrix(motion), picture.shape[::-1])
         if (weight > 0).any():
-            self._recent = Part(picture, weight), motion, min(worth, 0.9)
+            self._look = _Look(Part(picture, weight), motion, max(_DRIFT * worth, _LEAST))
 
     def _found_elsewhere(self, picture, missed: int) -> tuple[Similarity, float] | None:
         """As `_found`, of all places where it may be by now; only if it looks as it did first, or as it did last."""
         self._look_anew()
         radius = 0.05 * picture.shape[1] * (1 + missed / 4)
-        looks = [(self._first, Similarity(), 1.0), *([self._recent] if self._recent else ())]
         found = []
-        for part, motion, worth in looks:
-            from_there = self._known.after(motion.inverse())
-            for guess in (from_there, part.seek(picture, from_there, radius)):
-                match = guess and part.find(picture, guess, self._motion)
-                if match:
-                    found.append((match.motion.after(motion), worth * _confidence(match, picture)))
-        best = max(found, key=lambda each: each[1], default=None)
-        return best if best is not None and best[1] >= _AGAIN else None
+        for look in (_Look(self._first, Similarity(), 1.0), self._look):
+            from_there = self._known.after(look.motion.inverse())
+            for guess in (from_there, look.part.seek(picture, from_there, radius)):
+                match = guess and look.part.find(picture, guess, self._motion)
+                if (sure := confidence(match, picture)) >= _AGAIN:
+                    found.append((match.motion.after(look.motion), look.worth * sure))
+        return max(found, key=lambda each: each[1], default=None)
 
     def _share_inside(self, picture) -> float:
         """How much of the part would lie in the picture by now."""
@@ -340,7 +327,27 @@ class _Pursuit:
         return float(inside.mean())
 
 
-def _confidence(match: Match | None, picture: np.ndarray) -> float:
+@dataclass(frozen=True)
+class _Look:
+    """How a part looked in some picture; motion: from the first picture to that one; worth: the confidence of that."""
+
+    part: Part
+    motion: Similarity
+    worth: float
+
+    def find(self, picture, guess: Similarity, motion: Motion) -> tuple[Similarity, float] | None:
+        """The motion from the first picture, and its confidence: by corners or, where these do not agree on the
+        motion, on the location alone."""
+        guess = guess.after(self.motion.inverse())
+        for way, share in ((motion, 1.0), ("location", _SHIFTED)):
+            match = self.part.find(picture, guess, way)
+            if (sure := confidence(match, picture)) >= _LOST:
+                return match.motion.after(self.motion), share * self.worth * sure
+        return None
+
+
+def confidence(match: Match | None, picture: np.ndarray) -> float:
+    """How sure a match is, 0 to 1."""
     if match is None:
         return 0.0
     error = match.error * 640 / max(picture.shape)

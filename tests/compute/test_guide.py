@@ -1,0 +1,249 @@
+"""Guides of edge-aware diffusion, and what a renderer reads and keeps for them."""
+
+import numpy as np
+import pytest
+from scipy import ndimage
+from test_composition import Footage, few_pieces, footage
+from test_shots import BETWEEN, STEP, film, with_between
+
+from shutter_addon.compute import guide
+from shutter_addon.compute.cpu import CPUCompositor
+from shutter_addon.compute.renderer import Renderer
+from shutter_addon.core import light
+from shutter_addon.core.frame_state import FrameState, Options
+from shutter_addon.core.scribbles import Shape
+from shutter_addon.media.cuts import ShotSource
+
+LEVEL = 1 / 255
+
+
+def texture(height, width, seed=0, pixels=0.02) -> np.ndarray:
+    """Smooth display values (height, width, 3), 0 to 1, whose detail is so many heights wide."""
+    rng, rows = np.random.default_rng(seed), 48
+    coarse = rng.random((rows, rows * width // height, 3))
+    y, x = ((np.arange(n) + 0.5) * rows / height - 0.5 for n in (height, width))
+    at = np.meshgrid(y, x, indexing="ij")
+    return np.stack([ndimage.map_coordinates(coarse[..., k], at, order=1, mode="nearest") for k in range(3)], -1)
+
+
+def source_of(*pictures, dtype=np.uint8, **kind) -> Footage:
+    """Frames of pictures (h, w, 3 or 4), of values as they are stored."""
+    frames = np.stack([np.dstack([p, np.ones(p.shape[:2])]) if p.shape[2] == 3 else p for p in pictures])
+    if np.dtype(dtype).kind == "u":
+        frames = np.rint(frames * np.iinfo(dtype).max)
+    return Footage(frames.astype(dtype), **kind)
+
+
+def guide_of(source, index=0, block=1, step=1) -> np.ndarray:
+    return guide.Guides(source).guide(guide.guiding(index, step, range(source.count)), block)
+
+
+def smoothed(picture, block=1) -> np.ndarray:
+    """The reference: a Gaussian in float64, then means of blocks."""
+    short = min(picture.shape[:2])
+    picture = ndimage.gaussian_filter(picture.astype(float), (short / 240, short / 240, 0), mode="nearest")
+    down, right = (-n % block for n in picture.shape[:2])
+    picture = np.pad(picture, ((0, down), (0, right), (0, 0)), mode="edge")
+    height, width = (n // block for n in picture.shape[:2])
+    return picture.reshape(height, block, width, block, 3).mean(axis=(1, 3)) * short / (240 * block)
+
+
+@pytest.mark.parametrize("block", [1, 2, 4])
+@pytest.mark.parametrize("size", [(90, 120), (241, 323), (723, 1081)])
+def test_it_is_the_smoothed_frame(size, block):
+    picture = texture(*size)
+    found, expected = guide_of(source_of(picture), block=block), smoothed(picture, block)
+    assert found.dtype == np.float32
+    assert found.shape == expected.shape
+    # The largest pictures are smoothed from cells of 2 × 2 pixels, which takes some of the sharpest detail.
+    scale = min(size) / (240 * block)
+    assert np.abs(found - expected).max() <= (4 if min(size) > 720 else 1) * LEVEL * scale
+    assert np.abs(found - expected).mean() <= 0.5 * LEVEL * scale
+
+
+def test_differences_are_those_of_a_picture_of_240_rows():
+    """Whatever the size, and the blocks."""
+
+    def steepest(height, block):
+        found = guide_of(source_of(texture(height, height)), block=block)
+        return np.quantile(np.abs(np.diff(found, axis=1)), 0.9)
+
+    wanted = steepest(240, 1)
+    for height, block in ((480, 1), (720, 1), (960, 2), (960, 4)):
+        assert steepest(height, block) == pytest.approx(wanted, rel=0.08)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16, np.float32])
+@pytest.mark.parametrize("transfer", ["srgb", "linear"])
+def test_of_every_kind_of_samples(dtype, transfer):
+    """Without what is beyond white."""
+    picture = 0.4 + 0.6 * texture(90, 120)
+    shown = guide_of(source_of(picture, dtype=np.uint16))
+    stored = light.to_linear(picture) if transfer == "linear" else picture
+    assert np.abs(guide_of(source_of(stored, dtype=dtype, transfer=transfer)) - shown).max() <= LEVEL
+    if np.dtype(dtype).kind == "f":
+        bright = np.where(picture > 0.7, 1000 * picture, stored)
+        expected = guide_of(source_of(np.where(picture > 0.7, 1, picture), dtype=np.uint16))
+        found = guide_of(source_of(bright, dtype=dtype, transfer=transfer))
+        assert np.abs(found - expected).max() <= LEVEL
+        bright[3, 4], bright[50, 60] = np.nan, np.inf
+        assert np.isfinite(guide_of(source_of(bright, dtype=dtype, transfer=transfer))).all()
+
+
+@pytest.mark.parametrize("transfer", ["srgb", "linear"])
+def test_what_is_transparent_is_black(transfer):
+    picture, alpha = texture(90, 120), texture(90, 120, 1)[..., :1]
+    straight = source_of(np.dstack([picture, alpha]), dtype=np.float32, alpha="straight", transfer=transfer)
+    premultiplied = source_of(
+        np.dstack([picture * alpha, alpha]), dtype=np.float32, alpha="premultiplied", transfer=transfer
+    )
+    assert np.abs(guide_of(straight) - guide_of(premultiplied)).max() <= LEVEL / 16
+    hidden = np.dstack([picture, np.zeros_like(alpha)])
+    assert not guide_of(source_of(hidden, alpha="straight", dtype=np.uint16)).any()
+
+
+def test_frames_beside_it_steady_a_still_picture():
+    rng, still = np.random.default_rng(2), 0.2 + 0.6 * texture(240, 320)
+    noisy = [np.clip(still + rng.normal(0, 0.04, still.shape), 0, 1) for _ in range(6)]
+    clean = smoothed(still)
+    alone = guide_of(source_of(noisy[2])) - clean
+    steady = [guide_of(source_of(*noisy), index) for index in (2, 3)]
+    assert np.std(steady[0] - clean) <= 0.7 * np.std(alone)
+    change = guide_of(source_of(noisy[3])) - guide_of(source_of(noisy[2]))
+    assert np.std(steady[1] - steady[0]) <= 0.55 * np.std(change)
+
+
+def test_what_moves_stays_as_it_is_shown():
+    """A disk in front of a still picture, which is elsewhere in every frame: a plain mean would be 20 levels off."""
+    y, x = np.mgrid[:240, :320]
+    pictures = []
+    for k in range(5):
+        disk = (y - 120) ** 2 + (x - 60 - 50 * k) ** 2 < 20**2
+        pictures.append(np.where(disk[..., None], 0.9, 0.2 + 0.4 * texture(240, 320)))
+    for index in range(5):
+        assert np.abs(guide_of(source_of(*pictures), index) - smoothed(pictures[index])).max() <= 5 * LEVEL
+
+
+def test_those_beside_are_filmed_frames_of_the_shot():
+    assert guide.guiding(7, 1, range(20)) == (7, 5, 6, 8, 9)
+    assert guide.guiding(0, 1, range(20)) == (0, 1, 2)
+    assert guide.guiding(7, 1, range(7, 9)) == (7, 8)
+    assert guide.guiding(16, 8, range(99)) == (16, 0, 8, 24, 32)
+    assert guide.guiding(17, 8, range(99)) == (17, 8, 16, 24, 32)
+
+
+SHAPES = (
+    Shape(1, "line", 0.1, (np.array([[0.1, 0.2], [0.7, 0.3]]),)),
+    Shape(2, "lasso", 0.0, (np.array([[0.6, 0.6], [0.9, 0.6], [0.8, 0.9]]),)),
+)
+
+
+def guided(rng, window=6, strength=1.0, **options):
+    return few_pieces(rng, window, shapes=SHAPES, edge_aware=strength, **options)
+
+
+def test_what_was_shown_before_leaves_no_trace():
+    """In any order and direction, with a strength that changes, on and off."""
+    rng, device = np.random.default_rng(50), CPUCompositor()
+    renderer, index = Renderer(device, ShotSource(film(size=(17, 9)))), 4
+    for _ in range(40):
+        index = int(np.clip(index + rng.choice([1, 1, 1, -1, -2, 6, -9]), 0, 21))
+        strength, aggregate = rng.choice([0, 0.3, 1]), int(rng.choice([1, 2]))
+        position = rng.choice(["start", "center", "end"])
+        moment = guided(rng, 6, strength, position=position, aggregate=aggregate, stop_at_cuts=bool(rng.random() < 0.8))
+        direction = 1 if rng.random() > 0.3 else -1
+        fresh = Renderer(device, ShotSource(film(size=(17, 9))))
+        assert np.array_equal(renderer.picture(index, moment, direction), fresh.picture(index, moment, direction))
+        assert np.array_equal(renderer.coefficients(index, moment), fresh.coefficients(index, moment))
+
+
+def test_nothing_is_taken_from_beyond_a_cut():
+    """Coefficients are those of the shot alone, whatever the window shows."""
+    rng, device = np.random.default_rng(51), CPUCompositor()
+    whole, first = film(), film()
+    first.frames, first.count = first.frames[:7], 7
+    for position in ("start", "end"):
+        moment = guided(rng, 2, position=position)
+        found, alone = (Renderer(device, ShotSource(source)).coefficients(6, moment) for source in (whole, first))
+        assert np.array_equal(found, alone)
+
+
+def reads(moment, *calls) -> list[int]:
+    source = film()
+    renderer = Renderer(CPUCompositor(), ShotSource(source))
+    for call in calls:
+        call(renderer, moment)
+    return source.reads
+
+
+def test_at_0_nothing_more_is_read():
+    rng = np.random.default_rng(52)
+    still = FrameState(Options(4), np.eye(4)[[0, 0]], SHAPES[:1])  # the frame alone, everywhere
+    other = FrameState(Options(4, border=True), still.bars, SHAPES[:1])
+    for moment in (still, other):
+        assert reads(moment, lambda r, m: r.picture(3, m)) == [3]
+    assert reads(other, lambda r, m: r.coefficients(3, m)) == []
+    options = Options(4, border=True, edge_aware=0.5)
+    assert sorted(reads(FrameState(options, still.bars, SHAPES[:1]), lambda r, m: r.coefficients(3, m))) == [
+        1,
+        2,
+        3,
+        4,
+        5,
+    ]
+    everywhere = FrameState(Options(4, edge_aware=0.5), still.bars, SHAPES[:1])  # there is one shutter alone
+    assert reads(everywhere, lambda r, m: r.picture(3, m)) == [3]
+    assert guided(rng, 4, 0.0).key != guided(np.random.default_rng(52), 4, 0.5).key
+
+
+def test_frames_of_the_window_are_not_read_again():
+    """Played forward from the window's start, and backward from its end, within a shot."""
+    source, rng = film(), np.random.default_rng(53)
+    source.frames = np.stack([np.roll(source.frames[0], k, axis=1) for k in range(22)])
+    moment = guided(rng, 6)
+    renderer = Renderer(CPUCompositor(), ShotSource(source))
+    for index in range(12):
+        renderer.picture(index, moment)
+    assert len(source.reads) == len(set(source.reads))
+
+
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+def test_what_is_missing_is_what_is_read(position):
+    source, moment = film(), guided(np.random.default_rng(54), 4, position=position)
+    renderer = Renderer(CPUCompositor(), ShotSource(source))
+    for index in range(22):
+        renderer.picture(index, moment)
+    renderer.release_window()
+    for index in (5, 9, 20):
+        source.reads.clear()
+        missing = renderer.missing(index, 1, moment)
+        assert missing >= {index}
+        renderer.picture(index, moment)
+        assert set(source.reads) == missing
+        renderer.release_window()
+
+
+def test_in_betweens_that_guide_are_needed():
+    """The shown one, and filmed ones beside it; none of another shot."""
+    source = with_between()
+    renderer = Renderer(CPUCompositor(), ShotSource(source, STEP))
+    still = FrameState(Options(1, step=STEP, edge_aware=1.0), np.ones((2, 1)), SHAPES[:1])
+    moment = FrameState(Options(1, border=True, step=STEP, edge_aware=1.0), np.ones((2, 1)), SHAPES[:1])
+    assert renderer.needed(42, 1, still, known=False) == {42}
+    assert renderer.needed(42, 1, moment, known=False) == {36, 40, 42, 44, 48}
+    first = BETWEEN[1]
+    assert renderer.needed(first + 1, 1, moment, known=False) == {28, 32, 36}
+    assert renderer.needed(first + 2, 1, moment, known=False) == {29, 28, 32, 36}
+
+
+def test_without_opencv_it_is_said(monkeypatch):
+    import sys
+
+    from shutter_addon.core.messages import EffectError
+
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    renderer = Renderer(CPUCompositor(), footage(np.random.default_rng(55)))
+    moment = guided(np.random.default_rng(55))
+    with pytest.raises(EffectError, match="Follow Edges needs the Python package opencv-contrib-python-headless"):
+        renderer.picture(3, moment)
+    renderer.picture(3, guided(np.random.default_rng(55), strength=0.0))
