@@ -1,12 +1,11 @@
-"""Rendered scenes in which a subject's true mask and motion are known; scripts/one_stroke.py measures with them.
+"""Rendered scenes in which a subject's true mask and motion are known; for scripts/one_stroke.py.
 
-Each is seen straight from above: a painted board moves over a ground, so that its motion in the picture is a similarity.
+Each is seen straight from above: a painted board moves over a ground, in the picture by a similarity.
 Lengths are in units, of which the picture is 16 wide; frames count from 1. Needs Blender as a library (bpy).
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import cos, pi, radians, sin
@@ -19,6 +18,7 @@ from gallery import scenes
 
 COUNT = 40
 WIDE = 16.0
+COVER = 10.6  # how wide the bar is: the board lies below it altogether for five frames
 OUTLINE = [  # of the board, counter-clockwise
     (r * cos(a), r * sin(a))
     for i in range(72)
@@ -36,7 +36,7 @@ def still(_frame: float) -> tuple[float, float, float]:
 class Scene:
     """board: x, y, turn in radians and scale at a frame; camera: x, y and zoom; cover: x of a bar over the board.
 
-    ground, paint: colours; blur: how much of a frame's time the shutter is open."""
+    ground, paint: colours; blur: how much of a frame's time the shutter is open; masked: whether masks are rendered."""
 
     name: str
     board: Callable[[float], tuple[float, float, float, float]]
@@ -45,6 +45,8 @@ class Scene:
     ground: tuple[str, str] = ("#33503d", "#8fa06a")
     paint: tuple[str, str, str] = ("#d8803f", "#f0b878", "#8c3f22")
     blur: float = 0.0
+    masked: bool = False
+    start: int = COUNT // 2  # the frame at which the stroke is drawn
 
 
 def across(frame: float, speed: float = 1.0) -> tuple[float, float, float, float]:
@@ -64,38 +66,48 @@ def away(frame: float) -> tuple[float, float, float, float]:
 
 
 SCENES = [
-    Scene("moving", across),
-    Scene("similar", across, ground=("#8d6a48", "#a98660"), paint=("#a5825c", "#b8956c", "#84623f")),
-    Scene("blurred", lambda frame: across(frame, 1.6), blur=0.8),
+    Scene("moving", across, masked=True),
+    Scene("similar", across, ground=("#8d6a48", "#a98660"), paint=("#a5825c", "#b8956c", "#84623f"), masked=True),
+    Scene("blurred", lambda frame: across(frame, 1.6), blur=0.8, masked=True),
     Scene("shaken", lambda _frame: (0, 0, 0, 1), shaken),
     Scene("zoomed", lambda _frame: (0.5, 0.3, 0, 1), lambda frame: (0.02 * frame, 0, 1.5 ** ((frame - 20) / 20))),
     Scene("turned", lambda frame: (0, 0, radians(6) * (frame - 20), 1)),
-    Scene("covered", lambda frame: across(frame, 0.6), cover=lambda frame: 2.5 * (frame - 28)),
-    Scene("away", away),
+    Scene("covered", lambda frame: across(frame, 0.6), cover=lambda frame: 1.4 * (frame - 28)),
+    Scene("away", away, start=8),
 ]
 
 
 def render(scene: Scene, folder: Path, size=(640, 360), count: int = COUNT, samples: int = 4) -> None:
-    """Writes footage/0001.png … and mask/0001.png … (how much of a pixel the board covers, as encoded grey), and
-    truth.json: for each frame, the board's `place` in the picture (x, y in fractions, y up; turn in radians; scale, 1:
-    a unit is 1/16 of the width)."""
-    step = COUNT / count
+    """Writes footage/0001.png … and, where nothing covers the board, mask/0001.png …: how much of a pixel the board
+    covers, as encoded grey. What is there already stays."""
     scenes.SIZE = size
     if not scenes.complete(folder / "footage", count):
-        _build(scene, count, step, samples)
+        _build(scene, count, samples)
         scenes.render_frames(folder / "footage", count)
-    if not scenes.complete(folder / "mask", count):
-        _build(scene, count, step, samples, mask=True)
+    if scene.masked and not scenes.complete(folder / "mask", count):
+        _build(scene, count, samples, mask=True)
         scenes.render_frames(folder / "mask", count)
-    places = [place(scene, 1 + step * i, size) for i in range(count)]
-    (folder / "truth.json").write_text(json.dumps({"place": places}))
 
 
 def place(scene: Scene, frame: float, size) -> tuple[float, float, float, float]:
-    """Where the board lies in the picture, as in truth.json."""
+    """Where the board's centre lies in the picture: x, y in fractions, y up; its turn in radians; and its scale, with
+    which a unit is 1/16 of the width where it is 1."""
+    frame += scene.blur / 2  # in the middle of the exposure
     (x, y, turn, scale), (left, up, zoom) = scene.board(frame), scene.camera(frame)
     wide = WIDE / zoom
     return (x - left) / wide + 0.5, (y - up) / (wide * size[1] / size[0]) + 0.5, turn, scale * zoom
+
+
+def seen(scene: Scene, frame: float, size) -> float:
+    """How much of the board is in the picture and not covered, 0 to 1."""
+    rings = np.sqrt(np.linspace(0.02, 1, 40))[:, None, None]
+    points = on_picture((rings * np.array(OUTLINE)).reshape(-1, 2), place(scene, frame, size), size)
+    is_seen = ((points >= 0) & (points <= 1)).all(axis=1)
+    if scene.cover:
+        left, _, zoom = scene.camera(frame)
+        x = (points[:, 0] - 0.5) * WIDE / zoom + left
+        is_seen &= np.abs(x - scene.cover(frame)) > COVER / 2
+    return float(is_seen.mean())
 
 
 def on_picture(points, where, size) -> np.ndarray:
@@ -105,13 +117,15 @@ def on_picture(points, where, size) -> np.ndarray:
     return np.asarray(points) @ rotation.T * scale / WIDE * (1, size[0] / size[1]) + (x, y)
 
 
-def _build(scene: Scene, count: int, step: float, samples: int, mask: bool = False) -> None:
-    """Everything emits and nothing reflects, which needs few samples. mask: the board shines white, all else is black."""
+def _build(scene: Scene, count: int, samples: int, mask: bool = False) -> None:
+    """Builds it: all emits light and nothing reflects it, which needs few samples.
+
+    mask: the board shines white, all else is black"""
     scenes.begin("#000000", samples=samples, motion_blur=scene.blur)
     cycles = bpy.context.scene.cycles
     cycles.use_denoising, cycles.max_bounces = False, 0
     dark, white = (scenes.glow(color, 1.0) for color in ("#000000", "#ffffff"))
-    _camera(scene, count, step)
+    _camera(scene, count)
     _sheet((32, 32, 0), dark if mask else _mottled(*scene.ground, 0.25, 2048))
     board = scenes.empty()
     if mask:
@@ -120,19 +134,16 @@ def _build(scene: Scene, count: int, step: float, samples: int, mask: bool = Fal
         _shadow(board)
         _board(board, _mottled(*scene.paint[:2], 0.1), [scenes.glow(color, 1.0) for color in scene.paint[1:]])
 
-    def moved(index):
-        return lambda key: scene.board(1 + step * (key - 1))[index]
-
     scenes.animate(
         board,
         count,
-        location=lambda key: (moved(0)(key), moved(1)(key), 0.0),
-        rotation_euler=lambda key: (0, 0, moved(2)(key)),
-        scale=lambda key: (moved(3)(key),) * 3,
+        location=lambda key: (*scene.board(key)[:2], 0.0),
+        rotation_euler=lambda key: (0, 0, scene.board(key)[2]),
+        scale=lambda key: (scene.board(key)[3],) * 3,
     )
     if scene.cover:
-        bar = _sheet((3.4, 14, 1), dark if mask else _mottled("#6b7f9e", "#3d4a63", 0.2))
-        scenes.animate(bar, count, location=lambda key: (scene.cover(1 + step * (key - 1)), 0, 1))
+        bar = _sheet((COVER, 14, 1), dark if mask else _mottled("#6b7f9e", "#3d4a63", 0.2))
+        scenes.animate(bar, count, location=lambda key: (scene.cover(key), 0, 1))
     for thing in bpy.data.objects:
         _straighten(thing)
 
@@ -168,14 +179,13 @@ def _shadow(parent) -> None:
     _sheet((6, 6, 0.05), material, parent).location = 0.15, -0.15, 0.05
 
 
-def _camera(scene: Scene, count: int, step: float) -> None:
+def _camera(scene: Scene, count: int) -> None:
     scenes.camera((0, 0, 20), (0, 0, 0), 50)
     seen = bpy.context.scene.camera
     seen.rotation_euler = 0, 0, 0
     seen.data.type = "ORTHO"
-    place = scene.camera
-    scenes.animate(seen, count, location=lambda key: (*place(1 + step * (key - 1))[:2], 20))
-    scenes.animate(seen.data, count, ortho_scale=lambda key: WIDE / place(1 + step * (key - 1))[2])
+    scenes.animate(seen, count, location=lambda key: (*scene.camera(key)[:2], 20))
+    scenes.animate(seen.data, count, ortho_scale=lambda key: WIDE / scene.camera(key)[2])
 
 
 def _straighten(thing) -> None:

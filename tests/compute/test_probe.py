@@ -30,7 +30,7 @@ def test_a_point_shows_its_pixels_coefficients_and_shutter(request_of, interpola
     rng = np.random.default_rng(count)
     shapes = SHAPES if count > 2 else SHAPES[::2]
     found = request_of(state(rng, count=count, shapes=shapes, interpolation=interpolation, aggregate=aggregate))
-    values = found.renderer.coefficients(found.state)
+    values = found.renderer.coefficients(found.index, found.state)
     source = found.renderer.source
     for x, y in POINTS:
         row, column = int((1 - y) * source.height) // aggregate, int(x * source.width) // aggregate

@@ -26,7 +26,7 @@ def at(request: FrameRequest, point) -> Probed | None:
     column, row = int(np.floor(point[0] * source.width)), int(np.floor((1 - point[1]) * source.height))
     if not (0 <= column < source.width and 0 <= row < source.height):
         return None
-    texture, block, count = request.renderer.drawn_coefficients(request.state)
+    texture, block, count = request.renderer.drawn_coefficients(request.index, request.state, request.direction)
     values = np.maximum(blender_gpu.texel(texture, column // block, row // block)[:count], 0).astype(np.float64)
     coefficients = values / values.sum()
     return Probed(coefficients, compositor.mixed_shutter(request.state, coefficients))
