@@ -5,9 +5,9 @@
 The scenes are rendered by Blender (one_stroke_scenes.py), 40 frames of 640×360 each, once. A stroke is drawn inside the
 subject at one frame, and `shutter track` follows it both ways, with the window's defaults: border, Follow Edges 1.
 
-Masks: intersection over union of "coefficient > 0.5" with the true mask, the mean over all frames and the worst; beside
-the same without edges, and without tracking, and beside OpenCV's GrabCut, which gets the same tracked stroke as its
-foreground and the frame's edge as its background.
+Masks: intersection over union of "coefficient > 0.5" with the true mask, the mean over all frames and the worst, and
+the mean coefficient inside the true mask; beside the same without edges, and without tracking, and beside OpenCV's
+GrabCut, which gets the same tracked stroke as its foreground and the frame's edge as its background.
 
 Motion: how far the stroke's ends lie from where they belong, in pixels of 640, where the subject is seen altogether,
 and at any other frame of a confidence above 0.5. With every key, as tracked, and with keys thinned, as written.
@@ -62,7 +62,7 @@ def main() -> int:
         rows.append({"scene": scene.name, **motion(scene, folder, keyed)})
         if scene.masked:
             masks = Masks(folder, keyed)
-            rows[-1]["iou"] = {way: masks.overlap(way) for way in WAYS}
+            rows[-1] |= {"iou": {way: masks.overlap(way) for way in WAYS}, "inside": masks.inside("one stroke")}
             picture = masks.picture()
             stills.save(picture, folder.with_suffix(".png"))
             if arguments.docs and scene is chosen[0]:
@@ -140,7 +140,7 @@ class Masks:
     def __init__(self, folder: Path, keyed: dict[str, recipe.Recipe]):
         self._source = open_source(folder / "footage" / "0001.png")
         self._truth = open_source(folder / "mask" / "0001.png")
-        self._keyed = keyed
+        self._keyed, self._known = keyed, {}
         self._renderer = Renderer(open_compositor()[0], self._source)
         self.frames = range(1, self._source.count + 1)
 
@@ -151,6 +151,10 @@ class Masks:
             taken, true = self.taken(way, frame), self.true(frame)
             found.append((taken & true).sum() / (taken | true).sum())
         return {"mean": round(float(np.mean(found)), 3), "worst": round(float(np.min(found)), 3)}
+
+    def inside(self, way: str) -> float:
+        """The mean coefficient inside the true mask."""
+        return round(float(np.mean([self.coefficients(way, f)[self.true(f)].mean() for f in self.frames])), 2)
 
     def true(self, frame: int) -> np.ndarray:
         """Where the subject covers half a pixel or more: a grey of 188 is half of the light."""
@@ -164,10 +168,12 @@ class Masks:
 
     def coefficients(self, way: str, frame: int) -> np.ndarray:
         """The subject's coefficient (h, w)."""
-        state = self._state("drawn" if way == "without tracking" else "thinned", frame)
-        if way == "without edges":
-            state = replace(state, options=replace(state.options, edge_aware=0.0))
-        return self._renderer.coefficients(frame - 1, state)[1]
+        if (way, frame) not in self._known:
+            state = self._state("drawn" if way == "without tracking" else "thinned", frame)
+            if way == "without edges":
+                state = replace(state, options=replace(state.options, edge_aware=0.0))
+            self._known[way, frame] = self._renderer.coefficients(frame - 1, state)[1]
+        return self._known[way, frame]
 
     def _grabcut(self, frame: int) -> np.ndarray:
         picture = np.ascontiguousarray(self._source.read(frame - 1)[..., 2::-1])
