@@ -22,7 +22,9 @@ KEYS = [{"frame": 1, "value": 0.2}, {"frame": 9, "value": 1}]
 def film(tmp_path_factory, bunny):
     """A real film, small, and every tenth frame of it: the first file."""
     with open_source(bunny) as source:
-        frames = [cv2.resize(source.read(10 + 10 * k)[..., :3], SIZE, interpolation=cv2.INTER_AREA) for k in range(COUNT)]
+        frames = [
+            cv2.resize(source.read(10 + 10 * k)[..., :3], SIZE, interpolation=cv2.INTER_AREA) for k in range(COUNT)
+        ]
     return write_frames(tmp_path_factory.mktemp("film"), np.stack(frames))
 
 
