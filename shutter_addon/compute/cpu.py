@@ -163,8 +163,8 @@ def _difference(late: np.ndarray, early: np.ndarray) -> np.ndarray:
 class Solver:
     """compute.diffusion, with the methods of compute.diffusion_gpu.Diffusion. It ignores `warm`."""
 
-    def solve(self, labels: np.ndarray, count: int, *, warm: bool = False) -> np.ndarray:
-        return diffuse(labels, count)
+    def solve(self, labels: np.ndarray, count: int, guide=None, strength: float = 0.0, *, warm=False) -> np.ndarray:
+        return diffuse(labels, count, guide, strength)
 
     def release(self) -> None:
         pass

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from .edge_diffusion import diffuse_along_edges
+
 # Largest error × 255 over 67 scenes after 2, 3, 4, 5 cycles: 6.8, 1.1, 0.17, 0.03 (median 0.18, 0.014, 0.003, 0.0006).
 CYCLES = 4
 SWEEPS = 2
@@ -22,11 +24,14 @@ _COLOURS = ((0, 0), (1, 1), (0, 1), (1, 0))
 _OFFSETS = tuple((y, x) for y in (-1, 0, 1) for x in (-1, 0, 1))
 
 
-def diffuse(labels: np.ndarray, count: int) -> np.ndarray:
+def diffuse(labels: np.ndarray, count: int, guide: np.ndarray | None = None, strength: float = 0.0) -> np.ndarray:
     """Coefficients (count, H, W) float32, ≥ 0 and of sum 1, from labels (H, W): 0 free, 1 + shutter fixed.
 
+    guide, strength: as for core.conductances, (H, W, 3 or 4); None or 0: they spread alike everywhere
     Labels without any scribble give the first shutter everywhere.
     """
+    if follows_edges(labels, guide, strength):
+        return _finish(diffuse_along_edges(labels, count, guide, strength))
     levels = [_finest(labels)]
     while levels[-1].shape != (1, 1):
         levels.append(_coarser(levels[-1]))
@@ -34,6 +39,11 @@ def diffuse(labels: np.ndarray, count: int) -> np.ndarray:
     for cycle in range(CYCLES):
         _cycle(levels, solution, 0.0, SWEEPS if cycle else 0)
     return _finish(_inner(solution))
+
+
+def follows_edges(labels: np.ndarray, guide: np.ndarray | None, strength: float) -> bool:
+    """Whether there is anything to diffuse with other conductances than 1."""
+    return guide is not None and strength > 0 and 0 < np.count_nonzero(labels) < labels.size
 
 
 class _Level:

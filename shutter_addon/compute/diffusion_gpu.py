@@ -20,6 +20,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from .diffusion import diffuse, follows_edges
 from .passes import Image, Pass
 
 # V-cycles of a solve that starts from nothing. Largest error × 255 after 1, 2, 3, 4 cycles: 3.9, 0.67, 0.66, 0.66 over
@@ -136,15 +137,20 @@ class Diffusion:
         self._grids = []
         self._made_for = None
         self._tiles = None
+        self._edged = False
 
-    def solve(self, labels: np.ndarray, count: int, *, warm: bool = False):
+    def solve(self, labels: np.ndarray, count: int, guide=None, strength: float = 0.0, *, warm: bool = False):
         """Coefficients from labels (H, W) uint16, 0 free, 1 + shutter fixed: a texture array rgba32f, shutter i in
         layer i // 4 and channel i % 4. The next call overwrites it. Nothing is read back from the device.
 
+        guide, strength: as for core.conductances, (H, W, 3 or 4); None or 0: they spread alike everywhere
         warm: start from the last solution, if that had this size and count. It is faster where scribbles moved a
         little, and the result depends on the last solution as well, within the error.
         """
-        warm = self._prepare(labels.shape, count) and warm
+        if follows_edges(labels, guide, strength):
+            return self._along_edges(labels, count, guide, strength)
+        warm = self._prepare(labels.shape, count) and warm and not self._edged
+        self._edged = False
         finest = self._grids[0]
         self._device.write(finest.textures["labels"], np.ascontiguousarray(labels, dtype=np.uint16))
         self._list_tiles(labels)
@@ -154,6 +160,19 @@ class Diffusion:
             self._cycle(0)
         self._finish()
         return finest.textures["solution"]
+
+    def _along_edges(self, labels: np.ndarray, count: int, guide: np.ndarray, strength: float):
+        """As solve, with conductances. The next solve starts from nothing."""
+        self._prepare(labels.shape, count)
+        self._edged = True
+        solution = self._grids[0].textures["solution"]
+        coefficients = diffuse(labels, count, guide, strength)
+        values = np.zeros((4 * solution.size[2], *labels.shape), np.float32)
+        values[:count] = coefficients
+        for layer in range(solution.size[2]):
+            part = np.moveaxis(values[4 * layer : 4 * layer + 4], 0, 2)
+            self._device.write(solution, np.ascontiguousarray(part), layer)
+        return solution
 
     def release(self) -> None:
         for grid in self._grids:
