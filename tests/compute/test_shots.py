@@ -1,5 +1,6 @@
 """Windows end at the cuts of a source as at a clip's ends, on every device, against the float64 reference."""
 
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -44,6 +45,17 @@ class FilmOfShots(ShotSource):
         return self._source.linear()
 
 
+@cache
+def shots_of(dtype) -> FilmOfShots:
+    """The film, for tests that need not look for its cuts again and again."""
+    return FilmOfShots(film(dtype))
+
+
+@cache
+def shots_with_between(dtype) -> FilmOfShots:
+    return FilmOfShots(with_between(dtype), STEP)
+
+
 @pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
 @pytest.mark.parametrize("position", ["start", "center", "end"])
 @pytest.mark.parametrize("direction", [1, -1])
@@ -55,14 +67,14 @@ def test_a_window_shows_its_own_shot_alone(device, edges, position, direction, d
             state(rng, edges=edges, position=position),
             few_pieces(rng, 8, edges=edges, position=position, light="encoded"),
         ):
-            check(device, FilmOfShots(film(dtype)), moment, index, direction, SHOTS[index])
+            check(device, shots_of(dtype), moment, index, direction, SHOTS[index])
 
 
 @pytest.mark.parametrize("preset", sorted(presets.PRESETS))
 def test_presets(device, preset):
     bars = np.stack([presets.bars(preset, 12), presets.bars("STILL", 12)])
     moment = FrameState(Options(12, edges="shorten"), bars, state(np.random.default_rng(42)).shapes[:1])
-    check(device, FilmOfShots(film()), moment, 4, 1, SHOTS[4])
+    check(device, shots_of(np.uint8), moment, 4, 1, SHOTS[4])
 
 
 def test_off_the_whole_clip_is_seen_and_nothing_looked_at(device):
@@ -138,7 +150,7 @@ def test_in_betweens_are_of_the_shot_of_the_nearer_filmed_frame(device, edges, p
     for first, stop in pairwise(BETWEEN):
         for index, direction in ((first, 1), (first + 9, -1), (stop - 1, 1)):
             moment = state(rng, edges=edges, position=position)
-            check(device, FilmOfShots(with_between(dtype), STEP), moment, index, direction, range(first, stop))
+            check(device, shots_with_between(dtype), moment, index, direction, range(first, stop))
 
 
 def test_cuts_are_looked_for_in_filmed_frames_alone():
