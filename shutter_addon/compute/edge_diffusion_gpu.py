@@ -61,11 +61,12 @@ class _Level:
             self.textures["inverted"] = _filled(device, inverse.reshape(1, self.count, -1, 4))
         nodes = np.zeros((self.count, 4), np.float32)
         nodes[:, 0], nodes[:, 1] = graph.diagonal, graph.ground
-        nodes[:, 2] = 0 if self.dense else graph.parent
+        if graph.parent is not None:
+            nodes[:, 2] = graph.parent
         self.textures["nodes"] = _listed(device, nodes)
         links, ranks = _paired(graph)
         self.textures["links"], self.textures["ranks"] = _listed(device, links), _listed(device, ranks)
-        if not self.dense:
+        if graph.parent is not None:
             families = np.zeros((len(graph.starts), 4), np.float32)
             families[:, 0] = graph.starts
             families[:, 1] = np.append(graph.starts[1:], len(graph.order))
@@ -141,16 +142,18 @@ def _cycle(device, levels, layers, right, result) -> None:
     if level.dense:
         _run(device, _DENSE, level, layers, right=right, result=result)
         return
-    below = coarser[0]
-    values = level.textures["values"]
+    values = level.textures["values"] if coarser else result
     _run(device, _START, level, layers, right=right, result=values, damping=edge_diffusion.DAMPING)
+    if not coarser:
+        return
+    below, twice = coarser[0], len(coarser) > 1
     own = below.textures
     _run(device, _RESTRICT, level, layers, extent=below.count, right=right, result=own["right"], count=below.count)
     _cycle(device, coarser, layers, own["right"], own["once"])
-    if not below.dense:
+    if twice:
         _run(device, _RESIDUAL, below, layers, right=own["right"], values=own["once"], result=own["rest"], amount=1.0)
         _cycle(device, coarser, layers, own["rest"], own["again"])
-    given = {"once": own["once"], "again": own["again"], "parents": below.count, "twice": int(not below.dense)}
+    given = {"once": own["once"], "again": own["again"], "parents": below.count, "twice": int(twice)}
     _run(device, _PROLONG, level, layers, amount=edge_diffusion.OVERCORRECTION, **given)
     _run(device, _SMOOTH, level, layers, right=right, result=result, damping=edge_diffusion.DAMPING)
 

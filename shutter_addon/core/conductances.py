@@ -13,6 +13,9 @@ SIGMA = 0.03
 FLOOR = 3e-3
 # The squared difference in units of SIGMA from which on a conductance is FLOOR.
 STEEPEST = float(-np.log(FLOOR))
+# Conductances are multiples of 1 / STEPS: exponentials differ in their last bits from processor to processor, and sums
+# of such multiples are exact, in any order.
+STEPS = 1 << 20
 
 
 def conductances(guide: np.ndarray, strength: float) -> tuple[np.ndarray, np.ndarray]:
@@ -27,4 +30,5 @@ def conductances(guide: np.ndarray, strength: float) -> tuple[np.ndarray, np.nda
 
 def _across(differences: np.ndarray, strength: float) -> np.ndarray:
     largest = np.abs(differences).max(axis=-1, initial=0.0)
-    return np.exp(-strength * np.minimum((largest / SIGMA) ** 2, STEEPEST))
+    exact = np.exp(-strength * np.minimum((largest / SIGMA) ** 2, STEEPEST))
+    return np.rint(exact * STEPS) / STEPS

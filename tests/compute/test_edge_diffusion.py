@@ -122,6 +122,20 @@ def fixed_walls():
     return labels
 
 
+def pockets(side, width=160, height=120, seed=5):
+    """Free pockets of side × side pixels in all else, which is fixed."""
+    y, x = np.mgrid[:height, :width]
+    labels = np.random.default_rng(seed).integers(1, 4, (height, width)).astype(np.uint16)
+    labels[(y % (side + 1) > 0) & (x % (side + 1) > 0)] = 0
+    return labels
+
+
+def halves(gap, width=160, height=120):
+    """Every pocket of `gap` pixels is cut in two by an edge; every second one in unequal parts."""
+    x = np.arange(width) + np.zeros((height, 1))
+    return grey(0.5 * (x % (gap + 1) > np.where(x // (gap + 1) % 2, gap // 2, 1)))
+
+
 BUNNY, PEOPLE, WALKERS = ("bigbuckbunny.mp4", 60), ("pedestrians.avi", 30), ("walkers.mp4", 30)
 X = np.arange(WIDTH) / WIDTH + np.zeros((HEIGHT, 1))
 # name: labels, shutters, guide
@@ -167,6 +181,10 @@ SCENES = {
     "dust": (scattered(0.003), 3, film(*PEOPLE)),
     "half of it fixed": (scattered(0.5), 3, noise(0.3)),
     "walls of scribbles": (fixed_walls(), 2, film(*BUNNY)),
+    "single free pixels": (pockets(1), 3, noise(0.3, 160, 120)),
+    "pockets of two": (pockets(2), 3, grey(np.zeros((120, 160)))),
+    "pockets in halves": (pockets(7), 3, halves(7)),
+    "pockets with noise": (pockets(12), 3, noise(0.03, 160, 120)),
     "a band": (shapes(10, 3, 320, 40), 3, film(*PEOPLE, 320, 40)),
     "a tall band": (shapes(10, 3, 24, 192), 3, film(*BUNNY, 24, 192)),
     "odd": (shapes(11, 4, 97, 61), 4, film(*WALKERS, 97, 61)),
