@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 from scipy import ndimage
-from test_composition import Footage, few_pieces
+from test_composition import Footage, few_pieces, state
 from test_shots import BETWEEN, STEP, film, with_between
 
 from shutter_addon.compute import guide
 from shutter_addon.compute.cpu import CPUCompositor
-from shutter_addon.compute.renderer import Renderer
-from shutter_addon.core import light
+from shutter_addon.compute.gpu import GPUCompositor
+from shutter_addon.compute.renderer import Renderer, open_compositor
+from shutter_addon.core import compositor, exact_diffusion, light
 from shutter_addon.core.frame_state import FrameState, Options
 from shutter_addon.core.scribbles import Shape
 from shutter_addon.media.cuts import ShotSource
@@ -140,6 +141,40 @@ SHAPES = (
 
 def guided(rng, window=6, strength=1.0, **options):
     return few_pieces(rng, window, shapes=SHAPES, edge_aware=strength, **options)
+
+
+@pytest.fixture(params=["gpu", "cpu", "blender"], scope="module")
+def device(request):
+    if request.param == "blender":
+        return GPUCompositor(request.getfixturevalue("blender_device"))
+    return open_compositor(request.param)[0]
+
+
+@pytest.mark.parametrize("aggregate", [1, 2, 4])
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_pictures_equal_the_reference(device, aggregate, dtype):
+    """Two shutters over 8 bits, and eight over floats beyond white that are partly transparent."""
+    rng, whole = np.random.default_rng(56), dtype == np.uint8
+    count = 2 if whole else 8
+    pictures = [np.where(texture(60, 90, seed) > 0.5, 0.9, 0.1) * (1 if whole else 3) for seed in range(4)]
+    alpha = np.ones((60, 90, 1)) if whole else texture(60, 90, 9)[..., :1]
+    kind = {} if whole else {"alpha": "premultiplied", "transfer": "linear"}
+    source = source_of(*(np.dstack([p * alpha, alpha]) for p in pictures), dtype=dtype, **kind)
+    moment = state(
+        rng, 4, SHAPES[: min(count - 1, 2)], count, border=True, edge_aware=0.7, aggregate=aggregate, position="center"
+    )
+    renderer = Renderer(device, source)
+    labels = renderer.labels(moment)
+    exact = exact_diffusion.solve(labels, count, guide_of(source, 2, aggregate), 0.7)
+    assert np.abs(exact - exact_diffusion.solve(labels, count)).max() > 10 * LEVEL
+    assert np.abs(renderer.coefficients(2, moment) - exact).max() <= LEVEL
+    pixels = exact.repeat(aggregate, 1).repeat(aggregate, 2)[:, :60, :90]
+    indices = compositor.window_indices(moment.options, 2, range(4))
+    expected = compositor.compose(moment, source.linear()[np.maximum(indices, 0)], indices >= 0, pixels)
+    apart = np.abs(light.to_encoded(renderer.picture(2, moment).astype(float)) - light.to_encoded(expected))
+    assert (apart / np.maximum(1, np.abs(expected))).max() <= LEVEL
+    with device.current():
+        renderer.release_window()
 
 
 def test_what_was_shown_before_leaves_no_trace():
