@@ -149,7 +149,7 @@ def _scribble(bpy, edit, effect, strip, source, chance):
 
 def _keys(bpy, edit, effect, strip, source, chance):
     """Keys of impossible values, at impossible frames."""
-    names = ("window", "position", "aggregate", "border", "source_time", "shutters[0].bars[0].weight")
+    names = ("window", "position", "aggregate", "border", "edge_aware", "source_time", "shutters[0].bars[0].weight")
     path = f"{effect.path_from_id()}.{(*names, 'regions[0].location', 'regions[0].scale')[chance % 8]}"
     edit.animation_data_create()
     edit.keyframe_insert(path, frame=5)
