@@ -13,6 +13,7 @@ from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.core import compositor, exact_diffusion, light
 from shutter_addon.core.frame_state import FrameState, Options
 from shutter_addon.core.scribbles import Shape
+from shutter_addon.media import MediaError
 from shutter_addon.media.cuts import ShotSource
 
 LEVEL = 1 / 255
@@ -272,3 +273,19 @@ def test_in_betweens_that_guide_are_needed():
     first = BETWEEN[1]
     assert renderer.needed(first + 1, 1, moment, known=False) == {28, 32, 36}
     assert renderer.needed(first + 2, 1, moment, known=False) == {29, 28, 32, 36}
+
+
+def test_a_frame_that_cannot_be_read_is_missed_only_where_it_is_shown():
+    source, moment = film(), guided(np.random.default_rng(57), 1)
+    read = source.read
+
+    def fail(index):
+        if index == 3:
+            raise MediaError("broken")
+        return read(index)
+
+    source.read = fail
+    renderer = Renderer(CPUCompositor(), source)
+    renderer.coefficients(2, moment)
+    with pytest.raises(MediaError, match="broken"):
+        renderer.coefficients(3, moment)
