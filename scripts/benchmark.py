@@ -125,6 +125,7 @@ class Case:
         self.moved = np.roll(self.labels, max(1, width // 640), axis=(0, 1))  # three pixels of 1920
         self.solver = self.compositor.solver()
         self.handle = self.solver.solve(self.labels, count)
+        self.edge_solver = self.compositor.solver()
 
     def _open(self, window: int) -> None:
         self.compositor = GPUCompositor(self.device)
@@ -170,8 +171,10 @@ class Case:
         self.load(self.window if method == "ours" else self.frames)
 
     def diffuse(self, method: str) -> None:
-        guide = edged(*self.labels.shape) if method == "edges" else None
-        self.handle = self.solver.solve(self.labels, len(self.state.bars), guide, 1.0)
+        if method == "edges":
+            self.edges = self.edge_solver.solve(self.labels, len(self.state.bars), edged(*self.labels.shape), 1.0)
+        else:
+            self.handle = self.solver.solve(self.labels, len(self.state.bars))
 
     def diffuse_moved(self, method: str) -> None:
         self.labels, self.moved = self.moved, self.labels
@@ -251,18 +254,19 @@ class Case:
     def _edges_error(self) -> float:
         """Of what was solved last, along edges."""
         count = len(self.state.bars)
-        got, usual = self.compositor.coefficients(self.handle, count).copy(), edge_diffusion.ITERATIONS
+        got, usual = self.compositor.coefficients(self.edges, count).copy(), edge_diffusion.ITERATIONS
         try:
             edge_diffusion.ITERATIONS = 2 * usual
             self.diffuse("edges")
         finally:
             edge_diffusion.ITERATIONS = usual
-        return float(np.abs(self.compositor.coefficients(self.handle, count) - got).max() * 255)
+        return float(np.abs(self.compositor.coefficients(self.edges, count) - got).max() * 255)
 
     def release(self) -> None:
         self.window.release()
         self.frames.release()
         self.solver.release()
+        self.edge_solver.release()
         self.sums.release()
         for texture in self.compositor._textures.values():
             texture.release()

@@ -9,7 +9,7 @@ void main()
   }
   vec4 total = vec4(0.0);
   for (int k = 0; k < count; k += 4) {
-    vec4 row = imageLoad(inverse, ivec3(k >> 2, n, 0));
+    vec4 row = imageLoad(inverted, ivec3(k >> 2, n, 0));
     for (int i = 0; i < 4; i++) {
       if (k + i < count) {
         total += row[i] * imageLoad(right, at(k + i, layer()));

@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from . import edge_diffusion
+from .device import NoDeviceError
 from .passes import LOCAL_ROW, Image, Pass
 
 # Texels along a row of a graph's textures; include/graph.glsl has the same.
 ROW = 4096
+# Textures hold the numbers of nodes as floats, which are exact up to here.
+MOST = 1 << 24
 # Parts that a sum over all nodes is made of.
 PARTS = 1024
 
@@ -28,7 +31,7 @@ _SMOOTH = _pass("smooth", ("right", *_LINKED), ("result",), rank_count="int", da
 _RESIDUAL = _pass("residual", ("right", *_LINKED), ("result",), rank_count="int", amount="float")
 _RESTRICT = _pass("restrict", ("right", *_LINKED, "families", "children"), ("result",), rank_count="int")
 _PROLONG = _pass("prolong", ("nodes", "once", "again"), (), ("values",), parents="int", twice="int", amount="float")
-_DENSE = _pass("dense", ("inverse", "right"), ("result",))
+_DENSE = _pass("dense", ("inverted", "right"), ("result",))
 _DOT = _pass("dot", ("values", "right"), ("result",), parts="int")
 _SUM = Pass(
     "graph_sum",
@@ -55,7 +58,7 @@ class _Level:
         self.textures = {}
         if self.dense:
             inverse = np.pad(graph.inverse, ((0, 0), (0, -self.count % 4)))
-            self.textures["inverse"] = _filled(device, inverse.reshape(1, self.count, -1, 4))
+            self.textures["inverted"] = _filled(device, inverse.reshape(1, self.count, -1, 4))
         nodes = np.zeros((self.count, 4), np.float32)
         nodes[:, 0], nodes[:, 1] = graph.diagonal, graph.ground
         nodes[:, 2] = 0 if self.dense else graph.parent
@@ -83,7 +86,12 @@ def solve(device, labels, count: int, guide, strength: float, result, nothing: f
 
     labels, count, guide, strength: as for edge_diffusion.diffuse_along_edges
     nothing: coefficients below this are set to 0
+    NoDeviceError: there are more pixels than MOST
     """
+    if labels.size > MOST:
+        raise NoDeviceError(
+            f"edges cannot be followed in {labels.size} pixels, only in up to {MOST}: use larger blocks"
+        )
     fixed = (labels == np.arange(1, count + 1)[:, None, None]).astype(np.float32)
     graphs, pixels, right = edge_diffusion.graphs_of(labels, guide, strength, fixed)
     layers = result.size[2]

@@ -4,10 +4,12 @@ import re
 
 import pytest
 
-from shutter_addon.compute import diffusion_gpu, gpu, window
+from shutter_addon.compute import diffusion_gpu, edge_diffusion_gpu, gpu, window
 from shutter_addon.compute.passes import SHADERS, Pass, body
 
-PASSES = [value for value in vars(diffusion_gpu).values() if isinstance(value, Pass)]
+PASSES = [
+    value for made in (diffusion_gpu, edge_diffusion_gpu) for value in vars(made).values() if isinstance(value, Pass)
+]
 PASSES += [gpu.composition(way, 3, "frames", 1, 2, True, False) for way in ("pieces", "frames", "walk", "value")]
 PASSES += [
     gpu.composition(way, 3, stored, 1, 2, True, False)
