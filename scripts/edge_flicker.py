@@ -5,7 +5,7 @@ One stroke per film lies still, and the border is the other shutter. A pixel sta
 15 × 15 pixels, changes by no more than a level on average, of 255: codecs leave as much of noise. Changes of
 coefficients are in 255ths. `steadied` is as it renders, with the frames beside the shown one; `alone` is without these.
 
-    .venv/bin/python scripts/edge_flicker.py [--frames 24] [--noise 0,8] [--aggregate 2] [--device auto] [--json OUT]
+    .venv/bin/python scripts/edge_flicker.py [--films …] [--frames 24] [--noise 0,8] [--aggregate 2] [--json OUT]
 
 --noise: levels of noise, of every sample and frame anew, that are added to the footage after it was judged.
 """
@@ -84,7 +84,7 @@ def changes(compositor, film: Path, first: int, stroke, args, noise: float) -> d
 
 def run(args) -> list[dict]:
     compositor, rows = open_compositor(args.device)[0], []
-    for film, first, stroke in FILMS:
+    for film, first, stroke in (entry for entry in FILMS if entry[0].name in args.films):
         for noise in args.noise:
             for way, beside in (("steadied", guide.BESIDE), ("alone", 0)):
                 with mock.patch.object(guide, "BESIDE", beside):
@@ -97,6 +97,8 @@ def run(args) -> list[dict]:
 
 def parse(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    names = [film.name for film, *_ in FILMS]
+    parser.add_argument("--films", nargs="+", choices=names, default=names)
     parser.add_argument("--frames", type=int, default=24)
     parser.add_argument("--noise", type=lambda text: [float(part) for part in text.split(",")], default="0,8")
     parser.add_argument("--aggregate", type=int, choices=(1, 2, 4), default=2)

@@ -149,16 +149,16 @@ def _scribble(bpy, edit, effect, strip, source, chance):
 
 def _keys(bpy, edit, effect, strip, source, chance):
     """Keys of impossible values, at impossible frames."""
-    names = ("window", "position", "aggregate", "border", "source_time", "shutters[0].bars[0].weight")
-    path = f"{effect.path_from_id()}.{(*names, 'regions[0].location', 'regions[0].scale')[chance % 8]}"
+    names = ("window", "position", "aggregate", "border", "edge_aware", "source_time", "shutters[0].bars[0].weight")
+    path = f"{effect.path_from_id()}.{(*names, 'regions[0].location', 'regions[0].scale')[chance % 9]}"
     edit.animation_data_create()
     edit.keyframe_insert(path, frame=5)
     from shutter_addon.blender.data import fcurves
 
     for curve in fcurves.curves_under(edit, path):
         for key in curve.keyframe_points:
-            key.co = [(5, -1), (5, 1e30), (1e9, 5), (-1e9, 1e9), (5, float("nan")), (float("nan"), 1)][chance // 8 % 6]
-            key.interpolation = ("BEZIER", "ELASTIC", "CONSTANT")[chance // 64 % 3]
+            key.co = [(5, -1), (5, 1e30), (1e9, 5), (-1e9, 1e9), (5, float("nan")), (float("nan"), 1)][chance // 9 % 6]
+            key.interpolation = ("BEZIER", "ELASTIC", "CONSTANT")[chance // 54 % 3]
 
 
 def _another_source(bpy, edit, effect, strip, source, chance):

@@ -1,7 +1,8 @@
 """Guides of edge-aware diffusion: the shown frame as conductances are made of it (core.conductances).
 
 A guide is a frame's display values, without its finest detail: at a larger size an edge is as many times wider, and
-its differences are taken over as many times more pixels, so that conductances are those of a picture of ROWS rows.
+its differences are taken over as many times more pixels, so that conductances are those of a picture of ROWS rows (or
+columns, where it is upright).
 
 It is steadied: where the frames beside the shown one differ little from it, it is their mean. Noise that comes and
 goes in a still picture would else make coefficients flicker. What moves differs more, and stays as it is shown.
@@ -13,6 +14,7 @@ import numpy as np
 
 from ..core import light
 from ..core.frame_source import FrameSource
+from ..core.messages import UserError
 
 # Rows of the picture whose pixels are smoothed over about one, by a Gaussian of so many pixels.
 ROWS = 240
@@ -67,12 +69,16 @@ class Guides:
 
     def guide(self, frames: tuple[int, ...], block: int) -> np.ndarray:
         """The guide (h, w, 3) float32 of the frame that comes first in `guiding`, a pixel for each block × block of its
-        pixels: 0 to 1, times the rows of such pixels over ROWS."""
+        pixels: 0 to 1, times the rows of such pixels over ROWS. Frames beside it that cannot be read are left out."""
         key = frames, block
         if self._made is None or self._made[0] != key:
             for index in sorted(self.lacking(frames)):
-                self._reduced[index] = self._reduce(self._source.read(index))
-            shown, *beside = (self._reduced[index] for index in frames)
+                try:
+                    self._reduced[index] = self._reduce(self._source.read(index))
+                except UserError:
+                    if index == frames[0]:
+                        raise
+            shown, *beside = (self._reduced[index] for index in frames if index in self._reduced)
             scale = np.float32(self._short / (block * ROWS * _WHITE))
             self._made = key, self._on_blocks(_steadied(shown, beside) * scale, block)
         return self._made[1]
