@@ -304,7 +304,9 @@ class _Pursuit:
         later = self._by_later_look(picture, guess)
         if later is None:
             return (match.motion, sure) if sure >= _LOST else None
-        if sure < SURE:  # from there the first look may be near enough
+        points = self._first.points
+        if sure < SURE and np.abs(later[0](points) - guess(points)).max() > 1:
+            # from there the first look may be near enough
             again = self._first.find(picture, later[0], self._motion)
             if confidence(again, picture) > sure:
                 match, sure = again, confidence(again, picture)
