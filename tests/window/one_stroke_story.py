@@ -18,6 +18,7 @@ import traces
 FRAME, STROKE = 70, ((0.462, 0.65), (0.465, 0.62), (0.467, 0.59), (0.468, 0.565))
 MENDED = 85
 SHOWN = range(55, 96)
+RENDERED = range(65, 96, 10)
 FOLLOW_EDGES, TRACK = 425, 451  # where they stand in the sidebar, in pixels below its upper edge
 
 
@@ -141,16 +142,27 @@ def escaped():
 
 
 def rendered():
-    render = story.edit().render
-    render.image_settings.media_type = "IMAGE"
-    render.image_settings.file_format = "PNG"
-    render.filepath = str(driver.OUT / "final_")
-    story.edit().frame_start, story.edit().frame_end, story.edit().frame_step = 60, 90, 15
+    edit = story.edit()
+    edit.render.image_settings.media_type = "IMAGE"
+    edit.render.image_settings.file_format = "PNG"
+    edit.render.dither_intensity = 0
+    edit.render.filepath = str(driver.OUT / "final_")
+    edit.frame_start, edit.frame_end, edit.frame_step = RENDERED.start, RENDERED.stop - 1, RENDERED.step
     done = []
-    bpy.app.handlers.render_complete.append(lambda *_: done.append(True))
+    # The preview's pictures of the effect are renders of its own scene.
+    bpy.app.handlers.render_complete.append(lambda scene, *_: scene.name == "Edit" and done.append(True))
     with driver.override("PREVIEW"):
         bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
     yield from driver.until(lambda: done, "the render ends", 120)
+    for frame in RENDERED:
+        driver.saw(rendered=frame, stroke=stroke_at(frame))
+
+
+def stroke_at(frame):
+    """The middle of the region's stroke at a frame, in fractions of the picture."""
+    edit, effect, strip = part("blender.data.selection").active(bpy.context)
+    (points,) = part("blender.data.snapshot").region_at(edit, effect, strip, 0, (frame,)).at(frame).strokes
+    return points.mean(axis=0).tolist()
 
 
 def told():
