@@ -18,7 +18,7 @@ import traces
 FRAME, STROKE = 70, ((0.462, 0.65), (0.465, 0.62), (0.467, 0.59), (0.468, 0.565))
 MENDED = 85
 SHOWN = range(55, 96)
-RENDERED = range(65, 96, 10)
+RENDERED = range(65, 86, 20)
 FOLLOW_EDGES, TRACK = 425, 451  # where they stand in the sidebar, in pixels below its upper edge
 
 
@@ -106,6 +106,7 @@ def mended():
     yield 1.0
     with driver.override("PREVIEW"):
         x, y = part("blender.interface.region_gizmo").place(bpy.context).centre
+    driver.shot("3_wrong")
     before = tuple(region().location)
     yield from driver.drag(story.preview(), [(x, y), (x + 4, y + 3), (x + 8, y + 6)])
     assert tuple(region().location) != before
@@ -153,7 +154,7 @@ def rendered():
     bpy.app.handlers.render_complete.append(lambda scene, *_: scene.name == "Edit" and done.append(True))
     with driver.override("PREVIEW"):
         bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
-    yield from driver.until(lambda: done, "the render ends", 120)
+    yield from driver.until(lambda: done, "the render ends", 200)
     for frame in RENDERED:
         driver.saw(rendered=frame, stroke=stroke_at(frame))
 
