@@ -101,7 +101,7 @@ class SHUTTER_GT_region(Gizmo):
             return
         if self.is_modal:  # what is keyed is shown where its keys have it
             for points in outline(context, where):
-                drawing.lines(points, _MARK)
+                drawing.lines(points, _MARK, width=2)
         if not self.turns:
             drawing.lines([where.centre, where.corner], (1, 1, 1, 0.4))
         x, y = where.corner if self.turns else where.centre
