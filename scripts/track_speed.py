@@ -4,7 +4,8 @@
 
 FOOTAGE (the demo's film) is scaled to that size first. Regions: a line in the middle, 1/5 of the height long; a lasso
 around the middle half of the picture. Ways: "decode" reads every frame; "track" reads and tracks them, as the command
-does; "track alone" tracks pictures that were read before. Frames per second are medians. Needs no bpy.
+does; "track alone" tracks pictures that were read before. Frames per second and milliseconds of CPU time per frame, of
+all threads, are medians. Needs no bpy.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import statistics
 import sys
 import tempfile
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import av
@@ -53,22 +55,21 @@ def region(kind: str, aspect: float) -> Region:
     return Region(kind, 0, Constant(kind), Constant(0.02), drawings, *numbers)
 
 
-def decode(path: Path, _kind: str) -> tuple[float, int]:
-    """Seconds and frames."""
-    with PrefetchSource(open_source(path)) as source:
-        begun = time.perf_counter()
+def decode(path: Path, _kind: str) -> dict:
+    """Seconds, those of all threads, and frames."""
+    with PrefetchSource(open_source(path)) as source, timed(source.count) as taken:
         for index in range(source.count):
             source.want(range(index, min(index + tracking.AHEAD, source.count)))
             source.read(index)
-        return time.perf_counter() - begun, source.count
+    return taken
 
 
-def track(path: Path, kind: str) -> tuple[float, int]:
+def track(path: Path, kind: str) -> dict:
     with ShotSource(PrefetchSource(open_source(path))) as source:
         return _followed(tracking.Footage(source, lambda frame: frame), source, kind)
 
 
-def track_alone(path: Path, kind: str) -> tuple[float, int]:
+def track_alone(path: Path, kind: str) -> dict:
     with open_source(path) as source:
         footage = tracking.Footage(source, lambda frame: frame)
         for index in range(source.count):
@@ -76,11 +77,22 @@ def track_alone(path: Path, kind: str) -> tuple[float, int]:
         return _followed(footage, source, kind)
 
 
-def _followed(footage, source, kind: str) -> tuple[float, int]:
+def _followed(footage, source, kind: str) -> dict:
     frames = range(min(source.count, tracking.KEPT))
-    begun = time.perf_counter()
-    found = list(tracking.follow(region(kind, source.width / source.height), footage, 0, frames))
-    return time.perf_counter() - begun, len(found)
+    with timed(len(frames)) as taken:
+        found = list(tracking.follow(region(kind, source.width / source.height), footage, 0, frames))
+    if len(found) < len(frames) or found[-1].fault:
+        raise SystemExit(f"{kind}: lost at frame {found[-1].frame}")
+    return taken
+
+
+@contextmanager
+def timed(frames: int):
+    """Gives a dictionary with the frames per second of the block, and the milliseconds of CPU time per frame."""
+    taken, begun, cpu = {"frames": frames}, time.perf_counter(), time.process_time()
+    yield taken
+    taken["fps"] = frames / (time.perf_counter() - begun)
+    taken["cpu_ms"] = 1000 * (time.process_time() - cpu) / frames
 
 
 WAYS = {"decode": decode, "track": track, "track alone": track_alone}
@@ -91,16 +103,10 @@ def measure(path: Path, rounds: int) -> list[dict]:
     for _ in range(rounds):
         for kind in REGIONS:
             for name, way in WAYS.items():
-                seconds, frames = way(path, kind)
-                taken.setdefault((kind, name), []).append((frames / seconds, frames))
+                taken.setdefault((kind, name), []).append(way(path, kind))
     return [
-        {
-            "pass": "track",
-            "region": kind,
-            "way": way,
-            "frames": runs[0][1],
-            "fps": statistics.median(r[0] for r in runs),
-        }
+        {"pass": "track", "region": kind, "way": way, "frames": runs[0]["frames"]}
+        | {name: statistics.median(run[name] for run in runs) for name in ("fps", "cpu_ms")}
         for (kind, way), runs in taken.items()
     ]
 
@@ -117,7 +123,8 @@ def main() -> None:
         rows = measure(scaled(arguments.footage, (width, height), Path(folder)), arguments.rounds)
     for row in rows:
         row |= {"width": width, "height": height}
-        print(f"{row['region']:6} {row['way']:12} {row['frames']:4} frames {row['fps']:7.1f} fps")
+        numbers = f"{row['frames']:4} frames {row['fps']:7.1f} fps {row['cpu_ms']:6.1f} ms of CPU a frame"
+        print(f"{row['region']:6} {row['way']:12} {numbers}")
     if arguments.json:
         arguments.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
 

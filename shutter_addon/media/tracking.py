@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
-from ..core import motions, scribbles
+from ..core import light, motions, scribbles
 from ..core.effect import Region
 from ..core.frame_source import FrameSource
 from ..core.motions import Placement, Similarity
@@ -43,8 +42,12 @@ _DOUBTFUL = 0.2  # below it, it may as well be anywhere
 _DRIFT, _LEAST = 0.95, 0.1  # what a later look is worth beside the one before it, and at least
 _SHIFTED = 0.6  # what a location is worth where rotation and scale could not be found
 _FADING = 0.6  # below it another frame is taken to compare with beside the first
-_REACHES = 0.015, 0.03, 0.06, 0.12, 0.24  # heights of the picture around a line within which corners are looked for
-_ENOUGH = 14  # corners, where a shorter reach is enough
+# Heights of the picture around a region within which corners are looked for, as far as there are not enough of them.
+_REACHES = {"line": (0.015, 0.03, 0.06, 0.12, 0.24), "lasso": (0.0, 0.015, 0.03, 0.06, 0.12)}
+_ENOUGH = 14
+# So far from it corners still are its own, and so many have to be; what others may say of it, for they may belong to
+# something else.
+_NEAR, _ENOUGH_NEAR, _FAR = 0.03, 3, 0.3
 
 
 class TrackingError(MediaError, ValueError):
@@ -74,17 +77,17 @@ class Footage:
         share = min(1.0, WIDTH / max(source.width, source.height))
         self.size = max(1, round(source.width * share)), max(1, round(source.height * share))
         self._kept: dict[int, np.ndarray] = {}
-        self._upcoming: list[int] = []
+        self._wanted = range(0)
 
-    def want(self, frames: list[int]) -> None:
-        """Says which timeline frames will be asked for next, in this order."""
-        self._upcoming = list(dict.fromkeys(self._index_at(frame) for frame in frames))
+    def want(self, frames: range) -> None:
+        """Says which timeline frames will be asked for, in this order."""
+        self._wanted = frames
 
     def picture(self, frame: int) -> np.ndarray:
         """The picture (H, W) uint8 at a timeline frame. MediaError: it cannot be read."""
         index = self._index_at(frame)
         if index not in self._kept:
-            self._read(index)
+            self._read(index, *self._beside(frame))
         return self._kept[index]
 
     def cut(self, before: int, after: int) -> bool:
@@ -96,33 +99,40 @@ class Footage:
         shots = self._source.shots
         return shots is not None and low != high and high not in shots.around(low, low, high)
 
-    def _read(self, index: int) -> None:
-        """Reads a frame, and those that will be wanted after it if they lie before it."""
-        place = self._upcoming.index(index) if index in self._upcoming else 0
-        upcoming = [i for i in self._upcoming[place + 1 :] if i not in self._kept]
-        backward = [i for i in upcoming[: BLOCK - 1] if i < index]
+    def _beside(self, frame: int) -> tuple[int, list[int]]:
+        """The source's frame that is shown before a wanted frame, and those that are lacking behind it, in order."""
+        if frame not in self._wanted:
+            return self._index_at(frame), []
+        place = self._wanted.index(frame)
+        before = self._index_at(self._wanted[place - 1] if place else frame)
+        upcoming = dict.fromkeys(map(self._index_at, self._wanted[place + 1 : place + BLOCK]))
+        return before, [index for index in upcoming if index not in self._kept]
+
+    def _read(self, index: int, before: int, upcoming: list[int]) -> None:
+        """Reads a frame, and those that come next if they lie before it."""
+        backward = [i for i in upcoming if i < index]
         block = sorted({index, *backward})
         self._source.want([*block, *(upcoming[:AHEAD] if not backward else ())])
-        for before, i in pairwise([block[0], *block]):
-            self._cut(before, i)  # finds cuts while frames are read upwards
-            self._kept[i] = self._grey(self._source.read(i))
+        last = min(before, block[0])
+        for i in block:
+            self._cut(last, i)  # so that frames are read upwards, and once, to find cuts
+            self._kept[i], last = self._grey(self._source.read(i)), i
         while len(self._kept) > KEPT:
             del self._kept[next(iter(self._kept))]
 
     def _grey(self, frame: np.ndarray) -> np.ndarray:
         if frame.dtype != np.uint8:
             frame = _levels(frame, self._source.transfer)
-        grey = cv2.cvtColor(np.ascontiguousarray(frame[..., :3]), cv2.COLOR_RGB2GRAY)
-        return grey if grey.shape[::-1] == self.size else cv2.resize(grey, self.size, interpolation=cv2.INTER_AREA)
+        if frame.shape[1::-1] != self.size:
+            frame = cv2.resize(frame, self.size, interpolation=cv2.INTER_AREA)
+        return cv2.cvtColor(frame, cv2.COLOR_RGBA2GRAY)
 
 
 def _levels(frame: np.ndarray, transfer: str) -> np.ndarray:
     """Samples as levels of 8 bits, as they are shown."""
-    from ..core import light
-
     if frame.dtype == np.uint16:
         return (frame >> 8).astype(np.uint8)
-    values = np.nan_to_num(frame[..., :3].astype(np.float32)).clip(0, 1)
+    values = np.nan_to_num(frame.astype(np.float32)).clip(0, 1)
     return np.rint(255 * (light.to_encoded(values) if transfer == "linear" else values)).astype(np.uint8)
 
 
@@ -166,22 +176,24 @@ class _Track:
             raise TrackingError(EMPTY)
         self._centres = np.array([motions.centre(shape) for shape in shapes])
 
-    def part(self, frame: int) -> Part:
-        """What the region covers at a frame. TrackingError: there is nothing to follow."""
+    def part(self, frame: int) -> tuple[Part, float]:
+        """What the region covers at a frame, and how surely its corners are those of the region, up to 1: less where
+        they are far from it. TrackingError: there is nothing to follow."""
         shape, (width, height) = self._region.at(frame), self._footage.size
         covered = scribbles.rasterise([replace(shape, shutter=0)], width, height) > 0
         if not covered.any():
             raise TrackingError(OUTSIDE)
-        picture = self._footage.picture(frame)
-        for weight in _weights(covered, shape.kind):
-            part = Part(picture, weight)
+        picture, away = self._footage.picture(frame), cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 0)
+        for reach in [share * height for share in _REACHES[shape.kind]]:
+            part = Part(picture, _falloff(away, reach))
             if len(part.points) >= _ENOUGH:
-                return part
+                break
         if len(part.points) < registration.FEWEST[self._motion]:
             raise TrackingError(FEW)
-        return part
+        near = _falloff(away[part.points.imag.astype(int), part.points.real.astype(int)], _NEAR * height).sum()
+        return part, float(np.clip(near / _ENOUGH_NEAR, _FAR, 1))
 
-    def both_ways(self, part: Part, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
+    def both_ways(self, part: tuple[Part, float], start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
         yield Tracked(start, self._placement(start), 1.0)
         for rest in (range(start + 1, frames.stop), range(start - 1, frames.start - 1, -1)):
             anchor = next((frame for frame in rest if frame in anchors), None)
@@ -190,7 +202,7 @@ class _Track:
             else:
                 yield from self._between(part, start, anchor)
 
-    def _between(self, part: Part, start: int, anchor: int) -> Iterator[Tracked]:
+    def _between(self, part: tuple[Part, float], start: int, anchor: int) -> Iterator[Tracked]:
         """From `start` towards an anchor, and then blended with the way back from there."""
         step = 1 if anchor > start else -1
         there, back, faults = {}, {}, []
@@ -212,17 +224,19 @@ class _Track:
         yield Tracked(anchor, self._placement(anchor), 1.0)
         yield from (fault for fault in faults if fault.frame not in back)
 
-    def _from(self, part: Part, start: int, frames: range) -> Iterator[Tracked]:
+    def _from(self, part: tuple[Part, float], start: int, frames: range) -> Iterator[Tracked]:
         """Frames one after another, away from `start`."""
-        self._footage.want(list(frames))
+        self._footage.want(frames)
+        part, worth = part
         pursuit = _Pursuit(part, self._footage.picture(start), self._motion)
         last, shown, lost = Tracked(start, self._placement(start), 1.0), start, []
         for frame in frames:
+            picture = self._footage.picture(frame)
             if self._footage.cut(shown, frame):
                 fault = pursuit.reason if lost else SHOT_ENDS
                 yield Tracked((lost or [frame])[0], last.placement, 0.0, fault)
                 return
-            found, shown = pursuit.next(self._footage.picture(frame), len(lost)), frame
+            found, shown = pursuit.next(picture, len(lost)), frame
             if found is None:
                 lost.append(frame)
                 if len(lost) > PATIENCE:
@@ -230,7 +244,7 @@ class _Track:
                 continue
             placement = self._carried(start, frame, found[0], last.placement)
             yield from _bridged(last, placement, lost, frame)
-            last, lost = Tracked(frame, placement, found[1]), []
+            last, lost = Tracked(frame, placement, worth * found[1]), []
             yield last
         if lost:
             yield Tracked(lost[0], last.placement, 0.0, pursuit.reason)
@@ -362,16 +376,9 @@ def confidence(match: Match | None, picture: np.ndarray) -> float:
     return float(np.prod([min(factor, 1.0) for factor in factors])) / (1 + (error / 0.7) ** 2)
 
 
-def _weights(covered: np.ndarray, kind: str) -> Iterator[np.ndarray]:
-    """How much each pixel (H, W) belongs to what a region covers, 0 to 1: the fill of a lasso; around a line farther
-    and farther, the less the farther away it is."""
-    if kind == "lasso":
-        yield covered.astype(np.float32)
-        return
-    away = cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    for share in _REACHES:
-        reach = share * covered.shape[0]
-        yield np.where(away <= reach, np.exp(-2 * (away / reach) ** 2), 0).astype(np.float32)
+def _falloff(away: np.ndarray, reach: float) -> np.ndarray:
+    """How much pixels count that are so far away from a region, 0 to 1 float32; none beyond the reach."""
+    return np.where(away <= reach, np.exp(-2 * (away / max(reach, 1e-9)) ** 2), 0).astype(np.float32)
 
 
 def _bridged(last: Tracked, placement: Placement, lost: list[int], frame: int) -> Iterator[Tracked]:

@@ -94,7 +94,7 @@ def test_a_redrawn_shape_stays_drawn_where_it_was(track, film, tmp_path):
     for frame in range(1, COUNT + 1):
         after, was = (np.concatenate(shape.unmoved(frame)) for shape in shapes)
         assert after == pytest.approx(was, abs=1e-9)
-    assert shapes[0].location.at(8) == pytest.approx(expected(8), abs=0.5 / WIDTH)
+        assert shapes[0].location.at(frame) == pytest.approx(expected(frame), abs=0.5 / WIDTH)
 
 
 def test_what_a_keyed_time_shows_is_tracked(track, film, tmp_path):

@@ -206,6 +206,16 @@ def test_a_subject_that_leaves_the_picture_and_comes_back(subject, ground):
     assert list(faults.values()) == [tracking.LEFT]
 
 
+def test_a_subject_without_corners_is_never_sure(subject, ground):
+    """All corners around it belong to a ground that stands still."""
+    smooth = cv2.GaussianBlur(subject, (0, 0), 30) // 2 + 60
+    source, truth = film(smooth, np.roll(ground, 60, axis=1), lambda t: (3 * t,), 10, 4)
+    tracked, _ = followed(source, "line", 4)
+    off = errors(tracked, truth, "line")
+    assert max(off.values()) > 2
+    assert sure(tracked) == {4}
+
+
 def test_it_ends_at_a_cut_on_both_sides(subject, ground):
     whole, _ = film(subject, ground, lambda t: (t,), 8, 4)
     others = [np.roll(ground[:, ::-1], 2 * n, axis=1) for n in range(6)]
