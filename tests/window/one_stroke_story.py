@@ -18,6 +18,7 @@ import traces
 FRAME, STROKE = 70, ((0.462, 0.65), (0.465, 0.62), (0.467, 0.59), (0.468, 0.565))
 MENDED = 85
 SHOWN = range(55, 96)
+RENDERED = range(65, 86, 20)
 FOLLOW_EDGES, TRACK = 425, 451  # where they stand in the sidebar, in pixels below its upper edge
 
 
@@ -105,10 +106,11 @@ def mended():
     yield 1.0
     with driver.override("PREVIEW"):
         x, y = part("blender.interface.region_gizmo").place(bpy.context).centre
+    driver.shot("3_wrong")
     before = tuple(region().location)
     yield from driver.drag(story.preview(), [(x, y), (x + 4, y + 3), (x + 8, y + 6)])
+    yield from driver.until(lambda: kinds().get(MENDED) == "KEYFRAME", "the handle keys the region")
     assert tuple(region().location) != before
-    assert kinds()[MENDED] == "KEYFRAME"
     yield 1.0
     driver.shot("3_mended")
     keyed = story.curves()
@@ -141,16 +143,27 @@ def escaped():
 
 
 def rendered():
-    render = story.edit().render
-    render.image_settings.media_type = "IMAGE"
-    render.image_settings.file_format = "PNG"
-    render.filepath = str(driver.OUT / "final_")
-    story.edit().frame_start, story.edit().frame_end, story.edit().frame_step = 60, 90, 15
+    edit = story.edit()
+    edit.render.image_settings.media_type = "IMAGE"
+    edit.render.image_settings.file_format = "PNG"
+    edit.render.dither_intensity = 0
+    edit.render.filepath = str(driver.OUT / "final_")
+    edit.frame_start, edit.frame_end, edit.frame_step = RENDERED.start, RENDERED.stop - 1, RENDERED.step
     done = []
-    bpy.app.handlers.render_complete.append(lambda *_: done.append(True))
+    # The preview's pictures of the effect are renders of its own scene.
+    bpy.app.handlers.render_complete.append(lambda scene, *_: scene.name == "Edit" and done.append(True))
     with driver.override("PREVIEW"):
         bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
-    yield from driver.until(lambda: done, "the render ends", 120)
+    yield from driver.until(lambda: done, "the render ends", 200)
+    for frame in RENDERED:
+        driver.saw(rendered=frame, stroke=stroke_at(frame))
+
+
+def stroke_at(frame):
+    """The middle of the region's stroke at a frame, in fractions of the picture."""
+    edit, effect, strip = part("blender.data.selection").active(bpy.context)
+    (points,) = part("blender.data.snapshot").region_at(edit, effect, strip, 0, (frame,)).at(frame).strokes
+    return points.mean(axis=0).tolist()
 
 
 def told():

@@ -1,10 +1,14 @@
 """The extension in a real window: an editor's first minutes, by mouse and keyboard, on both of Blender's backends."""
 
+import shutil
+from pathlib import Path
+
 import numpy as np
 import OpenImageIO
 import pytest
-from telling import linked, needs_window, tell
+from telling import ROOT, linked, needs_window, tell
 
+from shutter_addon.media import open_source
 from shutter_addon.media.completeness import whole_pictures
 
 TOLERANCE = 2
@@ -64,6 +68,41 @@ def test_in_between_frames_are_built_and_removed(tmp_path):
         ("removed", "missing"),
     ]
     assert "Traceback" not in console
+
+
+def test_one_stroke(tmp_path):
+    """Drawn inside a walker, tracked, mended, stopped by Esc: where the stroke is, the film is as sharp as its source,
+    and those who walk beside are not."""
+    footage = ROOT / "assets" / "walkers.mp4"
+    given = {"footage": shutil.copy(footage, tmp_path), "packages": packages(tmp_path / "packages")}
+    seen, console = tell("one_stroke_story.py", "opengl", linked(tmp_path), **given)
+    assert "Traceback" not in console
+    facts = {name: entry[name] for entry in seen for name in entry}
+    assert facts["edge_aware"] > 0.9
+    for name, edited in (("tracked", ["70"]), ("mended", ["70", "85"]), ("escaped", ["70", "85"])):
+        kinds = facts[name]
+        assert [frame for frame, kind in kinds.items() if kind != "GENERATED"] == edited, name
+        assert len(kinds) > 5, name
+    with open_source(footage) as source:
+        for entry in (entry for entry in seen if "rendered" in entry):
+            frame, (x, y) = entry["rendered"], entry["stroke"]
+            apart = np.abs(pixels(tmp_path / f"final_{frame:04d}.png") - source.read(frame - 1)[..., :3])
+            row, column = round((1 - y) * apart.shape[0]), round(x * apart.shape[1])
+            assert apart[row - 2 : row + 3, column - 2 : column + 3].max() <= 6, frame
+            assert apart.max() > 60, frame
+
+
+def packages(folder):
+    """A folder of what tracking needs besides what the Blender of a distribution has."""
+    import cv2
+    import scenedetect
+
+    folder.mkdir()
+    site = Path(cv2.__file__).parents[1]
+    assert site == Path(scenedetect.__file__).parents[1]
+    for name in ("cv2", "scenedetect", "click", "platformdirs", "tqdm", *(p.name for p in site.glob("opencv*.libs"))):
+        (folder / name).symlink_to(site / name)
+    return folder
 
 
 def test_no_exception_reaches_the_console(told):

@@ -78,6 +78,16 @@ def place(context) -> Place | None:
     return Place(*ends, to_region, width / height)
 
 
+def outline(context, where: Place) -> list[np.ndarray]:
+    """The active region's strokes (n, 2) where its properties have it, keyed or not, in pixels of the preview's
+    region."""
+    edit, effect, strip = selection.active(context)
+    region = selection.active_region(effect)
+    numbers = region.location, np.degrees(region.rotation), region.scale
+    moved = scribbles.transform(_strokes_now(edit, effect, strip), *numbers, where.aspect)
+    return [geometry.mapped(where.to_region, points) for points in moved]
+
+
 class SHUTTER_GT_region(Gizmo):
     """One handle; `turns`: turns and scales, or moves."""
 
@@ -89,6 +99,9 @@ class SHUTTER_GT_region(Gizmo):
     def draw(self, context):
         if (where := place(context)) is None:
             return
+        if self.is_modal:  # what is keyed is shown where its keys have it
+            for points in outline(context, where):
+                drawing.lines(points, _MARK, width=2)
         if not self.turns:
             drawing.lines([where.centre, where.corner], (1, 1, 1, 0.4))
         x, y = where.corner if self.turns else where.centre

@@ -624,6 +624,7 @@ MESSAGES = {
     ("*", "the region has no strokes to follow"): "die Region hat keine Striche, denen zu folgen wäre",
     ("*", "the region lies outside the picture"): "die Region liegt außerhalb des Bildes",
     ("*", "there is no other frame to track"): "es gibt kein anderes Bild zum Verfolgen",
+    ("*", "the frame lies outside what can be tracked"): "das Bild liegt außerhalb dessen, was verfolgt werden kann",
     ("*", "Follow"): "Folgen",
     ("Operator", "Follow"): "Folgen",
     (
