@@ -8,10 +8,11 @@ diffuse: coefficients from new labels; diffuse_moved: the same, from the solutio
 readback: the picture to the host; frame: accumulate, compose and readback;
 copy: a gigabyte moved from one buffer of the device to another, read and written counting as half of it each.
 Methods: ours; paper: its Appendix A with search bounds (scripts/benchmark/appendix_a.glsl); average: the plain mean of
-the window's frames in the same light. Times are medians in milliseconds.
+the window's frames in the same light; edges: coefficients that follow a guide's edges. Times are medians in
+milliseconds.
 Frames are random noise. Errors are the largest over random pixels of the picture (--pixels) in 8-bit levels against
 the float64 reference; those of diffusion over all coefficients, times 255, against twelve cycles with cells
-everywhere on all grids.
+everywhere on all grids; those along edges against twice as many iterations.
 """
 
 from __future__ import annotations
@@ -24,13 +25,14 @@ import sys
 import time
 from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from shutter_addon.compute import cpu, diffusion, diffusion_gpu, gpu
+from shutter_addon.compute import cpu, diffusion, diffusion_gpu, edge_diffusion, gpu
 from shutter_addon.compute.gl import GLDevice
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.passes import LOCAL_ROW, Image, Pass
@@ -41,7 +43,7 @@ from shutter_addon.core.frame_source import FrameSource
 from shutter_addon.core.frame_state import FrameState, Options
 
 HERE = Path(__file__).resolve().with_suffix("")
-METHODS = ("ours", "paper", "average")
+METHODS = ("ours", "paper", "average", "edges")
 PASSES = ("compose", "accumulate", "diffuse", "diffuse_moved", "readback", "frame")
 COPIED = 1 << 28  # bytes, beyond any cache
 BARS = {
@@ -88,6 +90,20 @@ def shapes(count: int) -> tuple:
     return tuple(
         scribbles.Shape(next(shutter), kind, 0.02, (np.array(points),)) for kind, points in drawn[: max(count, 4)]
     )
+
+
+@cache
+def edged(height: int, width: int) -> np.ndarray:
+    """A guide (height, width, 3) float32: random colours 16 rows of a 240th apart, and what is linear between them."""
+    rng = np.random.default_rng(1)
+    pitch = 16 * min(height, width) / 240
+    guide = rng.random((int(height / pitch) + 2, int(width / pitch) + 2, 3)).astype(np.float32)
+    for axis, length in enumerate((height, width)):
+        before, share = np.divmod(np.arange(length) / pitch, 1)
+        share = np.expand_dims(share, [a for a in range(3) if a != axis]).astype(np.float32)
+        before = before.astype(int)
+        guide = (1 - share) * guide.take(before, axis) + share * guide.take(before + 1, axis)
+    return guide * np.float32(min(height, width) / 240)
 
 
 @dataclass
@@ -154,7 +170,8 @@ class Case:
         self.load(self.window if method == "ours" else self.frames)
 
     def diffuse(self, method: str) -> None:
-        self.handle = self.solver.solve(self.labels, len(self.state.bars))
+        guide = edged(*self.labels.shape) if method == "edges" else None
+        self.handle = self.solver.solve(self.labels, len(self.state.bars), guide, 1.0)
 
     def diffuse_moved(self, method: str) -> None:
         self.labels, self.moved = self.moved, self.labels
@@ -187,6 +204,8 @@ class Case:
 
     def error(self, name: str, method: str, pixels: int) -> float | None:
         """The largest error of what a pass just made."""
+        if method == "edges":
+            return self._edges_error()
         if name in ("diffuse", "diffuse_moved"):
             return self._diffusion_error()
         if name == "readback":
@@ -228,6 +247,17 @@ class Case:
             diffusion_gpu.CYCLES, diffusion_gpu.WHOLE = usual
             exact.release()
         return float(np.abs(self.compositor.coefficients(self.handle, count) - expected).max() * 255)
+
+    def _edges_error(self) -> float:
+        """Of what was solved last, along edges."""
+        count = len(self.state.bars)
+        got, usual = self.compositor.coefficients(self.handle, count).copy(), edge_diffusion.ITERATIONS
+        try:
+            edge_diffusion.ITERATIONS = 2 * usual
+            self.diffuse("edges")
+        finally:
+            edge_diffusion.ITERATIONS = usual
+        return float(np.abs(self.compositor.coefficients(self.handle, count) - got).max() * 255)
 
     def release(self) -> None:
         self.window.release()
@@ -343,7 +373,12 @@ def _average(state: FrameState) -> Pass:
 def jobs(case: Case, passes, methods):
     """(pass, method) of what is measured in a case."""
     for name, method in itertools.product(passes, methods):
-        has = {"ours": PASSES, "paper": ("compose",), "average": ("compose", "accumulate", "frame")}
+        has = {
+            "ours": PASSES,
+            "paper": ("compose",),
+            "average": ("compose", "accumulate", "frame"),
+            "edges": ("diffuse",),
+        }
         if isinstance(case, HostCase):
             has |= {"ours": [p for p in PASSES if p not in ("diffuse_moved", "readback")], "paper": ()}
         if name in has[method] and (method != "average" or case.state.options.aggregate == 1):

@@ -15,8 +15,9 @@ import numpy as np
 
 from ..core.conductances import conductances
 
-# Iterations of conjugate gradients, each with one W-cycle.
-ITERATIONS = 16
+# Iterations of conjugate gradients, each with one W-cycle. Largest error × 255 after 8, 12, 16, 20: 8, 1.4, 0.2, 0.01 in
+# frames of films, and 10, 2.8, 0.8, 0.2 in pictures of stripes and checks.
+ITERATIONS = 20
 # A link joins two nodes if it is at least this share of the root of the product of their diagonals; half of that share
 # on each coarser graph.
 STRONG = 0.15
@@ -25,7 +26,7 @@ DAMPING = 0.7
 # Corrections that are constant over a node are too small by about this factor (Braess 1995).
 OVERCORRECTION = 1.7
 # A graph of so many nodes or fewer is the coarsest, and its matrix is inverted.
-DENSE = 600
+DENSE = 300
 
 
 @dataclass
@@ -36,7 +37,7 @@ class Graph:
 
     diagonal: (n,) float32, of each node's equation: its links and its ground
     ground: (n,) float32, what ties it to fixed pixels
-    links: for rank k, (neighbour, weight) of the k-th link of the first nodes, those that have as many: int32 and float32
+    links: for rank k, the k-th link of those first nodes that have as many: (neighbour int32, weight float32)
     parent: (n,) int32, the node of the next graph; its number of nodes where there is none, or None on the coarsest
     order: (n,) int32 nodes of this graph in the order of their parents; those without one are left out
     starts: (coarse n,) int32 where each parent's begin in it
@@ -65,7 +66,7 @@ def diffuse_along_edges(labels: np.ndarray, count: int, guide: np.ndarray, stren
 
 
 def graphs_of(labels, guide, strength, values):
-    """The graphs, from the finest to the coarsest; the pixels (n,) of the finest one's nodes; and its right side (n, N).
+    """The graphs, the finest first; the pixels (n,) of its nodes; and its right side (n, N) float32.
 
     values: (N, H, W) float32 the fixed pixels' values
     """

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-# The difference of colours, 0 … 1, at which a conductance has fallen to 1/e.
+# The difference of guides at which a conductance has fallen to 1/e.
 SIGMA = 0.03
 # No conductance is smaller: every pixel can be reached, and the equations stay solvable in single precision.
 FLOOR = 3e-3
@@ -18,7 +18,7 @@ STEEPEST = float(-np.log(FLOOR))
 def conductances(guide: np.ndarray, strength: float) -> tuple[np.ndarray, np.ndarray]:
     """Conductances (h, w − 1) to the right neighbour and (h − 1, w) to the one below, float64 in FLOOR … 1.
 
-    guide: (h, w, 3 or more) display colours, 0 … 1; the first three channels count
+    guide: (h, w, 3 or more), finite: display colours, 0 … 1, times the picture's scale; the first three channels count
     strength: 0 … 1; 0 gives 1 everywhere, 1 the full contrast
     """
     colours = np.asarray(guide)[..., :3].astype(np.float64)

@@ -1,0 +1,298 @@
+"""Diffusion with conductances, on NumPy and both GPU devices, against the sparse direct solve of the same ones."""
+
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+import pytest
+
+from shutter_addon.compute import edge_diffusion
+from shutter_addon.compute.cpu import Solver
+from shutter_addon.compute.diffusion import diffuse
+from shutter_addon.compute.diffusion_gpu import Diffusion
+from shutter_addon.core import exact_diffusion
+from shutter_addon.core.scribbles import Shape, rasterise
+
+LEVEL = 1 / 255
+ASSETS = Path(__file__).parents[2] / "assets"
+WIDTH, HEIGHT = 96, 64
+
+
+def grey(values):
+    """A guide (h, w, 3) float32 of values (h, w)."""
+    return np.repeat(np.asarray(values, np.float32)[..., None], 3, axis=2)
+
+
+def shapes(seed, shutters=4, width=WIDTH, height=HEIGHT, count=6):
+    rng = np.random.default_rng(seed)
+    drawn = [
+        Shape(i % shutters, rng.choice(["line", "lasso"]), 0.02, (rng.random((3, 2)) * 0.5 + rng.random(2) * 0.5,))
+        for i in range(count)
+    ]
+    return rasterise(drawn, width, height)
+
+
+def dots(shutters=5, count=12, width=WIDTH, height=HEIGHT, seed=0):
+    labels, rng = np.zeros((height, width), np.uint16), np.random.default_rng(seed)
+    labels[rng.integers(0, height, count), rng.integers(0, width, count)] = 1 + np.arange(count) % shutters
+    return labels
+
+
+def film(name, index, width=WIDTH, height=HEIGHT, blur=0.5):
+    with av.open(str(ASSETS / name)) as container:
+        for number, frame in enumerate(container.decode(video=0)):
+            if number == index:
+                picture = cv2.resize(frame.to_ndarray(format="rgb24"), (width, height), interpolation=cv2.INTER_AREA)
+                return cv2.GaussianBlur(picture.astype(np.float32) / 255, (0, 0), blur)
+    raise IndexError(index)
+
+
+def noise(level, width=WIDTH, height=HEIGHT, seed=0):
+    return (0.5 + level * np.random.default_rng(seed).standard_normal((height, width, 3))).astype(np.float32)
+
+
+def walls(gap, width=WIDTH, height=HEIGHT, thick=1):
+    y, x = np.mgrid[:height, :width]
+    return grey((y % gap < thick) | (x % gap < thick))
+
+
+def checks(size, width=WIDTH, height=HEIGHT):
+    y, x = np.mgrid[:height, :width]
+    return grey((x // size + y // size) % 2)
+
+
+def spiral(gap, side=64):
+    picture, a, b = np.zeros((side, side)), 0, side - 1
+    while b - a > 2 * gap:
+        picture[a, a : b + 1] = picture[a : b + 1, b] = picture[b, a + gap : b + 1] = 1
+        picture[a + gap : b + 1, a + gap] = 1
+        a, b = a + gap, b - gap
+    return grey(picture)
+
+
+def maze(gap, side=64):
+    """Corridors of a floor's conductance along their walls, each open at one end."""
+    picture = np.zeros((side, side))
+    for k, y in enumerate(range(gap, side, gap)):
+        picture[y, slice(0, -gap) if k % 2 else slice(gap, None)] = 1
+    return grey(picture)
+
+
+def three_corners(side=64):
+    labels = np.zeros((side, side), np.uint16)
+    labels[side // 2, side // 2], labels[3, 3], labels[3, -4] = 1, 2, 3
+    return labels
+
+
+def blobs(size, seed=3):
+    random = np.random.default_rng(seed).random((HEIGHT, WIDTH)).astype(np.float32)
+    return grey(cv2.GaussianBlur(random, (0, 0), size) > 0.5)
+
+
+def one_stroke():
+    """A stroke of one pixel inside, and the border."""
+    labels = np.zeros((HEIGHT, WIDTH), np.uint16)
+    labels[[0, -1]] = labels[:, [0, -1]] = 1
+    labels[25:40, 48] = 2
+    return labels
+
+
+def ring_of_a_shutter():
+    """A closed ring of shutter 1; inside it is nothing else."""
+    labels = np.zeros((HEIGHT, WIDTH), np.uint16)
+    labels[20:45, 30:60] = 2
+    labels[21:44, 31:59] = 0
+    labels[5, 5] = 1
+    return labels
+
+
+def scattered(share, shutters=3, width=WIDTH, height=HEIGHT):
+    rng = np.random.default_rng(7)
+    labels = rng.integers(1, shutters + 1, (height, width)) * (rng.random((height, width)) < share)
+    labels[height // 2, width // 2] = 1
+    return labels.astype(np.uint16)
+
+
+def fixed_walls():
+    """Scribbles of one pixel that cut the picture into cells, with gaps."""
+    labels = np.zeros((HEIGHT, WIDTH), np.uint16)
+    labels[::9], labels[:, ::11] = 1, 2
+    labels[::9, 5::22] = 0
+    return labels
+
+
+BUNNY, PEOPLE, WALKERS = ("bigbuckbunny.mp4", 60), ("pedestrians.avi", 30), ("walkers.mp4", 30)
+X = np.arange(WIDTH) / WIDTH + np.zeros((HEIGHT, 1))
+# name: labels, shutters, guide
+SCENES = {
+    "bunny": (shapes(1), 4, film(*BUNNY)),
+    "bunny, one stroke": (one_stroke(), 2, film(*BUNNY)),
+    "bunny, sharp": (dots(), 5, film(*BUNNY, blur=0.3)),
+    "bunny, larger": (shapes(2, width=160, height=90), 4, film(*BUNNY, 160, 90)),
+    "people": (shapes(3), 4, film(*PEOPLE)),
+    "people, one stroke": (one_stroke(), 2, film(*PEOPLE)),
+    "people, sharp": (dots(), 5, film(*PEOPLE, blur=0.3)),
+    "people, larger": (shapes(4, width=160, height=90), 4, film(*PEOPLE, 160, 90)),
+    "people, 8 shutters": (shapes(5, 8, count=16), 8, film(*PEOPLE)),
+    "walkers": (shapes(6), 4, film(*WALKERS)),
+    "walkers and noise": (dots(), 5, film(*WALKERS) + noise(0.02) - np.float32(0.5)),
+    "walkers, 9 shutters": (dots(9, 30), 9, film(*WALKERS)),
+    "flat": (shapes(7), 4, grey(X * 0)),
+    "noise": (shapes(7), 4, noise(0.3)),
+    "little noise": (dots(), 5, noise(0.01)),
+    "some noise": (dots(), 5, noise(0.02)),
+    "more noise": (dots(), 5, noise(0.03)),
+    "walls, 2": (dots(), 5, walls(2)),
+    "walls, 3": (dots(), 5, walls(3)),
+    "walls, 4": (dots(), 5, walls(4)),
+    "walls, 5": (dots(), 5, walls(5)),
+    "walls, 8": (dots(), 5, walls(8)),
+    "walls, 16": (shapes(8), 4, walls(16)),
+    "thick walls": (shapes(8), 4, walls(16, thick=2)),
+    "rows": (dots(), 5, grey(np.arange(HEIGHT)[:, None] % 2 + X * 0)),
+    "pairs of rows": (dots(), 5, grey(np.arange(HEIGHT)[:, None] // 2 % 2 + X * 0)),
+    "checks, 1": (dots(), 5, checks(1)),
+    "checks, 3": (dots(), 5, checks(3)),
+    "checks, 8": (dots(), 5, checks(8)),
+    "diagonals": (dots(), 5, grey(np.add.outer(np.arange(HEIGHT), np.arange(WIDTH)) // 5 % 2)),
+    "spiral": (three_corners(), 3, spiral(7)),
+    "narrow spiral": (three_corners(), 3, spiral(3)),
+    "maze": (three_corners(), 3, maze(5)),
+    "narrow maze": (three_corners(), 3, maze(2)),
+    "blobs": (dots(), 5, blobs(4)),
+    "small blobs": (dots(), 5, blobs(1.5)),
+    "ramps": (shapes(9), 4, grey(X * 6 % 1)),
+    "enclosed": (ring_of_a_shutter(), 2, film(*BUNNY)),
+    "dust": (scattered(0.003), 3, film(*PEOPLE)),
+    "half of it fixed": (scattered(0.5), 3, noise(0.3)),
+    "walls of scribbles": (fixed_walls(), 2, film(*BUNNY)),
+    "a band": (shapes(10, 3, 320, 40), 3, film(*PEOPLE, 320, 40)),
+    "a tall band": (shapes(10, 3, 24, 192), 3, film(*BUNNY, 24, 192)),
+    "odd": (shapes(11, 4, 97, 61), 4, film(*WALKERS, 97, 61)),
+    "1×97": (scattered(0.03, 3, 1, 97), 3, noise(0.3, 1, 97)),
+    "97×1": (scattered(0.03, 3, 97, 1), 3, noise(0.3, 97, 1)),
+    "2×3": (scattered(0.0, 3, 2, 3), 3, noise(0.3, 2, 3)),
+}
+
+
+@pytest.fixture(scope="module")
+def exact():
+    """The exact solution of a scene at a strength; each is solved once."""
+    known = {}
+
+    def solve(scene, strength):
+        if (scene, strength) not in known:
+            known[scene, strength] = exact_diffusion.solve(*SCENES[scene], strength)
+        return known[scene, strength]
+
+    return solve
+
+
+@pytest.fixture(scope="module")
+def on_moderngl():
+    gl = pytest.importorskip("shutter_addon.compute.gl")
+    try:
+        device = gl.GLDevice()
+    except gl.NoDeviceError as error:
+        pytest.skip(str(error))
+    yield from solving(device)
+    device.release()
+
+
+@pytest.fixture(scope="module")
+def on_blender(blender_device):
+    yield from solving(blender_device)
+
+
+def solving(device):
+    solver = Diffusion(device)
+
+    def solve(labels, count, *how, **options):
+        with device.current():
+            layers = device.read(solver.solve(labels, count, *how, **options))
+        return np.moveaxis(layers, 3, 1).reshape(-1, *labels.shape)[:count]
+
+    yield solve
+    with device.current():
+        solver.release()
+
+
+@pytest.fixture(scope="module", params=["numpy", "moderngl", "blender"])
+def solve(request):
+    return Solver().solve if request.param == "numpy" else request.getfixturevalue(f"on_{request.param}")
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_is_the_exact_solution(scene, solve, exact):
+    labels, count, guide = SCENES[scene]
+    got = solve(labels, count, guide, 1.0)
+    assert got.shape == (count, *labels.shape)
+    assert got.dtype == np.float32
+    assert got.min() >= 0
+    np.testing.assert_allclose(got.sum(axis=0), 1, atol=1e-5)
+    np.testing.assert_array_equal(got[:, labels > 0].T, np.eye(count)[labels[labels > 0] - 1])
+    np.testing.assert_allclose(got, exact(scene, 1.0), rtol=0, atol=LEVEL)
+
+
+@pytest.mark.parametrize("scene", ["bunny", "walls, 4", "more noise"])
+@pytest.mark.parametrize("strength", [0.1, 0.6])
+def test_any_strength(scene, strength, solve, exact):
+    labels, count, guide = SCENES[scene]
+    np.testing.assert_allclose(solve(labels, count, guide, strength), exact(scene, strength), rtol=0, atol=LEVEL)
+
+
+def test_at_strength_0_nothing_changes_to_the_bit(solve):
+    labels, count, guide = SCENES["people, 8 shutters"]
+    plain = solve(labels, count).copy()
+    np.testing.assert_array_equal(solve(labels, count, guide, 0.0), plain)
+    np.testing.assert_array_equal(solve(labels, count, None, 1.0), plain)
+    solve(labels, count, guide, 1.0)
+    np.testing.assert_array_equal(solve(labels, count, warm=True), plain)
+
+
+def test_what_was_solved_before_does_not_change_a_bit(solve):
+    labels, count, guide = SCENES["bunny"]
+    first = solve(labels, count, guide, 1.0).copy()
+    solve(labels[::-1], count, guide[::-1], 0.5)
+    np.testing.assert_array_equal(solve(labels, count, guide, 1.0, warm=True), first)
+
+
+def test_alpha_in_the_guide_does_not_count(solve):
+    labels, count, guide = SCENES["bunny"]
+    with_alpha = np.dstack([guide, np.random.default_rng(0).random(guide.shape[:2]).astype(np.float32)])
+    np.testing.assert_array_equal(solve(labels, count, with_alpha, 1.0), solve(labels, count, guide, 1.0))
+
+
+def test_what_a_shutter_encloses_has_that_one_alone(solve):
+    labels, count, guide = SCENES["enclosed"]
+    got = solve(labels, count, guide, 1.0)
+    np.testing.assert_array_equal(got[1, 21:44, 31:59], 1)
+    np.testing.assert_array_equal(got[0, 21:44, 31:59], 0)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (37, 5)])
+@pytest.mark.parametrize("label", [0, 2])
+def test_nothing_to_diffuse(size, label, solve):
+    labels = np.full(size, label, np.uint16)
+    got = solve(labels, 3, noise(0.3, size[1], size[0]), 1.0)
+    want = np.eye(3)[max(label - 1, 0)][:, None, None]
+    np.testing.assert_array_equal(got, np.broadcast_to(want, got.shape))
+
+
+def test_a_stroke_stays_within_its_object():
+    """What the equations are for: a disc of another colour than the ground, with a line inside."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    disc = (x - 48) ** 2 + (y - 32) ** 2 < 22**2
+    got = diffuse(one_stroke(), 2, grey(0.4 + 0.2 * disc), 1.0)[1] > 0.5
+    assert (got & disc).sum() / (got | disc).sum() > 0.97
+    plain = diffuse(one_stroke(), 2)[1] > 0.5
+    assert (plain & disc).sum() / (plain | disc).sum() < 0.5
+
+
+def test_fewer_iterations_are_too_few(monkeypatch, exact):
+    """The scenes are hard enough to tell."""
+    monkeypatch.setattr(edge_diffusion, "ITERATIONS", 5)
+    scenes = ("people", "narrow maze", "checks, 3", "a band")
+    errors = [abs(diffuse(*SCENES[scene], 1.0) - exact(scene, 1.0)).max() for scene in scenes]
+    assert max(errors) > LEVEL
