@@ -224,7 +224,7 @@ def _track(arguments) -> None:
     source_recipe = recipe.load(arguments.recipe)
     names = [region.name for region in source_recipe.regions]
     if arguments.region not in names:
-        raise recipe.RecipeError(f'{arguments.recipe}: there is no region "{arguments.region}"')
+        raise film_output.OutputError(f'{arguments.recipe}: there is no region "{arguments.region}"')
     index = names.index(arguments.region)
     with _opened(arguments.source) as medium:
         film_output.spare(
@@ -249,22 +249,26 @@ def _followed(arguments, source_recipe, index: int, medium, frames: range) -> tu
     """What tracking found, by frame, and where it ended before the last frame. TrackingError: at once."""
     region = source_recipe.effect(medium.width / medium.height).regions[index]
     tracked, stops = {}, []
-    with ShotSource(PrefetchSource(medium)) as shots, film_output.progress(len(frames) - 1, "frame") as moved:
-
-        def shown(frame):
-            time = source_recipe.time_at(frame)
-            return retiming.nearest(frame - 1 if time is None else time - 1, shots)
-
-        footage = tracking.Footage(shots, shown)
-        for found in tracking.follow(region, footage, arguments.frame, frames, motion=arguments.motion):
-            if found.fault:
-                stops.append(found)
-            else:
-                tracked[found.frame] = found
-                moved()
-    if len(tracked) < 2:
-        raise tracking.TrackingError(f"{arguments.region}: {stops[0].fault}")
+    with ShotSource(PrefetchSource(medium)) as shots, film_output.progress(len(frames), "frame") as moved:
+        footage = tracking.Footage(shots, lambda frame: retiming.nearest(_shown(source_recipe, frame), shots))
+        try:
+            for found in tracking.follow(region, footage, arguments.frame, frames, motion=arguments.motion):
+                if found.fault:
+                    stops.append(found)
+                else:
+                    tracked[found.frame] = found
+                    moved()
+            if len(tracked) < 2:
+                raise tracking.TrackingError(stops[0].fault)
+        except tracking.TrackingError as error:
+            raise tracking.TrackingError(f"{arguments.region}: {error}") from None
     return tracked, stops
+
+
+def _shown(source_recipe, frame: int) -> float:
+    """The source frame that a recipe shows at a timeline frame; 0 is the first."""
+    time = source_recipe.time_at(frame)
+    return (frame if time is None else time) - 1
 
 
 def _write_track(arguments, result, tracked: dict, stops: list) -> None:

@@ -6,7 +6,7 @@ Equal pictures give equal results, whatever the number of threads.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -29,9 +29,9 @@ _QUALITY = 0.01  # of a corner, as a share of the best one's
 _WEAKEST = 2e-4  # the same, whatever the best one is: noise of some levels has less
 _LEVELS = 3  # a motion between two frames is found up to about 2 ** _LEVELS half windows
 _WINDOWS = 9, 21  # sides of the windows that are compared, in pixels: for small and for large parts
-_THERE_AND_BACK = 0.7  # pixels from where a corner started that it may come back to
+_THERE_AND_BACK = 1.0  # pixels from where a corner started that it may come back to
 _HYPOTHESES = 300
-_SOUGHT = 64  # pixels to which a part is made smaller to be sought
+_SOUGHT = 64  # pixels to which a part is made smaller to be sought, or compared as a whole
 _NOISE = 16.0  # levels² of contrast that count for nothing
 # Beyond these the motion between two pictures is none that a film has.
 _MOST_SCALE, _MOST_TURN = 1.5, 0.8
@@ -62,7 +62,7 @@ class Match:
     share: float
     visible: float
     error: float
-    likeness: float
+    likeness: float = 0.0
 
 
 class Part:
@@ -101,7 +101,7 @@ class Part:
             guess = found.motion
             if moved < 2:
                 break
-        return found
+        return replace(found, likeness=self._likeness(picture, found.motion))
 
     def seek(self, picture: np.ndarray, known: Similarity, radius: float) -> Similarity | None:
         """Where in a picture its pixels are most alike, turned and scaled as in `known`, within a radius of pixels of
@@ -144,7 +144,7 @@ class Part:
             return None
         found, good = self._flow(back)
         good &= seen
-        tolerance = max(0.75, max(picture.shape) / 640)
+        tolerance = max(1.0, max(picture.shape) / 640)
         fitted = fit(self.points, found, np.where(good, weights, 0), motion, tolerance)
         if fitted is None:
             return None
@@ -158,7 +158,6 @@ class Part:
             float(weights[agreeing].sum() / weights.sum()),
             float(weights.sum() / total),
             error,
-            self._likeness(picture, guess.after(change)),
         )
 
     def _flow(self, picture) -> tuple[np.ndarray, np.ndarray]:
@@ -172,13 +171,16 @@ class Part:
         return _plane(there) + self._origin, found.ravel().astype(bool) & back.ravel().astype(bool) & close.ravel()
 
     def _likeness(self, picture, motion) -> float:
-        """Correlation of the part's pixels with those in another picture, as far as they lie in it."""
-        size = self._picture.shape[::-1]
-        back_from = matrix(motion, self._origin)
-        back = cv2.warpAffine(picture, back_from, size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
+        """Correlation of the part's pixels with those in another picture, as far as they lie in it; both smaller."""
+        x, y, width, height = self.box
+        share = min(1.0, _SOUGHT / max(width, height))
+        size = max(1, round(share * width)), max(1, round(share * height))
+        small = Similarity(share, -share * complex(x, y))
+        there = small.after(motion.inverse())
         inside = np.ones(picture.shape, np.uint8)
-        inside = cv2.warpAffine(inside, back_from, size, flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP)
-        return correlation(self._picture, back, self._mask * inside)
+        first, weight = (cv2.warpAffine(each, matrix(small), size) for each in (self._whole, self.weight))
+        second, inside = (cv2.warpAffine(each, matrix(there), size) for each in (picture, inside))
+        return correlation(first, second, weight * inside)
 
 
 def correlation(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> float:

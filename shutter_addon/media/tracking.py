@@ -39,6 +39,7 @@ NOT_SHOWN = "the frame lies outside what can be tracked"
 SURE = 0.5  # from here on a frame is within about a pixel of 640
 _LOST = 0.12  # below it nothing was found
 _AGAIN = 0.3  # below it nothing was found where it might be anywhere
+_DOUBTFUL = 0.2  # below it, it may as well be anywhere
 _DRIFT, _LEAST = 0.95, 0.1  # what a later look is worth beside the one before it, and at least
 _SHIFTED = 0.6  # what a location is worth where rotation and scale could not be found
 _FADING = 0.6  # below it another frame is taken to compare with beside the first
@@ -265,9 +266,14 @@ class _Pursuit:
         """The motion from the first picture, and its confidence; None: it is not there. missed: for how many pictures
         before this one it was not."""
         found = None if missed else self._found(picture, self._speed.after(self._known))
-        found = found or self._found_elsewhere(picture, missed)
         if found is None:
-            self.reason = COVERED if self._share_inside(picture) > 0.5 else LEFT
+            self._look_anew()
+            found = self._found_elsewhere(picture, missed, self._look)
+        elif found[1] < _DOUBTFUL:
+            found = self._found_elsewhere(picture, missed) or found
+        if found is None:
+            if not missed:
+                self.reason = LEFT if self._leaves(picture) else COVERED
             return None
         self._speed = found[0].after(self._known.inverse()) if not missed else Similarity()
         self._known, self._seen = found[0], (picture, *found)
@@ -306,12 +312,11 @@ class _Pursuit:
         if (weight > 0).any():
             self._look = _Look(Part(picture, weight), motion, max(_DRIFT * worth, _LEAST))
 
-    def _found_elsewhere(self, picture, missed: int) -> tuple[Similarity, float] | None:
-        """As `_found`, of all places where it may be by now; only if it looks as it did first, or as it did last."""
-        self._look_anew()
+    def _found_elsewhere(self, picture, missed: int, *looks: _Look) -> tuple[Similarity, float] | None:
+        """As `_found`, of all places where it may be by now; only if it looks as it did first, or as in other looks."""
         radius = 0.05 * picture.shape[1] * (1 + missed / 4)
         found = []
-        for look in (_Look(self._first, Similarity(), 1.0), self._look):
+        for look in (_Look(self._first, Similarity(), 1.0), *looks):
             from_there = self._known.after(look.motion.inverse())
             for guess in (from_there, look.part.seek(picture, from_there, radius)):
                 match = guess and look.part.find(picture, guess, self._motion)
@@ -319,12 +324,12 @@ class _Pursuit:
                     found.append((match.motion.after(look.motion), look.worth * sure))
         return max(found, key=lambda each: each[1], default=None)
 
-    def _share_inside(self, picture) -> float:
-        """How much of the part would lie in the picture by now."""
-        places = self._speed.after(self._known)(self._first.points)
+    def _leaves(self, picture) -> bool:
+        """Whether most of the part would lie outside of the picture if it went on."""
+        places = self._speed.after(self._speed).after(self._known)(self._first.points)
         height, width = picture.shape
         inside = (places.real >= 0) & (places.real < width) & (places.imag >= 0) & (places.imag < height)
-        return float(inside.mean())
+        return inside.mean() < 0.5
 
 
 @dataclass(frozen=True)
@@ -347,13 +352,14 @@ class _Look:
 
 
 def confidence(match: Match | None, picture: np.ndarray) -> float:
-    """How sure a match is, 0 to 1."""
+    """How sure a match is, 0 to 1: by its expected error, how many corners agree, and how like the pixels are: the more
+    alike, the fewer corners have to agree."""
     if match is None:
         return 0.0
     error = match.error * 640 / max(picture.shape)
-    precise = 1 / (1 + (error / 0.7) ** 2)
-    alike = min(max(match.likeness, 0.0) / 0.6, 1.0)
-    return precise * alike * min(match.share / 0.6, 1.0) * min(match.visible / 0.6, 1.0)
+    likeness = max(match.likeness, 0.0)
+    factors = likeness / 0.6, match.share / (0.9 - 0.6 * likeness), match.visible / 0.6
+    return float(np.prod([min(factor, 1.0) for factor in factors])) / (1 + (error / 0.7) ** 2)
 
 
 def _weights(covered: np.ndarray, kind: str) -> Iterator[np.ndarray]:

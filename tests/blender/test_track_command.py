@@ -1,0 +1,166 @@
+"""The command `track`: from a recipe to the same recipe with keys."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import recipe, write_frames
+
+from shutter_addon.blender import command as program
+from shutter_addon.core import recipe as recipes
+from shutter_addon.media import tracking
+
+ROOT = Path(__file__).parents[2]
+WIDTH, HEIGHT, COUNT = 160, 120, 12
+CROSS = [[[0.35, 0.5], [0.65, 0.5]], [[0.5, 0.35], [0.5, 0.65]]]
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory):
+    """A textured wall that goes 3 pixels to the right and 1 up with every frame, on images."""
+    rng = np.random.default_rng(5)
+    wall = rng.integers(0, 256, (40, 50, 3)).repeat(5, 0).repeat(5, 1).astype(np.uint8)
+    views = [wall[20 + n : 20 + n + HEIGHT, 60 - 3 * n : 60 - 3 * n + WIDTH] for n in range(COUNT)]
+    return write_frames(tmp_path_factory.mktemp("wall"), np.stack(views))
+
+
+@pytest.fixture
+def track(bpy, tmp_path, capfd):
+    """Runs the command in this process: its exit code, and what it says on stderr."""
+
+    def run(source, *arguments, **given):
+        (tmp_path / "recipe.json").write_text(json.dumps(given.pop("recipe", plain())))
+        arguments = ["track", source, "--recipe", tmp_path / "recipe.json", *arguments]
+        code = program.main([str(argument) for argument in arguments])
+        return code, capfd.readouterr().err.strip()
+
+    return run
+
+
+def plain(**region):
+    fields = {"name": "cross", "shutter": "S1", "kind": "line", "strokes": CROSS}
+    return recipe(2, [1, 1], [1, 0], regions=[{"shutter": "S0", "strokes": [[[0, 0]]]}, fields | region])
+
+
+def keys(path):
+    return recipes.load(path).regions[1].keys
+
+
+def expected(frame, start=5):
+    return 3 * (frame - start) / WIDTH, 1 * (frame - start) / HEIGHT
+
+
+def test_the_recipe_gets_the_keys_that_the_motion_needs(track, film, tmp_path):
+    output, report = tmp_path / "out" / "tracked.json", tmp_path / "report.json"
+    assert track(film, "--region", "cross", "--frame", 5, "--output", output, "--report", report) == (0, "")
+    found = keys(output)
+    assert [key.frame for key in found] == [1, 5, 12]
+    assert (found[1].location, found[1].rotation, found[1].scale) == ((0, 0), 0, 1)
+    for key in found:
+        assert key.location == pytest.approx(expected(key.frame), abs=0.3 / WIDTH)
+        assert (key.rotation, key.scale) == (pytest.approx(0, abs=0.3), pytest.approx(1, abs=0.005))
+    told = json.loads(report.read_text())
+    assert [each["frame"] for each in told["frames"]] == list(range(1, COUNT + 1))
+    assert all(each["confidence"] > tracking.SURE for each in told["frames"])
+    assert told["stops"] == []
+    before, after = recipes.load(tmp_path / "recipe.json"), recipes.load(output)
+    assert (after.shutters, after.regions[0]) == (before.shutters, before.regions[0])
+
+
+def test_every_key_is_kept_on_demand_and_only_in_those_frames(track, film, tmp_path):
+    given = plain(keys=[{"frame": n, "location": [0.5, 0.5], "ease": "bezier"} for n in (2, 6.5, 11)])
+    given["regions"][1]["keys"][1]["location"] = [0, 0]
+    options = ("--region", "cross", "--frame", 6, "--frames", "4:8", "--motion", "location", "--all-keys")
+    assert track(film, *options, "--output", tmp_path / "t.json", recipe=given) == (0, "")
+    found = keys(tmp_path / "t.json")
+    assert [key.frame for key in found] == [2, 4, 5, 6, 7, 8, 11]
+    assert (found[0].ease, found[0].location, found[-1].location) == ("bezier", (0.5, 0.5), (0.5, 0.5))
+    assert {key.scale for key in found} == {1.0}
+    # where the keys had put it, frame 6 lies still
+    before = recipes.load(tmp_path / "recipe.json").effect(WIDTH / HEIGHT).regions[1].location.at(6)
+    assert found[3].location == pytest.approx(before)
+
+
+def test_a_redrawn_shape_stays_drawn_where_it_was(track, film, tmp_path):
+    other = [[[0.4, 0.4], [0.6, 0.6]]]
+    given = plain(keys=[{"frame": 4}, {"frame": 8, "strokes": other, "ease": "bezier"}])
+    assert track(film, "--region", "cross", "--frame", 5, "--output", tmp_path / "t.json", recipe=given) == (0, "")
+    region, before = (recipes.load(tmp_path / name).regions[1] for name in ("t.json", "recipe.json"))
+    shapes = [each.over_time(1, WIDTH / HEIGHT) for each in (region, before)]
+    for frame in range(1, COUNT + 1):
+        after, was = (np.concatenate(shape.unmoved(frame)) for shape in shapes)
+        assert after == pytest.approx(was, abs=1e-9)
+        assert shapes[0].location.at(frame) == pytest.approx(expected(frame), abs=0.5 / WIDTH)
+
+
+def test_what_a_keyed_time_shows_is_tracked(track, film, tmp_path):
+    given = plain() | {"time": [{"frame": 1, "value": 12}, {"frame": 23, "value": 1}]}
+    assert track(film, "--region", "cross", "--frame", 1, "--output", tmp_path / "t.json", recipe=given) == (0, "")
+    last = keys(tmp_path / "t.json")[-1]
+    assert last.frame == 23
+    assert last.location == pytest.approx(expected(1, 12), abs=0.4 / WIDTH)
+
+
+def test_where_it_ends_is_said(track, film, tmp_path):
+    rng = np.random.default_rng(1)
+    shots = [rng.integers(0, 256, (12, 16, 3), dtype=np.uint8).repeat(10, 0).repeat(10, 1) for _ in range(2)]
+    first = write_frames(tmp_path / "two", np.stack([shots[n // 6] for n in range(12)]))
+    options = ("--region", "cross", "--frame", 3, "--output", tmp_path / "t.json", "--report", tmp_path / "r.json")
+    code, said = track(first, *options)
+    assert (code, said) == (0, f"Virtual Shutter: cross: not tracked from frame 7 on: {tracking.SHOT_ENDS}")
+    assert json.loads((tmp_path / "r.json").read_text())["stops"] == [{"frame": 7, "reason": tracking.SHOT_ENDS}]
+    assert [key.frame for key in keys(tmp_path / "t.json")] == [1, 3, 6]
+
+
+def test_bad_input_is_one_sentence_and_writes_nothing(track, film, tmp_path):
+    flat = write_frames(tmp_path / "flat", np.full((3, HEIGHT, WIDTH, 3), 90, np.uint8))
+    one = write_frames(tmp_path / "one", np.zeros((1, HEIGHT, WIDTH, 3), np.uint8))
+    cross, output = ("--region", "cross"), tmp_path / "t.json"
+    far = plain(strokes=[[[5, 5], [6, 6]]])
+    for source, options, given, end in (
+        (flat, (*cross, "--frame", 2), plain(), tracking.FEW),
+        (one, (*cross, "--frame", 1), plain(), tracking.ALONE),
+        (film, (*cross, "--frame", 3), far, tracking.OUTSIDE),
+        (film, ("--region", "circle", "--frame", 3), plain(), 'there is no region "circle"'),
+        (film, (*cross, "--frame", 13), plain(), "--frame: 13 is not within the frames 1:12"),
+        (film, (*cross, "--frame", 3, "--frames", "4:9"), plain(), "--frame: 3 is not within the frames 4:9"),
+        (film, (*cross, "--frame", 3, "--frames", "4:99"), plain(), "4:99 is not within the clip's frames 1:12"),
+        (tmp_path / "none.mp4", (*cross, "--frame", 3), plain(), f"none.mp4: no such file in {tmp_path}"),
+    ):
+        code, said = track(source, *options, "--output", output, recipe=given)
+        assert code == 2
+        assert said.startswith("Virtual Shutter: ")
+        assert said.endswith(end)
+        assert "\n" not in said
+        assert not output.exists()
+
+
+def test_what_is_read_is_not_written_over(track, film, tmp_path):
+    code, said = track(film, "--region", "cross", "--frame", 3, "--output", tmp_path / "recipe.json")
+    assert (code, "which is read" in said) == (2, True)
+    assert keys(tmp_path / "recipe.json") == []
+    same = ("--output", tmp_path / "t.json", "--report", tmp_path / "t.json")
+    assert track(film, "--region", "cross", "--frame", 3, *same)[0] == 2
+    assert not (tmp_path / "t.json").exists()
+
+
+def test_neither_file_is_written_if_one_cannot_be(track, film, tmp_path):
+    (tmp_path / "folder").mkdir()
+    both = ("--output", tmp_path / "t.json", "--report", tmp_path / "folder")
+    code, said = track(film, "--region", "cross", "--frame", 3, *both)
+    assert (code, said.count("\n")) == (2, 0)
+    assert not (tmp_path / "t.json").exists()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["folder", "recipe.json"]
+
+
+def test_a_process_with_one_thread_writes_the_same_bytes(track, film, tmp_path):
+    options = ["--region", "cross", "--frame", "5", "--all-keys", "--output"]
+    assert track(film, *options, tmp_path / "a.json")[0] == 0
+    arguments = ["track", film, "--recipe", tmp_path / "recipe.json", *options, tmp_path / "b.json"]
+    command = [sys.executable, "-m", "shutter_addon", *map(str, arguments)]
+    subprocess.run(command, cwd=ROOT, env=os.environ | {"OPENCV_FOR_THREADS_NUM": "1"}, check=True)
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()

@@ -1,0 +1,322 @@
+"""Tracking against films whose motion is known: a part of one picture moves over another one."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+import pytest
+
+from shutter_addon.core import scribbles
+from shutter_addon.core.effect import Drawings, Region
+from shutter_addon.core.frame_source import FrameSource
+from shutter_addon.core.keyframes import Constant, Keys
+from shutter_addon.core.motions import Similarity
+from shutter_addon.media import open_source, tracking
+from shutter_addon.media.cuts import ShotSource
+
+ASSETS = Path(__file__).parents[2] / "assets"
+SIZE = WIDTH, HEIGHT = 480, 270
+PIXEL = WIDTH / 640  # errors are in pixels of 640
+MIDDLE = 210 + 135j
+RADII = 55, 45  # of the subject, an ellipse
+EVERY = {"line": [[0.40, 0.46], [0.44, 0.54], [0.48, 0.46]], "lasso": None}
+
+
+def still(name, index):
+    with open_source(ASSETS / name) as source:
+        return cv2.resize(source.read(index)[..., :3], SIZE, interpolation=cv2.INTER_AREA)
+
+
+@pytest.fixture(scope="module")
+def ground():
+    return still("walkers.mp4", 10)
+
+
+@pytest.fixture(scope="module")
+def subject():
+    return still("bigbuckbunny.mp4", 60)
+
+
+class Film(FrameSource):
+    """Frames (n, H, W, 3) of arrays."""
+
+    transfer, alpha, options, fps, path = "srgb", "opaque", {}, None, Path("film")
+
+    def __init__(self, frames):
+        self.frames, self.count, self.reads = frames, len(frames), []
+        self.height, self.width, _ = frames[0].shape
+        self.dtype = frames[0].dtype
+
+    def read(self, index):
+        self.reads.append(index)
+        frame = self.frames[index]
+        white = np.iinfo(self.dtype).max if self.dtype.kind == "u" else 1
+        return np.dstack([frame, np.full(frame.shape[:2], white, self.dtype)])
+
+
+def motion(x=0.0, y=0.0, degrees=0.0, scale=1.0):
+    """A similarity about the subject's middle."""
+    turn = scale * np.exp(1j * np.radians(degrees))
+    return Similarity(complex(turn), complex(MIDDLE + complex(x, y) - turn * MIDDLE))
+
+
+def warped(picture, way, border=cv2.BORDER_REFLECT):
+    turn, shift = way.turn, way.shift
+    matrix = np.array([[turn.real, -turn.imag, shift.real], [turn.imag, turn.real, shift.imag]])
+    return cv2.warpAffine(picture, matrix, SIZE, flags=cv2.INTER_LINEAR, borderMode=border)
+
+
+def ellipse(middle, radii):
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    distance = np.hypot((x - middle.real) / radii[0], (y - middle.imag) / radii[1])
+    return np.clip((1 - distance) * min(radii) + 0.5, 0, 1).astype(np.float32)
+
+
+def film(subject, ground, path, count, start, *, shutter=0.0, covered=()):
+    """A film, and the subject's true motion since the frame `start`; path: frame → arguments of `motion`. At `start`
+    the subject lies in its picture's place.
+
+    shutter: share of a frame's time for which it is exposed; covered: frames at which something lies over it"""
+    frames, mask, began = [], ellipse(MIDDLE, RADII), motion(*path(start)).inverse()
+
+    def way(time):
+        return motion(*path(time)).after(began)
+
+    for n in range(count):
+        times = n + np.linspace(-shutter / 2, shutter / 2, 7) if shutter else [n]
+        light = np.zeros((HEIGHT, WIDTH, 3), np.float32)
+        for time in times:
+            over = warped(mask, way(time), cv2.BORDER_CONSTANT)[..., None]
+            light += (1 - over) * warped(ground, motion(-0.6 * (time - start), 0.2 * (time - start)))
+            light += over * warped(subject, way(time))
+        frame = light / len(times)
+        if n in covered:
+            over = ellipse(way(n)(MIDDLE), (95, 85))[..., None]
+            frame = (1 - over) * frame + over * ground[::-1, ::-1]
+        frame += np.random.default_rng(n).normal(0, 2, frame.shape)
+        frames.append(np.clip(np.rint(frame), 0, 255).astype(np.uint8))
+    return Film(frames), [way(n) for n in range(count)]
+
+
+def strokes(kind):
+    if kind == "line":
+        return [np.array(EVERY["line"])]
+    around = MIDDLE + np.array([complex(RADII[0] * np.cos(a), RADII[1] * np.sin(a)) for a in np.linspace(0, 6.1, 24)])
+    return [np.stack([(around.real + 0.5) / WIDTH, 1 - (around.imag + 0.5) / HEIGHT], axis=1)]
+
+
+def region(kind, *, drawn=None, location=(0.0, 0.0)):
+    drawings = Drawings((0.0,), (strokes(kind) if drawn is None else drawn,), ("linear",), WIDTH / HEIGHT)
+    location = location if hasattr(location, "at") else Constant(location)
+    return Region("r", 0, Constant(kind), Constant(0.02), drawings, location, Constant(0.0), Constant(1.0))
+
+
+def followed(source, kind, start, frames=None, **options):
+    """What was tracked, by frame, and the faults, by frame."""
+    footage = tracking.Footage(source, lambda frame: frame)
+    given = region(kind) if "region" not in options else options.pop("region")
+    tracked, faults = {}, {}
+    for found in tracking.follow(given, footage, start, frames or range(source.count), **options):
+        if found.fault:
+            faults[found.frame] = found.fault
+        else:
+            tracked[found.frame] = found
+    return tracked, faults
+
+
+def pixels(shape):
+    points = np.concatenate(shape)
+    return points[:, 0] * WIDTH - 0.5 + 1j * ((1 - points[:, 1]) * HEIGHT - 0.5)
+
+
+def errors(tracked, truth, kind):
+    """By frame, by how many pixels of 640 the farthest point of the shape is off."""
+    shape, found = strokes(kind), {}
+    for frame, each in tracked.items():
+        p = each.placement
+        moved = scribbles.transform(shape, p.location, p.rotation, p.scale, WIDTH / HEIGHT)
+        found[frame] = np.abs(pixels(moved) - truth[frame](pixels(shape))).max() / PIXEL
+    return found
+
+
+def sure(tracked):
+    return {frame for frame, each in tracked.items() if each.confidence > tracking.SURE}
+
+
+def shake(t):
+    jolts = np.random.default_rng(4).normal(0, 5, (2, 40))
+    x, y = (np.interp(t, np.arange(40), row) for row in jolts)
+    return 2.0 * t + x, 0.5 * t + y, 0.3 * t
+
+
+# The way, the shutter, and how many of 24 frames are sure at least.
+PATHS = {
+    "shake": (shake, 0.0, 23),
+    "zoom and turn": (lambda t: (1.5 * t, 0, 4.0 * t, 1.015**t), 0.0, 23),
+    "blur": (lambda t: (45 * np.sin(t / 5), 8 * np.cos(t / 4)), 0.6, 16),
+}
+
+
+@pytest.mark.parametrize("kind", EVERY)
+@pytest.mark.parametrize("name", PATHS)
+def test_what_is_tracked_lies_within_a_pixel(subject, ground, name, kind):
+    path, shutter, least = PATHS[name]
+    source, truth = film(subject, ground, path, 24, 10, shutter=shutter)
+    tracked, faults = followed(source, kind, 10)
+    assert not faults
+    assert sorted(tracked) == list(range(24))
+    off = errors(tracked, truth, kind)
+    assert max(off.values()) <= 1
+    assert len(sure(tracked)) >= least
+
+
+def test_a_subject_that_was_covered_is_found_again(subject, ground):
+    source, truth = film(subject, ground, lambda t: (2.5 * t, 0.5 * t, t), 24, 4, covered=range(10, 15))
+    tracked, faults = followed(source, "lasso", 4)
+    assert not faults
+    assert sure(tracked) == set(range(24)) - set(range(10, 15))
+    off = errors(tracked, truth, "lasso")
+    assert max(off[frame] for frame in sure(tracked)) <= 1
+    assert max(off.values()) <= 3  # a straight way across what nobody saw
+
+
+def test_a_subject_that_stays_covered_ends_it(subject, ground, monkeypatch):
+    monkeypatch.setattr(tracking, "PATIENCE", 6)
+    source, truth = film(subject, ground, lambda t: (2.0 * t,), 24, 2, covered=range(8, 24))
+    tracked, faults = followed(source, "lasso", 2)
+    assert faults == {8: tracking.COVERED}
+    assert sorted(tracked) == list(range(8))
+    assert max(errors(tracked, truth, "lasso").values()) <= 1
+
+
+def test_a_subject_that_leaves_the_picture_and_comes_back(subject, ground):
+    def path(t):
+        return (-340 * np.sin(np.pi * np.clip((t - 5) / 18, 0, 1)),)
+
+    source, truth = film(subject, ground, path, 30, 2)
+    tracked, faults = followed(source, "line", 2)
+    assert not faults
+    off = errors(tracked, truth, "line")
+    assert max(off[frame] for frame in sure(tracked)) <= 1
+    assert {0, 5, 28, 29} <= sure(tracked)
+    assert 14 not in sure(tracked)
+    tracked, faults = followed(source, "line", 2, range(14))
+    assert list(faults.values()) == [tracking.LEFT]
+
+
+def test_it_ends_at_a_cut_on_both_sides(subject, ground):
+    whole, _ = film(subject, ground, lambda t: (t,), 8, 4)
+    others = [np.roll(ground[:, ::-1], 2 * n, axis=1) for n in range(6)]
+    film_ = ShotSource(Film([*(255 - frame for frame in others), *whole.frames, *others]))
+    tracked, faults = followed(film_, "lasso", 10)
+    assert sorted(tracked) == list(range(6, 14))
+    assert faults == {5: tracking.SHOT_ENDS, 14: tracking.SHOT_ENDS}
+
+
+@pytest.mark.parametrize("motion_", ["location", "rotation"])
+def test_only_what_is_asked_for_changes(subject, ground, motion_):
+    source, _ = film(subject, ground, lambda t: (2 * t, 0, 2 * t, 1.01**t), 8, 2)
+    tracked, _ = followed(source, "line", 2, motion=motion_)
+    assert all(each.placement.scale == pytest.approx(1, abs=1e-12) for each in tracked.values())
+    turned = tracked[7].placement.rotation
+    assert turned == (0 if motion_ == "location" else pytest.approx(-10, abs=1))
+    assert tracked[7].placement.location[0] == pytest.approx(10 / WIDTH, abs=1.5 / WIDTH)
+
+
+def test_between_two_keys_both_count(subject, ground):
+    """A mended frame: what lies between is blended, and beyond it nothing is touched."""
+    source, _ = film(subject, ground, lambda t: (3 * t,), 16, 2)
+    moved = 0.01
+    keys = Keys((0.0, 2.0, 12.0), ((0.0, 0.0), (0.0, 0.0), (30 / WIDTH + moved, 0.0)), ("linear",) * 3)
+    tracked, faults = followed(source, "lasso", 2, region=region("lasso", location=keys), anchors=(12,))
+    assert not faults
+    assert sorted(tracked) == list(range(13))
+    assert tracked[12].placement.location == pytest.approx((30 / WIDTH + moved, 0.0))
+    for frame in range(2, 13):
+        expected = 3 * (frame - 2) / WIDTH + moved * (frame - 2) / 10
+        assert tracked[frame].placement.location[0] == pytest.approx(expected, abs=0.7 / WIDTH)
+
+
+def test_the_order_of_reading_and_threads_change_no_bit(subject, ground, tmp_path):
+    source, _ = film(subject, ground, shake, 14, 6)
+    first = followed(source, "lasso", 6)
+    threads = cv2.getNumThreads()
+    try:
+        cv2.setNumThreads(1)
+        cv2.setRNGSeed(5)
+        footage = tracking.Footage(source, lambda frame: frame)
+        for frame in (13, 3, 8, 0):
+            footage.picture(frame)
+        again = list(tracking.follow(region("lasso"), footage, 6, range(14)))
+    finally:
+        cv2.setNumThreads(threads)
+    assert again == list(first[0].values())
+
+
+def test_backward_a_source_is_read_upwards(subject, ground):
+    source, _ = film(subject, ground, lambda t: (t,), 10, 9)
+    followed(source, "line", 9)
+    assert source.reads == [9, *range(9)]
+
+
+def test_what_a_retimed_strip_shows_is_tracked(subject, ground):
+    """Reversed, every frame twice."""
+    source, truth = film(subject, ground, lambda t: (3 * t, 0, t), 8, 7)
+    footage = tracking.Footage(source, lambda frame: 7 - (frame - 100) // 2)
+    tracked = {each.frame: each for each in tracking.follow(region("line"), footage, 100, range(100, 116))}
+    shown = {frame: truth[7 - (frame - 100) // 2] for frame in tracked}
+    assert sorted(tracked) == list(range(100, 116))
+    assert max(errors(tracked, shown, "line").values()) <= 1
+
+
+def test_deep_and_linear_pictures_look_alike(subject):
+    from shutter_addon.core import light
+
+    deep = Film([subject.astype(np.uint16) * 257])
+    linear = Film([light.to_linear(subject / 255).astype(np.float32)])
+    linear.transfer = "linear"
+    plain, *others = (
+        tracking.Footage(each, lambda frame: frame).picture(0) for each in (Film([subject]), deep, linear)
+    )
+    for other in others:
+        assert np.abs(plain.astype(int) - other).max() <= 1
+
+
+FAR = [np.array([[3.0, 3.0], [4.0, 4.0]])]
+
+
+@pytest.mark.parametrize(
+    ("given", "start", "frames", "fault"),
+    [
+        ({}, 9, range(3), tracking.NOT_SHOWN),
+        ({}, 1, range(1, 2), tracking.ALONE),
+        ({"drawn": []}, 1, range(3), tracking.EMPTY),
+        ({"drawn": FAR}, 1, range(3), tracking.OUTSIDE),
+        ({"flat": True}, 1, range(3), tracking.FEW),
+    ],
+)
+def test_what_cannot_be_tracked_is_one_sentence(subject, given, start, frames, fault):
+    flat = np.random.default_rng(0).normal(128, 2, (3, HEIGHT, WIDTH, 3)).round().astype(np.uint8)
+    source = Film(list(flat) if given.pop("flat", False) else [subject] * 3)
+    with pytest.raises(tracking.TrackingError) as raised:
+        tracking.follow(region("line", **given), tracking.Footage(source, lambda frame: frame), start, frames)
+    assert str(raised.value) == fault
+
+
+def test_a_movie_is_tracked_as_its_frames_are(subject, ground, tmp_path):
+    source, _ = film(subject, ground, lambda t: (2 * t, t), 12, 11)
+    path = tmp_path / "film.mkv"
+    with av.open(str(path), "w") as out:
+        stream = out.add_stream("ffv1", rate=Fraction(25))
+        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "bgr0"
+        for n, frame in enumerate(source.frames):
+            shown = av.VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24").reformat(format="bgr0")
+            shown.pts, shown.time_base = n, Fraction(1, 25)
+            out.mux(stream.encode(shown))
+        out.mux(stream.encode())
+    with ShotSource(open_source(path)) as movie:
+        tracked, faults = followed(movie, "line", 11)
+    assert not faults
+    assert (tracked, faults) == followed(source, "line", 11)
