@@ -125,6 +125,15 @@ def change_property(edit):
     edit.virtual_shutter.effects[0].position = "END"
 
 
+def follow_edges(edit):
+    edit.virtual_shutter.effects[0].edge_aware = 1
+
+
+def key_edges(edit):
+    edit.virtual_shutter.effects[0].keyframe_insert("edge_aware", frame=FRAME)
+    curve(edit, "edge_aware").keyframe_points[0].co[1] = 0.5
+
+
 def reverse_source(edit):
     edit.sequence_editor.strips["images"].use_reverse_frames = True
 
@@ -142,7 +151,7 @@ def move_effect_strip(edit):
 CHANGES = [
     insert_key, insert_key_only, move_key, change_value, delete_key, move_handle, change_ease, change_exotic_ease,
     mute_curve, add_modifier, draw_stroke, erase_stroke, move_points, delete_layer, remove_shutter,
-    change_property, reverse_source, slip_source, move_effect_strip,
+    change_property, follow_edges, key_edges, reverse_source, slip_source, move_effect_strip,
 ]  # fmt: skip
 
 

@@ -136,6 +136,8 @@ IMPOSSIBLE = {
     "rotation": (lambda e: raw(e.regions[0], "rotation", INF), 'region "Face": Rotation is inf, not -360000 to 360000'),
     "location": (lambda e: raw(e.regions[0], "location", [0.0, NAN]), 'region "Face": Location is nan'),
     "width": (lambda e: raw(e.regions[0], "width", -1.0), 'region "Face": Width is -1'),
+    "follow edges": (lambda e: raw(e, "edge_aware", 1.5), 'effect "Shutter": Follow Edges is 1.5, not 0 to 1'),
+    "keyed nan edges": (lambda e: key(e, "edge_aware", (1, NAN), (9, NAN)), 'effect "Shutter": Follow Edges is nan'),
     "source time": (lambda e: use_time(e, NAN), 'effect "Shutter": Source Time is nan'),
     "a nan key": (
         lambda e: key(e.shutters[1].bars[0], "weight", (NAN, 1), (5, 1)),

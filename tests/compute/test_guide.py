@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 from scipy import ndimage
-from test_composition import Footage, few_pieces, footage
+from test_composition import Footage, few_pieces, state
 from test_shots import BETWEEN, STEP, film, with_between
 
 from shutter_addon.compute import guide
 from shutter_addon.compute.cpu import CPUCompositor
-from shutter_addon.compute.renderer import Renderer
-from shutter_addon.core import light
+from shutter_addon.compute.gpu import GPUCompositor
+from shutter_addon.compute.renderer import Renderer, open_compositor
+from shutter_addon.core import compositor, exact_diffusion, light
 from shutter_addon.core.frame_state import FrameState, Options
 from shutter_addon.core.scribbles import Shape
 from shutter_addon.media.cuts import ShotSource
@@ -142,11 +143,45 @@ def guided(rng, window=6, strength=1.0, **options):
     return few_pieces(rng, window, shapes=SHAPES, edge_aware=strength, **options)
 
 
+@pytest.fixture(params=["gpu", "cpu", "blender"], scope="module")
+def device(request):
+    if request.param == "blender":
+        return GPUCompositor(request.getfixturevalue("blender_device"))
+    return open_compositor(request.param)[0]
+
+
+@pytest.mark.parametrize("aggregate", [1, 2, 4])
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_pictures_equal_the_reference(device, aggregate, dtype):
+    """Two shutters over 8 bits, and eight over floats beyond white that are partly transparent."""
+    rng, whole = np.random.default_rng(56), dtype == np.uint8
+    count = 2 if whole else 8
+    pictures = [np.where(texture(60, 90, seed) > 0.5, 0.9, 0.1) * (1 if whole else 3) for seed in range(4)]
+    alpha = np.ones((60, 90, 1)) if whole else texture(60, 90, 9)[..., :1]
+    kind = {} if whole else {"alpha": "premultiplied", "transfer": "linear"}
+    source = source_of(*(np.dstack([p * alpha, alpha]) for p in pictures), dtype=dtype, **kind)
+    moment = state(
+        rng, 4, SHAPES[: min(count - 1, 2)], count, border=True, edge_aware=0.7, aggregate=aggregate, position="center"
+    )
+    renderer = Renderer(device, source)
+    labels = renderer.labels(moment)
+    exact = exact_diffusion.solve(labels, count, guide_of(source, 2, aggregate), 0.7)
+    assert np.abs(exact - exact_diffusion.solve(labels, count)).max() > 10 * LEVEL
+    assert np.abs(renderer.coefficients(2, moment) - exact).max() <= LEVEL
+    pixels = exact.repeat(aggregate, 1).repeat(aggregate, 2)[:, :60, :90]
+    indices = compositor.window_indices(moment.options, 2, range(4))
+    expected = compositor.compose(moment, source.linear()[np.maximum(indices, 0)], indices >= 0, pixels)
+    apart = np.abs(light.to_encoded(renderer.picture(2, moment).astype(float)) - light.to_encoded(expected))
+    assert (apart / np.maximum(1, np.abs(expected))).max() <= LEVEL
+    with device.current():
+        renderer.release_window()
+
+
 def test_what_was_shown_before_leaves_no_trace():
     """In any order and direction, with a strength that changes, on and off."""
     rng, device = np.random.default_rng(50), CPUCompositor()
     renderer, index = Renderer(device, ShotSource(film(size=(17, 9)))), 4
-    for _ in range(40):
+    for _ in range(25):
         index = int(np.clip(index + rng.choice([1, 1, 1, -1, -2, 6, -9]), 0, 21))
         strength, aggregate = rng.choice([0, 0.3, 1]), int(rng.choice([1, 2]))
         position = rng.choice(["start", "center", "end"])
@@ -158,14 +193,17 @@ def test_what_was_shown_before_leaves_no_trace():
 
 
 def test_nothing_is_taken_from_beyond_a_cut():
-    """Coefficients are those of the shot alone, whatever the window shows."""
-    rng, device = np.random.default_rng(51), CPUCompositor()
-    whole, first = film(), film()
-    first.frames, first.count = first.frames[:7], 7
+    """Though the shots are much alike, and whatever the window shows."""
+    rng = np.random.default_rng(51)
+    frames = np.stack([np.roll(film().frames[0], k // 7, axis=1) for k in range(14)])
+    frames[7:] -= np.minimum(frames[7:], 4)
     for position in ("start", "end"):
-        moment = guided(rng, 2, position=position)
-        found, alone = (Renderer(device, ShotSource(source)).coefficients(6, moment) for source in (whole, first))
-        assert np.array_equal(found, alone)
+        moment, found = guided(rng, 4, position=position), []
+        for count in (14, 7):
+            source = ShotSource(Footage(frames[:count]))
+            source._cuts = {k: k == 7 for k in range(1, count)}
+            found.append(Renderer(CPUCompositor(), source).coefficients(6, moment))
+        assert np.array_equal(*found)
 
 
 def reads(moment, *calls) -> list[int]:
@@ -212,7 +250,7 @@ def test_what_is_missing_is_what_is_read(position):
     source, moment = film(), guided(np.random.default_rng(54), 4, position=position)
     renderer = Renderer(CPUCompositor(), ShotSource(source))
     for index in range(22):
-        renderer.picture(index, moment)
+        renderer.needed(index, 1, moment, known=False)  # which finds the cuts
     renderer.release_window()
     for index in (5, 9, 20):
         source.reads.clear()
@@ -234,16 +272,3 @@ def test_in_betweens_that_guide_are_needed():
     first = BETWEEN[1]
     assert renderer.needed(first + 1, 1, moment, known=False) == {28, 32, 36}
     assert renderer.needed(first + 2, 1, moment, known=False) == {29, 28, 32, 36}
-
-
-def test_without_opencv_it_is_said(monkeypatch):
-    import sys
-
-    from shutter_addon.core.messages import EffectError
-
-    monkeypatch.setitem(sys.modules, "cv2", None)
-    renderer = Renderer(CPUCompositor(), footage(np.random.default_rng(55)))
-    moment = guided(np.random.default_rng(55))
-    with pytest.raises(EffectError, match="Follow Edges needs the Python package opencv-contrib-python-headless"):
-        renderer.picture(3, moment)
-    renderer.picture(3, guided(np.random.default_rng(55), strength=0.0))

@@ -1,0 +1,144 @@
+"""Follow Edges in Blender: renders against the float64 reference, keys, chunks, and in-between frames that it needs."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+from standin import between
+from support import picture_of, read_picture, recipe, request, state, write_frames
+
+from shutter_addon.compute.guide import Guides, guiding
+from shutter_addon.core import compositor, exact_diffusion, light, scribbles
+from shutter_addon.core import recipe as recipes
+from shutter_addon.media import MediaError, inbetween, open_source
+
+SIZE, COUNT = (128, 72), 9
+STROKE = {"name": "Belly", "shutter": "S1", "width": 0.03, "strokes": [[[0.36, 0.6], [0.36, 0.3]]]}
+KEYS = [{"frame": 1, "value": 0.2}, {"frame": 9, "value": 1}]
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory, bunny):
+    """A real film, small, and every tenth frame of it: the first file."""
+    with open_source(bunny) as source:
+        frames = [
+            cv2.resize(source.read(10 + 10 * k)[..., :3], SIZE, interpolation=cv2.INTER_AREA) for k in range(COUNT)
+        ]
+    return write_frames(tmp_path_factory.mktemp("film"), np.stack(frames))
+
+
+def effect_recipe(**options):
+    return recipe(3, [1, 1, 1], [1, 0, 0], regions=[STROKE], border=True, **options)
+
+
+def expected(first, moment, index: int):
+    """(coefficients (N, h, w), picture (H, W, 3) in 8-bit levels) of the reference."""
+    block = moment.options.aggregate
+    with open_source(first) as source:
+        shot = range(source.count)
+        samples = np.stack([source.read(k) for k in shot])
+        labels = scribbles.rasterise(moment.shapes, *(-(-n // block) for n in SIZE), border=True)
+        seen = Guides(source).guide(guiding(index, 1, shot), block)
+    c = exact_diffusion.solve(labels, len(moment.bars), seen, moment.options.edge_aware)
+    pixels = c.repeat(block, 1).repeat(block, 2)[:, : SIZE[1], : SIZE[0]]
+    indices = compositor.window_indices(moment.options, index, shot)
+    frames = light.premultiplied(samples / 255, light.to_linear)[np.maximum(indices, 0)]
+    picture = compositor.compose(moment, frames, indices >= 0, pixels)
+    return c, light.to_encoded(picture[..., :3]) * 255
+
+
+@pytest.mark.parametrize("aggregate", [1, 2])
+def test_a_render_equals_the_reference(command, film, tmp_path, same_pixels, aggregate):
+    """With keys of its strength, and so do the coefficients that are written."""
+    data = effect_recipe(aggregate=aggregate, edge_aware=KEYS)
+    command(film, "--output", tmp_path / "out", "--weights", tmp_path / "w", "--frames", "4:9", recipe=data)
+    found = recipes.parse((tmp_path / "recipe.json").read_text())
+    for frame in (4, 9):
+        moment = found.at(frame, SIZE[0] / SIZE[1])
+        assert moment.options.edge_aware == pytest.approx(0.2 + 0.1 * (frame - 1))
+        c, picture = expected(film, moment, frame - 1)
+        written = np.moveaxis(read_picture(tmp_path / "w" / f"{frame:04d}.exr"), -1, 0)
+        assert np.abs(written - c).max() <= 1 / 255
+        same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), picture, 1, f"aggregate{aggregate}-{frame}")
+
+
+def test_chunks_are_the_whole(command, film, tmp_path):
+    """Bit for bit, with keys of its strength."""
+    data = effect_recipe(edge_aware=KEYS, position="center")
+    command(film, "--output", tmp_path / "whole", recipe=data)
+    for chunk in ("6:9", "3:4"):
+        command(film, "--output", tmp_path / "parts", "--frames", chunk, recipe=data)
+    for k in (3, 4, 6, 7, 8, 9):
+        assert np.array_equal(*(read_picture(tmp_path / way / f"{k:04d}.png") for way in ("whole", "parts")))
+
+
+@pytest.fixture
+def add(bpy, edit):
+    """Puts an effect of a recipe on the film; gives edit, effect and strip."""
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import add_effect
+
+    def added(first, data):
+        source = edit.sequence_editor.strips.new_image("film", str(first), 1, 1)
+        for number in range(2, COUNT + 1):
+            source.elements.append(f"f{number:04d}.png")
+        strip, effect = add_effect.add_effect(edit, source)
+        edit.render.resolution_x, edit.render.resolution_y = SIZE
+        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
+        return edit, effect, strip
+
+    return added
+
+
+def test_keys_are_blenders_and_change_what_is_shown(bpy, add, film):
+    from shutter_addon.blender.rendering import invalidation
+
+    edit, effect, strip = add(film, effect_recipe())
+    for frame, value in ((2, 0.0), (6, 1.0)):
+        effect.edge_aware = value
+        assert effect.keyframe_insert("edge_aware", frame=frame)
+    strengths = [state(edit, effect, strip, frame).options.edge_aware for frame in (1, 2, 4, 6, 9)]
+    assert strengths == pytest.approx([0, 0, 0.5, 1, 1], abs=1e-6)
+    invalidation.invalidate_changed(edit)
+    assert not invalidation.invalidate_changed(edit)
+    effect.keyframe_insert("edge_aware", frame=4)
+    assert invalidation.invalidate_changed(edit)
+
+
+def test_reversed_and_retimed_strips_follow_the_shown_frame(add, film, same_pixels):
+    edit, effect, strip = add(film, effect_recipe(edge_aware=1))
+    still = picture_of(effect.scene, COUNT - 3)
+    forward = request(edit, effect, strip, 3)
+    edit.sequence_editor.strips["film"].use_reverse_frames = True
+    back = request(edit, effect, strip, COUNT - 2)
+    assert (forward.index, back.index, back.direction) == (2, 2, -1)
+    assert np.array_equal(forward.coefficients(), back.coefficients())
+    assert not np.array_equal(picture_of(effect.scene, COUNT - 3), still)
+
+
+def test_in_betweens_that_it_needs_are_told_and_built(bpy, add, film, tmp_path):
+    """Where the window does not show them: the shutters are open after the shown frame alone."""
+    from shutter_addon.blender.rendering import session
+
+    data = effect_recipe(inbetween=2, time=[{"frame": 1, "value": 3.5}], edge_aware=1)
+    for shutter, bars in zip(data["shutters"], ([0, 1, 0], [0, 0, 0.5]), strict=True):
+        shutter["bars"] = bars
+    with session.using(session.RenderSettings(inbetween=tmp_path / "cache")), open_source(film) as source:
+        edit, effect, strip = add(film, data)
+        inbetween.build(source, tmp_path / "cache", 2, "quick", frames=(3, 4), between=between)
+        wanted = request(edit, effect, strip, 1)
+        assert wanted.index == 5
+        with pytest.raises(MediaError, match="in-between frames of frame 3 are missing"):
+            wanted.check()
+        with pytest.raises(MediaError, match="in-between frames of frame 3 are missing"):
+            wanted.picture()
+        effect.edge_aware = 0
+        request(edit, effect, strip, 1).check()
+        effect.edge_aware = 1
+        from shutter_addon.blender.data import snapshot
+
+        assert session.pairs(snapshot.take(edit, effect, strip, (1,), folder=tmp_path / "cache")) == {2, 3}
+        inbetween.build(source, tmp_path / "cache", 2, "quick", frames=(2, 2), between=between)
+        session.forget()
+        request(edit, effect, strip, 1).picture()
