@@ -4,6 +4,8 @@ The stroke was drawn at frame 22; the recipe has the keys that Track made of it:
 `shutter track walkers.mp4 --recipe R.json --region woman --frame 22 --frames 1:36 --output one_stroke.json`
 """
 
+from itertools import zip_longest
+
 from . import stills
 from .item import ASSETS, Item
 from .stills import Panel
@@ -18,15 +20,19 @@ def footage(_folder):
 
 def still(shots):
     (shot,) = shots
-    rows = [
-        ("Footage, frame {}", shot.source),
-        ("One stroke, drawn at frame 22", shot.scribbles),
-        ("How much of each shutter", shot.coefficients),
-        ("She is sharp, all else is 12 frames", shot.result),
-    ]
     return stills.sheet(
-        *(stills.row(*(Panel(shown(frame)[STREET], words.format(frame)) for frame in FRAMES)) for words, shown in rows)
+        row(shot.source, *(f"Frame {frame}" for frame in FRAMES)),
+        row(shot.scribbles, "One stroke, tracked"),
+        row(shot.coefficients, "How much of each shutter"),
+        row(shot.result, "Twelve frames, and she is sharp"),
+        caption=ITEM.caption,
     )
+
+
+def row(shown, *words):
+    """What is shown at each of the moments, with words below."""
+    panels = zip_longest((shown(frame)[STREET] for frame in FRAMES), words, fillvalue="")
+    return stills.row(*(Panel(picture, word) for picture, word in panels))
 
 
 ITEM = Item(

@@ -51,6 +51,7 @@ def main() -> int:
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help=", ".join(names))
     parser.add_argument("--output", type=Path, default=ROOT / "out" / "one_stroke", metavar="DIR")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
+    parser.add_argument("--aggregate", type=int, choices=(1, 2, 4), default=1, help="as in the recipe: 2 is quicker")
     parser.add_argument("--docs", action="store_true", help="renew docs/one_stroke.jpg")
     arguments = parser.parse_args()
     chosen = [scene for scene in truth.SCENES if scene.name in (arguments.scenes or names)]
@@ -58,7 +59,7 @@ def main() -> int:
     for scene in chosen:
         folder = arguments.output / scene.name
         truth.render(scene, folder)
-        keyed = tracked(scene, folder)
+        keyed = tracked(scene, folder, arguments.aggregate)
         rows.append({"scene": scene.name, **motion(scene, folder, keyed)})
         if scene.masked:
             masks = Masks(folder, keyed)
@@ -88,11 +89,11 @@ def stroked(scene: truth.Scene, size, window: int = 9) -> recipe.Recipe:
     )
 
 
-def tracked(scene: truth.Scene, folder: Path) -> dict[str, recipe.Recipe]:
+def tracked(scene: truth.Scene, folder: Path, aggregate: int = 1) -> dict[str, recipe.Recipe]:
     """The effect with the keys that the command writes: `thinned`, and `all` of them."""
     footage = folder / "footage" / "0001.png"
     with open_source(footage) as source:
-        drawn = stroked(scene, (source.width, source.height))
+        drawn = replace(stroked(scene, (source.width, source.height)), aggregate=aggregate)
     (folder / "drawn.json").write_text(recipe.dump(drawn), encoding="utf-8")
     options = ["--recipe", folder / "drawn.json", "--region", NAME, "--frame", scene.start]
     found = {"drawn": drawn}
@@ -172,7 +173,9 @@ class Masks:
             state = self._state("drawn" if way == "without tracking" else "thinned", frame)
             if way == "without edges":
                 state = replace(state, options=replace(state.options, edge_aware=0.0))
-            self._known[way, frame] = self._renderer.coefficients(frame - 1, state)[1]
+            share, block = self._renderer.coefficients(frame - 1, state)[1], state.options.aggregate
+            share = share.repeat(block, 0).repeat(block, 1)
+            self._known[way, frame] = share[: self._source.height, : self._source.width]
         return self._known[way, frame]
 
     def _grabcut(self, frame: int) -> np.ndarray:
