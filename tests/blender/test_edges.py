@@ -142,3 +142,18 @@ def test_in_betweens_that_it_needs_are_told_and_built(bpy, add, film, tmp_path):
         inbetween.build(source, tmp_path / "cache", 2, "quick", frames=(2, 2), between=between)
         session.forget()
         request(edit, effect, strip, 1).picture()
+
+
+def test_a_draft_has_larger_blocks_where_edges_are_followed(add, film, monkeypatch):
+    """Coefficients of a draft are those of the blocks; films and what has no edges to follow are never drafts."""
+    from shutter_addon.blender.rendering import session
+
+    monkeypatch.setattr(session, "DRAFT_ROWS", SIZE[1] // 3)
+    edit, effect, strip = add(film, effect_recipe(edge_aware=1))
+    exact = request(edit, effect, strip, 3)
+    draft = exact.draft()
+    assert (exact.state.options.aggregate, draft.state.options.aggregate) == (1, 4)
+    assert draft.coefficients().shape[1:] == (-(-SIZE[1] // 4), -(-SIZE[0] // 4))
+    effect.edge_aware = 0
+    plain = request(edit, effect, strip, 3)
+    assert plain.draft() is plain

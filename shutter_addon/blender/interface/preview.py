@@ -160,10 +160,10 @@ def _draw() -> None:
 
 
 def request_of(found: Shown) -> session.FrameRequest:
-    """What the effect strip shows at the current frame. One of session.FAULTS: it cannot be shown."""
+    """What the effect strip shows at the current frame, as a draft. One of session.FAULTS: it cannot be shown."""
     frame = found.edit.frame_current
     snapshot = invalidation.current(found.edit, found.effect, found.strip, frame)
-    return session.here().request(snapshot, frame)
+    return session.here().request(snapshot, frame).draft()
 
 
 def _show(context, found: Shown, settings, say) -> None:

@@ -1,10 +1,12 @@
 """Render sessions: a device, and the renderers of the effects that were shown last, whose frames they keep."""
 
+from __future__ import annotations
+
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -33,6 +35,8 @@ _KEPT = 4
 # Pictures whose frames are decoded in advance, and how many frames or bytes of them lie decoded at most, besides those
 # on the device: enough for a long window, whose frames are decoded while its first picture is diffused and compiled.
 _AHEAD, _DECODED, _DECODED_BYTES = 4, 8, 256 << 20
+# Blocks along the shorter side of a draft in which shutters follow edges.
+DRAFT_ROWS = 270
 _PATIENCE = 0.1  # seconds between two looks at whether a picture is still wanted
 
 _said: set[str] = set()  # what is said once
@@ -94,6 +98,17 @@ class FrameRequest:
         """As Renderer.coefficients; frames are decoded as for `picture`, which will read them as well."""
         self.prefetch()
         return self.renderer.coefficients(self.index, self.state, self.direction)
+
+    def draft(self) -> FrameRequest:
+        """The request as it is drawn while an editor waits: where shutters follow edges, of blocks so large that the
+        picture has no more than DRAFT_ROWS of them along its shorter side."""
+        options, source = self.state.options, self.renderer.source
+        if not options.edge_aware:
+            return self
+        block = options.aggregate
+        while min(source.width, source.height) > block * DRAFT_ROWS:
+            block *= 2
+        return replace(self, state=replace(self.state, options=replace(options, aggregate=block)))
 
     def check(self) -> None:
         """MediaError: an in-between frame that the picture needs is missing. No frame is read."""
