@@ -60,7 +60,7 @@ def shaken(frame: float) -> tuple[float, float, float]:
 
 
 def away(frame: float) -> tuple[float, float, float, float]:
-    """Out of the picture at the right, for frames 26 to 34 altogether, and back."""
+    """Out of the picture at the right, for frames 26 to 34 altogether, and nearly all the way back."""
     t = (frame - 10) / 20
     return 11.5 * sin(pi * min(max(t, 0), 2) / 2) ** 2, 0.4 * t, radians(8) * t, 1.0
 
