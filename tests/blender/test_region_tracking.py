@@ -220,6 +220,60 @@ def test_closed_early_it_keeps_what_it_has(bpy, edit, region):
     assert track_region.confidence_at(effect, 0, 21) is None
 
 
+def begun(bpy, until):
+    """Tracking that has come to a frame."""
+    edit, effect, strip = active(bpy)
+    steps = track_region.track(edit, effect, strip, 0, range(11, 31), "SCALE")
+    while next(steps) < until:
+        pass
+    return steps
+
+
+@pytest.mark.parametrize("is_closed", [False, True])
+@pytest.mark.parametrize("again", [False, True])
+def test_undo_while_it_runs_ends_it_without_another_key(bpy, edit, region, again, is_closed):
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="drawn")
+    bpy.context.scene.virtual_shutter.effects[0].regions[0].width = 0.5
+    bpy.ops.ed.undo_push(message="widened")
+    if again:
+        bpy.ops.ed.undo()
+    steps = begun(bpy, 15)
+    (bpy.ops.ed.redo if again else bpy.ops.ed.undo)()
+    before = everything(bpy)
+    assert before[2] == [[]] * 4
+    assert bpy.context.scene.virtual_shutter.effects[0].regions[0].width == pytest.approx(0.5 if again else 0.02)
+    if not is_closed:
+        assert list(steps) == []
+    steps.close()
+    assert everything(bpy) == before
+
+
+def test_another_file_while_it_runs_ends_it(bpy, edit, region):
+    steps = begun(bpy, 15)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    assert list(steps) == []
+
+
+@pytest.mark.parametrize("change", ["remove", "other", "move", "effects"])
+def test_what_happens_to_its_region_ends_it_without_another_key(bpy, edit, region, change):
+    effect = active(bpy)[1]
+    steps = begun(bpy, 15)
+    if change == "remove":
+        region_edits.remove_region(effect, 0)
+    elif change == "other":
+        region_edits.add_region(effect, effect.shutters[1])
+        region_edits.move_region(effect, 1, 0)
+    elif change == "move":
+        effect.start += 3
+    else:  # the collection is elsewhere in memory
+        for _ in range(40):
+            edit.virtual_shutter.effects.add()
+    before = keys(bpy)
+    assert len(list(steps)) == (15 if change == "effects" else 0)
+    assert (keys(bpy) == before) == (change != "effects")
+
+
 def test_it_tracks_what_a_reversed_strip_shows(bpy, edit, frames):
     source = new_source(edit, frames)
     source.use_reverse_frames = True

@@ -7,7 +7,9 @@ that the motion needs within a pixel of the picture.
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
+import bpy
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
@@ -33,6 +35,41 @@ _FAULTS = (
     n_("there is no other frame to track"),
 )
 
+_replacements = 0  # how often Blender's data has been replaced, by undo or by another file
+
+
+def data_replaced() -> None:
+    """Ends all tracking, without another key: what it has found belongs to data that is gone."""
+    global _replacements
+    _replacements += 1
+
+
+class Target(NamedTuple):
+    """A region that is tracked: found again before each step, as anything may happen to Blender's data in between.
+
+    scene: session_uid of the effect's scene; known: what would change if another region took its place"""
+
+    scene: int
+    index: int
+    known: tuple
+
+    @classmethod
+    def of(cls, effect, index: int) -> "Target":
+        return cls(effect.scene.session_uid, index, cls._known(effect, index))
+
+    def effect(self):
+        """The effect, or None: it is gone, has another region there, lies elsewhere, or something was undone."""
+        for scene in bpy.data.scenes:
+            for effect in scene.virtual_shutter.effects:
+                if effect.scene and effect.scene.session_uid == self.scene:
+                    is_there = self.index < len(effect.regions) and self._known(effect, self.index) == self.known
+                    return effect if is_there else None
+        return None
+
+    @staticmethod
+    def _known(effect, index: int) -> tuple:
+        return _replacements, effect.id_data.session_uid, effect.start, effect.regions[index].layer
+
 
 def frames_to_track(edit, strip, direction: str, until: int = 0) -> range:
     """The timeline frames from the current one FORWARD, BACKWARD or in BOTH directions: as far as the strip goes, and
@@ -49,7 +86,7 @@ def frames_to_track(edit, strip, direction: str, until: int = 0) -> range:
 
 def track(edit, effect, strip, index: int, frames: range, motion: str, *, all_keys: bool = False) -> Iterator[int]:
     """Tracks a region from the current frame through timeline frames (frames_to_track). Gives each frame once it is
-    keyed. Closed early, it keeps what it has.
+    keyed. Closed early, it keeps what it has. It ends without another key where the region is not there any more.
 
     motion: one of properties.MOTIONS; all_keys: keys are not thinned
     EffectError, MediaError: it cannot be tracked; where no frame has come yet, nothing has changed."""
@@ -59,13 +96,17 @@ def track(edit, effect, strip, index: int, frames: range, motion: str, *, all_ke
     here = Tracked(start, placement_now(effect.regions[index]), 1.0)
     shape = _standing(_region(edit, effect, strip, index, [start, *anchors]), here)
     found, stops = {start: here}, []
-    shown = snapshot.take(edit, effect, strip, frames)
+    shown, target = snapshot.take(edit, effect, strip, frames), Target.of(effect, index)
+    del edit, effect, strip, keys  # which may not outlive the first step
     with session.open_source(shown) as source:
         try:
             for tracked in _followed(shape, shown, source, start, frames, motion, anchors):
                 if tracked.fault:
                     stops.append(tracked)
                 elif tracked.frame != start:
+                    if (effect := target.effect()) is None:
+                        return
+                    keys = MotionKeys(effect, index, motion)
                     if len(found) == 1:
                         region_edits.key_region(effect, index)
                     found[tracked.frame] = tracked
@@ -73,7 +114,8 @@ def track(edit, effect, strip, index: int, frames: range, motion: str, *, all_ke
                     _write(keys, [beside, tracked], [beside, tracked])
                     yield tracked.frame
         finally:
-            if len(found) > 1:
+            if len(found) > 1 and (effect := target.effect()) is not None:
+                keys = MotionKeys(effect, index, motion)
                 kept = found if all_keys else _thinned(effect, shape, found, {start, *anchors})
                 _write(keys, [found[frame] for frame in kept], found.values())
                 _mark(effect, index, found, stops)

@@ -81,11 +81,14 @@ class SHUTTER_OT_track(_OfRegion, Operator):
         except FAULTS as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        self._tell(selection.active(context)[1])
+        self._tell()
         redraw(context)
         return {"FINISHED"}
 
     def modal(self, context, event):
+        if self._target.effect() is None:  # undone or removed in another window, or another file was loaded
+            self.cancel(context)
+            return {"CANCELLED"}
         is_stopped = event.type == "ESC" and event.value == "PRESS"
         if event.type == "TIMER":
             # What it takes to draw a frame, tracking takes at least as well.
@@ -95,8 +98,8 @@ class SHUTTER_OT_track(_OfRegion, Operator):
             return {"RUNNING_MODAL"}
         self.cancel(context)
         if self.direction == "BOTH":
-            self._edit.frame_set(self._start)
-        self._tell(selection.active(context)[1])
+            self._go_to(self._start)
+        self._tell()
         redraw(context)
         return {"FINISHED"}
 
@@ -110,7 +113,7 @@ class SHUTTER_OT_track(_OfRegion, Operator):
     def _begin(self, context):
         edit, effect, strip = selection.active(context)
         index = effect.active_region
-        self._edit, self._start, self._done = edit, edit.frame_current, set()
+        self._target, self._start, self._done = track_region.Target.of(effect, index), edit.frame_current, set()
         self._frames = track_region.frames_to_track(edit, strip, self.direction, self.until)
         self._steps = track_region.track(edit, effect, strip, index, self._frames, self.motion, all_keys=self.all_keys)
 
@@ -129,8 +132,12 @@ class SHUTTER_OT_track(_OfRegion, Operator):
             self.report({"WARNING"}, str(error))
         return False
 
+    def _go_to(self, frame: int):
+        if (effect := self._target.effect()) is not None:
+            effect.id_data.frame_set(frame)
+
     def _show(self, context):
-        self._edit.frame_set(self._frame)
+        self._go_to(self._frame)
         done, total = len(self._done), len(self._frames) - 1
         context.window_manager.progress_update(done)
         sentence = rpt_("Tracking: {done} of {total} frames, Esc to stop")
@@ -138,8 +145,10 @@ class SHUTTER_OT_track(_OfRegion, Operator):
         redraw(context)
         self._shown = time.perf_counter()
 
-    def _tell(self, effect):
-        for frame, fault in track_region.stops(effect, effect.active_region):
+    def _tell(self):
+        if (effect := self._target.effect()) is None:
+            return
+        for frame, fault in track_region.stops(effect, self._target.index):
             if frame in self._frames:
                 sentence = rpt_("Tracking stopped at frame {frame}: {fault}")
                 self.report({"WARNING"}, sentence.format(frame=frame, fault=fault))
