@@ -155,8 +155,8 @@ def test_all_keys_are_kept_if_one_wants(bpy, region):
 @pytest.mark.parametrize(("motion", "channels"), [("LOCATION", {"location"}), ("ROTATION", {"location", "rotation"})])
 def test_the_motion_says_what_is_keyed(bpy, region, motion, channels):
     track(bpy, motion=motion)
-    made = {c for c in ("location", "rotation", "scale") if any(key[2] == "GENERATED" for key in keys(bpy, c)[0])}
-    assert made == channels
+    assert {c for c in ("location", "rotation", "scale") if keys(bpy, c)} == channels
+    assert all(any(key[2] == "GENERATED" for key in keys(bpy, channel)[0]) for channel in channels)
 
 
 def test_only_what_was_asked_for_is_tracked(bpy, edit, region):
@@ -194,6 +194,71 @@ def test_keys_outside_of_what_was_tracked_stay(bpy, edit, region):
     track(bpy)
     assert [curve[-1] for curve in keys(bpy)] == before
     assert len(keys(bpy)[0]) > 3
+
+
+def placed(bpy, frame):
+    """All that is keyed of where the region is at a frame."""
+    edit, effect, _strip = active(bpy)
+    names = "location", "rotation", "scale"
+    curves = [c for name in names for c in fcurves.curves_under(edit, f"{effect.path_from_id()}.regions[0].{name}")]
+    return [curve.evaluate(frame) for curve in curves]
+
+
+@pytest.mark.parametrize("motion", ["LOCATION", "SCALE"])
+def test_frames_outside_of_what_was_tracked_stay_where_they_are(bpy, edit, region, motion):
+    """Forward from a mended frame, and until another one, between keys that an earlier track has thinned."""
+    track(bpy)
+    before = {frame: placed(bpy, frame) for frame in range(11, 31)}
+    edit.frame_set(18)
+    region.location[1] += 12 / SIZE[1]
+    _edit, effect, strip = active(bpy)
+    frames = track_region.frames_to_track(edit, strip, "FORWARD", 20)
+    steps = track_region.track(edit, effect, strip, 0, frames, motion)
+    assert next(steps) == 19
+    for outside in (range(11, 18), range(20, 31)):
+        for frame in outside:
+            assert placed(bpy, frame) == pytest.approx(before[frame], abs=1e-5)
+    assert list(steps) == [20]
+    for outside in (range(11, 18), range(21, 31)):
+        for frame in outside:
+            assert placed(bpy, frame) == pytest.approx(before[frame], abs=1e-5)
+    assert placed(bpy, 20)[1] == pytest.approx(before[20][1] + 12 / SIZE[1], abs=1.5 / SIZE[1])
+
+
+def test_a_made_key_that_the_editor_has_dragged_is_the_editors(bpy, edit, region):
+    """In the Graph Editor, which leaves its type."""
+    track(bpy)
+    curve = fcurves.find_curve(edit, "virtual_shutter.effects[0].regions[0].location", 1)
+    key = next(key for key in curve.keyframe_points if 14 < key.co[0] < 27)
+    frame, dragged = int(key.co[0]), key.co[1] + 0.05
+    key.co[1] = dragged
+    curve.update()
+    track(bpy)
+    assert curve.evaluate(frame) == pytest.approx(dragged)
+
+
+@pytest.mark.parametrize("operator", ["track", "region_key"])
+@pytest.mark.parametrize("part", ["curve", "group"])
+@pytest.mark.parametrize(("name", "sentence"), [("lock", "is locked"), ("mute", "is muted")])
+def test_curves_that_take_no_keys_are_said(bpy, edit, region, operator, part, name, sentence):
+    move(bpy, 15, 4)
+    (curve,) = fcurves.curves_under(edit, "virtual_shutter.effects[0].regions[0].rotation")
+    setattr(curve if part == "curve" else curve.group, name, True)
+    edit.frame_set(20)
+    channel = "Rotation" if part == "curve" else "Location"
+    refuses(bpy, operator, f'region "Sharp": the F-curve of "{channel}" {sentence}')
+
+
+def test_a_stop_beyond_what_was_to_be_tracked_stays(bpy, edit, tmp_path):
+    first = write_frames(tmp_path / "c", [picture(i, range(5, COUNT)) for i in range(COUNT)])
+    region = drawn(edit, new_source(edit, first))
+    _edit, effect, strip = active(bpy)
+    for frame in (18, 28):
+        stop = region.stops.add()
+        stop.frame, stop.forward, stop.fault = frame - effect.start, True, "covered"
+    list(track_region.track(edit, effect, strip, 0, range(11, 20), "SCALE"))
+    near, far = (frame for frame, _fault in track_region.stops(effect, 0))
+    assert (near < 18, far) == (True, 28)
 
 
 def test_a_region_that_was_moved_and_not_keyed_is_tracked_from_where_it_is(bpy, edit, region):

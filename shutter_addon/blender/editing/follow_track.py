@@ -29,7 +29,9 @@ def follow(edit, effect, strip, index: int) -> None:
     it cannot be followed, and nothing has changed."""
     start = edit.frame_current
     points = _points(edit, effect, strip, index, start)
-    region_edits.key_region(effect, index)
+    keys = _keys(effect, index)
+    keys.hold(start, start)
+    region_edits.key_region(effect, index, keys.channels())
     effect.regions[index].follow_frame = start - effect.start
     _key(edit, effect, strip, index, points)
 
@@ -44,9 +46,14 @@ def _start(effect, index: int) -> int:
     return round(effect.start + validation.number(effect.regions[index], "follow_frame"))
 
 
+def _keys(effect, index: int) -> MotionKeys:
+    region = effect.regions[index]
+    return MotionKeys(effect, index, "LOCATION" if region.follow_kind == "TRACK" else region.motion)
+
+
 def _key(edit, effect, strip, index: int, points: dict[int, Points]) -> None:
     region, start, size = effect.regions[index], _start(effect, index), annotations.picture_size(effect)
-    keys = MotionKeys(effect, index, "LOCATION" if region.follow_kind == "TRACK" else region.motion)
+    keys = _keys(effect, index)
     known = sorted({start, *(frame for frame in keys.edited(range(min(points), max(points) + 1)) if frame in points)})
     shape = snapshot.region_at(edit, effect, strip, index, points)
     placements = _followed(shape, points, known, start, size)
@@ -127,6 +134,7 @@ def _points(edit, effect, strip, index: int, start: int) -> dict[int, Points]:
     MediaError: there is nothing that it can follow from the frame `start` on."""
     region = effect.regions[index]
     validation.check_region(region)
+    region_edits.check_curves(effect, index)
     validation.word(region, "motion")
     tracks, size = _markers(region), annotations.picture_size(effect)
     times = _clip_times(edit, effect, strip, region.follow_clip)

@@ -1,7 +1,7 @@
 """Keys of a region's motion: those that tracking has made, among those of the editor, who mends it by more of them.
 
-What was made has Blender's key type Generated, which editors show in a colour of its own. All other keys are the
-editor's: they keep frame and value, and are linear where a made key follows.
+What was made has Blender's key type Generated, which editors show in a colour of its own, and the value that it was
+made with. All other keys are the editor's: they keep frame and value, and are linear where a made key follows.
 """
 
 from collections.abc import Mapping
@@ -15,6 +15,9 @@ from ..data import fcurves
 
 MADE = "GENERATED"
 _MADE = bpy.types.Keyframe.bl_rna.properties["type"].enum_items[MADE].value
+# What Blender gives each key as the overshoot of the ease Back, which linear keys have no use for: a made key keeps
+# there the value that it was made with, so that one which the editor has moved is told from it.
+NOTHING_KEPT = np.float32(1.70158)
 # The region's channels, and how many of their components a motion has.
 _COMPONENTS = (("location", 0), ("location", 1), ("rotation", 0), ("scale", 0))
 _COUNTS = {"LOCATION": 2, "ROTATION": 3, "SCALE": 4}
@@ -41,12 +44,28 @@ class MotionKeys:
         curve = self._curve("location")
         return curve is not None and bool(_are_made(curve).any())
 
+    def channels(self) -> list[str]:
+        """The region's channels that the motion has, and those that have keys already."""
+        count = _COUNTS[self.motion]
+        found = (name for k, (name, component) in enumerate(_COMPONENTS) if k < count or self._curve(name, component))
+        return list(dict.fromkeys(found))
+
+    def hold(self, first: int, last: int) -> None:
+        """Keys what was tracked right before and after these frames where it is there: it stays, whatever becomes of
+        the keys between."""
+        tracked = set(self.confidence()[0].tolist())
+        for frame in tracked & {first - 1, last + 1}:
+            for curve in filter(None, (self._curve(name, component) for name, component in _COMPONENTS)):
+                if frame not in fcurves.points_of(curve)[:, 0]:
+                    _insert(curve, frame, curve.evaluate(frame))
+
     def write(self, placements: Mapping[int, Placement], confidence: Mapping[int, float]) -> None:
         """Makes keys at these frames, in place of all that were made from the first frame of the confidence to its
-        last, of the channels that are not keyed as well.
+        last, of the channels that are not keyed as well. Other frames that were tracked stay as they are.
 
         confidence: 0 to 1 by frame"""
         within = min(confidence), max(confidence)
+        self.hold(*within)
         for k, (name, component) in enumerate(_COMPONENTS):
             is_keyed = k < _COUNTS[self.motion]
             values = {frame: _values(placement)[k] for frame, placement in placements.items()} if is_keyed else {}
@@ -84,12 +103,17 @@ def _replace(curve, values: dict[int, float], first: int, last: int) -> None:
         points.remove(points[i], fast=True)
     edited = set(fcurves.points_of(curve)[:, 0].tolist())
     for frame in sorted(values.keys() - edited):
-        points.insert(frame, values[frame], options={"FAST"}, keyframe_type=MADE)
+        _insert(curve, frame, values[frame])
     if values:
         begins_span = fcurves.points_of(curve)[:, 0] < last
         for i in np.flatnonzero(_within(curve, first, last) & (begins_span | _are_made(curve))).tolist():
             points[i].interpolation = "LINEAR"
     curve.update()
+
+
+def _insert(curve, frame: int, value: float) -> None:
+    key = curve.keyframe_points.insert(frame, value, options={"FAST"}, keyframe_type=MADE)
+    key.interpolation, key.back = "LINEAR", key.co[1]
 
 
 def _within(curve, first: int, last: int) -> np.ndarray:
@@ -98,6 +122,8 @@ def _within(curve, first: int, last: int) -> np.ndarray:
 
 
 def _are_made(curve) -> np.ndarray:
-    types = np.empty(len(curve.keyframe_points), np.int32)
+    """Which of an F-curve's keys (n,) were made, and are as they were made."""
+    types, kept = np.empty(len(curve.keyframe_points), np.int32), np.empty(len(curve.keyframe_points), np.float32)
     curve.keyframe_points.foreach_get("type", types)
-    return types == _MADE
+    curve.keyframe_points.foreach_get("back", kept)
+    return (types == _MADE) & ((kept == fcurves.points_of(curve)[:, 1]) | (kept == NOTHING_KEPT))

@@ -91,11 +91,16 @@ def track(edit, effect, strip, index: int, frames: range, motion: str, *, all_ke
     motion: one of properties.MOTIONS; all_keys: keys are not thinned
     EffectError, MediaError: it cannot be tracked; where no frame has come yet, nothing has changed."""
     validation.check_region(effect.regions[index])
+    region_edits.check_curves(effect, index)
     start, keys = edit.frame_current, MotionKeys(effect, index, motion)
     anchors = [frame for frame in keys.edited(frames) if frame != start]
     here = Tracked(start, placement_now(effect.regions[index]), 1.0)
     shape = _standing(_region(edit, effect, strip, index, [start, *anchors]), here)
     found, stops = {start: here}, []
+    reach = (
+        max((a for a in anchors if a < start), default=frames[0]),
+        min((a for a in anchors if a > start), default=frames[-1]),
+    )
     shown, target = snapshot.take(edit, effect, strip, frames), Target.of(effect, index)
     del edit, effect, strip, keys  # which may not outlive the first step
     with session.open_source(shown) as source:
@@ -108,7 +113,8 @@ def track(edit, effect, strip, index: int, frames: range, motion: str, *, all_ke
                         return
                     keys = MotionKeys(effect, index, motion)
                     if len(found) == 1:
-                        region_edits.key_region(effect, index)
+                        keys.hold(start, start)
+                        region_edits.key_region(effect, index, keys.channels())
                     found[tracked.frame] = tracked
                     beside = found.get(tracked.frame + (-1 if tracked.frame > start else 1), tracked)
                     _write(keys, [beside, tracked], [beside, tracked])
@@ -118,7 +124,7 @@ def track(edit, effect, strip, index: int, frames: range, motion: str, *, all_ke
                 keys = MotionKeys(effect, index, motion)
                 kept = found if all_keys else _thinned(effect, shape, found, {start, *anchors})
                 _write(keys, [found[frame] for frame in kept], found.values())
-                _mark(effect, index, found, stops)
+                _mark(effect, index, found, stops, reach)
     if len(found) == 1:
         raise EffectError(rpt_(stops[0].fault))
 
@@ -184,13 +190,16 @@ def _write(keys: MotionKeys, kept: Iterable[Tracked], found: Iterable[Tracked]) 
     keys.write({t.frame: t.placement for t in kept}, {t.frame: t.confidence for t in found})
 
 
-def _mark(effect, index: int, found: dict[int, Tracked], stops: list[Tracked]) -> None:
-    """Notes where tracking stopped, in place of what was noted of a direction, and of frames that it came through."""
+def _mark(effect, index: int, found: dict[int, Tracked], stops: list[Tracked], reach: tuple[int, int]) -> None:
+    """Notes where tracking stopped, in place of what was noted of frames that it came through, and of those behind a
+    stop up to where it was to go.
+
+    reach: the first and the last frame that it was to track"""
     region, start = effect.regions[index], next(iter(found))
     ways = {stop.frame > start for stop in stops}
+    first, last = reach[0] if False in ways else min(found), reach[1] if True in ways else max(found)
     for i in reversed(range(len(region.stops))):
-        old = region.stops[i]
-        if old.forward in ways or min(found) <= effect.start + old.frame <= max(found):
+        if first <= effect.start + region.stops[i].frame <= last:
             region.stops.remove(i)
     for stop in stops:
         new = region.stops.add()

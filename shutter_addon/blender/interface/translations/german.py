@@ -604,6 +604,14 @@ MESSAGES = {
         "*",
         "the current frame is outside of the Shutter strip",
     ): "das aktuelle Bild liegt außerhalb des Verschluss-Streifens",
+    (
+        "*",
+        'region "{region}": the F-curve of "{channel}" is locked',
+    ): "Region „{region}“: die F-Kurve von „{channel}“ ist gesperrt",
+    (
+        "*",
+        'region "{region}": the F-curve of "{channel}" is muted',
+    ): "Region „{region}“: die F-Kurve von „{channel}“ ist stummgeschaltet",
     ("*", "the shot ends here"): "die Einstellung endet hier",
     (
         "*",
