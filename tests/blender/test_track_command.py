@@ -77,12 +77,30 @@ def test_every_key_is_kept_on_demand_and_only_in_those_frames(track, film, tmp_p
     options = ("--region", "cross", "--frame", 6, "--frames", "4:8", "--motion", "location", "--all-keys")
     assert track(film, *options, "--output", tmp_path / "t.json", recipe=given) == (0, "")
     found = keys(tmp_path / "t.json")
-    assert [key.frame for key in found] == [2, 4, 5, 6, 7, 8, 11]
+    assert [key.frame for key in found] == [2, 3, 4, 5, 6, 7, 8, 9, 10, 11]
     assert (found[0].ease, found[0].location, found[-1].location) == ("bezier", (0.5, 0.5), (0.5, 0.5))
     assert {key.scale for key in found} == {1.0}
-    # where the keys had put it, frame 6 lies still
-    before = recipes.load(tmp_path / "recipe.json").effect(WIDTH / HEIGHT).regions[1].location.at(6)
-    assert found[3].location == pytest.approx(before)
+    # at frame 6, and at those that were not tracked, it is where the keys had put it
+    before, after = (
+        recipes.load(tmp_path / name).effect(WIDTH / HEIGHT).regions[1].location for name in ("recipe.json", "t.json")
+    )
+    for frame in (1, 2, 3, 6, 9, 10, 11, 12):
+        assert after.at(frame) == pytest.approx(before.at(frame)), frame
+
+
+@pytest.mark.parametrize("ease", ["linear", "constant"])
+def test_frames_beyond_those_that_are_tracked_stay(track, film, tmp_path, ease):
+    given = plain(keys=[{"frame": n, "location": [n / 50, 0], "scale": 1 + n / 50, "ease": ease} for n in (1, 6, 12)])
+    options = ("--region", "cross", "--frame", 6, "--frames", "5:7", "--output", tmp_path / "t.json")
+    assert track(film, *options, recipe=given) == (0, "")
+    before, after = (
+        recipes.load(tmp_path / name).effect(WIDTH / HEIGHT).regions[1] for name in ("recipe.json", "t.json")
+    )
+    for frame in (1, 2, 3, 4, 8, 9, 10, 11, 12):
+        assert after.location.at(frame) == pytest.approx(before.location.at(frame)), frame
+        assert after.scale.at(frame) == pytest.approx(before.scale.at(frame)), frame
+    if ease == "linear":
+        assert [key.frame for key in keys(tmp_path / "t.json")] == [1, 4, 5, 6, 7, 8, 12]
 
 
 def test_a_redrawn_shape_stays_drawn_where_it_was(track, film, tmp_path):
