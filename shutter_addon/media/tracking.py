@@ -6,9 +6,9 @@ fails, with the last one in which the subject was surely seen. No bpy.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, takewhile
 
 import numpy as np
 
@@ -80,9 +80,9 @@ class Footage:
         share = min(1.0, WIDTH / max(source.width, source.height))
         self.size = max(1, round(source.width * share)), max(1, round(source.height * share))
         self._kept: dict[int, np.ndarray] = {}
-        self._wanted = range(0)
+        self._wanted: Sequence[int] = ()
 
-    def want(self, frames: range) -> None:
+    def want(self, frames: Sequence[int]) -> None:
         """Says which timeline frames will be asked for, in this order."""
         self._wanted = frames
 
@@ -287,14 +287,13 @@ class _Track:
 
     def _alike(self, frame: int, other: int) -> bool:
         """Whether the region covers at one frame what it covers at another, as far as corners tell."""
-        return any(
-            confidence(
-                self.part(a)[0].find(self._footage.picture(b), self._known(a, b), self._motion),
-                self._footage.picture(b),
-            )
-            >= _DOUBTFUL
-            for a, b in ((frame, other), (other, frame))
-        )
+        return self._is_seen_at(frame, other) or self._is_seen_at(other, frame)
+
+    def _is_seen_at(self, frame: int, other: int) -> bool:
+        """Whether the look of a frame may be seen where the region is at another one."""
+        picture = self._footage.picture(other)
+        match = self.part(frame)[0].find(picture, self._known(frame, other), self._motion)
+        return confidence(match, picture) >= _DOUBTFUL
 
     def _surer(self, frame: int, other: int, shown: set[int]) -> int | None:
         """Of two frames the one whose look is the subject's: it is seen again behind the other one, but not the other's
@@ -306,10 +305,11 @@ class _Track:
         """Whether the look of a frame is surely seen soon behind another one."""
         step = 1 if other > frame else -1
         behind = range(other + step, other + step * (PATIENCE + 1), step)
+        behind = list(takewhile(shown.__contains__, behind))
         self._footage.want(behind)
         pursuit = _Pursuit(self.part(frame)[0], self._footage.picture(frame), self._motion, self._known(frame, other))
         for each in behind:
-            if each not in shown or self._footage.cut(each - step, each):
+            if self._footage.cut(each - step, each):
                 break
             found = pursuit.next(self._footage.picture(each))
             if found and found[1] >= SURE:
