@@ -1,3 +1,13 @@
 """The figures of the paper made again: footage, recipes and stills; `scripts/gallery NAME` makes one."""
 
-NAMES = ("pendulum", "sphere", "displacement", "bunny", "hands", "crowd", "rolling_shutter", "light_trails")
+NAMES = (
+    "pendulum",
+    "sphere",
+    "displacement",
+    "bunny",
+    "hands",
+    "crowd",
+    "rolling_shutter",
+    "light_trails",
+    "one_stroke",
+)

@@ -21,8 +21,9 @@ ASSETS = ROOT / "assets"
 
 @dataclass(frozen=True)
 class Item:
-    """A figure of the paper.
+    """A figure of the paper, or one beyond it.
 
+    figure: its number in the paper
     footage: gets a folder for what it renders, returns the source: a movie, or the first file of a sequence
     recipes: names of files beside the module; each becomes a film and a .blend of the same name
     frames: the film's first and last timeline frame
@@ -31,7 +32,7 @@ class Item:
     """
 
     name: str
-    figure: int
+    figure: int | None
     title: str
     footage: Callable[[Path], Path]
     recipes: tuple[str, ...]

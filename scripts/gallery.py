@@ -29,7 +29,8 @@ def main() -> int:
         return 2
     if not names:
         for item in map(load, NAMES):
-            print(f"{item.name:16} Figure {item.figure:2}: {item.title}")
+            figure = f"Figure {item.figure}" if item.figure else "new"
+            print(f"{item.name:16} {figure + ':':11}{item.title}")
     for item in map(load, names):
         try:
             code = make(item, arguments.output / item.name, arguments.docs)

@@ -9,6 +9,7 @@ from .interface import (
     operators,
     panels,
     preview,
+    probe_gizmo,
     region_gizmo,
     split_gizmo,
     track_operators,
@@ -29,6 +30,7 @@ _modules = (
     bar_editor,
     region_gizmo,
     split_gizmo,
+    probe_gizmo,
     handlers,
 )
 _commands = []

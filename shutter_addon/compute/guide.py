@@ -5,8 +5,6 @@ its differences are taken over as many times more pixels, so that conductances a
 
 It is steadied: where the frames beside the shown one differ little from it, it is their mean. Noise that comes and
 goes in a still picture would else make coefficients flicker. What moves differs more, and stays as it is shown.
-
-All is counted in 16-bit integers, or exact in a float: guides have the same bits on every machine.
 """
 
 from __future__ import annotations
@@ -15,13 +13,12 @@ import numpy as np
 
 from ..core import light
 from ..core.frame_source import FrameSource
-from ..core.messages import EffectError
 
 # Rows of the picture whose pixels are smoothed over about one, by a Gaussian of so many pixels.
 ROWS = 240
 BLUR = 1.0
 # The fewest rows that a frame is reduced to before it is smoothed: what is between them is gone afterwards anyway.
-REDUCED = 360
+REDUCED = 240
 # Filmed frames on each side that steady the shown one, and the difference, of 1, from which on one counts nothing.
 BESIDE = 2
 ALIKE = 0.04
@@ -70,39 +67,35 @@ class Guides:
 
     def guide(self, frames: tuple[int, ...], block: int) -> np.ndarray:
         """The guide (h, w, 3) float32 of the frame that comes first in `guiding`, a pixel for each block × block of its
-        pixels: 0 to 1, times the rows of such pixels over ROWS.
-
-        EffectError: OpenCV is missing."""
+        pixels: 0 to 1, times the rows of such pixels over ROWS."""
         key = frames, block
         if self._made is None or self._made[0] != key:
             for index in sorted(self.lacking(frames)):
                 self._reduced[index] = self._reduce(self._source.read(index))
             shown, *beside = (self._reduced[index] for index in frames)
-            self._made = key, self._on_blocks(_opencv().merge(_steadied(shown, beside)), block)
+            scale = np.float32(self._short / (block * ROWS * _WHITE))
+            self._made = key, self._on_blocks(_steadied(shown, beside) * scale, block)
         return self._made[1]
 
     def _reduce(self, frame: np.ndarray) -> np.ndarray:
         """A frame's display values (3, h, w) uint16 in cells, smoothed."""
-        cv2 = _opencv()
-        small = cv2.cvtColor(_averaged(_prepared(frame, self._source.alpha), self._cell), cv2.COLOR_RGBA2RGB)
-        white = np.iinfo(small.dtype).max if small.dtype.kind == "u" else 1
+        colours = _averaged(_over_black(frame, self._source.alpha), self._cell)
         if self._source.transfer == "linear":
-            small, white = light.to_encoded(small / np.float32(white)), 1
-        codes = np.rint(small * np.float32(_WHITE / white)).astype(np.uint16)
-        sigma = BLUR * self._short / (ROWS * self._cell)
-        smooth = cv2.GaussianBlur(codes, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE)
-        return np.ascontiguousarray(np.moveaxis(smooth, -1, 0))
+            colours = light.to_encoded(colours)
+        # What averaging and interpolation smooth by themselves: variances of 1/12 and 1/6 of a cell.
+        variance = (BLUR * self._short / (ROWS * self._cell)) ** 2 - (1 - 1 / self._cell**2) / 4
+        sigma = variance**0.5
+        smooth = _smoothed(_smoothed(np.ascontiguousarray(np.moveaxis(colours, -1, 0)), sigma, 1), sigma, 2)
+        return np.rint(smooth * np.float32(_WHITE)).astype(np.uint16)
 
     def _on_blocks(self, picture: np.ndarray, block: int) -> np.ndarray:
-        cv2 = _opencv()
-        width, height = -(-self._source.width // block), -(-self._source.height // block)
+        """A picture (3, h, w) of cells on blocks, (h, w, 3)."""
+        picture = np.ascontiguousarray(np.moveaxis(picture, 0, -1))
         if block > self._cell:
             picture = _averaged(picture, block // self._cell)
-        elif block < self._cell:
-            # Weights are multiples of 1 / (2 · scale), and so are exact in a float.
-            scale = self._cell // block
-            picture = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_LINEAR)[:height, :width]
-        return picture * np.float32(self._short / (block * ROWS * _WHITE))
+        for axis, length in enumerate((self._source.height, self._source.width)):
+            picture = _spread(picture, self._cell // block, axis, -(-length // block))
+        return picture
 
 
 class NotedSource:
@@ -120,48 +113,75 @@ class NotedSource:
         return frame
 
 
-def _prepared(frame: np.ndarray, alpha: str) -> np.ndarray:
-    """A frame over black, as it is shown; of floats what is between 0 and 1."""
+def _over_black(frame: np.ndarray, alpha: str) -> np.ndarray:
+    """A frame (h, w, 4) with its colours over black; whole numbers as they are, else what is between 0 and 1."""
     if frame.dtype.kind == "f":
         frame = np.nan_to_num(frame.astype(np.float32), copy=False).clip(0, 1)
     if alpha != "straight":
         return frame
     white = np.float32(np.iinfo(frame.dtype).max if frame.dtype.kind == "u" else 1)
-    return light.premultiplied(frame.astype(np.float32) / white)
+    return light.premultiplied(frame / white)
 
 
 def _averaged(picture: np.ndarray, size: int) -> np.ndarray:
-    """Means over squares of size × size pixels; at the right and at the bottom, the last pixel goes on."""
-    if size == 1:
+    """Means (h, w, 3) float32, 0 to 1, over squares of size × size pixels; at the right and the bottom, the last pixel
+    goes on."""
+    whole = picture.dtype.kind == "u"
+    unit = np.float32(size * size * (np.iinfo(picture.dtype).max if whole else 1))
+    if size > 1:
+        down, right = (-length % size for length in picture.shape[:2])
+        if down or right:
+            picture = np.pad(picture, ((0, down), (0, right), (0, 0)), mode="edge")
+        height, width, channels = picture.shape
+        sums = np.uint32 if whole else np.float32
+        rows = picture.reshape(height // size, size, -1).sum(axis=1, dtype=sums)
+        picture = rows.reshape(height // size, width // size, size, channels).sum(axis=2)
+    return picture[..., :3] / unit
+
+
+def _smoothed(planes: np.ndarray, sigma: float, axis: int) -> np.ndarray:
+    """Planes (3, h, w) float32 after a Gaussian along an axis; beyond the edge, the last pixel goes on."""
+    radius, length = round(3 * sigma), planes.shape[axis]
+    weights = np.exp(-0.5 * (np.arange(radius + 1) / sigma) ** 2)
+    weights = (weights / (2 * weights.sum() - weights[0])).astype(np.float32)
+    padded = np.pad(planes, [(radius, radius) if a == axis else (0, 0) for a in range(3)], mode="edge")
+
+    def at(offset):
+        cells = [slice(None)] * 3
+        cells[axis] = slice(radius + offset, radius + offset + length)
+        return padded[tuple(cells)]
+
+    total = at(0) * weights[0]
+    for k in range(1, radius + 1):
+        pair = at(-k) + at(k)
+        pair *= weights[k]
+        total += pair
+    return total
+
+
+def _spread(picture: np.ndarray, scale: int, axis: int, length: int) -> np.ndarray:
+    """Linear interpolation of a picture (h, w, 3) to `scale` times as many pixels along an axis, of which it gives
+    `length`. Its pixels lie in the middle of theirs."""
+    if scale < 2:
         return picture
-    cv2 = _opencv()
-    height, width = picture.shape[:2]
-    down, right = -height % size, -width % size
-    if down or right:
-        picture = cv2.copyMakeBorder(picture, 0, down, 0, right, cv2.BORDER_REPLICATE)
-    whole = picture.shape[1] // size, picture.shape[0] // size
-    return cv2.resize(picture, whole, interpolation=cv2.INTER_AREA)
+    picture = np.moveaxis(picture, axis, 0)
+    found = np.empty((scale * len(picture), *picture.shape[1:]), np.float32)
+    before, after = (np.concatenate(ends) for ends in ((picture[:1], picture[:-1]), (picture[1:], picture[-1:])))
+    for k in range(scale):
+        apart = (k + 0.5) / scale - 0.5
+        share = np.float32(abs(apart))
+        found[k::scale] = (1 - share) * picture + share * (before if apart < 0 else after)
+    return np.moveaxis(found[:length], 0, axis)
 
 
 def _steadied(shown: np.ndarray, beside: list[np.ndarray]) -> np.ndarray:
-    """The mean (3, h, w) float32, in whole numbers, of pictures uint16 where they are like `shown`."""
+    """The mean (3, h, w) float32 of pictures uint16 where they are like `shown`."""
     total, weights = shown.astype(np.float32), np.ones(shown.shape[1:], np.float32)
     for other in beside:
-        largest = _opencv().absdiff(other, shown).max(axis=0)
-        share = largest * np.float32(1 / (ALIKE * _WHITE))
+        apart = (np.maximum(other, shown) - np.minimum(other, shown)).max(axis=0)
+        share = apart * np.float32(1 / (ALIKE * _WHITE))
         weight = np.maximum(1 - share * share, 0) ** 2  # Tukey's biweight
         weights += weight
         for plane, other_plane in zip(total, other, strict=True):
             plane += weight * other_plane
-    return np.rint(total / weights)
-
-
-def _opencv():
-    try:
-        import cv2
-    except ImportError as error:  # a package without wheels
-        raise EffectError(
-            f"Follow Edges needs the Python package opencv-contrib-python-headless ({error}); "
-            "install the zip of Virtual Shutter that is made for your system"
-        ) from None
-    return cv2
+    return total / weights

@@ -44,6 +44,11 @@ def window_indices(options: Options, index: int, shot: range, direction: int = 1
     return source_frames(options, window_positions(options, index, direction), shot)
 
 
+def mixed_shutter(state: FrameState, coefficients) -> np.ndarray:
+    """The bars (…, L) of the shutter that pixels with coefficients (…, N) are exposed with, Σ coefficients = 1."""
+    return shutters.INTERPOLATIONS[state.options.interpolation](state.bars, coefficients)
+
+
 def compose(state: FrameState, frames, present, coefficients) -> np.ndarray:
     """The picture (H, W, 4) float64, scene-linear and premultiplied: F = e(q) · ∫ V(t + ⌊Q⁻¹(z)⌋) dz (§3.1, §3.4.1).
 

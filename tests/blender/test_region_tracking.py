@@ -7,6 +7,7 @@ from support import write_frames
 from shutter_addon.blender.data import annotations, fcurves, selection, strips
 from shutter_addon.blender.editing import add_effect, follow_track, region_edits, shutter_edits, track_region
 from shutter_addon.blender.editing.motion_keys import MotionKeys
+from shutter_addon.core.motions import Placement
 
 SIZE = np.array([240, 160])
 COUNT = 20
@@ -184,6 +185,22 @@ def test_a_wrong_frame_is_mended_by_a_key_and_tracking_again(bpy, edit, region):
     assert apart(bpy, 12, 1) < 2
     assert apart(bpy, 25, 14) == pytest.approx(12, abs=0.1)
     assert 3 < apart(bpy, 18, 7) < 9, "half of both"
+
+
+def test_a_made_key_that_the_editor_sets_again_is_the_editors(bpy, edit, region):
+    track(bpy, all_keys=True)
+    move(bpy, 25, 14)
+    assert types(bpy)[25] == "KEYFRAME"
+    assert types(bpy)[24] == types(bpy)[26] == "GENERATED"
+
+
+def test_the_editors_keys_are_never_written_over(bpy, edit, region):
+    move(bpy, 15, 4)
+    before = [curve[0][:3] for curve in keys(bpy)]
+    made = {frame: Placement((0.5, 0.5), 90.0, 2.0) for frame in (11, 15, 20)}
+    MotionKeys(active(bpy)[1], 0, "SCALE").write(made, dict.fromkeys(made, 1.0))
+    assert [curve[1][:3] for curve in keys(bpy)] == before
+    assert types(bpy) == {11: "GENERATED", 15: "KEYFRAME", 20: "GENERATED"}
 
 
 def test_keys_outside_of_what_was_tracked_stay(bpy, edit, region):
@@ -375,11 +392,17 @@ def test_where_the_subject_is_covered_it_stops_and_says_why(bpy, edit, tmp_path)
     assert len(region.stops) == 1, "it is the same one"
 
 
+def test_every_sentence_of_the_tracker_can_be_translated():
+    from shutter_addon.media import tracking
+
+    said = {words for name, words in vars(tracking).items() if name.isupper() and isinstance(words, str)}
+    assert len(said) > 5
+    assert said == set(track_region._FAULTS)
+
+
 def test_the_next_unsure_frame(bpy, region):
     _edit, effect, _strip = active(bpy)
     placement = {11: 1.0, 12: 0.9, 13: 0.4, 14: 0.6, 15: 0.0}
-    from shutter_addon.core.motions import Placement
-
     MotionKeys(effect, 0, "SCALE").write({11: Placement(), 15: Placement()}, placement)
     assert track_region.next_unsure(effect, 0, 11) == 13
     assert track_region.next_unsure(effect, 0, 13) == 15
@@ -474,8 +497,6 @@ def test_it_stops_at_a_cut(bpy, edit, tmp_path):
 
 
 def test_a_button_goes_to_the_frames_that_need_a_look(bpy, edit, region):
-    from shutter_addon.core.motions import Placement
-
     keys = MotionKeys(active(bpy)[1], 0, "SCALE")
     keys.write({11: Placement(), 15: Placement()}, {11: 1.0, 12: 0.9, 13: 0.4, 14: 0.6, 15: 0.0})
     call(bpy, "track_look")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy import ndimage
-from test_composition import Footage, few_pieces, footage
+from test_composition import Footage, few_pieces
 from test_shots import BETWEEN, STEP, film, with_between
 
 from shutter_addon.compute import guide
@@ -234,16 +234,3 @@ def test_in_betweens_that_guide_are_needed():
     first = BETWEEN[1]
     assert renderer.needed(first + 1, 1, moment, known=False) == {28, 32, 36}
     assert renderer.needed(first + 2, 1, moment, known=False) == {29, 28, 32, 36}
-
-
-def test_without_opencv_it_is_said(monkeypatch):
-    import sys
-
-    from shutter_addon.core.messages import EffectError
-
-    monkeypatch.setitem(sys.modules, "cv2", None)
-    renderer = Renderer(CPUCompositor(), footage(np.random.default_rng(55)))
-    moment = guided(np.random.default_rng(55))
-    with pytest.raises(EffectError, match="Follow Edges needs the Python package opencv-contrib-python-headless"):
-        renderer.picture(3, moment)
-    renderer.picture(3, guided(np.random.default_rng(55), strength=0.0))

@@ -110,3 +110,18 @@ def test_light_round_trip():
     codes = np.linspace(-0.5, 3, 1000)
     assert light.to_encoded(light.to_linear(codes)) == pytest.approx(codes, abs=1e-7)
     assert light.to_linear(np.float64(0.5)) == pytest.approx(0.21404114, abs=1e-7)
+
+
+@pytest.mark.parametrize("interpolation", ["displacement", "value"])
+def test_a_pixels_shutter_is_the_share_of_each_frame(interpolation):
+    """Each frame of the window alone in white shows how much of it the picture takes."""
+    bars = np.random.default_rng(5).random((3, 6))
+    shutter_state, c = state(bars, interpolation=interpolation), [0.2, 0.5, 0.3]
+    taken = []
+    for k in range(6):
+        pictures = np.zeros((6, 1, 1, 4))
+        pictures[k] = 1
+        taken.append(compositor.compose(shutter_state, pictures, np.ones(6, bool), everywhere(c, (1, 1)))[0, 0, 0])
+    shutter = compositor.mixed_shutter(shutter_state, c)
+    assert shutter / shutter.sum() == pytest.approx(taken)
+    assert shutter.sum() == pytest.approx(c @ bars.sum(axis=1))

@@ -12,7 +12,7 @@ import addon_utils
 import bpy
 import numpy as np
 import traces
-from driver import area_of, drag, enable, key, move, play, region_of, shot
+from driver import area_of, click, drag, enable, key, move, play, region_of, screen, shot
 
 FOOTAGE = Path(__file__).parents[2] / "assets" / "bigbuckbunny.mp4"
 
@@ -95,6 +95,47 @@ def a_drawn_region_is_one_step():
     assert len(effect_now().regions) == len(effect_now().scene.annotation.layers) == 0
 
 
+def probe_follows_the_pointer():
+    """The probe shows the pixel under the pointer, keeps it while the pointer is elsewhere, and takes no click."""
+    _, _, region = preview()
+    live = bpy.context.window_manager.virtual_shutter
+    before, live.probe = pixels("no probe"), True
+    for x, y in ((region.width // 2, region.height * 2 // 5), (region.width * 3 // 5, region.height * 3 // 5)):
+        for step in (8, 0):  # a pointer that rests tells nothing
+            move(region, x + step, y)
+            yield 0.5
+        expected, pixel = on_picture(region, x + 0.5, y + 0.5)
+        assert (np.abs(expected - live.probe_at) < pixel).all(), (tuple(live.probe_at), expected)
+        left, top = screen(region, x + 60, y - 60)
+        box = np.s_[top : top + 20, left : left + 20]
+        assert np.abs(pixels("probe")[box] - before[box]).max() > 0.1, "nothing is drawn beside the pointer"
+    edit_now().sequence_editor.active_strip.select = False
+    click(region, region.width * 0.6, region.height * 0.6)
+    yield 0.5
+    assert any(strip.select for strip in edit_now().sequence_editor.strips), "the click has not come through"
+    place = tuple(live.probe_at)
+    move(region, region.width / 2, region.height + 12)
+    yield 0.5
+    assert tuple(live.probe_at) == place
+
+
+def on_picture(region, x, y):
+    """A point of the preview's region in fractions of the picture, which is not scaled; and how large a pixel of the
+    region is there, as Blender rounds to one."""
+    render, to_view = effect_now().scene.render, region.view2d.region_to_view
+    size = render.resolution_x, render.resolution_y
+    at = np.array(to_view(x, y))
+    return at / size + 0.5, (np.array(to_view(x + 1, y + 1)) - at) / size
+
+
+def pixels(name):
+    """What the screen shows, top row first."""
+    image = bpy.data.images.load(str(shot(name)))
+    found = np.array(image.pixels[:]).reshape(image.size[1], image.size[0], -1)[::-1]
+    bpy.data.images.remove(image)
+    return found
+
+
 def disabled(before):
     """Nothing is left, and the preview takes a click and a key."""
     addon_utils.disable(traces.NAME)
@@ -120,6 +161,7 @@ def story():
     yield from painted_between_keys()
     shot("enabled")
     yield from a_drawn_region_is_one_step()
+    yield from probe_follows_the_pointer()
     yield from disabled(before)
     shot("disabled")
     enable()

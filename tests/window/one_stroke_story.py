@@ -135,7 +135,7 @@ def escaped():
     story.edit().frame_set(FRAME)
     yield 1.0
     yield from tracked()
-    yield from driver.until(lambda: story.edit().frame_current > FRAME + 3, "the preview goes along", 60)
+    yield from driver.until(lambda: story.edit().frame_current != FRAME, "the preview goes along", 60, wait=0.02)
     driver.shot("4_escaping")
     driver.key("Escape")
     yield from ended()

@@ -33,6 +33,7 @@ _FAULTS = (
     n_("the region has no strokes to follow"),
     n_("the region lies outside the picture"),
     n_("there is no other frame to track"),
+    n_("the frame lies outside what can be tracked"),
 )
 
 _replacements = 0  # how often Blender's data has been replaced, by undo or by another file

@@ -54,15 +54,19 @@ def lines(points, color, closed: bool = False, width: float = 1.0) -> None:
     gpu.state.blend_set("NONE")
 
 
-def text(x: float, y: float, words: str, size: float = 11, color=(1, 1, 1, 0.9)) -> None:
-    """Words with their lower left corner at a point."""
+def text(x: float, y: float, words: str, size: float = 11, color=(1, 1, 1, 0.9), until: float | None = None) -> None:
+    """Words with their lower left corner at a point; until: the x where they are cut off."""
     blf.size(0, size * ui_scale())
     blf.color(0, *color)
     blf.position(0, x, y, 0)
     blf.enable(0, blf.SHADOW)
     blf.shadow(0, 3, 0, 0, 0, 0.8)
+    if until is not None:
+        blf.enable(0, blf.CLIPPING)
+        blf.clipping(0, x, y - 2 * size, until, y + 4 * size)
     blf.draw(0, words)
     blf.disable(0, blf.SHADOW)
+    blf.disable(0, blf.CLIPPING)
 
 
 def _draw(kind: str, corners, colors, indices) -> None:

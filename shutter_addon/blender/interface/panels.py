@@ -125,6 +125,7 @@ def _draw_live(layout, context):
     view = row.row(align=True)
     view.active = live.live
     view.prop(live, "view", text="")
+    view.prop(live, "probe", text="", icon="EYEDROPPER")
 
 
 def _draw_source(layout, effect):

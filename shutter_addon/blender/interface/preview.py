@@ -6,7 +6,7 @@ import bpy
 import gpu
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty
 from bpy.types import PropertyGroup
 from gpu_extras.batch import batch_for_shader
 
@@ -74,6 +74,18 @@ class ShutterPreview(PropertyGroup):
         default=0.5,
         min=0.0,
         max=1.0,
+        update=redraw,
+    )
+    probe: BoolProperty(
+        name="Probe",
+        description="Show the shutter and the coefficients of the pixel that the pointer was over last",
+        update=redraw,
+    )
+    probe_at: FloatVectorProperty(
+        name="Probe Position",
+        description="The pixel that is probed, in fractions of the picture from its lower left corner",
+        size=2,
+        default=(-1.0, -1.0),
         update=redraw,
     )
 
@@ -147,10 +159,15 @@ def _draw() -> None:
         say.draw()
 
 
-def _show(context, found: Shown, settings, say) -> None:
+def request_of(found: Shown) -> session.FrameRequest:
+    """What the effect strip shows at the current frame. One of session.FAULTS: it cannot be shown."""
     frame = found.edit.frame_current
     snapshot = invalidation.current(found.edit, found.effect, found.strip, frame)
-    request = session.here().request(snapshot, frame)
+    return session.here().request(snapshot, frame)
+
+
+def _show(context, found: Shown, settings, say) -> None:
+    request = request_of(found)
     quad = Quad(context.region, found.strip, annotations.picture_size(found.effect))
     has_result = settings.view in ("RESULT", "SPLIT")
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0

@@ -118,6 +118,17 @@ class BlenderDevice:
         self._shaders = {}
 
 
+def texel(texture: Texture, x: int, y: int) -> np.ndarray:
+    """The numbers (4 · layers,) float32 of all layers of an rgba32f texture at a texel; nothing else is read."""
+    layers = texture.size[2]
+    values = np.empty((layers, 4), np.float32)
+    for layer, found in enumerate(values):
+        framebuffer = gpu.types.GPUFrameBuffer(color_slots={"texture": texture.gpu, "layer": layer})
+        with framebuffer.bind():
+            framebuffer.read_color(x, y, 1, 1, 4, 0, "FLOAT", data=_buffer("FLOAT", found))
+    return values.reshape(-1)
+
+
 @cache
 def opens_in_background() -> bool:
     """Whether Blender's GPU can be used without a window; it is from then on, on the main thread.

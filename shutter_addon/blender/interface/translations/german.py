@@ -546,6 +546,16 @@ MESSAGES = {
         "*",
         "Where the source ends and the result begins, as a fraction of the picture's width",
     ): "Wo die Quelle endet und das Ergebnis beginnt, als Bruchteil der Bildbreite",
+    ("*", "Probe"): "Sonde",
+    (
+        "*",
+        "Show the shutter and the coefficients of the pixel that the pointer was over last",
+    ): "Verschluss und Koeffizienten des Pixels zeigen, über dem der Zeiger zuletzt war",
+    ("*", "Probe Position"): "Ort der Sonde",
+    (
+        "*",
+        "The pixel that is probed, in fractions of the picture from its lower left corner",
+    ): "Das Pixel, das die Sonde zeigt, in Bruchteilen des Bildes von seiner unteren linken Ecke",
     ("*", "Shutter: {fault}"): "Verschluss: {fault}",
     ("*", "The strips above are hidden in this view"): "Die Streifen darüber sind in dieser Ansicht verborgen",
     ("*", "This view has the view transform Standard"): "Diese Ansicht hat die Anzeigetransformation Standard",
@@ -622,6 +632,7 @@ MESSAGES = {
     ("*", "the region has no strokes to follow"): "die Region hat keine Striche, denen zu folgen wäre",
     ("*", "the region lies outside the picture"): "die Region liegt außerhalb des Bildes",
     ("*", "there is no other frame to track"): "es gibt kein anderes Bild zum Verfolgen",
+    ("*", "the frame lies outside what can be tracked"): "das Bild liegt außerhalb dessen, was verfolgt werden kann",
     ("*", "Follow"): "Folgen",
     ("Operator", "Follow"): "Folgen",
     (

@@ -1,0 +1,135 @@
+"""The probe: a pixel's shutter as bars, and its coefficients as shares, beside it in the preview."""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from bpy.types import Gizmo, GizmoGroup
+
+from ..data import annotations, geometry
+from ..rendering import probe, session
+from . import drawing, preview
+
+_WIDTH, _HEIGHT, _LINE, _PAD, _APART = 180, 64, 17, 8, 14  # in units of the interface
+_BACK = (0.08, 0.08, 0.08, 0.85)
+_MARK = (1.0, 1.0, 1.0, 0.9)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the probe's box, its bars and its lines of text lie, in pixels of the region.
+
+    frame, bars: left, bottom, right, top; lines: the bottoms of the lines, from the first on"""
+
+    frame: tuple[float, float, float, float]
+    bars: tuple[float, float, float, float]
+    lines: tuple[float, ...]
+
+
+def layout(point, size, count: int, unit: float) -> Layout:
+    """The layout for a point of a region of this size with `count` shutters; unit: of the interface, in pixels.
+
+    The box lies at the right of the point and below it, or on the other side where the region ends."""
+    width, height = (_WIDTH + 2 * _PAD) * unit, (_HEIGHT + count * _LINE + 3 * _PAD) * unit
+    x, y = point
+    apart, pad = _APART * unit, _PAD * unit
+    left = x + apart if x + apart + width <= size[0] else x - apart - width
+    top = y - apart if y - apart - height >= 0 else y + apart + height
+    left, top = max(left, 0.0), max(min(top, size[1]), height)
+    bars = left + pad, top - pad - _HEIGHT * unit, left + width - pad, top - pad
+    lines = tuple(bars[1] - pad - (i + 1) * _LINE * unit for i in range(count))
+    return Layout((left, top - height, left + width, top), bars, lines)
+
+
+def _to_region(context, found) -> np.ndarray | None:
+    """Matrix from fractions of the shown picture to the region's pixels; None: nothing is seen of it."""
+    matrix = geometry.picture_to_region(found.strip, annotations.picture_size(found.effect), context.region)
+    return matrix if geometry.is_invertible(matrix) else None
+
+
+def _is_cropped(strip, size, point) -> bool:
+    crop, (x, y) = strip.crop, np.asarray(point) * size
+    return not (crop.min_x <= x < size[0] - crop.max_x and crop.min_y <= y < size[1] - crop.max_y)
+
+
+class SHUTTER_GT_probe(Gizmo):
+    """It follows the pointer, and is never hit: clicks go to whatever lies there."""
+
+    bl_idname = "SHUTTER_GT_probe"
+
+    def draw(self, context):
+        found, at = preview.shown(context), tuple(context.window_manager.virtual_shutter.probe_at)
+        if found is None or (matrix := _to_region(context, found)) is None:
+            return
+        if _is_cropped(found.strip, annotations.picture_size(found.effect), at):
+            return
+        try:
+            probed = probe.at(preview.request_of(found), at)
+        except session.FAULTS:  # which the live preview tells
+            return
+        if probed is not None:
+            _draw(context.region, geometry.mapped(matrix, np.array([at]))[0], found.effect.shutters, probed)
+
+    def test_select(self, context, location):
+        """Blender asks whenever the pointer moves: nothing else tells of it without taking events from others."""
+        found = preview.shown(context)
+        if found is not None and (matrix := _to_region(context, found)) is not None:
+            centre = np.array([location], dtype=np.float64) + 0.5
+            context.window_manager.virtual_shutter.probe_at = geometry.mapped(np.linalg.inv(matrix), centre)[0]
+        return -1
+
+
+def _draw(region, point, shutters, probed: probe.Probed) -> None:
+    unit = drawing.ui_scale()
+    place = layout(point, (region.width, region.height), len(shutters), unit)
+    colors = np.array([shutter.color for shutter in shutters])
+    (x, y), arm = point, 6 * unit
+    drawing.lines([(x - arm, y), (x + arm, y)], _MARK, width=1)
+    drawing.lines([(x, y - arm), (x, y + arm)], _MARK, width=1)
+    drawing.rectangles([place.frame], [_BACK])
+    _draw_bars(place.bars, probed.bars, (*(probed.coefficients @ colors), 0.95))
+    left, _, right, _ = place.bars
+    for bottom, shutter, share in zip(place.lines, shutters, probed.coefficients, strict=True):
+        drawing.rectangles([(left, bottom, left + 10 * unit, bottom + 10 * unit)], [(*shutter.color, 1.0)])
+        drawing.text(left + 16 * unit, bottom, shutter.name, until=right - 44 * unit)
+        drawing.text(right - 38 * unit, bottom, f"{share:.1%}")
+
+
+def _draw_bars(box, bars, color) -> None:
+    left, bottom, right, top = box
+    edges = np.linspace(left, right, len(bars) + 1)
+    heights = bottom + np.maximum(bars / max(1.0, bars.max()) * (top - bottom), 1)
+    gap = 1.0 if edges[1] - edges[0] > 3 else 0.0
+    boxes = [(a, bottom, b - gap, height) for a, b, height in zip(edges, edges[1:], heights, strict=False)]
+    drawing.rectangles(boxes, np.tile(color, (len(bars), 1)))
+
+
+class SHUTTER_GGT_probe(GizmoGroup):
+    bl_idname = "SHUTTER_GGT_probe"
+    bl_label = "Probe"
+    bl_space_type = "SEQUENCE_EDITOR"
+    bl_region_type = "PREVIEW"
+    bl_options = {"PERSISTENT"}
+
+    @classmethod
+    def poll(cls, context):
+        settings = context.window_manager.virtual_shutter
+        if not (settings.live and settings.probe) or bpy.app.is_job_running("RENDER"):
+            return False
+        return preview.shown(context) is not None
+
+    def setup(self, _context):
+        self.gizmos.new(SHUTTER_GT_probe.bl_idname)
+
+
+classes = (SHUTTER_GT_probe, SHUTTER_GGT_probe)
+
+
+def register():
+    for cls in classes:
+        bpy.utils.register_class(cls)
+
+
+def unregister():
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,32 @@
+"""What one pixel of the preview is made with: its coefficients and its shutter."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core import compositor
+from . import blender_gpu
+from .session import FrameRequest
+
+
+@dataclass(frozen=True)
+class Probed:
+    """A pixel's coefficients (N,), which sum to 1, and its shutter's bars (L,)."""
+
+    coefficients: np.ndarray
+    bars: np.ndarray
+
+
+def at(request: FrameRequest, point) -> Probed | None:
+    """What the pixel at a point is made with; None: the point lies beside the picture.
+
+    point: fractions of the picture, y up. It is called where Blender's GPU draws; one texel is read, and coefficients
+    are solved for only if what they depend on has changed since they were drawn."""
+    source = request.renderer.source
+    column, row = int(np.floor(point[0] * source.width)), int(np.floor((1 - point[1]) * source.height))
+    if not (0 <= column < source.width and 0 <= row < source.height):
+        return None
+    texture, block, count = request.renderer.drawn_coefficients(request.index, request.state, request.direction)
+    values = np.maximum(blender_gpu.texel(texture, column // block, row // block)[:count], 0).astype(np.float64)
+    coefficients = values / values.sum()
+    return Probed(coefficients, compositor.mixed_shutter(request.state, coefficients))

@@ -1,0 +1,24 @@
+"""Where the probe's box lies."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+
+@pytest.fixture(scope="module")
+def gizmo(bpy):
+    from shutter_addon.blender.interface import probe_gizmo
+
+    return probe_gizmo
+
+
+@given(st.floats(0, 1), st.floats(0, 1), st.integers(1, 8), st.floats(0.5, 2))
+def test_the_box_lies_in_the_region_and_beside_the_point(gizmo, x, y, count, unit):
+    size = 1600, 1000
+    point = x * size[0], y * size[1]
+    place = gizmo.layout(point, size, count, unit)
+    left, bottom, right, top = place.frame
+    assert 0 <= left < place.bars[0] < place.bars[2] < right <= size[0]
+    assert 0 <= bottom < place.lines[-1] <= place.lines[0] < place.bars[1] < place.bars[3] < top <= size[1]
+    assert len(place.lines) == count
+    assert not (left < point[0] < right and bottom < point[1] < top)
