@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support import write_frames
 
-from shutter_addon.blender.data import annotations, fcurves, selection, strips
+from shutter_addon.blender.data import annotations, fcurves, selection, strips, validation
 from shutter_addon.blender.editing import add_effect, follow_track, region_edits, shutter_edits, track_region
 from shutter_addon.blender.editing.motion_keys import MotionKeys
 from shutter_addon.core.motions import Placement
@@ -168,6 +168,10 @@ def test_only_what_was_asked_for_is_tracked(bpy, edit, region):
     assert track_region.frames_to_track(edit, strip, "BOTH") == range(11, 31)
     assert track_region.frames_to_track(edit, strip, "BOTH", 25) == range(11, 26)
     assert track_region.frames_to_track(edit, strip, "BACKWARD", 15) == range(15, 21)
+    assert track_region.frames_to_track(edit, strip, "FORWARD", 99) == range(20, 31)
+    for direction, until in (("FORWARD", 15), ("BACKWARD", 25), ("FORWARD", 20), ("BOTH", 20)):
+        with pytest.raises(validation.EffectError, match=f"Until is frame {until}, which does not lie"):
+            track_region.frames_to_track(edit, strip, direction, until)
     assert track(bpy, "FORWARD") == list(range(21, 31))
     assert min(types(bpy)) == 20
 
@@ -274,7 +278,7 @@ def test_a_stop_beyond_what_was_to_be_tracked_stays(bpy, edit, tmp_path):
         stop = region.stops.add()
         stop.frame, stop.forward, stop.fault = frame - effect.start, True, "covered"
     list(track_region.track(edit, effect, strip, 0, range(11, 20), "SCALE"))
-    near, far = (frame for frame, _fault in track_region.stops(effect, 0))
+    near, far = (frame for frame, *_ in track_region.stops(effect, 0))
     assert (near < 18, far) == (True, 28)
 
 
@@ -382,8 +386,9 @@ def test_where_the_subject_is_covered_it_stops_and_says_why(bpy, edit, tmp_path)
     region = drawn(edit, new_source(edit, first))
     effect = active(bpy)[1]
     track(bpy)
-    ((frame, fault),) = track_region.stops(effect, 0)
+    ((frame, fault, is_fault),) = track_region.stops(effect, 0)
     assert max(types(bpy)) < frame <= 16
+    assert is_fault
     assert fault in {"the subject is covered, or looks too different", "the subject has left the picture"}
     edit.frame_set(12)
     track(bpy, "BACKWARD")
@@ -455,8 +460,12 @@ def refuses(bpy, name, sentence, **settings):
 
 def test_tracking_is_one_step_of_undo(bpy, region, does):
     move(bpy, 14, 3)
-    does("track", direction="FORWARD", until=18, all_keys=True)
+    region.track_until, region.track_all_keys, region.motion = 18, True, "LOCATION"
+    does("track", direction="FORWARD")
     assert types(bpy).keys() == set(range(14, 19))
+    assert [len(curve) for curve in keys(bpy, "rotation")] == [1], "as the region says"
+    region = active(bpy)[1].regions[0]
+    region.track_until, region.track_all_keys = 0, False
     does("track", direction="BOTH")
     assert types(bpy).keys() >= {11, 30}
 
@@ -491,7 +500,7 @@ def test_it_stops_at_a_cut(bpy, edit, tmp_path):
     drawn(edit, new_source(edit, write_frames(tmp_path / "cut", shots)))
     assert call(bpy, "track") == {"FINISHED"}
     assert max(types(bpy)) == 20
-    assert track_region.stops(active(bpy)[1], 0) == [(21, "the shot ends here")]
+    assert track_region.stops(active(bpy)[1], 0) == [(21, "the shot ends here", False)]
     edit.frame_set(20)
     refuses(bpy, "track", "the shot ends here", direction="FORWARD")
 
@@ -662,6 +671,18 @@ def test_a_trimmed_reversed_and_retimed_strip_follows_what_it_shows(bpy, edit, f
     call(bpy, "follow")
     assert len(set(shown.values())) > 15
     assert max(apart(bpy, frame, index, of=COUNT - 1) for frame, index in shown.items()) < 1.2
+
+
+def test_a_clip_of_other_footage_is_refused(bpy, edit, region, clip, frames, tmp_path):
+    other = bpy.data.movieclips.load(str(write_frames(tmp_path / "other", [picture(0)] * COUNT)))
+    later = bpy.data.movieclips.load(str(frames.with_name("f0003.png")))
+    for wrong in (other, later):
+        mark(wrong.tracking.objects[0].tracks.new(name="middle", frame=1), 0)
+        set_up(region, wrong, "TRACK", "middle")
+        refuses(bpy, "follow", f'clip "{wrong.name}" does not begin with the same file as strip "images"')
+    clip.filepath = str(frames.parent / ".." / frames.parent.name / frames.name)
+    set_up(region, clip, "TRACK", "middle")
+    assert call(bpy, "follow") == {"FINISHED"}
 
 
 def test_what_cannot_be_followed_is_said(bpy, edit, region, clip):

@@ -132,7 +132,7 @@ def test_where_it_ends_is_said(track, film, tmp_path):
     first = write_frames(tmp_path / "two", np.stack([shots[n // 6] for n in range(12)]))
     options = ("--region", "cross", "--frame", 3, "--output", tmp_path / "t.json", "--report", tmp_path / "r.json")
     code, said = track(first, *options)
-    assert (code, said) == (0, f"Virtual Shutter: cross: not tracked from frame 7 on: {tracking.SHOT_ENDS}")
+    assert (code, said) == (0, "Virtual Shutter: cross: tracked to frame 6, where the shot ends")
     assert json.loads((tmp_path / "r.json").read_text())["stops"] == [{"frame": 7, "reason": tracking.SHOT_ENDS}]
     assert [key.frame for key in keys(tmp_path / "t.json")] == [1, 3, 6]
 

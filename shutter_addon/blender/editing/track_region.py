@@ -74,10 +74,14 @@ class Target(NamedTuple):
 
 def frames_to_track(edit, strip, direction: str, until: int = 0) -> range:
     """The timeline frames from the current one FORWARD, BACKWARD or in BOTH directions: as far as the strip goes, and
-    not beyond the frame `until`, unless that is 0. EffectError: the current one is none of the strip's."""
+    not beyond the frame `until`, unless that is 0. EffectError: the current one is none of the strip's, or `until` does
+    not lie in that direction."""
     current, first, last = edit.frame_current, strip.left_handle, strip.right_handle - 1
     if not first <= current <= last:
         raise EffectError(rpt_("the current frame is outside of the Shutter strip"))
+    if until and (until == current or direction == ("BACKWARD" if until > current else "FORWARD")):
+        sentence = rpt_("Until is frame {frame}, which does not lie in that direction; 0 is the end of the strip")
+        raise EffectError(sentence.format(frame=until))
     if until and until < current:
         first = max(first, until)
     elif until:
@@ -96,7 +100,7 @@ def track(edit, effect, strip, index: int, frames: range, motion: str, *, all_ke
     start, keys = edit.frame_current, MotionKeys(effect, index, motion)
     anchors = [frame for frame in keys.edited(frames) if frame != start]
     here = Tracked(start, placement_now(effect.regions[index]), 1.0)
-    shape = _standing(_region(edit, effect, strip, index, [start, *anchors]), here)
+    shape = _standing(snapshot.region_at(edit, effect, strip, index, frames), here)
     found, stops = {start: here}, []
     reach = (
         max((a for a in anchors if a < start), default=frames[0]),
@@ -130,10 +134,13 @@ def track(edit, effect, strip, index: int, frames: range, motion: str, *, all_ke
         raise EffectError(rpt_(stops[0].fault))
 
 
-def stops(effect, index: int) -> list[tuple[int, str]]:
-    """The timeline frames at which tracking of a region stopped, ascending, and why, in the user's language."""
+def stops(effect, index: int) -> list[tuple[int, str, bool]]:
+    """The timeline frames at which tracking of a region stopped, ascending, why, in the user's language, and whether
+    that is a fault: the end of a shot is none."""
     known = [stop for stop in effect.regions[index].stops if math.isfinite(effect.start + stop.frame)]
-    return sorted((round(effect.start + stop.frame), rpt_(stop.fault)) for stop in known)
+    return sorted(
+        (round(effect.start + stop.frame), rpt_(stop.fault), stop.fault != tracking.SHOT_ENDS) for stop in known
+    )
 
 
 def confidence_at(effect, index: int, frame: float) -> float | None:
@@ -147,13 +154,6 @@ def next_unsure(effect, index: int, frame: float) -> int | None:
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
     unsure = frames[(frames > frame) & (frames <= limits.MAX_FRAME) & (confidence < tracking.SURE)]
     return int(unsure[0]) if len(unsure) else None
-
-
-def _region(edit, effect, strip, index: int, frames: list[int]) -> Region:
-    """The region as the tracker asks for it."""
-    layer = annotations.layer_of(effect, effect.regions[index])
-    drawn = [drawing.frame_number for drawing in layer.frames] if layer else []
-    return snapshot.region_at(edit, effect, strip, index, [*frames, *drawn])
 
 
 def _standing(region: Region, here: Tracked) -> Region:
