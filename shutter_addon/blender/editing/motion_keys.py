@@ -34,15 +34,14 @@ class MotionKeys:
     def edited(self, frames: range) -> list[int]:
         """The whole frames, among these, at which the editor has set a key."""
         curves = (self._curve(name, component) for name, component in _COMPONENTS[: _COUNTS[self.motion]])
-        found = {
-            frame for curve in curves if curve for frame in fcurves.points_of(curve)[:, 0][~_are_made(curve)].tolist()
-        }
+        keys = map(_read, filter(None, curves))
+        found = {frame for all_frames, made in keys for frame in all_frames[~made].tolist()}
         return sorted(int(frame) for frame in found if frame in frames)
 
     def are_made(self) -> bool:
         """Whether any key of the region's location was made."""
         curve = self._curve("location")
-        return curve is not None and bool(_are_made(curve).any())
+        return curve is not None and bool(_read(curve)[1].any())
 
     def channels(self) -> list[str]:
         """The region's channels that the motion has, and those that have keys already."""
@@ -53,8 +52,8 @@ class MotionKeys:
     def hold(self, first: int, last: int) -> None:
         """Keys what was tracked right before and after these frames where it is there: it stays, whatever becomes of
         the keys between."""
-        tracked = set(self.confidence()[0].tolist())
-        for frame in tracked & {first - 1, last + 1}:
+        tracked = self.confidence()[0]
+        for frame in tracked[np.isin(tracked, (first - 1, last + 1))].tolist():
             for curve in filter(None, (self._curve(name, component) for name, component in _COMPONENTS)):
                 if frame not in fcurves.points_of(curve)[:, 0]:
                     _insert(curve, frame, curve.evaluate(frame))
@@ -98,16 +97,16 @@ def _values(placement: Placement) -> tuple[float, ...]:
 
 def _replace(curve, values: dict[int, float], first: int, last: int) -> None:
     """Makes keys of these values by frame, in place of those that were made from the first frame to the last."""
-    points = curve.keyframe_points
-    for i in np.flatnonzero(_within(curve, first, last) & _are_made(curve))[::-1].tolist():
-        points.remove(points[i], fast=True)
-    edited = set(fcurves.points_of(curve)[:, 0].tolist())
-    for frame in sorted(values.keys() - edited):
-        _insert(curve, frame, values[frame])
+    points, (frames, made) = curve.keyframe_points, _read(curve)
+    within = (frames >= first) & (frames <= last)
+    edited = within & ~made
     if values:
-        begins_span = fcurves.points_of(curve)[:, 0] < last
-        for i in np.flatnonzero(_within(curve, first, last) & (begins_span | _are_made(curve))).tolist():
+        for i in np.flatnonzero(edited & (frames < last)).tolist():
             points[i].interpolation = "LINEAR"
+    for i in np.flatnonzero(within & made)[::-1].tolist():
+        points.remove(points[i], fast=True)
+    for frame in sorted(values.keys() - set(frames[edited].tolist())):
+        _insert(curve, frame, values[frame])
     curve.update()
 
 
@@ -116,14 +115,10 @@ def _insert(curve, frame: int, value: float) -> None:
     key.interpolation, key.back = "LINEAR", key.co[1]
 
 
-def _within(curve, first: int, last: int) -> np.ndarray:
-    frames = fcurves.points_of(curve)[:, 0]
-    return (frames >= first) & (frames <= last)
-
-
-def _are_made(curve) -> np.ndarray:
-    """Which of an F-curve's keys (n,) were made, and are as they were made."""
-    types, kept = np.empty(len(curve.keyframe_points), np.int32), np.empty(len(curve.keyframe_points), np.float32)
+def _read(curve) -> tuple[np.ndarray, np.ndarray]:
+    """The frames (n,) of an F-curve's keys, and which of them were made and are as they were made."""
+    points, count = fcurves.points_of(curve), len(curve.keyframe_points)
+    types, kept = np.empty(count, np.int32), np.empty(count, np.float32)
     curve.keyframe_points.foreach_get("type", types)
     curve.keyframe_points.foreach_get("back", kept)
-    return (types == _MADE) & ((kept == fcurves.points_of(curve)[:, 1]) | (kept == NOTHING_KEPT))
+    return points[:, 0], (types == _MADE) & ((kept == points[:, 1]) | (kept == NOTHING_KEPT))
