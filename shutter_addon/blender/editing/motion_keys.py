@@ -55,7 +55,7 @@ class MotionKeys:
         tracked = self.confidence()[0]
         for frame in tracked[np.isin(tracked, (first - 1, last + 1))].tolist():
             for curve in filter(None, (self._curve(name, component) for name, component in _COMPONENTS)):
-                if frame not in fcurves.points_of(curve)[:, 0]:
+                if not curve.is_empty and frame not in fcurves.points_of(curve)[:, 0]:
                     _insert(curve, frame, curve.evaluate(frame))
 
     def write(self, placements: Mapping[int, Placement], confidence: Mapping[int, float]) -> None:
