@@ -32,7 +32,7 @@ _WINDOWS = 9, 21  # sides of the windows that are compared, in pixels: for small
 _THERE_AND_BACK = 1.0  # pixels from where a corner started that it may come back to
 _HYPOTHESES = 300
 _SOUGHT = 64  # pixels to which a part is made smaller to be sought, or compared as a whole
-_NOISE = 16.0  # levels² of contrast that count for nothing
+_NOISE = 16.0  # levels² of contrast that noise may have: they make no two pictures unlike
 # Beyond these the motion between two pictures is none that a film has.
 _MOST_SCALE, _MOST_TURN = 1.5, 0.8
 
@@ -91,13 +91,13 @@ class Part:
         side = int(np.clip(max(width, height) / 4, *_WINDOWS)) // 2 * 2 + 1
         self._window = side, side
         margin = side * 2
-        self._left, self._top = max(x - margin, 0), max(y - margin, 0)
-        right, bottom = min(x + width + margin, picture.shape[1]), min(y + height + margin, picture.shape[0])
-        crop = np.s_[self._top : bottom, self._left : right]
+        left, top = max(x - margin, 0), max(y - margin, 0)
+        crop = np.s_[top : y + height + margin, left : x + width + margin]
         self._picture, self._mask = np.ascontiguousarray(picture[crop]), np.ascontiguousarray(weight[crop])
-        self._origin = complex(self._left, self._top)
-        self.points = _corners(self._picture, self._mask) + self._origin
-        columns, rows = (self.points - self._origin).real.astype(int), (self.points - self._origin).imag.astype(int)
+        self._origin = complex(left, top)
+        found = _corners(self._picture, self._mask)
+        self.points = found + self._origin
+        columns, rows = found.real.astype(int), found.imag.astype(int)
         self._believed = self._mask[rows, columns].astype(np.float64)
         self._weights = self._believed.copy()
         self._ends = np.array([complex(a, b) for a in (x, x + width) for b in (y, y + height)])

@@ -40,6 +40,7 @@ def test_a_carried_shape_lies_where_the_motion_takes_its_points(shape, placement
     assert shown(shape, carried, size) == pytest.approx(expected, rel=1e-9, abs=1e-6)
 
 
+@settings(deadline=None)
 @given(shapes, placements, similarities, sizes, st.complex_numbers(max_magnitude=1000))
 def test_the_motion_between_two_placements_is_the_one_that_carried_the_shape(shape, placement, motion, size, point):
     centre = motions.centre(shape)
@@ -48,6 +49,7 @@ def test_the_motion_between_two_placements_is_the_one_that_carried_the_shape(sha
     assert found(point) == pytest.approx(motion(point), rel=1e-7, abs=1e-5)
 
 
+@settings(deadline=None)
 @given(shapes, placements, similarities, sizes, st.tuples(coordinate, coordinate))
 def test_a_shape_that_is_redrawn_goes_on_from_where_its_centre_was(shape, placement, motion, size, shift):
     centre = motions.centre(shape)
@@ -57,6 +59,7 @@ def test_a_shape_that_is_redrawn_goes_on_from_where_its_centre_was(shape, placem
     assert shown(redrawn, carried, size) == pytest.approx(expected, rel=1e-9, abs=1e-6)
 
 
+@settings(deadline=None)
 @given(similarities, similarities, st.complex_numbers(max_magnitude=1000))
 def test_motions_follow_one_another_and_go_back(first, second, point):
     assert second.after(first)(point) == pytest.approx(second(first(point)), abs=1e-6)

@@ -260,19 +260,19 @@ def test_a_subject_without_corners_is_never_sure(subject, ground):
 def test_it_ends_at_a_cut_on_both_sides(subject, ground):
     whole, _ = film(subject, ground, lambda t: (t,), 8, 4)
     others = [np.roll(ground[:, ::-1], 2 * n, axis=1) for n in range(6)]
-    film_ = ShotSource(Film([*(255 - frame for frame in others), *whole.frames, *others]))
-    tracked, faults = followed(film_, "lasso", 10)
+    joined = ShotSource(Film([*(255 - frame for frame in others), *whole.frames, *others]))
+    tracked, faults = followed(joined, "lasso", 10)
     assert sorted(tracked) == list(range(6, 14))
     assert faults == {5: tracking.SHOT_ENDS, 14: tracking.SHOT_ENDS}
 
 
-@pytest.mark.parametrize("motion_", ["location", "rotation"])
-def test_only_what_is_asked_for_changes(subject, ground, motion_):
+@pytest.mark.parametrize("change", ["location", "rotation"])
+def test_only_what_is_asked_for_changes(subject, ground, change):
     source, _ = film(subject, ground, lambda t: (2 * t, 0, 2 * t, 1.01**t), 8, 2)
-    tracked, _ = followed(source, "line", 2, motion=motion_)
+    tracked, _ = followed(source, "line", 2, motion=change)
     assert all(each.placement.scale == pytest.approx(1, abs=1e-12) for each in tracked.values())
     turned = tracked[7].placement.rotation
-    assert turned == (0 if motion_ == "location" else pytest.approx(-10, abs=1))
+    assert turned == (0 if change == "location" else pytest.approx(-10, abs=1))
     assert tracked[7].placement.location[0] == pytest.approx(10 / WIDTH, abs=1.5 / WIDTH)
 
 
