@@ -242,7 +242,12 @@ def _track(arguments) -> None:
     regions = [*source_recipe.regions[:index], region, *source_recipe.regions[index + 1 :]]
     _write_track(arguments, replace(source_recipe, regions=regions), tracked, stops)
     for stop in stops:
-        print(signed(f"{arguments.region}: not tracked from frame {stop.frame} on: {stop.fault}"), file=sys.stderr)
+        if stop.fault == tracking.SHOT_ENDS:
+            near = stop.frame - 1 if stop.frame > arguments.frame else stop.frame + 1
+            said = f"{arguments.region}: tracked to frame {near}, where the shot ends"
+        else:
+            said = f"{arguments.region}: not tracked from frame {stop.frame} on: {stop.fault}"
+        print(signed(said), file=sys.stderr)
 
 
 def _followed(arguments, source_recipe, index: int, medium, frames: range) -> tuple[dict, list]:

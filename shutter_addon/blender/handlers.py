@@ -8,7 +8,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .data import inbetween_settings, revision, selection, source_media, strips
-from .editing import copies, lifecycle, undelete
+from .editing import copies, lifecycle, track_region, undelete
 from .interface import inbetween_operators, preview_areas
 from .rendering import invalidation, job_snapshots, render_job, session
 
@@ -16,6 +16,7 @@ from .rendering import invalidation, job_snapshots, render_job, session
 @persistent
 def _before_load(*_):
     inbetween_operators.stop()
+    track_region.data_replaced()
     session.forget()
     invalidation.forget()
     inbetween_settings.built.forget()
@@ -41,6 +42,7 @@ def _update(scene=None, *_):
 @persistent
 def _after_undo(*_):
     revision.changed()
+    track_region.data_replaced()
     for edit in bpy.data.scenes:
         strips.invalidate(edit)
     session.drop_removed()

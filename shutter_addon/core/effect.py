@@ -15,6 +15,7 @@ from . import keyframes, limits, scribbles, shutters
 from .frame_state import FrameState
 from .keyframes import Bars, Channel
 from .messages import EffectError
+from .motions import Placement
 
 _CLOSED = 'shutter "{name}" at frame {frame}: {fault}'
 _TOO_MANY = 'region "{name}": more than {most} points with those before it'
@@ -93,6 +94,11 @@ class Region:
         location, rotation, scale = (channel.at(frame) for channel in (self.location, self.rotation, self.scale))
         moved = scribbles.transform(self.unmoved(frame), location, rotation, scale, self.drawings.aspect)
         return scribbles.Shape(self.shutter, self.kind.at(frame), self.width.at(frame), moved)
+
+    def placement(self, frame: float) -> Placement:
+        """Its keyed numbers at a frame."""
+        x, y = (float(number) for number in self.location.at(frame))
+        return Placement((x, y), float(self.rotation.at(frame)), float(self.scale.at(frame)))
 
     def unmoved(self, frame: float) -> list[np.ndarray]:
         """The strokes (n, 2) on the picture at a frame, as they are drawn. EffectError: they are nowhere near it."""

@@ -50,14 +50,28 @@ class Similarity:
 
 def centre(strokes: Iterable) -> np.ndarray:
     """The centre (2,) of the strokes' common bounding box, about which they are scaled and turned."""
-    points = np.concatenate([np.asarray(stroke, dtype=np.float64) for stroke in strokes])
+    points = _points(strokes)
     return (points.min(axis=0) + points.max(axis=0)) / 2
 
 
 def offsets(strokes: Iterable) -> np.ndarray:
     """The strokes' points (n, 2) from their centre on, in fractions of the picture."""
-    points = np.concatenate([np.asarray(stroke, dtype=np.float64) for stroke in strokes])
-    return points - (points.min(axis=0) + points.max(axis=0)) / 2
+    return _points(strokes) - centre(strokes)
+
+
+def _points(strokes: Iterable) -> np.ndarray:
+    return np.concatenate([np.asarray(stroke, dtype=np.float64) for stroke in strokes])
+
+
+def pixel(place, size) -> complex:
+    """A place in fractions of the picture, y up, in pixels of a size as Similarity counts them."""
+    return complex(place[0] * size[0], (1 - place[1]) * size[1]) - _CORNER
+
+
+def fractions(pixel: complex, size) -> tuple[float, float]:
+    """The place in fractions of the picture, y up, that is at a pixel."""
+    corner = pixel + _CORNER
+    return corner.real / size[0], 1 - corner.imag / size[1]
 
 
 def carried(placement: Placement, motion: Similarity, before, after, size) -> Placement:
@@ -65,12 +79,18 @@ def carried(placement: Placement, motion: Similarity, before, after, size) -> Pl
 
     before, after: centres (2,) of the shape as it is drawn when the motion begins and when it ends, fractions
     size: width and height of the picture whose pixels the motion counts"""
-    width, height = size
-    x, y = np.add(before, placement.location)
-    moved = motion(complex(x * width, (1 - y) * height) - _CORNER) + _CORNER
-    location = moved.real / width - float(after[0]), 1 - moved.imag / height - float(after[1])
+    x, y = fractions(motion(pixel(np.add(before, placement.location), size)), size)
+    location = x - float(after[0]), y - float(after[1])
     rotation = placement.rotation - math.degrees(cmath.phase(motion.turn))
     return Placement(location, rotation, placement.scale * abs(motion.turn))
+
+
+def motion_between(first: Placement, second: Placement, before, after, size) -> Similarity:
+    """The motion of the picture that takes a shape from one placement to another; arguments as of `carried`."""
+    angle = math.radians(first.rotation - second.rotation)
+    turn = cmath.rect(second.scale / first.scale, angle)
+    start, end = (pixel(np.add(*each), size) for each in ((before, first.location), (after, second.location)))
+    return Similarity(turn, end - turn * start)
 
 
 def unwound(placement: Placement, near: Placement) -> Placement:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
@@ -18,7 +19,7 @@ def with_placements(
     region: Region, placements: Mapping[int, Placement], exact: Collection[int], size, *, thin: bool = True
 ) -> Region:
     """The region with these placements as its keys, in place of those that it has from the first of these frames to the
-    last. Its drawings stay where and as they are.
+    last. At whole frames beyond these it stays where its keys put it, and its drawings stay where and as they are.
 
     placements: by frame; exact: those frames among them whose keys are kept in any case, and as they are given
     size: width and height of the picture; thin: no more keys than the motion needs within a pixel"""
@@ -32,11 +33,25 @@ def with_placements(
         shape = np.concatenate([motions.offsets(strokes) for strokes in drawn.values()])
         chosen = motions.thinned(placements, shape, size, kept)
     keys = [key for key in region.keys if not first <= key.frame <= last]
+    moved = region.over_time(0, size[0] / size[1])
+    for frame in _cut(region, first - 1, -1) + _cut(region, last + 1, 1):
+        keys.append(RegionKey(frame, tuple(moved.location.at(frame)), moved.rotation.at(frame), moved.scale.at(frame)))
     for frame in chosen:
         placement = placements[frame] if frame in exact else _rounded(placements[frame])
         ease = eases.get(frame, "linear")
         keys.append(RegionKey(frame, placement.location, placement.rotation, placement.scale, ease=ease))
     return _redrawn(replace(region, keys=sorted(keys, key=lambda key: key.frame)), drawn)
+
+
+def _cut(region: Region, edge: int, step: int) -> list[int]:
+    """The frames that need a key, so that what lies beyond an edge stays when keys on the other side of it change: the
+    edge where the way to the next key is straight, all frames on a way that is not; none without a key beyond."""
+    beyond = [key.frame for key in region.keys if step * (key.frame - edge) >= 0]
+    if not beyond or edge in beyond:
+        return []
+    if next((key.ease for key in reversed(region.keys) if key.frame < edge), "linear") == "linear":
+        return [edge]
+    return list(range(edge, math.ceil(min(beyond)) if step > 0 else math.floor(max(beyond)), step))
 
 
 def _redrawn(region: Region, drawn: dict) -> Region:

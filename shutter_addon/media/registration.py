@@ -46,6 +46,18 @@ def check() -> None:
         )
 
 
+def grey(frame: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """A frame (h, w, 4) uint8 as a grey picture of a size, width and height."""
+    if frame.shape[1::-1] != size:
+        frame = cv2.resize(frame, size, interpolation=cv2.INTER_AREA)
+    return cv2.cvtColor(frame, cv2.COLOR_RGBA2GRAY)
+
+
+def distances(mask: np.ndarray) -> np.ndarray:
+    """How far in pixels each pixel lies from where a mask (H, W) bool is true."""
+    return cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 0)
+
+
 @dataclass(frozen=True)
 class Match:
     """Where a part of a picture is in another one.
@@ -127,6 +139,11 @@ class Part:
             return None
         _, _, _, best = cv2.minMaxLoc(np.where(fits, scores, -1))
         return around.inverse().after(Similarity(1, complex(*best))).after(alone)
+
+    def again(self, picture: np.ndarray, motion: Similarity) -> Part | None:
+        """The part as it looks in another picture after a motion; None: it is not in it."""
+        weight = cv2.warpAffine(self.weight, matrix(motion), picture.shape[::-1])
+        return Part(picture, weight) if (weight > 0).any() else None
 
     def learn(self, match: Match) -> None:
         """Takes in which corners move with the part, and which do not."""

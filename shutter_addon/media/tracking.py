@@ -6,8 +6,9 @@ fails, with the last one in which the subject was surely seen. No bpy.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise, takewhile
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from ..core.frame_source import FrameSource
 from ..core.motions import Placement, Similarity
 from . import registration
 from .errors import MediaError
-from .registration import Match, Motion, Part, cv2
+from .registration import Match, Motion, Part
 
 WIDTH = 960  # pixels of the pictures that are compared, at most, along their longer side
 PATIENCE = 25  # frames for which a lost subject is looked for
@@ -42,6 +43,8 @@ _DOUBTFUL = 0.2  # below it, it may as well be anywhere
 _DRIFT, _LEAST = 0.95, 0.1  # what a later look is worth beside the one before it, and at least
 _SHIFTED = 0.6  # what a location is worth where rotation and scale could not be found
 _FADING = 0.6  # below it another frame is taken to compare with beside the first
+_UNLIKE = 0.4  # what a look is worth that an anchor's contradicts, where nothing tells which one is the subject's
+_ASKED = 4  # anchors on each side that are asked
 # Heights of the picture around a region within which corners are looked for, as far as there are not enough of them.
 _REACHES = {"line": (0.015, 0.03, 0.06, 0.12, 0.24), "lasso": (0.0, 0.015, 0.03, 0.06, 0.12)}
 _ENOUGH = 14
@@ -77,9 +80,9 @@ class Footage:
         share = min(1.0, WIDTH / max(source.width, source.height))
         self.size = max(1, round(source.width * share)), max(1, round(source.height * share))
         self._kept: dict[int, np.ndarray] = {}
-        self._wanted = range(0)
+        self._wanted: Sequence[int] = ()
 
-    def want(self, frames: range) -> None:
+    def want(self, frames: Sequence[int]) -> None:
         """Says which timeline frames will be asked for, in this order."""
         self._wanted = frames
 
@@ -123,9 +126,7 @@ class Footage:
     def _grey(self, frame: np.ndarray) -> np.ndarray:
         if frame.dtype != np.uint8:
             frame = _levels(frame, self._source.transfer)
-        if frame.shape[1::-1] != self.size:
-            frame = cv2.resize(frame, self.size, interpolation=cv2.INTER_AREA)
-        return cv2.cvtColor(frame, cv2.COLOR_RGBA2GRAY)
+        return registration.grey(frame, self.size)
 
 
 def _levels(frame: np.ndarray, transfer: str) -> np.ndarray:
@@ -148,42 +149,50 @@ def follow(
     """Where a region is at frames of the timeline, if it moves with what it covers at `start`: that frame itself, then
     those behind it, then those before it.
 
-    region: its channels are evaluated at `start`, at anchors and where its drawings have frames
+    region: its drawings are evaluated at all of the frames; location, rotation and scale at `start` and at anchors
     frames: all that may be tracked, `start` among them
     motion: what changes beside the location: "rotation", or "scale" and rotation
     anchors: frames whose placement is right as it is. Tracking ends at the nearest one on each side; what lies between
-    comes a second time then, blended with what is tracked back from there.
+    comes a second time then, blended with what is tracked back from there. What the region covers is compared with what
+    it covers there, so that a frame in which something lies over the subject does not count as its look: anchors beyond
+    `frames` are of use, too.
     A direction that ends early ends with a Tracked that has a fault. TrackingError: nothing can be tracked from there.
     MediaError, while it goes on: a frame cannot be read."""
     if start not in frames:
         raise TrackingError(NOT_SHOWN)
     if len(frames) < 2:
         raise TrackingError(ALONE)
-    track = _Track(region, footage, motion, sorted({start, *anchors}))
-    part = track.part(start)
-    return track.both_ways(part, start, range(min(frames), max(frames) + 1), set(anchors))
+    frames = range(min(frames), max(frames) + 1)
+    track = _Track(region, footage, motion, {*frames, *anchors})
+    track.part(start)
+    return track.both_ways(start, frames, {*anchors} - {start})
 
 
 class _Track:
     """What tracking a region needs to know."""
 
-    def __init__(self, region: Region, footage: Footage, motion: Motion, evaluated: list[int]):
+    def __init__(self, region: Region, footage: Footage, motion: Motion, frames: Collection[int]):
         self._region, self._footage, self._motion = region, footage, motion
-        redrawn = region.drawings.frames if len(region.drawings.frames) > 1 else ()
-        self._drawn = sorted({*evaluated, *redrawn})
-        shapes = [region.unmoved(frame) for frame in self._drawn]
-        if not all(map(len, shapes)):
+        shapes = {frame: region.unmoved(frame) for frame in frames}
+        if not all(map(len, shapes.values())):
             raise TrackingError(EMPTY)
-        self._centres = np.array([motions.centre(shape) for shape in shapes])
+        self._centres = {frame: motions.centre(shape) for frame, shape in shapes.items()}
+        self._parts: dict[int, tuple[Part, float]] = {}
+        self._doubted: dict[int, int | None] = {}
 
     def part(self, frame: int) -> tuple[Part, float]:
         """What the region covers at a frame, and how surely its corners are those of the region, up to 1: less where
         they are far from it. TrackingError: there is nothing to follow."""
+        if frame not in self._parts:
+            self._parts[frame] = self._part(frame)
+        return self._parts[frame]
+
+    def _part(self, frame: int) -> tuple[Part, float]:
         shape, (width, height) = self._region.at(frame), self._footage.size
         covered = scribbles.rasterise([replace(shape, shutter=0)], width, height) > 0
         if not covered.any():
             raise TrackingError(OUTSIDE)
-        picture, away = self._footage.picture(frame), cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 0)
+        picture, away = self._footage.picture(frame), registration.distances(covered)
         for reach in [share * height for share in _REACHES[shape.kind]]:
             part = Part(picture, _falloff(away, reach))
             if len(part.points) >= _ENOUGH:
@@ -193,75 +202,149 @@ class _Track:
         near = _falloff(away[part.points.imag.astype(int), part.points.real.astype(int)], _NEAR * height).sum()
         return part, float(np.clip(near / _ENOUGH_NEAR, _FAR, 1))
 
-    def both_ways(self, part: tuple[Part, float], start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
-        yield Tracked(start, self._placement(start), 1.0)
+    def both_ways(self, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
+        yield Tracked(start, self._region.placement(start), 1.0)
+        self._doubted = self._doubts(start, sorted(anchors), {*frames, *anchors})
         for rest in (range(start + 1, frames.stop), range(start - 1, frames.start - 1, -1)):
             anchor = next((frame for frame in rest if frame in anchors), None)
             if anchor is None:
-                yield from self._from(part, start, rest)
+                yield from self._from(start, rest)
             else:
-                yield from self._between(part, start, anchor)
+                yield from self._between(start, anchor)
 
-    def _between(self, part: tuple[Part, float], start: int, anchor: int) -> Iterator[Tracked]:
+    def _between(self, start: int, anchor: int) -> Iterator[Tracked]:
         """From `start` towards an anchor, and then blended with the way back from there."""
         step = 1 if anchor > start else -1
         there, back, faults = {}, {}, []
-        for found in self._from(part, start, range(start + step, anchor, step)):
+        for found in self._from(start, range(start + step, anchor, step)):
             if found.fault:
                 faults.append(found)
             else:
                 there[found.frame] = found
                 yield found
-        try:
-            returning = self._from(self.part(anchor), anchor, range(anchor - step, start, -step))
+        if self._has_part(anchor):  # or what was found from the start alone has to do
+            returning = self._from(anchor, range(anchor - step, start, -step))
             back = {found.frame: found for found in returning if not found.fault}
-        except TrackingError:  # what was found from the start alone has to do
-            pass
         for frame in range(start + step, anchor, step):
             share = (frame - start) / (anchor - start)
             if blended := _blended(there.get(frame), back.get(frame), share):
                 yield blended
-        yield Tracked(anchor, self._placement(anchor), 1.0)
+        yield Tracked(anchor, self._region.placement(anchor), 1.0)
         yield from (fault for fault in faults if fault.frame not in back)
 
-    def _from(self, part: tuple[Part, float], start: int, frames: range) -> Iterator[Tracked]:
+    def _from(self, start: int, frames: range) -> Iterator[Tracked]:
         """Frames one after another, away from `start`."""
         self._footage.want(frames)
-        part, worth = part
-        pursuit = _Pursuit(part, self._footage.picture(start), self._motion)
-        last, shown, lost = Tracked(start, self._placement(start), 1.0), start, []
+        origin, pursuit, worth = self._pursuit(start)
+        last, shown, lost = Tracked(start, self._region.placement(start), 1.0), start, []
         for frame in frames:
             picture = self._footage.picture(frame)
             if self._footage.cut(shown, frame):
                 fault = pursuit.reason if lost else SHOT_ENDS
                 yield Tracked((lost or [frame])[0], last.placement, 0.0, fault)
                 return
-            found, shown = pursuit.next(picture, len(lost)), frame
+            found, shown = pursuit.next(picture), frame
             if found is None:
                 lost.append(frame)
                 if len(lost) > PATIENCE:
                     break
                 continue
-            placement = self._carried(start, frame, found[0], last.placement)
-            yield from _bridged(last, placement, lost, frame)
-            last, lost = Tracked(frame, placement, worth * found[1]), []
+            seen = Tracked(frame, self._carried(origin, frame, found[0], last.placement), worth * found[1])
+            yield from self._bridged(last, seen, lost)
+            last, lost = seen, []
             yield last
         if lost:
             yield Tracked(lost[0], last.placement, 0.0, pursuit.reason)
 
-    def _placement(self, frame: int) -> Placement:
-        region = self._region
-        x, y = (float(number) for number in region.location.at(frame))
-        return Placement((x, y), float(region.rotation.at(frame)), float(region.scale.at(frame)))
+    def _pursuit(self, start: int) -> tuple[int, _Pursuit, float]:
+        """The frame whose look is searched for from `start` on, the pursuit of it, and what that is worth."""
+        origin = self._doubted.get(start, start)
+        if origin is None:
+            part, worth = self.part(start)
+            return start, _Pursuit(part, self._footage.picture(start), self._motion), _UNLIKE * worth
+        part, worth = self.part(origin)
+        known = None if origin == start else self._known(origin, start)
+        return origin, _Pursuit(part, self._footage.picture(origin), self._motion, known), worth
 
-    def _carried(self, start: int, frame: int, motion: Similarity, near: Placement) -> Placement:
-        before, after = self._centre(start), self._centre(frame)
-        moved = motions.carried(self._placement(start), motion, before, after, self._footage.size)
+    def _doubts(self, start: int, anchors: list[int], shown: set[int]) -> dict[int, int | None]:
+        """Of `start` and the anchors beside it those where something else may lie over the subject, each with a frame
+        whose look is surely the subject's, or None. shown: the frames that can be looked at."""
+        alike, rivals = [start], []
+        for side in ([a for a in anchors if a > start], [a for a in reversed(anchors) if a < start]):
+            before = start
+            for anchor in filter(self._has_part, side[:_ASKED]):
+                if not self._alike(before, anchor):
+                    rivals += [] if self._cut(start, anchor) else [anchor]
+                    break
+                alike.append(anchor)
+                before = anchor
+        surer = {rival: self._surer(start, rival, shown) for rival in rivals}
+        if all(look == start for look in surer.values()):
+            return dict.fromkeys(rivals, start)
+        sure = [rival for rival in rivals if surer[rival] == rival]
+        unsure = [rival for rival in rivals if surer[rival] != rival]
+        return dict.fromkeys(alike, next(iter(sure), None)) | dict.fromkeys(unsure)
+
+    def _alike(self, frame: int, other: int) -> bool:
+        """Whether the region covers at one frame what it covers at another, as far as corners tell."""
+        return self._is_seen_at(frame, other) or self._is_seen_at(other, frame)
+
+    def _is_seen_at(self, frame: int, other: int) -> bool:
+        """Whether the look of a frame may be seen where the region is at another one."""
+        picture = self._footage.picture(other)
+        match = self.part(frame)[0].find(picture, self._known(frame, other), self._motion)
+        return confidence(match, picture) >= _DOUBTFUL
+
+    def _surer(self, frame: int, other: int, shown: set[int]) -> int | None:
+        """Of two frames the one whose look is the subject's: it is seen again behind the other one, but not the other's
+        behind this one. None: that does not tell."""
+        first, second = self._is_seen_behind(frame, other, shown), self._is_seen_behind(other, frame, shown)
+        return None if first == second else frame if first else other
+
+    def _is_seen_behind(self, frame: int, other: int, shown: set[int]) -> bool:
+        """Whether the look of a frame is surely seen soon behind another one."""
+        step = 1 if other > frame else -1
+        behind = range(other + step, other + step * (PATIENCE + 1), step)
+        behind = list(takewhile(shown.__contains__, behind))
+        self._footage.want(behind)
+        pursuit = _Pursuit(self.part(frame)[0], self._footage.picture(frame), self._motion, self._known(frame, other))
+        for each in behind:
+            if self._footage.cut(each - step, each):
+                break
+            found = pursuit.next(self._footage.picture(each))
+            if found and found[1] >= SURE:
+                return True
+        return False
+
+    def _cut(self, frame: int, other: int) -> bool:
+        return any(self._footage.cut(*pair) for pair in pairwise(range(min(frame, other), max(frame, other) + 1)))
+
+    def _has_part(self, frame: int) -> bool:
+        try:
+            self.part(frame)
+        except TrackingError:
+            return False
+        return True
+
+    def _known(self, frame: int, other: int) -> Similarity:
+        """The motion from one frame to another, both of which have a right placement."""
+        placements, centres = zip(*((self._region.placement(f), self._centres[f]) for f in (frame, other)), strict=True)
+        return motions.motion_between(*placements, *centres, self._footage.size)
+
+    def _carried(self, origin: int, frame: int, motion: Similarity, near: Placement) -> Placement:
+        before, after = self._centres[origin], self._centres[frame]
+        moved = motions.carried(self._region.placement(origin), motion, before, after, self._footage.size)
         return motions.unwound(moved, near)
 
-    def _centre(self, frame: int) -> tuple[float, float]:
-        """The centre of the region's shape as it is drawn at a frame; between drawings it goes straight."""
-        return tuple(float(np.interp(frame, self._drawn, axis)) for axis in self._centres.T)
+    def _bridged(self, last: Tracked, found: Tracked, lost: list[int]) -> Iterator[Tracked]:
+        """Frames at which the subject was not seen, on a straight way between those beside them, however the shape is
+        redrawn meanwhile."""
+        for missing in lost:
+            share = (missing - last.frame) / (found.frame - last.frame)
+            centre = (1 - share) * self._centres[last.frame] + share * self._centres[found.frame]
+            straight = motions.between(last.placement, found.placement, share)
+            x, y = (float(number) for number in straight.location + centre - self._centres[missing])
+            yield Tracked(missing, replace(straight, location=(x, y)), 0.0)
 
 
 class _Pursuit:
@@ -269,16 +352,19 @@ class _Pursuit:
 
     reason: why it was not found in the last one"""
 
-    def __init__(self, part: Part, picture: np.ndarray, motion: Motion):
+    def __init__(self, part: Part, picture: np.ndarray, motion: Motion, known: Similarity | None = None):
+        """picture: the part's; known: the motion up to a picture in which the part is, but cannot be seen; the next one
+        comes after that. None: it comes after the part's."""
         self._first, self._motion, self.reason = part, motion, COVERED
         # the motion up to the last picture in which it was found, and its last step
-        self._known = self._speed = Similarity()
+        self._known, self._speed = known or Similarity(), Similarity()
+        self._missed = 0 if known is None else 1  # for how many pictures it was not found
         self._look = _Look(part, Similarity(), 1.0)  # how it looked later, if it is no longer like the first
         self._seen = picture, Similarity(), 1.0  # the last picture in which it was found, the motion, its confidence
 
-    def next(self, picture: np.ndarray, missed: int) -> tuple[Similarity, float] | None:
-        """The motion from the first picture, and its confidence; None: it is not there. missed: for how many pictures
-        before this one it was not."""
+    def next(self, picture: np.ndarray) -> tuple[Similarity, float] | None:
+        """The motion from the first picture, and its confidence; None: it is not there."""
+        missed = self._missed
         found = None if missed else self._found(picture, self._speed.after(self._known))
         if found is None:
             self._look_anew()
@@ -288,9 +374,10 @@ class _Pursuit:
         if found is None:
             if not missed:
                 self.reason = LEFT if self._leaves(picture) else COVERED
+            self._missed += 1
             return None
         self._speed = found[0].after(self._known.inverse()) if not missed else Similarity()
-        self._known, self._seen = found[0], (picture, *found)
+        self._known, self._seen, self._missed = found[0], (picture, *found), 0
         return found
 
     def _found(self, picture, guess: Similarity) -> tuple[Similarity, float] | None:
@@ -324,9 +411,8 @@ class _Pursuit:
     def _look_anew(self) -> None:
         """Takes the look that it had when it was found last."""
         picture, motion, worth = self._seen
-        weight = cv2.warpAffine(self._first.weight, registration.matrix(motion), picture.shape[::-1])
-        if (weight > 0).any():
-            self._look = _Look(Part(picture, weight), motion, max(_DRIFT * worth, _LEAST))
+        if later := self._first.again(picture, motion):
+            self._look = _Look(later, motion, max(_DRIFT * worth, _LEAST))
 
     def _found_elsewhere(self, picture, missed: int, *looks: _Look) -> tuple[Similarity, float] | None:
         """As `_found`, of all places where it may be by now; only if it looks as it did first, or as in other looks."""
@@ -381,13 +467,6 @@ def confidence(match: Match | None, picture: np.ndarray) -> float:
 def _falloff(away: np.ndarray, reach: float) -> np.ndarray:
     """How much pixels count that are so far away from a region, 0 to 1 float32; none beyond the reach."""
     return np.where(away <= reach, np.exp(-2 * (away / max(reach, 1e-9)) ** 2), 0).astype(np.float32)
-
-
-def _bridged(last: Tracked, placement: Placement, lost: list[int], frame: int) -> Iterator[Tracked]:
-    """Frames at which the subject was not seen, on a straight way between those beside them."""
-    for missing in lost:
-        share = (missing - last.frame) / (frame - last.frame)
-        yield Tracked(missing, motions.between(last.placement, placement, share), 0.0)
 
 
 def _blended(first: Tracked | None, second: Tracked | None, share: float) -> Tracked | None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support import write_frames
 
-from shutter_addon.blender.data import annotations, fcurves, selection, strips
+from shutter_addon.blender.data import annotations, fcurves, selection, strips, validation
 from shutter_addon.blender.editing import add_effect, follow_track, region_edits, shutter_edits, track_region
 from shutter_addon.blender.editing.motion_keys import MotionKeys
 from shutter_addon.core.motions import Placement
@@ -156,8 +156,8 @@ def test_all_keys_are_kept_if_one_wants(bpy, region):
 @pytest.mark.parametrize(("motion", "channels"), [("LOCATION", {"location"}), ("ROTATION", {"location", "rotation"})])
 def test_the_motion_says_what_is_keyed(bpy, region, motion, channels):
     track(bpy, motion=motion)
-    made = {c for c in ("location", "rotation", "scale") if any(key[2] == "GENERATED" for key in keys(bpy, c)[0])}
-    assert made == channels
+    assert {c for c in ("location", "rotation", "scale") if keys(bpy, c)} == channels
+    assert all(any(key[2] == "GENERATED" for key in keys(bpy, channel)[0]) for channel in channels)
 
 
 def test_only_what_was_asked_for_is_tracked(bpy, edit, region):
@@ -168,6 +168,10 @@ def test_only_what_was_asked_for_is_tracked(bpy, edit, region):
     assert track_region.frames_to_track(edit, strip, "BOTH") == range(11, 31)
     assert track_region.frames_to_track(edit, strip, "BOTH", 25) == range(11, 26)
     assert track_region.frames_to_track(edit, strip, "BACKWARD", 15) == range(15, 21)
+    assert track_region.frames_to_track(edit, strip, "FORWARD", 99) == range(20, 31)
+    for direction, until in (("FORWARD", 15), ("BACKWARD", 25), ("FORWARD", 20), ("BOTH", 20)):
+        with pytest.raises(validation.EffectError, match=f"Until is frame {until}, which does not lie"):
+            track_region.frames_to_track(edit, strip, direction, until)
     assert track(bpy, "FORWARD") == list(range(21, 31))
     assert min(types(bpy)) == 20
 
@@ -213,6 +217,71 @@ def test_keys_outside_of_what_was_tracked_stay(bpy, edit, region):
     assert len(keys(bpy)[0]) > 3
 
 
+def placed(bpy, frame):
+    """All that is keyed of where the region is at a frame."""
+    edit, effect, _strip = active(bpy)
+    names = "location", "rotation", "scale"
+    curves = [c for name in names for c in fcurves.curves_under(edit, f"{effect.path_from_id()}.regions[0].{name}")]
+    return [curve.evaluate(frame) for curve in curves]
+
+
+@pytest.mark.parametrize("motion", ["LOCATION", "SCALE"])
+def test_frames_outside_of_what_was_tracked_stay_where_they_are(bpy, edit, region, motion):
+    """Forward from a mended frame, and until another one, between keys that an earlier track has thinned."""
+    track(bpy)
+    before = {frame: placed(bpy, frame) for frame in range(11, 31)}
+    edit.frame_set(18)
+    region.location[1] += 12 / SIZE[1]
+    _edit, effect, strip = active(bpy)
+    frames = track_region.frames_to_track(edit, strip, "FORWARD", 20)
+    steps = track_region.track(edit, effect, strip, 0, frames, motion)
+    assert next(steps) == 19
+    for outside in (range(11, 18), range(20, 31)):
+        for frame in outside:
+            assert placed(bpy, frame) == pytest.approx(before[frame], abs=1e-5)
+    assert list(steps) == [20]
+    for outside in (range(11, 18), range(21, 31)):
+        for frame in outside:
+            assert placed(bpy, frame) == pytest.approx(before[frame], abs=1e-5)
+    assert placed(bpy, 20)[1] == pytest.approx(before[20][1] + 12 / SIZE[1], abs=1.5 / SIZE[1])
+
+
+def test_a_made_key_that_the_editor_has_dragged_is_the_editors(bpy, edit, region):
+    """In the Graph Editor, which leaves its type."""
+    track(bpy)
+    curve = fcurves.find_curve(edit, "virtual_shutter.effects[0].regions[0].location", 1)
+    key = next(key for key in curve.keyframe_points if 14 < key.co[0] < 27)
+    frame, dragged = int(key.co[0]), key.co[1] + 0.05
+    key.co[1] = dragged
+    curve.update()
+    track(bpy)
+    assert curve.evaluate(frame) == pytest.approx(dragged)
+
+
+@pytest.mark.parametrize("operator", ["track", "region_key"])
+@pytest.mark.parametrize("part", ["curve", "group"])
+@pytest.mark.parametrize(("name", "sentence"), [("lock", "is locked"), ("mute", "is muted")])
+def test_curves_that_take_no_keys_are_said(bpy, edit, region, operator, part, name, sentence):
+    move(bpy, 15, 4)
+    (curve,) = fcurves.curves_under(edit, "virtual_shutter.effects[0].regions[0].rotation")
+    setattr(curve if part == "curve" else curve.group, name, True)
+    edit.frame_set(20)
+    channel = "Rotation" if part == "curve" else "Location"
+    refuses(bpy, operator, f'region "Sharp": the F-curve of "{channel}" {sentence}')
+
+
+def test_a_stop_beyond_what_was_to_be_tracked_stays(bpy, edit, tmp_path):
+    first = write_frames(tmp_path / "c", [picture(i, range(5, COUNT)) for i in range(COUNT)])
+    region = drawn(edit, new_source(edit, first))
+    _edit, effect, strip = active(bpy)
+    for frame in (18, 28):
+        stop = region.stops.add()
+        stop.frame, stop.forward, stop.fault = frame - effect.start, True, "covered"
+    list(track_region.track(edit, effect, strip, 0, range(11, 20), "SCALE"))
+    near, far = (frame for frame, *_ in track_region.stops(effect, 0))
+    assert (near < 18, far) == (True, 28)
+
+
 def test_a_region_that_was_moved_and_not_keyed_is_tracked_from_where_it_is(bpy, edit, region):
     move(bpy, 11, 3)
     bpy.context.scene.frame_set(20)
@@ -235,6 +304,60 @@ def test_closed_early_it_keeps_what_it_has(bpy, edit, region):
     assert max(apart(bpy, frame, frame - 11) for frame in range(11, 21)) < 1.5
     assert track_region.confidence_at(effect, 0, 20) > 0.5
     assert track_region.confidence_at(effect, 0, 21) is None
+
+
+def begun(bpy, until):
+    """Tracking that has come to a frame."""
+    edit, effect, strip = active(bpy)
+    steps = track_region.track(edit, effect, strip, 0, range(11, 31), "SCALE")
+    while next(steps) < until:
+        pass
+    return steps
+
+
+@pytest.mark.parametrize("is_closed", [False, True])
+@pytest.mark.parametrize("again", [False, True])
+def test_undo_while_it_runs_ends_it_without_another_key(bpy, edit, region, again, is_closed):
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="drawn")
+    bpy.context.scene.virtual_shutter.effects[0].regions[0].width = 0.5
+    bpy.ops.ed.undo_push(message="widened")
+    if again:
+        bpy.ops.ed.undo()
+    steps = begun(bpy, 15)
+    (bpy.ops.ed.redo if again else bpy.ops.ed.undo)()
+    before = everything(bpy)
+    assert before[2] == [[]] * 4
+    assert bpy.context.scene.virtual_shutter.effects[0].regions[0].width == pytest.approx(0.5 if again else 0.02)
+    if not is_closed:
+        assert list(steps) == []
+    steps.close()
+    assert everything(bpy) == before
+
+
+def test_another_file_while_it_runs_ends_it(bpy, edit, region):
+    steps = begun(bpy, 15)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    assert list(steps) == []
+
+
+@pytest.mark.parametrize("change", ["remove", "other", "move", "effects"])
+def test_what_happens_to_its_region_ends_it_without_another_key(bpy, edit, region, change):
+    effect = active(bpy)[1]
+    steps = begun(bpy, 15)
+    if change == "remove":
+        region_edits.remove_region(effect, 0)
+    elif change == "other":
+        region_edits.add_region(effect, effect.shutters[1])
+        region_edits.move_region(effect, 1, 0)
+    elif change == "move":
+        effect.start += 3
+    else:  # the collection is elsewhere in memory
+        for _ in range(40):
+            edit.virtual_shutter.effects.add()
+    before = keys(bpy)
+    assert len(list(steps)) == (15 if change == "effects" else 0)
+    assert (keys(bpy) == before) == (change != "effects")
 
 
 def test_it_tracks_what_a_reversed_strip_shows(bpy, edit, frames):
@@ -263,8 +386,9 @@ def test_where_the_subject_is_covered_it_stops_and_says_why(bpy, edit, tmp_path)
     region = drawn(edit, new_source(edit, first))
     effect = active(bpy)[1]
     track(bpy)
-    ((frame, fault),) = track_region.stops(effect, 0)
+    ((frame, fault, is_fault),) = track_region.stops(effect, 0)
     assert max(types(bpy)) < frame <= 16
+    assert is_fault
     assert fault in {"the subject is covered, or looks too different", "the subject has left the picture"}
     edit.frame_set(12)
     track(bpy, "BACKWARD")
@@ -336,8 +460,12 @@ def refuses(bpy, name, sentence, **settings):
 
 def test_tracking_is_one_step_of_undo(bpy, region, does):
     move(bpy, 14, 3)
-    does("track", direction="FORWARD", until=18, all_keys=True)
+    region.track_until, region.track_all_keys, region.motion = 18, True, "LOCATION"
+    does("track", direction="FORWARD")
     assert types(bpy).keys() == set(range(14, 19))
+    assert [len(curve) for curve in keys(bpy, "rotation")] == [1], "as the region says"
+    region = active(bpy)[1].regions[0]
+    region.track_until, region.track_all_keys = 0, False
     does("track", direction="BOTH")
     assert types(bpy).keys() >= {11, 30}
 
@@ -372,7 +500,7 @@ def test_it_stops_at_a_cut(bpy, edit, tmp_path):
     drawn(edit, new_source(edit, write_frames(tmp_path / "cut", shots)))
     assert call(bpy, "track") == {"FINISHED"}
     assert max(types(bpy)) == 20
-    assert track_region.stops(active(bpy)[1], 0) == [(21, "the shot ends here")]
+    assert track_region.stops(active(bpy)[1], 0) == [(21, "the shot ends here", False)]
     edit.frame_set(20)
     refuses(bpy, "track", "the shot ends here", direction="FORWARD")
 
@@ -543,6 +671,18 @@ def test_a_trimmed_reversed_and_retimed_strip_follows_what_it_shows(bpy, edit, f
     call(bpy, "follow")
     assert len(set(shown.values())) > 15
     assert max(apart(bpy, frame, index, of=COUNT - 1) for frame, index in shown.items()) < 1.2
+
+
+def test_a_clip_of_other_footage_is_refused(bpy, edit, region, clip, frames, tmp_path):
+    other = bpy.data.movieclips.load(str(write_frames(tmp_path / "other", [picture(0)] * COUNT)))
+    later = bpy.data.movieclips.load(str(frames.with_name("f0003.png")))
+    for wrong in (other, later):
+        mark(wrong.tracking.objects[0].tracks.new(name="middle", frame=1), 0)
+        set_up(region, wrong, "TRACK", "middle")
+        refuses(bpy, "follow", f'clip "{wrong.name}" does not begin with the same file as strip "images"')
+    clip.filepath = str(frames.parent / ".." / frames.parent.name / frames.name)
+    set_up(region, clip, "TRACK", "middle")
+    assert call(bpy, "follow") == {"FINISHED"}
 
 
 def test_what_cannot_be_followed_is_said(bpy, edit, region, clip):

@@ -11,6 +11,7 @@ import pytest
 from support import recipe, write_frames
 
 from shutter_addon.blender import command as program
+from shutter_addon.core import motions
 from shutter_addon.core import recipe as recipes
 from shutter_addon.media import tracking
 
@@ -77,24 +78,44 @@ def test_every_key_is_kept_on_demand_and_only_in_those_frames(track, film, tmp_p
     options = ("--region", "cross", "--frame", 6, "--frames", "4:8", "--motion", "location", "--all-keys")
     assert track(film, *options, "--output", tmp_path / "t.json", recipe=given) == (0, "")
     found = keys(tmp_path / "t.json")
-    assert [key.frame for key in found] == [2, 4, 5, 6, 7, 8, 11]
+    assert [key.frame for key in found] == [2, 3, 4, 5, 6, 7, 8, 9, 10, 11]
     assert (found[0].ease, found[0].location, found[-1].location) == ("bezier", (0.5, 0.5), (0.5, 0.5))
     assert {key.scale for key in found} == {1.0}
-    # where the keys had put it, frame 6 lies still
-    before = recipes.load(tmp_path / "recipe.json").effect(WIDTH / HEIGHT).regions[1].location.at(6)
-    assert found[3].location == pytest.approx(before)
+    # at frame 6, and at those that were not tracked, it is where the keys had put it
+    before, after = (
+        recipes.load(tmp_path / name).effect(WIDTH / HEIGHT).regions[1].location for name in ("recipe.json", "t.json")
+    )
+    for frame in (1, 2, 3, 6, 9, 10, 11, 12):
+        assert after.at(frame) == pytest.approx(before.at(frame)), frame
 
 
-def test_a_redrawn_shape_stays_drawn_where_it_was(track, film, tmp_path):
-    other = [[[0.4, 0.4], [0.6, 0.6]]]
-    given = plain(keys=[{"frame": 4}, {"frame": 8, "strokes": other, "ease": "bezier"}])
+@pytest.mark.parametrize("ease", ["linear", "constant"])
+def test_frames_beyond_those_that_are_tracked_stay(track, film, tmp_path, ease):
+    given = plain(keys=[{"frame": n, "location": [n / 50, 0], "scale": 1 + n / 50, "ease": ease} for n in (1, 6, 12)])
+    options = ("--region", "cross", "--frame", 6, "--frames", "5:7", "--output", tmp_path / "t.json")
+    assert track(film, *options, recipe=given) == (0, "")
+    before, after = (
+        recipes.load(tmp_path / name).effect(WIDTH / HEIGHT).regions[1] for name in ("recipe.json", "t.json")
+    )
+    for frame in (1, 2, 3, 4, 8, 9, 10, 11, 12):
+        assert after.location.at(frame) == pytest.approx(before.location.at(frame)), frame
+        assert after.scale.at(frame) == pytest.approx(before.scale.at(frame)), frame
+    if ease == "linear":
+        assert [key.frame for key in keys(tmp_path / "t.json")] == [1, 4, 5, 6, 7, 8, 12]
+
+
+@pytest.mark.parametrize("ease", ["linear", "bezier", "constant"])
+def test_a_redrawn_shape_stays_drawn_as_it_was_and_on_what_it_covers(track, film, tmp_path, ease):
+    other = [[[0.5, 0.4], [0.7, 0.6]]]
+    given = plain(keys=[{"frame": 4, "ease": ease}, {"frame": 8, "strokes": other, "ease": "bezier"}])
     assert track(film, "--region", "cross", "--frame", 5, "--output", tmp_path / "t.json", recipe=given) == (0, "")
     region, before = (recipes.load(tmp_path / name).regions[1] for name in ("t.json", "recipe.json"))
     shapes = [each.over_time(1, WIDTH / HEIGHT) for each in (region, before)]
     for frame in range(1, COUNT + 1):
         after, was = (np.concatenate(shape.unmoved(frame)) for shape in shapes)
         assert after == pytest.approx(was, abs=1e-9)
-        assert shapes[0].location.at(frame) == pytest.approx(expected(frame), abs=0.5 / WIDTH)
+        since = motions.centre(shapes[0].unmoved(frame)) - motions.centre(shapes[0].unmoved(5))
+        assert since + shapes[0].location.at(frame) == pytest.approx(expected(frame), abs=1.2 / WIDTH)
 
 
 def test_what_a_keyed_time_shows_is_tracked(track, film, tmp_path):
@@ -111,7 +132,7 @@ def test_where_it_ends_is_said(track, film, tmp_path):
     first = write_frames(tmp_path / "two", np.stack([shots[n // 6] for n in range(12)]))
     options = ("--region", "cross", "--frame", 3, "--output", tmp_path / "t.json", "--report", tmp_path / "r.json")
     code, said = track(first, *options)
-    assert (code, said) == (0, f"Virtual Shutter: cross: not tracked from frame 7 on: {tracking.SHOT_ENDS}")
+    assert (code, said) == (0, "Virtual Shutter: cross: tracked to frame 6, where the shot ends")
     assert json.loads((tmp_path / "r.json").read_text())["stops"] == [{"frame": 7, "reason": tracking.SHOT_ENDS}]
     assert [key.frame for key in keys(tmp_path / "t.json")] == [1, 3, 6]
 

@@ -41,6 +41,15 @@ def test_a_carried_shape_lies_where_the_motion_takes_its_points(shape, placement
 
 
 @settings(deadline=None)
+@given(shapes, placements, similarities, sizes, st.complex_numbers(max_magnitude=1000))
+def test_the_motion_between_two_placements_is_the_one_that_carried_the_shape(shape, placement, motion, size, point):
+    centre = motions.centre(shape)
+    carried = motions.carried(placement, motion, centre, centre, size)
+    found = motions.motion_between(placement, carried, centre, centre, size)
+    assert found(point) == pytest.approx(motion(point), rel=1e-7, abs=1e-5)
+
+
+@settings(deadline=None)
 @given(shapes, placements, similarities, sizes, st.tuples(coordinate, coordinate))
 def test_a_shape_that_is_redrawn_goes_on_from_where_its_centre_was(shape, placement, motion, size, shift):
     centre = motions.centre(shape)

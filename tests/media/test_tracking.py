@@ -1,5 +1,6 @@
 """Tracking against films whose motion is known: a part of one picture moves over another one."""
 
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from shutter_addon.core import scribbles
+from shutter_addon.core import motions, scribbles
 from shutter_addon.core.effect import Drawings, Region
 from shutter_addon.core.frame_source import FrameSource
 from shutter_addon.core.keyframes import Constant, Keys
@@ -182,6 +183,46 @@ def test_a_subject_that_was_covered_is_found_again(subject, ground):
     assert max(off.values()) <= 3  # a straight way across what nobody saw
 
 
+@pytest.fixture(scope="module")
+def passing(subject, ground):
+    """A subject that goes by, covered at the frames 10 to 14, and its true motion since the frame 4."""
+    return film(subject, ground, lambda t: (2.5 * t, 0.5 * t), 24, 4, covered=range(10, 15))
+
+
+@pytest.mark.parametrize("kind", EVERY)
+@pytest.mark.parametrize(
+    ("start", "anchors", "frames", "expected"),
+    [
+        (12, {4}, range(24), range(4, 24)),
+        (12, {4}, range(12, 24), range(12, 24)),
+        (13, {4, 12}, range(24), range(12, 24)),
+        (12, {4, 20}, range(24), range(4, 21)),
+        (4, {12}, range(24), range(13)),
+    ],
+)
+def test_a_frame_mended_under_a_cover_misleads_nobody(passing, kind, start, anchors, frames, expected):
+    source, truth = passing
+    keyed = sorted({start, *anchors})
+    ways = [(2.5 * (n - 4) / WIDTH, -0.5 * (n - 4) / HEIGHT) for n in keyed]
+    given = region(kind, location=Keys(tuple(keyed), tuple(ways), ("linear",) * len(keyed)))
+    tracked, faults = followed(source, kind, start, frames, region=given, anchors=anchors)
+    assert not faults
+    assert set(tracked) == set(expected)
+    off, free = errors(tracked, truth, kind), set(tracked) - set(range(10, 15))
+    assert sure(tracked) == free | {*keyed} & set(tracked)
+    assert max(off[frame] for frame in sure(tracked)) <= 1
+    assert max(off.values()) <= 3
+
+
+def test_where_nothing_tells_the_subject_from_its_cover_no_frame_is_sure(passing):
+    """What comes behind the mended frame is not to be tracked, so nobody knows whether the subject is seen there."""
+    source, _ = passing
+    keys = Keys((4.0, 12.0), ((0.0, 0.0), (20 / WIDTH, -4 / HEIGHT)), ("linear",) * 2)
+    tracked, _ = followed(source, "lasso", 12, range(4, 13), region=region("lasso", location=keys), anchors={4})
+    assert set(tracked) == set(range(4, 13))
+    assert sure(tracked) == {4, 12}
+
+
 def test_a_subject_that_stays_covered_ends_it(subject, ground, monkeypatch):
     monkeypatch.setattr(tracking, "PATIENCE", 6)
     source, truth = film(subject, ground, lambda t: (2.0 * t,), 24, 2, covered=range(8, 24))
@@ -219,19 +260,19 @@ def test_a_subject_without_corners_is_never_sure(subject, ground):
 def test_it_ends_at_a_cut_on_both_sides(subject, ground):
     whole, _ = film(subject, ground, lambda t: (t,), 8, 4)
     others = [np.roll(ground[:, ::-1], 2 * n, axis=1) for n in range(6)]
-    film_ = ShotSource(Film([*(255 - frame for frame in others), *whole.frames, *others]))
-    tracked, faults = followed(film_, "lasso", 10)
+    joined = ShotSource(Film([*(255 - frame for frame in others), *whole.frames, *others]))
+    tracked, faults = followed(joined, "lasso", 10)
     assert sorted(tracked) == list(range(6, 14))
     assert faults == {5: tracking.SHOT_ENDS, 14: tracking.SHOT_ENDS}
 
 
-@pytest.mark.parametrize("motion_", ["location", "rotation"])
-def test_only_what_is_asked_for_changes(subject, ground, motion_):
+@pytest.mark.parametrize("change", ["location", "rotation"])
+def test_only_what_is_asked_for_changes(subject, ground, change):
     source, _ = film(subject, ground, lambda t: (2 * t, 0, 2 * t, 1.01**t), 8, 2)
-    tracked, _ = followed(source, "line", 2, motion=motion_)
+    tracked, _ = followed(source, "line", 2, motion=change)
     assert all(each.placement.scale == pytest.approx(1, abs=1e-12) for each in tracked.values())
     turned = tracked[7].placement.rotation
-    assert turned == (0 if motion_ == "location" else pytest.approx(-10, abs=1))
+    assert turned == (0 if change == "location" else pytest.approx(-10, abs=1))
     assert tracked[7].placement.location[0] == pytest.approx(10 / WIDTH, abs=1.5 / WIDTH)
 
 
@@ -243,10 +284,25 @@ def test_between_two_keys_both_count(subject, ground):
     tracked, faults = followed(source, "lasso", 2, region=region("lasso", location=keys), anchors=(12,))
     assert not faults
     assert sorted(tracked) == list(range(13))
+    assert sure(tracked) == set(range(13))
     assert tracked[12].placement.location == pytest.approx((30 / WIDTH + moved, 0.0))
     for frame in range(2, 13):
         expected = 3 * (frame - 2) / WIDTH + moved * (frame - 2) / 10
         assert tracked[frame].placement.location[0] == pytest.approx(expected, abs=0.7 / WIDTH)
+
+
+@pytest.mark.parametrize("ease", ["linear", "bezier", "constant"])
+def test_a_shape_that_is_redrawn_meanwhile_stays_on_its_subject(subject, ease):
+    """A still film: the shape's own way from drawing to drawing is made up for."""
+    drawn = [stroke + shift for shift in ((0, 0), (0.15, 0.05)) for stroke in strokes("lasso")]
+    drawings = Drawings((2.0, 9.0), (drawn[:1], drawn[1:]), (ease,) * 2, WIDTH / HEIGHT)
+    given = replace(region("lasso"), drawings=drawings)
+    source = Film([subject if n not in (4, 5) else subject[:, ::-1] for n in range(10)])
+    tracked, _ = followed(source, "lasso", 2, region=given)
+    assert sure(tracked) == set(range(10)) - {4, 5}
+    for frame, each in tracked.items():
+        off = motions.centre(given.unmoved(frame)) + each.placement.location - motions.centre(drawn[:1])
+        assert np.hypot(*(off * SIZE)) / PIXEL <= 0.5
 
 
 def test_the_order_of_reading_and_threads_change_no_bit(subject, ground, tmp_path):

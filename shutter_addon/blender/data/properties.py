@@ -239,7 +239,7 @@ class ShutterRegion(PropertyGroup):
     stops: CollectionProperty(type=TrackStop)
     motion: EnumProperty(
         name="Motion",
-        description="What tracking and following key",
+        description="Which channels Track and Follow key",
         items=MOTIONS,
         default="SCALE",
         options=_UNKEYED,
@@ -268,7 +268,8 @@ class ShutterRegion(PropertyGroup):
         name="Object", description="Tracking object that has the tracks; without one, the camera"
     )
     follow_track: StringProperty(name="Track", description="Name of the track or plane track that is followed")
-    # Where the region's own place counts, from the effect's start; and of what the keys were made.
+    # The frame, from the effect's start, at which the editor has put the region; and a digest of the markers that its
+    # keys were made from.
     follow_frame: FloatProperty(name="Follow From", min=-2 * MAX_FRAME, max=2 * MAX_FRAME, options={"HIDDEN"})
     follow_stamp: StringProperty(options={"HIDDEN"})
 

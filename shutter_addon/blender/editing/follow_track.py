@@ -6,7 +6,9 @@ where it is at one frame of the timeline, and from the editor's other keys; it g
 
 import hashlib
 from bisect import bisect_left, bisect_right
+from pathlib import Path
 
+import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
@@ -18,9 +20,6 @@ from ..rendering import session
 from . import region_edits
 from .motion_keys import MotionKeys
 
-# From the middle of a pixel, at which motions.Similarity has whole numbers, to its corner.
-_CORNER = 0.5 + 0.5j
-
 Points = dict[str, complex]  # where markers are in the picture, in pixels as motions.Similarity counts them
 
 
@@ -29,7 +28,9 @@ def follow(edit, effect, strip, index: int) -> None:
     it cannot be followed, and nothing has changed."""
     start = edit.frame_current
     points = _points(edit, effect, strip, index, start)
-    region_edits.key_region(effect, index)
+    keys = _keys(effect, index)
+    keys.hold(start, start)
+    region_edits.key_region(effect, index, keys.channels())
     effect.regions[index].follow_frame = start - effect.start
     _key(edit, effect, strip, index, points)
 
@@ -44,9 +45,14 @@ def _start(effect, index: int) -> int:
     return round(effect.start + validation.number(effect.regions[index], "follow_frame"))
 
 
+def _keys(effect, index: int) -> MotionKeys:
+    region = effect.regions[index]
+    return MotionKeys(effect, index, "LOCATION" if region.follow_kind == "TRACK" else region.motion)
+
+
 def _key(edit, effect, strip, index: int, points: dict[int, Points]) -> None:
     region, start, size = effect.regions[index], _start(effect, index), annotations.picture_size(effect)
-    keys = MotionKeys(effect, index, "LOCATION" if region.follow_kind == "TRACK" else region.motion)
+    keys = _keys(effect, index)
     known = sorted({start, *(frame for frame in keys.edited(range(min(points), max(points) + 1)) if frame in points)})
     shape = snapshot.region_at(edit, effect, strip, index, points)
     placements = _followed(shape, points, known, start, size)
@@ -127,6 +133,7 @@ def _points(edit, effect, strip, index: int, start: int) -> dict[int, Points]:
     MediaError: there is nothing that it can follow from the frame `start` on."""
     region = effect.regions[index]
     validation.check_region(region)
+    region_edits.check_curves(effect, index)
     validation.word(region, "motion")
     tracks, size = _markers(region), annotations.picture_size(effect)
     times = _clip_times(edit, effect, strip, region.follow_clip)
@@ -146,20 +153,29 @@ def _points(edit, effect, strip, index: int, start: int) -> dict[int, Points]:
 def _clip_times(edit, effect, strip, clip) -> dict[int, float]:
     """By timeline frame of the strip what it shows, in the clip's frames: in-between frames lie between two of them."""
     frames = range(strip.left_handle, strip.right_handle)
-    shown, first = snapshot.take(edit, effect, strip, frames), _first_frame(strips.source_of(edit, effect, strip), clip)
+    source = strips.source_of(edit, effect, strip)
+    _check_footage(source, clip)
+    shown, first = snapshot.take(edit, effect, strip, frames), _first_frame(source, clip)
     with session.open_source(shown) as source:
         return {frame: session.source_index(shown, frame, source)[0] / source.step + first for frame in frames}
 
 
 def _points_at(tracks, time: float, size) -> Points:
     """Of the markers (see _markers) those that there are at a time in the clip's frames."""
-    width, height = size
     found = {name: _place_at(frames, places, time) for name, frames, places in tracks}
-    return {
-        name: complex(place[0] * width, (1 - place[1]) * height) - _CORNER
-        for name, place in found.items()
-        if place is not None
-    }
+    return {name: motions.pixel(place, size) for name, place in found.items() if place is not None}
+
+
+def _check_footage(source, clip) -> None:
+    """EffectError: a clip begins with another file than a strip does. MediaError: the strip has no files."""
+    first = _file(source.clip) if source.type == "MOVIECLIP" and source.clip else source_media.spec(source).path
+    if first.resolve() != _file(clip).resolve():
+        sentence = rpt_('clip "{clip}" does not begin with the same file as strip "{strip}"')
+        raise EffectError(sentence.format(clip=clip.name, strip=source.name))
+
+
+def _file(clip) -> Path:
+    return Path(bpy.path.abspath(clip.filepath, library=clip.library))
 
 
 def _first_frame(source, clip) -> int:
@@ -178,40 +194,45 @@ def _place_at(frames: np.ndarray, places: np.ndarray, time: float) -> np.ndarray
     return before + (time - np.floor(time)) * (after - before)
 
 
-def _followed(shape, points: dict[int, Points], known: list[int], start: int, size) -> dict[int, Placement]:
-    """By frame the placement of a region that is moved as the points are, from those at known frames; between two of
-    these, blended from both.
+class _Follower:
+    """Carries a region along the points that it follows.
 
-    shape: a core.effect.Region"""
-    centres = {frame: motions.centre(shape.unmoved(frame)) for frame in points}
-    moves = {frame: _motions(points, frame) for frame in known}
+    shape: a core.effect.Region; known: the frames, ascending, at which its placement is known"""
 
-    def carried(origin, frame):
-        motion = moves[origin].get(frame)
-        return motion and motions.carried(_placement(shape, origin), motion, centres[origin], centres[frame], size)
+    def __init__(self, shape, points: dict[int, Points], known: list[int], size):
+        self._shape, self._known, self._size = shape, known, size
+        self._centres = {frame: motions.centre(shape.unmoved(frame)) for frame in points}
+        self._moves = {frame: _motions(points, frame) for frame in known}
 
-    def placed(frame, near):
-        origins = known[max(bisect_right(known, frame) - 1, 0)], known[min(bisect_left(known, frame), len(known) - 1)]
-        first, second = (
-            motions.unwound(found, near) if (found := carried(origin, frame)) else None for origin in origins
-        )
-        if first is None or second is None or origins[0] == origins[1]:
+    def at(self, frame: int, near: Placement) -> Placement | None:
+        """The placement at a frame, its rotation next to another one's: between two known frames blended from both.
+        None: too few points are there."""
+        before = self._known[max(bisect_right(self._known, frame) - 1, 0)]
+        after = self._known[min(bisect_left(self._known, frame), len(self._known) - 1)]
+        first, second = self._carried(before, frame, near), self._carried(after, frame, near)
+        if first is None or second is None or before == after:
             return first or second
-        return motions.between(first, second, (frame - origins[0]) / (origins[1] - origins[0]))
+        return motions.between(first, second, (frame - before) / (after - before))
 
-    result = {start: _placement(shape, start)}
+    def _carried(self, origin: int, frame: int, near: Placement) -> Placement | None:
+        motion = self._moves[origin].get(frame)
+        if motion is None:
+            return None
+        centres = self._centres[origin], self._centres[frame]
+        return motions.unwound(motions.carried(self._shape.placement(origin), motion, *centres, self._size), near)
+
+
+def _followed(shape, points: dict[int, Points], known: list[int], start: int, size) -> dict[int, Placement]:
+    """By frame the placement of a region that is moved as the points are, from those at known frames."""
+    follower, result = _Follower(shape, points, known, size), {start: shape.placement(start)}
     frames = sorted(points)
     for way in ([f for f in frames if f > start], [f for f in reversed(frames) if f < start]):
         near = result[start]
         for frame in way:
-            if (found := placed(frame, near)) is not None:
+            found = follower.at(frame, near)
+            if found is not None:
                 near = result[frame] = found
     return dict(sorted(result.items()))
-
-
-def _placement(shape, frame: int) -> Placement:
-    x, y = shape.location.at(frame)
-    return Placement((x, y), float(shape.rotation.at(frame)), shape.scale.at(frame))
 
 
 def _motions(points: dict[int, Points], origin: int) -> dict[int, Similarity]:

@@ -1,7 +1,7 @@
 """Keys of a region's motion: those that tracking has made, among those of the editor, who mends it by more of them.
 
-What was made has Blender's key type Generated, which editors show in a colour of its own. All other keys are the
-editor's: they keep frame and value, and are linear where a made key follows.
+What was made has Blender's key type Generated, which editors show in a colour of its own, and the value that it was
+made with. All other keys are the editor's: they keep frame and value, and are linear where a made key follows.
 """
 
 from collections.abc import Mapping
@@ -15,6 +15,9 @@ from ..data import fcurves
 
 MADE = "GENERATED"
 _MADE = bpy.types.Keyframe.bl_rna.properties["type"].enum_items[MADE].value
+# What Blender gives each key as the overshoot of the ease Back, which linear keys have no use for: a made key keeps
+# there the value that it was made with, so that one which the editor has moved is told from it.
+NOTHING_KEPT = np.float32(1.70158)
 # The region's channels, and how many of their components a motion has.
 _COMPONENTS = (("location", 0), ("location", 1), ("rotation", 0), ("scale", 0))
 _COUNTS = {"LOCATION": 2, "ROTATION": 3, "SCALE": 4}
@@ -31,22 +34,37 @@ class MotionKeys:
     def edited(self, frames: range) -> list[int]:
         """The whole frames, among these, at which the editor has set a key."""
         curves = (self._curve(name, component) for name, component in _COMPONENTS[: _COUNTS[self.motion]])
-        found = {
-            frame for curve in curves if curve for frame in fcurves.points_of(curve)[:, 0][~_are_made(curve)].tolist()
-        }
+        keys = map(_read, filter(None, curves))
+        found = {frame for all_frames, made in keys for frame in all_frames[~made].tolist()}
         return sorted(int(frame) for frame in found if frame in frames)
 
     def are_made(self) -> bool:
         """Whether any key of the region's location was made."""
         curve = self._curve("location")
-        return curve is not None and bool(_are_made(curve).any())
+        return curve is not None and bool(_read(curve)[1].any())
+
+    def channels(self) -> list[str]:
+        """The region's channels that the motion has, and those that have keys already."""
+        count = _COUNTS[self.motion]
+        found = (name for k, (name, component) in enumerate(_COMPONENTS) if k < count or self._curve(name, component))
+        return list(dict.fromkeys(found))
+
+    def hold(self, first: int, last: int) -> None:
+        """Keys what was tracked right before and after these frames where it is there: it stays, whatever becomes of
+        the keys between."""
+        tracked = self.confidence()[0]
+        for frame in tracked[np.isin(tracked, (first - 1, last + 1))].tolist():
+            for curve in filter(None, (self._curve(name, component) for name, component in _COMPONENTS)):
+                if not curve.is_empty and frame not in fcurves.points_of(curve)[:, 0]:
+                    _insert(curve, frame, curve.evaluate(frame))
 
     def write(self, placements: Mapping[int, Placement], confidence: Mapping[int, float]) -> None:
         """Makes keys at these frames, in place of all that were made from the first frame of the confidence to its
-        last, of the channels that are not keyed as well.
+        last, of the channels that are not keyed as well. Other frames that were tracked stay as they are.
 
         confidence: 0 to 1 by frame"""
         within = min(confidence), max(confidence)
+        self.hold(*within)
         for k, (name, component) in enumerate(_COMPONENTS):
             is_keyed = k < _COUNTS[self.motion]
             values = {frame: _values(placement)[k] for frame, placement in placements.items()} if is_keyed else {}
@@ -79,25 +97,28 @@ def _values(placement: Placement) -> tuple[float, ...]:
 
 def _replace(curve, values: dict[int, float], first: int, last: int) -> None:
     """Makes keys of these values by frame, in place of those that were made from the first frame to the last."""
-    points = curve.keyframe_points
-    for i in np.flatnonzero(_within(curve, first, last) & _are_made(curve))[::-1].tolist():
-        points.remove(points[i], fast=True)
-    edited = set(fcurves.points_of(curve)[:, 0].tolist())
-    for frame in sorted(values.keys() - edited):
-        points.insert(frame, values[frame], options={"FAST"}, keyframe_type=MADE)
+    points, (frames, made) = curve.keyframe_points, _read(curve)
+    within = (frames >= first) & (frames <= last)
+    edited = within & ~made
     if values:
-        begins_span = fcurves.points_of(curve)[:, 0] < last
-        for i in np.flatnonzero(_within(curve, first, last) & (begins_span | _are_made(curve))).tolist():
+        for i in np.flatnonzero(edited & (frames < last)).tolist():
             points[i].interpolation = "LINEAR"
+    for i in np.flatnonzero(within & made)[::-1].tolist():
+        points.remove(points[i], fast=True)
+    for frame in sorted(values.keys() - set(frames[edited].tolist())):
+        _insert(curve, frame, values[frame])
     curve.update()
 
 
-def _within(curve, first: int, last: int) -> np.ndarray:
-    frames = fcurves.points_of(curve)[:, 0]
-    return (frames >= first) & (frames <= last)
+def _insert(curve, frame: int, value: float) -> None:
+    key = curve.keyframe_points.insert(frame, value, options={"FAST"}, keyframe_type=MADE)
+    key.interpolation, key.back = "LINEAR", key.co[1]
 
 
-def _are_made(curve) -> np.ndarray:
-    types = np.empty(len(curve.keyframe_points), np.int32)
+def _read(curve) -> tuple[np.ndarray, np.ndarray]:
+    """The frames (n,) of an F-curve's keys, and which of them were made and are as they were made."""
+    points, count = fcurves.points_of(curve), len(curve.keyframe_points)
+    types, kept = np.empty(count, np.int32), np.empty(count, np.float32)
     curve.keyframe_points.foreach_get("type", types)
-    return types == _MADE
+    curve.keyframe_points.foreach_get("back", kept)
+    return points[:, 0], (types == _MADE) & ((kept == points[:, 1]) | (kept == NOTHING_KEPT))

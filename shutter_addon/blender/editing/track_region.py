@@ -7,7 +7,9 @@ that the motion needs within a pixel of the picture.
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
+import bpy
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
@@ -34,13 +36,52 @@ _FAULTS = (
     n_("the frame lies outside what can be tracked"),
 )
 
+_replacements = 0  # how often Blender's data has been replaced, by undo or by another file
+
+
+def data_replaced() -> None:
+    """Ends all tracking, without another key: what it has found belongs to data that is gone."""
+    global _replacements
+    _replacements += 1
+
+
+class Target(NamedTuple):
+    """A region that is tracked: found again before each step, as anything may happen to Blender's data in between.
+
+    scene: session_uid of the effect's scene; known: what would change if another region took its place"""
+
+    scene: int
+    index: int
+    known: tuple
+
+    @classmethod
+    def of(cls, effect, index: int) -> "Target":
+        return cls(effect.scene.session_uid, index, cls._known(effect, index))
+
+    def effect(self):
+        """The effect, or None: it is gone, has another region there, lies elsewhere, or something was undone."""
+        for scene in bpy.data.scenes:
+            for effect in scene.virtual_shutter.effects:
+                if effect.scene and effect.scene.session_uid == self.scene:
+                    is_there = self.index < len(effect.regions) and self._known(effect, self.index) == self.known
+                    return effect if is_there else None
+        return None
+
+    @staticmethod
+    def _known(effect, index: int) -> tuple:
+        return _replacements, effect.id_data.session_uid, effect.start, effect.regions[index].layer
+
 
 def frames_to_track(edit, strip, direction: str, until: int = 0) -> range:
     """The timeline frames from the current one FORWARD, BACKWARD or in BOTH directions: as far as the strip goes, and
-    not beyond the frame `until`, unless that is 0. EffectError: the current one is none of the strip's."""
+    not beyond the frame `until`, unless that is 0. EffectError: the current one is none of the strip's, or `until` does
+    not lie in that direction."""
     current, first, last = edit.frame_current, strip.left_handle, strip.right_handle - 1
     if not first <= current <= last:
         raise EffectError(rpt_("the current frame is outside of the Shutter strip"))
+    if until and (until == current or direction == ("BACKWARD" if until > current else "FORWARD")):
+        sentence = rpt_("Until is frame {frame}, which does not lie in that direction; 0 is the end of the strip")
+        raise EffectError(sentence.format(frame=until))
     if until and until < current:
         first = max(first, until)
     elif until:
@@ -50,42 +91,56 @@ def frames_to_track(edit, strip, direction: str, until: int = 0) -> range:
 
 def track(edit, effect, strip, index: int, frames: range, motion: str, *, all_keys: bool = False) -> Iterator[int]:
     """Tracks a region from the current frame through timeline frames (frames_to_track). Gives each frame once it is
-    keyed. Closed early, it keeps what it has.
+    keyed. Closed early, it keeps what it has. It ends without another key where the region is not there any more.
 
     motion: one of properties.MOTIONS; all_keys: keys are not thinned
     EffectError, MediaError: it cannot be tracked; where no frame has come yet, nothing has changed."""
     validation.check_region(effect.regions[index])
+    region_edits.check_curves(effect, index)
     start, keys = edit.frame_current, MotionKeys(effect, index, motion)
     anchors = [frame for frame in keys.edited(frames) if frame != start]
     here = Tracked(start, placement_now(effect.regions[index]), 1.0)
-    shape = _standing(_region(edit, effect, strip, index, [start, *anchors]), here)
+    shape = _standing(snapshot.region_at(edit, effect, strip, index, frames), here)
     found, stops = {start: here}, []
-    shown = snapshot.take(edit, effect, strip, frames)
+    reach = (
+        max((a for a in anchors if a < start), default=frames[0]),
+        min((a for a in anchors if a > start), default=frames[-1]),
+    )
+    shown, target = snapshot.take(edit, effect, strip, frames), Target.of(effect, index)
+    del edit, effect, strip, keys  # which may not outlive the first step
     with session.open_source(shown) as source:
         try:
             for tracked in _followed(shape, shown, source, start, frames, motion, anchors):
                 if tracked.fault:
                     stops.append(tracked)
                 elif tracked.frame != start:
+                    if (effect := target.effect()) is None:
+                        return
+                    keys = MotionKeys(effect, index, motion)
                     if len(found) == 1:
-                        region_edits.key_region(effect, index)
+                        keys.hold(start, start)
+                        region_edits.key_region(effect, index, keys.channels())
                     found[tracked.frame] = tracked
                     beside = found.get(tracked.frame + (-1 if tracked.frame > start else 1), tracked)
                     _write(keys, [beside, tracked], [beside, tracked])
                     yield tracked.frame
         finally:
-            if len(found) > 1:
+            if len(found) > 1 and (effect := target.effect()) is not None:
+                keys = MotionKeys(effect, index, motion)
                 kept = found if all_keys else _thinned(effect, shape, found, {start, *anchors})
                 _write(keys, [found[frame] for frame in kept], found.values())
-                _mark(effect, index, found, stops)
+                _mark(effect, index, found, stops, reach)
     if len(found) == 1:
         raise EffectError(rpt_(stops[0].fault))
 
 
-def stops(effect, index: int) -> list[tuple[int, str]]:
-    """The timeline frames at which tracking of a region stopped, ascending, and why, in the user's language."""
+def stops(effect, index: int) -> list[tuple[int, str, bool]]:
+    """The timeline frames at which tracking of a region stopped, ascending, why, in the user's language, and whether
+    that is a fault: the end of a shot is none."""
     known = [stop for stop in effect.regions[index].stops if math.isfinite(effect.start + stop.frame)]
-    return sorted((round(effect.start + stop.frame), rpt_(stop.fault)) for stop in known)
+    return sorted(
+        (round(effect.start + stop.frame), rpt_(stop.fault), stop.fault != tracking.SHOT_ENDS) for stop in known
+    )
 
 
 def confidence_at(effect, index: int, frame: float) -> float | None:
@@ -99,13 +154,6 @@ def next_unsure(effect, index: int, frame: float) -> int | None:
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
     unsure = frames[(frames > frame) & (frames <= limits.MAX_FRAME) & (confidence < tracking.SURE)]
     return int(unsure[0]) if len(unsure) else None
-
-
-def _region(edit, effect, strip, index: int, frames: list[int]) -> Region:
-    """The region as the tracker asks for it."""
-    layer = annotations.layer_of(effect, effect.regions[index])
-    drawn = [drawing.frame_number for drawing in layer.frames] if layer else []
-    return snapshot.region_at(edit, effect, strip, index, [*frames, *drawn])
 
 
 def _standing(region: Region, here: Tracked) -> Region:
@@ -143,13 +191,16 @@ def _write(keys: MotionKeys, kept: Iterable[Tracked], found: Iterable[Tracked]) 
     keys.write({t.frame: t.placement for t in kept}, {t.frame: t.confidence for t in found})
 
 
-def _mark(effect, index: int, found: dict[int, Tracked], stops: list[Tracked]) -> None:
-    """Notes where tracking stopped, in place of what was noted of a direction, and of frames that it came through."""
+def _mark(effect, index: int, found: dict[int, Tracked], stops: list[Tracked], reach: tuple[int, int]) -> None:
+    """Notes where tracking stopped, in place of what was noted of frames that it came through, and of those behind a
+    stop up to where it was to go.
+
+    reach: the first and the last frame that it was to track"""
     region, start = effect.regions[index], next(iter(found))
     ways = {stop.frame > start for stop in stops}
+    first, last = reach[0] if False in ways else min(found), reach[1] if True in ways else max(found)
     for i in reversed(range(len(region.stops))):
-        old = region.stops[i]
-        if old.forward in ways or min(found) <= effect.start + old.frame <= max(found):
+        if first <= effect.start + region.stops[i].frame <= last:
             region.stops.remove(i)
     for stop in stops:
         new = region.stops.add()

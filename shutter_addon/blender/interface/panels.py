@@ -193,16 +193,10 @@ class _Regions(_WithEffect):
 
 def _draw_tracking(layout, effect, region) -> None:
     """The buttons; how sure tracking was of the current frame, and where it stopped."""
-    try:
-        motion = validation.word(region, "motion")
-    except validation.EffectError as error:
-        layout.label(text=str(error), icon="ERROR", translate=False)
-        return
     row = layout.row(align=True)
     for direction, _name, _description, icon, _number in track_operators.DIRECTIONS:
         button = row.operator("shutter.track", text="Track" if direction == "BOTH" else "", icon=icon)
-        button.direction, button.motion = direction, motion
-        button.until, button.all_keys = region.track_until, region.track_all_keys
+        button.direction = direction
     index = effect.active_region
     confidence = track_region.confidence_at(effect, index, effect.id_data.frame_current)
     if confidence is not None:
@@ -210,9 +204,9 @@ def _draw_tracking(layout, effect, region) -> None:
         text = iface_("Confidence: {percent} %").format(percent=f"{100 * confidence:.0f}")
         row.label(text=text, icon="CHECKMARK" if confidence >= SURE else "ERROR", translate=False)
         row.operator("shutter.track_look")
-    for frame, fault in track_region.stops(effect, index):
+    for frame, reason, is_fault in track_region.stops(effect, index):
         row = layout.row(align=True)
-        row.label(text=fault, icon="ERROR", translate=False)
+        row.label(text=reason, icon="ERROR" if is_fault else "INFO", translate=False)
         place = row.row()
         place.ui_units_x = 2.5
         place.operator("shutter.track_look", text=str(frame), translate=False).frame = frame

@@ -158,9 +158,18 @@ class SHUTTER_GT_region(Gizmo):
             return
         effect, index = found[1], found[1].active_region
         if bar_edits.auto_key(context) or MotionKeys(effect, index, region.motion).are_made():
-            region_edits.key_region(effect, index)
+            _key(context, effect, index)
             context.area.tag_redraw()  # panels show keys
         bpy.ops.ed.undo_push(message=iface_("Transform Region", contexts.operator_default))
+
+
+def _key(context, effect, index: int) -> None:
+    """Keys the region, or says why it cannot be: gizmos have no reports."""
+    try:
+        region_edits.key_region(effect, index)
+    except validation.EffectError as error:
+        sentence, show = str(error), context.window_manager.popup_menu
+        show(lambda menu, _context: menu.layout.label(text=sentence, translate=False), icon="ERROR")
 
 
 class SHUTTER_GGT_region(GizmoGroup):

@@ -4,11 +4,11 @@ import time
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import BoolProperty, EnumProperty, IntProperty
+from bpy.props import EnumProperty, IntProperty
 from bpy.types import Operator
 
-from ..data import selection
-from ..data.properties import CONTEXT, MOTIONS
+from ..data import selection, validation
+from ..data.properties import CONTEXT
 from ..editing import follow_track, track_region
 from ..rendering.session import FAULTS
 from .operators import _OfRegion, redraw, refused
@@ -24,7 +24,7 @@ DIRECTIONS = (
 
 
 class SHUTTER_OT_track(_OfRegion, Operator):
-    """Key the active region by what it covers at this frame, up to your own keys (Esc keeps what is done)"""
+    """Key the active region by what it covers here, up to your own keys (Esc stops and keeps the tracked frames)"""
 
     bl_idname = "shutter.track"
     bl_label = "Track Region"
@@ -38,25 +38,6 @@ class SHUTTER_OT_track(_OfRegion, Operator):
         default="BOTH",
         options={"SKIP_SAVE"},
         translation_context=CONTEXT,
-    )
-    motion: EnumProperty(
-        name="Motion",
-        description="What tracking and following key",
-        items=MOTIONS,
-        default="SCALE",
-        options={"SKIP_SAVE"},
-        translation_context=CONTEXT,
-    )
-    until: IntProperty(
-        name="Until",
-        description="Timeline frame at which tracking stops; 0 is the end of the strip",
-        options={"SKIP_SAVE"},
-        translation_context=CONTEXT,
-    )
-    all_keys: BoolProperty(
-        name="All Keys",
-        description="Keep a key at every tracked frame, in place of those that the motion needs within a pixel",
-        options={"SKIP_SAVE"},
     )
 
     def invoke(self, context, _event):
@@ -81,11 +62,14 @@ class SHUTTER_OT_track(_OfRegion, Operator):
         except FAULTS as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        self._tell(selection.active(context)[1])
+        self._tell()
         redraw(context)
         return {"FINISHED"}
 
     def modal(self, context, event):
+        if self._target.effect() is None:  # undone or removed in another window, or another file was loaded
+            self.cancel(context)
+            return {"CANCELLED"}
         is_stopped = event.type == "ESC" and event.value == "PRESS"
         if event.type == "TIMER":
             # What it takes to draw a frame, tracking takes at least as well.
@@ -95,8 +79,8 @@ class SHUTTER_OT_track(_OfRegion, Operator):
             return {"RUNNING_MODAL"}
         self.cancel(context)
         if self.direction == "BOTH":
-            self._edit.frame_set(self._start)
-        self._tell(selection.active(context)[1])
+            self._go_to(self._start)
+        self._tell()
         redraw(context)
         return {"FINISHED"}
 
@@ -109,10 +93,11 @@ class SHUTTER_OT_track(_OfRegion, Operator):
 
     def _begin(self, context):
         edit, effect, strip = selection.active(context)
-        index = effect.active_region
-        self._edit, self._start, self._done = edit, edit.frame_current, set()
-        self._frames = track_region.frames_to_track(edit, strip, self.direction, self.until)
-        self._steps = track_region.track(edit, effect, strip, index, self._frames, self.motion, all_keys=self.all_keys)
+        index, region = effect.active_region, selection.active_region(effect)
+        self._target, self._start, self._done = track_region.Target.of(effect, index), edit.frame_current, set()
+        self._frames = track_region.frames_to_track(edit, strip, self.direction, region.track_until)
+        motion, all_keys = validation.word(region, "motion"), region.track_all_keys
+        self._steps = track_region.track(edit, effect, strip, index, self._frames, motion, all_keys=all_keys)
 
     def _go_on(self, seconds: float) -> bool:
         """Tracks for a while; whether there is more to track. One of FAULTS: there is nothing to track at all."""
@@ -129,8 +114,12 @@ class SHUTTER_OT_track(_OfRegion, Operator):
             self.report({"WARNING"}, str(error))
         return False
 
+    def _go_to(self, frame: int):
+        if (effect := self._target.effect()) is not None:
+            effect.id_data.frame_set(frame)
+
     def _show(self, context):
-        self._edit.frame_set(self._frame)
+        self._go_to(self._frame)
         done, total = len(self._done), len(self._frames) - 1
         context.window_manager.progress_update(done)
         sentence = rpt_("Tracking: {done} of {total} frames, Esc to stop")
@@ -138,11 +127,13 @@ class SHUTTER_OT_track(_OfRegion, Operator):
         redraw(context)
         self._shown = time.perf_counter()
 
-    def _tell(self, effect):
-        for frame, fault in track_region.stops(effect, effect.active_region):
+    def _tell(self):
+        if (effect := self._target.effect()) is None:
+            return
+        for frame, fault, is_fault in track_region.stops(effect, self._target.index):
             if frame in self._frames:
                 sentence = rpt_("Tracking stopped at frame {frame}: {fault}")
-                self.report({"WARNING"}, sentence.format(frame=frame, fault=fault))
+                self.report({"WARNING" if is_fault else "INFO"}, sentence.format(frame=frame, fault=fault))
 
 
 class SHUTTER_OT_track_look(_OfRegion, Operator):

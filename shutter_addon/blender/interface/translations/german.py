@@ -565,9 +565,9 @@ MESSAGES = {
     ("Operator", "Track Region"): "Region verfolgen",
     (
         "*",
-        "Key the active region by what it covers at this frame, up to your own keys (Esc keeps what is done)",
-    ): "Der aktiven Region Schlüsselbilder nach dem geben, was sie in diesem Bild bedeckt, bis zu den eigenen "
-    "Schlüsselbildern (Esc behält, was getan ist)",
+        "Key the active region by what it covers here, up to your own keys (Esc stops and keeps the tracked frames)",
+    ): "Der aktiven Region Schlüsselbilder nach dem geben, was sie hier bedeckt, bis zu den eigenen "
+    "Schlüsselbildern (Esc hält an und behält die verfolgten Bilder)",
     ("Virtual Shutter", "Direction"): "Richtung",
     ("*", "Where tracking goes from the current frame"): "Wohin vom aktuellen Bild aus verfolgt wird",
     ("Virtual Shutter", "Backward"): "Rückwärts",
@@ -577,7 +577,7 @@ MESSAGES = {
     ("Virtual Shutter", "Forward"): "Vorwärts",
     ("*", "Towards the strip's last frame"): "Zum letzten Bild des Streifens hin",
     ("Virtual Shutter", "Motion"): "Bewegung",
-    ("*", "What tracking and following key"): "Was Verfolgen und Folgen mit Schlüsselbildern versehen",
+    ("*", "Which channels Track and Follow key"): "Welchen Kanälen Verfolgen und Folgen Schlüsselbilder geben",
     ("Virtual Shutter", "Location"): "Position",
     ("*", "The region is moved"): "Die Region wird bewegt",
     ("Virtual Shutter", "Location, Rotation"): "Position, Rotation",
@@ -614,6 +614,14 @@ MESSAGES = {
         "*",
         "the current frame is outside of the Shutter strip",
     ): "das aktuelle Bild liegt außerhalb des Verschluss-Streifens",
+    (
+        "*",
+        'region "{region}": the F-curve of "{channel}" is locked',
+    ): "Region „{region}“: die F-Kurve von „{channel}“ ist gesperrt",
+    (
+        "*",
+        'region "{region}": the F-curve of "{channel}" is muted',
+    ): "Region „{region}“: die F-Kurve von „{channel}“ ist stummgeschaltet",
     ("*", "the shot ends here"): "die Einstellung endet hier",
     (
         "*",
@@ -636,7 +644,7 @@ MESSAGES = {
         "*",
         "Key the active region anew by what it follows, after the track has changed",
     ): "Der aktiven Region neue Schlüsselbilder nach dem geben, dem sie folgt, nachdem die Spur sich geändert hat",
-    ("*", "What the region follows"): "Wem die Region folgt",
+    ("*", "What the region follows"): "Was die Region verfolgt",
     ("*", "Track"): "Spur",
     (
         "*",
@@ -664,6 +672,14 @@ MESSAGES = {
     ("*", "Choose a clip first"): "Zuerst einen Clip wählen",
     ("*", "The region follows no track yet"): "Die Region folgt noch keiner Spur",
     ("*", 'clip "{clip}" has no track "{track}"'): "Clip „{clip}“ hat keine Spur „{track}“",
+    (
+        "*",
+        'clip "{clip}" does not begin with the same file as strip "{strip}"',
+    ): "Clip „{clip}“ beginnt nicht mit derselben Datei wie Streifen „{strip}“",
+    (
+        "*",
+        "Until is frame {frame}, which does not lie in that direction; 0 is the end of the strip",
+    ): "Bis ist Bild {frame}, das nicht in dieser Richtung liegt; 0 ist das Ende des Streifens",
     (
         "*",
         '"{track}" of clip "{clip}" has no marker at frame {frame}',
