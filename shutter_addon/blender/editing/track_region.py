@@ -98,15 +98,16 @@ def track(edit, effect, strip, index: int, frames: range, motion: str, *, all_ke
     validation.check_region(effect.regions[index])
     region_edits.check_curves(effect, index)
     start, keys = edit.frame_current, MotionKeys(effect, index, motion)
-    anchors = [frame for frame in keys.edited(frames) if frame != start]
-    here = Tracked(start, placement_now(effect.regions[index]), 1.0)
-    shape = _standing(snapshot.region_at(edit, effect, strip, index, frames), here)
+    # Those beyond the frames that are tracked tell how the subject looks as well.
+    anchors = [frame for frame in keys.edited(range(strip.left_handle, strip.right_handle)) if frame != start]
+    here, known = Tracked(start, placement_now(effect.regions[index]), 1.0), sorted({*frames, *anchors})
+    shape = _standing(snapshot.region_at(edit, effect, strip, index, known), here)
     found, stops = {start: here}, []
     reach = (
-        max((a for a in anchors if a < start), default=frames[0]),
-        min((a for a in anchors if a > start), default=frames[-1]),
+        max((a for a in anchors if frames[0] <= a < start), default=frames[0]),
+        min((a for a in anchors if start < a <= frames[-1]), default=frames[-1]),
     )
-    shown, target = snapshot.take(edit, effect, strip, frames), Target.of(effect, index)
+    shown, target = snapshot.take(edit, effect, strip, known), Target.of(effect, index)
     del edit, effect, strip, keys  # which may not outlive the first step
     with session.open_source(shown) as source:
         try:
