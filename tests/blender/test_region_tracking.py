@@ -424,11 +424,21 @@ def test_every_sentence_of_the_tracker_can_be_translated():
 
 def test_the_next_unsure_frame(bpy, region):
     _edit, effect, _strip = active(bpy)
-    placement = {11: 1.0, 12: 0.9, 13: 0.4, 14: 0.6, 15: 0.0}
-    MotionKeys(effect, 0, "SCALE").write({11: Placement(), 15: Placement()}, placement)
-    assert track_region.next_unsure(effect, 0, 11) == 13
-    assert track_region.next_unsure(effect, 0, 13) == 15
-    assert track_region.next_unsure(effect, 0, 15) is None
+    confidence = {11: 1.0, 12: 0.9, 13: 0.4, 14: 0.2, 15: 0.3, 16: 0.6, 17: 0.0}
+    MotionKeys(effect, 0, "SCALE").write({11: Placement(), 17: Placement()}, confidence)
+    assert track_region.next_unsure(effect, 0, 11) == 14, "the worst of its stretch"
+    assert track_region.next_unsure(effect, 0, 14) == 17
+    assert track_region.next_unsure(effect, 0, 17) is None
+    assert track_region.unsure_among(effect, 0, range(11, 17)) == 3
+
+
+def test_what_the_editor_keys_is_sure(bpy, edit, region):
+    track(bpy)
+    _edit, effect, _strip = active(bpy)
+    keys = MotionKeys(effect, 0, "SCALE")
+    keys.write({}, dict.fromkeys(range(13, 16), 0.3))
+    move(bpy, 14, 3)
+    assert [track_region.confidence_at(effect, 0, frame) for frame in (13, 14, 15)] == pytest.approx([0.3, 1, 0.3])
 
 
 # The operators
@@ -629,8 +639,8 @@ def test_a_gap_in_a_track_is_bridged_and_unsure(bpy, edit, region, clip):
     call(bpy, "follow")
     effect = active(bpy)[1]
     assert track_region.next_unsure(effect, 0, 11) == 18
-    assert track_region.next_unsure(effect, 0, 18) == 19
-    assert track_region.next_unsure(effect, 0, 19) is None
+    assert track_region.next_unsure(effect, 0, 18) is None
+    assert track_region.unsure_among(effect, 0, range(11, 31)) == 2
 
 
 def test_a_changed_track_is_followed_anew(bpy, edit, region, clip, does):

@@ -54,4 +54,5 @@ def tell(story, backend, folder, **given):
     assert (folder / "result.json").exists(), console[-4000:]
     result = json.loads((folder / "result.json").read_text())
     assert not result["fault"], f"{result['fault']}\nPictures: {folder}"
+    assert done.returncode == 0, console[-4000:]
     return result["seen"], console

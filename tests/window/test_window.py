@@ -46,6 +46,10 @@ def test_bars_between_keys_and_the_extension_disabled(tmp_path):
     assert "Traceback" not in console
 
 
+def test_blender_quits_after_a_render(tmp_path):
+    tell("quitting.py", "opengl", linked(tmp_path))
+
+
 def test_without_wheels(tmp_path):
     """Blender's own GPU in the preview; a render's thread may not use it, takes NumPy and says so."""
     ((seen,), console) = tell("without_wheels.py", "opengl", linked(tmp_path))

@@ -100,8 +100,8 @@ def check_curves(effect, index: int) -> None:
 
 
 def key_region(effect, index: int, channels=CHANNELS) -> None:
-    """Keys a region's channels at the current frame; where tracking has made a key, it is the editor's from now on.
-    EffectError: as check_curves says."""
+    """Keys a region's channels at the current frame; where tracking has made a key, it is the editor's from now on, and
+    sure. EffectError: as check_curves says."""
     check_curves(effect, index)
     edit, path = effect.id_data, f"{effect.path_from_id()}.regions[{index}]"
     for name in channels:
@@ -110,3 +110,8 @@ def key_region(effect, index: int, channels=CHANNELS) -> None:
             for key in curve.keyframe_points:
                 if key.co[0] == edit.frame_current_final:
                     key.type, key.back = "KEYFRAME", NOTHING_KEPT
+    for curve in fcurves.curves_under(edit, f"{path}.confidence"):
+        for key in curve.keyframe_points:
+            if key.co[0] == edit.frame_current_final:
+                key.co[1] = 100
+        curve.update()

@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import bpy
+import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
@@ -151,10 +152,20 @@ def confidence_at(effect, index: int, frame: float) -> float | None:
 
 
 def next_unsure(effect, index: int, frame: float) -> int | None:
-    """The first timeline frame after another one of which tracking was not sure, or None."""
+    """The least sure timeline frame of the first stretch of unsure ones that begins after a frame, or None."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
-    unsure = frames[(frames > frame) & (frames <= limits.MAX_FRAME) & (confidence < tracking.SURE)]
-    return int(unsure[0]) if len(unsure) else None
+    unsure = (frames <= limits.MAX_FRAME) & (confidence < tracking.SURE)
+    begins = np.flatnonzero(unsure & ~np.append(False, unsure[:-1]) & (frames > frame))
+    if not len(begins):
+        return None
+    stretch = np.flatnonzero(~np.append(unsure[begins[0] :], False))[0]
+    return int(frames[begins[0] + confidence[begins[0] : begins[0] + stretch].argmin()])
+
+
+def unsure_among(effect, index: int, frames) -> int:
+    """Of how many of these timeline frames tracking was not sure."""
+    known, confidence = MotionKeys(effect, index, "LOCATION").confidence()
+    return int((np.isin(known, list(frames)) & (confidence < tracking.SURE)).sum())
 
 
 def _standing(region: Region, here: Tracked) -> Region:

@@ -33,8 +33,8 @@ def _show_start(context) -> None:
 
 def _show_end() -> None:
     global _timer
-    _say(None)
-    if _timer is not None:
+    if _timer is not None:  # Blender crashes where a text is taken from the status bar while it quits
+        _say(None)
         bpy.context.window_manager.event_timer_remove(_timer)
         _timer = None
 

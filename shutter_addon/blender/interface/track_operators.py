@@ -130,6 +130,10 @@ class SHUTTER_OT_track(_OfRegion, Operator):
     def _tell(self):
         if (effect := self._target.effect()) is None:
             return
+        sentence = rpt_("Frames {first} to {last} are tracked, {unsure} of them unsure")
+        unsure = track_region.unsure_among(effect, self._target.index, self._done)
+        first, last = min(self._done | {self._start}), max(self._done | {self._start})
+        self.report({"INFO"}, sentence.format(first=first, last=last, unsure=unsure))
         for frame, fault, is_fault in track_region.stops(effect, self._target.index):
             if frame in self._frames:
                 sentence = rpt_("Tracking stopped at frame {frame}: {fault}")
@@ -145,7 +149,7 @@ class SHUTTER_OT_track_look(_OfRegion, Operator):
 
     frame: IntProperty(
         name="Frame",
-        description="Timeline frame; without one, the next that is unsure",
+        description="Timeline frame; without one, the worst of the next that are unsure",
         options={"SKIP_SAVE"},
     )
 
@@ -156,7 +160,7 @@ class SHUTTER_OT_track_look(_OfRegion, Operator):
             return {"FINISHED"}
         frame = track_region.next_unsure(effect, effect.active_region, edit.frame_current)
         if frame is None:
-            self.report({"INFO"}, "Tracking is sure of all frames from here on")
+            self.report({"INFO"}, "No other stretch of unsure frames lies ahead")
             return {"CANCELLED"}
         edit.frame_set(frame)
         return {"FINISHED"}

@@ -595,6 +595,10 @@ MESSAGES = {
         "Keep a key at every tracked frame, in place of those that the motion needs within a pixel",
     ): "Ein Schlüsselbild in jedem verfolgten Bild, statt derer, die die Bewegung auf ein Pixel genau braucht",
     ("*", "Tracking: {done} of {total} frames, Esc to stop"): "Verfolgt: {done} von {total} Bildern, Esc hält an",
+    (
+        "*",
+        "Frames {first} to {last} are tracked, {unsure} of them unsure",
+    ): "Bilder {first} bis {last} sind verfolgt, {unsure} davon unsicher",
     ("*", "Tracking stopped at frame {frame}: {fault}"): "Das Verfolgen hielt bei Bild {frame} an: {fault}",
     ("*", "Confidence"): "Sicherheit",
     ("*", "How sure tracking was of where the region is"): "Wie sicher beim Verfolgen war, wo die Region ist",
@@ -604,12 +608,12 @@ MESSAGES = {
     ("*", "Frame"): "Bild",
     (
         "*",
-        "Timeline frame; without one, the next that is unsure",
-    ): "Bild der Zeitleiste; ohne eines das nächste unsichere",
+        "Timeline frame; without one, the worst of the next that are unsure",
+    ): "Bild der Zeitleiste; ohne eines das schlechteste der nächsten unsicheren",
     (
         "*",
-        "Tracking is sure of all frames from here on",
-    ): "Von hier an ist das Verfolgen aller Bilder sicher",
+        "No other stretch of unsure frames lies ahead",
+    ): "Es folgt keine weitere Strecke unsicherer Bilder",
     (
         "*",
         "the current frame is outside of the Shutter strip",
