@@ -181,7 +181,9 @@ class SHUTTER_GGT_region(GizmoGroup):
 
     @classmethod
     def poll(cls, context):
-        found = selection.active(context)
+        settings, found = context.window_manager.virtual_shutter, selection.active(context)
+        if settings.live and settings.probe:  # a handle under the pointer would take it from the probe
+            return False
         return found is not None and found[0].is_editable and selection.active_region(found[1]) is not None
 
     @classmethod
