@@ -117,7 +117,9 @@ def test_a_build_reopens_its_source_once_and_no_other(bpy, inbetween_build, edit
     ready = edit, strips.effect_of(edit, first.scene), first
     opened, asked, go = [], threading.Semaphore(0), threading.Semaphore(0)
     monkeypatch.setattr(
-        session, "_open", lambda shown, usual=session._open: opened.append(shown.timing.name) or usual(shown)
+        session,
+        "open_source",
+        lambda shown, usual=session.open_source: opened.append(shown.timing.name) or usual(shown),
     )
 
     def draw():
