@@ -8,7 +8,7 @@ import planted
 import pytest
 
 SCRIPTS = Path(__file__).parents[1] / "scripts"
-INPUTS = {"recipes": 40, "media": 80, "caches": 60, "blends": 50}
+INPUTS = {"recipes": 25, "media": 50, "caches": 40, "blends": 35}
 
 
 @pytest.fixture
