@@ -1,10 +1,10 @@
-// A grid's values before conjugate gradients ask for a guess.
-#include "diffuse.glsl"
+// Zeros in all cells of a grid.
+#include "inside.glsl"
 
 void main()
 {
-  ivec3 p = ivec3(corner(size) + in_eights(), gl_GlobalInvocationID.z);
+  ivec3 p = ivec3(gl_GlobalInvocationID);
   if (inside(p.xy, size)) {
-    imageStore(solution, p, vec4(0.0));
+    imageStore(values, p, vec4(0.0));
   }
 }

@@ -30,7 +30,7 @@ _COARSEN = tile_pass("edges_coarsen", ("links", "weights"), {"next": STORED}, GR
 _SMOOTH = tile_pass("edges_smooth", ("links",), {"solution": CHANGED}, {**GRID, "colour": "int"})
 _RESTRICT = tile_pass("edges_restrict", ("links", "own", "weights"), {"next": STORED}, GRIDS)
 _ADD = tile_pass("edges_add", ("coarser", "weights"), {"solution": CHANGED}, GRIDS)
-_ZERO = tile_pass("edges_zero", (), {"solution": STORED}, GRID)
+_ZERO = Pass("edges_zero", images={"values": STORED}, constants={"size": "ivec2"})
 _MISSING = tile_pass("edges_missing", ("stencil", "right", "values"), {"result": STORED}, {**GRID, "amount": "float"})
 _TURN = tile_pass("edges_turn", ("values", "sums"), {"result": CHANGED}, {**GRID, "fresh": "int"})
 _STEP = tile_pass("edges_step", ("values", "right", "sums"), {"solution": CHANGED, "result": CHANGED}, GRID)
@@ -57,6 +57,7 @@ class EdgeDiffusion(Diffusion):
     def __init__(self, device):
         super().__init__(device)
         self._more = {}
+        self._solved, self._sweeps = 0, 0
 
     def solve(self, labels: np.ndarray, count: int, guide: np.ndarray, strength: float):
         """As Diffusion.solve; guide and strength as for diffuse_along_edges. Some pixel has to be fixed, and some free.
@@ -65,29 +66,24 @@ class EdgeDiffusion(Diffusion):
         side = cell_side(guide.shape[:2], labels.shape)
         self._prepare(labels.shape, count)
         self._solved = min(first_solved(side), len(self._grids) - 1)
-        self._provide(guide.shape[:2])
-        finest = self._grids[0]
-        self._device.write(finest.textures["labels"], np.ascontiguousarray(labels, dtype=np.uint16))
-        self._device.write(self._more["resistances"], resistances(guide, strength)[..., None])
         self._sweeps = SWEEPS if side == 1 else SMOOTH_SWEEPS
+        self._provide(guide.shape[:2])
+        self._device.write(self._grids[0].textures["labels"], np.ascontiguousarray(labels, dtype=np.uint16))
+        self._device.write(self._more["resistances"], resistances(guide, strength)[..., None])
         self._list_tiles(labels, 0, anew=True)
         placed = {"guided": guide.shape[1::-1], "side": side, "resistances": self._more["resistances"]}
-        self._run(_LINKS, finest, "anew", 64, **placed)
-        if side == 1:
-            self._start(0)
-            self._coarsen()
-        else:
+        self._run(_LINKS, self._grids[0], "anew", 64, **placed)
+        if side > 1:
             self._list_tiles(labels, self._solved, anew=True)
-            self._start(0)
-            self._coarsen()
-            for iterations in NEAR_CYCLES:
-                self._cycle(0, iterations)
-            self._spread()
+        self._start(0)
+        self._coarsen()
+        if side > 1:
+            self._cycle_near()
             self._list_tiles(labels, 0)
         for iterations in CYCLES if side == 1 else LAST_CYCLES:
             self._visit(0, iterations)
-        self._run(FINISH, finest, "near", 64, nothing=NOTHING)
-        return finest.textures["solution"]
+        self._run(FINISH, self._grids[0], "near", 64, nothing=NOTHING)
+        return self._grids[0].textures["solution"]
 
     def release(self) -> None:
         for texture in self._more.values():
@@ -96,18 +92,30 @@ class EdgeDiffusion(Diffusion):
         super().release()
 
     def _provide(self, cells) -> None:
-        """Makes the textures that plain diffusion has not."""
+        """Makes the textures that plain diffusion has not. Those of conjugate gradients are zero: sums go over all of
+        them, and passes leave out tiles where nothing is free."""
         grid, finest = self._grids[self._solved], self._grids[0]
-        sizes = {"resistances": (cells[1], cells[0], 1, "r32f")}
-        sizes |= dict.fromkeys(("residual", "guess", "direction", "answer"), (*grid.size, grid.layers, "rgba32f"))
+        vectors = dict.fromkeys(("residual", "guess", "direction", "answer"), (*grid.size, grid.layers, "rgba32f"))
+        sizes = vectors | {"resistances": (cells[1], cells[0], 1, "r32f")}
         sizes |= {"sums": (4, 1, grid.layers, "rgba32f"), "parts": (PARTS, 1, grid.layers, "rgba32f")}
         for name, size in sizes.items():
             if name not in self._more or self._more[name].size != size[:3]:
                 if name in self._more:
                     self._more.pop(name).release()
                 self._more[name] = self._device.texture(*size)
+        for name in vectors:
+            self._clear(grid, self._more[name])
         if "links" not in finest.textures:
             finest.textures["links"] = self._device.texture(*finest.size, 1, "rgba32f")
+
+    def _cycle_near(self) -> None:
+        """Cycles near scribbles alone; then the pixels far from them get their values from the grid that was solved."""
+        for iterations in NEAR_CYCLES:
+            self._cycle(0, iterations)
+        for fine, coarse in reversed(list(pairwise(self._grids[: self._solved + 1]))):
+            given = {"from": fine.textures["own"], "to": fine.textures["solution"], "amount": 1.0}
+            given |= {"coarse": coarse.size, "coarser": coarse.textures["solution"]}
+            self._run(PROLONG, fine, "far", 16, fine.layers, **given)
 
     def _cycle(self, index: int, iterations: int) -> None:
         """A V-cycle near scribbles, over the grids from this one to that of the conjugate gradients."""
@@ -128,7 +136,7 @@ class EdgeDiffusion(Diffusion):
         own["solution"], own["right"] = more["guess"], more["residual"]  # for the cycles
         try:
             for iteration in range(iterations):
-                self._clear(grid)
+                self._clear(grid, more["guess"])
                 self._visit(self._solved, twice=TWICE)
                 self._dot(grid, more["guess"], more["residual"], 0)
                 turned = {"values": more["guess"], "sums": more["sums"], "result": more["direction"]}
@@ -155,7 +163,7 @@ class EdgeDiffusion(Diffusion):
             return
         self._smooth(grid, self._sweeps)
         self._restrict(grid, *coarser, grid.textures["solution"])
-        self._clear(*coarser)
+        self._clear(*coarser, coarser[0].textures["solution"])
         if index + 1 == self._solved:
             self._conjugate_gradients(*coarser, iterations)
         else:
@@ -165,15 +173,8 @@ class EdgeDiffusion(Diffusion):
         self._run(_ADD, grid, "near", 16, grid.layers, **below)
         self._smooth(grid, self._sweeps, back=True)
 
-    def _clear(self, grid) -> None:
-        self._run(_ZERO, grid, "near", 64, grid.layers)
-
-    def _spread(self) -> None:
-        """Gives the pixels far from scribbles, and the cells of the grids before the solved one, their values."""
-        for fine, coarse in reversed(list(pairwise(self._grids[: self._solved + 1]))):
-            given = {"from": fine.textures["own"], "to": fine.textures["solution"], "amount": 1.0}
-            given |= {"coarse": coarse.size, "coarser": coarse.textures["solution"]}
-            self._run(PROLONG, fine, "far", 16, fine.layers, **given)
+    def _clear(self, grid, values) -> None:
+        self._device.run(_ZERO, (*grid.size, grid.layers), images={"values": values}, size=grid.size)
 
     def _dot(self, grid, one, other, place: int) -> None:
         parts = min(PARTS, grid.size[0] * grid.size[1])

@@ -296,6 +296,16 @@ def test_what_was_solved_before_does_not_change_a_bit(solve):
         np.testing.assert_array_equal(solve(labels, count, guide, 1.0, warm=True), first)
 
 
+def test_where_nothing_is_free_any_more_nothing_is_left(solve):
+    """Half of the picture becomes a scribble, which the sums of conjugate gradients must not notice."""
+    labels, count, guide = shapes(13, 4, 256, 192), 4, film(*PEOPLE, 256, 192)
+    wide = labels.copy()
+    wide[:, 100:] = 3
+    first = solve(wide, count, guide, 1.0).copy()
+    solve(labels, count, guide, 1.0)
+    np.testing.assert_array_equal(solve(wide, count, guide, 1.0), first)
+
+
 def test_alpha_in_the_guide_does_not_count(solve):
     labels, count, guide = SCENES["bunny"]
     with_alpha = np.dstack([guide, np.random.default_rng(0).random(guide.shape[:2]).astype(np.float32)])
