@@ -5,7 +5,13 @@ int frame;
 
 void add_frame(int quad)
 {
+#if MOVED
+  for (motion = 0; motion < motions; motion++) {
+    expose(quad, frame, mixed(quad, 0, 1 + (frame - first) * motions + motion));
+  }
+#else
   expose(quad, frame, mixed(quad, 0, 1 + frame - first));
+#endif
 }
 
 void main()

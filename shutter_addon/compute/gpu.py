@@ -12,8 +12,8 @@ from ..core.frame_state import FrameState, Options
 from .device import Device
 from .diffusion_gpu import Diffusion
 from .passes import LOCAL_ROW, Image, Pass
-from .tables import padded, table
-from .window import BLOCK, TILE, Frames, Sums, decoding, open_window
+from .tables import moved_tables, padded, table
+from .window import BLOCK, TILE, Frames, Sums, WholeFrames, decoding, open_window
 
 # Rows of pixels that one invocation of compose_sums composes.
 PAIR = 2
@@ -59,6 +59,7 @@ def composition(way: str, groups: int, stored: str, decode: int, edges: int, pre
         | ({"count": "int"} if edges == 2 or not summed else {})
         | (_UNIT if summed else {}),
         defines={
+            "MOVED": 0,
             "GROUPS": groups,
             "SUMS": int(summed),
             "TILED": int(stored == "tiles"),
@@ -87,6 +88,40 @@ def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, encoded
         },
         blocks={"table": (1 + rows) * (2 * groups + 1)},
         local_size=(64, TILE[1] // PAIR, 1),
+    )
+
+
+@cache
+def composition_of_moved(
+    way: str, groups: int, decode: int, shortened: bool, premultiplied: bool, encoded: bool, sharp: bool, at: tuple
+) -> Pass:
+    """The pass of a way, "walk" or "value", where shutters follow something.
+
+    shortened: frames are left out; sharp: how frames are resampled (core.compositor.resampled)
+    at: whether passes over other frames come before and after; the others as for `composition`"""
+    continued, unfinished = at
+    images = _IMAGES | {"table": _READ, "moves": _READ} | ({"summed": _READ} if continued else {})
+    numbers = ("motions", *_OF_WAY[way], *(("seen_first", "seen_last", "parts") if shortened else ()))
+    return Pass(
+        f"compose_{way}",
+        samplers={"frames": "sampler2DArray"},
+        images=images,
+        constants=_PLACE | dict.fromkeys(numbers, "int"),
+        defines={
+            "MOVED": 1,
+            "QUADS": 1,
+            "GROUPS": groups,
+            "SUMS": 0,
+            "TILED": 0,
+            "EDGES": 2 if shortened else 0,
+            "DECODE": decode,
+            "PREMULTIPLIED": int(premultiplied),
+            "ENCODED": int(encoded),
+            "SHARP": int(sharp),
+            "CONTINUED": int(continued),
+            "UNFINISHED": int(unfinished),
+        },
+        local_size=LOCAL_ROW,
     )
 
 
@@ -189,9 +224,9 @@ class GPUCompositor:
         """A context manager: all other methods are called inside it, on any one thread (Device.current)."""
         return self.device.current()
 
-    def window(self, source: FrameSource, capacity: int) -> Frames | Sums:
-        """A window of `capacity` frames on the device."""
-        return open_window(self.device, source, capacity)
+    def window(self, source: FrameSource, capacity: int, moved: bool = False) -> Frames | Sums:
+        """A window of `capacity` frames on the device; moved: pictures of it have FrameState.following."""
+        return open_window(self.device, source, capacity, moved)
 
     def solver(self) -> Diffusion:
         """A new diffusion. Its solution is valid until its next solve."""
@@ -222,6 +257,8 @@ class GPUCompositor:
         index, direction: as for core.compositor.window_positions
         handle: coefficients, a texture of a solver or of `constant`; block: the pixels along a side of each texel
         """
+        if state.following is not None:
+            return self._draw_moved(window, index, direction, state, handle, block)
         options, values = state.options, table(state)
         first, last = shutters.open_span(state.bars)
         origin = int(compositor.window_positions(options, index, direction)[0])
@@ -248,6 +285,42 @@ class GPUCompositor:
                 block_bits=(block - 1).bit_length(),
                 **given,
             )
+        return window.picture
+
+    def _draw_moved(self, window: WholeFrames, index: int, direction: int, state: FrameState, handle, block: int):
+        """As `draw`, where shutters follow something: a pass for each texture array of frames, which adds its own to
+        what those before have summed."""
+        options, (width, height) = state.options, (window.source.width, window.source.height)
+        frames = compositor.window_indices(options, index, window.shot, direction)
+        first, last = shutters.open_span(state.bars)
+        values, moves = moved_tables(state, frames)
+        motions, there = len(moves) // len(frames), np.flatnonzero(frames >= 0)
+        shortened = bool((frames[first:last] < 0).any())
+        given = {"size": (width, height), "top": 0, "height": height, "block_bits": (block - 1).bit_length()}
+        given |= {"first": first, "last": last, "rows": len(values) - 1 - motions, "motions": motions}
+        given |= {"seen_first": int(there[0]), "seen_last": int(there[-1]), "parts": len(values) - motions}
+        images = {"coefficients": handle, "table": self._filled("table", values[None], "rgba32f")}
+        slots, sums = frames % window.capacity, ("sum", "other sum")
+        for held, stack in window.stacks():
+            at = held.start > 0, held.stop < window.capacity
+            inside = (frames >= 0) & (slots >= held.start) & (slots < held.stop)
+            moves[:, 0, 0] = np.where(inside, slots - held.start, -1).repeat(motions)
+            images["moves"] = self._filled("moves", moves[None], "rgba32f")
+            images["summed"] = images.get("picture")
+            sums = sums[::-1]
+            images["picture"] = self._texture(sums[0], width, height, 1, "rgba32f") if at[1] else window.picture
+            program = composition_of_moved(
+                "value" if options.interpolation == "value" else "walk",
+                -(-len(state.bars) // 4),
+                decoding(window.transfer, options),
+                shortened,
+                window.source.alpha == "premultiplied",
+                options.light == "encoded",
+                window.source.alpha == "opaque",
+                at,
+            )
+            extent = width, -(-height // _LINES["walk"])
+            self.device.run(program, extent, textures={"frames": stack}, images=images, **given)
         return window.picture
 
     def _texture(self, name: str, width: int, height: int, layers: int, kind: str):

@@ -26,9 +26,11 @@ TILE = 8, 4
 _STORED = {np.uint8: "rgba8", np.uint16: "rgba16", np.float16: "rgba16f", np.float32: "rgba32f"}
 
 
-def open_window(device: Device, source: FrameSource, capacity: int) -> Window:
+def open_window(device: Device, source: FrameSource, capacity: int, moved: bool) -> Window:
     """The fastest window of `capacity` frames: running sums if the source is `summable` and the device has room for
-    them, else the frames."""
+    them, else the frames. moved: what is seen of a frame lies elsewhere in it, so it has to be whole."""
+    if moved:
+        return WholeFrames(device, source, capacity)
     if summable(source):
         try:
             return Sums(device, source, capacity)
@@ -108,7 +110,7 @@ class Frames(Window):
             self._allocate(kind, pixel_bytes)
         except NoDeviceError:
             self._host = {}
-            self.textures = [device.texture(source.width, self.rows, capacity, kind)]
+            self.textures = [device.texture(source.width, self.rows, self.layers, kind)]
             self.picture = device.texture(source.width, source.height, 1, "rgba32f")
 
     @property
@@ -125,11 +127,15 @@ class Frames(Window):
                 continue
             frame = self._read(index)
             if self._host is None:
-                for top, height, texture in super().bands():
-                    self._send(texture, frame[top : top + height], layer)
+                self._place(frame, layer)
             else:
                 self._host[layer] = frame
             self._held[layer] = index
+
+    def _place(self, frame: np.ndarray, layer: int) -> None:
+        """Sends a frame to its place on the device."""
+        for top, height, texture in super().bands():
+            self._send(texture, frame[top : top + height], layer)
 
     def bands(self):
         if self._host is None:
@@ -157,6 +163,44 @@ class Frames(Window):
     def release(self) -> None:
         super().release()
         self._held, self._host = {}, None
+
+
+class WholeFrames(Frames):
+    """A window of the frames as they are, each whole: source frame i in slot i mod `capacity`, and as many slots in a
+    texture array as BAND_BYTES allow.
+
+    Where the device has no room for all, the frames stay on the host, and every picture sends them.
+    layers: slots in a texture array
+    """
+
+    def _allocate(self, kind: str, pixel_bytes: int) -> None:
+        source, frame_bytes = self.source, self.source.width * self.source.height * pixel_bytes
+        self.rows, self.tops = source.height, range(0, source.height, source.height)
+        self.layers = min(self.capacity, max(1, BAND_BYTES // frame_bytes), self.device.max_layers)
+        try:
+            if frame_bytes * self.capacity > RESIDENT_BYTES:
+                raise NoDeviceError("over the budget")
+            for _ in range(0, self.capacity, self.layers):
+                self.textures.append(self.device.texture(source.width, source.height, self.layers, kind))
+            self.picture = self.device.texture(source.width, source.height, 1, "rgba32f")
+        except NoDeviceError:
+            self.release()
+            raise
+
+    def _place(self, frame: np.ndarray, layer: int) -> None:
+        self._send(self.textures[layer // self.layers], frame, layer % self.layers)
+
+    def stacks(self):
+        """Yields (slots, texture array) of each array; the texture is valid until the next one."""
+        for first in range(0, self.capacity, self.layers):
+            slots = range(first, min(first + self.layers, self.capacity))
+            if self._host is None:
+                yield slots, self.textures[first // self.layers]
+                continue
+            for slot in slots:
+                if slot in self._host:
+                    self._send(self.textures[0], self._host[slot], slot - first)
+            yield slots, self.textures[0]
 
 
 def decoding(stored: str, options: Options) -> int:

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_composition import Footage, check, device, footage, state  # noqa: F401
+from test_composition import check, device, footage, state  # noqa: F401
 
-from shutter_addon.compute.renderer import Renderer, open_compositor
+from shutter_addon.compute import window
+from shutter_addon.compute.renderer import Renderer
 from shutter_addon.core.frame_state import Following
 
 
@@ -35,3 +36,76 @@ def test_random_motions(device, interpolation, light, followers):  # noqa: F811
     source = footage(rng)
     moment = state(rng, interpolation=interpolation, light=light, exposure="weighted")
     check(device, source, following(rng, source, moment, followers), 2)
+
+
+@pytest.mark.parametrize("interpolation", ["displacement", "value"])
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize(("index", "direction"), [(1, 1), (18, 1), (2, -1)])
+def test_ends_of_the_clip(device, interpolation, edges, index, direction):  # noqa: F811
+    rng = np.random.default_rng(32)
+    source = footage(rng)
+    moment = state(rng, interpolation=interpolation, edges=edges, position="center", aggregate=2)
+    moment.bars[1, : 8 if index > 9 else 14] = 0  # of which nothing is left beyond the end
+    moment.bars[1, -1] = 0.5
+    check(device, source, following(rng, source, moment, (0, 1)), index, direction)
+
+
+@pytest.mark.parametrize("alpha", ["straight", "premultiplied"])
+@pytest.mark.parametrize("transfer", ["srgb", "linear"])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16, np.float32])
+def test_kinds_of_footage(device, dtype, transfer, alpha):  # noqa: F811
+    rng = np.random.default_rng(33)
+    source = footage(rng, dtype=dtype, transfer=transfer, alpha=alpha)
+    if alpha == "premultiplied":
+        colours = source.frames[..., :3] * (source.frames[..., 3:] / source.frames.max())
+        source.frames[..., :3] = colours.astype(dtype)
+    moment = state(rng, light="encoded" if dtype == np.uint16 else "linear")
+    check(device, source, following(rng, source, moment, (0, 2)), 3)
+
+
+@pytest.mark.parametrize("interpolation", ["displacement", "value"])
+def test_many_shutters(device, interpolation):  # noqa: F811
+    rng = np.random.default_rng(34)
+    source, moment = footage(rng), state(rng, count=6, interpolation=interpolation)
+    check(device, source, following(rng, source, moment, (0, 4, 5)), 3)
+
+
+@pytest.mark.parametrize("resident", [True, False])
+def test_frames_in_several_textures(device, monkeypatch, resident):  # noqa: F811
+    """As of windows for which a device has no room in one."""
+    rng = np.random.default_rng(35)
+    source = footage(rng)
+    monkeypatch.setattr(window, "BAND_BYTES", 5 * source.width * source.height * 4)
+    if not resident:
+        monkeypatch.setattr(window, "RESIDENT_BYTES", 0)
+    for options in ({}, {"edges": "shorten", "interpolation": "value"}, {"light": "encoded", "edges": "mirror"}):
+        moment = following(rng, source, state(rng, **options), (0, 1))
+        moment.bars[2, :6] = 0
+        for index in (2, 14):
+            check(device, source, moment, index)
+
+
+def test_one_shutter_everywhere(device):  # noqa: F811
+    rng = np.random.default_rng(36)
+    source = footage(rng)
+    check(device, source, following(rng, source, state(rng, shapes=()), (0,)), 3)
+
+
+def test_following_nothing_changes_no_bit(device):  # noqa: F811
+    """Nor does what is followed by a shutter that holds nowhere, or what stands still."""
+    rng = np.random.default_rng(37)
+    source, moment = footage(rng), state(rng, shapes=())
+    plain = Renderer(device, source).picture(3, moment)
+    assert np.array_equal(Renderer(device, source).picture(3, following(rng, source, moment, (1, 2))), plain)
+    still = Following(0, np.ones((20, 3), complex), np.zeros((20, 3), complex))
+    assert still.of(slice(None)) is None
+
+
+def test_chunks_have_the_same_bits(device):  # noqa: F811
+    rng = np.random.default_rng(38)
+    source = footage(rng)
+    moments = [following(rng, source, state(rng)) for _ in range(4)]
+    renderer = Renderer(device, source)
+    in_order = [renderer.picture(index, moment) for index, moment in enumerate(moments)]
+    for index in (3, 1, 0, 2):
+        assert np.array_equal(Renderer(device, source).picture(index, moments[index]), in_order[index])

@@ -1,0 +1,138 @@
+// Frames that are not taken where a pixel lies, but where what its shutters follow was: one resampling a frame.
+// frames: some of the window's frames; moves: rows for the window's frames, one for each of `motions` (more than one
+// where pictures are mixed): the frame's layer, −1: it is not among these; whether it is there at all; then the columns
+// of turn − 1 and of shift, real and imaginary parts, four shutters per texel. `seen_first` to `seen_last`: the frames
+// that are there.
+// CONTINUED: what earlier passes have summed is in `summed`; UNFINISHED: a later pass adds the other frames.
+// SHARP: as core.compositor.resampled.
+int motion = 0;
+
+vec4 moved_weights(float t)
+{
+  return vec4(((1.0 - 0.5 * t) * t - 0.5) * t,
+              (1.5 * t - 2.5) * t * t + 1.0,
+              ((2.0 - 1.5 * t) * t + 0.5) * t,
+              (0.5 * t - 0.5) * t * t);
+}
+
+// The light of a frame at a pixel and a distance from it.
+vec4 seen_light(ivec2 pixel, vec2 away, int layer)
+{
+  // Far outside all is the same, and large numbers have no fractions.
+  away = clamp(away, vec2(-2 - pixel), vec2(size + 1 - pixel));
+  vec2 whole = floor(away);
+  vec2 t = away - whole;
+  ivec2 b = pixel + ivec2(whole);
+  ivec2 last_pixel = size - 1;
+  ivec2 c_ = clamp(b + 1, ivec2(0), last_pixel);
+  ivec2 a = clamp(b - 1, ivec2(0), last_pixel);
+  ivec2 d = clamp(b + 2, ivec2(0), last_pixel);
+  b = clamp(b, ivec2(0), last_pixel);
+  vec4 bb = frame_light(b, layer);
+  vec4 cb = frame_light(ivec2(c_.x, b.y), layer);
+  vec4 bc = frame_light(ivec2(b.x, c_.y), layer);
+  vec4 cc = frame_light(c_, layer);
+#if SHARP
+  vec4 x = moved_weights(t.x);
+  vec4 y = moved_weights(t.y);
+  vec4 light = y.x * (x.x * frame_light(a, layer) + x.y * frame_light(ivec2(b.x, a.y), layer) +
+                      x.z * frame_light(ivec2(c_.x, a.y), layer) + x.w * frame_light(ivec2(d.x, a.y), layer));
+  light += y.y * (x.x * frame_light(ivec2(a.x, b.y), layer) + x.y * bb + x.z * cb +
+                  x.w * frame_light(ivec2(d.x, b.y), layer));
+  light += y.z * (x.x * frame_light(ivec2(a.x, c_.y), layer) + x.y * bc + x.z * cc +
+                  x.w * frame_light(ivec2(d.x, c_.y), layer));
+  light += y.w * (x.x * frame_light(ivec2(a.x, d.y), layer) + x.y * frame_light(ivec2(b.x, d.y), layer) +
+                  x.z * frame_light(ivec2(c_.x, d.y), layer) + x.w * frame_light(d, layer));
+  return clamp(light, min(min(bb, cb), min(bc, cc)), max(max(bb, cb), max(bc, cc)));
+#else
+  return mix(mix(bb, cb, t.x), mix(bc, cc, t.x), t.y);
+#endif
+}
+
+// turn · z + shift − z, where a pixel's (turn − 1, shift) is `move`.
+vec2 moved_by(vec4 move, ivec2 pixel)
+{
+  vec2 z = vec2(pixel);
+  return vec2(move.x * z.x - move.y * z.y, move.y * z.x + move.x * z.y) + move.zw;
+}
+
+// A number of moves for a quad's pixels.
+vec4 moves_of(int quad, int number, int row)
+{
+  vec4 sum = vec4(0.0);
+  for (int g = 0; g < GROUPS; g++) {
+    sum += imageLoad(moves, ivec3(1 + number * GROUPS + g, row, 0)) * c[quad * GROUPS + g];
+  }
+  return sum;
+}
+
+void expose(int quad, int frame, vec4 weight)
+{
+  int row = frame * motions + motion;
+  vec4 place = imageLoad(moves, ivec3(0, row, 0));
+  centre[quad] += weight * (float(frame) + 0.5);
+  share[quad] += weight * place.y;
+  // A loop, for software renderers run both sides of a branch.
+  int layer = any(greaterThan(weight, vec4(1e-6))) ? int(place.x) : -1;
+  for (; layer >= 0; layer = -1) {
+    mat4 move = transpose(mat4(moves_of(quad, 0, row), moves_of(quad, 1, row), moves_of(quad, 2, row),
+                               moves_of(quad, 3, row)));
+    mat4 light;
+    light[0] = weight.x * seen_light(pixel_at(quad, 0), moved_by(move[0], pixel_at(quad, 0)), layer);
+    light[1] = weight.y * seen_light(pixel_at(quad, 1), moved_by(move[1], pixel_at(quad, 1)), layer);
+    light[2] = weight.z * seen_light(pixel_at(quad, 2), moved_by(move[2], pixel_at(quad, 2)), layer);
+    light[3] = weight.w * seen_light(pixel_at(quad, 3), moved_by(move[3], pixel_at(quad, 3)), layer);
+    total[quad] += light;
+  }
+}
+
+#if EDGES == 2  // shorten
+// A pixel's light in the frame that is nearest to its exposure's time, if it is among these frames.
+vec4 nearest_light(int quad, int pixel)
+{
+  int nearest = clamp(int(centre[quad][pixel] - 1e-3), seen_first, seen_last);
+  vec4 light = vec4(0.0);
+  for (motion = 0; motion < motions; motion++) {
+    int row = nearest * motions + motion;
+    float part = 0.0;
+    vec4 move = vec4(0.0);
+    for (int g = 0; g < GROUPS; g++) {
+      vec4 own = c[quad * GROUPS + g][pixel];
+      part += dot(own, imageLoad(table, ivec3(g, parts + motion, 0)));
+      for (int number = 0; number < 4; number++) {
+        move[number] += dot(own, imageLoad(moves, ivec3(1 + number * GROUPS + g, row, 0)));
+      }
+    }
+    int layer = int(imageLoad(moves, ivec3(0, row, 0)).x);
+    ivec2 own_pixel = pixel_at(quad, pixel);
+    vec4 found = seen_light(own_pixel, moved_by(move, own_pixel), max(layer, 0));
+    light += layer < 0 ? vec4(0.0) : part * found;
+  }
+  return light;
+}
+#endif
+
+void store(int quad, int pixel, float gain)
+{
+  ivec2 at = corner + ivec2(0, 4 * quad + pixel);
+  if (at.y >= size.y) {
+    return;
+  }
+  vec4 color = total[quad][pixel] / max(share[quad][pixel], 1e-6);
+#if EDGES == 2
+  for (int once = share[quad][pixel] > 1e-6 ? 1 : 0; once < 1; once++) {
+    color = nearest_light(quad, pixel);
+  }
+#endif
+  ivec3 stored = ivec3(at.x, height - 1 - at.y, 0);
+#if CONTINUED
+  color += imageLoad(summed, stored);
+#endif
+#if !UNFINISHED
+#  if ENCODED
+  color.rgb = to_linear_exact(straight(color)) * color.a;
+#  endif
+  color.rgb *= gain;
+#endif
+  imageStore(picture, stored, color);
+}
