@@ -90,11 +90,11 @@ class Region:
         """Its keyed numbers at a frame."""
         return _placement(self, frame)
 
-    def centre(self, frame: float) -> np.ndarray:
-        """The point (2,) about which it is turned and scaled, in fractions of the picture: the picture's centre, where
-        nothing is drawn. EffectError: its strokes are nowhere near the picture."""
+    def centre(self, frame: float) -> np.ndarray | None:
+        """The point (2,) about which it is turned and scaled, in fractions of the picture; None: nothing is drawn.
+        EffectError: its strokes are nowhere near the picture."""
         strokes = self.unmoved(frame)
-        return motions.centre(strokes) if strokes else np.array([0.5, 0.5])
+        return motions.centre(strokes) if strokes else None
 
     def unmoved(self, frame: float) -> list[np.ndarray]:
         """The strokes (n, 2) on the picture at a frame, as they are drawn. EffectError: they are nowhere near it."""

@@ -85,15 +85,17 @@ def _times(shown: Callable[[float], int], frame: float, index: int, wanted: rang
 
 
 def _motion(subject: Region | Camera, frame: float, time: float, size) -> Similarity:
-    """The motion of the picture from a timeline frame to a time that may lie between two."""
-    if time == frame:
-        return Similarity()
+    """The motion of the picture from a timeline frame to a time that may lie between two; none where nothing is drawn
+    that could be followed."""
     whole = frame + math.floor(time - frame)
-    start, before = subject.placement(frame), subject.centre(frame)
-    placement, after = subject.placement(whole), subject.centre(whole)
-    if share := time - whole:
-        placement = motions.between(placement, subject.placement(whole + 1), share)
-        after = (1 - share) * after + share * subject.centre(whole + 1)
-    if abs(start.scale) < _SMALLEST or (start == placement and np.array_equal(before, after)):
+    share = time - whole
+    frames = [frame, whole, whole + 1 if share else whole]
+    start, *placements = (subject.placement(number) for number in frames)
+    before, *centres = (subject.centre(number) for number in frames)
+    if before is None or any(centre is None for centre in centres) or abs(start.scale) < _SMALLEST:
         return Similarity()
+    placement = motions.between(*placements, share)
+    after = (1 - share) * centres[0] + share * centres[1]
+    if start == placement and np.array_equal(before, after):
+        return Similarity()  # to the bit
     return motions.motion_between(start, placement, before, after, size)
