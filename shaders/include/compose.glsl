@@ -116,6 +116,7 @@ int layer_of(int frame)
   return layer < layers ? layer : layer - layers;
 }
 #else
+#  if !PACKED
 // The frame's light as it is summed, premultiplied.
 vec4 frame_light(ivec2 place, int slot)
 {
@@ -136,6 +137,7 @@ vec4 frame_light(ivec2 place, int slot)
 #endif
   return color;
 }
+#  endif
 
 #  if !MOVED
 // The layer of the window's frame, or of the shot's end beyond which it lies.

@@ -1,10 +1,10 @@
 // Frames that are not taken where a pixel lies, but where what its shutters follow was: one resampling a frame.
-// frames: some of the window's frames; moves: rows for the window's frames, one for each of `motions` (more than one
+// frames: some of the window's frames; or with PACKED packed_frames, as shaders/pack.glsl makes them. moves: rows for the window's frames, one for each of `motions` (more than one
 // where pictures are mixed): the frame's layer, −1: it is not among these; whether it is there at all; then the columns
 // of turn − 1 and of shift, real and imaginary parts, four shutters per texel. `seen_first` to `seen_last`: the frames
 // that are there.
-// CONTINUED: what earlier passes have summed is in `summed`; UNFINISHED: a later pass adds the other frames.
-// SHARP: as core.compositor.resampled.
+// SEVERAL: some of the window's frames are not among these; CONTINUED: what earlier passes have summed is in `summed`; UNFINISHED: a later pass adds the other frames.
+// SHARP: as core.compositor.seen.
 int motion = 0;
 
 vec4 moved_weights(float t)
@@ -15,14 +15,60 @@ vec4 moved_weights(float t)
               (0.5 * t - 0.5) * t * t);
 }
 
+// The distance from a pixel to the place that is seen there, its whole and its broken part. Beyond the frame's last
+// pixels all is the same, and large numbers have no fractions.
+void part(ivec2 pixel, vec2 away, out ivec2 whole, out vec2 broken)
+{
+  away = clamp(away, vec2(-1 - pixel), vec2(size - pixel));
+  vec2 below = floor(away);
+  whole = ivec2(below);
+  broken = away - below;
+}
+
+#if PACKED
+#include "packed.glsl"
+
+// Of a column of four pixels, two pairs.
+struct Column {
+  vec3 a, b, c, d;
+};
+
+Column column_at(ivec2 place, int layer)
+{
+  uvec2 upper = imageLoad(packed_frames, ivec3(place, layer)).rg;
+  uvec2 lower = imageLoad(packed_frames, ivec3(place + ivec2(0, 2), layer)).rg;
+  return Column(unpacked_color(upper.x), unpacked_color(upper.y), unpacked_color(lower.x), unpacked_color(lower.y));
+}
+
+vec3 column_light(Column column, vec4 y)
+{
+  return y.x * column.a + y.y * column.b + y.z * column.c + y.w * column.d;
+}
+
 // The light of a frame at a pixel and a distance from it.
 vec4 seen_light(ivec2 pixel, vec2 away, int layer)
 {
-  // Far outside all is the same, and large numbers have no fractions.
-  away = clamp(away, vec2(-2 - pixel), vec2(size + 1 - pixel));
-  vec2 whole = floor(away);
-  vec2 t = away - whole;
-  ivec2 b = pixel + ivec2(whole);
+  ivec2 whole;
+  vec2 t;
+  part(pixel, away, whole, t);
+  ivec2 place = pixel + whole + BEFORE - 1;
+  vec4 x = moved_weights(t.x);
+  vec4 y = moved_weights(t.y);
+  Column left = column_at(place + ivec2(1, 0), layer);
+  Column right = column_at(place + ivec2(2, 0), layer);
+  vec3 light = x.x * column_light(column_at(place, layer), y) + x.y * column_light(left, y) +
+               x.z * column_light(right, y) + x.w * column_light(column_at(place + ivec2(3, 0), layer), y);
+  light = clamp(light, min(min(left.b, left.c), min(right.b, right.c)), max(max(left.b, left.c), max(right.b, right.c)));
+  return vec4(light * packed_unit(), 1.0);
+}
+#else
+// The light of a frame at a pixel and a distance from it.
+vec4 seen_light(ivec2 pixel, vec2 away, int layer)
+{
+  ivec2 whole;
+  vec2 t;
+  part(pixel, away, whole, t);
+  ivec2 b = pixel + whole;
   ivec2 last_pixel = size - 1;
   ivec2 c_ = clamp(b + 1, ivec2(0), last_pixel);
   ivec2 a = clamp(b - 1, ivec2(0), last_pixel);
@@ -49,6 +95,8 @@ vec4 seen_light(ivec2 pixel, vec2 away, int layer)
 #endif
 }
 
+#endif
+
 // turn · z + shift − z, where a pixel's (turn − 1, shift) is `move`.
 vec2 moved_by(vec4 move, ivec2 pixel)
 {
@@ -71,10 +119,16 @@ void expose(int quad, int frame, vec4 weight)
   int row = frame * motions + motion;
   vec4 place = imageLoad(moves, ivec3(0, row, 0));
   centre[quad] += weight * (float(frame) + 0.5);
-  share[quad] += weight * place.y;
-  // A loop, for software renderers run both sides of a branch.
-  int layer = any(greaterThan(weight, vec4(1e-6))) ? int(place.x) : -1;
-  for (; layer >= 0; layer = -1) {
+  weight *= place.y;
+  share[quad] += weight;
+  // Software renderers run both sides of a branch, and a loop is dear to them as well.
+#if SEVERAL
+  int layer = any(greaterThan(weight, vec4(0.0))) ? int(place.x) : -1;
+  for (; layer >= 0; layer = -1)
+#else
+  int layer = max(int(place.x), 0);
+#endif
+  {
     mat4 move = transpose(mat4(moves_of(quad, 0, row), moves_of(quad, 1, row), moves_of(quad, 2, row),
                                moves_of(quad, 3, row)));
     mat4 light;

@@ -13,7 +13,7 @@ from .device import Device
 from .diffusion_gpu import Diffusion
 from .passes import LOCAL_ROW, Image, Pass
 from .tables import moved_tables, padded, table
-from .window import BLOCK, TILE, Frames, Sums, WholeFrames, decoding, open_window
+from .window import BLOCK, TILE, Frames, PackedFrames, Sums, WholeFrames, decoding, open_window
 
 # Rows of pixels that one invocation of compose_sums composes.
 PAIR = 2
@@ -31,6 +31,7 @@ _OF_WAY = {"pieces": ("rows",), "value": ("first", "last")} | dict.fromkeys(
 )
 # Rows of pixels that one invocation composes, by the pass; BLOCK for all others.
 _LINES = {"sums": PAIR, "walk": 4}
+_MOVED_LINES = 4  # where shutters follow something
 # Loop iterations of an invocation. Mesa's software renderer ends its loops after 65,535 in all, without an error.
 _MOST_ITERATIONS = 60_000
 # The numbers of pieces for which compose_sums is compiled. A table with another number is filled up with empty pieces.
@@ -60,6 +61,7 @@ def composition(way: str, groups: int, stored: str, decode: int, edges: int, pre
         | (_UNIT if summed else {}),
         defines={
             "MOVED": 0,
+            "PACKED": 0,
             "GROUPS": groups,
             "SUMS": int(summed),
             "TILED": int(stored == "tiles"),
@@ -93,23 +95,37 @@ def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, encoded
 
 @cache
 def composition_of_moved(
-    way: str, groups: int, decode: int, shortened: bool, premultiplied: bool, encoded: bool, sharp: bool, at: tuple
+    way: str,
+    quads: int,
+    groups: int,
+    packed: bool,
+    decode: int,
+    shortened: bool,
+    premultiplied: bool,
+    encoded: bool,
+    sharp: bool,
+    at: tuple[bool, bool],
 ) -> Pass:
-    """The pass of a way, "walk" or "value", where shutters follow something.
+    """The pass of a way, "frames", "walk" or "value", where shutters follow something.
 
-    shortened: frames are left out; sharp: how frames are resampled (core.compositor.resampled)
+    quads: of pixels that an invocation composes; packed: as PackedFrames are; shortened: frames are left out
+    sharp: how frames are resampled (core.compositor.seen)
     at: whether passes over other frames come before and after; the others as for `composition`"""
     continued, unfinished = at
     images = _IMAGES | {"table": _READ, "moves": _READ} | ({"summed": _READ} if continued else {})
+    images |= {"packed_frames": Image("rg32ui", reads=True, writes=False)} if packed else {}
     numbers = ("motions", *_OF_WAY[way], *(("seen_first", "seen_last", "parts") if shortened else ()))
     return Pass(
         f"compose_{way}",
-        samplers={"frames": "sampler2DArray"},
+        samplers={} if packed else {"frames": "sampler2DArray"},
         images=images,
         constants=_PLACE | dict.fromkeys(numbers, "int"),
         defines={
             "MOVED": 1,
-            "QUADS": 1,
+            "PACKED": int(packed),
+            "SQUARED": int(not encoded),
+            "SEVERAL": int(continued or unfinished),
+            "QUADS": quads,
             "GROUPS": groups,
             "SUMS": 0,
             "TILED": 0,
@@ -160,6 +176,14 @@ def frames_iterations(values: np.ndarray, span: tuple[int, int]) -> int:
     return int(frames.sum()) + len(start) + span[1] - span[0]
 
 
+def _moved_way(options: Options, values: np.ndarray, span: tuple[int, int]) -> str:
+    """The way to compose where shutters follow something; arguments as for way_of."""
+    if options.interpolation == "value":
+        return "value"
+    loops = frames_iterations(values, span) + span[1] - span[0]
+    return "frames" if loops <= _MOST_ITERATIONS else "walk"
+
+
 def _filled_rows(rows: int) -> float:
     """The number of pieces that compose_sums is compiled for, if there are `rows`; infinite: there are too many."""
     return next((filled for filled in _ROWS if filled >= rows), np.inf)
@@ -201,7 +225,7 @@ def _from_frames(way: str, window, state: FrameState, rows: int, origin: int, di
         indices = compositor.source_frames(options, origin + direction * np.arange(options.window), window.shot)
         lowest, decode, edges = (
             int(indices[indices >= 0].min()),
-            decoding(window.transfer, options),
+            decoding(window.transfer, options.light),
             _EDGES[options.edges],
         )
     given |= {"layers": window.layers, "lowest_layer": lowest % window.layers}
@@ -288,14 +312,15 @@ class GPUCompositor:
         return window.picture
 
     def _draw_moved(self, window: WholeFrames, index: int, direction: int, state: FrameState, handle, block: int):
-        """As `draw`, where shutters follow something: a pass for each texture array of frames, which adds its own to
-        what those before have summed."""
+        """As `draw`, where shutters follow something: a pass for each texture array of frames, which adds what is seen
+        of these to what those before have."""
         options, (width, height) = state.options, (window.source.width, window.source.height)
         frames = compositor.window_indices(options, index, window.shot, direction)
         first, last = shutters.open_span(state.bars)
         values, moves = moved_tables(state, frames)
         motions, there = len(moves) // len(frames), np.flatnonzero(frames >= 0)
-        shortened = bool((frames[first:last] < 0).any())
+        shortened, packed = bool((frames[first:last] < 0).any()), isinstance(window, PackedFrames)
+        way = _moved_way(options, values[: len(values) - motions], (first, last))
         given = {"size": (width, height), "top": 0, "height": height, "block_bits": (block - 1).bit_length()}
         given |= {"first": first, "last": last, "rows": len(values) - 1 - motions, "motions": motions}
         given |= {"seen_first": int(there[0]), "seen_last": int(there[-1]), "parts": len(values) - motions}
@@ -309,17 +334,22 @@ class GPUCompositor:
             images["summed"] = images.get("picture")
             sums = sums[::-1]
             images["picture"] = self._texture(sums[0], width, height, 1, "rgba32f") if at[1] else window.picture
+            # What has more to do for a pixel takes long to compile for many.
+            quads = BLOCK // 4 if packed and way != "walk" and not (shortened or any(at)) else 1
             program = composition_of_moved(
-                "value" if options.interpolation == "value" else "walk",
+                way,
+                quads,
                 -(-len(state.bars) // 4),
-                decoding(window.transfer, options),
+                packed,
+                0 if packed else decoding(window.transfer, options.light),
                 shortened,
                 window.source.alpha == "premultiplied",
                 options.light == "encoded",
                 window.source.alpha == "opaque",
                 at,
             )
-            extent = width, -(-height // _LINES["walk"])
+            images["packed_frames"] = stack
+            extent = width, -(-height // (4 * quads))
             self.device.run(program, extent, textures={"frames": stack}, images=images, **given)
         return window.picture
 

@@ -62,11 +62,12 @@ def compose(state: FrameState, frames, present, coefficients, moves=None) -> np.
     encoded = state.options.light == "encoded"
     frames = [_encode(frame) if encoded else frame for frame in frames]
     opaque = all((frame[..., 3] == 1).all() for frame in frames)
-    total = 0.0
+    y, x = np.indices(coefficients.shape[1:])
+    total, own = 0.0, x + 1j * y
     for weights, turns, shifts in _exposed(state, coefficients, np.asarray(present), moves):
         for k, frame in enumerate(frames):
-            seen = frame if moves is None else resampled(frame, turns[k], shifts[k], sharp=opaque)
-            total = total + weights[..., k, None] * seen
+            shown = frame if moves is None else seen(frame, turns[k] * own + shifts[k], sharp=opaque)
+            total = total + weights[..., k, None] * shown
     gain = np.einsum("n,nhw->hw", state.gains, coefficients)
     return (_decode(total) if encoded else total) * np.concatenate(
         [np.repeat(gain[..., None], 3, axis=-1), np.ones_like(gain)[..., None]], axis=-1
@@ -88,16 +89,14 @@ def _exposed(state: FrameState, coefficients: np.ndarray, present: np.ndarray, m
     return [(weights, *mixed)]
 
 
-def resampled(frame: np.ndarray, turn, shift, *, sharp: bool) -> np.ndarray:
-    """What a frame (H, W, C) shows at turn · z + shift for each pixel z = x + iy; turn, shift: (H, W), or alike.
+def seen(frame: np.ndarray, places: np.ndarray, *, sharp: bool) -> np.ndarray:
+    """What a frame (H, W, C) shows at places (…), x + iy as motions.Similarity counts: (…, C).
 
     sharp: by Catmull and Rom's cubic, kept between the four pixels around, for it would ring about highlights; else
     linearly, as colours with an alpha have to be. Beyond its edges the frame goes on as its last pixels."""
     height, width = frame.shape[:2]
-    y, x = np.indices((height, width))
-    place = turn * (x + 1j * y) + shift
     # Far outside all is the same, and large numbers have no fractions.
-    x, y = np.clip(place.real, -2, width + 1), np.clip(place.imag, -2, height + 1)
+    x, y = np.clip(places.real, -2, width + 1), np.clip(places.imag, -2, height + 1)
     column, row = np.floor(x).astype(int), np.floor(y).astype(int)
 
     def pixel(i, j):

@@ -75,7 +75,7 @@ def test_frames_in_several_textures(device, monkeypatch, resident):  # noqa: F81
     """As of windows for which a device has no room in one."""
     rng = np.random.default_rng(35)
     source = footage(rng)
-    monkeypatch.setattr(window, "BAND_BYTES", 5 * source.width * source.height * 4)
+    monkeypatch.setattr(window, "BAND_BYTES", 7 * (source.width + window.RIM) * (source.height + window.RIM) * 8)
     if not resident:
         monkeypatch.setattr(window, "RESIDENT_BYTES", 0)
     for options in ({}, {"edges": "shorten", "interpolation": "value"}, {"light": "encoded", "edges": "mirror"}):
