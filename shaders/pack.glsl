@@ -1,6 +1,7 @@
 // A frame as exposures that follow something read it: a whole number a pixel, with that of the pixel below beside it, and
-// a rim of two pixels before and three behind that repeat the frame's edges. Linear light is kept as its square root, so that dark steps are small; encoded
-// light as it is. (DECODE: how samples become the light that is summed, 0 as they are, 1 made linear, 2 made encoded.)
+// a rim of two pixels before and three behind that repeat the frame's edges. Linear light is kept as its square root, so
+// that dark steps are small; encoded light as it is.
+// DECODE: how samples become the light that is summed, 0 as they are, 1 made linear, 2 made encoded.
 #include "light.glsl"
 #include "packed.glsl"
 

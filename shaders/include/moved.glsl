@@ -1,10 +1,11 @@
-// Frames that are not taken where a pixel lies, but where what its shutters follow was: one resampling a frame.
-// frames: some of the window's frames; or with PACKED packed_frames, as shaders/pack.glsl makes them. moves: rows for the window's frames, one for each of `motions` (more than one
-// where pictures are mixed): the frame's layer, −1: it is not among these; whether it is there at all; then the columns
-// of turn − 1 and of shift, real and imaginary parts, four shutters per texel. `seen_first` to `seen_last`: the frames
-// that are there.
-// SEVERAL: some of the window's frames are not among these; CONTINUED: what earlier passes have summed is in `summed`; UNFINISHED: a later pass adds the other frames.
-// SHARP: as core.compositor.seen.
+// Frames that are not seen where a pixel lies, but where what its shutters follow was: one resampling a frame.
+// frames: some of the window's, in layers; or with PACKED packed_frames, as shaders/pack.glsl makes them.
+// moves: a row for each of the window's frames and of `motions`, of which there are several where pictures are mixed: the
+// frame's layer (−1: it is not among these) and whether it is there at all; then the columns of turn − 1 and of shift,
+// real and imaginary parts, four shutters per texel. seen_first to seen_last: the window's frames that are there.
+// table: as for compose.glsl, a row for each frame and motion; from row `parts` on, one for each motion: 1 for its shutters.
+// SEVERAL: other passes have other frames. CONTINUED: what those before have summed is in `summed`; UNFINISHED: another
+// one follows. SHARP: as in core.compositor.seen.
 int motion = 0;
 
 vec4 moved_weights(float t)
@@ -121,8 +122,8 @@ void expose(int quad, int frame, vec4 weight)
   centre[quad] += weight * (float(frame) + 0.5);
   weight *= place.y;
   share[quad] += weight;
-  // Software renderers run both sides of a branch, and a loop is dear to them as well.
 #if SEVERAL
+  // A loop, for software renderers run both sides of a branch; and it is dear to them as well.
   int layer = any(greaterThan(weight, vec4(0.0))) ? int(place.x) : -1;
   for (; layer >= 0; layer = -1)
 #else

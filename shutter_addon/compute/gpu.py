@@ -31,7 +31,6 @@ _OF_WAY = {"pieces": ("rows",), "value": ("first", "last")} | dict.fromkeys(
 )
 # Rows of pixels that one invocation composes, by the pass; BLOCK for all others.
 _LINES = {"sums": PAIR, "walk": 4}
-_MOVED_LINES = 4  # where shutters follow something
 # Loop iterations of an invocation. Mesa's software renderer ends its loops after 65,535 in all, without an error.
 _MOST_ITERATIONS = 60_000
 # The numbers of pieces for which compose_sums is compiled. A table with another number is filled up with empty pieces.
@@ -325,10 +324,12 @@ class GPUCompositor:
         given |= {"first": first, "last": last, "rows": len(values) - 1 - motions, "motions": motions}
         given |= {"seen_first": int(there[0]), "seen_last": int(there[-1]), "parts": len(values) - motions}
         images = {"coefficients": handle, "table": self._filled("table", values[None], "rgba32f")}
-        slots, sums = frames % window.capacity, ("sum", "other sum")
+        # What is left out is read in another's place: what lies in its own may be no number.
+        slots = np.where(frames < 0, frames[there[0]], frames) % window.capacity
+        sums = "sum", "other sum"
         for held, stack in window.stacks():
             at = held.start > 0, held.stop < window.capacity
-            inside = (frames >= 0) & (slots >= held.start) & (slots < held.stop)
+            inside = (slots >= held.start) & (slots < held.stop)
             moves[:, 0, 0] = np.where(inside, slots - held.start, -1).repeat(motions)
             images["moves"] = self._filled("moves", moves[None], "rgba32f")
             images["summed"] = images.get("picture")

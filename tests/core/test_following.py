@@ -54,6 +54,8 @@ def test_time_that_turns_back():
     shown = lambda other: 20 - abs(int(other) - 20)  # noqa: E731
     found = shifts(made(STRAIGHT, "center"), [17, 18, 19, 20], frame=18, index=18, shown=shown)
     assert found == pytest.approx(np.array([-1, 0, 1, 2]) * STEP)
+    found = shifts(made(STRAIGHT, "center"), [19], frame=20, index=20, shown=shown)
+    assert found == pytest.approx(np.array([STEP]))  # before and after as near: after
 
 
 def test_what_is_never_shown_lies_as_the_nearest_that_is():

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_composition import check, device, footage, state  # noqa: F401
+from test_composition import SHAPES, check, device, footage, state  # noqa: F401
 
 from shutter_addon.compute import window
 from shutter_addon.compute.renderer import Renderer
@@ -28,9 +28,8 @@ def following(rng, source, moment, followers=(1,)):
     return replace(moment, following=motions(rng, source.count, len(moment.bars), followers, size))
 
 
-@pytest.mark.parametrize("interpolation", ["displacement", "value"])
-@pytest.mark.parametrize("light", ["linear", "encoded"])
-@pytest.mark.parametrize("followers", [(0,), (1, 2), (0, 1, 2)])
+@pytest.mark.parametrize(("interpolation", "light"), [("displacement", "linear"), ("value", "encoded")])
+@pytest.mark.parametrize("followers", [(0,), (0, 1, 2)])
 def test_random_motions(device, interpolation, light, followers):  # noqa: F811
     rng = np.random.default_rng(31)
     source = footage(rng)
@@ -51,8 +50,9 @@ def test_ends_of_the_clip(device, interpolation, edges, index, direction):  # no
 
 
 @pytest.mark.parametrize("alpha", ["straight", "premultiplied"])
-@pytest.mark.parametrize("transfer", ["srgb", "linear"])
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16, np.float32])
+@pytest.mark.parametrize(
+    ("dtype", "transfer"), [(np.uint8, "srgb"), (np.uint16, "linear"), (np.float16, "srgb"), (np.float32, "linear")]
+)
 def test_kinds_of_footage(device, dtype, transfer, alpha):  # noqa: F811
     rng = np.random.default_rng(33)
     source = footage(rng, dtype=dtype, transfer=transfer, alpha=alpha)
@@ -63,10 +63,9 @@ def test_kinds_of_footage(device, dtype, transfer, alpha):  # noqa: F811
     check(device, source, following(rng, source, moment, (0, 2)), 3)
 
 
-@pytest.mark.parametrize("interpolation", ["displacement", "value"])
-def test_many_shutters(device, interpolation):  # noqa: F811
+def test_many_shutters(device):  # noqa: F811
     rng = np.random.default_rng(34)
-    source, moment = footage(rng), state(rng, count=6, interpolation=interpolation)
+    source, moment = footage(rng), state(rng, count=6)
     check(device, source, following(rng, source, moment, (0, 4, 5)), 3)
 
 
@@ -78,7 +77,7 @@ def test_frames_in_several_textures(device, monkeypatch, resident):  # noqa: F81
     monkeypatch.setattr(window, "BAND_BYTES", 7 * (source.width + window.RIM) * (source.height + window.RIM) * 8)
     if not resident:
         monkeypatch.setattr(window, "RESIDENT_BYTES", 0)
-    for options in ({}, {"edges": "shorten", "interpolation": "value"}, {"light": "encoded", "edges": "mirror"}):
+    for options in ({"edges": "mirror"}, {"edges": "shorten"}):
         moment = following(rng, source, state(rng, **options), (0, 1))
         moment.bars[2, :6] = 0
         for index in (2, 14):
@@ -109,3 +108,45 @@ def test_chunks_have_the_same_bits(device):  # noqa: F811
     in_order = [renderer.picture(index, moment) for index, moment in enumerate(moments)]
     for index in (3, 1, 0, 2):
         assert np.array_equal(Renderer(device, source).picture(index, moments[index]), in_order[index])
+
+
+@pytest.mark.parametrize("seed", range(41, 45))
+def test_anything(device, seed):  # noqa: F811
+    rng = np.random.default_rng(seed)
+
+    def one(*options):
+        return options[rng.integers(len(options))]
+
+    count, length = int(rng.integers(1, 5)), int(rng.integers(1, 30))
+    alpha, dtype = one("opaque", "straight"), one(np.uint8, np.uint16, np.float32)
+    size = int(rng.integers(1, 90)), int(rng.integers(1, 50))
+    source = footage(
+        rng, count=int(rng.integers(1, 40)), size=size, dtype=dtype, alpha=alpha, transfer=one("srgb", "linear")
+    )
+    moment = state(
+        rng,
+        length,
+        shapes=tuple(shape for shape in SHAPES if shape.shutter < count),
+        count=count,
+        interpolation=one("displacement", "value"),
+        light="linear" if alpha == "straight" else one("linear", "encoded"),
+        exposure=one("normalized", "weighted"),
+        edges=one("hold", "mirror", "shorten"),
+        position=one("start", "center", "end"),
+        aggregate=one(1, 2, 4),
+        step=one(1, 2),
+    )
+    followers = [i for i in range(count) if rng.random() < 0.7] or [0]
+    check(device, source, following(rng, source, moment, followers), int(rng.integers(source.count)), one(1, -1))
+
+
+def test_frames_that_are_left_out_are_not_read(device):  # noqa: F811
+    """Whatever lies in their place: of what is no number not even none must be taken."""
+    rng = np.random.default_rng(39)
+    source = footage(rng, dtype=np.float16)
+    source.frames[16] = np.nan
+    renderer = Renderer(device, source)
+    for index in (14, 18):
+        moment = following(rng, source, state(rng, edges="shorten"))
+        picture = renderer.picture(index, moment)
+    assert np.isfinite(picture).all()
