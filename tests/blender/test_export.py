@@ -95,9 +95,9 @@ def camera_keys(draw):
 
 
 @st.composite
-def following_recipes(draw):
+def following_recipes(draw, longest=6):
     """Recipes whose shutters follow the camera, or regions, which have names of their own."""
-    found = draw(valid_recipes())
+    found = draw(valid_recipes(longest))
     named = [dataclasses.replace(region, name=f"{region.name[:9]}{i}") for i, region in enumerate(found.regions)]
     followed = st.sampled_from([None, recipes.CAMERA, *(region.name for region in named)])
     shutters = [dataclasses.replace(shutter, follow=draw(followed)) for shutter in found.shutters]
