@@ -12,7 +12,7 @@ the window's frames in the same light; edges: coefficients that follow a guide's
 shutter follows a subject that moves, turns and grows. Times are medians in milliseconds.
 Frames are random noise. Errors are the largest over random pixels of the picture (--pixels) in 8-bit levels against
 the float64 reference; those of diffusion over all coefficients, times 255, against twelve cycles with cells
-everywhere on all grids; those along edges against twice as many iterations.
+everywhere on all grids; those along edges against eight more cycles.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from shutter_addon.compute import cpu, diffusion, diffusion_gpu, edge_diffusion, gpu
+from shutter_addon.compute import cpu, diffusion, diffusion_gpu, edge_diffusion_gpu, gpu, guide
 from shutter_addon.compute.gl import GLDevice
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.passes import LOCAL_ROW, Image, Pass
@@ -94,16 +94,19 @@ def shapes(count: int) -> tuple:
 
 @cache
 def edged(height: int, width: int) -> np.ndarray:
-    """A guide (height, width, 3) float32: random colours 16 rows of a 240th apart, and what is linear between them."""
+    """A guide (h, w, 3) float32 of so many pixels, on cells as large as compute.guide would make them: random colours
+    16 rows of a 240th apart, and what is linear between them."""
+    cell = guide.cell_of(min(height, width))
+    height, width = -(-height // cell), -(-width // cell)
     rng = np.random.default_rng(1)
-    pitch = 16 * min(height, width) / 240
-    guide = rng.random((int(height / pitch) + 2, int(width / pitch) + 2, 3)).astype(np.float32)
+    pitch = 16 * min(height, width) / guide.ROWS
+    found = rng.random((int(height / pitch) + 2, int(width / pitch) + 2, 3)).astype(np.float32)
     for axis, length in enumerate((height, width)):
         before, share = np.divmod(np.arange(length) / pitch, 1)
         share = np.expand_dims(share, [a for a in range(3) if a != axis]).astype(np.float32)
         before = before.astype(int)
-        guide = (1 - share) * guide.take(before, axis) + share * guide.take(before + 1, axis)
-    return guide * np.float32(min(height, width) / 240)
+        found = (1 - share) * found.take(before, axis) + share * found.take(before + 1, axis)
+    return found * np.float32(min(height, width) / guide.ROWS)
 
 
 def following(count: int, window: int, size) -> Following:
@@ -288,12 +291,12 @@ class Case:
     def _edges_error(self) -> float:
         """Of what was solved last, along edges."""
         count = len(self.state.bars)
-        got, usual = self.compositor.coefficients(self.edges, count).copy(), edge_diffusion.ITERATIONS
+        got, usual = self.compositor.coefficients(self.edges, count).copy(), edge_diffusion_gpu.LAST_CYCLES
         try:
-            edge_diffusion.ITERATIONS = 2 * usual
+            edge_diffusion_gpu.LAST_CYCLES = (4,) * 8
             self.diffuse("edges")
         finally:
-            edge_diffusion.ITERATIONS = usual
+            edge_diffusion_gpu.LAST_CYCLES = usual
         return float(np.abs(self.compositor.coefficients(self.edges, count) - got).max() * 255)
 
     def release(self) -> None:

@@ -15,6 +15,7 @@ from ..core import compositor, light, shutters
 from ..core.frame_source import FrameSource
 from ..core.frame_state import FrameState, Options
 from .diffusion import diffuse
+from .edge_diffusion import diffuse_along_edges, follows_edges
 from .resampling import around, resampled
 from .running_sums import RunningSums, summable
 
@@ -171,10 +172,12 @@ def _difference(late: np.ndarray, early: np.ndarray) -> np.ndarray:
 
 
 class Solver:
-    """compute.diffusion, with the methods of compute.diffusion_gpu.Diffusion. It ignores `warm`."""
+    """compute.diffusion and compute.edge_diffusion, with the methods of compute.gpu.Solver. It ignores `warm`."""
 
     def solve(self, labels: np.ndarray, count: int, guide=None, strength: float = 0.0, *, warm=False) -> np.ndarray:
-        return diffuse(labels, count, guide, strength)
+        if follows_edges(labels, guide, strength):
+            return diffuse_along_edges(labels, count, guide, strength)
+        return diffuse(labels, count)
 
     def release(self) -> None:
         pass

@@ -20,8 +20,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from . import edge_diffusion_gpu
-from .diffusion import follows_edges
 from .passes import Image, Pass
 
 # V-cycles of a solve that starts from nothing. Largest error × 255 after 1, 2, 3, 4 cycles: 3.9, 0.67, 0.66, 0.66 over
@@ -51,41 +49,46 @@ NOTHING = 1 / 4096
 # Cells (y, x) of 2 × 2 in the order of a smoothing sweep.
 _COLOURS = ((0, 0), (1, 1), (0, 1), (1, 0))
 
-_READ = Image("rgba32f", reads=True, writes=False)
-_STORED = Image("rgba32f")
-_CHANGED = Image("rgba32f", reads=True)
+READ = Image("rgba32f", reads=True, writes=False)
+STORED = Image("rgba32f")
+CHANGED = Image("rgba32f", reads=True)
 _TILES = {"tiles": Image("r32f", reads=True, writes=False)}
-_LABELS = {"labels": Image("r16ui", reads=True, writes=False)}
-_GRID = {"first": "int", "last": "int", "size": "ivec2"}
-_GRIDS = {**_GRID, "coarse": "ivec2"}
+LABELS = {"labels": Image("r16ui", reads=True, writes=False)}
+GRID = {"first": "int", "last": "int", "size": "ivec2"}
+GRIDS = {**GRID, "coarse": "ivec2"}
 
 
-def _pass(name: str, reads: tuple[str, ...], images: dict[str, Image], constants: dict[str, str]) -> Pass:
+def tile_pass(name: str, reads: tuple[str, ...], images: dict[str, Image], constants: dict[str, str]) -> Pass:
     """A pass over a list of tiles. It reads all textures as images: texelFetch is far slower on a software renderer."""
-    return Pass(f"diffuse_{name}", images={**_TILES, **dict.fromkeys(reads, _READ), **images}, constants=constants)
+    return Pass(name, images={**_TILES, **dict.fromkeys(reads, READ), **images}, constants=constants)
 
 
-_START = _pass("start", (), {**_LABELS, "solution": _STORED, "own": _STORED}, {**_GRID, "warm": "int"})
-_CLEAR = _pass("clear", ("finer",), dict.fromkeys(("solution", "own", "right"), _STORED), {**_GRID, "warm": "int"})
-_WEIGHTS_FINEST = _pass("weights_finest", (), {**_LABELS, "weights": _STORED}, {**_GRID, "hold": "float"})
-_WEIGHTS = _pass("weights", ("stencil",), {"weights": _STORED}, {**_GRID, "hold": "float"})
-_COARSEN_FINEST = _pass("coarsen_finest", ("weights",), {"next": _STORED}, _GRIDS)
-_COARSEN = _pass("coarsen", ("stencil", "weights"), {"next": _STORED}, _GRIDS)
-_SMOOTH_FINEST = _pass("smooth_finest", (), {**_LABELS, "solution": _CHANGED}, {**_GRID, "colour": "int"})
-_SMOOTH = _pass("smooth", ("stencil", "right"), {"solution": _CHANGED}, {**_GRID, "colour": "ivec2"})
-_PROLONG = _pass("prolong", ("from", "coarser", "weights"), {"to": _STORED}, {**_GRIDS, "amount": "float"})
-_RESTRICT_FINEST = _pass("restrict_finest", ("own", "weights"), {"next": _STORED}, _GRIDS)
-_RESTRICT = _pass("restrict", ("stencil", "own", "weights", "right"), {"next": _STORED}, _GRIDS)
+_START = tile_pass("diffuse_start", (), {**LABELS, "solution": STORED, "own": STORED}, {**GRID, "warm": "int"})
+_CLEAR = tile_pass(
+    "diffuse_clear", ("finer",), dict.fromkeys(("solution", "own", "right"), STORED), {**GRID, "warm": "int"}
+)
+_WEIGHTS_FINEST = tile_pass("diffuse_weights_finest", (), {**LABELS, "weights": STORED}, {**GRID, "hold": "float"})
+_WEIGHTS = tile_pass("diffuse_weights", ("stencil",), {"weights": STORED}, {**GRID, "hold": "float"})
+_COARSEN_FINEST = tile_pass("diffuse_coarsen_finest", ("weights",), {"next": STORED}, GRIDS)
+_COARSEN = tile_pass("diffuse_coarsen", ("stencil", "weights"), {"next": STORED}, GRIDS)
+_SMOOTH_FINEST = tile_pass("diffuse_smooth_finest", (), {**LABELS, "solution": CHANGED}, {**GRID, "colour": "int"})
+_SMOOTH = tile_pass("diffuse_smooth", ("stencil", "right"), {"solution": CHANGED}, {**GRID, "colour": "ivec2"})
+PROLONG = tile_pass("diffuse_prolong", ("from", "coarser", "weights"), {"to": STORED}, {**GRIDS, "amount": "float"})
+_RESTRICT_FINEST = tile_pass("diffuse_restrict_finest", ("own", "weights"), {"next": STORED}, GRIDS)
+_RESTRICT = tile_pass("diffuse_restrict", ("stencil", "own", "weights", "right"), {"next": STORED}, GRIDS)
+_COARSER = {"weights": _WEIGHTS, "coarsen": _COARSEN, "restrict": _RESTRICT}
 _SOLVE = Pass(
     "diffuse_solve",
-    images={"stencil": _READ, "right": _READ, "solution": _STORED},
+    images={"stencil": READ, "right": READ, "solution": STORED},
     constants={"size": "ivec2"},
     defines={"SOLVED": SOLVED},
     local_size=(1, 1, 1),
 )
-_FINISH = _pass("finish", (), {"solution": _CHANGED}, {**_GRID, "layers": "int", "nothing": "float"})
-_EXPAND = _pass("expand", ("coarser",), {"solution": _STORED}, _GRIDS)
-_EXPAND_RIM = _pass("expand_rim", ("coarser",), {"solution": _STORED}, {**_GRIDS, "layers": "int", "beyond": "vec2"})
+FINISH = tile_pass("diffuse_finish", (), {"solution": CHANGED}, {**GRID, "layers": "int", "nothing": "float"})
+_EXPAND = tile_pass("diffuse_expand", ("coarser",), {"solution": STORED}, GRIDS)
+_EXPAND_RIM = tile_pass(
+    "diffuse_expand_rim", ("coarser",), {"solution": STORED}, {**GRIDS, "layers": "int", "beyond": "vec2"}
+)
 
 
 class _Grid:
@@ -133,42 +136,37 @@ class _Grid:
 class Diffusion:
     """compute.diffusion.diffuse on a device. Its textures are kept until the size or the number of shutters changes."""
 
+    # The passes over the pixels, by what those over coarser grids are called.
+    finest = {
+        "weights": _WEIGHTS_FINEST,
+        "coarsen": _COARSEN_FINEST,
+        "smooth": _SMOOTH_FINEST,
+        "restrict": _RESTRICT_FINEST,
+    }
+
     def __init__(self, device):
         self._device = device
         self._grids = []
         self._made_for = None
         self._tiles = None
-        self._edged = False
 
-    def solve(self, labels: np.ndarray, count: int, guide=None, strength: float = 0.0, *, warm: bool = False):
+    def solve(self, labels: np.ndarray, count: int, *, warm: bool = False):
         """Coefficients from labels (H, W) uint16, 0 free, 1 + shutter fixed: a texture array rgba32f, shutter i in
         layer i // 4 and channel i % 4. The next call overwrites it. Nothing is read back from the device.
 
-        guide, strength: as for core.conductances, (H, W, 3 or 4); None or 0: they spread alike everywhere
         warm: start from the last solution, if that had this size and count. It is faster where scribbles moved a
         little, and the result depends on the last solution as well, within the error.
         """
-        if follows_edges(labels, guide, strength):
-            return self._along_edges(labels, count, guide, strength)
-        warm = self._prepare(labels.shape, count) and warm and not self._edged
-        self._edged = False
+        warm = self._prepare(labels.shape, count) and warm
         finest = self._grids[0]
         self._device.write(finest.textures["labels"], np.ascontiguousarray(labels, dtype=np.uint16))
-        self._list_tiles(labels)
+        self._list_tiles(labels, next(k for k, grid in enumerate(self._grids) if max(grid.size) <= WHOLE))
         self._start(int(warm))
         self._coarsen()
         for _ in range(WARM_CYCLES if warm else CYCLES):
             self._cycle(0)
         self._finish()
         return finest.textures["solution"]
-
-    def _along_edges(self, labels: np.ndarray, count: int, guide: np.ndarray, strength: float):
-        """As solve, with conductances."""
-        self._prepare(labels.shape, count)
-        self._edged = True
-        solution = self._grids[0].textures["solution"]
-        edge_diffusion_gpu.solve(self._device, labels, count, guide, strength, solution, NOTHING)
-        return solution
 
     def release(self) -> None:
         for grid in self._grids:
@@ -194,28 +192,32 @@ class Diffusion:
         self._tiles = self._device.texture(256, -(-tiles // 256), 1, "r32f")
         return False
 
-    def _list_tiles(self, labels: np.ndarray) -> None:
-        """Sends the lists of tiles of all grids to the device, and notes their places (_Grid.ranges)."""
+    def _list_tiles(self, labels: np.ndarray, whole: int, *, anew: bool = False) -> None:
+        """Sends the lists of tiles of all grids to the device, and notes their places (_Grid.ranges).
+
+        whole: the first of the grids that have cells of their own everywhere
+        anew: whether all operators have changed
+        """
         held, free = _in_fours(labels != 0)
         listed, end = [], 0
-        for grid in self._grids:
+        for index, grid in enumerate(self._grids):
             touched = _grown(held)
             solid = ~_grown(free, 1 if grid.finest else 2)
-            changed = (touched | grid.touched) & ~(solid & grid.solid)
+            changed = np.ones_like(touched) if anew else (touched | grid.touched) & ~(solid & grid.solid)
             held, free = _halved(held), _halved(free)
             # A coarse cell inside a scribble may still have a value: it stands for free cells beside the scribble.
             live = free if grid.finest else _grown(free)
-            reached = _grown(held, BAND) if max(grid.size) > WHOLE else np.ones_like(held)
+            reached = _grown(held, BAND) if index < whole else np.ones_like(held)
             near = reached & live
             feeding = _grown(near)
             around = feeding & live
             stale = (reached | grid.reached) & _grown(live)
             # Passes read W in the tiles around those near, so it must be zero there. At full size, tiles that are all
             # fixed must hold the values of their labels.
-            anew = stale | around | ~live if grid.finest else stale | around
+            unsolved = stale | around | ~live if grid.finest else stale | around
             rim = ~near & live & _last_ones(grid)
             eights, fours = grid.codes
-            lists = [eights[tiles] for tiles in (near, around & ~near, live & ~around, rim, anew)]
+            lists = [eights[tiles] for tiles in (near, around & ~near, live & ~around, rim, unsolved)]
             lists += [eights[feeding] / 2, fours[changed]]  # a tile is four cells wide on the next grid
             ends = (end + np.cumsum([len(tiles) for tiles in lists])).tolist()
             grid.ranges = {
@@ -244,8 +246,8 @@ class Diffusion:
     def _coarsen(self) -> None:
         """Makes each grid's prolongation P, and from it the next grid's operator."""
         for fine, coarse in pairwise(self._grids):
-            self._run(_WEIGHTS_FINEST if fine.finest else _WEIGHTS, fine, "changed", 8, hold=HOLD)
-            coarsen = _COARSEN_FINEST if fine.finest else _COARSEN
+            weights, coarsen = (self._pass(fine, name) for name in ("weights", "coarsen"))
+            self._run(weights, fine, "changed", 8, hold=HOLD)
             to = {"size": fine.size, "coarse": coarse.size, "next": coarse.textures["stencil"]}
             self._run(coarsen, coarse, "changed", 16, **fine.textures, **to)
 
@@ -253,40 +255,52 @@ class Diffusion:
         """A V-cycle over the grid of this index and all coarser ones."""
         grid, *coarser = self._grids[index : index + 2]
         if not coarser:
-            self._run(_SOLVE, grid, "near", 1, grid.layers)  # the coarsest grid has one tile
+            self._solve_coarsest(grid)
             return
         sweeps = FINEST_SWEEPS if grid.finest else SWEEPS
         self._smooth(grid, sweeps)
-        self._correct(index, grid, *coarser)
+        first_whole = max(coarser[0].size) <= WHOLE and (grid.finest or max(grid.size) > WHOLE)
+        self._correct(grid, *coarser, lambda: [self._cycle(index + 1) for _ in range(1 + first_whole)])
         self._smooth(grid, sweeps)
 
-    def _correct(self, index: int, grid: _Grid, coarse: _Grid) -> None:
-        """Solves the coarser grids for this grid's right-hand side: W stays, and U becomes W + P U' with the new U'."""
+    def _solve_coarsest(self, grid: _Grid) -> None:
+        self._run(_SOLVE, grid, "near", 1, grid.layers)  # it has one tile
+
+    def _correct(self, grid: _Grid, coarse: _Grid, solve) -> None:
+        """Has the next grid solved for this grid's right-hand side: W stays, and U becomes W + P U' with the new U'."""
         values, own = grid.textures["solution"], grid.textures["own"]
         prolong = {"coarse": coarse.size, "coarser": coarse.textures["solution"]}
-        self._run(_PROLONG, grid, "near", 16, grid.layers, **prolong, **{"from": values}, to=own, amount=-1.0)
-        restrict = _RESTRICT_FINEST if grid.finest else _RESTRICT
-        self._run(restrict, grid, "feeding", 16, grid.layers, coarse=coarse.size, next=coarse.textures["right"])
-        first_whole = max(coarse.size) <= WHOLE and (grid.finest or max(grid.size) > WHOLE)
-        for _ in range(2 if first_whole else 1):
-            self._cycle(index + 1)
-        self._run(_PROLONG, grid, "reached", 16, grid.layers, **prolong, **{"from": own}, to=values, amount=1.0)
+        self._run(PROLONG, grid, "near", 16, grid.layers, **prolong, **{"from": values}, to=own, amount=-1.0)
+        self._restrict(grid, coarse, own)
+        solve()
+        self._run(PROLONG, grid, "reached", 16, grid.layers, **prolong, **{"from": own}, to=values, amount=1.0)
 
-    def _smooth(self, grid: _Grid, sweeps: int) -> None:
-        """Gauss-Seidel sweeps: red-black at full size, where cells have four neighbours, and else in four colours."""
+    def _restrict(self, grid: _Grid, coarse: _Grid, own) -> None:
+        """What a grid's equations miss with these values becomes the next grid's right-hand side."""
+        to = {"coarse": coarse.size, "next": coarse.textures["right"]}
+        self._run(self._pass(grid, "restrict"), grid, "feeding", 16, grid.layers, own=own, **to)
+
+    def _smooth(self, grid: _Grid, sweeps: int, *, back: bool = False) -> None:
+        """Gauss-Seidel sweeps: red-black at full size, where cells have four neighbours, and else in four colours.
+
+        back: in the opposite order"""
+        way = -1 if back else 1
         for _ in range(sweeps):
             if grid.finest:
-                for colour in (0, 1):
-                    self._run(_SMOOTH_FINEST, grid, "near", 32, grid.layers, colour=colour)
+                for colour in (0, 1)[::way]:
+                    self._run(self._pass(grid, "smooth"), grid, "near", 32, grid.layers, colour=colour)
             else:
-                for y, x in _COLOURS:
+                for y, x in _COLOURS[::way]:
                     if x < grid.size[0] and y < grid.size[1]:
                         self._run(_SMOOTH, grid, "near", 16, grid.layers, colour=(x, y))
+
+    def _pass(self, grid: _Grid, name: str) -> Pass:
+        return self.finest[name] if grid.finest else _COARSER[name]
 
     def _finish(self) -> None:
         """Makes coefficients of the solution, on all cells of all grids, from the coarsest to the finest."""
         for index, grid in reversed(list(enumerate(self._grids))):
-            self._run(_FINISH, grid, "near", 64, nothing=NOTHING)
+            self._run(FINISH, grid, "near", 64, nothing=NOTHING)
             if index + 1 < len(self._grids):
                 coarse = self._grids[index + 1]
                 below = {"coarse": coarse.size, "coarser": coarse.textures["solution"]}
@@ -313,7 +327,7 @@ class Diffusion:
         own = {"size": grid.size, "layers": grid.layers, "first": first, "last": last, "tiles": self._tiles}
         given = {**own, **grid.textures, **extra}
         # These passes have four invocations for each tile, and take two tiles to a row of eight.
-        rows = -(-(last - first) // 2) if program in (_WEIGHTS, _WEIGHTS_FINEST) else last - first
+        rows = -(-(last - first) // 2) if program in (_WEIGHTS, self.finest["weights"]) else last - first
         self._device.run(
             program,
             (cells, rows, layers),

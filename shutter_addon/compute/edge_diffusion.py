@@ -1,258 +1,242 @@
 """Diffusion with conductances: coefficients that spread freely within what the picture shows as one, and hardly across
 its edges.
 
-The free pixels are the nodes of a graph, its links their conductances; what ties a node to fixed pixels is its ground.
-A coarser graph has a node for all that hangs together by strong links within 2 × 2 cells of its grid, so that what an
-edge separates stays apart however coarse the graph. (Coarse grids of which every cell is one unknown leak through
-edges that run between their cells.) W-cycles over these graphs precondition conjugate gradients.
+The method is multigrid as in compute.diffusion, with a prolongation that follows the operator: what a cell takes of the
+coarse cells around it goes by how it is tied to them (Dendy's black box multigrid, 1982). A grid knows little of what
+lies between edges that are finer than its cells. So the grid whose cells are the guide's is solved by conjugate
+gradients, each iteration a cycle over it and the coarser ones; where the guide's cells are pixels, the grid after the
+pixels is. On the grids before it conductances are smooth, and V-cycles are enough.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from ..core.conductances import conductances
+from ..core.conductances import cell_side, conductances
+from .diffusion import COLOURS, OFFSETS, beyond, finished, inner, padded, part
 
-# Iterations of conjugate gradients, each with one W-cycle. Largest error × 255 after 8, 12, 16, 20: 7.0, 1.4, 0.2, 0.01
-# in frames of films at 320 × 180, and 10, 2.8, 0.8, 0.2 in stripes and checks of two and three pixels.
-ITERATIONS = 20
-# A link joins two nodes if it is at least this share of the root of the product of their diagonals; half of that share
-# on each coarser graph.
-STRONG = 0.15
-# A Jacobi step takes this share of the correction. With 1 it would leave errors that alternate from node to node.
-DAMPING = 0.7
-# Corrections that are constant over a node are too small by about this factor (Braess 1995).
-OVERCORRECTION = 1.7
-# A graph of so many nodes or fewer is the coarsest, and its matrix is inverted.
-DENSE = 300
-
-
-@dataclass
-class Graph:
-    """A graph, and how it becomes the next coarser one.
-
-    Nodes lie in the order of their degrees, the highest first.
-
-    diagonal: (n,) float32, of each node's equation: its links and its ground; where there are no links, times DAMPING,
-        so that a Jacobi step solves it
-    ground: (n,) float32, what ties it to fixed pixels
-    links: for rank k, the k-th link of those first nodes that have as many: (neighbour int32, weight float32)
-    parent: (n,) int32, the node of the next graph; its number of nodes where there is none: a node without links is
-        solved by itself. None on the coarsest
-    order: int32 nodes of this graph in the order of their parents; those without one are left out
-    starts: (coarse n,) int32 where each parent's begin in it
-    inverse: (n, n) float32 of the coarsest graph's matrix; None if it has no links, and on other graphs
-    """
-
-    diagonal: np.ndarray
-    ground: np.ndarray
-    links: list[tuple[np.ndarray, np.ndarray]]
-    parent: np.ndarray | None = None
-    order: np.ndarray | None = None
-    starts: np.ndarray | None = None
-    inverse: np.ndarray | None = None
+# Cycles where the guide's cells are pixels, whatever it shows, and the iterations of conjugate gradients in each.
+# Largest error × 255 over the scenes of the tests after 6, 8: 1.1, 0.2. And cycles where the cells are larger, so that
+# on pixels conductances are smooth.
+CYCLES = (4,) * 8
+SMOOTH_CYCLES = (5, 3, 2, 2)
+# Gauss-Seidel sweeps over a grid before its correction by coarser ones, and again after it.
+SWEEPS = 2
+# So many grids after that of the conjugate gradients are visited twice for each visit of the one before.
+TWICE = 2
+# A cell of which more than this share of the diagonal is no tie to free cells does not follow them fully.
+GROUNDED = 1e-3
 
 
 def diffuse_along_edges(labels: np.ndarray, count: int, guide: np.ndarray, strength: float) -> np.ndarray:
-    """The solution (count, H, W) float32 before small shares are dropped; some pixel has to be fixed, and some free.
+    """Coefficients (count, H, W) float32, ≥ 0 and of sum 1, from labels (H, W): 0 free, 1 + shutter fixed. Some pixel
+    has to be fixed, and some free.
 
-    guide, strength: as for core.conductances, (H, W, 3 or more)
+    guide: (h, w, 3 or more) as for core.conductances; its cells are pixels, or 2 × 2, 4 × 4, … of them
+    strength: 0 … 1, how much conductances follow it
     """
-    fixed = labels == np.arange(1, count + 1)[:, None, None]
-    solution = fixed.astype(np.float32)
-    graphs, pixels, right = graphs_of(labels, guide, strength, solution)
-    solution.reshape(count, -1)[:, pixels] = _conjugate_gradients(graphs, right).T
-    return solution
+    side = cell_side(guide.shape[:2], labels.shape)
+    across, down = (ties.astype(np.float32) for ties in conductances(guide, strength, labels.shape))
+    grids = [_finest(labels == 0, across, down)]
+    while grids[-1].shape != (1, 1):
+        grids.append(_coarser(grids[-1]))
+    solved = min(first_solved(side), len(grids) - 1)
+    solution = padded(labels == np.arange(1, count + 1)[:, None, None])
+    for iterations in CYCLES if side == 1 else SMOOTH_CYCLES:
+        missing = _unbalanced(solution, across, down) * grids[0].live
+        inner(solution)[:] += _cycle(grids, missing, solved, iterations)
+    return finished(inner(solution))
 
 
-def graphs_of(labels, guide, strength, values):
-    """The graphs, the finest first; the pixels (n,) of its nodes; and its right side (n, N) float32.
+def follows_edges(labels: np.ndarray, guide: np.ndarray | None, strength: float) -> bool:
+    """Whether there is anything to diffuse with other conductances than 1."""
+    return guide is not None and strength > 0 and 0 < np.count_nonzero(labels) < labels.size
 
-    values: (N, H, W) float32 the fixed pixels' values
+
+def first_solved(side: int) -> int:
+    """The grid that conjugate gradients solve, where the guide's cells are so many pixels wide."""
+    return max(1, side.bit_length() - 1)
+
+
+class _Grid:
+    """A grid's operator A between its free cells, and the prolongation P from the next grid.
+
+    ties: {(dy, dx): (H, W)} what ties a cell to its neighbour, −A; diagonal: (H, W) of A, 0 for cells that are not free
+    takes: {(b, a): (H, W)} what cell (y, x) takes of the next grid's cell (y // 2 + b, x // 2 + a)
     """
-    height, width = labels.shape
-    cells = np.arange(labels.size, dtype=np.int32).reshape(height, width)
-    right, down = conductances(guide, strength)
-    one = np.concatenate([cells[:, :-1].ravel(), cells[:-1].ravel()])
-    other = np.concatenate([cells[:, 1:].ravel(), cells[1:].ravel()])
-    weight = np.concatenate([right.ravel(), down.ravel()])
-    free = labels.ravel() == 0
-    values = values.reshape(len(values), -1).T
-    ground, given = np.zeros(labels.size), np.zeros((labels.size, values.shape[1]), np.float32)
-    for a, b in ((one, other), (other, one)):
-        held = free[a] & ~free[b]
-        ground += np.bincount(a[held], weight[held], labels.size)
-        np.add.at(given, a[held], weight[held, None].astype(np.float32) * values[b[held]])
-    inner = free[one] & free[other]
-    pixels = np.nonzero(free)[0]
-    number = np.cumsum(free) - 1
-    one, other = number[one[inner]], number[other[inner]]
-    place = np.stack(np.divmod(pixels, width))
-    graphs, order = _hierarchy(one, other, weight[inner], ground[pixels], place, max(height, width))
-    return graphs, pixels[order], given[pixels[order]]
+
+    def __init__(self, ties, diagonal):
+        self.shape, self.ties, self.diagonal = diagonal.shape, ties, diagonal
+        self.live = diagonal > 0
+        self.inverse = np.divide(1, diagonal, where=self.live, out=np.zeros_like(diagonal))
+        self.takes = _prolongation(ties, diagonal, self.live)
 
 
-def _hierarchy(one, other, weight, ground, place, extent):
-    """The graphs, and the order of the finest one's nodes among those given.
+def _finest(free, across, down) -> _Grid:
+    height, width = free.shape
+    ties = {(0, 1): across, (1, 0): down, (0, -1): across, (-1, 0): down}
+    whole, diagonal = {}, np.zeros((height, width), np.float32)
+    for (dy, dx), weights in ties.items():
+        weights = np.pad(weights, ((int(dy < 0), int(dy > 0)), (int(dx < 0), int(dx > 0))))
+        diagonal += weights
+        whole[dy, dx] = weights * free * part(padded(free[None]), (dy, dx))[0]
+    return _Grid(whole, diagonal * free)
 
-    one, other, weight: the links' ends and weights; ground: (n,); place: (2, n) cells; extent: cells along a side
+
+def _prolongation(ties, diagonal, live):
+    """Between two coarse cells of a row or a column a cell takes of each as much as all that lies on its side pulls;
+    between four, what its own equation makes of those around it."""
+
+    def tie(dy, dx):
+        return ties.get((dy, dx), np.float32(0))
+
+    def divided(a, b):
+        return np.divide(a, b, where=b > 0, out=np.zeros_like(diagonal))
+
+    grounded = diagonal - sum(ties.values()) > GROUNDED * diagonal
+    sides = []
+    for turned in (False, True):
+        before, middle, after = (sum(tie(*((k, j) if turned else (j, k))) for j in (-1, 0, 1)) for k in (-1, 0, 1))
+        total = np.where(grounded, diagonal - middle, before + after)
+        sides.append((divided(before, total), divided(after, total)))
+    (west, east), (north, south) = sides
+    height, width = live.shape
+    odd_row, odd_column = np.arange(height)[:, None] % 2 == 1, np.arange(width) % 2 == 1
+
+    def near(values, dy, dx):
+        return part(padded(values[None]), (dy, dx))[0]
+
+    between = {
+        (0, 0): tie(-1, -1) + tie(0, -1) * near(north, 0, -1) + tie(-1, 0) * near(west, -1, 0),
+        (0, 1): tie(-1, 1) + tie(0, 1) * near(north, 0, 1) + tie(-1, 0) * near(east, -1, 0),
+        (1, 0): tie(1, -1) + tie(0, -1) * near(south, 0, -1) + tie(1, 0) * near(west, 1, 0),
+        (1, 1): tie(1, 1) + tie(0, 1) * near(south, 0, 1) + tie(1, 0) * near(east, 1, 0),
+    }
+    total = np.where(grounded, diagonal, sum(ties.values()))
+    takes = {}
+    for (b, a), middle in between.items():
+        alone = live if (b, a) == (0, 0) else 0
+        in_row = (west, east)[a] if b == 0 else 0
+        in_column = (north, south)[b] if a == 0 else 0
+        even = np.where(odd_column, in_row, alone)
+        takes[b, a] = (live * np.where(odd_row, np.where(odd_column, divided(middle, total), in_column), even)).astype(
+            np.float32
+        )
+    return takes
+
+
+def _coarser(fine: _Grid) -> _Grid:
+    """PᵀAP by probing: coarse cells three apart do not meet in a row, so nine vectors tell all rows."""
+    height, width = ((n + 1) // 2 for n in fine.shape)
+    rows, columns = np.arange(height) % 3, np.arange(width) % 3
+    probes = np.stack([np.outer(rows == y, columns == x) for y in range(3) for x in range(3)]).astype(np.float32)
+    answers = -_restricted(fine, _missing(fine, padded(_prolonged(fine, probes)), 0.0))
+    entries = {}
+    for y, x in OFFSETS:
+        near = (rows[:, None] + y) % 3 * 3 + (columns + x) % 3
+        entries[y, x] = np.take_along_axis(answers, near[None], axis=0)[0]
+        entries[y, x][beyond(height, y)] = 0
+        entries[y, x][:, beyond(width, x)] = 0
+    diagonal = entries.pop((0, 0))
+    return _Grid({offset: -entry for offset, entry in entries.items()}, np.maximum(diagonal, 0))
+
+
+def _unbalanced(solution, across, down) -> np.ndarray:
+    """What flows into each pixel (N, H, W). By differences: a diagonal that is rounded would leak like a ground."""
+    values = inner(solution)
+    flow = np.zeros_like(values)
+    for axis, weights in ((2, across), (1, down)):
+        passed = weights * np.diff(values, axis=axis)
+        flow, passed = np.moveaxis(flow, axis, 0), np.moveaxis(passed, axis, 0)
+        flow[:-1] += passed
+        flow[1:] -= passed
+        flow = np.moveaxis(flow, 0, axis)
+    return flow
+
+
+def _cycle(grids, right, solved: int, iterations: int, twice: int = 0) -> np.ndarray:
+    """An approximate solution (N, H, W), by a cycle over these grids.
+
+    solved: which of them conjugate gradients solve in so many iterations; none if it is 0 or less
+    twice: how many of the grids after the first are visited twice
     """
-    graphs, strong, first = [], STRONG, None
-    while True:
-        degree = np.bincount(one, minlength=len(ground)) + np.bincount(other, minlength=len(ground))
-        order = np.argsort(-degree, kind="stable")
-        linked = np.count_nonzero(degree)
-        first = order if first is None else first
-        rank = np.empty_like(order)
-        rank[order] = np.arange(len(order))
-        if graphs:
-            _hand_over(graphs[-1], rank)
-        one, other, ground, place = rank[one], rank[other], ground[order], place[:, order]
-        diagonal = ground + sum(np.bincount(ends, weight, len(ground)) for ends in (one, other))
-        graphs.append(_graph(one, other, weight, ground, diagonal, linked))
-        if linked == 0 or len(ground) <= DENSE:
-            return graphs, first
-        extent = -(-extent // 2)
-        place = place[:, :linked] // 2
-        graphs[-1].parent = _joined(one, other, weight, diagonal[:linked], place, 0.0 if extent == 1 else strong)
-        parent = graphs[-1].parent
-        strong /= 2
-        count = parent.max() + 1
-        place = _first_of(parent, place, count)
-        ground = np.bincount(parent, ground[:linked], count)
-        one, other, weight = _merged(parent[one], parent[other], weight, count)
+    grid, *below = grids
+    values = padded(np.zeros_like(right))
+    for colours in (COLOURS,) * SWEEPS:
+        _smooth(grid, values, right, colours)
+    if not below:
+        return inner(values)
+    coarse = _restricted(grid, _missing(grid, values, right))
+    if solved == 1:
+        correction = _conjugate_gradients(below, coarse, iterations)
+    else:
+        correction = _cycle(below, coarse, solved - 1, iterations, twice - 1)
+        if twice > 0 and len(below) > 1:
+            correction += _cycle(below, _missing(below[0], padded(correction), coarse), 0, 0, twice - 1)
+    inner(values)[:] += _prolonged(grid, correction)
+    for colours in (COLOURS[::-1],) * SWEEPS:
+        _smooth(grid, values, right, colours)
+    return inner(values)
 
 
-def _graph(one, other, weight, ground, diagonal, linked: int) -> Graph:
-    """The graph of these links; the coarsest one's matrix is inverted. linked: how many nodes have links, the first."""
-    damped = diagonal.astype(np.float32)
-    damped[linked:] *= np.float32(DAMPING)
-    graph = Graph(damped, ground.astype(np.float32), _ranked(one, other, weight, len(ground)))
-    if linked > 0 and len(ground) <= DENSE:
-        graph.inverse = _inverse(one, other, weight, diagonal)
-    return graph
-
-
-def _joined(one, other, weight, diagonal, place, strong) -> np.ndarray:
-    """The node of the next graph for each node: those that strong links join within a cell have the same."""
-    root = np.sqrt(diagonal)
-    joins = (place[:, one] == place[:, other]).all(axis=0) & (weight >= strong * root[one] * root[other])
-    one, other = one[joins], other[joins]
-    label = np.arange(len(diagonal))
-    while True:
-        least = np.minimum(label[one], label[other])
-        if (label[one] == least).all() and (label[other] == least).all():
-            break
-        np.minimum.at(label, one, least)
-        np.minimum.at(label, other, least)
-        label = label[label]
-    return (np.cumsum(label == np.arange(len(label))) - 1)[label]
-
-
-def _first_of(parent, place, count):
-    result = np.empty((2, count), place.dtype)
-    result[:, parent] = place
-    return result
-
-
-def _merged(one, other, weight, count):
-    """Links between the nodes of a coarser graph: those of the same two nodes become one."""
-    apart = one != other
-    one, other, weight = one[apart], other[apart], weight[apart]
-    key = np.minimum(one, other).astype(np.int64) * count + np.maximum(one, other)
-    order = np.argsort(key, kind="stable")
-    key = key[order]
-    starts = np.nonzero(np.diff(key, prepend=-1))[0]
-    total = np.add.reduceat(weight[order], starts) if len(key) else weight
-    return *np.divmod(key[starts], count), total
-
-
-def _hand_over(finer: Graph, rank) -> None:
-    """Gives the finer graph its children by parent. rank: (n,) the places of the coarser one's nodes in its order."""
-    parent = rank[finer.parent].astype(np.int32)
-    finer.order = np.argsort(parent, kind="stable").astype(np.int32)
-    finer.starts = np.searchsorted(parent[finer.order], np.arange(len(rank))).astype(np.int32)
-    alone = np.full(len(finer.diagonal) - len(parent), len(rank), np.int32)
-    finer.parent = np.concatenate([parent, alone])
-
-
-def _ranked(one, other, weight, count):
-    """Graph.links of links whose nodes lie in the order of their degrees."""
-    ends, to, weights = np.r_[one, other], np.r_[other, one], np.r_[weight, weight].astype(np.float32)
-    order = np.argsort(ends, kind="stable")
-    ends, to, weights = ends[order], to[order], weights[order]
-    degree = np.bincount(ends, minlength=count)
-    rank = np.arange(len(ends)) - np.repeat(np.cumsum(degree) - degree, degree)
-    by_rank = np.argsort(rank, kind="stable")
-    to, weights = to[by_rank].astype(np.int32), weights[by_rank]
-    stops = np.cumsum(np.bincount(rank))
-    return [(to[a:b], weights[a:b]) for a, b in zip(np.r_[0, stops[:-1]], stops, strict=True)] if len(stops) else []
-
-
-def _inverse(one, other, weight, diagonal) -> np.ndarray:
-    """By Gauss and Jordan, row by row: LAPACK's bits depend on the processor."""
-    matrix = np.diag(diagonal)
-    matrix[one, other] -= weight
-    matrix[other, one] -= weight
-    inverse = np.eye(len(matrix))
-    for k in range(len(matrix)):
-        pivot = matrix[k, k]
-        matrix[k] /= pivot
-        inverse[k] /= pivot
-        factors = matrix[:, k].copy()
-        factors[k] = 0
-        matrix -= factors[:, None] * matrix[k]
-        inverse -= factors[:, None] * inverse[k]
-    return inverse.astype(np.float32)
-
-
-def _conjugate_gradients(graphs, right) -> np.ndarray:
-    solution, residual, direction = np.zeros_like(right), right.copy(), np.zeros_like(right)
-    before = np.zeros(right.shape[1], np.float32)
-    for _ in range(ITERATIONS):
-        guess = _cycle(graphs, residual)
-        power = (residual * guess).sum(axis=0)
+def _conjugate_gradients(grids, right, iterations: int) -> np.ndarray:
+    solution, residual, direction = np.zeros_like(right), right, np.zeros_like(right)
+    before = np.zeros((len(right), 1, 1), np.float32)
+    for _ in range(iterations):
+        guess = _cycle(grids, residual, 0, 0, TWICE)
+        power = _dot(residual, guess)
         direction = guess + _ratio(power, before) * direction
-        answer = _applied(graphs[0], direction)
-        step = _ratio(power, (direction * answer).sum(axis=0))
-        solution += step * direction
-        residual -= step * answer
+        answer = -_missing(grids[0], padded(direction), 0.0)
+        step = _ratio(power, _dot(direction, answer))
+        solution = solution + step * direction
+        residual = residual - step * answer
         before = power
     return solution
+
+
+def _dot(one, other):
+    return (one * other).sum(axis=(1, 2), keepdims=True)
 
 
 def _ratio(a, b):
     return np.divide(a, b, out=np.zeros_like(a), where=b > 0)
 
 
-def _cycle(graphs, right) -> np.ndarray:
-    """An approximate solution, linear and symmetric in the right side: one W-cycle."""
-    graph, *coarser = graphs
-    if graph.inverse is not None:
-        return np.einsum("ij,jk->ik", graph.inverse, right)  # not @, as BLAS's bits depend on the processor
-    inverse = (DAMPING / graph.diagonal)[:, None]
-    values = inverse * right
-    if not coarser:
-        return values
-    coarse = _gathered(graph, right - _applied(graph, values))
-    correction = _cycle(coarser, coarse)
-    if len(coarser) > 1:
-        correction += _cycle(coarser, coarse - _applied(coarser[0], correction))
-    values += np.float32(OVERCORRECTION) * np.append(correction, np.zeros_like(correction[:1]), axis=0)[graph.parent]
-    values += inverse * (right - _applied(graph, values))
-    return values
+def _smooth(grid: _Grid, values, right, colours) -> None:
+    """A Gauss-Seidel sweep over the padded values (N, H + 2, W + 2)."""
+    height, width = grid.shape
+    for y, x in colours:
+        cells = np.s_[y::2, x::2]
+        total = right[:, *cells].copy()
+        for (dy, dx), weights in grid.ties.items():
+            total += weights[cells] * values[:, y + 1 + dy : height + 1 + dy : 2, x + 1 + dx : width + 1 + dx : 2]
+        inner(values)[:, *cells] = total * grid.inverse[cells]
 
 
-def _applied(graph, values) -> np.ndarray:
-    """The graph's matrix times values (n, N). By differences: a diagonal that is rounded would leak like a ground."""
-    total = graph.ground[:, None] * values
-    for to, weight in graph.links:
-        total[: len(to)] += weight[:, None] * (values[: len(to)] - values[to])
+def _missing(grid: _Grid, values, right) -> np.ndarray:
+    """What the equations of padded values still miss, (N, H, W)."""
+    total = right - grid.diagonal * inner(values)
+    for offset, weights in grid.ties.items():
+        total += weights * part(values, offset)
     return total
 
 
-def _gathered(graph, values) -> np.ndarray:
-    """The sums of values (n, N) over the nodes of each parent."""
-    return np.add.reduceat(values[graph.order], graph.starts, axis=0)
+def _prolonged(grid: _Grid, coarse) -> np.ndarray:
+    total = np.zeros((len(coarse), *grid.shape), np.float32)
+    for (b, a), weights in grid.takes.items():
+        rows, columns = (
+            np.minimum(np.arange(n) // 2 + k, count - 1)
+            for n, k, count in zip(grid.shape, (b, a), coarse.shape[1:], strict=True)
+        )
+        total += weights * coarse[:, rows][:, :, columns]
+    return total
+
+
+def _restricted(grid: _Grid, values) -> np.ndarray:
+    """The transpose of _prolonged."""
+    height, width = ((n + 1) // 2 for n in grid.shape)
+    total = np.zeros((len(values), height + 1, width + 1), np.float32)
+    for (b, a), weights in grid.takes.items():
+        shares = np.pad(weights * values, ((0, 0), (0, grid.shape[0] % 2), (0, grid.shape[1] % 2)))
+        total[:, b : b + height, a : a + width] += shares.reshape(len(values), height, 2, width, 2).sum(axis=(2, 4))
+    return total[:, :height, :width]

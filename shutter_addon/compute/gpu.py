@@ -11,6 +11,8 @@ from ..core.frame_source import FrameSource
 from ..core.frame_state import FrameState, Options
 from .device import Device
 from .diffusion_gpu import Diffusion
+from .edge_diffusion import follows_edges
+from .edge_diffusion_gpu import EdgeDiffusion
 from .passes import LOCAL_ROW, Image, Pass
 from .tables import moved_tables, padded, table
 from .window import BLOCK, TILE, Frames, PackedFrames, Sums, WholeFrames, decoding, open_window
@@ -235,6 +237,25 @@ def _from_frames(way: str, window, state: FrameState, rows: int, origin: int, di
     return composition(way, groups, stored, decode, edges, premultiplied, options.light == "encoded"), given
 
 
+class Solver:
+    """Diffusion on a Device, plain or along edges. What the other kind has on the device is freed."""
+
+    def __init__(self, device: Device):
+        self._plain, self._edged = Diffusion(device), EdgeDiffusion(device)
+
+    def solve(self, labels: np.ndarray, count: int, guide=None, strength: float = 0.0, *, warm: bool = False):
+        """As Diffusion.solve; along the edges of a guide (EdgeDiffusion.solve) where there are some to follow."""
+        if follows_edges(labels, guide, strength):
+            self._plain.release()
+            return self._edged.solve(labels, count, guide, strength)
+        self._edged.release()
+        return self._plain.solve(labels, count, warm=warm)
+
+    def release(self) -> None:
+        self._plain.release()
+        self._edged.release()
+
+
 class GPUCompositor:
     """Composes on a Device; the same methods as CPUCompositor."""
 
@@ -251,9 +272,9 @@ class GPUCompositor:
         """A window of `capacity` frames on the device; moved: pictures of it have FrameState.following."""
         return open_window(self.device, source, capacity, moved)
 
-    def solver(self) -> Diffusion:
-        """A new diffusion. Its solution is valid until its next solve."""
-        return Diffusion(self.device)
+    def solver(self) -> Solver:
+        """A new solver. Its solution is valid until its next solve."""
+        return Solver(self.device)
 
     def constant(self, values: np.ndarray):
         """Coefficients (N,) of the whole picture, as a texture of one texel. Valid until the next call."""

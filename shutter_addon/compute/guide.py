@@ -1,8 +1,7 @@
-"""Guides of edge-aware diffusion: the shown frame as conductances are made of it (core.conductances).
+"""Guides of edge-aware diffusion: the shown frame as resistances are made of it (core.conductances).
 
-A guide is a frame's display values, without its finest detail: at a larger size an edge is as many times wider, and
-its differences are taken over as many times more pixels, so that conductances are those of a picture of ROWS rows (or
-columns, where it is upright).
+A guide is a frame's display values on cells of 1, 2, 4 … pixels, without its finest detail. Its differences are scaled
+to those of a picture of ROWS rows (or columns, where it is upright).
 
 It is steadied: where the frames beside the shown one differ little from it, it is their mean. Noise that comes and
 goes in a still picture would else make coefficients flicker. What moves differs more, and stays as it is shown.
@@ -40,13 +39,18 @@ def reach(step: int) -> int:
     return BESIDE * step
 
 
+def cell_of(short: int) -> int:
+    """How many pixels a guide's cells are wide and high, where the picture's shorter side has so many."""
+    return 1 << max(short // REDUCED, 1).bit_length() - 1
+
+
 class Guides:
     """Guides of one source's frames. Its frames are read and reduced once, as long as they are kept."""
 
     def __init__(self, source: FrameSource):
         self._source = source
         self._short = min(source.width, source.height)
-        self._cell = 1 << max(self._short // REDUCED, 1).bit_length() - 1  # pixels along a side of a reduced one
+        self._cell = cell_of(self._short)
         self._kept = frozenset()
         self._reduced: dict[int, np.ndarray] = {}
         self._made = None
@@ -68,8 +72,9 @@ class Guides:
         return set(frames).difference(self._reduced)
 
     def guide(self, frames: tuple[int, ...], block: int) -> np.ndarray:
-        """The guide (h, w, 3) float32 of the frame that comes first in `guiding`, a pixel for each block × block of its
-        pixels: 0 to 1, times the rows of such pixels over ROWS. Frames beside it that cannot be read are left out."""
+        """The guide (h, w, 3) float32 of the frame that comes first in `guiding`: 0 to 1, times the rows of its cells
+        over ROWS. Its cells are blocks of pixels, or larger where a large frame has no finer detail. Frames beside it
+        that cannot be read are left out."""
         key = frames, block
         if self._made is None or self._made[0] != key:
             for index in sorted(self.lacking(frames)):
@@ -79,8 +84,9 @@ class Guides:
                     if index == frames[0]:
                         raise
             shown, *beside = (self._reduced[index] for index in frames if index in self._reduced)
-            scale = np.float32(self._short / (block * ROWS * _WHITE))
-            self._made = key, self._on_blocks(_steadied(shown, beside) * scale, block)
+            made = _steadied(shown, beside) * np.float32(self._short / (max(block, self._cell) * ROWS * _WHITE))
+            made = np.ascontiguousarray(np.moveaxis(made, 0, -1))
+            self._made = key, _averaged(made, max(block // self._cell, 1))
         return self._made[1]
 
     def _reduce(self, frame: np.ndarray) -> np.ndarray:
@@ -93,15 +99,6 @@ class Guides:
         sigma = variance**0.5
         smooth = _smoothed(_smoothed(np.ascontiguousarray(np.moveaxis(colours, -1, 0)), sigma, 1), sigma, 2)
         return np.rint(smooth * np.float32(_WHITE)).astype(np.uint16)
-
-    def _on_blocks(self, picture: np.ndarray, block: int) -> np.ndarray:
-        """A picture (3, h, w) of cells on blocks, (h, w, 3)."""
-        picture = np.ascontiguousarray(np.moveaxis(picture, 0, -1))
-        if block > self._cell:
-            picture = _averaged(picture, block // self._cell)
-        for axis, length in enumerate((self._source.height, self._source.width)):
-            picture = _spread(picture, self._cell // block, axis, -(-length // block))
-        return picture
 
 
 class NotedSource:
@@ -163,21 +160,6 @@ def _smoothed(planes: np.ndarray, sigma: float, axis: int) -> np.ndarray:
         pair *= weights[k]
         total += pair
     return total
-
-
-def _spread(picture: np.ndarray, scale: int, axis: int, length: int) -> np.ndarray:
-    """Linear interpolation of a picture (h, w, 3) to `scale` times as many pixels along an axis, of which it gives
-    `length`. Its pixels lie in the middle of theirs."""
-    if scale < 2:
-        return picture
-    picture = np.moveaxis(picture, axis, 0)
-    found = np.empty((scale * len(picture), *picture.shape[1:]), np.float32)
-    before, after = (np.concatenate(ends) for ends in ((picture[:1], picture[:-1]), (picture[1:], picture[-1:])))
-    for k in range(scale):
-        apart = (k + 0.5) / scale - 0.5
-        share = np.float32(abs(apart))
-        found[k::scale] = (1 - share) * picture + share * (before if apart < 0 else after)
-    return np.moveaxis(found[:length], 0, axis)
 
 
 def _steadied(shown: np.ndarray, beside: list[np.ndarray]) -> np.ndarray:

@@ -26,7 +26,7 @@ def solve(labels: np.ndarray, count: int, guide: np.ndarray | None = None, stren
         right, down = (
             (np.ones((height, width - 1)), np.ones((height - 1, width)))
             if guide is None
-            else conductances(guide, strength)
+            else conductances(guide, strength, labels.shape)
         )
         one = np.concatenate([cells[:, :-1].ravel(), cells[:-1].ravel()])
         other = np.concatenate([cells[:, 1:].ravel(), cells[1:].ravel()])

@@ -7,10 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from shutter_addon.compute import edge_diffusion
-from shutter_addon.compute.cpu import Solver
-from shutter_addon.compute.diffusion import diffuse
-from shutter_addon.compute.diffusion_gpu import Diffusion
+from shutter_addon.compute import cpu, edge_diffusion, gpu
 from shutter_addon.core import exact_diffusion
 from shutter_addon.core.scribbles import Shape, rasterise
 
@@ -224,7 +221,7 @@ def on_blender(blender_device):
 
 
 def solving(device):
-    solver = Diffusion(device)
+    solver = gpu.Solver(device)
 
     def solve(labels, count, *how, **options):
         with device.current():
@@ -238,7 +235,7 @@ def solving(device):
 
 @pytest.fixture(scope="module", params=["numpy", "moderngl", "blender"])
 def solve(request):
-    return Solver().solve if request.param == "numpy" else request.getfixturevalue(f"on_{request.param}")
+    return cpu.Solver().solve if request.param == "numpy" else request.getfixturevalue(f"on_{request.param}")
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -253,11 +250,33 @@ def test_is_the_exact_solution(scene, solve, exact):
     np.testing.assert_allclose(got, exact(scene, 1.0), rtol=0, atol=LEVEL)
 
 
-@pytest.mark.parametrize("scene", ["bunny", "walls, 4", "more noise"])
+@pytest.mark.parametrize("scene", ["bunny", "walls, 8", "more noise"])
 @pytest.mark.parametrize("strength", [0.1, 0.6])
 def test_any_strength(scene, strength, solve, exact):
     labels, count, guide = SCENES[scene]
     np.testing.assert_allclose(solve(labels, count, guide, strength), exact(scene, strength), rtol=0, atol=LEVEL)
+
+
+def coarse(name, side, width, height):
+    """A film's guide on cells of side × side pixels."""
+    return film(*name, -(-width // side), -(-height // side))
+
+
+@pytest.mark.parametrize("side", [2, 4, 8])
+@pytest.mark.parametrize("film", [BUNNY, PEOPLE, WALKERS], ids=lambda film: film[0])
+def test_cells_may_be_larger_than_pixels(film, side, solve):
+    """As those of large frames: strokes and dots of a pixel on smooth conductances, a size that cells do not divide."""
+    width, height = 301, 203
+    labels = np.maximum(shapes(12, 4, width, height), dots(4, 12, width, height))
+    guide = coarse(film, side, width, height)
+    wanted = exact_diffusion.solve(labels, 4, guide, 1.0)
+    assert np.abs(wanted - exact_diffusion.solve(labels, 4)).max() > 20 * LEVEL
+    np.testing.assert_allclose(solve(labels, 4, guide, 1.0), wanted, rtol=0, atol=LEVEL)
+
+
+def test_a_guide_that_does_not_fit_is_refused(solve):
+    with pytest.raises(ValueError, match="a guide of 5 × 4 cells does not fit 96 × 64 pixels"):
+        solve(shapes(1), 4, grey(np.zeros((4, 5))), 1.0)
 
 
 def test_at_strength_0_nothing_changes_to_the_bit(solve):
@@ -270,10 +289,11 @@ def test_at_strength_0_nothing_changes_to_the_bit(solve):
 
 
 def test_what_was_solved_before_does_not_change_a_bit(solve):
-    labels, count, guide = SCENES["bunny"]
-    first = solve(labels, count, guide, 1.0).copy()
-    solve(labels[::-1], count, guide[::-1], 0.5)
-    np.testing.assert_array_equal(solve(labels, count, guide, 1.0, warm=True), first)
+    labels, count, fine = SCENES["bunny"]
+    for guide in (fine, coarse(BUNNY, 4, WIDTH, HEIGHT)):
+        first = solve(labels, count, guide, 1.0).copy()
+        solve(np.full_like(labels, 2) * (labels[::-1] == 0), count, guide[::-1], 0.5)
+        np.testing.assert_array_equal(solve(labels, count, guide, 1.0, warm=True), first)
 
 
 def test_alpha_in_the_guide_does_not_count(solve):
@@ -302,15 +322,15 @@ def test_a_stroke_stays_within_its_object():
     """What the equations are for: a disc of another colour than the ground, with a line inside."""
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     disc = (x - 48) ** 2 + (y - 32) ** 2 < 22**2
-    got = diffuse(one_stroke(), 2, grey(0.4 + 0.2 * disc), 1.0)[1] > 0.5
+    got = cpu.Solver().solve(one_stroke(), 2, grey(0.4 + 0.2 * disc), 1.0)[1] > 0.5
     assert (got & disc).sum() / (got | disc).sum() > 0.97
-    plain = diffuse(one_stroke(), 2)[1] > 0.5
+    plain = cpu.Solver().solve(one_stroke(), 2)[1] > 0.5
     assert (plain & disc).sum() / (plain | disc).sum() < 0.5
 
 
-def test_fewer_iterations_are_too_few(monkeypatch, exact):
+def test_fewer_cycles_are_too_few(monkeypatch, exact):
     """The scenes are hard enough to tell."""
-    monkeypatch.setattr(edge_diffusion, "ITERATIONS", 5)
+    monkeypatch.setattr(edge_diffusion, "CYCLES", (4, 4))
     scenes = ("people", "narrow maze", "checks, 3", "a band")
-    errors = [abs(diffuse(*SCENES[scene], 1.0) - exact(scene, 1.0)).max() for scene in scenes]
+    errors = [abs(cpu.Solver().solve(*SCENES[scene], 1.0) - exact(scene, 1.0)).max() for scene in scenes]
     assert max(errors) > LEVEL

@@ -6,36 +6,63 @@ import numpy as np
 import pytest
 
 from shutter_addon.core import exact_diffusion
-from shutter_addon.core.conductances import conductances
+from shutter_addon.core.conductances import conductances, resistances
 
 
-def by_hand(a, b, strength):
-    difference = max(abs(float(x) - float(y)) for x, y in zip(a, b, strict=True))
-    return max(math.exp(-((difference / 0.03) ** 2)), 3e-3) ** strength
+def by_hand(guide, strength):
+    """The resistance of each cell, by the steeper of its slopes; at the picture's edge the last cell goes on."""
+    height, width, _ = guide.shape
+    found = np.ones((height, width))
+    for y, x in np.ndindex(found.shape):
+        before, after = guide[y, max(x - 1, 0)], guide[y, min(x + 1, width - 1)]
+        above, below = guide[max(y - 1, 0), x], guide[min(y + 1, height - 1), x]
+        slopes = [abs(float(b) - float(a)) / 2 for a, b in zip((*before, *above), (*after, *below), strict=True)]
+        found[y, x] = max(math.exp(-((max(slopes) / 0.03) ** 2)), 3e-3) ** -strength
+    return found
+
+
+def noise(height, width):
+    return (0.5 + 0.03 * np.random.default_rng(1).standard_normal((height, width, 3))).astype(np.float32)
 
 
 @pytest.mark.parametrize("strength", [0.0, 0.3, 1.0])
 def test_conductances_are_those_of_the_definition(strength):
-    guide = 0.5 + 0.03 * np.random.default_rng(1).standard_normal((5, 7, 3))
-    right, down = conductances(guide, strength)
-    assert right.shape == (5, 6)
-    assert down.shape == (4, 7)
-    for y, x in np.ndindex(right.shape):
-        assert right[y, x] == pytest.approx(by_hand(guide[y, x], guide[y, x + 1], strength), abs=1e-6)
-    for y, x in np.ndindex(down.shape):
-        assert down[y, x] == pytest.approx(by_hand(guide[y, x], guide[y + 1, x], strength), abs=1e-6)
+    guide = noise(5, 7)
+    cells = by_hand(guide, strength)
+    assert cells.max() < 400
+    np.testing.assert_allclose(resistances(guide, strength), cells, rtol=0, atol=6e-4)
+    right, down = conductances(guide, strength, (5, 7))
+    np.testing.assert_allclose(1 / right, (cells[:, 1:] + cells[:, :-1]) / 2, rtol=0, atol=6e-4)
+    np.testing.assert_allclose(1 / down, (cells[1:] + cells[:-1]) / 2, rtol=0, atol=6e-4)
+
+
+@pytest.mark.parametrize("side", [2, 4])
+def test_between_the_middles_of_larger_cells_resistances_are_linear(side):
+    height, width = 5 * side - 1, 7 * side - side // 2
+    guide = noise(5, 7)
+    cells, pixels = by_hand(guide, 1.0), np.empty((height, width))
+    for y, x in np.ndindex(pixels.shape):
+        place = [np.clip((n + 0.5) / side - 0.5, 0, last) for n, last in ((y, 4), (x, 6))]
+        (j, v), (i, u) = (
+            (int(min(n, last - 1)), n - int(min(n, last - 1))) for n, last in zip(place, (4, 6), strict=True)
+        )
+        pixels[y, x] = (1 - v) * ((1 - u) * cells[j, i] + u * cells[j, i + 1]) + v * (
+            (1 - u) * cells[j + 1, i] + u * cells[j + 1, i + 1]
+        )
+    right, down = conductances(guide, 1.0, (height, width))
+    np.testing.assert_allclose(1 / right, (pixels[:, 1:] + pixels[:, :-1]) / 2, rtol=0, atol=1e-3)
+    np.testing.assert_allclose(1 / down, (pixels[1:] + pixels[:-1]) / 2, rtol=0, atol=1e-3)
 
 
 def test_alpha_does_not_count():
     guide = np.random.default_rng(2).random((4, 5, 3)).astype(np.float32)
     with_alpha = np.dstack([guide, np.random.default_rng(3).random((4, 5))])
-    for one, other in zip(conductances(guide, 1), conductances(with_alpha, 1), strict=True):
-        np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(resistances(with_alpha, 1), resistances(guide, 1))
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 4), (4, 1)])
 def test_pictures_of_one_row_or_column(size):
-    right, down = conductances(np.zeros((*size, 3)), 1.0)
+    right, down = conductances(np.zeros((*size, 3)), 1.0, size)
     assert right.shape == (size[0], size[1] - 1)
     assert down.shape == (size[0] - 1, size[1])
 
@@ -45,7 +72,7 @@ def test_the_exact_solution_balances_every_free_pixel():
     guide, labels = 0.5 + 0.05 * rng.standard_normal((9, 11, 3)), np.zeros((9, 11), np.uint16)
     labels[2, 3], labels[7, 8], labels[0, 10] = 1, 2, 3
     solution = exact_diffusion.solve(labels, 3, guide, 0.8)
-    right, down = conductances(guide, 0.8)
+    right, down = conductances(guide, 0.8, labels.shape)
     flow = np.zeros_like(solution)
     across, along = right * np.diff(solution, axis=2), down * np.diff(solution, axis=1)
     flow[:, :, :-1] += across

@@ -1,22 +1,18 @@
 // The next direction of conjugate gradients. sums: residual · guess of this iteration and of the last.
-#include "graph.glsl"
+#include "diffuse.glsl"
 
 void main()
 {
-  int n = node();
-  if (n >= count) {
+  ivec3 p = ivec3(corner(size) + in_eights(), gl_GlobalInvocationID.z);
+  if (!inside(p.xy, size)) {
     return;
   }
-  ivec3 p = at(n, layer());
   vec4 now = imageLoad(sums, ivec3(0, 0, p.z));
   vec4 before = imageLoad(sums, ivec3(1, 0, p.z));
-  vec4 share = vec4(0.0);
-  for (int i = 0; i < 4; i++) {
-    share[i] = before[i] > 0.0 ? now[i] / before[i] : 0.0;
-  }
   vec4 turned = imageLoad(values, p);
   if (fresh == 0) {
-    turned += share * imageLoad(result, p);
+    vec4 goes_on = vec4(greaterThan(before, vec4(0.0)));
+    turned += goes_on * now / max(before, vec4(1e-37)) * imageLoad(result, p);
   }
   imageStore(result, p, turned);
 }
