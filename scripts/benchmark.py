@@ -8,8 +8,8 @@ diffuse: coefficients from new labels; diffuse_moved: the same, from the solutio
 readback: the picture to the host; frame: accumulate, compose and readback;
 copy: a gigabyte moved from one buffer of the device to another, read and written counting as half of it each.
 Methods: ours; paper: its Appendix A with search bounds (scripts/benchmark/appendix_a.glsl); average: the plain mean of
-the window's frames in the same light; edges: coefficients that follow a guide's edges. Times are medians in
-milliseconds.
+the window's frames in the same light; edges: coefficients that follow a guide's edges; follow: ours, where the last
+shutter follows a subject that moves, turns and grows. Times are medians in milliseconds.
 Frames are random noise. Errors are the largest over random pixels of the picture (--pixels) in 8-bit levels against
 the float64 reference; those of diffusion over all coefficients, times 255, against twelve cycles with cells
 everywhere on all grids; those along edges against eight more cycles.
@@ -24,7 +24,7 @@ import statistics
 import sys
 import time
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -40,10 +40,10 @@ from shutter_addon.compute.tables import table as table_of
 from shutter_addon.compute.window import Frames
 from shutter_addon.core import compositor, light, presets, scribbles, shutters
 from shutter_addon.core.frame_source import FrameSource
-from shutter_addon.core.frame_state import FrameState, Options
+from shutter_addon.core.frame_state import Following, FrameState, Options
 
 HERE = Path(__file__).resolve().with_suffix("")
-METHODS = ("ours", "paper", "average", "edges")
+METHODS = ("ours", "paper", "average", "edges", "follow")
 PASSES = ("compose", "accumulate", "diffuse", "diffuse_moved", "readback", "frame")
 COPIED = 1 << 28  # bytes, beyond any cache
 BARS = {
@@ -109,6 +109,15 @@ def edged(height: int, width: int) -> np.ndarray:
     return found * np.float32(min(height, width) / guide.ROWS)
 
 
+def following(count: int, window: int, size) -> Following:
+    """What the last of some shutters follows: from frame to frame 4 pixels on, turned by 0.06° and 0.05 % larger."""
+    turns, shifts = np.ones((window, count), complex), np.zeros((window, count), complex)
+    centre, frames = complex(*size) / 2, np.arange(window)
+    turns[:, -1] = (1 + 0.0005 * frames) * np.exp(0.001j * frames)
+    shifts[:, -1] = (1 - turns[:, -1]) * centre + (3.3 + 1.7j) * frames
+    return Following(0, turns, shifts)
+
+
 @dataclass
 class Case:
     """One configuration on the device. `index`: the source frame that is composed; what slides the window moves it."""
@@ -119,8 +128,11 @@ class Case:
     kind: str
     index: int = 0
     shared: bool = True
+    follows: bool = True
 
     def __post_init__(self):
+        size = self.source.width, self.source.height
+        self.followed = replace(self.state, following=following(len(self.state.bars), self.state.options.window, size))
         count, block = len(self.state.bars), self.state.options.aggregate
         self._open(self.state.options.window)
         width, height = -(-self.source.width // block), -(-self.source.height // block)
@@ -133,6 +145,7 @@ class Case:
     def _open(self, window: int) -> None:
         self.compositor = GPUCompositor(self.device)
         self.window = self.compositor.window(self.source, window)
+        self.whole = self.compositor.window(self.source, window, True) if self.follows else None
         # What the other methods read.
         plain = isinstance(self.window, Frames)
         self.frames = self.window if plain else Frames(self.device, self.source, window)
@@ -145,15 +158,14 @@ class Case:
         return np.arange(self.index, self.index + self.state.options.window)
 
     def load(self, *windows) -> None:
-        for window in windows or (self.window, self.frames):
+        for window in windows or filter(None, (self.window, self.frames, self.whole)):
             window.load(self._wanted, self.state.options, range(self.source.count))
 
     def compose(self, method: str) -> None:
-        if method == "ours":
-            block = self.state.options.aggregate
-            self.compositor.draw(self.window, self.index, 1, self.state, self.handle, block)
+        if method in ("ours", "follow"):
+            self.drawn = self._drawn(method)
             return
-        block = self.state.options.aggregate if method == "paper" else 1
+        self.drawn, block = self.window.picture, self.state.options.aggregate if method == "paper" else 1
         program = _appendix_a(self.state, self.shared) if method == "paper" else _average(self.state)
         for top, height, frames in self.frames.bands():
             extent = (-(-self.source.width // block), -(-height // block))
@@ -168,6 +180,14 @@ class Case:
                 height=self.source.height,
                 first_layer=self.index % self.frames.layers,
             )
+
+    def _drawn(self, method: str):
+        block = self.state.options.aggregate
+        if method == "ours":
+            return self.compositor.draw(self.window, self.index, 1, self.state, self.handle, block)
+        moved = replace(self.followed.following, first=self.index)
+        state = replace(self.followed, following=moved)
+        return self.compositor.draw(self.whole, self.index, 1, state, self.handle, block)
 
     def accumulate(self, method: str) -> None:
         self.index += 1
@@ -184,7 +204,7 @@ class Case:
         self.solver.solve(self.labels, len(self.state.bars), warm=True)
 
     def readback(self, method: str) -> np.ndarray:
-        return self.compositor.read(self.window.picture)
+        return self.compositor.read(self.drawn)
 
     def frame(self, method: str) -> None:
         self.accumulate(method)
@@ -221,7 +241,7 @@ class Case:
         rng = np.random.default_rng(self.index)
         y, x = rng.integers(0, self.source.height, pixels), rng.integers(0, self.source.width, pixels)
         picture = self.readback(method)[y, x, :3].astype(np.float64)
-        expected = self._reference(y, x, method)
+        expected = self._followed(y, x) if method == "follow" else self._reference(y, x, method)
         return float(np.abs(light.to_encoded(picture) - light.to_encoded(expected)).max() * 255)
 
     def _reference(self, y, x, method: str) -> np.ndarray:
@@ -241,6 +261,20 @@ class Case:
         return np.concatenate(
             [compositor.compose(self.state, frames[:, :, p], present, c[..., p])[0, :, :3] for p in parts]
         )
+
+    def _followed(self, y, x) -> np.ndarray:
+        """float64 colours (P, 3) of pixels of what follows."""
+        block, count = self.state.options.aggregate, len(self.state.bars)
+        c = self.compositor.coefficients(self.handle, count)[:, y // block, x // block].astype(np.float64)
+        weights = compositor.mixed_shutter(self.state, np.moveaxis(c, 0, -1))
+        weights /= weights.sum(axis=-1, keepdims=True)
+        turns, shifts = self.followed.following.at(np.arange(len(self._wanted)))
+        total = 0.0
+        for k, index in enumerate(self._wanted):
+            frame = light.premultiplied(self.source.read(int(index)) / 255.0, light.to_linear)[..., :3]
+            places = np.einsum("n,np->p", turns[k], c) * (x + 1j * y) + np.einsum("n,np->p", shifts[k], c)
+            total = total + weights[:, k, None] * compositor.seen(frame, places, sharp=True)
+        return total
 
     def _diffusion_error(self) -> float:
         """Of what was solved last."""
@@ -266,8 +300,8 @@ class Case:
         return float(np.abs(self.compositor.coefficients(self.edges, count) - got).max() * 255)
 
     def release(self) -> None:
-        self.window.release()
-        self.frames.release()
+        for window in filter(None, (self.window, self.frames, self.whole)):
+            window.release()
         self.solver.release()
         self.edge_solver.release()
         self.sums.release()
@@ -304,12 +338,11 @@ class HostCase(Case):
     def _open(self, window: int) -> None:
         self.compositor = cpu.CPUCompositor()
         self.window = self.compositor.window(self.source, window)
-        self.frames = cpu.Frames(self.source, window)
+        self.whole = self.frames = cpu.Frames(self.source, window)
 
     def compose(self, method: str) -> None:
-        if method == "ours":
-            block = self.state.options.aggregate
-            self.picture = self.compositor.draw(self.window, self.index, 1, self.state, self.handle, block)
+        if method in ("ours", "follow"):
+            self.drawn = self._drawn(method)
             return
         encoded = self.state.options.light == "encoded"
         values = np.arange(256, dtype=np.float32) / np.float32(255)
@@ -318,10 +351,10 @@ class HostCase(Case):
         for frame in self.frames.frames.values():
             total += curve.take(frame[..., :3])
         total /= len(self._wanted)
-        self.picture = light.to_linear(total) if encoded else total
+        self.drawn = light.to_linear(total) if encoded else total
 
     def readback(self, method: str) -> np.ndarray:
-        return self.picture
+        return self.drawn
 
     def must_move(self, name: str, method: str) -> None:
         return None
@@ -385,6 +418,7 @@ def jobs(case: Case, passes, methods):
             "paper": ("compose",),
             "average": ("compose", "accumulate", "frame"),
             "edges": ("diffuse",),
+            "follow": ("compose",) if case.state.options.light == "linear" else (),
         }
         if isinstance(case, HostCase):
             has |= {"ours": [p for p in PASSES if p not in ("diffuse_moved", "readback")], "paper": ()}
@@ -441,7 +475,8 @@ def run(args) -> list[dict]:
             ):
                 options = Options(window, light=args.light, aggregate=block)
                 state = FrameState(options, bars(kind, count, window), shapes(count))
-                case = made_for(device, source, state, kind, shared=args.sums == "shared")
+                follows = "follow" in args.methods and "compose" in args.passes
+                case = made_for(device, source, state, kind, shared=args.sums == "shared", follows=follows)
                 made = measure(case, args)
                 case.release()
                 for row, moved in made:

@@ -5,7 +5,11 @@ int frame;
 
 void add_frame(int quad)
 {
+#if MOVED
+  expose(quad, frame, mixed(quad, 0, 1 + (frame - first) * motions + motion));
+#else
   expose(quad, frame, mixed(quad, 0, 1 + frame - first));
+#endif
 }
 
 void main()
@@ -14,7 +18,12 @@ void main()
     return;
   }
   for (frame = first; frame < last; frame++) {
-    EACH(add_frame);
+#if MOVED
+    for (motion = 0; motion < motions; motion++)
+#endif
+    {
+      EACH(add_frame);
+    }
   }
   EACH(finish_quad);
 }

@@ -22,11 +22,11 @@ FOOTAGE = (
 
 def plausible(random, longest: int) -> dict:
     """A recipe that keeps to the format, with a window of so many frames at most."""
-    from test_export import valid_recipes
+    from test_export import following_recipes
 
     from shutter_addon.core import recipe
 
-    return json.loads(recipe.dump(hostile.drawn(valid_recipes(longest), random)))
+    return json.loads(recipe.dump(hostile.drawn(following_recipes(longest), random)))
 
 
 def make(random, folder):

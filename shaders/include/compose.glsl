@@ -6,6 +6,7 @@
 // The window's frame k is frame `origin` + k · `direction` of the shot, which has `count`. frames: source frame i in layer
 // i mod `layers`; or with SUMS the running sums instead, from position `lowest` on, the shot's ends extended: position
 // i's in that layer.
+// With MOVED shutters follow something: see moved.glsl.
 // GROUPS of four shutters, TILED, EDGES, DECODE, PREMULTIPLIED, ENCODED: see compute/gpu.py. Software renderers run both
 // sides of every branch: what is costly stands in loops or behind these definitions.
 #include "light.glsl"
@@ -115,6 +116,7 @@ int layer_of(int frame)
   return layer < layers ? layer : layer - layers;
 }
 #else
+#  if !PACKED
 // The frame's light as it is summed, premultiplied.
 vec4 frame_light(ivec2 place, int slot)
 {
@@ -135,7 +137,9 @@ vec4 frame_light(ivec2 place, int slot)
 #endif
   return color;
 }
+#  endif
 
+#  if !MOVED
 // The layer of the window's frame, or of the shot's end beyond which it lies.
 int layer_of(int frame)
 {
@@ -149,8 +153,12 @@ int layer_of(int frame)
   int layer = clamp(index, 0, count - 1) - lowest + lowest_layer;
   return layer < layers ? layer : layer - layers;
 }
+#  endif
 #endif
 
+#if MOVED
+#include "moved.glsl"
+#else
 void expose(int quad, int frame, vec4 weight)
 {
 #if EDGES == 2  // shorten
@@ -185,6 +193,7 @@ void store(int quad, int pixel, float gain)
   // Bottom row first: Blender's order, and GL's.
   imageStore(picture, ivec3(at.x, height - 1 - top - at.y, 0), color);
 }
+#endif
 
 void finish_quad(int quad)
 {

@@ -16,6 +16,7 @@ from ..core.frame_source import FrameSource
 from ..core.frame_state import FrameState, Options
 from .diffusion import diffuse
 from .edge_diffusion import diffuse_along_edges, follows_edges
+from .resampling import around, resampled
 from .running_sums import RunningSums, summable
 
 # A tile's rows and columns, multiples of every block. So small that its arrays stay in the processor's cache, and that
@@ -92,6 +93,15 @@ class Frames:
     def light(self, tile: Tile, position: int) -> np.ndarray:
         """The light (3 or 4, h, w) float32 of the frame at a position: premultiplied, `1 / unit` for white."""
         return self._decode(tile.of(self.frames[self._at[position]]))
+
+    def seen(self, tile: Tile, position: int, turn, shift) -> np.ndarray:
+        """As `light`, of what the frame shows at turn · z + shift for each pixel z; turn, shift: (h, w), or alike."""
+        if not (np.any(turn != 1) or np.any(shift)):
+            return self.light(tile, position)
+        y, x = np.ogrid[tile.rows, tile.columns]
+        frame = self.frames[self._at[position]]
+        rows, columns, x, y = around(turn * (x + 1j * y) + shift, frame.shape)
+        return resampled(self._decode(frame[rows, columns]), x, y, sharp=self.source.alpha == "opaque")
 
     def release(self) -> None:
         self.frames = {}
@@ -181,8 +191,9 @@ class CPUCompositor:
     def current(self):
         return nullcontext(self)
 
-    def window(self, source: FrameSource, capacity: int) -> Frames | Sums:
-        return (Sums if Sums.fit(source, capacity) else Frames)(source, capacity)
+    def window(self, source: FrameSource, capacity: int, moved: bool = False) -> Frames | Sums:
+        """A window of `capacity` frames; moved: pictures of it have FrameState.following."""
+        return (Sums if Sums.fit(source, capacity) and not moved else Frames)(source, capacity)
 
     def solver(self) -> Solver:
         return Solver()
@@ -203,8 +214,12 @@ class CPUCompositor:
         # Backwards in time is forwards with the shutters reversed.
         bars = state.bars[:, ::direction]
         origin = int(compositor.window_positions(options, index, direction).min())
-        present = compositor.source_frames(options, origin + np.arange(options.window), window.shot) >= 0
-        expose = _way(window, options, bars, origin, present, direction)
+        frames = compositor.source_frames(options, origin + np.arange(options.window), window.shot)
+        if state.following is None:
+            expose = _way(window, options, bars, origin, frames >= 0, direction)
+        else:
+            moves = state.following.at(frames)
+            expose = partial(_followed, window, options, bars, origin, frames >= 0, moves, direction)
         for tile in window.tiles:
             c = tile.coefficients(handle, block)
             planes = expose(tile, c, block)
@@ -311,34 +326,69 @@ def _valued(normalised: np.ndarray, c: np.ndarray):
 
 def _by_frames(window, weigh, origin: int, present, direction: int, tile: Tile, c: np.ndarray, block: int):
     """The light (3 or 4, h, w) of a tile, frame after frame; present: the frames that are, None for all of them."""
-    weighted = ((frame, tile.pixels(weight, block)) for frame, weight in weigh(c))
+    weighted = ((frame, tile.pixels(weight, block), None) for frame, weight in weigh(c))
+
+    def look(frame, _):
+        return window.light(tile, origin + frame)
+
     if present is None:
-        return _sum(window, tile, origin, weighted)
-    return _without_absent(window, tile, origin, present, direction, list(weighted))
+        return _sum(look, weighted)
+    return _without_absent(look, tile, present, direction, list(weighted), [(1.0, None)])
 
 
-def _sum(window, tile: Tile, origin: int, weighted) -> np.ndarray | None:
+def _followed(window: Frames, options: Options, bars, origin: int, there, moves, direction: int, tile: Tile, c, block):
+    """The light (3 or 4, h, w) of a tile where shutters follow something; there: whether each frame of the window is;
+    moves: the turns and shifts (L, N) of all."""
+    first, last = shutters.open_span(bars)
+
+    def look(frame, shares):
+        mixed = (np.tensordot(part[first + frame], shares, axes=1) for part in moves)
+        return window.seen(tile, origin + first + frame, *(tile.pixels(part, block) for part in mixed))
+
+    def weighed(weights, shares):
+        return [(frame, tile.pixels(weight, block), shares) for frame, weight in weights]
+
+    if options.interpolation == "displacement":
+        parts, knots = [(1.0, c)], shutters.knots(bars[:, first:last])
+        weighted = weighed(_displaced(knots, last - first, c), c)
+    else:
+        # What moves alike is looked at once.
+        alike = np.unique(np.concatenate(moves).T, axis=0, return_inverse=True)[1]
+        own = [alike == number for number in range(alike.max() + 1)]
+        shares = [(np.arange(len(alike)) == one.argmax()).astype(float)[:, None, None] for one in own]
+        parts = [(tile.pixels(c[one].sum(axis=0), block), share) for one, share in zip(own, shares, strict=True)]
+        normalised = bars[:, first:last] / bars.sum(axis=1, keepdims=True)
+        some = [weighed(_valued(normalised[one], c[one]), share) for one, share in zip(own, shares, strict=True)]
+        weighted = [entry for entries in some for entry in entries]
+    if there[first:last].all():
+        return _sum(look, weighted)
+    return _without_absent(look, tile, np.flatnonzero(there) - first, direction, weighted, parts)
+
+
+def _sum(look, weighted) -> np.ndarray | None:
+    """Of entries (frame, weight, shares): the light of `look(frame, shares)`, weighted; None: there are none."""
     total = None
-    for frame, weight in weighted:
-        light_ = window.light(tile, origin + frame)
+    for frame, weight, shares in weighted:
+        light_ = look(frame, shares)
         light_ *= weight
         total = light_ if total is None else np.add(total, light_, out=total)
     return total
 
 
-def _without_absent(window, tile: Tile, origin: int, present: np.ndarray, direction: int, weighted: list):
+def _without_absent(look, tile: Tile, present: np.ndarray, direction: int, weighted: list, parts: list):
     """The light (3 or 4, h, w) where the weight of absent frames is given to the others; where there are none, to the
-    nearest."""
-    centre = sum(weight * (frame + 0.5) for frame, weight in weighted) - direction * compositor.CLOSE
-    kept = [(frame, weight) for frame, weight in weighted if frame in present]
-    share = sum(weight for _, weight in kept)
-    picture = _sum(window, tile, origin, kept)
+    nearest, in parts (part, shares)."""
+    centre = sum(weight * (frame + 0.5) for frame, weight, _ in weighted) - direction * compositor.CLOSE
+    kept = [entry for entry in weighted if entry[0] in present]
+    share = sum(weight for _, weight, _ in kept)
+    picture = _sum(look, kept)
     picture = 0.0 if picture is None else picture / np.maximum(share, np.float32(1e-6))
     alone = np.broadcast_to(share <= 1e-6, tile.shape)
     if alone.any():
         nearest = present[np.abs(np.expand_dims(centre, -1) - (present + 0.5)).argmin(axis=-1)]
         for frame in np.unique(np.broadcast_to(nearest, tile.shape)[alone]).tolist():
-            picture = np.where(alone & (nearest == frame), window.light(tile, origin + frame), picture)
+            found = sum(part * look(frame, shares) for part, shares in parts)
+            picture = np.where(alone & (nearest == frame), found, picture)
     return picture
 
 

@@ -14,8 +14,8 @@ from .diffusion_gpu import Diffusion
 from .edge_diffusion import follows_edges
 from .edge_diffusion_gpu import EdgeDiffusion
 from .passes import LOCAL_ROW, Image, Pass
-from .tables import padded, table
-from .window import BLOCK, TILE, Frames, Sums, decoding, open_window
+from .tables import moved_tables, padded, table
+from .window import BLOCK, TILE, Frames, PackedFrames, Sums, WholeFrames, decoding, open_window
 
 # Rows of pixels that one invocation of compose_sums composes.
 PAIR = 2
@@ -61,6 +61,8 @@ def composition(way: str, groups: int, stored: str, decode: int, edges: int, pre
         | ({"count": "int"} if edges == 2 or not summed else {})
         | (_UNIT if summed else {}),
         defines={
+            "MOVED": 0,
+            "PACKED": 0,
             "GROUPS": groups,
             "SUMS": int(summed),
             "TILED": int(stored == "tiles"),
@@ -89,6 +91,54 @@ def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, encoded
         },
         blocks={"table": (1 + rows) * (2 * groups + 1)},
         local_size=(64, TILE[1] // PAIR, 1),
+    )
+
+
+@cache
+def composition_of_moved(
+    way: str,
+    quads: int,
+    groups: int,
+    packed: bool,
+    decode: int,
+    shortened: bool,
+    premultiplied: bool,
+    encoded: bool,
+    sharp: bool,
+    at: tuple[bool, bool],
+) -> Pass:
+    """The pass of a way, "frames", "walk" or "value", where shutters follow something.
+
+    quads: of pixels that an invocation composes; packed: as PackedFrames are; shortened: frames are left out
+    sharp: how frames are resampled (core.compositor.seen)
+    at: whether passes over other frames come before and after; the others as for `composition`"""
+    continued, unfinished = at
+    images = _IMAGES | {"table": _READ, "moves": _READ} | ({"summed": _READ} if continued else {})
+    images |= {"packed_frames": Image("rg32ui", reads=True, writes=False)} if packed else {}
+    numbers = ("motions", *_OF_WAY[way], *(("seen_first", "seen_last", "parts") if shortened else ()))
+    return Pass(
+        f"compose_{way}",
+        samplers={} if packed else {"frames": "sampler2DArray"},
+        images=images,
+        constants=_PLACE | dict.fromkeys(numbers, "int"),
+        defines={
+            "MOVED": 1,
+            "PACKED": int(packed),
+            "SQUARED": int(not encoded),
+            "SEVERAL": int(continued or unfinished),
+            "QUADS": quads,
+            "GROUPS": groups,
+            "SUMS": 0,
+            "TILED": 0,
+            "EDGES": 2 if shortened else 0,
+            "DECODE": decode,
+            "PREMULTIPLIED": int(premultiplied),
+            "ENCODED": int(encoded),
+            "SHARP": int(sharp),
+            "CONTINUED": int(continued),
+            "UNFINISHED": int(unfinished),
+        },
+        local_size=LOCAL_ROW,
     )
 
 
@@ -125,6 +175,14 @@ def frames_iterations(values: np.ndarray, span: tuple[int, int]) -> int:
     from_ = start.max(axis=(1, 2)) - 2 * apart  # the earliest start of a shutter, and once more the difference
     frames = np.clip(np.ceil(until), *span) - np.clip(np.floor(from_), *span) + 1
     return int(frames.sum()) + len(start) + span[1] - span[0]
+
+
+def _moved_way(options: Options, values: np.ndarray, span: tuple[int, int]) -> str:
+    """The way to compose where shutters follow something; arguments as for way_of."""
+    if options.interpolation == "value":
+        return "value"
+    loops = frames_iterations(values, span) + span[1] - span[0]
+    return "frames" if loops <= _MOST_ITERATIONS else "walk"
 
 
 def _filled_rows(rows: int) -> float:
@@ -168,7 +226,7 @@ def _from_frames(way: str, window, state: FrameState, rows: int, origin: int, di
         indices = compositor.source_frames(options, origin + direction * np.arange(options.window), window.shot)
         lowest, decode, edges = (
             int(indices[indices >= 0].min()),
-            decoding(window.transfer, options),
+            decoding(window.transfer, options.light),
             _EDGES[options.edges],
         )
     given |= {"layers": window.layers, "lowest_layer": lowest % window.layers}
@@ -210,9 +268,9 @@ class GPUCompositor:
         """A context manager: all other methods are called inside it, on any one thread (Device.current)."""
         return self.device.current()
 
-    def window(self, source: FrameSource, capacity: int) -> Frames | Sums:
-        """A window of `capacity` frames on the device."""
-        return open_window(self.device, source, capacity)
+    def window(self, source: FrameSource, capacity: int, moved: bool = False) -> Frames | Sums:
+        """A window of `capacity` frames on the device; moved: pictures of it have FrameState.following."""
+        return open_window(self.device, source, capacity, moved)
 
     def solver(self) -> Solver:
         """A new solver. Its solution is valid until its next solve."""
@@ -243,6 +301,8 @@ class GPUCompositor:
         index, direction: as for core.compositor.window_positions
         handle: coefficients, a texture of a solver or of `constant`; block: the pixels along a side of each texel
         """
+        if state.following is not None:
+            return self._draw_moved(window, index, direction, state, handle, block)
         options, values = state.options, table(state)
         first, last = shutters.open_span(state.bars)
         origin = int(compositor.window_positions(options, index, direction)[0])
@@ -269,6 +329,50 @@ class GPUCompositor:
                 block_bits=(block - 1).bit_length(),
                 **given,
             )
+        return window.picture
+
+    def _draw_moved(self, window: WholeFrames, index: int, direction: int, state: FrameState, handle, block: int):
+        """As `draw`, where shutters follow something: a pass for each texture array of frames, which adds what is seen
+        of these to what those before have."""
+        options, (width, height) = state.options, (window.source.width, window.source.height)
+        frames = compositor.window_indices(options, index, window.shot, direction)
+        first, last = shutters.open_span(state.bars)
+        values, moves = moved_tables(state, frames)
+        motions, there = len(moves) // len(frames), np.flatnonzero(frames >= 0)
+        shortened, packed = bool((frames[first:last] < 0).any()), isinstance(window, PackedFrames)
+        way = _moved_way(options, values[: len(values) - motions], (first, last))
+        given = {"size": (width, height), "top": 0, "height": height, "block_bits": (block - 1).bit_length()}
+        given |= {"first": first, "last": last, "rows": len(values) - 1 - motions, "motions": motions}
+        given |= {"seen_first": int(there[0]), "seen_last": int(there[-1]), "parts": len(values) - motions}
+        images = {"coefficients": handle, "table": self._filled("table", values[None], "rgba32f")}
+        # What is left out is read in another's place: what lies in its own may be no number.
+        slots = np.where(frames < 0, frames[there[0]], frames) % window.capacity
+        sums = "sum", "other sum"
+        for held, stack in window.stacks():
+            at = held.start > 0, held.stop < window.capacity
+            inside = (slots >= held.start) & (slots < held.stop)
+            moves[:, 0, 0] = np.where(inside, slots - held.start, -1).repeat(motions)
+            images["moves"] = self._filled("moves", moves[None], "rgba32f")
+            images["summed"] = images.get("picture")
+            sums = sums[::-1]
+            images["picture"] = self._texture(sums[0], width, height, 1, "rgba32f") if at[1] else window.picture
+            # What has more to do for a pixel takes long to compile for many.
+            quads = BLOCK // 4 if packed and way != "walk" and not (shortened or any(at)) else 1
+            program = composition_of_moved(
+                way,
+                quads,
+                -(-len(state.bars) // 4),
+                packed,
+                0 if packed else decoding(window.transfer, options.light),
+                shortened,
+                window.source.alpha == "premultiplied",
+                options.light == "encoded",
+                window.source.alpha == "opaque",
+                at,
+            )
+            images["packed_frames"] = stack
+            extent = width, -(-height // (4 * quads))
+            self.device.run(program, extent, textures={"frames": stack}, images=images, **given)
         return window.picture
 
     def _texture(self, name: str, width: int, height: int, layers: int, kind: str):

@@ -46,7 +46,7 @@ class Renderer:
         self.compositor, self.source = compositor, source
         self._solver = compositor.solver()
         self._guides = guide.Guides(source)
-        self._window = None
+        self._window = self._kind = None
         self._labelled = self._solved = self._drawn = None
 
     def picture(self, index: int, state: FrameState, direction: int = 1) -> np.ndarray:
@@ -143,7 +143,7 @@ class Renderer:
     def missing(self, index: int, direction: int, state: FrameState) -> set[int]:
         """The source frames that `draw` would read: needed ones that are not loaded, and those in which it looks for
         cuts."""
-        held = self._window.held if self._window and self._window.capacity == state.options.window else ()
+        held = self._window.held if self._window and self._kind == self._kind_for(state) else ()
         shown, beside = self._needed(index, direction, state, known=True)
         missing = shown.difference(held) | self._guides.lacking(beside)
         if self._stops(state):
@@ -190,7 +190,7 @@ class Renderer:
 
     def _parts(self, index: int, state: FrameState, direction: int, quick: bool):
         """The arguments of the compositor's `draw`, with the window loaded."""
-        window = self._window_for(state.options.window)
+        window = self._window_for(state)
         self._keep_guides(index, direction, state)
         if (sole := self._sole(state)) is None:
             self._load(window, index, direction, state)
@@ -229,10 +229,17 @@ class Renderer:
             self._solved = key, labels, not quick, self._solver.solve(labels, count, *guided, warm=quick)
         return self._solved[3]
 
-    def _window_for(self, length: int):
-        if self._window is None or self._window.capacity != length:
+    def _kind_for(self, state: FrameState) -> tuple[int, bool]:
+        """The length of the window, and whether its frames are seen elsewhere than where they are."""
+        sole = self._sole(state)
+        return state.options.window, (state if sole is None else state.alone(sole)).following is not None
+
+    def _window_for(self, state: FrameState):
+        kind = self._kind_for(state)
+        if self._window is None or self._kind != kind:
             self.release_window()
-            self._window = self.compositor.window(guide.NotedSource(self.source, self._guides), length)
+            self._kind = kind
+            self._window = self.compositor.window(guide.NotedSource(self.source, self._guides), *kind)
         return self._window
 
     def release_window(self) -> None:

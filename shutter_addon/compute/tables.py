@@ -42,3 +42,30 @@ def _pieces(bars) -> np.ndarray:
 def _bars(bars) -> np.ndarray:
     first, last = shutters.open_span(bars)
     return padded((bars / bars.sum(axis=1, keepdims=True)).T[first:last])
+
+
+def moved_tables(state: FrameState, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The table of `table` and that of the moves (L · motions, columns, 4) float32 which shaders/include/moved.glsl
+    describes, its first number of each row 0.
+
+    By displacement there is one motion, in which the shutters' own are mixed; by value one for all shutters that move
+    alike: the table has a row for each frame and motion. Behind these it has one for each motion, 1 for its shutters.
+    frames: the source frames (L,) of the window; −1: none"""
+    turns, shifts = state.following.at(frames)
+    numbers = np.stack([turns.real - 1, turns.imag, shifts.real, shifts.imag], axis=1)  # (L, 4, N)
+    values = table(state)
+    own = np.ones((1, len(state.bars)))
+    if state.options.interpolation == "value":
+        kinds, kind = np.unique(numbers.reshape(-1, len(state.bars)), axis=1, return_inverse=True)
+        own = np.eye(kinds.shape[1])[:, kind]
+        numbers = kinds.reshape(*numbers.shape[:2], -1, 1).transpose(0, 2, 1, 3).repeat(len(state.bars), axis=3)
+        numbers = numbers.reshape(-1, *numbers.shape[2:])
+        bars = _bars(state.bars)
+        values = np.concatenate([values[:1], (bars[:, None] * padded(own)).reshape(-1, *bars.shape[1:])])
+    parts = np.zeros((len(own), *values.shape[1:]), np.float32)
+    columns = padded(numbers)  # (rows, 4, G, 4)
+    parts[:, : columns.shape[2]] = padded(own)
+    moves = np.zeros((len(columns), 1 + 4 * columns.shape[2], 4), np.float32)
+    moves[:, 1:] = columns.reshape(len(columns), -1, 4)
+    moves[:, 0, 1] = (frames >= 0).repeat(len(own))
+    return np.concatenate([values, parts]).astype(np.float32), moves

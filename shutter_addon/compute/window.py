@@ -20,15 +20,19 @@ RESIDENT_BYTES = 6 << 30
 
 # Rows of pixels that one invocation of the passes through frames composes. Bands are a multiple of it high.
 BLOCK = 16
+# Pixels by which packed frames are larger, as in shaders/include/packed.glsl.
+RIM = 5
 # A tile of running sums in pixels (across, down), as in shaders/include/sums.glsl.
 TILE = 8, 4
 
 _STORED = {np.uint8: "rgba8", np.uint16: "rgba16", np.float16: "rgba16f", np.float32: "rgba32f"}
 
 
-def open_window(device: Device, source: FrameSource, capacity: int) -> Window:
+def open_window(device: Device, source: FrameSource, capacity: int, moved: bool) -> Window:
     """The fastest window of `capacity` frames: running sums if the source is `summable` and the device has room for
-    them, else the frames."""
+    them, else the frames. moved: what is seen of a frame lies elsewhere in it, so it has to be whole."""
+    if moved:
+        return (PackedFrames if summable(source) else WholeFrames)(device, source, capacity)
     if summable(source):
         try:
             return Sums(device, source, capacity)
@@ -93,6 +97,8 @@ class Frames(Window):
     Where the device has no room for all bands, the frames stay on the host, and every picture sends them band by band.
     """
 
+    _kind: str | None = None  # of its textures, if it is not that of the frames
+
     def __init__(self, device: Device, source: FrameSource, capacity: int):
         super().__init__(device, source, capacity)
         self.layers = capacity
@@ -103,12 +109,12 @@ class Frames(Window):
         self.transfer = "linear" if self._linearises else source.transfer
         # The linear value of an encoded half can exceed the range of a half.
         stored = np.dtype(np.float32 if self._linearises else source.dtype)
-        kind, pixel_bytes = _STORED[stored.type], 4 * stored.itemsize
+        kind, pixel_bytes = self._kind or _STORED[stored.type], 8 if self._kind else 4 * stored.itemsize
         try:
             self._allocate(kind, pixel_bytes)
         except NoDeviceError:
             self._host = {}
-            self.textures = [device.texture(source.width, self.rows, capacity, kind)]
+            self.textures = [device.texture(*self._texels(source.width, self.rows), self.layers, kind)]
             self.picture = device.texture(source.width, source.height, 1, "rgba32f")
 
     @property
@@ -125,11 +131,15 @@ class Frames(Window):
                 continue
             frame = self._read(index)
             if self._host is None:
-                for top, height, texture in super().bands():
-                    self._send(texture, frame[top : top + height], layer)
+                self._place(frame, layer)
             else:
                 self._host[layer] = frame
             self._held[layer] = index
+
+    def _place(self, frame: np.ndarray, layer: int) -> None:
+        """Sends a frame to its place on the device."""
+        for top, height, texture in super().bands():
+            self._send(texture, frame[top : top + height], layer)
 
     def bands(self):
         if self._host is None:
@@ -159,10 +169,94 @@ class Frames(Window):
         self._held, self._host = {}, None
 
 
-def decoding(stored: str, options: Options) -> int:
+class WholeFrames(Frames):
+    """A window of the frames as they are, each whole: source frame i in slot i mod `capacity`, and as many slots in a
+    texture array as BAND_BYTES allow.
+
+    Where the device has no room for all, the frames stay on the host, and every picture sends them.
+    layers: slots in a texture array
+    """
+
+    def _allocate(self, kind: str, pixel_bytes: int) -> None:
+        source = self.source
+        across, down = self._texels(source.width, source.height)
+        frame_bytes = across * down * pixel_bytes
+        self.rows, self.tops = source.height, range(0, source.height, source.height)
+        self.layers = min(self.capacity, max(1, BAND_BYTES // frame_bytes), self.device.max_layers)
+        try:
+            if frame_bytes * self.capacity > RESIDENT_BYTES:
+                raise NoDeviceError("over the budget")
+            for _ in range(0, self.capacity, self.layers):
+                self.textures.append(self.device.texture(across, down, self.layers, kind))
+            self.picture = self.device.texture(source.width, source.height, 1, "rgba32f")
+        except NoDeviceError:
+            Window.release(self)
+            raise
+
+    def _place(self, frame: np.ndarray, layer: int) -> None:
+        self._send(self.textures[layer // self.layers], frame, layer % self.layers)
+
+    def stacks(self):
+        """Yields (slots, texture array) of each array; the texture is valid until the next one."""
+        for first in range(0, self.capacity, self.layers):
+            slots = range(first, min(first + self.layers, self.capacity))
+            if self._host is None:
+                yield slots, self.textures[first // self.layers]
+                continue
+            for slot in slots:
+                if slot in self._host:
+                    self._send(self.textures[0], self._host[slot], slot - first)
+            yield slots, self.textures[0]
+
+
+class PackedFrames(WholeFrames):
+    """A window of whole opaque 8-bit frames, in the light that is summed and quick to read (shaders/pack.glsl)."""
+
+    _kind = "rg32ui"
+
+    def __init__(self, device: Device, source: FrameSource, capacity: int):
+        super().__init__(device, source, capacity)
+        self._light, self._sent = "linear", device.texture(source.width, source.height, 1, "rgba8")
+
+    def _texels(self, width: int, height: int) -> tuple[int, int]:
+        return width + RIM, height + RIM
+
+    def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
+        if options.light != self._light:
+            self._light = options.light
+            self._held.clear()
+        super().load(positions, options, shot)
+
+    def _send(self, texture, rows: np.ndarray, layer: int) -> None:
+        size = self.source.width, self.source.height
+        self.device.write(self._sent, rows, opaque=True)
+        program = packing(decoding(self.source.transfer, self._light), self._light == "linear")
+        textures, images = {"frame": self._sent}, {"packed_frames": texture}
+        extent = self._texels(*size)
+        self.device.run(program, extent, textures=textures, images=images, size=size, layer=layer)
+
+    def release(self) -> None:
+        super().release()
+        self._sent.release()
+
+
+@cache
+def packing(decode: int, squared: bool) -> Pass:
+    """The pass that packs a frame; decode: of `decoding`; squared: what is summed is linear light."""
+    return Pass(
+        "pack",
+        samplers={"frame": "sampler2DArray"},
+        images={"packed_frames": Image("rg32ui")},
+        constants={"size": "ivec2", "layer": "int"},
+        defines={"DECODE": decode, "SQUARED": int(squared)},
+        local_size=(64, 1, 1),
+    )
+
+
+def decoding(stored: str, light: str) -> int:
     """DECODE of the shaders, how samples become the light that is summed (Options.light): 0 unchanged, 1 made linear,
     2 made encoded. stored: the samples' transfer, "srgb" or "linear"."""
-    summed = "srgb" if options.light == "encoded" else "linear"
+    summed = "srgb" if light == "encoded" else "linear"
     return 0 if stored == summed else 1 if summed == "linear" else 2
 
 
@@ -227,7 +321,7 @@ class Sums(RunningSums, Window):
 
     def _add(self, frame: int, same: int | None, known: int, next_: int) -> None:
         program = accumulation(
-            decoding(self.source.transfer, self._options), same is not None, next_ < known, self.tiled
+            decoding(self.source.transfer, self._options.light), same is not None, next_ < known, self.tiled
         )
         given = {"known": known % self.layers, "next": next_ % self.layers}
         if same is None:

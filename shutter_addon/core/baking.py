@@ -6,9 +6,10 @@ Between two keys a recipe knows three eases. Where a channel does something else
 whole frame, recipe and effect agree within TOLERANCE.
 """
 
+import itertools
 import math
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from decimal import Decimal
 from functools import cache
 from itertools import pairwise
@@ -16,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from . import keyframes, limits, recipe
-from .effect import Effect, Region
+from .effect import Camera, Effect, Region
 from .keyframes import Channel, Samples
 
 # Of the largest bar, of fractions of the picture, of degrees; of the larger key's value where that is above 1.
@@ -31,15 +32,25 @@ def baked(effect: Effect, shown: range, inbetween_method: str) -> recipe.Recipe:
     which are as at the first frame."""
     options = effect.options.at(shown.start)
     names = _different([shutter.name for shutter in effect.shutters])
-    regions = [_region(region, names[region.shutter], shown) for region in effect.regions]
+    called = _region_names(effect)
+    regions = [
+        _region(region, name, names[region.shutter], shown) for region, name in zip(effect.regions, called, strict=True)
+    ]
+    # A region without strokes says nothing of how anything moves.
+    known = {region.name for region in regions if region} | {recipe.CAMERA}
+    follows = [name if name in known else None for name in _follows(effect, called)]
     found = recipe.Recipe(
         1,
-        shutters=[_shutter(effect, i, name, options.interpolation, shown) for i, name in enumerate(names)],
+        shutters=[
+            replace(_shutter(effect, i, name, options.interpolation, shown), follow=follows[i])
+            for i, name in enumerate(names)
+        ],
         regions=[region for region in regions if region],
         inbetween=options.step,
         inbetween_method=inbetween_method,
         edge_aware=_edge_aware(effect.edge_aware, shown),
         time=_time(effect.time, shown) if effect.time else [],
+        camera=_camera(effect.camera, shown),
         **{name: value for name, value in asdict(options).items() if name not in ("step", "edge_aware")},
     )
     return recipe.parse(recipe.dump(found))
@@ -59,6 +70,26 @@ def _different(names: list[str]) -> list[str]:
 def _numbered(name: str, number: int) -> str:
     end = "" if number == 1 else f" {number}"
     return name[: limits.MAX_NAME - len(end)] + end
+
+
+def _region_names(effect: Effect) -> list[str]:
+    """The regions' names; those that shutters follow are as no other's, and not the camera's."""
+    followed = [shutter.follow for shutter in effect.shutters if shutter.follow]
+    names = [region.name for region in effect.regions]
+    for i, region in enumerate(effect.regions):
+        mistaken = region.name == recipe.CAMERA and effect.camera in followed
+        if mistaken or any(region is other for other in followed):
+            taken = {recipe.CAMERA, *names[:i], *names[i + 1 :]}
+            numbered = (_numbered(region.name or "Region", number) for number in itertools.count(1))
+            names[i] = next(name for name in numbered if name not in taken)
+    return names
+
+
+def _follows(effect: Effect, names: list[str]) -> list[str | None]:
+    """What each shutter follows, in a recipe's words."""
+    words = {id(region): name for region, name in zip(effect.regions, names, strict=True)}
+    words |= {id(effect.camera): recipe.CAMERA, id(None): None}
+    return [words[id(shutter.follow)] for shutter in effect.shutters]
 
 
 def _shutter(effect: Effect, index: int, name: str, interpolation: str, shown: range) -> recipe.Shutter:
@@ -113,23 +144,45 @@ def _value_keys(at: Callable[[float], float], channel: Channel, shown: range) ->
     return [recipe.ValueKey(_frame(frame, shown), _short(at(frame)), ease) for frame, ease in keys]
 
 
-def _region(region: Region, shutter: str, shown: range) -> recipe.Region | None:
+def _region(region: Region, name: str, shutter: str, shown: range) -> recipe.Region | None:
     drawings = _drawings(region, shown.start)
     if not drawings:
         return None
-    moves = [channel for channel in (region.location, region.rotation, region.scale) if isinstance(channel, Samples)]
-    eases: dict[float, str] = {}
-    for channel in moves:
-        eases = dict(channel.keys) | eases
     # The ease from a drawing to the next is its own.
     words = dict(zip(region.drawings.frames, region.drawings.eases, strict=True)) if len(drawings) > 1 else {}
     words = {number: words[number] for number in drawings if words}
+    keys = _move_keys(region, words, shown)
+    first = min(drawings)
+    redrawn = {number: strokes for number, strokes in drawings.items() if words and number != keys[0][0]}
+    return recipe.Region(
+        shutter,
+        name,
+        region.kind.at(shown.start),
+        _short(region.width.at(shown.start)),
+        drawings[first],
+        [
+            recipe.RegionKey(_frame(frame, shown), *_place_words(region, frame), redrawn.get(frame), ease)
+            for frame, ease in keys
+        ],
+    )
+
+
+def _camera(camera: Camera, shown: range) -> list[recipe.CameraKey]:
+    keys = _move_keys(camera, {}, shown)
+    return [recipe.CameraKey(_frame(frame, shown), *_place_words(camera, frame), ease) for frame, ease in keys]
+
+
+def _move_keys(moving: Region | Camera, words: dict, shown: range) -> list[tuple[float, str]]:
+    """Frames and eases of the keys of location, rotation and scale; words: as of _keys."""
+    moves = [channel for channel in (moving.location, moving.rotation, moving.scale) if isinstance(channel, Samples)]
+    eases: dict[float, str] = {}
+    for channel in moves:
+        eases = dict(channel.keys) | eases
     frames = eases.keys() | words.keys()
 
     @cache
     def place(frame):
-        (x, y), rotation, scale = (channel.at(frame) for channel in (region.location, region.rotation, region.scale))
-        return np.array([x, y, rotation, scale])
+        return _place(moving, frame)
 
     if not frames and tuple(place(shown.start)) != (0, 0, 0, 1):
         frames = {shown.start}
@@ -142,24 +195,18 @@ def _region(region: Region, shutter: str, shown: range) -> recipe.Region | None:
     def still(frame, held):
         return fits(held, held, frame, 0)
 
-    keys = _keys(fits, still, eases, sorted(frames), words, shown) if frames or moves else []
-    first = min(drawings)
-    redrawn = {number: strokes for number, strokes in drawings.items() if words and number != keys[0][0]}
-    return recipe.Region(
-        shutter,
-        region.name,
-        region.kind.at(shown.start),
-        _short(region.width.at(shown.start)),
-        drawings[first],
-        [_region_key(frame, place(frame), redrawn.get(frame), ease, shown) for frame, ease in keys],
-    )
+    return _keys(fits, still, eases, sorted(frames), words, shown) if frames or moves else []
 
 
-def _region_key(frame: float, place, strokes, ease: str, shown: range) -> recipe.RegionKey:
-    x, y, rotation, scale = place
-    return recipe.RegionKey(
-        _frame(frame, shown), (_short(x), _short(y)), _short_degrees(rotation), _short(scale), strokes, ease
-    )
+def _place(moving: Region | Camera, frame: float) -> np.ndarray:
+    (x, y), rotation, scale = (channel.at(frame) for channel in (moving.location, moving.rotation, moving.scale))
+    return np.array([x, y, rotation, scale])
+
+
+def _place_words(moving: Region | Camera, frame: float) -> tuple:
+    """Location, rotation and scale at a frame, as a recipe has them."""
+    x, y, rotation, scale = _place(moving, frame)
+    return (_short(x), _short(y)), _short_degrees(rotation), _short(scale)
 
 
 def _drawings(region: Region, frame: float) -> dict[int, list]:

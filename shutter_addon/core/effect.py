@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from . import keyframes, limits, scribbles, shutters
+from . import keyframes, limits, motions, scribbles, shutters
 from .frame_state import FrameState
 from .keyframes import Bars, Channel
 from .messages import EffectError
@@ -24,15 +24,6 @@ _FAR = 'region "{name}": a point of its strokes is nowhere near the picture'
 
 class FarStrokeError(ValueError):
     """A point of a stroke is farther from the picture than any effect has it (limits.MAX_DISTANCE)."""
-
-
-@dataclass(frozen=True)
-class Shutter:
-    """name, color: RGB display values, 0 to 1"""
-
-    name: str
-    color: tuple[float, float, float]
-    bars: Bars
 
 
 @dataclass(frozen=True)
@@ -97,8 +88,13 @@ class Region:
 
     def placement(self, frame: float) -> Placement:
         """Its keyed numbers at a frame."""
-        x, y = (float(number) for number in self.location.at(frame))
-        return Placement((x, y), float(self.rotation.at(frame)), float(self.scale.at(frame)))
+        return _placement(self, frame)
+
+    def centre(self, frame: float) -> np.ndarray | None:
+        """The point (2,) about which it is turned and scaled, in fractions of the picture; None: nothing is drawn.
+        EffectError: its strokes are nowhere near the picture."""
+        strokes = self.unmoved(frame)
+        return motions.centre(strokes) if strokes else None
 
     def unmoved(self, frame: float) -> list[np.ndarray]:
         """The strokes (n, 2) on the picture at a frame, as they are drawn. EffectError: they are nowhere near it."""
@@ -117,6 +113,41 @@ class Region:
 
 
 @dataclass(frozen=True)
+class Camera:
+    """How what the camera sees moves in the picture, about the picture's centre; its numbers are as a Region's."""
+
+    location: Channel
+    rotation: Channel
+    scale: Channel
+
+    def placement(self, frame: float) -> Placement:
+        """Its keyed numbers at a frame."""
+        return _placement(self, frame)
+
+    def centre(self, _frame: float) -> np.ndarray:
+        """The point (2,) about which it is turned and scaled, in fractions of the picture."""
+        return np.array([0.5, 0.5])
+
+
+STILL_CAMERA = Camera(*map(keyframes.Constant, ((0.0, 0.0), 0.0, 1.0)))
+
+
+def _placement(moving: Region | Camera, frame: float) -> Placement:
+    x, y = (float(number) for number in moving.location.at(frame))
+    return Placement((x, y), float(moving.rotation.at(frame)), float(moving.scale.at(frame)))
+
+
+@dataclass(frozen=True)
+class Shutter:
+    """name, color: RGB display values, 0 to 1; follow: what its exposure moves with, None: nothing"""
+
+    name: str
+    color: tuple[float, float, float]
+    bars: Bars
+    follow: Region | Camera | None = None
+
+
+@dataclass(frozen=True)
 class Effect:
     """The whole effect but its source.
 
@@ -124,6 +155,7 @@ class Effect:
     regions: later ones lie over earlier ones
     options: channel of frame_state.Options, but for
     edge_aware: channel of its own, as its keys are numbers
+    camera: which shutters may follow
     time: channel of (source frame, whether it runs backward), the source's first frame is 1; None: the strip's own
     timing tells what is shown"""
 
@@ -132,6 +164,7 @@ class Effect:
     options: Channel
     time: Channel | None = None
     edge_aware: Channel = field(default=keyframes.Constant(0.0))
+    camera: Camera = STILL_CAMERA
 
     def at(self, frame: float) -> FrameState:
         """The effect at a frame. EffectError: no picture can be made of it."""

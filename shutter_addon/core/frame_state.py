@@ -46,18 +46,50 @@ class Options:
 
 
 @dataclass(frozen=True)
+class Following:
+    """Where the points of the shown picture lie in the source's frames, for each shutter: z → turn · z + shift, as
+    motions.Similarity counts them.
+
+    first: the source frame of the first row
+    turns, shifts: (S, N) complex128, a row for each source frame from there on; 1 and 0 for a shutter that follows
+    nothing, or what does not move
+    """
+
+    first: int
+    turns: np.ndarray
+    shifts: np.ndarray
+
+    def at(self, frames) -> tuple[np.ndarray, np.ndarray]:
+        """The turns and shifts (L, N) of source frames (L,); of those that have none, such as −1, any."""
+        rows = np.clip(np.asarray(frames) - self.first, 0, len(self.turns) - 1)
+        return self.turns[rows], self.shifts[rows]
+
+    @property
+    def key(self) -> tuple:
+        """Hashable, and equal for equal motions."""
+        return self.first, self.turns.tobytes(), self.shifts.tobytes()
+
+    def of(self, chosen) -> Following | None:
+        """That of some shutters alone; None: none of them moves."""
+        turns, shifts = self.turns[:, chosen], self.shifts[:, chosen]
+        return Following(self.first, turns, shifts) if (turns != 1).any() or shifts.any() else None
+
+
+@dataclass(frozen=True)
 class FrameState:
     """The effect at one frame.
 
     bars: (N, L) float64, the weight of each frame of the window for each shutter; shutter 0 is the default
     shapes: of the scribbles, where they are at this frame, the later over the earlier
     reference: the exposure (sum of bars) of full brightness where exposure is "weighted"; None: the default shutter's
+    following: what exposures follow; None: nothing that moves
     """
 
     options: Options
     bars: np.ndarray
     shapes: tuple[scribbles.Shape, ...] = ()
     reference: float | None = None
+    following: Following | None = None
 
     @property
     def gains(self) -> np.ndarray:
@@ -73,9 +105,11 @@ class FrameState:
     def key(self) -> tuple:
         """Hashable, and equal for states that give the same picture of the same frames."""
         shapes = ((s.shutter, s.kind, s.width, *(stroke.tobytes() for stroke in s.strokes)) for s in self.shapes)
-        return self.options, self.bars.shape, self.bars.tobytes(), self.reference, tuple(shapes)
+        bars = self.bars.shape, self.bars.tobytes()
+        return self.options, *bars, self.reference, self.following and self.following.key, tuple(shapes)
 
     def alone(self, chosen: int) -> FrameState:
         """The state of a picture in which one shutter, `chosen`, is everywhere."""
         options = replace(self.options, edge_aware=0.0)  # there is nothing to diffuse
-        return FrameState(options, self.bars[chosen, None], (), self.reference or float(self.bars[0].sum()))
+        following = self.following and self.following.of([chosen])
+        return FrameState(options, self.bars[chosen, None], (), self.reference or float(self.bars[0].sum()), following)

@@ -38,6 +38,10 @@ class RecipeError(UserError, ValueError):
         super().__init__(sentence(text))
 
 
+# What a shutter follows that moves with the camera.
+CAMERA = "camera"
+
+
 @dataclass(frozen=True)
 class ShutterKey:
     frame: float
@@ -47,21 +51,22 @@ class ShutterKey:
 
 @dataclass(frozen=True)
 class Shutter:
-    """Bars, or keys of bars."""
+    """Bars, or keys of bars; follow: a region's name, or CAMERA."""
 
     name: str
     color: tuple[float, float, float] = (0.8, 0.8, 0.8)
     bars: list[float] | None = None
     keys: list[ShutterKey] = field(default_factory=list)
+    follow: str | None = None
 
-    def over_time(self) -> effect.Shutter:
-        """As plain data."""
+    def over_time(self, follow: effect.Region | effect.Camera | None = None) -> effect.Shutter:
+        """As plain data; follow: what is followed, in the same form."""
         if not self.keys:
             constant = keyframes.Constant(np.asarray(self.bars, float))
-            return effect.Shutter(self.name, self.color, keyframes.Bars(constant))
+            return effect.Shutter(self.name, self.color, keyframes.Bars(constant), follow)
         frames, bars, eases = _columns(self.keys, "frame", "bars", "ease")
         keys = tuple(zip(frames, eases, strict=True))
-        return effect.Shutter(self.name, self.color, keyframes.Bars(keyframes.Keys(frames, bars, eases), keys))
+        return effect.Shutter(self.name, self.color, keyframes.Bars(keyframes.Keys(frames, bars, eases), keys), follow)
 
 
 @dataclass(frozen=True)
@@ -74,6 +79,25 @@ class RegionKey:
     scale: float = 1.0
     strokes: list[Stroke] | None = None
     ease: Ease = "linear"
+
+
+@dataclass(frozen=True)
+class CameraKey:
+    """Where what the camera sees lies in the picture, as of a region whose centre is the picture's."""
+
+    frame: float
+    location: Point = (0.0, 0.0)
+    rotation: float = 0.0
+    scale: float = 1.0
+    ease: Ease = "linear"
+
+
+def _moves(keys: list[RegionKey] | list[CameraKey]) -> list[keyframes.Channel]:
+    """Channels of location, rotation and scale."""
+    if not keys:
+        return [keyframes.Constant(value) for value in ((0.0, 0.0), 0.0, 1.0)]
+    frames, eases, *moves = _columns(keys, "frame", "ease", "location", "rotation", "scale")
+    return [keyframes.Keys(frames, values, eases) for values in moves]
 
 
 @dataclass(frozen=True)
@@ -105,10 +129,7 @@ class Region:
             aspect,
         )
         fixed = self.name, shutter, keyframes.Constant(self.kind), keyframes.Constant(self.width), drawings
-        if not self.keys:
-            return effect.Region(*fixed, *map(keyframes.Constant, ((0.0, 0.0), 0.0, 1.0)))
-        frames, eases, *moves = _columns(self.keys, "frame", "ease", "location", "rotation", "scale")
-        return effect.Region(*fixed, *(keyframes.Keys(frames, values, eases) for values in moves))
+        return effect.Region(*fixed, *_moves(self.keys))
 
 
 @dataclass(frozen=True)
@@ -143,6 +164,7 @@ class Recipe:
     inbetween: Factor = 1
     inbetween_method: Literal["quick", "good"] = "quick"
     time: list[ValueKey] = field(default_factory=list)
+    camera: list[CameraKey] = field(default_factory=list)
 
     @property
     def options(self) -> Options:
@@ -153,12 +175,16 @@ class Recipe:
     def effect(self, aspect: float) -> effect.Effect:
         """As plain data, for a picture of width / height = aspect. Frame 1 is the strip's first."""
         order = {shutter.name: i for i, shutter in enumerate(self.shutters)}
+        regions = tuple(region.over_time(order[region.shutter], aspect) for region in self.regions)
+        camera = effect.Camera(*_moves(self.camera))
+        followed = {region.name: region for region in regions} | {CAMERA: camera, None: None}
         return effect.Effect(
-            tuple(shutter.over_time() for shutter in self.shutters),
-            tuple(region.over_time(order[region.shutter], aspect) for region in self.regions),
+            tuple(shutter.over_time(followed[shutter.follow]) for shutter in self.shutters),
+            regions,
             keyframes.Constant(self.options),
             self._source_time(),
             _numbers(self.edge_aware),
+            camera,
         )
 
     def _source_time(self) -> keyframes.SourceTime | None:
@@ -277,7 +303,8 @@ def save(recipe: Recipe, path: str | Path) -> None:
 
 def _compact(value):
     if isinstance(value, dict):
-        return {k: _compact(v) for k, v in value.items() if v is not None and (v or k not in ("keys", "time"))}
+        keys = "keys", "time", "camera"
+        return {k: _compact(v) for k, v in value.items() if v is not None and (v or k not in keys)}
     return [_compact(v) for v in value] if isinstance(value, (list, tuple)) else value
 
 
@@ -464,7 +491,11 @@ def _check(recipe: Recipe) -> None:
         taken = places.setdefault(shutter.name, i)
         _require(taken == i, f"shutters[{i}].name", f"{_shown(shutter.name)} is taken by shutters[{taken}]")
         _check_shutter(shutter, recipe.window, f"shutters[{i}]")
+        _check_follow(shutter.follow, recipe.regions, f"shutters[{i}].follow")
     _check_values(recipe.time, "time", limits.MAX_FRAME)
+    _check_frames(recipe.camera, "camera")
+    for k, key in enumerate(recipe.camera):
+        _check_placement(key, f"camera[{k}]")
     if isinstance(recipe.edge_aware, list):
         _require(recipe.edge_aware, "edge_aware", "empty: there is no key")
         _check_values(recipe.edge_aware, "edge_aware", 1, 0)
@@ -494,6 +525,26 @@ def _check_shutter(shutter: Shutter, window: int, place: str) -> None:
             raise RecipeError(f"{where}: {error}") from None
 
 
+def _check_follow(follow: str | None, regions: list[Region], place: str) -> None:
+    """A name that two of them have says nothing."""
+    if follow is None:
+        return
+    called = [f"regions[{i}]" for i, region in enumerate(regions) if region.name == follow]
+    if follow == CAMERA:
+        _require(not called, place, f"{_shown(follow)} is the camera, and {', '.join(called[:1])} as well")
+        return
+    _require(follow, place, "empty: it names a region, or is " + _shown(CAMERA))
+    _require(called, place, f"there is no region {_shown(follow)}")
+    _require(len(called) == 1, place, f"{_shown(follow)} is the name of {' and '.join(called[:2])}")
+
+
+def _check_placement(key: RegionKey | CameraKey, place: str) -> None:
+    for axis, value in enumerate(key.location):
+        _require_within(value, limits.MAX_DISTANCE, f"{place}.location[{axis}]")
+    _require_within(key.rotation, limits.MAX_DEGREES, f"{place}.rotation")
+    _require_within(key.scale, limits.MAX_SCALE, f"{place}.scale")
+
+
 def _check_region(region: Region, place: str) -> None:
     _check_name(region.name, f"{place}.name")
     _require(region.width >= 0, f"{place}.width", f"{region.width} is negative")
@@ -505,10 +556,7 @@ def _check_region(region: Region, place: str) -> None:
         where = f"{place}.keys[{k}]"
         whole = not (redrawn if k == 0 else key.strokes is not None) or key.frame == int(key.frame)
         _require(whole, f"{where}.frame", f"{_plain(key.frame)} is no whole frame, but redrawn")
-        for axis, value in enumerate(key.location):
-            _require_within(value, limits.MAX_DISTANCE, f"{where}.location[{axis}]")
-        _require_within(key.rotation, limits.MAX_DEGREES, f"{where}.rotation")
-        _require_within(key.scale, limits.MAX_SCALE, f"{where}.scale")
+        _check_placement(key, where)
         if key.strokes is not None:
             _check_strokes(key.strokes, f"{where}.strokes")
     _check_strokes(region.strokes, f"{place}.strokes")

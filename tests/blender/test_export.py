@@ -81,7 +81,27 @@ def valid_recipes(draw, longest=6):
         draw(st.sampled_from([1, 2, 4, 8, 16])),
         draw(st.sampled_from(["quick", "good"])),
         draw(st.just([]) | value_keys(-10, 10000)),
+        draw(st.just([]) | camera_keys()),
     )
+
+
+@st.composite
+def camera_keys(draw):
+    places = {frame: draw(st.tuples(*[numbers(-100, 100)] * 2)) for frame in draw(frames)}
+    return [
+        recipes.CameraKey(frame, place, draw(st.integers(-720_00, 720_00)) / 100, draw(numbers(-50, 50)), draw(eases))
+        for frame, place in places.items()
+    ]
+
+
+@st.composite
+def following_recipes(draw, longest=6):
+    """Recipes whose shutters follow the camera, or regions, which have names of their own."""
+    found = draw(valid_recipes(longest))
+    named = [dataclasses.replace(region, name=f"{region.name[:9]}{i}") for i, region in enumerate(found.regions)]
+    followed = st.sampled_from([None, recipes.CAMERA, *(region.name for region in named)])
+    shutters = [dataclasses.replace(shutter, follow=draw(followed)) for shutter in found.shutters]
+    return dataclasses.replace(found, shutters=shutters, regions=named)
 
 
 @pytest.fixture
@@ -111,6 +131,13 @@ def export(effect_on):
 @settings(max_examples=60, suppress_health_check=list(HealthCheck))
 @given(valid_recipes())
 def test_a_recipe_comes_back_as_it_was(effect_on, source):
+    apply(effect_on, source)
+    assert export(effect_on) == source
+
+
+@settings(max_examples=15, suppress_health_check=list(HealthCheck))
+@given(following_recipes())
+def test_what_is_followed_comes_back(effect_on, source):
     apply(effect_on, source)
     assert export(effect_on) == source
 

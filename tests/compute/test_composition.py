@@ -82,7 +82,8 @@ def composed(device, source, moment, index, direction=1, shot=None):
     c = c.repeat(block, 1).repeat(block, 2)[:, : source.height, : source.width].astype(np.float64)
     c /= c.sum(axis=0)
     indices = compositor.window_indices(moment.options, index, shot or range(source.count), direction)
-    expected = compositor.compose(moment, source.linear()[np.maximum(indices, 0)], indices >= 0, c)
+    moves = moment.following and moment.following.at(indices)
+    expected = compositor.compose(moment, source.linear()[np.maximum(indices, 0)], indices >= 0, c, moves)
     assert picture.shape == expected.shape
     renderer.release_window()
     return picture, expected

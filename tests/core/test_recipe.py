@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from shutter_addon.core import limits, recipe, scribbles
 from shutter_addon.core.compositor import window_positions
+from shutter_addon.core.motions import Placement
 
 EXAMPLE = {
     "version": 1,
@@ -66,6 +67,10 @@ def test_defaults():
     assert small.options == recipe.Options(2)
     assert small.options.aggregate == 1
     assert small.regions == []
+
+
+def name_both(data, name):
+    data["regions"] = [data["regions"][0] | {"name": name} for _ in range(2)]
 
 
 def broken(change):
@@ -166,6 +171,20 @@ def broken(change):
             lambda d: d.update(edge_aware=[{"frame": 2, "value": 1}, {"frame": 2, "value": 0}]),
             "edge_aware[1].frame: 2 does not follow 2",
         ),
+        (lambda d: d["shutters"][0].update(follow="X"), 'shutters[0].follow: there is no region "X"'),
+        (lambda d: d["shutters"][0].update(follow=""), 'shutters[0].follow: empty: it names a region, or is "camera"'),
+        (lambda d: d["shutters"][0].update(follow=1), "shutters[0].follow: 1 is not a text"),
+        (
+            lambda d: (d["shutters"][0].update(follow="twice"), name_both(d, "twice")),
+            'shutters[0].follow: "twice" is the name of regions[0] and regions[1]',
+        ),
+        (
+            lambda d: (d["shutters"][0].update(follow="camera"), name_both(d, "camera")),
+            'shutters[0].follow: "camera" is the camera, and regions[0] as well',
+        ),
+        (lambda d: d.update(camera=[{"frame": 1}, {"frame": 1}]), "camera[1].frame: 1 does not follow 1"),
+        (lambda d: d.update(camera=[{"frame": 1, "location": [0, 2e3]}]), "camera[0].location[1]: 2000 is not"),
+        (lambda d: d.update(camera=[{"frame": 1, "strokes": []}]), "camera[0]: unknown field strokes"),
         (lambda d: d.update(time=[{"frame": 1, "value": 1e308}]), "time[0].value: 1e+308 is not -1048574 to 1048574"),
         (
             lambda d: d.update(time=[{"frame": k, "value": 1} for k in range(100_001)]),
@@ -190,6 +209,21 @@ def is_a_sentence(text):
 
 DEEP = 100_000
 ONE = '{"version": 1, "window": 1, "shutters": [{"name": "A", "bars": [1]}], '
+
+
+def test_what_is_followed_comes_back():
+    data = json.loads(broken(lambda d: d["regions"][0].update(name="cup")))
+    data["shutters"][0]["follow"], data["shutters"][1]["follow"] = "cup", "camera"
+    data["camera"] = [
+        {"frame": 1},
+        {"frame": 9, "location": [0.1, -0.2], "rotation": 5, "scale": 1.25, "ease": "bezier"},
+    ]
+    found = recipe.parse(json.dumps(data))
+    assert recipe.parse(recipe.dump(found)) == found
+    effect = found.effect(1.5)
+    assert effect.shutters[0].follow is effect.regions[0]
+    assert effect.shutters[1].follow is effect.camera
+    assert effect.camera.placement(5) == Placement((0.05, -0.1), 2.5, 1.125)
 
 
 @pytest.mark.parametrize(

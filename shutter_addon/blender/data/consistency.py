@@ -50,6 +50,24 @@ def rename(effect, old: str, new: str) -> str:
     return new
 
 
+def rename_followed(effect, old: str, new: str) -> None:
+    """Shutters that follow a region go on to do so under its new name, unless another region has the old one."""
+    if [region.name for region in effect.regions].count(old) > 1:
+        return
+    for shutter in effect.shutters:
+        if shutter.follow_region == old != new:
+            shutter.follow_region = new
+
+
+def forget_followed(effect, name: str) -> None:
+    """Shutters follow nothing that followed a region of this name, unless there is one."""
+    if name in [region.name for region in effect.regions]:
+        return
+    for shutter in effect.shutters:
+        if shutter.follow == "REGION" and shutter.follow_region == name:
+            shutter.follow, shutter.follow_region = "NOTHING", ""
+
+
 def bars(shutter) -> np.ndarray:
     """A shutter's bars as they stand, float64 (L,)."""
     weights = np.empty(len(shutter.bars), dtype=np.float32)

@@ -90,6 +90,12 @@ FOLLOWED = (
     ("OBJECT", "Object", "All tracks of an object, or of the camera"),
 )
 
+FOLLOWS = (
+    ("NOTHING", "Nothing", "The exposure stays where it is in the picture"),
+    ("REGION", "Region", "The exposure moves with a region: what the region moves with stays sharp"),
+    ("CAMERA", "Camera", "The exposure moves with what the camera sees, as if the camera had stood still"),
+)
+
 # The renderer asks the F-curves itself: keys on these would show, and not render.
 _UNKEYED = set()
 
@@ -104,9 +110,11 @@ def _renamed(shutter, new: str, old: str, _is_set) -> str:
     return consistency.rename(selection.effect_of_item(shutter), old, new)
 
 
-def _shortened(_region, new: str, _old: str, _is_set) -> str:
+def _shortened(region, new: str, old: str, _is_set) -> str:
     """As recipes have names. Blender's own `maxlen` counts bytes, of which a character takes up to four."""
-    return new[:MAX_NAME]
+    new = new[:MAX_NAME]
+    consistency.rename_followed(selection.effect_of_item(region), old, new)
+    return new
 
 
 def _recolored(shutter, _context):
@@ -171,6 +179,16 @@ class Shutter(PropertyGroup):
         options=_UNKEYED,
     )
     bars: CollectionProperty(type=ShutterBar)
+    follow: EnumProperty(
+        name="Follow",
+        description="What the exposure moves with",
+        items=FOLLOWS,
+        update=_changed,
+        options=_UNKEYED,
+    )
+    follow_region: StringProperty(
+        name="Followed Region", description="Name of the region that the exposure moves with", update=_changed
+    )
 
 
 class TrackStop(PropertyGroup):
@@ -336,6 +354,31 @@ class ShutterEffect(PropertyGroup):
         subtype="FACTOR",
         min=0.0,
         max=1.0,
+        update=_changed,
+    )
+    camera_location: FloatVectorProperty(
+        name="Camera Location",
+        description="Where what the camera sees has moved to, as a fraction of the picture",
+        subtype="XYZ",
+        size=2,
+        min=-MAX_DISTANCE,
+        max=MAX_DISTANCE,
+        update=_changed,
+    )
+    camera_rotation: FloatProperty(
+        name="Camera Rotation",
+        description="Rotation of what the camera sees, about the picture's center",
+        subtype="ANGLE",
+        min=-math.radians(MAX_DEGREES),
+        max=math.radians(MAX_DEGREES),
+        update=_changed,
+    )
+    camera_scale: FloatProperty(
+        name="Camera Scale",
+        description="Scale of what the camera sees, about the picture's center",
+        default=1.0,
+        min=-MAX_SCALE,
+        max=MAX_SCALE,
         update=_changed,
     )
     bars_per_frame: IntProperty(

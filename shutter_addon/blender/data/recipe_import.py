@@ -30,6 +30,7 @@ def apply(edit, effect, strip, source: recipe.Recipe) -> None:
     if source.time:
         _set_number(edit, effect, "source_time", source.time, first)
     _set_number(edit, effect, "edge_aware", source.edge_aware, first)
+    _set_moves(edit, effect, path, "camera_", source.camera, first, group=effect.name)
     for i, shutter in enumerate(source.shutters):
         _add_shutter(edit, effect, f"{path}.shutters[{i}]", shutter, first)
     colors = {shutter.name: shutter.color for shutter in source.shutters}
@@ -49,7 +50,7 @@ def _set_number(edit, effect, name: str, value: recipe.Keyable, first: float) ->
 def _check_keys(source: recipe.Recipe, first: float) -> None:
     """EffectError: keys would lie beyond Blender's timeline, or on the same frame, as it counts in float32."""
     edge_aware = source.edge_aware if isinstance(source.edge_aware, list) else []
-    for keys in (source.time, edge_aware, *(part.keys for part in (*source.shutters, *source.regions))):
+    for keys in (source.time, edge_aware, source.camera, *(part.keys for part in (*source.shutters, *source.regions))):
         frames = np.array([key.frame + first for key in keys], dtype=np.float32)
         if (wrong := np.flatnonzero(np.abs(frames) > limits.MAX_FRAME)).size:
             sentence = rpt_("frame {frame} of the recipe: a key cannot lie beyond Blender's timeline")
@@ -73,6 +74,9 @@ def clear(edit, effect) -> None:
 def _add_shutter(edit, effect, path: str, source: recipe.Shutter, first: float) -> None:
     shutter = effect.shutters.add()
     shutter.name, shutter.color = source.name, source.color
+    if source.follow is not None:
+        shutter.follow = "CAMERA" if source.follow == recipe.CAMERA else "REGION"
+        shutter.follow_region = "" if source.follow == recipe.CAMERA else source.follow
     for weight in source.bars if source.bars is not None else source.keys[0].bars:
         shutter.bars.add().weight = weight
     if source.keys:
@@ -86,10 +90,17 @@ def _add_region(edit, effect, strip, path: str, source: recipe.Region, color, fi
     region.name, region.shutter, region.width = source.name, source.shutter, source.width
     region.kind = source.kind.upper()
     region.layer = _draw(effect, strip, source, color, first)
-    if not source.keys:
+    _set_moves(edit, region, path, "", source.keys, first)
+
+
+def _set_moves(edit, moving, path: str, prefix: str, keys: list, first: float, **curve) -> None:
+    """Location, rotation and scale of a property group, whose names have a prefix, and their keys."""
+    start = keys[0] if keys else recipe.CameraKey(0)
+    setattr(moving, f"{prefix}location", start.location)
+    setattr(moving, f"{prefix}rotation", np.radians(start.rotation))
+    setattr(moving, f"{prefix}scale", start.scale)
+    if not keys:
         return
-    start = source.keys[0]
-    region.location, region.rotation, region.scale = start.location, np.radians(start.rotation), start.scale
     channels = {
         ("location", 0): lambda key: key.location[0],
         ("location", 1): lambda key: key.location[1],
@@ -97,8 +108,8 @@ def _add_region(edit, effect, strip, path: str, source: recipe.Region, color, fi
         ("scale", 0): lambda key: key.scale,
     }
     for (name, index), value in channels.items():
-        keys = [(key.frame + first, value(key), key.ease) for key in source.keys]
-        fcurves.set_keys(edit, f"{path}.{name}", index, keys)
+        numbers = [(key.frame + first, value(key), key.ease) for key in keys]
+        fcurves.set_keys(edit, f"{path}.{prefix}{name}", index, numbers, **curve)
 
 
 def _draw(effect, strip, source: recipe.Region, color, first: float) -> str:

@@ -15,7 +15,7 @@ from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core import effect as model
-from ...core import keyframes, limits
+from ...core import following, keyframes, limits
 from ...core.frame_state import FrameState, Options
 from ...core.messages import EffectError
 from ...core.retiming import StripTiming
@@ -112,21 +112,68 @@ def read(edit, effect, strip, frames, *, thorough: bool = False) -> model.Effect
     curves, path = Curves(edit), effect.path_from_id()
     options = _options(curves, path, effect, frames)
     names = [shutter.name for shutter in effect.shutters]
-    placement = _placement(curves, effect, strip, frames)
+    followed = {shutter.follow_region for shutter in effect.shutters if shutter.follow == "REGION"}
+    around = _around(effect, frames)
+    placement = _placement(curves, effect, strip, around)
+    regions = tuple(
+        _region(
+            curves,
+            f"{path}.regions[{i}]",
+            effect,
+            region,
+            names.index(region.shutter),
+            placement,
+            around if region.name in followed else frames,
+        )
+        for i, region in enumerate(effect.regions)
+        if region.shutter in names
+    )
+    camera = model.Camera(
+        _channel(curves, effect, path, "camera_location", around),
+        _channel(curves, effect, path, "camera_rotation", around, np.degrees),
+        _channel(curves, effect, path, "camera_scale", around),
+    )
     return model.Effect(
         tuple(
-            _shutter(curves, f"{path}.shutters[{i}]", shutter, options, frames, thorough)
+            _shutter(
+                curves,
+                f"{path}.shutters[{i}]",
+                shutter,
+                options,
+                frames,
+                thorough,
+                _followed(shutter, regions, camera),
+            )
             for i, shutter in enumerate(effect.shutters)
         ),
-        tuple(
-            _region(curves, f"{path}.regions[{i}]", effect, region, names.index(region.shutter), placement, frames)
-            for i, region in enumerate(effect.regions)
-            if region.shutter in names
-        ),
+        regions,
         options,
-        _source_time(curves, path, effect, frames) if effect.use_source_time else None,
+        _source_time(curves, path, effect, around) if effect.use_source_time else None,
         _channel(curves, effect, path, "edge_aware", frames),
+        camera,
     )
+
+
+def _around(effect, frames):
+    """The frames at which motions are asked for: where a shutter follows something, those around these frames too."""
+    if all(shutter.follow == "NOTHING" for shutter in effect.shutters):
+        return frames
+    reach = following.reach(validation.number(effect, "window"))
+    return np.unique(np.add.outer(sorted(frames), np.arange(-reach, reach + 1))).tolist()
+
+
+def _followed(shutter, regions, camera: model.Camera) -> model.Region | model.Camera | None:
+    """What a shutter follows. EffectError: there is no such region."""
+    wish = validation.word(shutter, "follow")
+    if wish == "NOTHING":
+        return None
+    if wish == "CAMERA":
+        return camera
+    found = next((region for region in regions if region.name == shutter.follow_region), None)
+    if found is None:
+        sentence = rpt_('{place}: there is no region "{region}" to follow')
+        raise EffectError(sentence.format(place=validation.place(shutter), region=shutter.follow_region))
+    return found
 
 
 def bars_at(edit, effect, index: int, frame: float) -> np.ndarray:
@@ -233,11 +280,13 @@ def _options_at(effect, curves: dict, frame: float) -> Options:
     )
 
 
-def _shutter(curves: Curves, path: str, shutter, options: keyframes.Channel, frames, thorough=False) -> model.Shutter:
+def _shutter(
+    curves: Curves, path: str, shutter, options: keyframes.Channel, frames, thorough=False, follow=None
+) -> model.Shutter:
     bars = _tried(_bars, curves, path, shutter, options, frames, thorough)
     if isinstance(bars, EffectError):
         bars = keyframes.Bars(keyframes.Constant(bars))
-    return model.Shutter(shutter.name, tuple(shutter.color), bars)
+    return model.Shutter(shutter.name, tuple(shutter.color), bars, follow)
 
 
 def _bars(curves: Curves, path: str, shutter, options: keyframes.Channel, frames, thorough: bool) -> keyframes.Bars:

@@ -7,7 +7,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..data import fcurves
 from ..data.annotations import annotation, layer_of
-from ..data.consistency import choose_region, color_layers, unique
+from ..data.consistency import choose_region, color_layers, forget_followed, unique
 from ..data.validation import EffectError
 from . import collection_edits
 from .motion_keys import NOTHING_KEPT
@@ -40,7 +40,9 @@ def remove_region(effect, index: int) -> None:
     layer = layer_of(effect, effect.regions[index])
     if layer is not None:
         effect.scene.annotation.layers.remove(layer)
+    name = effect.regions[index].name
     collection_edits.remove(effect, "regions", index)
+    forget_followed(effect, name)
     effect.active_region = min(effect.active_region, max(len(effect.regions) - 1, 0))
     choose_region(effect)
 

@@ -106,6 +106,7 @@ class _Shutters:
         row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
         layout.use_property_split = True
         layout.prop(effect, "window")
+        _draw_follow(layout, effect, shutter)
         try:
             bars = bar_edits.shown(effect, effect.active_shutter).bars
         except validation.EffectError as error:
@@ -114,6 +115,18 @@ class _Shutters:
         row = layout.row()
         row.active = not bars.any()
         row.label(text=bar_edits.summary(bars), icon="NONE" if bars.any() else "ERROR", translate=False)
+
+
+def _draw_follow(layout, effect, shutter) -> None:
+    """What the exposure moves with."""
+    layout.prop(shutter, "follow")
+    if shutter.follow == "REGION":
+        layout.prop_search(shutter, "follow_region", effect, "regions", text="Region")
+    elif shutter.follow == "CAMERA":
+        column = layout.column(align=True)
+        column.prop(effect, "camera_location", text="Location")
+        column.prop(effect, "camera_rotation", text="Rotation")
+        column.prop(effect, "camera_scale", text="Scale")
 
 
 def _draw_live(layout, context):

@@ -17,7 +17,7 @@ import OpenImageIO
 from ...compute.device import NoDeviceError
 from ...compute.gpu import GPUCompositor
 from ...compute.renderer import Renderer, open_compositor
-from ...core import retiming
+from ...core import following, retiming
 from ...core.frame_state import FrameState
 from ...core.messages import EffectError
 from ...media import MediaError, cuts
@@ -163,7 +163,18 @@ class RenderSession:
             return known[2]
         state = snapshot.state(frame)
         index, backward = source_index(snapshot, frame, renderer.source)
-        found = FrameRequest(renderer, index, state, -1 if backward else 1)
+        direction = -1 if backward else 1
+        with translated():
+            state = following.followed(
+                snapshot.effect,
+                state,
+                frame,
+                index,
+                direction,
+                renderer.source,
+                lambda other: source_index(snapshot, other, renderer.source)[0],
+            )
+        found = FrameRequest(renderer, index, state, direction)
         self._requests[snapshot.scene] = snapshot, frame, found
         return found
 

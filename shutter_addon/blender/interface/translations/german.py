@@ -637,6 +637,45 @@ MESSAGES = {
     ("*", "the region lies outside the picture"): "die Region liegt außerhalb des Bildes",
     ("*", "there is no other frame to track"): "es gibt kein anderes Bild zum Verfolgen",
     ("*", "the frame lies outside what can be tracked"): "das Bild liegt außerhalb dessen, was verfolgt werden kann",
+    ("*", "Nothing"): "Nichts",
+    ("*", "Camera"): "Kamera",
+    ("*", "What the exposure moves with"): "Womit sich die Belichtung mitbewegt",
+    (
+        "*",
+        "The exposure stays where it is in the picture",
+    ): "Die Belichtung bleibt, wo sie im Bild ist",
+    (
+        "*",
+        "The exposure moves with a region: what the region moves with stays sharp",
+    ): "Die Belichtung bewegt sich mit einer Region: Was sich mit der Region bewegt, bleibt scharf",
+    (
+        "*",
+        "The exposure moves with what the camera sees, as if the camera had stood still",
+    ): "Die Belichtung bewegt sich mit dem, was die Kamera sieht, als hätte die Kamera still gestanden",
+    ("*", "Followed Region"): "Verfolgte Region",
+    (
+        "*",
+        "Name of the region that the exposure moves with",
+    ): "Name der Region, mit der sich die Belichtung bewegt",
+    ("*", "Camera Location"): "Position der Kamera",
+    (
+        "*",
+        "Where what the camera sees has moved to, as a fraction of the picture",
+    ): "Wohin sich bewegt hat, was die Kamera sieht, als Bruchteil des Bildes",
+    ("*", "Camera Rotation"): "Drehung der Kamera",
+    (
+        "*",
+        "Rotation of what the camera sees, about the picture's center",
+    ): "Drehung dessen, was die Kamera sieht, um die Bildmitte",
+    ("*", "Camera Scale"): "Skalierung der Kamera",
+    (
+        "*",
+        "Scale of what the camera sees, about the picture's center",
+    ): "Skalierung dessen, was die Kamera sieht, um die Bildmitte",
+    (
+        "*",
+        '{place}: there is no region "{region}" to follow',
+    ): "{place}: Es gibt keine Region „{region}“, der zu folgen wäre",
     ("*", "Follow"): "Folgen",
     ("Operator", "Follow"): "Folgen",
     (

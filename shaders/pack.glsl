@@ -1,0 +1,28 @@
+// A frame as exposures that follow something read it: a whole number a pixel, with that of the pixel below beside it, and
+// a rim of two pixels before and three behind that repeat the frame's edges. Linear light is kept as its square root, so
+// that dark steps are small; encoded light as it is.
+// DECODE: how samples become the light that is summed, 0 as they are, 1 made linear, 2 made encoded.
+#include "light.glsl"
+#include "packed.glsl"
+
+uint packed_at(ivec2 pixel)
+{
+  vec3 color = texelFetch(frame, ivec3(clamp(pixel, ivec2(0), size - 1), 0), 0).rgb;
+#if DECODE == 1
+  color = to_linear(color);
+#elif DECODE == 2
+  color = to_encoded(color);
+#endif
+  return packed_color(color);
+}
+
+void main()
+{
+  ivec2 place = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(place, size + RIM))) {
+    return;
+  }
+  place -= BEFORE;
+  imageStore(packed_frames, ivec3(place + BEFORE, layer),
+             uvec4(packed_at(place), packed_at(place + ivec2(0, 1)), 0u, 0u));
+}

@@ -1,0 +1,101 @@
+"""What the exposures of shutters follow: where the points of the shown picture lie in the frames around it.
+
+Keys of regions and of the camera are on timeline frames, a window has frames of the source. What a source frame shows
+is where the keys have it at the timeline frame that shows it: of several the one nearest to the shown frame; between
+two timeline frames for a source frame that is passed over there, or for an in-between frame. Between timeline frames
+motion is straight.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from . import compositor, motions
+from .effect import Camera, Effect, Region
+from .frame_source import FrameSource
+from .frame_state import Following, FrameState, Options
+from .motions import Similarity
+
+# Below this scale a subject is a point, and says nothing of where the others are.
+_SMALLEST = 1e-6
+
+
+def reach(window: int) -> int:
+    """How many timeline frames before and after the shown one say where the source frames of a window lie: enough for
+    footage that is slowed down to a quarter. Source frames shown beyond have the motion of the nearest within."""
+    return 4 * window
+
+
+def followed(
+    effect: Effect,
+    state: FrameState,
+    frame: float,
+    index: int,
+    direction: int,
+    source: FrameSource,
+    shown: Callable[[float], int],
+) -> FrameState:
+    """The effect's state at a timeline frame, with what its shutters follow.
+
+    index, direction: the source frame that is shown there, as for compositor.window_positions
+    shown: the source frame that is shown at a timeline frame a whole number of frames away, at most `reach`
+    EffectError: what is followed lies nowhere"""
+    subjects = [shutter.follow for shutter in effect.shutters]
+    if not any(subjects):
+        return state
+    frames = _seen(state.options, index, direction, source.count)
+    times = _times(shown, frame, index, frames, reach(state.options.window))
+    turns = np.ones((len(frames), len(subjects)), np.complex128)
+    shifts = np.zeros_like(turns)
+    for subject in {id(subject): subject for subject in subjects if subject}.values():
+        found = [_motion(subject, frame, time, (source.width, source.height)) for time in times]
+        followers = [other is subject for other in subjects]
+        turns[:, followers] = np.array([motion.turn for motion in found])[:, None]
+        shifts[:, followers] = np.array([motion.shift for motion in found])[:, None]
+    return replace(state, following=Following(frames.start, turns, shifts).of(slice(None)))
+
+
+def _seen(options: Options, index: int, direction: int, count: int) -> range:
+    """The source frames that a window may show, wherever its shot ends."""
+    positions = compositor.window_positions(options, index, direction)
+    beyond = options.window if options.edges == "mirror" else 0
+    low, high = min(positions.min(), index) - beyond, max(positions.max(), index) + beyond
+    return range(max(int(low), 0), min(int(high), count - 1) + 1)
+
+
+def _times(shown: Callable[[float], int], frame: float, index: int, wanted: range, reach: int) -> list[float]:
+    """The time on the timeline, nearest to a frame, at which each of the wanted source frames is shown."""
+    times, last = {index: frame}, {1: index, -1: index}
+    for distance in range(1, reach + 1):
+        if len(times) == len(wanted):
+            break
+        for way, before in last.items():
+            after = last[way] = shown(frame + way * distance)
+            low, high = max(min(before, after), wanted.start), min(max(before, after), wanted.stop - 1)
+            for source in range(low, high + 1) if before != after else ():
+                share = (source - before) / (after - before)
+                times.setdefault(source, frame + way * (distance - 1 + share))
+    found = np.array(sorted(times))
+    nearest = found[np.abs(found - np.arange(wanted.start, wanted.stop)[:, None]).argmin(axis=1)]
+    return [times[source] for source in nearest.tolist()]
+
+
+def _motion(subject: Region | Camera, frame: float, time: float, size) -> Similarity:
+    """The motion of the picture from a timeline frame to a time that may lie between two; none where nothing is drawn
+    that could be followed."""
+    whole = frame + math.floor(time - frame)
+    share = time - whole
+    frames = [frame, whole, whole + 1 if share else whole]
+    start, *placements = (subject.placement(number) for number in frames)
+    before, *centres = (subject.centre(number) for number in frames)
+    if before is None or any(centre is None for centre in centres) or abs(start.scale) < _SMALLEST:
+        return Similarity()
+    placement = motions.between(*placements, share)
+    after = (1 - share) * centres[0] + share * centres[1]
+    if start == placement and np.array_equal(before, after):
+        return Similarity()  # to the bit
+    return motions.motion_between(start, placement, before, after, size)

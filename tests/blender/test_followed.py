@@ -1,0 +1,148 @@
+"""Exposures that follow: footage that moves as its keys say stays sharp, however its strip is played."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support import read_picture, recipe, request, write_frames
+
+from shutter_addon.core import light
+from shutter_addon.core import recipe as recipes
+
+COUNT, WIDTH, HEIGHT, WINDOW = 24, 120, 72, 6
+INSIDE = np.s_[20:-20, 20:-20]  # where no window reaches beyond the picture
+
+
+def codes(index, velocity):
+    """What frame `index` shows (H, W, 3) uint8: a pattern that moves by so many pixels a frame, x right and y down."""
+    y, x = np.indices((HEIGHT, WIDTH))
+    x, y = x - velocity[0] * index, y - velocity[1] * index
+    waves = [np.sin(x / 3 + y / 7), np.sin(x / 5 - y / 2.5), np.sin(x / 4 + 2 * np.sin(y / 6))]
+    return np.rint(127.5 + 110 * np.stack(waves, axis=-1)).astype(np.uint8)
+
+
+def place(index, velocity):
+    return velocity[0] * index / WIDTH, -velocity[1] * index / HEIGHT
+
+
+def region(keys):
+    """A stroke that lies still but for its keys, {timeline frame: location}."""
+    return {
+        "name": "car",
+        "shutter": "S0",
+        "strokes": [[[0.4, 0.4], [0.6, 0.6]]],
+        "keys": [{"frame": frame, "location": list(location)} for frame, location in keys.items()],
+    }
+
+
+def following(keys, follow="car", **options):
+    data = recipe(WINDOW, [1] * WINDOW, regions=[region(keys)], **options)
+    data["shutters"][0]["follow"] = follow
+    return data
+
+
+@pytest.fixture
+def shown(bpy, edit, tmp_path):
+    """Gives the picture of an effect at a timeline frame, and the recipe's, for footage of a velocity; change: what
+    happens to the source strip first."""
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import add_effect
+    from shutter_addon.blender.rendering import session
+
+    def show(data, velocity, frame, change=lambda source: None):
+        first = write_frames(tmp_path / "in", [codes(index, velocity) for index in range(COUNT)])
+        source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
+        for i in range(2, COUNT + 1):
+            source.elements.append(f"f{i:04d}.png")
+        change(source)
+        strip, effect = add_effect.add_effect(edit, source)
+        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
+        return edit, effect, strip, request(edit, effect, strip, frame)
+
+    yield show
+    session.forget()
+
+
+def levels_off(request, velocity):
+    """How far a picture is at most from the shown frame as it is, in 8-bit levels."""
+    picture = light.to_encoded(request.picture()[..., :3].astype(float))
+    return np.abs(255 * picture - codes(request.index, velocity))[INSIDE].max()
+
+
+# Whole pixels are exact, and between pixels the cubic is nearly so.
+VELOCITIES = pytest.mark.parametrize(("velocity", "most"), [((2, -1), 0.6), ((1.3, 0.6), 3)])
+
+
+@VELOCITIES
+def test_what_moves_by_keys_stays_sharp(shown, velocity, most):
+    keys = {frame: place(frame - 1, velocity) for frame in (1, COUNT)}
+    *_, found = shown(following(keys), velocity, 9)
+    assert levels_off(found, velocity) <= most
+    assert levels_off(replace(found, state=replace(found.state, following=None)), velocity) > 30
+
+
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+def test_a_reversed_strip(shown, position):
+    velocity = 2, 1
+    keys = {frame: place(COUNT - frame, velocity) for frame in (1, COUNT)}
+    data = following(keys, position=position)
+    *_, found = shown(data, velocity, 12, lambda source: setattr(source, "use_reverse_frames", True))
+    assert found.direction == -1
+    assert levels_off(found, velocity) <= 0.6
+
+
+@pytest.mark.parametrize("speed", [0.5, 1.5, 2, -1])
+def test_keyed_time(shown, speed):
+    """Keys as tracking makes them: at every frame of the timeline, where what is shown has the subject."""
+    velocity, start = (1, -1), 1 if speed > 0 else COUNT
+    values = {frame: start + speed * (frame - 1) for frame in range(1, int((COUNT - 1) / abs(speed)) + 2)}
+    time = [{"frame": frame, "value": value} for frame, value in values.items()]
+    keys = {frame: place(np.floor(value - 0.5), velocity) for frame, value in values.items()}
+    *_, found = shown(following(keys, time=time), velocity, 5)
+    assert levels_off(found, velocity) <= 0.6
+
+
+def test_the_camera_and_nothing_left_behind(shown):
+    """What the camera sees is followed by its keys, and a recipe without them puts them back."""
+    from shutter_addon.blender.data import recipe_import
+
+    velocity = 2, -1
+    camera = [{"frame": frame, "location": place(frame - 1, velocity)} for frame in (1, COUNT)]
+    edit, effect, strip, found = shown(following({}, "camera", camera=camera), velocity, 9)
+    assert levels_off(found, velocity) <= 0.6
+    recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(following({}, "camera"))))
+    assert tuple(effect.camera_location) == (0, 0)
+    assert request(edit, effect, strip, 9).state.following is None
+
+
+def test_a_region_that_is_renamed_or_removed(shown):
+    from shutter_addon.blender.data import snapshot
+    from shutter_addon.blender.editing import region_edits
+
+    velocity = 2, -1
+    edit, effect, strip, _ = shown(following({frame: place(frame, velocity) for frame in (0, COUNT)}), velocity, 9)
+    effect.regions[0].name = "truck"
+    assert effect.shutters[0].follow_region == "truck"
+    assert request(edit, effect, strip, 9).state.following is not None
+    effect.shutters[0].follow_region = "ship"
+    with pytest.raises(snapshot.EffectError, match='shutter "S0": there is no region "ship" to follow'):
+        request(edit, effect, strip, 9)
+    effect.shutters[0].follow_region = "truck"
+    region_edits.remove_region(effect, 0)
+    assert effect.shutters[0].follow == "NOTHING"
+    assert request(edit, effect, strip, 9).state.following is None
+
+
+def test_the_command_follows(command, tmp_path):
+    """Through the sequencer; chunks have the same bits as the film."""
+    velocity = 2, -1
+    first = write_frames(tmp_path / "in", [codes(index, velocity) for index in range(COUNT)])
+    data = following({frame: place(frame - 1, velocity) for frame in (1, COUNT)})
+    command(first, "--output", tmp_path / "film", "--frames", "8:10", recipe=data)
+    command(first, "--output", tmp_path / "chunk", "--frames", "10:10", recipe=data)
+    for number in (8, 9, 10):
+        picture = read_picture(tmp_path / "film" / f"{number:04d}.png")[..., :3]
+        assert np.abs(picture - codes(number - 1, velocity))[INSIDE].max() <= 0.6
+    chunk, film = ((tmp_path / name / "0010.png").read_bytes() for name in ("chunk", "film"))
+    assert chunk == film

@@ -1,0 +1,152 @@
+"""Exposures that follow something, on all devices, against the float64 reference and a subject that moves by keys."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_composition import SHAPES, check, device, footage, state  # noqa: F401
+
+from shutter_addon.compute import window
+from shutter_addon.compute.renderer import Renderer
+from shutter_addon.core.frame_state import Following
+
+
+def motions(rng, count, shutters, followers, size=(37, 23)):
+    """Random motions of `count` source frames: turned, scaled and shifted by some pixels, some far."""
+    turns, shifts = np.ones((count, shutters), complex), np.zeros((count, shutters), complex)
+    for follower in followers:
+        angle, scale = rng.uniform(-0.3, 0.3, count), rng.uniform(0.7, 1.4, count)
+        turns[:, follower] = scale * np.exp(1j * angle)
+        centre = complex(*size) / 2
+        away = rng.normal(0, 4, (2, count)) * np.where(rng.random(count) < 0.1, 20, 1)
+        shifts[:, follower] = centre - turns[:, follower] * centre + away[0] + 1j * away[1]
+    return Following(0, turns, shifts)
+
+
+def following(rng, source, moment, followers=(1,)):
+    size = source.width, source.height
+    return replace(moment, following=motions(rng, source.count, len(moment.bars), followers, size))
+
+
+@pytest.mark.parametrize(("interpolation", "light"), [("displacement", "linear"), ("value", "encoded")])
+@pytest.mark.parametrize("followers", [(0,), (0, 1, 2)])
+def test_random_motions(device, interpolation, light, followers):  # noqa: F811
+    rng = np.random.default_rng(31)
+    source = footage(rng)
+    moment = state(rng, interpolation=interpolation, light=light, exposure="weighted")
+    check(device, source, following(rng, source, moment, followers), 2)
+
+
+@pytest.mark.parametrize("interpolation", ["displacement", "value"])
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize(("index", "direction"), [(1, 1), (18, 1), (2, -1)])
+def test_ends_of_the_clip(device, interpolation, edges, index, direction):  # noqa: F811
+    rng = np.random.default_rng(32)
+    source = footage(rng)
+    moment = state(rng, interpolation=interpolation, edges=edges, position="center", aggregate=2)
+    moment.bars[1, : 8 if index > 9 else 14] = 0  # of which nothing is left beyond the end
+    moment.bars[1, -1] = 0.5
+    check(device, source, following(rng, source, moment, (0, 1)), index, direction)
+
+
+@pytest.mark.parametrize("alpha", ["straight", "premultiplied"])
+@pytest.mark.parametrize(
+    ("dtype", "transfer"), [(np.uint8, "srgb"), (np.uint16, "linear"), (np.float16, "srgb"), (np.float32, "linear")]
+)
+def test_kinds_of_footage(device, dtype, transfer, alpha):  # noqa: F811
+    rng = np.random.default_rng(33)
+    source = footage(rng, dtype=dtype, transfer=transfer, alpha=alpha)
+    if alpha == "premultiplied":
+        colours = source.frames[..., :3] * (source.frames[..., 3:] / source.frames.max())
+        source.frames[..., :3] = colours.astype(dtype)
+    moment = state(rng, light="encoded" if dtype == np.uint16 else "linear")
+    check(device, source, following(rng, source, moment, (0, 2)), 3)
+
+
+def test_many_shutters(device):  # noqa: F811
+    rng = np.random.default_rng(34)
+    source, moment = footage(rng), state(rng, count=6)
+    check(device, source, following(rng, source, moment, (0, 4, 5)), 3)
+
+
+@pytest.mark.parametrize("resident", [True, False])
+def test_frames_in_several_textures(device, monkeypatch, resident):  # noqa: F811
+    """As of windows for which a device has no room in one."""
+    rng = np.random.default_rng(35)
+    source = footage(rng)
+    monkeypatch.setattr(window, "BAND_BYTES", 7 * (source.width + window.RIM) * (source.height + window.RIM) * 8)
+    if not resident:
+        monkeypatch.setattr(window, "RESIDENT_BYTES", 0)
+    for options in ({"edges": "mirror"}, {"edges": "shorten"}):
+        moment = following(rng, source, state(rng, **options), (0, 1))
+        moment.bars[2, :6] = 0
+        for index in (2, 14):
+            check(device, source, moment, index)
+
+
+def test_one_shutter_everywhere(device):  # noqa: F811
+    rng = np.random.default_rng(36)
+    source = footage(rng)
+    check(device, source, following(rng, source, state(rng, shapes=()), (0,)), 3)
+
+
+def test_following_nothing_changes_no_bit(device):  # noqa: F811
+    """Nor does what is followed by a shutter that holds nowhere, or what stands still."""
+    rng = np.random.default_rng(37)
+    source, moment = footage(rng), state(rng, shapes=())
+    plain = Renderer(device, source).picture(3, moment)
+    assert np.array_equal(Renderer(device, source).picture(3, following(rng, source, moment, (1, 2))), plain)
+    still = Following(0, np.ones((20, 3), complex), np.zeros((20, 3), complex))
+    assert still.of(slice(None)) is None
+
+
+def test_chunks_have_the_same_bits(device):  # noqa: F811
+    rng = np.random.default_rng(38)
+    source = footage(rng)
+    moments = [following(rng, source, state(rng)) for _ in range(4)]
+    renderer = Renderer(device, source)
+    in_order = [renderer.picture(index, moment) for index, moment in enumerate(moments)]
+    for index in (3, 1, 0, 2):
+        assert np.array_equal(Renderer(device, source).picture(index, moments[index]), in_order[index])
+
+
+@pytest.mark.parametrize("seed", range(41, 45))
+def test_anything(device, seed):  # noqa: F811
+    rng = np.random.default_rng(seed)
+
+    def one(*options):
+        return options[rng.integers(len(options))]
+
+    count, length = int(rng.integers(1, 5)), int(rng.integers(1, 30))
+    alpha, dtype = one("opaque", "straight"), one(np.uint8, np.uint16, np.float32)
+    size = int(rng.integers(1, 90)), int(rng.integers(1, 50))
+    source = footage(
+        rng, count=int(rng.integers(1, 40)), size=size, dtype=dtype, alpha=alpha, transfer=one("srgb", "linear")
+    )
+    moment = state(
+        rng,
+        length,
+        shapes=tuple(shape for shape in SHAPES if shape.shutter < count),
+        count=count,
+        interpolation=one("displacement", "value"),
+        light="linear" if alpha == "straight" else one("linear", "encoded"),
+        exposure=one("normalized", "weighted"),
+        edges=one("hold", "mirror", "shorten"),
+        position=one("start", "center", "end"),
+        aggregate=one(1, 2, 4),
+        step=one(1, 2),
+    )
+    followers = [i for i in range(count) if rng.random() < 0.7] or [0]
+    check(device, source, following(rng, source, moment, followers), int(rng.integers(source.count)), one(1, -1))
+
+
+def test_frames_that_are_left_out_are_not_read(device):  # noqa: F811
+    """Whatever lies in their place: of what is no number not even none must be taken."""
+    rng = np.random.default_rng(39)
+    source = footage(rng, dtype=np.float16)
+    source.frames[16] = np.nan
+    renderer = Renderer(device, source)
+    for index in (14, 18):
+        moment = following(rng, source, state(rng, edges="shorten"))
+        picture = renderer.picture(index, moment)
+    assert np.isfinite(picture).all()

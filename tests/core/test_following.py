@@ -1,0 +1,118 @@
+"""Where the points of the shown picture lie in frames of the source, by keys on the timeline."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from shutter_addon.core import following, motions, recipe
+from shutter_addon.core.motions import Placement
+
+SOURCE = SimpleNamespace(count=40, width=64, height=48)
+
+
+def made(keys=(), position="start", edges="hold", follow="car", camera=(), strokes=(((0.4, 0.4), (0.6, 0.6)),)):
+    region = recipe.Region("Long", "car", strokes=[list(stroke) for stroke in strokes], keys=list(keys))
+    shutter = recipe.Shutter("Long", bars=[1.0] * 6, follow=follow)
+    return recipe.Recipe(1, 6, [shutter], [region], position=position, edges=edges, camera=list(camera))
+
+
+def followed(source, frame, index, direction=1, shown=None):
+    effect = source.effect(SOURCE.width / SOURCE.height)
+    state = effect.at(frame)
+    shown = shown or (lambda other: index + round(other - frame))
+    return following.followed(effect, state, frame, index, direction, SOURCE, shown).following
+
+
+STRAIGHT = [recipe.RegionKey(0, (0, 0)), recipe.RegionKey(100, (1, 0.5))]
+STEP = 0.64 - 0.24j  # pixels a frame, y down
+
+
+def shifts(source, frames, **given):
+    return followed(source, **given).at(frames)[1][:, 0]
+
+
+def test_a_straight_way():
+    assert shifts(made(STRAIGHT), [10, 11, 15], frame=11, index=10) == pytest.approx(np.array([0, 1, 5]) * STEP)
+
+
+def test_frames_that_are_shown_backward_come_before():
+    found = shifts(made(STRAIGHT), [10, 9, 5], frame=11, index=10, direction=-1, shown=lambda other: 21 - int(other))
+    assert found == pytest.approx(np.array([0, 1, 5]) * STEP)
+
+
+@pytest.mark.parametrize(("speed", "frames_of_time"), [(2, 0.5), (0.5, 2), (0.25, 4)])
+def test_a_strip_of_another_speed(speed, frames_of_time):
+    """Of two timeline frames that show a source frame, the nearest counts; between two there are the frames between."""
+    shown = lambda other: 10 + int(np.floor((other - 12) * speed))  # noqa: E731
+    found = shifts(made(STRAIGHT), range(10, 16), frame=12, index=10, shown=shown)
+    assert found == pytest.approx(np.arange(6) * frames_of_time * STEP)
+
+
+def test_time_that_turns_back():
+    """The nearest time at which a frame is shown is the one that counts."""
+    shown = lambda other: 20 - abs(int(other) - 20)  # noqa: E731
+    found = shifts(made(STRAIGHT, "center"), [17, 18, 19, 20], frame=18, index=18, shown=shown)
+    assert found == pytest.approx(np.array([-1, 0, 1, 2]) * STEP)
+    found = shifts(made(STRAIGHT, "center"), [19], frame=20, index=20, shown=shown)
+    assert found == pytest.approx(np.array([STEP]))  # before and after as near: after
+
+
+def test_what_is_never_shown_lies_as_the_nearest_that_is():
+    found = shifts(made(STRAIGHT), range(10, 16), frame=11, index=10, shown=lambda other: min(int(other) - 1, 12))
+    assert found == pytest.approx(np.array([0, 1, 2, 2, 2, 2]) * STEP)
+
+
+def test_mirrored_frames_have_the_motion_of_what_they_are():
+    found = followed(made(STRAIGHT, edges="mirror"), 39, 38)
+    assert found.at([39, 35])[1][:, 0] == pytest.approx(np.array([1, -3]) * STEP)
+
+
+def test_turned_and_scaled_about_the_shapes_centre():
+    keys = [recipe.RegionKey(1), recipe.RegionKey(2, (0.1, 0), 90, 2)]
+    source = made(keys, strokes=[((0.25, 0.25), (0.5, 0.25))])
+    motion = motions.Similarity(*(part[0, 0] for part in followed(source, 1, 0).at([1])))
+    size = SOURCE.width, SOURCE.height
+    centre, moved = (motions.pixel(place, size) for place in ((0.375, 0.25), (0.475, 0.25)))
+    assert motion(centre) == pytest.approx(moved)
+    assert motion(centre + 3) - moved == pytest.approx(-6j)  # counter-clockwise, where y points down
+
+
+def test_a_redrawn_shape_moves_as_its_centre_does():
+    keys = [recipe.RegionKey(1), recipe.RegionKey(3, strokes=[[(0.5, 0.4), (0.7, 0.6)]])]
+    assert shifts(made(keys), [0, 1, 2], frame=1, index=0) == pytest.approx([0, 0.05 * 64, 0.1 * 64])
+
+
+def test_the_camera_turns_about_the_pictures_centre():
+    keys = [recipe.CameraKey(1), recipe.CameraKey(2, (0, 0.25), 0, 1.5)]
+    motion = motions.Similarity(*(part[0, 0] for part in followed(made(follow="camera", camera=keys), 1, 0).at([1])))
+    assert motion(31.5 + 23.5j) == pytest.approx(31.5 + 11.5j)
+    assert motion.turn == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("keys", [[], STRAIGHT[:1], [recipe.RegionKey(0, scale=0), recipe.RegionKey(9, (1, 1))]])
+def test_what_does_not_move_is_nothing_to_follow(keys):
+    source = made(keys)
+    assert followed(source, 0, 0) is None
+    assert source.at(5, 4 / 3).key == made(keys, follow=None).at(5, 4 / 3).key
+
+
+def test_a_subject_of_no_size_later_is_a_point():
+    keys = [recipe.RegionKey(0), recipe.RegionKey(4, scale=0)]
+    assert followed(made(keys), 0, 0).at([4])[0][0, 0] == 0
+
+
+def test_in_between_frames_take_the_motion_between():
+    """Four frames of the source to a frame of the timeline."""
+    found = shifts(made(STRAIGHT), range(8, 14), frame=3, index=8, shown=lambda other: 4 * int(other - 1))
+    assert found == pytest.approx(np.arange(6) / 4 * STEP)
+
+
+def test_a_bezier_way_is_straight_between_frames():
+    keys = [recipe.RegionKey(0, ease="bezier"), recipe.RegionKey(4, (1, 0))]
+    effect = made(keys).effect(4 / 3)
+    halfway = motions.between(*(effect.regions[0].placement(frame) for frame in (1, 2)), 0.5)
+    found = shifts(made(keys), [1], frame=1, index=0, shown=lambda other: 2 * int(other - 1))
+    start = effect.regions[0].placement(1)
+    assert found[0] == pytest.approx((halfway.location[0] - start.location[0]) * 64)
+    assert isinstance(start, Placement)
