@@ -20,6 +20,8 @@ from .diffusion import COLOURS, OFFSETS, beyond, finished, inner, padded, part
 # on pixels conductances are smooth.
 CYCLES = (4,) * 8
 SMOOTH_CYCLES = (5, 3, 2, 2)
+# A cycle that changes no coefficient by more is the last.
+ENOUGH = 1 / 4096
 # Gauss-Seidel sweeps over a grid before its correction by coarser ones, and again after it.
 SWEEPS = 2
 # So many grids after that of the conjugate gradients are visited twice for each visit of the one before.
@@ -44,7 +46,10 @@ def diffuse_along_edges(labels: np.ndarray, count: int, guide: np.ndarray, stren
     solution = padded(labels == np.arange(1, count + 1)[:, None, None])
     for iterations in CYCLES if side == 1 else SMOOTH_CYCLES:
         missing = _unbalanced(solution, across, down) * grids[0].live
-        inner(solution)[:] += _cycle(grids, missing, solved, iterations)
+        change = _cycle(grids, missing, solved, iterations)
+        inner(solution)[:] += change
+        if np.abs(change).max() < ENOUGH:
+            break
     return finished(inner(solution))
 
 
