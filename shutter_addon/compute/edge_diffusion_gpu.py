@@ -12,8 +12,7 @@ from .edge_diffusion import CYCLES, SWEEPS, TWICE, first_solved
 from .passes import LOCAL_ROW, Image, Pass
 
 # Where the guide's cells are larger than pixels: the iterations of conjugate gradients in each cycle, first of cycles
-# near scribbles alone, then of those everywhere. Largest error × 255 in frames of three films at 1920 × 1080: 0.6; with
-# a second one everywhere 0.16.
+# near scribbles alone, then of those everywhere. Largest error × 255 in frames of three films at 1920 × 1080: 0.6.
 NEAR_CYCLES = (4, 2)
 LAST_CYCLES = (1,)
 # Sweeps over a grid, before and after its correction, in cycles over smooth conductances.
