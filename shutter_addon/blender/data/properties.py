@@ -113,7 +113,10 @@ def _renamed(shutter, new: str, old: str, _is_set) -> str:
 def _shortened(region, new: str, old: str, _is_set) -> str:
     """As recipes have names. Blender's own `maxlen` counts bytes, of which a character takes up to four."""
     new = new[:MAX_NAME]
-    consistency.rename_followed(selection.effect_of_item(region), old, new)
+    # Blender takes long to find an item's place among many: only where the name counts.
+    effects = region.id_data.virtual_shutter.effects
+    if any(shutter.follow_region == old for effect in effects for shutter in effect.shutters):
+        consistency.rename_followed(selection.effect_of_item(region), old, new)
     return new
 
 
