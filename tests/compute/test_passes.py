@@ -19,6 +19,12 @@ PASSES += [
 for tiled in (True, False):
     PASSES += [gpu.composition_of_sums(4, 2, True, tiled, False)]
     PASSES += [window.accumulation(1, again, False, tiled) for again in (True, False)]
+PASSES += [window.packing(1, True)]
+PASSES += [
+    gpu.composition_of_moved(way, 2, 3, packed, 1, shortened, False, False, True, (True, False))
+    for way in ("frames", "walk", "value")
+    for packed, shortened in ((True, True), (False, False))
+]
 # Of what is declared inside the sources, whatever it is: variables, parameters, functions.
 DECLARED = re.compile(r"\b(?:bool|u?int|float|[biu]?vec[234])\s+(\w+)")
 BYTES = {"int": 4, "float": 4, "ivec2": 8, "vec2": 8}
