@@ -19,7 +19,7 @@ HOLD = 0.8
 # Coefficients below this are none: regions that one shutter encloses get exactly that one.
 NOTHING = 1 / 4096
 COLOURS = ((0, 0), (1, 1), (0, 1), (1, 0))
-OFFSETS = tuple((y, x) for y in (-1, 0, 1) for x in (-1, 0, 1))
+_OFFSETS = tuple((y, x) for y in (-1, 0, 1) for x in (-1, 0, 1))
 
 
 def diffuse(labels: np.ndarray, count: int) -> np.ndarray:
@@ -51,29 +51,39 @@ class _Level:
 def _finest(labels: np.ndarray) -> _Level:
     """The 5-point Laplacian; solutions hold the fixed values, so every neighbour counts."""
     ones, fixed = padded(np.ones((1, *labels.shape))), padded(labels[None] != 0)
-    cross = {offset: 1 for offset in OFFSETS if 0 in offset and any(offset)}
+    cross = {offset: 1 for offset in _OFFSETS if 0 in offset and any(offset)}
     neighbours, held = (sum(part(a, offset)[0] for offset in cross) for a in (ones, fixed))
     return _Level(cross, np.maximum(neighbours, 1), labels == 0, held)
 
 
 def _coarser(fine: _Level) -> _Level:
-    """PᵀAP by probing: coarse cells three apart do not meet in a row, so nine vectors tell all rows."""
-    height, width = ((n + 1) // 2 for n in fine.shape)
+    def answer(values):
+        return -_restrict(fine, missing(fine, padded(_prolong(fine, values)), 0.0))
+
+    weights, diagonal = galerkin(fine.shape, answer)
+    return _Level(weights, diagonal, diagonal > 0, diagonal - sum(weights.values()))
+
+
+def galerkin(shape, answer):
+    """The next coarser grid's operator: {offset: what a cell gives its neighbour, (h, w)} and its diagonal (h, w).
+
+    shape: of the finer grid; answer: gives PᵀAP of values (N, h, w). Coarse cells three apart do not meet in a row of
+    it, so nine vectors tell all rows."""
+    height, width = ((n + 1) // 2 for n in shape)
     rows, columns = np.arange(height) % 3, np.arange(width) % 3
     probes = np.stack([np.outer(rows == y, columns == x) for y in range(3) for x in range(3)]).astype(np.float32)
-    answers = -_restrict(fine, _residual(fine, padded(_prolong(fine, probes)), 0.0))
-    entries = {}
-    for y, x in OFFSETS:
+    answers, entries = answer(probes), {}
+    for y, x in _OFFSETS:
         near = (rows[:, None] + y) % 3 * 3 + (columns + x) % 3
         entries[y, x] = np.take_along_axis(answers, near[None], axis=0)[0]
         # Grids of one or two cells: beyond the edge there is nothing.
-        entries[y, x][beyond(height, y)] = 0
-        entries[y, x][:, beyond(width, x)] = 0
+        entries[y, x][_beyond(height, y)] = 0
+        entries[y, x][:, _beyond(width, x)] = 0
     diagonal = entries.pop((0, 0))
-    return _Level({o: -a for o, a in entries.items()}, diagonal, diagonal > 0, diagonal + sum(entries.values()))
+    return {offset: -entry for offset, entry in entries.items()}, diagonal
 
 
-def beyond(size: int, offset: int) -> np.ndarray:
+def _beyond(size: int, offset: int) -> np.ndarray:
     neighbours = np.arange(size) + offset
     return (neighbours < 0) | (neighbours >= size)
 
@@ -82,20 +92,20 @@ def _cycle(levels, solution, right, sweeps) -> None:
     """One V-cycle on the padded solution (N, H + 2, W + 2), in place."""
     level, *below = levels
     for _ in range(sweeps):
-        _smooth(level, solution, right)
+        smooth(level, solution, right)
     if below:
-        residual = _restrict(level, _residual(level, solution, right))
+        residual = _restrict(level, missing(level, solution, right))
         correction = padded(np.zeros_like(residual))
         _cycle(below, correction, residual, SWEEPS)
         inner(solution)[:] += _prolong(level, inner(correction))
     for _ in range(SWEEPS):
-        _smooth(level, solution, right)
+        smooth(level, solution, right)
 
 
-def _smooth(level: _Level, solution, right) -> None:
-    """A Gauss-Seidel sweep in four colours, which are red-black where only four neighbours count."""
+def smooth(level, solution, right, colours=COLOURS) -> None:
+    """A Gauss-Seidel sweep over the padded solution, in four colours: red-black where only four neighbours count."""
     height, width = level.shape
-    for y, x in COLOURS:
+    for y, x in colours:
         cells = np.s_[y::2, x::2]
         total = right[:, *cells] if np.ndim(right) else 0.0
         for (dy, dx), weight in level.weights.items():
@@ -105,8 +115,8 @@ def _smooth(level: _Level, solution, right) -> None:
         np.copyto(own, total * level.inverse[cells], where=level.live[cells])
 
 
-def _residual(level: _Level, solution, right) -> np.ndarray:
-    """What the equations of the live cells still miss, (N, H, W)."""
+def missing(level, solution, right) -> np.ndarray:
+    """What the equations of the live cells of a padded solution still miss, (N, H, W)."""
     total = right - level.diagonal * inner(solution)
     for offset, weight in level.weights.items():
         total += weight * part(solution, offset)

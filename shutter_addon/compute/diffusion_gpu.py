@@ -73,7 +73,7 @@ _COARSEN_FINEST = tile_pass("diffuse_coarsen_finest", ("weights",), {"next": STO
 _COARSEN = tile_pass("diffuse_coarsen", ("stencil", "weights"), {"next": STORED}, GRIDS)
 _SMOOTH_FINEST = tile_pass("diffuse_smooth_finest", (), {**LABELS, "solution": CHANGED}, {**GRID, "colour": "int"})
 _SMOOTH = tile_pass("diffuse_smooth", ("stencil", "right"), {"solution": CHANGED}, {**GRID, "colour": "ivec2"})
-PROLONG = tile_pass("diffuse_prolong", ("from", "coarser", "weights"), {"to": STORED}, {**GRIDS, "amount": "float"})
+_PROLONG = tile_pass("diffuse_prolong", ("from", "coarser", "weights"), {"to": STORED}, {**GRIDS, "amount": "float"})
 _RESTRICT_FINEST = tile_pass("diffuse_restrict_finest", ("own", "weights"), {"next": STORED}, GRIDS)
 _RESTRICT = tile_pass("diffuse_restrict", ("stencil", "own", "weights", "right"), {"next": STORED}, GRIDS)
 _COARSER = {"weights": _WEIGHTS, "coarsen": _COARSEN, "restrict": _RESTRICT}
@@ -196,7 +196,7 @@ class Diffusion:
         """Sends the lists of tiles of all grids to the device, and notes their places (_Grid.ranges).
 
         whole: the first of the grids that have cells of their own everywhere
-        anew: whether all operators have changed
+        anew: whether nothing of the last solve counts, and all operators have changed
         """
         held, free = _in_fours(labels != 0)
         listed, end = [], 0
@@ -211,7 +211,7 @@ class Diffusion:
             near = reached & live
             feeding = _grown(near)
             around = feeding & live
-            stale = (reached | grid.reached) & _grown(live)
+            stale = np.ones_like(live) if anew else (reached | grid.reached) & _grown(live)
             # Passes read W in the tiles around those near, so it must be zero there. At full size, tiles that are all
             # fixed must hold the values of their labels.
             unsolved = stale | around | ~live if grid.finest else stale | around
@@ -260,20 +260,28 @@ class Diffusion:
         sweeps = FINEST_SWEEPS if grid.finest else SWEEPS
         self._smooth(grid, sweeps)
         first_whole = max(coarser[0].size) <= WHOLE and (grid.finest or max(grid.size) > WHOLE)
-        self._correct(grid, *coarser, lambda: [self._cycle(index + 1) for _ in range(1 + first_whole)])
+        self._hand_down(grid, *coarser)
+        for _ in range(1 + first_whole):
+            self._cycle(index + 1)
+        self._take_up(grid, *coarser, "reached")
         self._smooth(grid, sweeps)
 
     def _solve_coarsest(self, grid: _Grid) -> None:
         self._run(_SOLVE, grid, "near", 1, grid.layers)  # it has one tile
 
-    def _correct(self, grid: _Grid, coarse: _Grid, solve) -> None:
-        """Has the next grid solved for this grid's right-hand side: W stays, and U becomes W + P U' with the new U'."""
-        values, own = grid.textures["solution"], grid.textures["own"]
-        prolong = {"coarse": coarse.size, "coarser": coarse.textures["solution"]}
-        self._run(PROLONG, grid, "near", 16, grid.layers, **prolong, **{"from": values}, to=own, amount=-1.0)
-        self._restrict(grid, coarse, own)
-        solve()
-        self._run(PROLONG, grid, "reached", 16, grid.layers, **prolong, **{"from": own}, to=values, amount=1.0)
+    def _hand_down(self, grid: _Grid, coarse: _Grid) -> None:
+        """Makes W of U, and the next grid's right-hand side of W."""
+        images = {"from": grid.textures["solution"], "to": grid.textures["own"]}
+        self._prolong(grid, coarse, "near", images, -1.0)
+        self._restrict(grid, coarse, grid.textures["own"])
+
+    def _take_up(self, grid: _Grid, coarse: _Grid, tiles: str) -> None:
+        """U becomes W + P U' with the next grid's U'."""
+        self._prolong(grid, coarse, tiles, {"from": grid.textures["own"], "to": grid.textures["solution"]}, 1.0)
+
+    def _prolong(self, grid: _Grid, coarse: _Grid, tiles: str, images, amount: float) -> None:
+        coarser = {"coarse": coarse.size, "coarser": coarse.textures["solution"]}
+        self._run(_PROLONG, grid, tiles, 16, grid.layers, **coarser, **images, amount=amount)
 
     def _restrict(self, grid: _Grid, coarse: _Grid, own) -> None:
         """What a grid's equations miss with these values becomes the next grid's right-hand side."""

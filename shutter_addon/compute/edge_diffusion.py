@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.conductances import cell_side, conductances
-from .diffusion import COLOURS, OFFSETS, beyond, finished, inner, padded, part
+from .diffusion import COLOURS, finished, galerkin, inner, missing, padded, part, smooth
 
 # Cycles where the guide's cells are pixels, whatever it shows, and the iterations of conjugate gradients in each.
 # Largest error × 255 over the scenes of the tests after 6, 8: 1.1, 0.2. And cycles where the cells are larger, so that
@@ -45,8 +45,8 @@ def diffuse_along_edges(labels: np.ndarray, count: int, guide: np.ndarray, stren
     solved = min(first_solved(side), len(grids) - 1)
     solution = padded(labels == np.arange(1, count + 1)[:, None, None])
     for iterations in CYCLES if side == 1 else SMOOTH_CYCLES:
-        missing = _unbalanced(solution, across, down) * grids[0].live
-        change = _cycle(grids, missing, solved, iterations)
+        flow = _unbalanced(solution, across, down) * grids[0].live
+        change = _cycle(grids, flow, solved, iterations)
         inner(solution)[:] += change
         if np.abs(change).max() < ENOUGH:
             break
@@ -66,15 +66,16 @@ def first_solved(side: int) -> int:
 class _Grid:
     """A grid's operator A between its free cells, and the prolongation P from the next grid.
 
-    ties: {(dy, dx): (H, W)} what ties a cell to its neighbour, −A; diagonal: (H, W) of A, 0 for cells that are not free
+    weights: {(dy, dx): (H, W)} what ties a cell to its neighbour, −A
+    diagonal: (H, W) of A, 0 for cells that are not free
     takes: {(b, a): (H, W)} what cell (y, x) takes of the next grid's cell (y // 2 + b, x // 2 + a)
     """
 
-    def __init__(self, ties, diagonal):
-        self.shape, self.ties, self.diagonal = diagonal.shape, ties, diagonal
+    def __init__(self, weights, diagonal):
+        self.shape, self.weights, self.diagonal = diagonal.shape, weights, diagonal
         self.live = diagonal > 0
         self.inverse = np.divide(1, diagonal, where=self.live, out=np.zeros_like(diagonal))
-        self.takes = _prolongation(ties, diagonal, self.live)
+        self.takes = _prolongation(weights, diagonal, self.live)
 
 
 def _finest(free, across, down) -> _Grid:
@@ -131,19 +132,11 @@ def _prolongation(ties, diagonal, live):
 
 
 def _coarser(fine: _Grid) -> _Grid:
-    """PᵀAP by probing: coarse cells three apart do not meet in a row, so nine vectors tell all rows."""
-    height, width = ((n + 1) // 2 for n in fine.shape)
-    rows, columns = np.arange(height) % 3, np.arange(width) % 3
-    probes = np.stack([np.outer(rows == y, columns == x) for y in range(3) for x in range(3)]).astype(np.float32)
-    answers = -_restricted(fine, _missing(fine, padded(_prolonged(fine, probes)), 0.0))
-    entries = {}
-    for y, x in OFFSETS:
-        near = (rows[:, None] + y) % 3 * 3 + (columns + x) % 3
-        entries[y, x] = np.take_along_axis(answers, near[None], axis=0)[0]
-        entries[y, x][beyond(height, y)] = 0
-        entries[y, x][:, beyond(width, x)] = 0
-    diagonal = entries.pop((0, 0))
-    return _Grid({offset: -entry for offset, entry in entries.items()}, np.maximum(diagonal, 0))
+    def answer(values):
+        return -_restricted(fine, missing(fine, padded(_prolonged(fine, values)), 0.0))
+
+    weights, diagonal = galerkin(fine.shape, answer)
+    return _Grid(weights, np.maximum(diagonal, 0))
 
 
 def _unbalanced(solution, across, down) -> np.ndarray:
@@ -168,19 +161,19 @@ def _cycle(grids, right, solved: int, iterations: int, twice: int = 0) -> np.nda
     grid, *below = grids
     values = padded(np.zeros_like(right))
     for colours in (COLOURS,) * SWEEPS:
-        _smooth(grid, values, right, colours)
+        smooth(grid, values, right, colours)
     if not below:
         return inner(values)
-    coarse = _restricted(grid, _missing(grid, values, right))
+    coarse = _restricted(grid, missing(grid, values, right))
     if solved == 1:
         correction = _conjugate_gradients(below, coarse, iterations)
     else:
         correction = _cycle(below, coarse, solved - 1, iterations, twice - 1)
         if twice > 0 and len(below) > 1:
-            correction += _cycle(below, _missing(below[0], padded(correction), coarse), 0, 0, twice - 1)
+            correction += _cycle(below, missing(below[0], padded(correction), coarse), 0, 0, twice - 1)
     inner(values)[:] += _prolonged(grid, correction)
     for colours in (COLOURS[::-1],) * SWEEPS:
-        _smooth(grid, values, right, colours)
+        smooth(grid, values, right, colours)
     return inner(values)
 
 
@@ -191,7 +184,7 @@ def _conjugate_gradients(grids, right, iterations: int) -> np.ndarray:
         guess = _cycle(grids, residual, 0, 0, TWICE)
         power = _dot(residual, guess)
         direction = guess + _ratio(power, before) * direction
-        answer = -_missing(grids[0], padded(direction), 0.0)
+        answer = -missing(grids[0], padded(direction), 0.0)
         step = _ratio(power, _dot(direction, answer))
         solution = solution + step * direction
         residual = residual - step * answer
@@ -205,25 +198,6 @@ def _dot(one, other):
 
 def _ratio(a, b):
     return np.divide(a, b, out=np.zeros_like(a), where=b > 0)
-
-
-def _smooth(grid: _Grid, values, right, colours) -> None:
-    """A Gauss-Seidel sweep over the padded values (N, H + 2, W + 2)."""
-    height, width = grid.shape
-    for y, x in colours:
-        cells = np.s_[y::2, x::2]
-        total = right[:, *cells].copy()
-        for (dy, dx), weights in grid.ties.items():
-            total += weights[cells] * values[:, y + 1 + dy : height + 1 + dy : 2, x + 1 + dx : width + 1 + dx : 2]
-        inner(values)[:, *cells] = total * grid.inverse[cells]
-
-
-def _missing(grid: _Grid, values, right) -> np.ndarray:
-    """What the equations of padded values still miss, (N, H, W)."""
-    total = right - grid.diagonal * inner(values)
-    for offset, weights in grid.ties.items():
-        total += weights * part(values, offset)
-    return total
 
 
 def _prolonged(grid: _Grid, coarse) -> np.ndarray:

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..core.conductances import cell_side, resistances
-from .diffusion_gpu import CHANGED, FINISH, GRID, GRIDS, LABELS, NOTHING, PROLONG, READ, STORED, Diffusion, tile_pass
+from .diffusion_gpu import CHANGED, FINISH, GRID, GRIDS, LABELS, NOTHING, READ, STORED, Diffusion, tile_pass
 from .edge_diffusion import CYCLES, SWEEPS, TWICE, first_solved
 from .passes import LOCAL_ROW, Image, Pass
 
@@ -69,15 +69,13 @@ class EdgeDiffusion(Diffusion):
         self._provide(guide.shape[:2])
         self._device.write(self._grids[0].textures["labels"], np.ascontiguousarray(labels, dtype=np.uint16))
         self._device.write(self._more["resistances"], resistances(guide, strength)[..., None])
-        self._list_tiles(labels, 0, anew=True)
+        self._list_tiles(labels, 0 if side == 1 else self._solved, anew=True)
         placed = {"guided": guide.shape[1::-1], "side": side, "resistances": self._more["resistances"]}
         self._run(_LINKS, self._grids[0], "anew", 64, **placed)
-        if side > 1:
-            self._list_tiles(labels, self._solved, anew=True)
         self._start(0)
         self._coarsen()
         if side > 1:
-            self._cycle_near()
+            self._cycles_near()
             self._list_tiles(labels, 0)
         for iterations in CYCLES if side == 1 else LAST_CYCLES:
             self._visit(0, iterations)
@@ -107,24 +105,25 @@ class EdgeDiffusion(Diffusion):
         if "links" not in finest.textures:
             finest.textures["links"] = self._device.texture(*finest.size, 1, "rgba32f")
 
-    def _cycle_near(self) -> None:
+    def _cycles_near(self) -> None:
         """Cycles near scribbles alone; then the pixels far from them get their values from the grid that was solved."""
         for iterations in NEAR_CYCLES:
-            self._cycle(0, iterations)
+            self._near_cycle(0, iterations)
         for fine, coarse in reversed(list(pairwise(self._grids[: self._solved + 1]))):
-            given = {"from": fine.textures["own"], "to": fine.textures["solution"], "amount": 1.0}
-            given |= {"coarse": coarse.size, "coarser": coarse.textures["solution"]}
-            self._run(PROLONG, fine, "far", 16, fine.layers, **given)
+            self._take_up(fine, coarse, "far")
 
-    def _cycle(self, index: int, iterations: int) -> None:
+    def _near_cycle(self, index: int, iterations: int) -> None:
         """A V-cycle near scribbles, over the grids from this one to that of the conjugate gradients."""
         grid = self._grids[index]
         if index == self._solved:
             self._conjugate_gradients(grid, iterations)
             return
         sweeps = NEAR_SWEEPS if grid.finest else SMOOTH_SWEEPS
+        coarse = self._grids[index + 1]
         self._smooth(grid, sweeps)
-        self._correct(grid, self._grids[index + 1], lambda: self._cycle(index + 1, iterations))
+        self._hand_down(grid, coarse)
+        self._near_cycle(index + 1, iterations)
+        self._take_up(grid, coarse, "reached")
         self._smooth(grid, sweeps, back=True)
 
     def _conjugate_gradients(self, grid, iterations: int) -> None:
