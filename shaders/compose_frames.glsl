@@ -40,6 +40,22 @@ void find_middle()
   EACH(widen_reach);
 }
 
+#if MOVED
+// When the block's pixels are exposed. A frame seen elsewhere costs too much for those that none of them exposes.
+float from = 1e9;
+float until = 0.0;
+
+void widen_exposure(int quad)
+{
+  vec4 start = mixed(quad, 0, 1);
+  vec4 end = mixed(quad, GROUPS, rows);
+  vec2 low = min(start.xy, start.zw);
+  vec2 high = max(end.xy, end.zw);
+  from = min(from, min(low.x, low.y));
+  until = max(until, max(high.x, high.y));
+}
+#endif
+
 // The middle's quantile in the table's row, at the piece's start (column 0) or end (column GROUPS).
 float middle_time(int column, int row)
 {
@@ -79,7 +95,14 @@ void main()
   EACH(CLEAR);
   float passed = 0.0;
   int row = 1;
-  for (frame = first; frame < last; frame++) {
+  int begin = first;
+  int end = last;
+#if MOVED
+  EACH(widen_exposure);
+  begin = max(begin, int(from));
+  end = min(end, int(ceil(until)));
+#endif
+  for (frame = begin; frame < end; frame++) {
     boundary = float(frame + 1);
     for (; row <= rows; row++) {
       vec2 extent = extent_of(row);

@@ -1,8 +1,8 @@
 // Frames that are not seen where a pixel lies, but where what its shutters follow was: one resampling a frame.
 // frames: some of the window's, in layers; or with PACKED packed_frames, as shaders/pack.glsl makes them.
 // moves: a row for each of the window's frames and of `motions`, of which there are several where pictures are mixed: the
-// frame's layer (−1: it is not among these) and whether it is there at all; then the columns of turn − 1 and of shift,
-// real and imaginary parts, four shutters per texel. seen_first to seen_last: the window's frames that are there.
+// frame's layer (−1: it is not among these) and whether it is there at all; then a texel for each of the SHUTTERS: turn − 1
+// and shift, real and imaginary parts. seen_first to seen_last: the window's frames that are there.
 // table: as for compose.glsl, a row for each frame and motion; from row `parts` on, one for each motion: 1 for its shutters.
 // SEVERAL: other passes have other frames. CONTINUED: what those before have summed is in `summed`; UNFINISHED: another
 // one follows. SHARP: as in core.compositor.seen.
@@ -105,12 +105,15 @@ vec2 moved_by(vec4 move, ivec2 pixel)
   return vec2(move.x * z.x - move.y * z.y, move.y * z.x + move.x * z.y) + move.zw;
 }
 
-// A number of moves for a quad's pixels.
-vec4 moves_of(int quad, int number, int row)
+// (turn − 1, shift) of a quad's pixels, a column each.
+mat4 moves_of(int quad, int row)
 {
-  vec4 sum = vec4(0.0);
-  for (int g = 0; g < GROUPS; g++) {
-    sum += imageLoad(moves, ivec3(1 + number * GROUPS + g, row, 0)) * c[quad * GROUPS + g];
+  mat4 sum = mat4(0.0);
+  for (int i = 0; i < SHUTTERS; i++) {
+    vec4 own = imageLoad(moves, ivec3(1 + i, row, 0));
+    for (int pixel = 0; pixel < 4; pixel++) {
+      sum[pixel] += c[quad * GROUPS + i / 4][pixel][i % 4] * own;
+    }
   }
   return sum;
 }
@@ -130,8 +133,7 @@ void expose(int quad, int frame, vec4 weight)
   int layer = max(int(place.x), 0);
 #endif
   {
-    mat4 move = transpose(mat4(moves_of(quad, 0, row), moves_of(quad, 1, row), moves_of(quad, 2, row),
-                               moves_of(quad, 3, row)));
+    mat4 move = moves_of(quad, row);
     mat4 light;
     light[0] = weight.x * seen_light(pixel_at(quad, 0), moved_by(move[0], pixel_at(quad, 0)), layer);
     light[1] = weight.y * seen_light(pixel_at(quad, 1), moved_by(move[1], pixel_at(quad, 1)), layer);
@@ -150,17 +152,12 @@ vec4 nearest_light(int quad, int pixel)
   for (motion = 0; motion < motions; motion++) {
     int row = nearest * motions + motion;
     float part = 0.0;
-    vec4 move = vec4(0.0);
     for (int g = 0; g < GROUPS; g++) {
-      vec4 own = c[quad * GROUPS + g][pixel];
-      part += dot(own, imageLoad(table, ivec3(g, parts + motion, 0)));
-      for (int number = 0; number < 4; number++) {
-        move[number] += dot(own, imageLoad(moves, ivec3(1 + number * GROUPS + g, row, 0)));
-      }
+      part += dot(c[quad * GROUPS + g][pixel], imageLoad(table, ivec3(g, parts + motion, 0)));
     }
     int layer = int(imageLoad(moves, ivec3(0, row, 0)).x);
     ivec2 own_pixel = pixel_at(quad, pixel);
-    vec4 found = seen_light(own_pixel, moved_by(move, own_pixel), max(layer, 0));
+    vec4 found = seen_light(own_pixel, moved_by(moves_of(quad, row)[pixel], own_pixel), max(layer, 0));
     light += layer < 0 ? vec4(0.0) : part * found;
   }
   return light;

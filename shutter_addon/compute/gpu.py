@@ -98,7 +98,7 @@ def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, encoded
 def composition_of_moved(
     way: str,
     quads: int,
-    groups: int,
+    shutters: int,
     packed: bool,
     decode: int,
     shortened: bool,
@@ -127,7 +127,8 @@ def composition_of_moved(
             "SQUARED": int(not encoded),
             "SEVERAL": int(continued or unfinished),
             "QUADS": quads,
-            "GROUPS": groups,
+            "GROUPS": -(-shutters // 4),
+            "SHUTTERS": shutters,
             "SUMS": 0,
             "TILED": 0,
             "EDGES": 2 if shortened else 0,
@@ -361,7 +362,7 @@ class GPUCompositor:
             program = composition_of_moved(
                 way,
                 quads,
-                -(-len(state.bars) // 4),
+                len(state.bars),
                 packed,
                 0 if packed else decoding(window.transfer, options.light),
                 shortened,

@@ -45,7 +45,7 @@ def _bars(bars) -> np.ndarray:
 
 
 def moved_tables(state: FrameState, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The table of `table` and that of the moves (L · motions, columns, 4) float32 which shaders/include/moved.glsl
+    """The table of `table` and that of the moves (L · motions, 1 + N, 4) float32 which shaders/include/moved.glsl
     describes, its first number of each row 0.
 
     By displacement there is one motion, in which the shutters' own are mixed; by value one for all shutters that move
@@ -63,9 +63,9 @@ def moved_tables(state: FrameState, frames: np.ndarray) -> tuple[np.ndarray, np.
         bars = _bars(state.bars)
         values = np.concatenate([values[:1], (bars[:, None] * padded(own)).reshape(-1, *bars.shape[1:])])
     parts = np.zeros((len(own), *values.shape[1:]), np.float32)
-    columns = padded(numbers)  # (rows, 4, G, 4)
-    parts[:, : columns.shape[2]] = padded(own)
-    moves = np.zeros((len(columns), 1 + 4 * columns.shape[2], 4), np.float32)
-    moves[:, 1:] = columns.reshape(len(columns), -1, 4)
+    grouped = padded(own)
+    parts[:, : grouped.shape[1]] = grouped
+    moves = np.zeros((len(numbers), 1 + len(state.bars), 4), np.float32)
+    moves[:, 1:] = numbers.swapaxes(1, 2)
     moves[:, 0, 1] = (frames >= 0).repeat(len(own))
     return np.concatenate([values, parts]).astype(np.float32), moves
