@@ -290,13 +290,16 @@ class Case:
 
     def _edges_error(self) -> float:
         """Of what was solved last, along edges."""
-        count = len(self.state.bars)
-        got, usual = self.compositor.coefficients(self.edges, count).copy(), edge_diffusion_gpu.LAST_CYCLES
+        count, settings = len(self.state.bars), ("LAST_CYCLES", "PIXEL_CYCLES", "ENOUGH")
+        got = self.compositor.coefficients(self.edges, count).copy()
+        usual = [getattr(edge_diffusion_gpu, name) for name in settings]
         try:
-            edge_diffusion_gpu.LAST_CYCLES = (4,) * 8
+            for name, value in zip(settings, ((4,) * 8, (4,) * 16, 0), strict=True):
+                setattr(edge_diffusion_gpu, name, value)
             self.diffuse("edges")
         finally:
-            edge_diffusion_gpu.LAST_CYCLES = usual
+            for name, value in zip(settings, usual, strict=True):
+                setattr(edge_diffusion_gpu, name, value)
         return float(np.abs(self.compositor.coefficients(self.edges, count) - got).max() * 255)
 
     def release(self) -> None:

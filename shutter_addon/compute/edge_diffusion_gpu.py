@@ -8,9 +8,14 @@ import numpy as np
 
 from ..core.conductances import cell_side, resistances
 from .diffusion_gpu import CHANGED, FINISH, GRID, GRIDS, LABELS, NOTHING, READ, STORED, Diffusion, tile_pass
-from .edge_diffusion import CYCLES, SWEEPS, TWICE, first_solved
+from .edge_diffusion import SWEEPS, TWICE, first_solved
 from .passes import LOCAL_ROW, Image, Pass
 
+# Where the guide's cells are pixels: the iterations of conjugate gradients in each cycle, and the change of a coefficient
+# after which no other cycle follows. Largest error × 255 over the scenes of the tests where the last cycle changed less
+# than 1/255, 1/512 and 1/1024: 0.80, 0.38, 0.18.
+PIXEL_CYCLES = (4,) * 9
+ENOUGH = 1 / 512
 # Where the guide's cells are larger than pixels: the iterations of conjugate gradients in each cycle, first of cycles
 # near scribbles alone, then of those everywhere. Largest error × 255 in frames of three films at 1920 × 1080: 0.6.
 NEAR_CYCLES = (4, 2)
@@ -39,6 +44,12 @@ _DOT = Pass(
     constants={"size": "ivec2", "parts": "int"},
     local_size=LOCAL_ROW,
 )
+_CHANGE = Pass(
+    "edges_change",
+    images={"solution": READ, "own": CHANGED, "result": STORED},
+    constants={"size": "ivec2", "parts": "int"},
+    local_size=LOCAL_ROW,
+)
 _SUM = Pass(
     "edges_sum",
     images={"result": READ, "sums": CHANGED},
@@ -60,6 +71,7 @@ class EdgeDiffusion(Diffusion):
 
     def solve(self, labels: np.ndarray, count: int, guide: np.ndarray, strength: float):
         """As Diffusion.solve; guide and strength as for diffuse_along_edges. Some pixel has to be fixed, and some free.
+        Where the guide's cells are pixels, a number is read back after each cycle: whether it was enough.
 
         The result does not depend on what was solved before."""
         side = cell_side(guide.shape[:2], labels.shape)
@@ -77,8 +89,10 @@ class EdgeDiffusion(Diffusion):
         if side > 1:
             self._cycles_near()
             self._list_tiles(labels, 0)
-        for iterations in CYCLES if side == 1 else LAST_CYCLES:
+        for iterations in PIXEL_CYCLES if side == 1 else LAST_CYCLES:
             self._visit(0, iterations)
+            if side == 1 and self._change() < ENOUGH:
+                break
         self._run(FINISH, self._grids[0], "near", 64, nothing=NOTHING)
         return self._grids[0].textures["solution"]
 
@@ -173,6 +187,14 @@ class EdgeDiffusion(Diffusion):
 
     def _clear(self, grid, values) -> None:
         self._device.run(_ZERO, (*grid.size, grid.layers), images={"values": values}, size=grid.size)
+
+    def _change(self) -> float:
+        """By how much the coefficients have changed at most, since the last call or the start."""
+        grid = self._grids[0]
+        parts = min(PARTS, grid.size[0] * grid.size[1])
+        images = {"solution": grid.textures["solution"], "own": grid.textures["own"], "result": self._more["parts"]}
+        self._device.run(_CHANGE, (parts, 1, grid.layers), images=images, size=grid.size, parts=parts)
+        return self._device.read(self._more["parts"])[:, :, :parts].max()
 
     def _dot(self, grid, one, other, place: int) -> None:
         parts = min(PARTS, grid.size[0] * grid.size[1])
