@@ -290,7 +290,7 @@ class Case:
 
     def _edges_error(self) -> float:
         """Of what was solved last, along edges."""
-        count, settings = len(self.state.bars), ("LAST_CYCLES", "PIXEL_CYCLES", "ENOUGH")
+        count, settings = len(self.state.bars), ("LAST_CYCLES", "CYCLES", "ENOUGH")
         got = self.compositor.coefficients(self.edges, count).copy()
         usual = [getattr(edge_diffusion_gpu, name) for name in settings]
         try:

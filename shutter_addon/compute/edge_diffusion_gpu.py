@@ -8,14 +8,9 @@ import numpy as np
 
 from ..core.conductances import cell_side, resistances
 from .diffusion_gpu import CHANGED, FINISH, GRID, GRIDS, LABELS, NOTHING, READ, STORED, Diffusion, tile_pass
-from .edge_diffusion import SWEEPS, TWICE, first_solved
+from .edge_diffusion import CYCLES, ENOUGH, SWEEPS, TWICE, first_solved
 from .passes import LOCAL_ROW, Image, Pass
 
-# Where the guide's cells are pixels: the iterations of conjugate gradients in each cycle, and the change of a coefficient
-# after which no other cycle follows. Largest error × 255 over the scenes of the tests where the last cycle changed less
-# than 1/255, 1/512 and 1/1024: 0.80, 0.38, 0.18.
-PIXEL_CYCLES = (4,) * 9
-ENOUGH = 1 / 512
 # Where the guide's cells are larger than pixels: the iterations of conjugate gradients in each cycle, first of cycles
 # near scribbles alone, then of those everywhere. Largest error × 255 in frames of three films at 1920 × 1080: 0.6.
 NEAR_CYCLES = (4, 2)
@@ -89,7 +84,7 @@ class EdgeDiffusion(Diffusion):
         if side > 1:
             self._cycles_near()
             self._list_tiles(labels, 0)
-        for iterations in PIXEL_CYCLES if side == 1 else LAST_CYCLES:
+        for iterations in CYCLES if side == 1 else LAST_CYCLES:
             self._visit(0, iterations)
             if side == 1 and self._change() < ENOUGH:
                 break
