@@ -20,8 +20,8 @@ from .diffusion import COLOURS, finished, galerkin, inner, missing, padded, part
 # on pixels conductances are smooth.
 CYCLES = (4,) * 8
 SMOOTH_CYCLES = (5, 3, 2, 2)
-# A cycle that changes no coefficient by as much is the last. Largest error × 255 over the scenes of the tests, on a GPU,
-# for 1/255, 1/512, 1/1024: 0.80, 0.38, 0.18; three frames of films at 640 × 360 take six to eight cycles.
+# A cycle that changes no coefficient by as much is the last. Largest error × 255 over the scenes of the tests on a GPU
+# for 1/255, 1/512, 1/1024: 0.80, 0.38, 0.18. Three frames of films at 640 × 360 take six to eight cycles.
 ENOUGH = 1 / 512
 # Gauss-Seidel sweeps over a grid before its correction by coarser ones, and again after it.
 SWEEPS = 2
