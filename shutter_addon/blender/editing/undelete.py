@@ -60,6 +60,8 @@ def _plain(struct) -> dict:
         name = prop.identifier
         if prop.type == "COLLECTION":
             plain[name] = [_plain(item) for item in getattr(struct, name)]
+        elif property_copy.is_group(struct, name):
+            plain[name] = _plain(getattr(struct, name))
         elif prop.type != "POINTER" and name != "co_ui":  # setting that one moves a key's handles
             value = property_copy.stored(struct, name)
             plain[name] = tuple(value) if getattr(prop, "is_array", False) else value
@@ -71,6 +73,8 @@ def _fill(struct, plain: dict) -> None:
         if isinstance(value, list):
             for item in value:
                 _fill(_add(getattr(struct, name), name, item), item)
+        elif isinstance(value, dict):
+            _fill(getattr(struct, name), value)
         elif not struct.is_property_readonly(name):
             property_copy.store(struct, name, value)
 

@@ -1,4 +1,4 @@
-"""Operators that key a region by the footage: as what it covers moves, or as something tracked in a movie clip does."""
+"""Operators that key a region or the camera by the footage: as what is seen moves, or as a movie clip's tracks do."""
 
 import time
 
@@ -9,9 +9,9 @@ from bpy.types import Operator
 
 from ..data import selection, validation
 from ..data.properties import CONTEXT
-from ..editing import follow_track, track_region
+from ..editing import bar_edits, follow_stabilization, follow_track, shutter_edits, track_region
 from ..rendering.session import FAULTS
-from .operators import _OfRegion, redraw, refused
+from .operators import _OfEffect, _OfRegion, _OfShutter, redraw, refused
 
 # Seconds of work, at least, from one look at the window to the next.
 _TICK = 0.05
@@ -23,11 +23,9 @@ DIRECTIONS = (
 )
 
 
-class SHUTTER_OT_track(_OfRegion, Operator):
-    """Key the active region by what it covers here, up to your own keys (Esc stops and keeps the tracked frames)"""
+class _Tracks:
+    """Keys what moves in the footage, frame after frame, while the window shows it."""
 
-    bl_idname = "shutter.track"
-    bl_label = "Track Region"
     bl_options = {"UNDO"}
 
     # Blender would use again what a button was pressed with before.
@@ -43,11 +41,7 @@ class SHUTTER_OT_track(_OfRegion, Operator):
     def invoke(self, context, _event):
         if bpy.app.background:
             return self.execute(context)
-        try:
-            self._begin(context)
-            self._go_on(_TICK)
-        except FAULTS as error:
-            self.report({"ERROR"}, str(error))
+        if not self._begins(context, _TICK):
             return {"CANCELLED"}
         self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
         context.window_manager.progress_begin(0, len(self._frames))
@@ -56,11 +50,7 @@ class SHUTTER_OT_track(_OfRegion, Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context):
-        try:
-            self._begin(context)
-            self._go_on(float("inf"))
-        except FAULTS as error:
-            self.report({"ERROR"}, str(error))
+        if not self._begins(context, float("inf")):
             return {"CANCELLED"}
         self._tell()
         redraw(context)
@@ -91,12 +81,31 @@ class SHUTTER_OT_track(_OfRegion, Operator):
         context.window_manager.progress_end()
         context.workspace.status_text_set(None)
 
+    def subject(self, effect) -> int | None:
+        """What is tracked, as for selection.moving."""
+        raise NotImplementedError
+
+    def begun(self, context, effect) -> None:
+        """There is something that can be tracked."""
+
+    def _begins(self, context, seconds: float) -> bool:
+        """Tracks for a while; False, with a sentence: there is nothing to track, and nothing has changed."""
+        try:
+            self._begin(context)
+            self._go_on(seconds)
+        except FAULTS as error:
+            self.report({"ERROR"}, str(error))
+            return False
+        self.begun(context, selection.active(context)[1])
+        return True
+
     def _begin(self, context):
         edit, effect, strip = selection.active(context)
-        index, region = effect.active_region, selection.active_region(effect)
+        index = self.subject(effect)
+        moving = selection.moving(effect, index)
         self._target, self._start, self._done = track_region.Target.of(effect, index), edit.frame_current, set()
-        self._frames = track_region.frames_to_track(edit, strip, self.direction, region.track_until)
-        motion, all_keys = validation.word(region, "motion"), region.track_all_keys
+        self._frames = track_region.frames_to_track(edit, strip, self.direction, moving.track_until)
+        motion, all_keys = validation.word(moving, "motion"), moving.track_all_keys
         self._steps = track_region.track(edit, effect, strip, index, self._frames, motion, all_keys=all_keys)
 
     def _go_on(self, seconds: float) -> bool:
@@ -140,11 +149,42 @@ class SHUTTER_OT_track(_OfRegion, Operator):
                 self.report({"WARNING" if is_fault else "INFO"}, sentence.format(frame=frame, fault=fault))
 
 
-class SHUTTER_OT_track_look(_OfRegion, Operator):
-    """Go to a frame that tracking is not sure of"""
+class SHUTTER_OT_track(_Tracks, _OfRegion, Operator):
+    """Key the active region by what it covers here, up to your own keys (Esc stops and keeps the tracked frames)"""
 
-    bl_idname = "shutter.track_look"
-    bl_label = "Next Unsure Frame"
+    bl_idname = "shutter.track"
+    bl_label = "Track Region"
+
+    def subject(self, effect):
+        return effect.active_region
+
+
+class SHUTTER_OT_track_camera(_Tracks, _OfEffect, Operator):
+    """Key the camera by what the regions leave free, up to your own keys (Esc stops and keeps the tracked frames)"""
+
+    bl_idname = "shutter.track_camera"
+    bl_label = "Track Camera"
+
+    def subject(self, _effect):
+        return None
+
+
+class SHUTTER_OT_tripod(_Tracks, _OfShutter, Operator):
+    """Track the camera, and give the shutter a long exposure that follows it, as if on a tripod"""
+
+    bl_idname = "shutter.tripod"
+    bl_label = "Tripod"
+
+    def subject(self, _effect):
+        return None
+
+    def begun(self, context, effect):
+        shutter_edits.put_on_tripod(effect, bar_edits.auto_key(context))
+
+
+class _Looks:
+    """Goes to a frame that tracking is not sure of."""
+
     bl_options = {"REGISTER"}
 
     frame: IntProperty(
@@ -158,7 +198,7 @@ class SHUTTER_OT_track_look(_OfRegion, Operator):
         if self.properties.is_property_set("frame"):
             edit.frame_set(self.frame)
             return {"FINISHED"}
-        frame = track_region.next_unsure(effect, effect.active_region, edit.frame_current)
+        frame = track_region.next_unsure(effect, self.subject(effect), edit.frame_current)
         if frame is None:
             self.report({"INFO"}, "No other stretch of unsure frames lies ahead")
             return {"CANCELLED"}
@@ -166,25 +206,46 @@ class SHUTTER_OT_track_look(_OfRegion, Operator):
         return {"FINISHED"}
 
 
-class _Follows(_OfRegion):
-    """Keys the region by what it is set to follow."""
+class SHUTTER_OT_track_look(_Looks, _OfRegion, Operator):
+    """Go to a frame that tracking is not sure of"""
+
+    bl_idname = "shutter.track_look"
+    bl_label = "Next Unsure Frame"
+
+    def subject(self, effect):
+        return effect.active_region
+
+
+class SHUTTER_OT_track_camera_look(_Looks, _OfEffect, Operator):
+    """Go to a frame that tracking is not sure of"""
+
+    bl_idname = "shutter.track_camera_look"
+    bl_label = "Next Unsure Frame"
+
+    def subject(self, _effect):
+        return None
+
+
+class _Follows:
+    """Keys a region or the camera by what it is set to follow."""
 
     def change(self, context, effect):
         try:
-            self.key(*selection.active(context), effect.active_region)
+            self.follow(selection.active(context))
         except FAULTS as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return None
 
 
-class SHUTTER_OT_follow(_Follows, Operator):
+class SHUTTER_OT_follow(_Follows, _OfRegion, Operator):
     """Key the active region by a track of a movie clip, from where the region is at this frame"""
 
     bl_idname = "shutter.follow"
     bl_label = "Follow"
 
-    key = staticmethod(follow_track.follow)
+    def follow(self, active):
+        follow_track.follow(*active, active[1].active_region)
 
     @classmethod
     def possible(cls, effect):
@@ -193,13 +254,14 @@ class SHUTTER_OT_follow(_Follows, Operator):
         return selection.active_region(effect).follow_clip is not None or refused(cls, rpt_("Choose a clip first"))
 
 
-class SHUTTER_OT_follow_update(_Follows, Operator):
+class SHUTTER_OT_follow_update(_Follows, _OfRegion, Operator):
     """Key the active region anew by what it follows, after the track has changed"""
 
     bl_idname = "shutter.follow_update"
     bl_label = "Update"
 
-    key = staticmethod(follow_track.update)
+    def follow(self, active):
+        follow_track.update(*active, active[1].active_region)
 
     @classmethod
     def possible(cls, effect):
@@ -210,7 +272,30 @@ class SHUTTER_OT_follow_update(_Follows, Operator):
         )
 
 
-classes = (SHUTTER_OT_track, SHUTTER_OT_track_look, SHUTTER_OT_follow, SHUTTER_OT_follow_update)
+class SHUTTER_OT_follow_stabilization(_Follows, _OfEffect, Operator):
+    """Key the camera by the 2D stabilization of a movie clip, from where the camera is at this frame"""
+
+    bl_idname = "shutter.follow_stabilization"
+    bl_label = "Follow Stabilization"
+
+    def follow(self, active):
+        follow_stabilization.follow(*active)
+
+    @classmethod
+    def possible(cls, effect):
+        return effect.camera.follow_clip is not None or refused(cls, rpt_("Choose a clip first"))
+
+
+classes = (
+    SHUTTER_OT_track,
+    SHUTTER_OT_track_camera,
+    SHUTTER_OT_tripod,
+    SHUTTER_OT_track_look,
+    SHUTTER_OT_track_camera_look,
+    SHUTTER_OT_follow,
+    SHUTTER_OT_follow_update,
+    SHUTTER_OT_follow_stabilization,
+)
 
 
 def register():
