@@ -210,6 +210,7 @@ def _draw_tracking(layout, effect, region) -> None:
     for direction, _name, _description, icon, _number in track_operators.DIRECTIONS:
         button = row.operator("shutter.track", text="Track" if direction == "BOTH" else "", icon=icon)
         button.direction = direction
+    layout.operator("shutter.panning_shot", icon="CON_FOLLOWTRACK")
     index = effect.active_region
     confidence = track_region.confidence_at(effect, index, effect.id_data.frame_current)
     if confidence is not None:

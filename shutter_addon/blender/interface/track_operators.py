@@ -1,4 +1,5 @@
-"""Operators that key a region by the footage: as what it covers moves, or as something tracked in a movie clip does."""
+"""Operators that key a region by the footage: as what it covers moves, or as something tracked in a movie clip does;
+and one that makes a panning shot of that."""
 
 import time
 
@@ -9,7 +10,7 @@ from bpy.types import Operator
 
 from ..data import selection, validation
 from ..data.properties import CONTEXT
-from ..editing import follow_track, track_region
+from ..editing import bar_edits, follow_track, panning_shot, track_region
 from ..rendering.session import FAULTS
 from .operators import _OfRegion, redraw, refused
 
@@ -23,66 +24,61 @@ DIRECTIONS = (
 )
 
 
-class SHUTTER_OT_track(_OfRegion, Operator):
-    """Key the active region by what it covers here, up to your own keys (Esc stops and keeps the tracked frames)"""
+class _Tracks(_OfRegion):
+    """Tracks the active region from the current frame in a `direction` of DIRECTIONS."""
 
-    bl_idname = "shutter.track"
-    bl_label = "Track Region"
     bl_options = {"UNDO"}
 
-    # Blender would use again what a button was pressed with before.
-    direction: EnumProperty(
-        name="Direction",
-        description="Where tracking goes from the current frame",
-        items=DIRECTIONS,
-        default="BOTH",
-        options={"SKIP_SAVE"},
-        translation_context=CONTEXT,
-    )
+    def ended(self, context) -> None:
+        """Called once all is tracked, and not after Esc. EffectError: what comes after tracking cannot be done."""
 
     def invoke(self, context, _event):
-        if bpy.app.background:
-            return self.execute(context)
+        return self._run(context, float("inf") if bpy.app.background else _TICK)
+
+    def execute(self, context):
+        return self._run(context, float("inf"))
+
+    def _run(self, context, seconds: float):
+        """Tracks for a while, and then whenever Blender has time."""
         try:
             self._begin(context)
-            self._go_on(_TICK)
+            goes_on = self._go_on(seconds)
         except FAULTS as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        if not goes_on:
+            return self._finish(context)
         self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
         context.window_manager.progress_begin(0, len(self._frames))
         context.window_manager.modal_handler_add(self)
         self._show(context)
         return {"RUNNING_MODAL"}
 
-    def execute(self, context):
-        try:
-            self._begin(context)
-            self._go_on(float("inf"))
-        except FAULTS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        self._tell()
-        redraw(context)
-        return {"FINISHED"}
-
     def modal(self, context, event):
         if self._target.effect() is None:  # undone or removed in another window, or another file was loaded
             self.cancel(context)
             return {"CANCELLED"}
-        is_stopped = event.type == "ESC" and event.value == "PRESS"
+        is_stopped = is_ended = event.type == "ESC" and event.value == "PRESS"
         if event.type == "TIMER":
             # What it takes to draw a frame, tracking takes at least as well.
-            is_stopped = not self._go_on(max(_TICK, time.perf_counter() - self._shown))
+            is_ended = not self._go_on(max(_TICK, time.perf_counter() - self._shown))
             self._show(context)
-        if not is_stopped:
+        if not is_ended:
             return {"RUNNING_MODAL"}
         self.cancel(context)
         if self.direction == "BOTH":
             self._go_to(self._start)
+        return self._finish(context, is_stopped)
+
+    def _finish(self, context, is_stopped: bool = False):
         self._tell()
+        try:
+            if not is_stopped and self._target.effect() is not None:
+                self.ended(context)
+        except FAULTS as error:
+            self.report({"ERROR"}, str(error))
         redraw(context)
-        return {"FINISHED"}
+        return {"FINISHED"}  # what was tracked can be undone
 
     def cancel(self, context):
         """It has ended, or its window was closed."""
@@ -128,7 +124,7 @@ class SHUTTER_OT_track(_OfRegion, Operator):
         self._shown = time.perf_counter()
 
     def _tell(self):
-        if (effect := self._target.effect()) is None:
+        if (effect := self._target.effect()) is None or not self._done:
             return
         sentence = rpt_("Frames {first} to {last} are tracked, {unsure} of them unsure")
         unsure = track_region.unsure_among(effect, self._target.index, self._done)
@@ -138,6 +134,43 @@ class SHUTTER_OT_track(_OfRegion, Operator):
             if frame in self._frames:
                 sentence = rpt_("Tracking stopped at frame {frame}: {fault}")
                 self.report({"WARNING" if is_fault else "INFO"}, sentence.format(frame=frame, fault=fault))
+
+
+class SHUTTER_OT_track(_Tracks, Operator):
+    """Key the active region by what it covers here, up to your own keys (Esc stops and keeps the tracked frames)"""
+
+    bl_idname = "shutter.track"
+    bl_label = "Track Region"
+
+    # Blender would use again what a button was pressed with before.
+    direction: EnumProperty(
+        name="Direction",
+        description="Where tracking goes from the current frame",
+        items=DIRECTIONS,
+        default="BOTH",
+        options={"SKIP_SAVE"},
+        translation_context=CONTEXT,
+    )
+
+
+class SHUTTER_OT_panning_shot(_Tracks, Operator):
+    """Keep what the active region moves with sharp while all else streaks (tracks the region unless it has keys)"""
+
+    bl_idname = "shutter.panning_shot"
+    bl_label = "Panning Shot"
+
+    direction = "BOTH"
+
+    def _begin(self, context):
+        edit, effect, strip = selection.active(context)
+        index = effect.active_region
+        if panning_shot.is_ready(edit, effect, strip, index):
+            self._target, self._steps, self._done = track_region.Target.of(effect, index), iter(()), set()
+        else:
+            super()._begin(context)
+
+    def ended(self, context):
+        panning_shot.set_up(self._target.effect(), self._target.index, bar_edits.auto_key(context))
 
 
 class SHUTTER_OT_track_look(_OfRegion, Operator):
@@ -210,7 +243,13 @@ class SHUTTER_OT_follow_update(_Follows, Operator):
         )
 
 
-classes = (SHUTTER_OT_track, SHUTTER_OT_track_look, SHUTTER_OT_follow, SHUTTER_OT_follow_update)
+classes = (
+    SHUTTER_OT_track,
+    SHUTTER_OT_panning_shot,
+    SHUTTER_OT_track_look,
+    SHUTTER_OT_follow,
+    SHUTTER_OT_follow_update,
+)
 
 
 def register():

@@ -637,6 +637,12 @@ MESSAGES = {
     ("*", "the region lies outside the picture"): "die Region liegt außerhalb des Bildes",
     ("*", "there is no other frame to track"): "es gibt kein anderes Bild zum Verfolgen",
     ("*", "the frame lies outside what can be tracked"): "das Bild liegt außerhalb dessen, was verfolgt werden kann",
+    ("Operator", "Panning Shot"): "Mitzieher",
+    (
+        "*",
+        "Keep what the active region moves with sharp while all else streaks (tracks the region unless it has keys)",
+    ): "Scharf halten, womit sich die aktive Region bewegt, und alles andere verwischen "
+    "(verfolgt die Region, falls sie keine Schlüsselbilder hat)",
     ("*", "Nothing"): "Nichts",
     ("*", "Camera"): "Kamera",
     ("*", "What the exposure moves with"): "Womit sich die Belichtung mitbewegt",
