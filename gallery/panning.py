@@ -10,10 +10,21 @@ from __future__ import annotations
 from math import atan2, cos, pi, sin
 from pathlib import Path
 
+import numpy as np
+
+from shutter_addon.core import recipe
+from shutter_addon.media import open_source
+
+from . import stills
+from .item import Item
+from .stills import Panel
+
 COUNT = 40
 FRAME, WINDOW = 20, 25  # what is shown, and how many frames its exposure has
 DISTANCE, HEIGHT = 14.0, 1.02  # of the camera, in metres
 WHEEL = 0.24
+NAME = "scooter"
+STROKE = [[0.36, 0.52], [0.44, 0.56], [0.43, 0.46], [0.42, 0.34], [0.58, 0.42]]  # parcels, jacket, seat, tail, shield
 
 
 def footage(folder: Path) -> Path:
@@ -58,6 +69,18 @@ def mask(folder: Path) -> Path:
     return path
 
 
+def drawn() -> recipe.Recipe:
+    """One stroke on the scooter at the shown frame, and one shutter that follows it: what Panning Shot sets up, before
+    it tracks."""
+    return recipe.Recipe(
+        1,
+        WINDOW,
+        [recipe.Shutter("Panning", (0.9, 0.62, 0.0), [1.0] * WINDOW, follow=NAME)],
+        [recipe.Region("Panning", NAME, "line", 0.02, [STROKE])],
+        position="center",
+    )
+
+
 def place(frame: float) -> float:
     """Where the scooter is, in metres to the right; it speeds up a little."""
     time = frame - FRAME
@@ -86,19 +109,20 @@ def _is_part(thing) -> bool:
 
 def _street(scenes) -> None:
     """A pavement before shops: tiles, doors, windows, signs and posters."""
-    grey, stone, dark = (scenes.paint(color, 0.9) for color in ("#55585d", "#a9a294", "#2c3136"))
+    grey, stone, dark, line = (scenes.paint(color, 0.9) for color in ("#55585d", "#a9a294", "#2c3136", "#d8d4c8"))
     scenes.box((60, 40, 0.2), (0, -17, -0.1), grey)
     scenes.box((60, 2.0, 0.3), (0, 2.6, 0), stone)
-    for i in range(-20, 21):
+    for i in range(-5, 6):
         scenes.box((0.02, 0.05, 0.16), (0.9 * i, 1.59, 0.08), dark)
-        scenes.box((0.9, 0.12, 0.01), (1.8 * i, -1.3, 0.0), scenes.paint("#d8d4c8", 0.9))
+    for i in range(-2, 3):
+        scenes.box((0.9, 0.12, 0.01), (1.8 * i, -1.3, 0.0), line)
     walls = "#c8795c", "#e2c58a", "#6f9a94", "#b9a3c9", "#d9d0bf"
     words = "CAFÉ", "LIVRES", "PAIN", "VÉLOS", "FLEURS"
-    for i in range(-4, 5):
+    for i in range(-2, 3):
         x, wall = 1.9 * i, scenes.paint(walls[i % 5], 0.9)
         scenes.box((1.88, 1, 6), (x, 4.2, 3), wall)
         _shop(scenes, x, words[i % 5], walls[(i + 2) % 5])
-    for i in range(-5, 6):
+    for i in range(-3, 3):
         scenes.tube((1.9 * i + 0.95, 2.2, 0), (1.9 * i + 0.95, 2.2, 0.75), 0.05, dark)
 
 
@@ -183,4 +207,29 @@ def _rider(scenes, root, dark) -> None:
         scenes.box((0.05, 0.01, 0.2), (-0.42 + 0.07 * i, -0.165, 1.2), white, parent=root)
 
 
-ITEM = None
+def still(shots):
+    (shot,) = shots
+    with open_source(truth(shot.footage.parents[1] / "truth")) as source:
+        panned = source.read(0)[..., :3] / np.float32(255)
+    count = f"{WINDOW} frames"
+    return stills.sheet(
+        stills.row(
+            Panel(shot.scribbles(FRAME, dim=1.0), "A still camera, and one stroke, tracked"),
+            Panel(shot.everywhere(FRAME, "Panning"), f"{count}, as a still camera exposes them"),
+        ),
+        stills.row(
+            Panel(shot.result(FRAME), f"{count} that follow the stroke"),
+            Panel(panned, "The truth: a camera that pans"),
+        ),
+    )
+
+
+ITEM = Item(
+    name="panning",
+    figure=None,
+    title="a panning shot of what a still camera took",
+    footage=footage,
+    recipes=("panning.json",),
+    frames=(WINDOW // 2 + 1, COUNT - WINDOW // 2),
+    still=still,
+)
