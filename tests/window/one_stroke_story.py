@@ -41,6 +41,8 @@ def kinds():
     from bpy_extras.anim_utils import action_get_channelbag_for_slot as bag_of
 
     data = story.edit().animation_data
+    if data is None:
+        return {}
     curve = bag_of(data.action, data.action_slot).fcurves.find("virtual_shutter.effects[0].regions[0].location")
     return {int(key.co[0]): key.type for key in curve.keyframe_points}
 

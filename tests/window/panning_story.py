@@ -24,10 +24,29 @@ def shutters():
     ]
 
 
-def panned():
-    """By the button in the sidebar; one undo takes all of it back."""
-    before = shutters()
+def clicked():
+    """The button in the sidebar."""
     driver.click(sidebar(), sidebar().width * 0.45, sidebar().height - PANNING_SHOT)
+
+
+def escaped():
+    """Where nothing was tracked yet, the button tracks: what is tracked until Esc stays, and the shutters are as they
+    were."""
+    before = shutters()
+    clicked()
+    driver.key("Escape")
+    yield from driver.until(lambda: len(one_stroke_story.kinds()) > 1, "tracking keys the region")
+    driver.move(story.preview(), 50, story.preview().height - 50)
+    yield 1.0
+    assert not bpy.context.window.modal_operators
+    assert shutters() == before
+    driver.saw(escaped=one_stroke_story.kinds())
+
+
+def panned():
+    """One undo takes all of it back."""
+    before = shutters()
+    clicked()
     yield from driver.until(lambda: shutters() != before, "the shutters change")
     after = shutters()
     driver.saw(panned=after)
@@ -54,6 +73,7 @@ def played():
 
 def told():
     yield from one_stroke_story.begun(SHOWN)
+    yield from escaped()
     yield from one_stroke_story.tracked()
     yield from one_stroke_story.ended()
     yield from story.seen("2_tracked")
