@@ -52,6 +52,11 @@ class MotionKeys:
         curve = self._curve("location")
         return curve is not None and bool(_read(curve)[1].any())
 
+    def are_several(self) -> bool:
+        """Whether a channel of the motion has keys at more than one frame: with one alone the region stands still."""
+        curves = (self._curve(name, component) for name, component in _COMPONENTS[: _COUNTS[self.motion]])
+        return any(len(curve.keyframe_points) > 1 for curve in filter(None, curves))
+
     def channels(self) -> list[str]:
         """The channels that the motion has, and those that have keys already."""
         count = _COUNTS[self.motion]

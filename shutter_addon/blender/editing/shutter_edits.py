@@ -5,7 +5,7 @@ from bpy.app.translations import pgettext_data as data_
 
 from ...core import presets
 from ..data import fcurves, property_copy, validation
-from . import bar_edits, collection_edits
+from . import collection_edits
 from .region_edits import remove_region
 
 # Told apart on footage and by colour-blind eyes (Okabe and Ito).
@@ -72,14 +72,3 @@ def move_shutter(effect, index: int, to: int) -> None:
     """Moves a shutter in the list; whichever comes first is the default."""
     collection_edits.move(effect, "shutters", index, to)
     effect.active_shutter = to
-
-
-def put_on_tripod(effect, key: bool = False) -> None:
-    """Opens the active shutter for the whole window around the frame, and has it follow the camera; the default one in
-    its place where the active one has no region, as nothing would be seen of it. key: and keys its bars here."""
-    name = effect.shutters[effect.active_shutter].name
-    if not any(region.shutter == name for region in effect.regions):
-        effect.active_shutter = 0
-    effect.shutters[effect.active_shutter].follow, effect.position = "CAMERA", "CENTER"
-    bars = presets.bars("ANGLE_360", validation.number(effect, "window"))
-    bar_edits.paint(effect, effect.active_shutter, bars, key)

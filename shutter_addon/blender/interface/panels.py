@@ -212,6 +212,8 @@ def _draw_tracking(layout, effect, index: int | None) -> None:
     for direction, _name, _description, icon, _number in track_operators.DIRECTIONS:
         button = row.operator(track, text=words if direction == "BOTH" else "", icon=icon)
         button.direction = direction
+    if index is not None:
+        layout.operator("shutter.panning_shot", icon="CON_FOLLOWTRACK")
     confidence = track_region.confidence_at(effect, index, effect.id_data.frame_current)
     if confidence is not None:
         row = layout.row(align=True)

@@ -651,8 +651,8 @@ MESSAGES = {
     ("Operator", "Tripod"): "Stativ",
     (
         "*",
-        "Track the camera, and give the shutter a long exposure that follows it, as if on a tripod",
-    ): "Die Kamera verfolgen und dem Verschluss eine lange Belichtung geben, die ihr folgt, wie auf einem Stativ",
+        "Expose for long as if the camera had stood still (tracks the camera unless it has keys)",
+    ): "Lange belichten, als hätte die Kamera still gestanden (verfolgt die Kamera, wenn sie keine Schlüsselbilder hat)",
     ("Operator", "Follow Stabilization"): "Der Stabilisierung folgen",
     (
         "*",
@@ -662,6 +662,12 @@ MESSAGES = {
     ("*", 'camera of effect "{name}"'): "Kamera des Effekts „{name}“",
     ("*", "How what the camera sees moves"): "Wie sich bewegt, was die Kamera sieht",
     ("*", "Name of the camera's animation channels"): "Name der Animationskanäle der Kamera",
+    ("Operator", "Panning Shot"): "Mitzieher",
+    (
+        "*",
+        "Keep what the active region moves with sharp while all else streaks (tracks the region unless it has keys)",
+    ): "Scharf halten, womit sich die aktive Region bewegt, und alles andere verwischen "
+    "(verfolgt die Region, falls sie keine Schlüsselbilder hat)",
     ("*", "Nothing"): "Nichts",
     ("*", "Camera"): "Kamera",
     ("*", "What the exposure moves with"): "Womit sich die Belichtung mitbewegt",
