@@ -3,10 +3,14 @@ it by more of them.
 
 What was made has Blender's key type Generated, which editors show in a colour of its own, and the value that it was
 made with. All other keys are the editor's: they keep frame and value, and are linear where a made key follows.
+
+A key that the editor sets bends the frames around it, as keys do, until tracking begins at it: then frames that are not
+tracked again are where tracking had left them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise, zip_longest
 
 import bpy
 import numpy as np
@@ -21,7 +25,8 @@ from ..data.validation import EffectError
 MADE = "GENERATED"
 _MADE = bpy.types.Keyframe.bl_rna.properties["type"].enum_items[MADE].value
 # What Blender gives each key as the overshoot of the ease Back, which linear keys have no use for: a made key keeps
-# there the value that it was made with, so that one which the editor has moved is told from it.
+# there the value that it was made with, so that one which the editor has moved is told from it. Keys that the editor
+# has set keep what was tracked there before.
 NOTHING_KEPT = np.float32(1.70158)
 # The channels, and how many of their components a motion has.
 _COMPONENTS = (("location", 0), ("location", 1), ("rotation", 0), ("scale", 0))
@@ -64,27 +69,31 @@ class MotionKeys:
         return list(dict.fromkeys(found))
 
     def hold(self, first: int, last: int) -> None:
-        """Keys what was tracked right before and after these frames where it is there: it stays, whatever becomes of
-        the keys between."""
+        """Keys what was tracked right before and after these frames where tracking has left it: it stays, whatever
+        becomes of the keys between, and wherever the editor has moved the first and the last of them."""
         tracked = self.confidence()[0]
-        for frame in tracked[np.isin(tracked, (first - 1, last + 1))].tolist():
-            for curve in filter(None, (self._curve(name, component) for name, component in _COMPONENTS)):
-                if not curve.is_empty and frame not in fcurves.points_of(curve)[:, 0]:
-                    _insert(curve, frame, curve.evaluate(frame))
+        beside = tracked[np.isin(tracked, (first - 1, last + 1))].tolist()
+        for curve in filter(None, (self._curve(name, component) for name, component in _COMPONENTS)):
+            for frame, value in _as_tracked(curve, (first, last), beside).items():
+                _insert(curve, frame, value)
 
     def write(self, placements: Mapping[int, Placement], confidence: Mapping[int, float]) -> None:
-        """Makes keys at these frames, in place of all that were made from the first frame of the confidence to its
-        last, of the channels that are not keyed as well. Other frames that were tracked stay as they are.
+        """Makes keys at some of the frames that have a confidence, in place of all that were made at these, of the
+        channels that are not keyed as well. Other frames that were tracked stay as they are; those between, which never
+        were, have no confidence at all: it is 0.
 
         confidence: 0 to 1 by frame"""
-        within = min(confidence), max(confidence)
-        self.hold(*within)
+        for first, last in runs(confidence):
+            self.hold(first, last)
         for k, (name, component) in enumerate(_COMPONENTS):
             is_keyed = k < _COUNTS[self.motion]
             values = {frame: _values(placement)[k] for frame, placement in placements.items()} if is_keyed else {}
             if (curve := self._curve(name, component, new=is_keyed)) is not None:
-                _replace(curve, values, *within)
-        _replace(self._curve("confidence", new=True), {f: 100 * share for f, share in confidence.items()}, *within)
+                _replace(curve, values, confidence)
+        known = {*confidence, *self.confidence()[0].tolist()}
+        between = dict.fromkeys(set(range(min(confidence), max(confidence))) - known, 0.0)
+        every = between | {frame: 100 * share for frame, share in confidence.items()}
+        _replace(self._curve("confidence", new=True), every, every)
 
     def confidence(self) -> tuple[np.ndarray, np.ndarray]:
         """The frames (n,) that have a confidence, ascending, and what it is, 0 to 1."""
@@ -117,23 +126,62 @@ def check_curves(effect, index: int | None) -> None:
                     raise EffectError(rpt_(sentence).format(place=validation.place(moving), channel=label))
 
 
-def insert(effect, index: int | None, channels=CHANNELS) -> None:
-    """Keys channels of a region or of the camera at the current frame; where tracking has made a key, it is the
-    editor's from now on, and sure. EffectError: as check_curves says."""
+def insert(effect, index: int | None, channels=CHANNELS, *, keep_tracked: bool = False) -> None:
+    """Keys channels of a region or of the camera at the edit's current frame; where tracking has made a key, it is the
+    editor's from now on, and sure. EffectError: as check_curves says.
+
+    keep_tracked: whether the keys keep what was tracked there, for the next MotionKeys.hold"""
     check_curves(effect, index)
     edit, moving = effect.id_data, selection.moving(effect, index)
-    path = moving.path_from_id()
+    path, frame = moving.path_from_id(), edit.frame_current
     for name in channels:
-        edit.keyframe_insert(f"{path}.{name}", group=moving.name)
-        for curve in fcurves.curves_under(edit, f"{path}.{name}"):
-            for key in curve.keyframe_points:
-                if key.co[0] == edit.frame_current_final:
-                    key.type, key.back = "KEYFRAME", NOTHING_KEPT
+        tracked = [_tracked_value(curve, frame) for curve in fcurves.curves_under(edit, f"{path}.{name}")]
+        # Without a frame Blender takes that of the window's scene, which may be another one.
+        edit.keyframe_insert(f"{path}.{name}", group=moving.name, frame=frame)
+        curves = fcurves.curves_under(edit, f"{path}.{name}")
+        for curve, value in zip_longest(curves, tracked, fillvalue=NOTHING_KEPT):
+            for key in _keys_at(curve, frame):
+                key.type, key.back = "KEYFRAME", value if keep_tracked else NOTHING_KEPT
     for curve in fcurves.curves_under(edit, f"{path}.confidence"):
-        for key in curve.keyframe_points:
-            if key.co[0] == edit.frame_current_final:
-                key.co[1] = 100
+        for key in _keys_at(curve, frame):
+            key.back = key.co[1] = 100
         curve.update()
+
+
+def runs(frames: Iterable[int]) -> list[tuple[int, int]]:
+    """The first and the last of each stretch of frames without a gap, ascending."""
+    ordered = sorted(frames)
+    ends = [i for i, (frame, after) in enumerate(pairwise(ordered)) if after != frame + 1]
+    firsts, lasts = [0, *(i + 1 for i in ends)], [*ends, len(ordered) - 1]
+    return [(ordered[first], ordered[last]) for first, last in zip(firsts, lasts, strict=True)]
+
+
+def _keys_at(curve, frame: int) -> list:
+    return [key for key in curve.keyframe_points if key.co[0] == frame]
+
+
+def _tracked_value(curve, frame: int) -> float:
+    """What tracking has made of a frame, for a key that the editor sets there; of the editor's key there, what it
+    keeps."""
+    for key in _keys_at(curve, frame):
+        if key.type != MADE:
+            return key.back
+    return NOTHING_KEPT if curve.is_empty else curve.evaluate(frame)
+
+
+def _as_tracked(curve, edited: tuple[int, int], frames: list[float]) -> dict[float, float]:
+    """The values of an F-curve at frames without a key, with what tracking said of two frames that the editor may have
+    keyed since; it is forgotten after this."""
+    moved = []
+    for key in (key for frame in set(edited) for key in _keys_at(curve, frame)):
+        if key.type != MADE and key.back != NOTHING_KEPT:
+            moved.append((key, key.co[1], key.interpolation))
+            key.co_ui[1], key.back, key.interpolation = key.back, NOTHING_KEPT, "LINEAR"
+    keyed = fcurves.points_of(curve)[:, 0]
+    values = {frame: curve.evaluate(frame) for frame in frames if not curve.is_empty and frame not in keyed}
+    for key, value, ease in moved:
+        key.co_ui[1], key.interpolation = value, ease
+    return values
 
 
 def _values(placement: Placement) -> tuple[float, ...]:
@@ -141,13 +189,13 @@ def _values(placement: Placement) -> tuple[float, ...]:
     return *placement.location, np.radians(placement.rotation), placement.scale
 
 
-def _replace(curve, values: dict[int, float], first: int, last: int) -> None:
-    """Makes keys of these values by frame, in place of those that were made from the first frame to the last."""
+def _replace(curve, values: dict[int, float], found: Iterable[int]) -> None:
+    """Makes keys of these values by frame, in place of those that were made at the frames that were found."""
     points, (frames, made) = curve.keyframe_points, _read(curve)
-    within = (frames >= first) & (frames <= last)
+    within = np.isin(frames, list(found))
     edited = within & ~made
     if values:
-        for i in np.flatnonzero(edited & (frames < last)).tolist():
+        for i in np.flatnonzero(edited & (frames < max(found))).tolist():
             points[i].interpolation = "LINEAR"
     for i in np.flatnonzero(within & made)[::-1].tolist():
         points.remove(points[i], fast=True)

@@ -80,5 +80,5 @@ def free_layers(effect, annotation) -> list:
 
 
 def key_region(effect, index: int) -> None:
-    """Keys where a region is at the current frame (motion_keys.insert). EffectError: it cannot be keyed."""
-    motion_keys.insert(effect, index)
+    """Keys where the editor has put a region at the current frame. EffectError: it cannot be keyed."""
+    motion_keys.insert(effect, index, keep_tracked=True)

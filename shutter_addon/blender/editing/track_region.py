@@ -146,9 +146,12 @@ def track(
         finally:
             if len(found) > 1 and (effect := target.effect()) is not None:
                 keys = MotionKeys(effect, index, motion)
-                kept = found if all_keys else _thinned(effect, subject, found, {start, *anchors})
+                ends = {frame for run in motion_keys.runs(found) for frame in run}
+                kept = found if all_keys else _thinned(effect, subject, found, {start, *anchors, *ends})
                 _write(keys, [found[frame] for frame in kept], found.values())
                 _mark(effect, index, found, stops, reach)
+                if index is not None:
+                    effect.regions[index].follow_stamp = ""  # what it followed would undo this
     if len(found) == 1:
         raise EffectError(rpt_(stops[0].fault))
 

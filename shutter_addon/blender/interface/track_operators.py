@@ -75,7 +75,11 @@ class _Tracks:
         is_stopped = is_ended = event.type == "ESC" and event.value == "PRESS"
         if event.type == "TIMER":
             # What it takes to draw a frame, tracking takes at least as well.
-            is_ended = not self._go_on(max(_TICK, time.perf_counter() - self._shown))
+            try:
+                is_ended = not self._go_on(max(_TICK, time.perf_counter() - self._shown))
+            except Exception:  # Blender ends the operator then, and asks for no `cancel`
+                self.cancel(context)
+                raise
             self._show(context)
         if not is_ended:
             return {"RUNNING_MODAL"}
