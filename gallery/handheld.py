@@ -7,7 +7,7 @@ The truth is the mean of the same frames through a camera that stands as the sha
 
 from __future__ import annotations
 
-from math import sin
+from math import atan2, cos, hypot, sin
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +22,8 @@ from .stills import Panel
 COUNT = 32
 FRAME = 16  # that is shown: its window is all of them
 OPEN = 0.25  # of a frame's time
+EYE, TARGET = (0, -40, 2.6), (0, 0, 2.9)
+LENS = 85  # of the camera, in mm of a 36 mm wide sensor
 SPEED = 0.16  # of the cars, in metres a frame
 
 
@@ -42,6 +44,26 @@ def exposed(first: Path) -> np.ndarray:
         return np.mean([light.to_linear(frame) for frame in frames], axis=0)
 
 
+def seen(frame: float, places: np.ndarray, size) -> np.ndarray:
+    """Where what is at places of the shown frame, complex in pixels, lies at another one: as the camera turns, the rays
+    through the middle of its exposure."""
+    focus, middle = LENS / 36 * size[0], complex(*np.subtract(size, 1)) / 2
+    away = places - middle
+    rays = np.stack([away.real, -away.imag, np.full(len(away), -focus)])  # right, up, behind
+    right, up, behind = _turned(_shake(frame + OPEN / 2)).T @ _turned((0, 0, 0)) @ rays
+    return middle - focus * (right - 1j * up) / behind
+
+
+def _turned(angles) -> np.ndarray:
+    """How the camera lies in the scene (3, 3), turned by tilt, roll and pan."""
+    level = atan2(hypot(*np.subtract(TARGET, EYE)[:2]), EYE[2] - TARGET[2])
+    (a, b), (c, d), (e, f) = ((cos(angle), sin(angle)) for angle in np.add(angles, (level, 0, 0)))
+    tilt = np.array([[1, 0, 0], [0, a, -b], [0, b, a]])
+    roll = np.array([[c, 0, d], [0, 1, 0], [-d, 0, c]])
+    pan = np.array([[e, -f, 0], [f, e, 0], [0, 0, 1]])
+    return pan @ roll @ tilt
+
+
 def held() -> recipe.Recipe:
     """One shutter that follows the camera: what Tripod sets up, before it tracks."""
     return recipe.Recipe(
@@ -60,7 +82,7 @@ def _render(folder: Path, turned) -> Path:
     scenes.begin("#2a3c6e", 0.8, samples=4, motion_blur=OPEN)
     render = scenes.bpy.context.scene.render
     render.resolution_x, render.resolution_y = (side * 2 // 3 for side in scenes.SIZE)
-    scenes.camera((0, -40, 2.6), (0, 0, 2.9), 85)
+    scenes.camera(EYE, TARGET, LENS)
     scenes.lamp("SUN", 0.25, (-6, -9, 8), color="#8fa8ff", size=0.2)
     _street(scenes)
     for lane, height, start in ((-4.6, 0.0, -7.0), (-4.6, 0.0, -1.5), (-7.2, 0.05, 6.0), (-7.2, 0.05, 0.5)):

@@ -167,7 +167,7 @@ def test_the_buttons_are_one_step_of_undo(bpy, effect, name):
     bpy.context.view_layer.update()
     bpy.ops.ed.undo_push(message="before")
     before = everything(bpy)
-    assert call(bpy, name, direction="FORWARD") == {"FINISHED"}
+    assert call(bpy, name) == {"FINISHED"}
     after = everything(bpy)
     assert (after[2] != before[2], after[3:] != before[3:]) == (True, name == "tripod")
     bpy.ops.ed.undo()

@@ -27,8 +27,8 @@ def place(group) -> str:
     """The effect, shutter, bar, region or camera that a property group is, in the user's words."""
     path = group.path_from_id()
     if path.endswith(".camera"):
-        effect = group.id_data.path_resolve(path.removesuffix(".camera"))
-        return rpt_(_PLACES["camera"]).format(name=effect.name)
+        words = _PLACES["camera"]
+        return rpt_(words).format(name=group.id_data.path_resolve(path.removesuffix(".camera")).name)
     found = re.match(r".*?effects\[\d+\](?:\.(shutters|regions)\[\d+\])?", path)
     words = rpt_(_PLACES[found[1] or ""]).format(name=group.id_data.path_resolve(found[0]).name)
     bar = re.search(r"\.bars\[(\d+)\]$", path)

@@ -206,11 +206,10 @@ class _Regions(_WithEffect):
 def _draw_tracking(layout, effect, index: int | None) -> None:
     """Of a region or the camera (selection.moving) the buttons; how sure tracking was of the current frame, and where
     it stopped."""
-    track, words = ("shutter.track", "Track") if index is not None else ("shutter.track_camera", "Track Camera")
-    look = f"{track}_look"
+    track = "shutter.track_camera" if index is None else "shutter.track"
     row = layout.row(align=True)
     for direction, _name, _description, icon, _number in track_operators.DIRECTIONS:
-        button = row.operator(track, text=words if direction == "BOTH" else "", icon=icon)
+        button = row.operator(track, text="Track" if direction == "BOTH" else "", icon=icon)
         button.direction = direction
     if index is not None:
         layout.operator("shutter.panning_shot", icon="CON_FOLLOWTRACK")
@@ -219,13 +218,13 @@ def _draw_tracking(layout, effect, index: int | None) -> None:
         row = layout.row(align=True)
         text = iface_("Confidence: {percent} %").format(percent=f"{100 * confidence:.0f}")
         row.label(text=text, icon="CHECKMARK" if confidence >= SURE else "ERROR", translate=False)
-        row.operator(look)
+        row.operator(f"{track}_look")
     for frame, reason, is_fault in track_region.stops(effect, index):
         row = layout.row(align=True)
         row.label(text=reason, icon="ERROR" if is_fault else "INFO", translate=False)
         place = row.row()
         place.ui_units_x = 2.5
-        place.operator(look, text=str(frame), translate=False).frame = frame
+        place.operator(f"{track}_look", text=str(frame), translate=False).frame = frame
 
 
 class _WithRegion(_WithEffect):

@@ -652,7 +652,7 @@ MESSAGES = {
     (
         "*",
         "Expose for long as if the camera had stood still (tracks the camera unless it has keys)",
-    ): "Lange belichten, als hätte die Kamera still gestanden (verfolgt die Kamera, wenn sie keine Schlüsselbilder hat)",
+    ): "Lange belichten, als hätte die Kamera still gestanden (verfolgt sie, wenn sie keine Schlüsselbilder hat)",
     ("Operator", "Follow Stabilization"): "Der Stabilisierung folgen",
     (
         "*",
