@@ -14,8 +14,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from . import compositor, motions
-from .effect import Camera, Effect, Region
+from . import compositor, motions, trails
+from .effect import Camera, Effect, Region, Shutter
 from .frame_source import FrameSource
 from .frame_state import Following, FrameState, Options
 from .motions import Similarity
@@ -39,7 +39,8 @@ def followed(
     source: FrameSource,
     shown: Callable[[float], int],
 ) -> FrameState:
-    """The effect's state at a timeline frame, with what its shutters follow.
+    """The effect's state at a timeline frame, with what its shutters follow, and with the bars of those whose trail has
+    a length.
 
     index, direction: the source frame that is shown there, as for compositor.window_positions
     shown: the source frame that is shown at a timeline frame a whole number of frames away, at most `reach`
@@ -56,7 +57,28 @@ def followed(
         followers = [other is subject for other in subjects]
         turns[:, followers] = np.array([motion.turn for motion in found])[:, None]
         shifts[:, followers] = np.array([motion.shift for motion in found])[:, None]
-    return replace(state, following=Following(frames.start, turns, shifts).of(slice(None)))
+    following = Following(frames.start, turns, shifts)
+    positions = compositor.window_positions(state.options, index, direction)
+    seen = compositor.source_frames(state.options, positions, range(source.count))
+    # What is left out beyond the clip's ends stands still there, as what is held does.
+    places = following.at(np.where(seen < 0, positions, seen))
+    shown_at = float(np.abs(positions - index).argmin()) + 0.5
+    bars = [
+        _with_trail(shutter, own, frame, turn, shift, (source.width, source.height), shown_at)
+        for shutter, own, turn, shift in zip(effect.shutters, state.bars, *(part.T for part in places), strict=True)
+    ]
+    return replace(state, bars=np.stack(bars), following=following.of(slice(None)))
+
+
+def _with_trail(shutter: Shutter, bars: np.ndarray, frame: float, turns, shifts, size, shown_at: float) -> np.ndarray:
+    """A shutter's bars (L,), open for as long as its trail is, if it has one; turns, shifts: (L,) by which it follows.
+
+    shown_at: the time of the shown frame in the window"""
+    if shutter.follow is None or shutter.trail is None:
+        return bars
+    points = np.array([motions.pixel(corner, size) for corner in shutter.follow.corners(frame)], np.complex128)
+    way = trails.travelled(turns[:, None] * points + shifts[:, None]) / size[1]
+    return trails.with_length(bars, way, float(shutter.trail.at(frame)), shown_at)
 
 
 def _seen(options: Options, index: int, direction: int, count: int) -> range:

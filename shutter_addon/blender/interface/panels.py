@@ -118,7 +118,7 @@ class _Shutters:
 
 
 def _draw_follow(layout, effect, shutter) -> None:
-    """What the exposure moves with."""
+    """What the exposure moves with, and what says how long it is."""
     layout.prop(shutter, "follow")
     if shutter.follow == "REGION":
         layout.prop_search(shutter, "follow_region", effect, "regions", text="Region")
@@ -127,6 +127,10 @@ def _draw_follow(layout, effect, shutter) -> None:
         column.prop(effect, "camera_location", text="Location")
         column.prop(effect, "camera_rotation", text="Rotation")
         column.prop(effect, "camera_scale", text="Scale")
+    if shutter.follow != "NOTHING":
+        layout.prop(shutter, "length")
+        if shutter.length == "MOTION":
+            layout.prop(shutter, "trail")
 
 
 def _draw_live(layout, context):
