@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from . import compositor, motions, trails
-from .effect import Camera, Effect, Region, Shutter
+from .effect import Camera, Effect, Region
 from .frame_source import FrameSource
 from .frame_state import Following, FrameState, Options
 from .motions import Similarity
@@ -58,27 +58,27 @@ def followed(
         turns[:, followers] = np.array([motion.turn for motion in found])[:, None]
         shifts[:, followers] = np.array([motion.shift for motion in found])[:, None]
     following = Following(frames.start, turns, shifts)
+    bars = _with_trails(effect, state, following, frame, index, direction, source)
+    return replace(state, bars=bars, following=following.of(slice(None)))
+
+
+def _with_trails(
+    effect: Effect, state: FrameState, following: Following, frame: float, index: int, direction: int, source
+) -> np.ndarray:
+    """The state's bars (N, L), those of shutters whose trail has a length open for it; arguments as of `followed`."""
+    bars, size = state.bars.copy(), (source.width, source.height)
     positions = compositor.window_positions(state.options, index, direction)
+    shown_at = float(np.abs(positions - index).argmin()) + 0.5
     seen = compositor.source_frames(state.options, positions, range(source.count))
     # What is left out beyond the clip's ends stands still there, as what is held does.
-    places = following.at(np.where(seen < 0, positions, seen))
-    shown_at = float(np.abs(positions - index).argmin()) + 0.5
-    bars = [
-        _with_trail(shutter, own, frame, turn, shift, (source.width, source.height), shown_at)
-        for shutter, own, turn, shift in zip(effect.shutters, state.bars, *(part.T for part in places), strict=True)
-    ]
-    return replace(state, bars=np.stack(bars), following=following.of(slice(None)))
-
-
-def _with_trail(shutter: Shutter, bars: np.ndarray, frame: float, turns, shifts, size, shown_at: float) -> np.ndarray:
-    """A shutter's bars (L,), open for as long as its trail is, if it has one; turns, shifts: (L,) by which it follows.
-
-    shown_at: the time of the shown frame in the window"""
-    if shutter.follow is None or shutter.trail is None:
-        return bars
-    points = np.array([motions.pixel(corner, size) for corner in shutter.follow.corners(frame)], np.complex128)
-    way = trails.travelled(turns[:, None] * points + shifts[:, None]) / size[1]
-    return trails.with_length(bars, way, float(shutter.trail.at(frame)), shown_at)
+    turns, shifts = following.at(np.where(seen < 0, positions, seen))
+    for i, shutter in enumerate(effect.shutters):
+        if shutter.follow and shutter.trail:
+            corners = [motions.pixel(corner, size) for corner in shutter.follow.corners(frame)]
+            places = np.outer(turns[:, i], corners) + shifts[:, i, None]
+            way = trails.travelled(places) / source.height
+            bars[i] = trails.with_length(bars[i], way, float(shutter.trail.at(frame)), shown_at)
+    return bars
 
 
 def _seen(options: Options, index: int, direction: int, count: int) -> range:

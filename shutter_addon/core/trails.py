@@ -12,6 +12,8 @@ from . import shutters
 
 # In frames. A trail of no length is a still frame.
 _SHORTEST = 1e-3
+# Of the exposure. Where bars go from key to key, rounding may leave as much in a bar that is closed.
+_CLOSED = 1e-9
 
 
 def travelled(places: np.ndarray) -> np.ndarray:
@@ -33,6 +35,7 @@ def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) 
     way: of `travelled`, in the unit of the length
     shown: the time in 0 … L that keeps its place; of bars that are closed there, the nearest that is open. Where an end
     of the span reaches the window's, only the other one goes on"""
+    bars = np.where(bars > _CLOSED * bars.sum(), bars, 0)
     first, last = shutters.open_span(bars)
     about = min(max(shown, first), last)
     before = (about - first) / (last - first)

@@ -75,6 +75,12 @@ def test_limits():
     assert trails.with_length(np.ones(1), np.zeros(2), 0.3, 0.5).tolist() == [1]
 
 
+def test_what_rounding_leaves_does_not_open_a_bar():
+    bars, way = np.r_[np.ones(4), np.zeros(4)], np.linspace(0, 1, 9)
+    noisy = bars + np.r_[np.zeros(4), 1e-15, np.zeros(3)]
+    assert trails.with_length(noisy, way, 0.25, 0.5) == pytest.approx(trails.with_length(bars, way, 0.25, 0.5))
+
+
 def test_no_jumps():
     """A span grows past frames little by little."""
     box, way = np.ones(WINDOW), np.cumsum([0, *np.linspace(0.01, 0.1, WINDOW)])
