@@ -1,6 +1,7 @@
 """Exposures that are open while what they follow moves by a set length."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -164,6 +165,14 @@ def test_a_reversed_source():
     backward, same = followed(recipe.Recipe(1, 23, [shutter], position="center", camera=keys), 31, direction=-1)
     assert same == index
     assert backward.bars[0] == pytest.approx(forward.bars[0, ::-1])
+
+
+def test_in_between_frames_count_as_the_parts_of_one():
+    plain, _ = followed(accelerating(0.2), 40)
+    source = replace(accelerating(0.2, bars=(1.0,) * 4 * WINDOW), inbetween=4)
+    effect, fine = source.effect(1.6), SimpleNamespace(count=4 * SOURCE.count, width=160, height=100)
+    state = following.followed(effect, effect.at(40), 40, 156, 1, fine, lambda other: 4 * round(other - 1))
+    assert open_frames(state.bars[0]) == pytest.approx(4 * open_frames(plain.bars[0]), rel=0.03)
 
 
 def test_frames_change_no_bit():

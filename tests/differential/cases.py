@@ -104,18 +104,19 @@ def follows(recipe: dict) -> bool:
 
 
 def add_motion(rng, recipe: dict, count: int) -> None:
-    """What shutters follow and how far, in half of the recipes, and edges of the footage that regions keep to."""
+    """What shutters follow and how far, in most recipes, and edges of the footage that regions keep to."""
     for i, region in enumerate(recipe["regions"]):
         region["name"] = f"R{i}"
-    if rng.random() < 0.15:
+    if rng.random() < 0.2:
         recipe["edge_aware"] = choose(rng, 1.0, round(rng.random(), 3), random_numbers(rng, count, 1))
-    if rng.random() < 0.5:
+    if rng.random() < 0.4:
         return
-    if rng.random() < 0.8:
-        recipe["camera"] = [random_camera_key(rng, frame) for frame in frames(rng, count, 6)]
+    keyed = sorted({-4, *frames(rng, count, 6), count + 6})  # so that it moves all the time
+    recipe["camera"] = [random_camera_key(rng, frame) for frame in keyed]
+    moving = ["camera", "camera", *(region["name"] for region in recipe["regions"] if "keys" in region)]
     for shutter in recipe["shutters"]:
-        if rng.random() < 0.7:
-            shutter["follow"] = choose(rng, "camera", *(region["name"] for region in recipe["regions"]))
+        if rng.random() < 0.8:
+            shutter["follow"] = choose(rng, *moving)
             if rng.random() < 0.4:
                 shutter["trail"] = choose(rng, 0.0, round(rng.uniform(0, 0.5), 4), random_numbers(rng, count, 0.8))
 
