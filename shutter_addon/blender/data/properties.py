@@ -96,6 +96,11 @@ FOLLOWS = (
     ("CAMERA", "Camera", "The exposure moves with what the camera sees, as if the camera had stood still"),
 )
 
+LENGTHS = (
+    ("FRAMES", "Frames", "The bars say for how many frames the shutter is open"),
+    ("MOTION", "Motion", "The shutter is open while what it follows moves by a set length; the bars are the shape"),
+)
+
 # The renderer asks the F-curves itself: keys on these would show, and not render.
 _UNKEYED = set()
 
@@ -191,6 +196,24 @@ class Shutter(PropertyGroup):
     )
     follow_region: StringProperty(
         name="Followed Region", description="Name of the region that the exposure moves with", update=_changed
+    )
+    length: EnumProperty(
+        name="Length",
+        description="What says how long the exposure is",
+        items=LENGTHS,
+        update=_changed,
+        options=_UNKEYED,
+    )
+    trail: FloatProperty(
+        name="Trail Length",
+        description="How far what is followed moves while the shutter is open, as a fraction of the picture's height",
+        default=0.1,
+        min=0.0,
+        max=MAX_DISTANCE,
+        soft_max=1.0,
+        precision=3,
+        step=1,
+        update=_changed,
     )
 
 

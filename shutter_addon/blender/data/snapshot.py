@@ -287,7 +287,9 @@ def _shutter(
     bars = _tried(_bars, curves, path, shutter, options, frames, thorough)
     if isinstance(bars, EffectError):
         bars = keyframes.Bars(keyframes.Constant(bars))
-    return model.Shutter(shutter.name, tuple(shutter.color), bars, follow)
+    is_trail = follow is not None and validation.word(shutter, "length") == "MOTION"
+    trail = _channel(curves, shutter, path, "trail", frames) if is_trail else None
+    return model.Shutter(shutter.name, tuple(shutter.color), bars, follow, trail)
 
 
 def _bars(curves: Curves, path: str, shutter, options: keyframes.Channel, frames, thorough: bool) -> keyframes.Bars:

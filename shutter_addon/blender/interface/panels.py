@@ -120,11 +120,15 @@ class _Shutters:
 
 
 def _draw_follow(layout, effect, shutter) -> None:
-    """What the exposure moves with."""
+    """What the exposure moves with, and what says how long it is."""
     layout.prop(shutter, "follow")
     if shutter.follow == "REGION":
         layout.prop_search(shutter, "follow_region", effect, "regions", text="Region")
-    elif shutter.follow == "CAMERA":
+    if shutter.follow != "NOTHING":
+        layout.prop(shutter, "length")
+        if shutter.length == "MOTION":
+            layout.prop(shutter, "trail")
+    if shutter.follow == "CAMERA":
         _draw_tracking(layout, effect, None)
 
 

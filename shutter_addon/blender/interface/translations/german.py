@@ -688,6 +688,24 @@ MESSAGES = {
         "*",
         "Name of the region that the exposure moves with",
     ): "Name der Region, mit der sich die Belichtung bewegt",
+    ("*", "Length"): "Länge",
+    ("*", "Frames"): "Bilder",
+    ("*", "Motion"): "Bewegung",
+    ("*", "What says how long the exposure is"): "Was sagt, wie lang die Belichtung ist",
+    (
+        "*",
+        "The bars say for how many frames the shutter is open",
+    ): "Die Balken sagen, wie viele Bilder lang der Verschluss offen ist",
+    (
+        "*",
+        "The shutter is open while what it follows moves by a set length; the bars are the shape",
+    ): "Der Verschluss ist offen, während sich das, womit er sich mitbewegt, um eine gegebene Länge bewegt; "
+    "die Balken sind die Form",
+    ("*", "Trail Length"): "Länge der Spur",
+    (
+        "*",
+        "How far what is followed moves while the shutter is open, as a fraction of the picture's height",
+    ): "Wie weit sich bei offenem Verschluss bewegt, was verfolgt wird, als Bruchteil der Bildhöhe",
     (
         "*",
         "Where what the camera sees has moved to, as a fraction of the picture",
