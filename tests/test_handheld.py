@@ -13,7 +13,7 @@ from pathlib import Path
 sys.path.insert(1, "scripts")
 import handheld
 from gallery import scenes
-scenes.SIZE, handheld.scene.COUNT, handheld.scene.FRAME = (480, 270), 7, 4
+scenes.SIZE, handheld.scene.COUNT, handheld.scene.FRAME = (384, 216), 5, 3
 print(json.dumps(handheld.measure(Path(sys.argv[1]))))
 """
 
