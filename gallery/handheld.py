@@ -1,7 +1,7 @@
 """A long exposure held in the hand: houses stand still as on a tripod, and the lights of cars trail.
 
 The recipe has the keys that the command made, from a recipe without:
-`shutter track footage/0001.png --recipe R.json --camera --frame 16 --all-keys --output handheld.json`
+`shutter track footage/0001.exr --recipe R.json --camera --frame 16 --all-keys --output handheld.json`
 The truth is the mean of the same frames through a camera that stands as the shaken one does at the shown frame.
 """
 
@@ -28,7 +28,8 @@ SPEED = 0.16  # of the cars, in metres a frame
 
 
 def footage(folder: Path) -> Path:
-    """By a camera that shakes: it turns about its centre; a long lens makes that a shift and a turn of the picture."""
+    """Half-float EXR, so that lamps leave bright trails. The camera shakes: it turns about its centre, and a long lens
+    makes that a shift and a turn of the picture."""
     return _render(folder, _shake)
 
 
@@ -40,8 +41,7 @@ def steady(folder: Path) -> Path:
 def exposed(first: Path) -> np.ndarray:
     """The mean of all frames (h, w, 3) in linear light, scene-linear."""
     with open_source(first) as source:
-        frames = (source.read(index)[..., :3] / np.float32(255) for index in range(source.count))
-        return np.mean([light.to_linear(frame) for frame in frames], axis=0)
+        return np.mean([source.read(index)[..., :3].astype(np.float32) for index in range(source.count)], axis=0)
 
 
 def seen(frame: float, places: np.ndarray, size) -> np.ndarray:
@@ -77,7 +77,7 @@ def held() -> recipe.Recipe:
 def _render(folder: Path, turned) -> Path:
     from . import scenes
 
-    if first := scenes.complete(folder, COUNT):
+    if first := scenes.complete(folder, COUNT, ".exr"):
         return first
     scenes.begin("#2a3c6e", 0.8, samples=4, motion_blur=OPEN)
     render = scenes.bpy.context.scene.render
@@ -94,7 +94,7 @@ def _render(folder: Path, turned) -> Path:
         COUNT,
         rotation_euler=lambda frame: tuple(np.add((tilt, roll, pan), turned(frame))),
     )
-    return scenes.render_frames(folder, COUNT)
+    return scenes.render_frames(folder, COUNT, "OPEN_EXR")
 
 
 def _shake(frame: float) -> tuple[float, float, float]:
@@ -170,7 +170,7 @@ def still(shots):
         stills.row(
             Panel(shot.source(FRAME), "A frame, held in the hand"), Panel(plain, f"{COUNT} frames, as they are")
         ),
-        stills.row(Panel(shot.result(FRAME), "the same, following the camera"), Panel(truth, "On a tripod")),
+        stills.row(Panel(shot.result(FRAME), "The same, following the camera"), Panel(truth, "On a tripod")),
     )
 
 

@@ -27,6 +27,7 @@ from quality import similarity
 
 from gallery import handheld as scene
 from shutter_addon.core import light, motions, recipe
+from shutter_addon.media import open_source
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -52,11 +53,13 @@ def measure(folder: Path) -> dict:
     footage, steady = scene.footage(folder / "footage"), scene.steady(folder / "steady")
     following = tracked(footage, folder)
     plain = replace(following, shutters=[replace(shutter, follow=None) for shutter in following.shutters])
-    truth = np.rint(255 * np.clip(light.to_encoded(scene.exposed(steady)), 0, 1)).astype(np.uint8)
+    truth = encoded(scene.exposed(steady))
+    with open_source(footage) as source:
+        single = source.read(scene.FRAME - 1)[..., :3].astype(np.float32)
     size = truth.shape[1::-1]
     seen = seen_by_all(following, size)
     pictures = {
-        "a single frame": codes(footage, scene.FRAME - 1),
+        "a single frame": encoded(single),
         "plain exposure": exposed(footage, plain, folder / "plain"),
         "following the camera": exposed(footage, following, folder / "following"),
     }
@@ -65,6 +68,11 @@ def measure(folder: Path) -> dict:
         for name, picture in pictures.items()
     ]
     return {"rows": rows, "seen": float(seen.mean()), "off": off(following, size)}
+
+
+def encoded(picture: np.ndarray) -> np.ndarray:
+    """A scene-linear picture as 8-bit sRGB."""
+    return np.rint(255 * np.clip(light.to_encoded(picture), 0, 1)).astype(np.uint8)
 
 
 def tracked(footage: Path, folder: Path) -> recipe.Recipe:

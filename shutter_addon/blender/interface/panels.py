@@ -213,7 +213,9 @@ def _draw_tracking(layout, effect, index: int | None) -> None:
     track = "shutter.track_camera" if index is None else "shutter.track"
     row = layout.row(align=True)
     for direction, _name, _description, icon, _number in track_operators.DIRECTIONS:
-        button = row.operator(track, text="Track" if direction == "BOTH" else "", icon=icon)
+        button = row.operator(
+            track, text=("Track Camera" if index is None else "Track") if direction == "BOTH" else "", icon=icon
+        )
         button.direction = direction
     if index is not None:
         layout.operator("shutter.panning_shot", icon="CON_FOLLOWTRACK")
