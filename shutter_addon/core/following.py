@@ -99,8 +99,9 @@ def _times(shown: Callable[[float], int], frame: float, index: int, wanted: rang
             after = last[way] = shown(frame + way * distance)
             low, high = max(min(before, after), wanted.start), min(max(before, after), wanted.stop - 1)
             for source in range(low, high + 1) if before != after else ():
-                share = (source - before) / (after - before)
-                times.setdefault(source, frame + way * (distance - 1 + share))
+                apart = distance - 1 + (source - before) / (after - before)
+                if source not in times or apart < abs(times[source] - frame):
+                    times[source] = frame + way * apart
     found = np.array(sorted(times))
     nearest = found[np.abs(found - np.arange(wanted.start, wanted.stop)[:, None]).argmin(axis=1)]
     return [times[source] for source in nearest.tolist()]

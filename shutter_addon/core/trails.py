@@ -10,7 +10,7 @@ import numpy as np
 
 from . import shutters
 
-# In frames. A trail of no length is a still frame.
+# In frames.
 _SHORTEST = 1e-3
 # Of the exposure. Where bars go from key to key, rounding may leave as much in a bar that is closed.
 _CLOSED = 1e-9
@@ -29,8 +29,8 @@ def travelled(places: np.ndarray) -> np.ndarray:
 
 
 def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) -> np.ndarray:
-    """Bars (L,) of the same shape and sum, open while a subject moves by `length`; for the whole window, where it moves
-    less.
+    """Bars (L,) of the same shape and sum, open while a subject moves by `length`, no longer than that takes; for the
+    whole window, where it moves less.
 
     way: of `travelled`, in the unit of the length
     shown: the time in 0 … L that keeps its place; of bars that are closed there, the nearest that is open. Where an end
@@ -49,7 +49,8 @@ def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) 
     bends += [(boundaries - about) / share for share in (-before, 1 - before) if share]
     widths = np.unique(np.concatenate(bends).clip(0, len(bars)))
     moved = np.interp(starts(widths) + widths, boundaries, way) - np.interp(starts(widths), boundaries, way)
-    width = np.interp(length, moved, widths) if length < moved[-1] else widths[-1]
+    # Backward, for of widths that add no motion the least counts: a trail of no length is a still frame.
+    width = np.interp(-length, -moved[::-1], widths[::-1]) if length <= moved[-1] else len(bars)
     width = max(float(width), _SHORTEST)
     start = float(starts(width))
     return shutters.spanning(bars, start, start + width)

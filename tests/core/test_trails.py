@@ -71,6 +71,9 @@ def test_limits():
     assert trails.with_length(box, still, 0.1, 11.5) == pytest.approx(box)
     assert trails.with_length(quarter, still, 0.1, 0.5) == pytest.approx(np.full(WINDOW, 0.25))
     assert trails.with_length(box, way, 0, 11.5) == pytest.approx(WINDOW * np.eye(WINDOW)[11])  # the shown frame
+    assert trails.with_length(box, still, 0, 11.5) == pytest.approx(WINDOW * np.eye(WINDOW)[11])
+    late_mover = np.r_[np.zeros(20), np.arange(5) / 4]
+    assert trails.with_length(box, late_mover, 0, 0.5) == pytest.approx(WINDOW * np.eye(WINDOW)[0])
     assert trails.with_length(box, way, 1e-9, 11.5) == pytest.approx(WINDOW * np.eye(WINDOW)[11])
     late = np.r_[np.zeros(20), np.ones(4)]
     assert trails.with_length(late, way, 0, 0.5) == pytest.approx(4 * np.eye(WINDOW)[20])  # the nearest open one

@@ -378,7 +378,7 @@ def trailed(recipe, shutter, bars, frame, turns, shifts, shown_time, aspect):
         return sum(overlap(start, end, k, k + 1) * step for k, step in enumerate(own))
 
     low, high = 0.001, float(len(bars))
-    if way(*span(high)) > length:
+    if way(*span(high)) >= length:
         for _ in range(HALVINGS):
             width = (low + high) / 2
             low, high = (width, high) if way(*span(width)) < length else (low, width)
