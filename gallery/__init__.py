@@ -10,4 +10,5 @@ NAMES = (
     "rolling_shutter",
     "light_trails",
     "one_stroke",
+    "panning",
 )

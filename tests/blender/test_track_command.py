@@ -13,7 +13,7 @@ from support import recipe, write_frames
 from shutter_addon.blender import command as program
 from shutter_addon.core import motions
 from shutter_addon.core import recipe as recipes
-from shutter_addon.media import tracking
+from shutter_addon.media import camera_tracking, tracking
 
 ROOT = Path(__file__).parents[2]
 WIDTH, HEIGHT, COUNT = 160, 120, 12
@@ -146,6 +146,9 @@ def test_bad_input_is_one_sentence_and_writes_nothing(track, film, tmp_path):
         (flat, (*cross, "--frame", 2), plain(), tracking.FEW),
         (one, (*cross, "--frame", 1), plain(), tracking.ALONE),
         (film, (*cross, "--frame", 3), far, tracking.OUTSIDE),
+        (flat, ("--camera", "--frame", 2), plain(), f"camera: {camera_tracking.BARE}"),
+        (film, ("--frame", 3), plain(), "track: either --region NAME or --camera, one of the two"),
+        (film, (*cross, "--camera", "--frame", 3), plain(), "track: either --region NAME or --camera, one of the two"),
         (film, ("--region", "circle", "--frame", 3), plain(), 'there is no region "circle"'),
         (film, (*cross, "--frame", 13), plain(), "--frame: 13 is not within the frames 1:12"),
         (film, (*cross, "--frame", 3, "--frames", "4:9"), plain(), "--frame: 3 is not within the frames 4:9"),
@@ -158,6 +161,24 @@ def test_bad_input_is_one_sentence_and_writes_nothing(track, film, tmp_path):
         assert said.endswith(end)
         assert "\n" not in said
         assert not output.exists()
+
+
+def test_the_camera_gets_keys_that_a_shutter_follows(track, film, tmp_path):
+    """The wall goes by, and a region has nothing to do with it."""
+    given = plain(strokes=[[[0.5, 0.5]]]) | {"camera": [{"frame": 20, "location": [0.5, 0]}]}
+    options = ("--camera", "--frame", 5, "--output", tmp_path / "t.json", "--report", tmp_path / "r.json")
+    assert track(film, *options, recipe=given) == (0, "")
+    before, after = (recipes.load(tmp_path / name) for name in ("recipe.json", "t.json"))
+    camera = after.effect(WIDTH / HEIGHT).camera
+    shift = np.subtract(camera.placement(12).location, camera.placement(1).location)
+    assert shift == pytest.approx(expected(12, 1), abs=0.3 / WIDTH)
+    assert camera.placement(5).location == (0.5, 0), "as it was"
+    assert [key.frame for key in after.camera] == [1, 5, 12, 13, 20]
+    assert (after.regions, after.shutters) == (before.regions, before.shutters)
+    told = json.loads((tmp_path / "r.json").read_text())
+    assert (told["camera"], "region" in told, len(told["frames"])) == (True, False, COUNT)
+    assert track(film, *options, "--all-keys", recipe=given) == (0, "")
+    assert [key.frame for key in recipes.load(tmp_path / "t.json").camera] == [*range(1, COUNT + 2), 20]
 
 
 def test_what_is_read_is_not_written_over(track, film, tmp_path):

@@ -1,4 +1,5 @@
-"""Keys of a region's motion: those that tracking has made, among those of the editor, who mends it by more of them.
+"""Keys of the motion of a region or of the camera: those that tracking has made, among those of the editor, who mends
+it by more of them.
 
 What was made has Blender's key type Generated, which editors show in a colour of its own, and the value that it was
 made with. All other keys are the editor's: they keep frame and value, and are linear where a made key follows.
@@ -9,26 +10,34 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.motions import Placement
-from ..data import fcurves
+from ..data import fcurves, selection, validation
+from ..data.validation import EffectError
 
 MADE = "GENERATED"
 _MADE = bpy.types.Keyframe.bl_rna.properties["type"].enum_items[MADE].value
 # What Blender gives each key as the overshoot of the ease Back, which linear keys have no use for: a made key keeps
 # there the value that it was made with, so that one which the editor has moved is told from it.
 NOTHING_KEPT = np.float32(1.70158)
-# The region's channels, and how many of their components a motion has.
+# The channels, and how many of their components a motion has.
 _COMPONENTS = (("location", 0), ("location", 1), ("rotation", 0), ("scale", 0))
+CHANNELS = ("location", "rotation", "scale")
+_LOCKED = n_('{place}: the F-curve of "{channel}" is locked')
+_MUTED = n_('{place}: the F-curve of "{channel}" is muted')
 _COUNTS = {"LOCATION": 2, "ROTATION": 3, "SCALE": 4}
 
 
 @dataclass(frozen=True)
 class MotionKeys:
-    """The keys of an effect's region for a motion (properties.MOTIONS); frames are timeline frames of the edit."""
+    """The keys of a region, or of the camera (index as for selection.moving), for a motion (properties.MOTIONS); frames
+    are timeline frames of the edit."""
 
     effect: bpy.types.PropertyGroup
-    index: int
+    index: int | None
     motion: str
 
     def edited(self, frames: range) -> list[int]:
@@ -39,12 +48,17 @@ class MotionKeys:
         return sorted(int(frame) for frame in found if frame in frames)
 
     def are_made(self) -> bool:
-        """Whether any key of the region's location was made."""
+        """Whether any key of the location was made."""
         curve = self._curve("location")
         return curve is not None and bool(_read(curve)[1].any())
 
+    def are_several(self) -> bool:
+        """Whether a channel of the motion has keys at more than one frame: with one alone the region stands still."""
+        curves = (self._curve(name, component) for name, component in _COMPONENTS[: _COUNTS[self.motion]])
+        return any(len(curve.keyframe_points) > 1 for curve in filter(None, curves))
+
     def channels(self) -> list[str]:
-        """The region's channels that the motion has, and those that have keys already."""
+        """The channels that the motion has, and those that have keys already."""
         count = _COUNTS[self.motion]
         found = (name for k, (name, component) in enumerate(_COMPONENTS) if k < count or self._curve(name, component))
         return list(dict.fromkeys(found))
@@ -79,15 +93,47 @@ class MotionKeys:
         return points[:, 0], points[:, 1] / 100
 
     def _curve(self, name: str, component: int = 0, *, new: bool = False):
-        edit, path = self.effect.id_data, f"{self.effect.path_from_id()}.regions[{self.index}].{name}"
+        moving = selection.moving(self.effect, self.index)
+        edit, path = self.effect.id_data, f"{moving.path_from_id()}.{name}"
         if new:
-            return fcurves.ensure_curve(edit, path, component, self.effect.regions[self.index].name)
+            return fcurves.ensure_curve(edit, path, component, moving.name)
         return fcurves.find_curve(edit, path, component)
 
 
-def placement_now(region) -> Placement:
-    """Where a region is as its properties stand: at the current frame, keyed or not."""
-    return Placement(tuple(region.location), float(np.degrees(region.rotation)), region.scale)
+def placement_now(moving) -> Placement:
+    """Where a region or the camera is as its properties stand: at the current frame, keyed or not."""
+    return Placement(tuple(moving.location), float(np.degrees(moving.rotation)), moving.scale)
+
+
+def check_curves(effect, index: int | None) -> None:
+    """EffectError: an F-curve of where a region or the camera is cannot be keyed, or its keys would do nothing."""
+    moving = selection.moving(effect, index)
+    for name in (*CHANNELS, "confidence"):
+        for curve in fcurves.curves_under(effect.id_data, f"{moving.path_from_id()}.{name}"):
+            for part in filter(None, (curve, curve.group)):
+                if part.lock or part.mute:
+                    sentence = _LOCKED if part.lock else _MUTED
+                    label = iface_(moving.bl_rna.properties[name].name)
+                    raise EffectError(rpt_(sentence).format(place=validation.place(moving), channel=label))
+
+
+def insert(effect, index: int | None, channels=CHANNELS) -> None:
+    """Keys channels of a region or of the camera at the current frame; where tracking has made a key, it is the
+    editor's from now on, and sure. EffectError: as check_curves says."""
+    check_curves(effect, index)
+    edit, moving = effect.id_data, selection.moving(effect, index)
+    path = moving.path_from_id()
+    for name in channels:
+        edit.keyframe_insert(f"{path}.{name}", group=moving.name)
+        for curve in fcurves.curves_under(edit, f"{path}.{name}"):
+            for key in curve.keyframe_points:
+                if key.co[0] == edit.frame_current_final:
+                    key.type, key.back = "KEYFRAME", NOTHING_KEPT
+    for curve in fcurves.curves_under(edit, f"{path}.confidence"):
+        for key in curve.keyframe_points:
+            if key.co[0] == edit.frame_current_final:
+                key.co[1] = 100
+        curve.update()
 
 
 def _values(placement: Placement) -> tuple[float, ...]:
