@@ -46,11 +46,14 @@ def check() -> None:
         )
 
 
-def grey(frame: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """A frame (h, w, 4) uint8 as a grey picture of a size, width and height."""
-    if frame.shape[1::-1] != size:
-        frame = cv2.resize(frame, size, interpolation=cv2.INTER_AREA)
-    return cv2.cvtColor(frame, cv2.COLOR_RGBA2GRAY)
+def grey(frame: np.ndarray, size: tuple[int, int], alpha: str = "opaque") -> np.ndarray:
+    """A frame (h, w, 4) uint8, over black, as a grey picture of a size, width and height; alpha: the source's."""
+    picture = cv2.cvtColor(frame, cv2.COLOR_RGBA2GRAY)
+    if alpha == "straight":
+        picture = cv2.multiply(picture, cv2.extractChannel(frame, 3), scale=1 / 255)
+    if picture.shape[::-1] != size:  # one channel takes a third of the time that four take
+        picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+    return picture
 
 
 def distances(mask: np.ndarray) -> np.ndarray:

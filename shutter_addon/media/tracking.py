@@ -126,17 +126,18 @@ class Footage:
             del self._kept[next(iter(self._kept))]
 
     def _grey(self, frame: np.ndarray) -> np.ndarray:
+        """Over black: colours that are hidden may be anything."""
+        alpha = self._source.alpha
         if frame.dtype != np.uint8:
-            frame = _levels(frame, self._source.transfer)
-        return registration.grey(frame, self.size)
+            frame, alpha = _levels(light.over_black(frame, alpha), self._source.transfer), "opaque"
+        return registration.grey(frame, self.size, alpha)
 
 
 def _levels(frame: np.ndarray, transfer: str) -> np.ndarray:
-    """Samples as levels of 8 bits, as they are shown."""
+    """Samples, of 16 bits or floats from 0 to 1, as levels of 8 bits, as they are shown."""
     if frame.dtype == np.uint16:
         return (frame >> 8).astype(np.uint8)
-    values = np.nan_to_num(frame.astype(np.float32)).clip(0, 1)
-    return np.rint(255 * (light.to_encoded(values) if transfer == "linear" else values)).astype(np.uint8)
+    return np.rint(255 * (light.to_encoded(frame) if transfer == "linear" else frame)).astype(np.uint8)
 
 
 def follow(
@@ -158,7 +159,8 @@ def follow(
     comes a second time then, blended with what is tracked back from there. What the region covers is compared with what
     it covers there, so that a frame in which something lies over the subject does not count as its look: anchors beyond
     `frames` are of use, too.
-    A direction that ends early ends with a Tracked that has a fault. TrackingError: nothing can be tracked from there.
+    A direction that ends early ends with a Tracked that has a fault; where a gap is left on the way to an anchor, there
+    is one on each side of it. TrackingError: nothing can be tracked from there.
     MediaError, while it goes on: a frame cannot be read."""
     check_frames(start, frames)
     return _RegionTrack(region, footage, motion, {*frames, *anchors}).both_ways(start, frames, anchors)
@@ -234,14 +236,15 @@ class Track(ABC):
                 there[found.frame] = found
                 yield found
         if self._has_part(anchor):  # or what was found from the start alone has to do
-            returning = self._from(anchor, range(anchor - step, start, -step))
+            returning = list(self._from(anchor, range(anchor - step, start, -step)))
             back = {found.frame: found for found in returning if not found.fault}
+            faults += [found for found in returning if found.fault]
         for frame in range(start + step, anchor, step):
             share = (frame - start) / (anchor - start)
             if blended := _blended(there.get(frame), back.get(frame), share):
                 yield blended
         yield Tracked(anchor, self._subject.placement(anchor), 1.0)
-        yield from (fault for fault in faults if fault.frame not in back)
+        yield from (fault for fault in faults if fault.frame not in there | back)
 
     def _from(self, start: int, frames: range) -> Iterator[Tracked]:
         """Frames one after another, away from `start`."""
