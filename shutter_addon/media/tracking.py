@@ -50,6 +50,7 @@ _ASKED = 4  # anchors on each side that are asked
 # Heights of the picture around a region within which corners are looked for, as far as there are not enough of them.
 _REACHES = {"line": (0.015, 0.03, 0.06, 0.12, 0.24), "lasso": (0.0, 0.015, 0.03, 0.06, 0.12)}
 _ENOUGH = 14
+_AROUND = 0.05  # widths of the picture around its place within which it is sought at least
 # So far from it corners still are its own, and so many have to be; what others may say of it, for they may belong to
 # something else.
 _NEAR, _ENOUGH_NEAR, _FAR = 0.03, 3, 0.3
@@ -301,7 +302,7 @@ class _RegionTrack(Track):
         self._doubted: dict[int, int | None] = {}
 
     def _part(self, frame: int) -> tuple[Part, float]:
-        """Corners far from the region are less surely its own."""
+        """Corners far from the region are less surely its own; those of a pattern may be those of its next period."""
         shape, (width, height) = self._subject.at(frame), self._footage.size
         covered = scribbles.rasterise([replace(shape, shutter=0)], width, height) > 0
         if not covered.any():
@@ -314,7 +315,8 @@ class _RegionTrack(Track):
         if len(part.points) < registration.FEWEST[self._motion]:
             raise TrackingError(FEW)
         near = _falloff(away[part.points.imag.astype(int), part.points.real.astype(int)], _NEAR * height).sum()
-        return part, float(np.clip(near / _ENOUGH_NEAR, _FAR, 1))
+        unlike = (1 - part.rival(_AROUND * width)) / (1 - registration.ALIKE)
+        return part, float(np.clip(near / _ENOUGH_NEAR, _FAR, 1) * np.clip(unlike, _FAR, 1))
 
     def _both_ways(self, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
         self._doubted = self._doubts(start, sorted(anchors), {*frames, *anchors})
@@ -459,7 +461,7 @@ class _Pursuit:
 
     def _found_elsewhere(self, picture, missed: int, *looks: _Look) -> tuple[Similarity, float] | None:
         """As `_found`, of all places where it may be by now; only if it looks as it did first, or as in other looks."""
-        radius = 0.05 * picture.shape[1] * (1 + missed / 4)
+        radius = _AROUND * picture.shape[1] * (1 + missed / 4)
         found = []
         for look in (_Look(self._first, Similarity(), 1.0), *looks):
             from_there = self._known.after(look.motion.inverse())

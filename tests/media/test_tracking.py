@@ -267,6 +267,19 @@ def test_a_subject_without_corners_is_never_sure(subject, ground):
     assert sure(tracked) == {4}
 
 
+@pytest.mark.parametrize("kind", EVERY)
+def test_a_pattern_that_repeats_itself_is_never_sure(ground, kind):
+    """Shaded checks that go by so quickly that the next period is nearer than their own place."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    shading = cv2.GaussianBlur(np.random.default_rng(0).normal(0, 120, (HEIGHT, WIDTH)), (0, 0), 6)
+    checks = cv2.GaussianBlur(60 + 120.0 * ((x // 8 + y // 8) % 2) + shading, (0, 0), 1)
+    cloth = np.dstack([checks] * 3).clip(0, 255).astype(np.uint8)
+    source, truth = film(cloth, ground, lambda t: (10 * t,), 10, 4)
+    tracked, _ = followed(source, kind, 4)
+    assert max(errors(tracked, truth, kind).values()) > 10
+    assert sure(tracked) == {4}
+
+
 def test_it_ends_at_a_cut_on_both_sides(subject, ground):
     whole, _ = film(subject, ground, lambda t: (t,), 8, 4)
     others = [np.roll(ground[:, ::-1], 2 * n, axis=1) for n in range(6)]
