@@ -50,6 +50,7 @@ _ASKED = 4  # anchors on each side that are asked
 # Heights of the picture around a region within which corners are looked for, as far as there are not enough of them.
 _REACHES = {"line": (0.015, 0.03, 0.06, 0.12, 0.24), "lasso": (0.0, 0.015, 0.03, 0.06, 0.12)}
 _ENOUGH = 14
+_AROUND = 0.05  # widths of the picture around its place within which it is sought at least
 # So far from it corners still are its own, and so many have to be; what others may say of it, for they may belong to
 # something else.
 _NEAR, _ENOUGH_NEAR, _FAR = 0.03, 3, 0.3
@@ -126,17 +127,18 @@ class Footage:
             del self._kept[next(iter(self._kept))]
 
     def _grey(self, frame: np.ndarray) -> np.ndarray:
+        """Over black: colours that are hidden may be anything."""
+        alpha = self._source.alpha
         if frame.dtype != np.uint8:
-            frame = _levels(frame, self._source.transfer)
-        return registration.grey(frame, self.size)
+            frame, alpha = _levels(light.over_black(frame, alpha), self._source.transfer), "opaque"
+        return registration.grey(frame, self.size, alpha)
 
 
 def _levels(frame: np.ndarray, transfer: str) -> np.ndarray:
-    """Samples as levels of 8 bits, as they are shown."""
+    """Samples, of 16 bits or floats from 0 to 1, as levels of 8 bits, as they are shown."""
     if frame.dtype == np.uint16:
         return (frame >> 8).astype(np.uint8)
-    values = np.nan_to_num(frame.astype(np.float32)).clip(0, 1)
-    return np.rint(255 * (light.to_encoded(values) if transfer == "linear" else values)).astype(np.uint8)
+    return np.rint(255 * (light.to_encoded(frame) if transfer == "linear" else frame)).astype(np.uint8)
 
 
 def follow(
@@ -158,7 +160,8 @@ def follow(
     comes a second time then, blended with what is tracked back from there. What the region covers is compared with what
     it covers there, so that a frame in which something lies over the subject does not count as its look: anchors beyond
     `frames` are of use, too.
-    A direction that ends early ends with a Tracked that has a fault. TrackingError: nothing can be tracked from there.
+    A direction that ends early ends with a Tracked that has a fault; where a gap is left on the way to an anchor, there
+    is one on each side of it. TrackingError: nothing can be tracked from there.
     MediaError, while it goes on: a frame cannot be read."""
     check_frames(start, frames)
     return _RegionTrack(region, footage, motion, {*frames, *anchors}).both_ways(start, frames, anchors)
@@ -234,14 +237,15 @@ class Track(ABC):
                 there[found.frame] = found
                 yield found
         if self._has_part(anchor):  # or what was found from the start alone has to do
-            returning = self._from(anchor, range(anchor - step, start, -step))
+            returning = list(self._from(anchor, range(anchor - step, start, -step)))
             back = {found.frame: found for found in returning if not found.fault}
+            faults += [found for found in returning if found.fault]
         for frame in range(start + step, anchor, step):
             share = (frame - start) / (anchor - start)
             if blended := _blended(there.get(frame), back.get(frame), share):
                 yield blended
         yield Tracked(anchor, self._subject.placement(anchor), 1.0)
-        yield from (fault for fault in faults if fault.frame not in back)
+        yield from (fault for fault in faults if fault.frame not in there | back)
 
     def _from(self, start: int, frames: range) -> Iterator[Tracked]:
         """Frames one after another, away from `start`."""
@@ -298,7 +302,7 @@ class _RegionTrack(Track):
         self._doubted: dict[int, int | None] = {}
 
     def _part(self, frame: int) -> tuple[Part, float]:
-        """Corners far from the region are less surely its own."""
+        """Corners far from the region are less surely its own; those of a pattern may be those of its next period."""
         shape, (width, height) = self._subject.at(frame), self._footage.size
         covered = scribbles.rasterise([replace(shape, shutter=0)], width, height) > 0
         if not covered.any():
@@ -311,7 +315,8 @@ class _RegionTrack(Track):
         if len(part.points) < registration.FEWEST[self._motion]:
             raise TrackingError(FEW)
         near = _falloff(away[part.points.imag.astype(int), part.points.real.astype(int)], _NEAR * height).sum()
-        return part, float(np.clip(near / _ENOUGH_NEAR, _FAR, 1))
+        unlike = (1 - part.rival(_AROUND * width)) / (1 - registration.ALIKE)
+        return part, float(np.clip(near / _ENOUGH_NEAR, _FAR, 1) * np.clip(unlike, _FAR, 1))
 
     def _both_ways(self, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
         self._doubted = self._doubts(start, sorted(anchors), {*frames, *anchors})
@@ -456,7 +461,7 @@ class _Pursuit:
 
     def _found_elsewhere(self, picture, missed: int, *looks: _Look) -> tuple[Similarity, float] | None:
         """As `_found`, of all places where it may be by now; only if it looks as it did first, or as in other looks."""
-        radius = 0.05 * picture.shape[1] * (1 + missed / 4)
+        radius = _AROUND * picture.shape[1] * (1 + missed / 4)
         found = []
         for look in (_Look(self._first, Similarity(), 1.0), *looks):
             from_there = self._known.after(look.motion.inverse())
