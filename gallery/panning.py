@@ -1,7 +1,7 @@
 """A panning shot of footage that a still camera took: the exposure follows a scooter, and its street streaks.
 
-The stroke was drawn at frame 20; the recipe has the keys that Track made of it:
-`shutter track footage/0001.png --recipe R.json --region scooter --frame 20 --output panning.json`
+The stroke was drawn at frame 18; the recipe has the keys that Track made of it:
+`shutter track footage/0001.png --recipe R.json --region scooter --frame 18 --output panning.json`
 The truth is the same scene, exposed by Cycles itself for as long, through a camera that pans with the scooter.
 """
 
@@ -19,8 +19,9 @@ from . import stills
 from .item import Item
 from .stills import Panel
 
-COUNT = 40
-FRAME, WINDOW = 20, 25  # what is shown, and how many frames its exposure has
+SIZE = 640, 360
+COUNT = 36
+FRAME, WINDOW = 18, 25  # what is shown, and how many frames its exposure has
 DISTANCE, HEIGHT = 14.0, 1.02  # of the camera, in metres
 WHEEL = 0.24
 NAME = "scooter"
@@ -28,7 +29,7 @@ STROKE = [[0.36, 0.52], [0.44, 0.56], [0.43, 0.46], [0.42, 0.34], [0.58, 0.42]] 
 
 
 def footage(folder: Path) -> Path:
-    """240 frames a second: the scooter moves by five pixels of 960 a frame."""
+    """240 frames a second: the scooter moves by more than three pixels a frame."""
     from . import scenes
 
     if first := scenes.complete(folder, COUNT):
@@ -37,7 +38,7 @@ def footage(folder: Path) -> Path:
     return scenes.render_frames(folder, COUNT)
 
 
-def truth(folder: Path, samples: int = 128) -> Path:
+def truth(folder: Path, samples: int = 64) -> Path:
     """The picture of a camera that pans with the scooter, open for the whole window around the shown frame, at which it
     stands as the still one does."""
     from . import scenes
@@ -46,7 +47,8 @@ def truth(folder: Path, samples: int = 128) -> Path:
     if not path.exists():
         scene = _begin(scenes, samples, motion_blur=float(WINDOW))
         scene.render.motion_blur_position = "CENTER"
-        pan(scenes, scene.camera)
+        start = scene.camera.rotation_euler.copy()
+        scenes.animate(scene.camera, COUNT, rotation_euler=lambda frame: (*start[:2], start[2] - bearing(frame)))
         for thing in scene.objects:
             thing.cycles.motion_steps = 5
         scenes.render_frames(folder, FRAME, first=FRAME)
@@ -87,20 +89,20 @@ def place(frame: float) -> float:
     return 0.031 * time + 0.00012 * time * time
 
 
-def pan(scenes, camera) -> None:
-    """Turns a camera about the vertical as the scooter goes by."""
-    start = tuple(camera.rotation_euler)
-    turn = lambda frame: (*start[:2], start[2] - atan2(place(frame), DISTANCE))  # noqa: E731
-    scenes.animate(camera, COUNT, rotation_euler=turn)
+def bearing(frame: float) -> float:
+    """In what direction the camera sees the scooter, in radians to the right."""
+    return atan2(place(frame), DISTANCE)
 
 
 def _begin(scenes, samples: int, motion_blur: float = 0.0):
-    scenes.begin("#c4d4e6", 0.75, samples=samples, motion_blur=motion_blur)
+    """The scene, with the still camera."""
+    scene = scenes.begin("#c4d4e6", 0.75, samples=samples, motion_blur=motion_blur)
+    scene.render.resolution_x, scene.render.resolution_y = SIZE
     scenes.camera((0, -DISTANCE, HEIGHT), (0, 0, HEIGHT), 85)
     scenes.lamp("SUN", 3.0, (-5, -8, 9), color="#fff0d4", size=0.05)
     _street(scenes)
     _scooter(scenes)
-    return scenes.bpy.context.scene
+    return scene
 
 
 def _is_part(thing) -> bool:
@@ -127,7 +129,7 @@ def _street(scenes) -> None:
 
 
 def _shop(scenes, x: float, words: str, color: str) -> None:
-    cream, glass, sign = scenes.paint("#f1e7d2", 0.6), scenes.paint("#33505f", 0.3), scenes.paint(color, 0.6)
+    cream, glass, sign = scenes.paint("#cdbfa6", 0.6), scenes.paint("#5d7a87", 0.3), scenes.paint(color, 0.6)
     scenes.box((1.05, 0.1, 1.15), (x - 0.32, 3.68, 1.05), cream)
     scenes.box((0.93, 0.1, 1.03), (x - 0.32, 3.65, 1.05), glass)
     scenes.box((0.5, 0.1, 1.6), (x + 0.6, 3.68, 0.9), sign)
@@ -153,8 +155,9 @@ def _scooter(scenes) -> None:
     scenes.plate([(-0.66, 0.74), (-0.1, 0.7), (-0.12, 0.8), (-0.64, 0.84)], 0.28, (0, 0, 0), dark, 0.04, root)
     scenes.ball((0.06, 0.09, 0.09), (0.66, 0, 0.92), scenes.paint("#fff3c4", 0.2), root)
     scenes.tube((0.54, -0.28, 1.04), (0.54, 0.28, 1.04), 0.022, dark, parent=root)
-    for i in range(3):
-        scenes.box((0.2, 0.02, 0.022), (-0.5, -0.19, 0.44 + 0.05 * i), dark, parent=root)
+    _checks(scenes, root, (-0.72, -0.18, 0.36), (10, 2), cream)
+    scenes.text("VITE!", 0.16, (-0.46, -0.19, 0.56), cream, root)
+    _checks(scenes, root, (0.44, -0.19, 0.4), (3, 8), cream)
     _parcels(scenes, root)
     for x in (-0.6, 0.68):
         _wheel(scenes, root, x, dark, chrome)
@@ -167,8 +170,17 @@ def _parcels(scenes, root) -> None:
     ink = scenes.paint("#23262b", 0.8)
     scenes.text("POST", 0.16, (-0.86, -0.24, 1.14), ink, root)
     scenes.text("24 · 7", 0.1, (-0.86, -0.24, 0.98), ink, root)
-    for i in range(6):
-        scenes.box((0.025 if i % 2 else 0.05, 0.01, 0.06), (-1.02 + 0.065 * i, -0.235, 0.89), ink, parent=root)
+    _checks(scenes, root, (-1.1, -0.235, 0.84), (11, 2), ink)
+    _checks(scenes, root, (-1.1, -0.235, 1.22), (11, 1), ink)
+
+
+def _checks(scenes, root, corner, counts, material) -> None:
+    """Every other one of columns and rows of squares, from a lower left corner on, facing the camera."""
+    side, (x, y, z), (columns, rows) = 0.044, corner, counts
+    places = [(x + i * side, z + j * side) for i in range(columns) for j in range(rows) if (i + j) % 2]
+    points = [(a + side * u, 0, b + side * v) for a, b in places for u, v in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    faces = [range(4 * k, 4 * k + 4) for k in range(len(places))]
+    scenes.mesh(points, faces, (0, y, 0), material, root)
 
 
 def _wheel(scenes, root, x: float, dark, chrome) -> None:
@@ -203,8 +215,8 @@ def _rider(scenes, root, dark) -> None:
     scenes.box((0.34, 0.02, 0.03), (-0.23, -0.155, 1.74), scenes.paint("#c9372c", 0.5), 0.005, root)
     for y in (-0.14, 0.14):
         scenes.ball((0.13, 0.06, 0.055), (0.18, y, 0.31), dark, root)
-    for i in range(3):
-        scenes.box((0.05, 0.01, 0.2), (-0.42 + 0.07 * i, -0.165, 1.2), white, parent=root)
+    for i in range(4):
+        scenes.box((0.04, 0.03, 0.34), (-0.45 + 0.075 * i, -0.16, 1.17), white, parent=root)
 
 
 def still(shots):

@@ -20,8 +20,8 @@ from shutter_addon.core import light
 SIZE = 960, 540
 
 
-def begin(sky: str, strength: float = 1.0, samples: int = 4, motion_blur: float = 0.0) -> None:
-    """An empty scene for Cycles, evenly lit by the sky.
+def begin(sky: str, strength: float = 1.0, samples: int = 4, motion_blur: float = 0.0):
+    """Gives an empty scene for Cycles, evenly lit by the sky.
 
     sky: its colour
     motion_blur: how much of a frame's time the footage's own shutter is open, 0 to 1, from the frame on
@@ -41,6 +41,7 @@ def begin(sky: str, strength: float = 1.0, samples: int = 4, motion_blur: float 
     scene.view_settings.view_transform = "Standard"
     scene.world = bpy.data.worlds.new("Sky")
     shade(scene.world, "Background", Color=linear(sky), Strength=strength)
+    return scene
 
 
 def render_frames(folder: Path, count: int, file_format: str = "PNG", first: int = 1) -> Path:

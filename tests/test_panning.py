@@ -12,8 +12,7 @@ import json, sys
 from pathlib import Path
 sys.path.insert(1, "scripts")
 import panning
-from gallery import scenes
-scenes.SIZE = 240, 135
+panning.scene.SIZE = 240, 135
 panning.scene.COUNT, panning.scene.FRAME, panning.scene.WINDOW = 11, 6, 9
 print(json.dumps({row.pop("picture"): row for row in panning.measure(Path(sys.argv[1]), samples=16)}))
 """
