@@ -51,7 +51,7 @@ def with_camera(
     source: Recipe, placements: Mapping[int, Placement], exact: Collection[int], size, *, thin: bool = True
 ) -> Recipe:
     """The recipe whose camera has these placements as its keys; arguments as of with_placements. Thinned keys are
-    right to a quarter of a pixel everywhere in the picture."""
+    within a quarter of a pixel of the placements, everywhere in the picture."""
     first, last = min(placements), max(placements)
     chosen = motions.thinned(placements, CORNERS, size, exact, STEADY) if thin else sorted(placements)
     camera = source.effect(size[0] / size[1]).camera
