@@ -23,7 +23,7 @@ from ..compute.device import NoDeviceError
 from ..compute.renderer import DEVICES
 from ..core import atomic_write, recipe, region_keys, retiming
 from ..core.messages import sentence, signed
-from ..media import MediaError, PrefetchSource, camera_tracking, open_source, registration, tracking
+from ..media import MediaError, PrefetchSource, camera_tracking, filmed_frames, open_source, registration, tracking
 from ..media.completeness import is_whole_blend, why_short
 from ..media.cuts import ShotSource
 from ..media.files import check_name
@@ -263,23 +263,26 @@ def _followed(arguments, source_recipe, index: int | None, medium, frames: range
     """What tracking of a region, or of the camera, found by frame, and where it ended before the last frame.
     TrackingError: at once."""
     effect = source_recipe.effect(medium.width / medium.height)
-    tracked, stops = {}, []
-    with ShotSource(PrefetchSource(medium)) as shots, film_output.progress(len(frames), "frame") as moved:
-        footage = tracking.Footage(shots, lambda frame: retiming.nearest(_shown(source_recipe, frame), shots))
-        what = footage, arguments.frame, frames
+    subject = effect.camera if index is None else effect.regions[index]
+    times = {frame: _shown(source_recipe, frame, medium.count) for frame in frames}
+    filmed = filmed_frames.FilmedFrames(times, arguments.frame)
+    with ShotSource(PrefetchSource(medium)) as shots, film_output.progress(len(filmed.frames), "frame") as moved:
+        footage = tracking.Footage(shots, filmed.index_at)
+        what = footage, filmed.start, filmed.frames
         if index is None:
-            steps = camera_tracking.follow_camera(effect.camera, effect.regions, *what, motion=arguments.motion)
+            regions = [filmed.seen(region) for region in effect.regions]
+            steps = camera_tracking.follow_camera(filmed.seen(subject), regions, *what, motion=arguments.motion)
         else:
-            steps = tracking.follow(effect.regions[index], *what, motion=arguments.motion)
-        for found in steps:
-            if found.fault:
-                stops.append(found)
-            else:
-                tracked[found.frame] = found
-                moved()
-    if len(tracked) < 2:
+            steps = tracking.follow(filmed.seen(subject), *what, motion=arguments.motion)
+        tracked = []
+        for step in steps:
+            tracked.append(step)
+            moved()
+    found = list(filmed.on_timeline(subject, tracked, footage.size))
+    stops = [each for each in found if each.fault]
+    if len(found) - len(stops) < 2:
         raise tracking.TrackingError(stops[0].fault)
-    return tracked, stops
+    return {each.frame: each for each in found if not each.fault}, stops
 
 
 def _keyed(source_recipe, index: int | None, *placements, thin: bool) -> recipe.Recipe:
@@ -291,10 +294,11 @@ def _keyed(source_recipe, index: int | None, *placements, thin: bool) -> recipe.
     return replace(source_recipe, regions=regions)
 
 
-def _shown(source_recipe, frame: int) -> float:
-    """The source frame that a recipe shows at a timeline frame; 0 is the first."""
-    time = source_recipe.time_at(frame)
-    return (frame if time is None else time) - 1
+def _shown(source_recipe, frame: int, count: int) -> float:
+    """Which of a source's frames, from 0 on, a recipe shows at a timeline frame; a fraction: an in-between one."""
+    time, factor = source_recipe.time_at(frame), source_recipe.inbetween
+    filmed = (frame if time is None else time) - 1
+    return retiming.nearest(filmed, factor, (count - 1) * factor + 1) / factor
 
 
 def _write_track(arguments, result, tracked: dict, stops: list) -> None:
