@@ -114,7 +114,7 @@ def test_the_camera_and_nothing_left_behind(shown):
     edit, effect, strip, found = shown(following({}, "camera", camera=camera), velocity, 9)
     assert levels_off(found, velocity) <= 0.6
     recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(following({}, "camera"))))
-    assert tuple(effect.camera_location) == (0, 0)
+    assert tuple(effect.camera.location) == (0, 0)
     assert request(edit, effect, strip, 9).state.following is None
 
 

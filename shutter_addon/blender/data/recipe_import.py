@@ -30,7 +30,7 @@ def apply(edit, effect, strip, source: recipe.Recipe) -> None:
     if source.time:
         _set_number(edit, effect, path, "source_time", source.time, first, group=effect.name)
     _set_number(edit, effect, path, "edge_aware", source.edge_aware, first, group=effect.name)
-    _set_moves(edit, effect, path, "camera_", source.camera, first, group=effect.name)
+    _set_moves(edit, effect.camera, f"{path}.camera", source.camera, first, group=effect.camera.name)
     for i, shutter in enumerate(source.shutters):
         _add_shutter(edit, effect, f"{path}.shutters[{i}]", shutter, first)
     colors = {shutter.name: shutter.color for shutter in source.shutters}
@@ -67,6 +67,7 @@ def clear(edit, effect) -> None:
     fcurves.remove_curves(edit, effect.path_from_id() + ".")
     effect.shutters.clear()
     effect.regions.clear()
+    effect.camera.stops.clear()
     effect.active_shutter = effect.active_region = 0
     if effect.scene.annotation is not None:
         for layer in list(effect.scene.annotation.layers):
@@ -95,15 +96,13 @@ def _add_region(edit, effect, strip, path: str, source: recipe.Region, color, fi
     region.name, region.shutter, region.width = source.name, source.shutter, source.width
     region.kind = source.kind.upper()
     region.layer = _draw(effect, strip, source, color, first)
-    _set_moves(edit, region, path, "", source.keys, first)
+    _set_moves(edit, region, path, source.keys, first)
 
 
-def _set_moves(edit, moving, path: str, prefix: str, keys: list, first: float, **curve) -> None:
-    """Location, rotation and scale of a property group, whose names have a prefix, and their keys."""
+def _set_moves(edit, moving, path: str, keys: list, first: float, **curve) -> None:
+    """Location, rotation and scale of a region or of the camera, and their keys."""
     start = keys[0] if keys else recipe.CameraKey(0)
-    setattr(moving, f"{prefix}location", start.location)
-    setattr(moving, f"{prefix}rotation", np.radians(start.rotation))
-    setattr(moving, f"{prefix}scale", start.scale)
+    moving.location, moving.rotation, moving.scale = start.location, np.radians(start.rotation), start.scale
     if not keys:
         return
     channels = {
@@ -114,7 +113,7 @@ def _set_moves(edit, moving, path: str, prefix: str, keys: list, first: float, *
     }
     for (name, index), value in channels.items():
         numbers = [(key.frame + first, value(key), key.ease) for key in keys]
-        fcurves.set_keys(edit, f"{path}.{prefix}{name}", index, numbers, **curve)
+        fcurves.set_keys(edit, f"{path}.{name}", index, numbers, **curve)
 
 
 def _draw(effect, strip, source: recipe.Region, color, first: float) -> str:

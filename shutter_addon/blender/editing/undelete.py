@@ -62,6 +62,8 @@ def _plain(struct) -> dict:
         name = prop.identifier
         if prop.type == "COLLECTION":
             plain[name] = [_plain(item) for item in getattr(struct, name)]
+        elif property_copy.is_group(struct, name):
+            plain[name] = _plain(getattr(struct, name))
         elif prop.type == "POINTER":
             if isinstance(clip := getattr(struct, name), bpy.types.MovieClip):
                 plain[name] = clip.session_uid
@@ -76,6 +78,8 @@ def _fill(struct, plain: dict) -> None:
         if isinstance(value, list):
             for item in value:
                 _fill(_add(getattr(struct, name), name, item), item)
+        elif isinstance(value, dict):
+            _fill(getattr(struct, name), value)
         elif struct.bl_rna.properties[name].type == "POINTER":
             setattr(struct, name, next((clip for clip in bpy.data.movieclips if clip.session_uid == value), None))
         elif not struct.is_property_readonly(name):
