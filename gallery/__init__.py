@@ -10,4 +10,6 @@ NAMES = (
     "rolling_shutter",
     "light_trails",
     "one_stroke",
+    "handheld",
+    "panning",
 )

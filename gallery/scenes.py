@@ -20,8 +20,8 @@ from shutter_addon.core import light
 SIZE = 960, 540
 
 
-def begin(sky: str, strength: float = 1.0, samples: int = 4, motion_blur: float = 0.0) -> None:
-    """An empty scene for Cycles, evenly lit by the sky.
+def begin(sky: str, strength: float = 1.0, samples: int = 4, motion_blur: float = 0.0):
+    """Gives an empty scene for Cycles, evenly lit by the sky.
 
     sky: its colour
     motion_blur: how much of a frame's time the footage's own shutter is open, 0 to 1, from the frame on
@@ -41,10 +41,11 @@ def begin(sky: str, strength: float = 1.0, samples: int = 4, motion_blur: float 
     scene.view_settings.view_transform = "Standard"
     scene.world = bpy.data.worlds.new("Sky")
     shade(scene.world, "Background", Color=linear(sky), Strength=strength)
+    return scene
 
 
-def render_frames(folder: Path, count: int, file_format: str = "PNG") -> Path:
-    """Renders the scene's frames 1 to count that the folder does not have yet; the first one's path.
+def render_frames(folder: Path, count: int, file_format: str = "PNG", first: int = 1) -> Path:
+    """Renders the scene's frames from the first to count that the folder does not have yet; the first one's path.
 
     file_format: PNG (8 bits) or OPEN_EXR (half float, scene-linear)
     """
@@ -55,9 +56,9 @@ def render_frames(folder: Path, count: int, file_format: str = "PNG") -> Path:
     settings.color_mode = "RGB"
     settings.color_depth = "8" if file_format == "PNG" else "16"
     ending = scene.render.file_extension
-    paths = [folder / f"{frame:04}{ending}" for frame in range(1, count + 1)]
+    paths = [folder / f"{frame:04}{ending}" for frame in range(first, count + 1)]
     part = folder / f".part{ending}"
-    for frame, path in enumerate(tqdm(paths, desc="footage", unit="frame"), start=1):
+    for frame, path in enumerate(tqdm(paths, desc="footage", unit="frame"), start=first):
         if not path.exists():
             scene.frame_set(frame)
             bpy.ops.render.render()

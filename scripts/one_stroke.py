@@ -52,7 +52,7 @@ def main() -> int:
     parser.add_argument("--output", type=Path, default=ROOT / "out" / "one_stroke", metavar="DIR")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
     parser.add_argument("--aggregate", type=int, choices=(1, 2, 4), default=1, help="as in the recipe: 2 is quicker")
-    parser.add_argument("--docs", action="store_true", help="renew docs/one_stroke.jpg")
+    parser.add_argument("--docs", action="store_true", help="renew docs/one_stroke_SCENE.jpg")
     arguments = parser.parse_args()
     chosen = [scene for scene in truth.SCENES if scene.name in (arguments.scenes or names)]
     rows = []
@@ -66,8 +66,8 @@ def main() -> int:
             rows[-1] |= {"iou": {way: masks.overlap(way) for way in WAYS}, "inside": masks.inside("one stroke")}
             picture = masks.picture()
             stills.save(picture, folder.with_suffix(".png"))
-            if arguments.docs and scene is chosen[0]:
-                stills.save(picture, ROOT / "docs" / "one_stroke.jpg")
+            if arguments.docs:
+                stills.save(picture, ROOT / "docs" / f"one_stroke_{scene.name}.jpg")
         print(json.dumps(rows[-1]), flush=True)
     if arguments.json:
         arguments.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")

@@ -31,10 +31,11 @@ ASSETS = Path(__file__).resolve().parents[1] / "assets"
 FILMS = [ASSETS / name for name in ("bigbuckbunny.mp4", "pedestrians.avi")]
 
 
-def similarity(picture: np.ndarray, other: np.ndarray) -> float:
-    """Structural similarity of two 8-bit pictures (H, W, 3)."""
+def similarity(picture: np.ndarray, other: np.ndarray, where: np.ndarray | None = None) -> float:
+    """Structural similarity of two 8-bit pictures (H, W, 3); where: (H, W) bool, the mean over these pixels alone."""
     how = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
-    return float(structural_similarity(picture, other, channel_axis=2, data_range=255, **how))
+    mean, each = structural_similarity(picture, other, channel_axis=2, data_range=255, full=True, **how)
+    return float(mean if where is None else each[where].mean())
 
 
 def similarities(compositor, film, kind: str, count: int, window: int, block: int, frames: int) -> list[float]:

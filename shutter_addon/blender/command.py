@@ -1,7 +1,8 @@
 """The command: from a source and a recipe to a finished film, through Blender's sequencer.
 
 `python -m shutter_addon render …`, and `blender -c shutter render …` in an installed Blender. `inbetween` in place of
-`render` builds in-between frames alone, `track` has a recipe's region follow what it covers.
+`render` builds in-between frames alone, `track` has a recipe's region follow what it covers, or its camera what stands
+still.
 """
 
 import argparse
@@ -22,7 +23,7 @@ from ..compute.device import NoDeviceError
 from ..compute.renderer import DEVICES
 from ..core import atomic_write, recipe, region_keys, retiming
 from ..core.messages import sentence, signed
-from ..media import MediaError, PrefetchSource, open_source, registration, tracking
+from ..media import MediaError, PrefetchSource, camera_tracking, filmed_frames, open_source, registration, tracking
 from ..media.completeness import is_whole_blend, why_short
 from ..media.cuts import ShotSource
 from ..media.files import check_name
@@ -113,10 +114,11 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument("--method", choices=METHODS, default="quick", help="of optical flow")
     build.add_argument("--frames", metavar="A:B", help="source frames A to B, and up to the one behind; 1 is the first")
     build.add_argument("--cache", type=_place, metavar="DIR", required=True, help="where in-between frames shall lie")
-    track = commands.add_parser("track", help="have a recipe's region follow what it covers")
+    track = commands.add_parser("track", help="follow what a region covers, or the camera")
     track.add_argument("source", type=_place, help="a movie, or the first file of an image sequence")
     track.add_argument("--recipe", type=_place, required=True, help="the effect, a JSON file")
-    track.add_argument("--region", required=True, metavar="NAME", help="the region that is to follow")
+    track.add_argument("--region", metavar="NAME", help="the region that is to follow")
+    track.add_argument("--camera", action="store_true", help="in its place: the camera, by all that regions leave free")
     track.add_argument("--frame", type=int, required=True, metavar="F", help="the frame at which it lies right")
     track.add_argument(
         "--frames", metavar="A:B", help="timeline frames A to B, both ways from F; 1 is the strip's first"
@@ -221,11 +223,11 @@ def _build_alone(arguments) -> None:
 
 
 def _track(arguments) -> None:
+    if arguments.camera == (arguments.region is not None):
+        raise film_output.OutputError("track: either --region NAME or --camera, one of the two")
     source_recipe = recipe.load(arguments.recipe)
-    names = [region.name for region in source_recipe.regions]
-    if arguments.region not in names:
-        raise film_output.OutputError(f'{arguments.recipe}: there is no region "{arguments.region}"')
-    index = names.index(arguments.region)
+    index = None if arguments.camera else _region_index(arguments, source_recipe)
+    subject = recipe.CAMERA if arguments.camera else arguments.region
     with _opened(arguments.source) as medium:
         film_output.spare(
             filter(None, (arguments.output, arguments.report)), [arguments.source, *_files(medium), arguments.recipe]
@@ -233,53 +235,76 @@ def _track(arguments) -> None:
         first, last = _frames(arguments.frames, new_edit.length(medium, source_recipe))
         if not first <= arguments.frame <= last:
             raise film_output.OutputError(f"--frame: {arguments.frame} is not within the frames {first}:{last}")
-        tracked, stops = _followed(arguments, source_recipe, index, medium, range(first, last + 1))
+        try:
+            tracked, stops = _followed(arguments, source_recipe, index, medium, range(first, last + 1))
+        except tracking.TrackingError as error:
+            raise tracking.TrackingError(f"{subject}: {error}") from None
         size = medium.width, medium.height
     placements = {frame: found.placement for frame, found in tracked.items()}
-    region = region_keys.with_placements(
-        source_recipe.regions[index], placements, {arguments.frame}, size, thin=not arguments.all_keys
-    )
-    regions = [*source_recipe.regions[:index], region, *source_recipe.regions[index + 1 :]]
-    _write_track(arguments, replace(source_recipe, regions=regions), tracked, stops)
+    with_keys = _keyed(source_recipe, index, placements, {arguments.frame}, size, thin=not arguments.all_keys)
+    _write_track(arguments, with_keys, tracked, stops)
     for stop in stops:
         if stop.fault == tracking.SHOT_ENDS:
             near = stop.frame - 1 if stop.frame > arguments.frame else stop.frame + 1
-            said = f"{arguments.region}: tracked to frame {near}, where the shot ends"
+            said = f"{subject}: tracked to frame {near}, where the shot ends"
         else:
-            said = f"{arguments.region}: not tracked from frame {stop.frame} on: {stop.fault}"
+            said = f"{subject}: not tracked from frame {stop.frame} on: {stop.fault}"
         print(signed(said), file=sys.stderr)
 
 
-def _followed(arguments, source_recipe, index: int, medium, frames: range) -> tuple[dict, list]:
-    """What tracking found, by frame, and where it ended before the last frame. TrackingError: at once."""
-    region = source_recipe.effect(medium.width / medium.height).regions[index]
-    tracked, stops = {}, []
-    with ShotSource(PrefetchSource(medium)) as shots, film_output.progress(len(frames), "frame") as moved:
-        footage = tracking.Footage(shots, lambda frame: retiming.nearest(_shown(source_recipe, frame), shots))
-        try:
-            for found in tracking.follow(region, footage, arguments.frame, frames, motion=arguments.motion):
-                if found.fault:
-                    stops.append(found)
-                else:
-                    tracked[found.frame] = found
-                    moved()
-            if len(tracked) < 2:
-                raise tracking.TrackingError(stops[0].fault)
-        except tracking.TrackingError as error:
-            raise tracking.TrackingError(f"{arguments.region}: {error}") from None
-    return tracked, stops
+def _region_index(arguments, source_recipe) -> int:
+    names = [region.name for region in source_recipe.regions]
+    if arguments.region not in names:
+        raise film_output.OutputError(f'{arguments.recipe}: there is no region "{arguments.region}"')
+    return names.index(arguments.region)
 
 
-def _shown(source_recipe, frame: int) -> float:
-    """The source frame that a recipe shows at a timeline frame; 0 is the first."""
-    time = source_recipe.time_at(frame)
-    return (frame if time is None else time) - 1
+def _followed(arguments, source_recipe, index: int | None, medium, frames: range) -> tuple[dict, list]:
+    """What tracking of a region, or of the camera, found by frame, and where it ended before the last frame.
+    TrackingError: at once."""
+    effect = source_recipe.effect(medium.width / medium.height)
+    subject = effect.camera if index is None else effect.regions[index]
+    times = {frame: _shown(source_recipe, frame, medium.count) for frame in frames}
+    filmed = filmed_frames.FilmedFrames(times, arguments.frame)
+    with ShotSource(PrefetchSource(medium)) as shots, film_output.progress(len(filmed.frames), "frame") as moved:
+        footage = tracking.Footage(shots, filmed.index_at)
+        what = footage, filmed.start, filmed.frames
+        if index is None:
+            regions = [filmed.seen(region) for region in effect.regions]
+            steps = camera_tracking.follow_camera(filmed.seen(subject), regions, *what, motion=arguments.motion)
+        else:
+            steps = tracking.follow(filmed.seen(subject), *what, motion=arguments.motion)
+        tracked = []
+        for step in steps:
+            tracked.append(step)
+            moved()
+    found = list(filmed.on_timeline(subject, tracked, footage.size))
+    stops = [each for each in found if each.fault]
+    if len(found) - len(stops) < 2:
+        raise tracking.TrackingError(stops[0].fault)
+    return {each.frame: each for each in found if not each.fault}, stops
+
+
+def _keyed(source_recipe, index: int | None, *placements, thin: bool) -> recipe.Recipe:
+    """The recipe with placements as keys of a region, or of the camera; arguments as of region_keys."""
+    if index is None:
+        return region_keys.with_camera(source_recipe, *placements, thin=thin)
+    regions = list(source_recipe.regions)
+    regions[index] = region_keys.with_placements(regions[index], *placements, thin=thin)
+    return replace(source_recipe, regions=regions)
+
+
+def _shown(source_recipe, frame: int, count: int) -> float:
+    """Which of a source's frames, from 0 on, a recipe shows at a timeline frame; a fraction: an in-between one."""
+    time, factor = source_recipe.time_at(frame), source_recipe.inbetween
+    filmed = (frame if time is None else time) - 1
+    return retiming.nearest(filmed, factor, (count - 1) * factor + 1) / factor
 
 
 def _write_track(arguments, result, tracked: dict, stops: list) -> None:
     """Writes the recipe, and the report of it, both whole or neither."""
     report = {
-        "region": arguments.region,
+        **({"camera": True} if arguments.camera else {"region": arguments.region}),
         "frame": arguments.frame,
         "motion": arguments.motion,
         "frames": [{"frame": n, "confidence": round(tracked[n].confidence, 3)} for n in sorted(tracked)],

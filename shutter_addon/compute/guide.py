@@ -91,7 +91,7 @@ class Guides:
 
     def _reduce(self, frame: np.ndarray) -> np.ndarray:
         """A frame's display values (3, h, w) uint16 in cells, smoothed."""
-        colours = _averaged(_over_black(frame, self._source.alpha), self._cell)
+        colours = _averaged(light.over_black(frame, self._source.alpha), self._cell)
         if self._source.transfer == "linear":
             colours = light.to_encoded(colours)
         # What averaging and interpolation smooth by themselves: variances of 1/12 and 1/6 of a cell.
@@ -114,16 +114,6 @@ class NotedSource:
         frame = self._source.read(index)
         self._guides.note(index, frame)
         return frame
-
-
-def _over_black(frame: np.ndarray, alpha: str) -> np.ndarray:
-    """A frame (h, w, 4) with its colours over black; whole numbers as they are, else what is between 0 and 1."""
-    if frame.dtype.kind == "f":
-        frame = np.nan_to_num(frame.astype(np.float32), copy=False).clip(0, 1)
-    if alpha != "straight":
-        return frame
-    white = np.float32(np.iinfo(frame.dtype).max if frame.dtype.kind == "u" else 1)
-    return light.premultiplied(frame / white)
 
 
 def _averaged(picture: np.ndarray, size: int) -> np.ndarray:

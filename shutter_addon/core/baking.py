@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from . import keyframes, limits, recipe
-from .effect import Camera, Effect, Region
+from .effect import Camera, Effect, Region, Shutter
 from .keyframes import Channel, Samples
 
 # Of the largest bar, of fractions of the picture, of degrees; of the larger key's value where that is above 1.
@@ -42,13 +42,13 @@ def baked(effect: Effect, shown: range, inbetween_method: str) -> recipe.Recipe:
     found = recipe.Recipe(
         1,
         shutters=[
-            replace(_shutter(effect, i, name, options.interpolation, shown), follow=follows[i])
+            _following(effect.shutters[i], _shutter(effect, i, name, options.interpolation, shown), follows[i], shown)
             for i, name in enumerate(names)
         ],
         regions=[region for region in regions if region],
         inbetween=options.step,
         inbetween_method=inbetween_method,
-        edge_aware=_edge_aware(effect.edge_aware, shown),
+        edge_aware=_number(effect.edge_aware, shown),
         time=_time(effect.time, shown) if effect.time else [],
         camera=_camera(effect.camera, shown),
         **{name: value for name, value in asdict(options).items() if name not in ("step", "edge_aware")},
@@ -92,6 +92,12 @@ def _follows(effect: Effect, names: list[str]) -> list[str | None]:
     return [words[id(shutter.follow)] for shutter in effect.shutters]
 
 
+def _following(shutter: Shutter, found: recipe.Shutter, follow: str | None, shown: range) -> recipe.Shutter:
+    """A recipe's shutter with what it follows, and how far."""
+    trail = _number(shutter.trail, shown) if follow and shutter.trail else None
+    return replace(found, follow=follow, trail=trail)
+
+
 def _shutter(effect: Effect, index: int, name: str, interpolation: str, shown: range) -> recipe.Shutter:
     shutter = effect.shutters[index]
     color, sampled = tuple(_short(component) for component in shutter.color), shutter.bars
@@ -119,7 +125,7 @@ def _shutter(effect: Effect, index: int, name: str, interpolation: str, shown: r
     )
 
 
-def _edge_aware(channel: Channel, shown: range) -> recipe.Keyable:
+def _number(channel: Channel, shown: range) -> recipe.Keyable:
     if isinstance(channel, Samples):
         return _value_keys(channel.at, channel, shown)
     return _short(channel.at(shown.start))

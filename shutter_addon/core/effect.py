@@ -96,6 +96,12 @@ class Region:
         strokes = self.unmoved(frame)
         return motions.centre(strokes) if strokes else None
 
+    def corners(self, frame: float) -> np.ndarray:
+        """Those (4, 2) of the box around it as it lies at a frame, in fractions of the picture; (0, 2): nothing is
+        drawn. EffectError: its strokes are nowhere near the picture."""
+        strokes = self.at(frame).strokes
+        return motions.corners(strokes) if strokes else np.empty((0, 2))
+
     def unmoved(self, frame: float) -> list[np.ndarray]:
         """The strokes (n, 2) on the picture at a frame, as they are drawn. EffectError: they are nowhere near it."""
         return self._near(lambda: self.drawings.at(frame))
@@ -128,6 +134,10 @@ class Camera:
         """The point (2,) about which it is turned and scaled, in fractions of the picture."""
         return np.array([0.5, 0.5])
 
+    def corners(self, _frame: float) -> np.ndarray:
+        """The picture's (4, 2), in fractions of it."""
+        return np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+
 
 STILL_CAMERA = Camera(*map(keyframes.Constant, ((0.0, 0.0), 0.0, 1.0)))
 
@@ -139,12 +149,15 @@ def _placement(moving: Region | Camera, frame: float) -> Placement:
 
 @dataclass(frozen=True)
 class Shutter:
-    """name, color: RGB display values, 0 to 1; follow: what its exposure moves with, None: nothing"""
+    """name, color: RGB display values, 0 to 1; follow: what its exposure moves with, None: nothing
+    trail: channel of how far that moves while the shutter is open, in fractions of the picture's height; None: the bars
+    say for how many frames it is open"""
 
     name: str
     color: tuple[float, float, float]
     bars: Bars
     follow: Region | Camera | None = None
+    trail: Channel | None = None
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from . import compositor, motions
+from . import compositor, motions, trails
 from .effect import Camera, Effect, Region
 from .frame_source import FrameSource
 from .frame_state import Following, FrameState, Options
@@ -39,7 +39,8 @@ def followed(
     source: FrameSource,
     shown: Callable[[float], int],
 ) -> FrameState:
-    """The effect's state at a timeline frame, with what its shutters follow.
+    """The effect's state at a timeline frame, with what its shutters follow, and with the bars of those whose trail has
+    a length.
 
     index, direction: the source frame that is shown there, as for compositor.window_positions
     shown: the source frame that is shown at a timeline frame a whole number of frames away, at most `reach`
@@ -56,7 +57,28 @@ def followed(
         followers = [other is subject for other in subjects]
         turns[:, followers] = np.array([motion.turn for motion in found])[:, None]
         shifts[:, followers] = np.array([motion.shift for motion in found])[:, None]
-    return replace(state, following=Following(frames.start, turns, shifts).of(slice(None)))
+    following = Following(frames.start, turns, shifts)
+    bars = _with_trails(effect, state, following, frame, index, direction, source)
+    return replace(state, bars=bars, following=following.of(slice(None)))
+
+
+def _with_trails(
+    effect: Effect, state: FrameState, following: Following, frame: float, index: int, direction: int, source
+) -> np.ndarray:
+    """The state's bars (N, L), those of shutters whose trail has a length open for it; arguments as of `followed`."""
+    bars, size = state.bars.copy(), (source.width, source.height)
+    positions = compositor.window_positions(state.options, index, direction)
+    shown_at = float(np.abs(positions - index).argmin()) + 0.5
+    seen = compositor.source_frames(state.options, positions, range(source.count))
+    # What is left out beyond the clip's ends stands still there, as what is held does.
+    turns, shifts = following.at(np.where(seen < 0, positions, seen))
+    for i, shutter in enumerate(effect.shutters):
+        if shutter.follow and shutter.trail:
+            corners = [motions.pixel(corner, size) for corner in shutter.follow.corners(frame)]
+            places = np.outer(turns[:, i], corners) + shifts[:, i, None]
+            way = trails.travelled(places) / source.height
+            bars[i] = trails.with_length(bars[i], way, float(shutter.trail.at(frame)), shown_at)
+    return bars
 
 
 def _seen(options: Options, index: int, direction: int, count: int) -> range:
@@ -77,8 +99,9 @@ def _times(shown: Callable[[float], int], frame: float, index: int, wanted: rang
             after = last[way] = shown(frame + way * distance)
             low, high = max(min(before, after), wanted.start), min(max(before, after), wanted.stop - 1)
             for source in range(low, high + 1) if before != after else ():
-                share = (source - before) / (after - before)
-                times.setdefault(source, frame + way * (distance - 1 + share))
+                apart = distance - 1 + (source - before) / (after - before)
+                if source not in times or apart < abs(times[source] - frame):
+                    times[source] = frame + way * apart
     found = np.array(sorted(times))
     nearest = found[np.abs(found - np.arange(wanted.start, wanted.stop)[:, None]).argmin(axis=1)]
     return [times[source] for source in nearest.tolist()]

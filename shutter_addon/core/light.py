@@ -25,6 +25,17 @@ def premultiplied(rgba: np.ndarray, convert=None) -> np.ndarray:
     return np.concatenate([rgb * rgba[..., 3:], rgba[..., 3:]], axis=-1)
 
 
+def over_black(frame: np.ndarray, alpha: str) -> np.ndarray:
+    """A source's frame (…, 4) with its colours over black, in its own code values: float32, what is between 0 and 1, if
+    it has floats or a straight alpha, else its whole numbers as they are."""
+    if frame.dtype.kind == "f":
+        frame = np.nan_to_num(frame.astype(np.float32), copy=False).clip(0, 1)
+    if alpha != "straight":
+        return frame
+    white = np.float32(np.iinfo(frame.dtype).max if frame.dtype.kind == "u" else 1)
+    return premultiplied(frame / white)
+
+
 def straight(rgba: np.ndarray) -> np.ndarray:
     """Premultiplied RGBA (…, 4) to straight; what is fully transparent keeps its colours (light without cover)."""
     return np.concatenate([rgba[..., :3] / _cover(rgba), rgba[..., 3:]], axis=-1)

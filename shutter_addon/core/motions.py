@@ -54,6 +54,13 @@ def centre(strokes: Iterable) -> np.ndarray:
     return (points.min(axis=0) + points.max(axis=0)) / 2
 
 
+def corners(strokes: Iterable) -> np.ndarray:
+    """The corners (4, 2) of the strokes' common bounding box."""
+    points = _points(strokes)
+    (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
+    return np.array([(left, bottom), (right, bottom), (right, top), (left, top)])
+
+
 def offsets(strokes: Iterable) -> np.ndarray:
     """The strokes' points (n, 2) from their centre on, in fractions of the picture."""
     return _points(strokes) - centre(strokes)

@@ -43,6 +43,18 @@ CAMERA = "camera"
 
 
 @dataclass(frozen=True)
+class ValueKey:
+    """A number at a frame."""
+
+    frame: float
+    value: float
+    ease: Ease = "linear"
+
+
+Keyable = float | list[ValueKey]
+
+
+@dataclass(frozen=True)
 class ShutterKey:
     frame: float
     bars: list[float]
@@ -51,22 +63,30 @@ class ShutterKey:
 
 @dataclass(frozen=True)
 class Shutter:
-    """Bars, or keys of bars; follow: a region's name, or CAMERA."""
+    """Bars, or keys of bars.
+
+    follow: a region's name, or CAMERA
+    trail: how far that moves while the shutter is open, in fractions of the picture's height; None: the bars say for
+    how many frames it is open"""
 
     name: str
     color: tuple[float, float, float] = (0.8, 0.8, 0.8)
     bars: list[float] | None = None
     keys: list[ShutterKey] = field(default_factory=list)
     follow: str | None = None
+    trail: Keyable | None = None
 
     def over_time(self, follow: effect.Region | effect.Camera | None = None) -> effect.Shutter:
         """As plain data; follow: what is followed, in the same form."""
+        trail = None if self.trail is None else _numbers(self.trail)
+        return effect.Shutter(self.name, self.color, self._bars_over_time(), follow, trail)
+
+    def _bars_over_time(self) -> keyframes.Bars:
         if not self.keys:
-            constant = keyframes.Constant(np.asarray(self.bars, float))
-            return effect.Shutter(self.name, self.color, keyframes.Bars(constant), follow)
+            return keyframes.Bars(keyframes.Constant(np.asarray(self.bars, float)))
         frames, bars, eases = _columns(self.keys, "frame", "bars", "ease")
         keys = tuple(zip(frames, eases, strict=True))
-        return effect.Shutter(self.name, self.color, keyframes.Bars(keyframes.Keys(frames, bars, eases), keys), follow)
+        return keyframes.Bars(keyframes.Keys(frames, bars, eases), keys)
 
 
 @dataclass(frozen=True)
@@ -130,18 +150,6 @@ class Region:
         )
         fixed = self.name, shutter, keyframes.Constant(self.kind), keyframes.Constant(self.width), drawings
         return effect.Region(*fixed, *_moves(self.keys))
-
-
-@dataclass(frozen=True)
-class ValueKey:
-    """A number at a frame."""
-
-    frame: float
-    value: float
-    ease: Ease = "linear"
-
-
-Keyable = float | list[ValueKey]
 
 
 @dataclass(frozen=True)
@@ -336,6 +344,8 @@ def _number(value, _kind) -> float:
 
 
 def _keyable(converter, value, kind):
+    if value is None and kind != Keyable:
+        return None
     if isinstance(value, list):
         return converter.structure(value, list[ValueKey])
     try:
@@ -425,7 +435,7 @@ def _converter():
     converter.register_structure_hook(str, _exactly(str, "a text"))
     converter.register_structure_hook(bool, _exactly(bool, "true or false"))
     converter.register_structure_hook_func(lambda kind: get_origin(kind) is Literal, _choice)
-    converter.register_structure_hook_func(lambda kind: kind == Keyable, partial(_keyable, converter))
+    converter.register_structure_hook_func(lambda kind: kind in (Keyable, Keyable | None), partial(_keyable, converter))
     converter.register_structure_hook_factory(lambda kind: get_origin(kind) is tuple, _tuple)
     converter.register_structure_hook_factory(lambda kind: get_origin(kind) is list, _list)
     converter.register_structure_hook_factory(is_dataclass, _dataclass)
@@ -492,15 +502,14 @@ def _check(recipe: Recipe) -> None:
         _require(taken == i, f"shutters[{i}].name", f"{_shown(shutter.name)} is taken by shutters[{taken}]")
         _check_shutter(shutter, recipe.window, f"shutters[{i}]")
         _check_follow(shutter.follow, recipe.regions, f"shutters[{i}].follow")
+        if shutter.trail is not None:
+            _require(shutter.follow, f"shutters[{i}].trail", "the shutter follows nothing that could move so far")
+            _check_number(shutter.trail, f"shutters[{i}].trail", limits.MAX_DISTANCE)
     _check_values(recipe.time, "time", limits.MAX_FRAME)
     _check_frames(recipe.camera, "camera")
     for k, key in enumerate(recipe.camera):
         _check_placement(key, f"camera[{k}]")
-    if isinstance(recipe.edge_aware, list):
-        _require(recipe.edge_aware, "edge_aware", "empty: there is no key")
-        _check_values(recipe.edge_aware, "edge_aware", 1, 0)
-    else:
-        _require_within(recipe.edge_aware, 1, "edge_aware", 0)
+    _check_number(recipe.edge_aware, "edge_aware", 1)
     for i, region in enumerate(recipe.regions):
         there_is_none = f"there is no shutter {_shown(region.shutter)}"
         _require(region.shutter in places, f"regions[{i}].shutter", there_is_none)
@@ -584,6 +593,15 @@ def _check_name(name: str, place: str) -> None:
     _require(len(name) <= limits.MAX_NAME, place, f"{len(name)} characters, the most are {limits.MAX_NAME}")
     wrong = next((c for c in name if c == "\0" or "\ud800" <= c <= "\udfff"), "")
     _require(not wrong, place, f"U+{ord(wrong or ' '):04X} is no character of a name")
+
+
+def _check_number(value: Keyable, place: str, most: float) -> None:
+    """A number from 0 on, or keys of it."""
+    if isinstance(value, list):
+        _require(value, place, "empty: there is no key")
+        _check_values(value, place, most, 0)
+    else:
+        _require_within(value, most, place, 0)
 
 
 def _check_values(keys: list[ValueKey], place: str, most: float, least: float | None = None) -> None:

@@ -65,7 +65,7 @@ def source_frame(strip: StripTiming, frame: float, medium) -> int:
 
     first = strip.content_trim_start + strip.first
     if medium.step > 1:
-        return nearest(first + float(position(frame)), medium)
+        return nearest(first + float(position(frame)), medium.step, medium.count)
     if strip.is_clip:  # Blender takes the whole part
         return first + int(position(frame))
     # Blender rounds a position to the nearest frame, but caches the result by the position's whole part. So a slow
@@ -77,9 +77,10 @@ def source_frame(strip: StripTiming, frame: float, medium) -> int:
     return first + min(index, length - 1)
 
 
-def nearest(filmed: float, medium) -> int:
-    """The frame of the medium that is nearest to a time, which counts filmed frames from 0 on."""
-    return min(max(math.floor(filmed * medium.step + 0.5), 0), medium.count - 1)
+def nearest(filmed: float, step: int, count: int) -> int:
+    """The frame that is nearest to a time, which counts filmed frames from 0 on, of a medium that has so many frames,
+    every step-th of which was filmed."""
+    return min(max(math.floor(filmed * step + 0.5), 0), count - 1)
 
 
 def _position(strip: StripTiming, rate: float, length: int, frame: float) -> np.float32:

@@ -166,6 +166,17 @@ def resample(bars, window: int) -> np.ndarray:
     return np.diff(np.interp(at, np.arange(len(bars) + 1), total)) * window / len(bars)
 
 
+def spanning(bars, start: float, end: float) -> np.ndarray:
+    """Bars (L,) of the same shutter in other times: it is open from one to the other, 0 ≤ start < end ≤ L, its quantile
+    scaled and shifted, its exposure the same."""
+    bars = np.asarray(bars, dtype=np.float64)
+    first, last = open_span(bars)
+    boundaries = np.arange(len(bars) + 1, dtype=np.float64)
+    times = first + (boundaries - start) * ((last - first) / (end - start))
+    total = np.interp(times, boundaries, np.concatenate([[0.0], np.cumsum(bars)]))
+    return np.diff(np.maximum.accumulate(total))  # by rounding alone would it fall
+
+
 def multiplied(bars, old: int, new: int, position: str = "start") -> np.ndarray:
     """Bars of the same shutter, in time, where each source frame has `new` frames in place of `old`, both powers of 2.
 

@@ -32,6 +32,7 @@ _WINDOWS = 9, 21  # sides of the windows that are compared, in pixels: for small
 _THERE_AND_BACK = 1.0  # pixels from where a corner started that it may come back to
 _HYPOTHESES = 300
 _SOUGHT = 64  # pixels to which a part is made smaller to be sought, or compared as a whole
+ALIKE = 0.6  # the correlation from which on something else may be taken for a part
 _NOISE = 16.0  # levels² of contrast that noise may have: they make no two pictures unlike
 # Beyond these the motion between two pictures is none that a film has.
 _MOST_SCALE, _MOST_TURN = 1.5, 0.8
@@ -46,11 +47,14 @@ def check() -> None:
         )
 
 
-def grey(frame: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """A frame (h, w, 4) uint8 as a grey picture of a size, width and height."""
-    if frame.shape[1::-1] != size:
-        frame = cv2.resize(frame, size, interpolation=cv2.INTER_AREA)
-    return cv2.cvtColor(frame, cv2.COLOR_RGBA2GRAY)
+def grey(frame: np.ndarray, size: tuple[int, int], alpha: str = "opaque") -> np.ndarray:
+    """A frame (h, w, 4) uint8, over black, as a grey picture of a size, width and height; alpha: the source's."""
+    picture = cv2.cvtColor(frame, cv2.COLOR_RGBA2GRAY)
+    if alpha == "straight":
+        picture = cv2.multiply(picture, cv2.extractChannel(frame, 3), scale=1 / 255)
+    if picture.shape[::-1] != size:  # one channel takes a third of the time that four take
+        picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+    return picture
 
 
 def distances(mask: np.ndarray) -> np.ndarray:
@@ -139,6 +143,24 @@ class Part:
             return None
         _, _, _, best = cv2.minMaxLoc(np.where(fits, scores, -1))
         return around.inverse().after(Similarity(1, complex(*best))).after(alone)
+
+    def rival(self, radius: float) -> float:
+        """How like it something beside it looks, up to 1: the highest correlation with its own picture displaced by up
+        to a radius of pixels, but for the hill around no displacement; 0: none is above ALIKE. Shading that is coarser
+        than the windows does not count, as it tells no corner from another."""
+        x, y, width, height = self.box
+        room = round(radius)
+        fine = self._whole - cv2.GaussianBlur(self._whole.astype(np.float32), (0, 0), _WINDOWS[1] / 2)
+        place = cv2.copyMakeBorder(fine, room, room, room, room, cv2.BORDER_CONSTANT)
+        place = place[y : y + height + 2 * room, x : x + width + 2 * room]
+        # a level of noise: what is flat is like nothing
+        place = place + np.random.default_rng(0).normal(0, 1, place.shape).astype(np.float32)
+        part = place[room : room + height, room : room + width]
+        weight = self.weight[y : y + height, x : x + width]
+        scores = cv2.matchTemplate(place, part, cv2.TM_CCOEFF_NORMED, mask=weight)
+        _, hills = cv2.connectedComponents((scores > ALIKE).astype(np.uint8))
+        others = (hills > 0) & (hills != hills[room, room])
+        return float(scores[others].max(initial=0.0))
 
     def again(self, picture: np.ndarray, motion: Similarity) -> Part | None:
         """The part as it looks in another picture after a motion; None: it is not in it."""

@@ -6,14 +6,16 @@ fails, with the last one in which the subject was surely seen. No bpy.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, takewhile
+from typing import Protocol
 
 import numpy as np
 
 from ..core import light, motions, scribbles
-from ..core.effect import Region
+from ..core.effect import Camera, Region
 from ..core.frame_source import FrameSource
 from ..core.motions import Placement, Similarity
 from . import registration
@@ -48,6 +50,7 @@ _ASKED = 4  # anchors on each side that are asked
 # Heights of the picture around a region within which corners are looked for, as far as there are not enough of them.
 _REACHES = {"line": (0.015, 0.03, 0.06, 0.12, 0.24), "lasso": (0.0, 0.015, 0.03, 0.06, 0.12)}
 _ENOUGH = 14
+_AROUND = 0.05  # widths of the picture around its place within which it is sought at least
 # So far from it corners still are its own, and so many have to be; what others may say of it, for they may belong to
 # something else.
 _NEAR, _ENOUGH_NEAR, _FAR = 0.03, 3, 0.3
@@ -124,17 +127,18 @@ class Footage:
             del self._kept[next(iter(self._kept))]
 
     def _grey(self, frame: np.ndarray) -> np.ndarray:
+        """Over black: colours that are hidden may be anything."""
+        alpha = self._source.alpha
         if frame.dtype != np.uint8:
-            frame = _levels(frame, self._source.transfer)
-        return registration.grey(frame, self.size)
+            frame, alpha = _levels(light.over_black(frame, alpha), self._source.transfer), "opaque"
+        return registration.grey(frame, self.size, alpha)
 
 
 def _levels(frame: np.ndarray, transfer: str) -> np.ndarray:
-    """Samples as levels of 8 bits, as they are shown."""
+    """Samples, of 16 bits or floats from 0 to 1, as levels of 8 bits, as they are shown."""
     if frame.dtype == np.uint16:
         return (frame >> 8).astype(np.uint8)
-    values = np.nan_to_num(frame.astype(np.float32)).clip(0, 1)
-    return np.rint(255 * (light.to_encoded(values) if transfer == "linear" else values)).astype(np.uint8)
+    return np.rint(255 * (light.to_encoded(frame) if transfer == "linear" else frame)).astype(np.uint8)
 
 
 def follow(
@@ -156,55 +160,65 @@ def follow(
     comes a second time then, blended with what is tracked back from there. What the region covers is compared with what
     it covers there, so that a frame in which something lies over the subject does not count as its look: anchors beyond
     `frames` are of use, too.
-    A direction that ends early ends with a Tracked that has a fault. TrackingError: nothing can be tracked from there.
+    A direction that ends early ends with a Tracked that has a fault; where a gap is left on the way to an anchor, there
+    is one on each side of it. TrackingError: nothing can be tracked from there.
     MediaError, while it goes on: a frame cannot be read."""
+    check_frames(start, frames)
+    return _RegionTrack(region, footage, motion, {*frames, *anchors}).both_ways(start, frames, anchors)
+
+
+def check_frames(start: int, frames: range) -> None:
+    """TrackingError: from there nothing can be tracked through these frames."""
     if start not in frames:
         raise TrackingError(NOT_SHOWN)
     if len(frames) < 2:
         raise TrackingError(ALONE)
-    frames = range(min(frames), max(frames) + 1)
-    track = _Track(region, footage, motion, {*frames, *anchors})
-    track.part(start)
-    return track.both_ways(start, frames, {*anchors} - {start})
 
 
-class _Track:
-    """What tracking a region needs to know."""
+class Pursuit(Protocol):
+    """What is looked for in one frame after another.
 
-    def __init__(self, region: Region, footage: Footage, motion: Motion, frames: Collection[int]):
-        self._region, self._footage, self._motion = region, footage, motion
-        shapes = {frame: region.unmoved(frame) for frame in frames}
-        if not all(map(len, shapes.values())):
+    reason: why it was not found in the last one"""
+
+    reason: str
+
+    def next(self, frame: int) -> tuple[Similarity, float] | None:
+        """The motion from the first picture to a frame's, and its confidence; None: it is not there."""
+
+
+class Track(ABC):
+    """What tracking a subject, a region or the camera, needs to know."""
+
+    def __init__(self, subject: Region | Camera, footage: Footage, motion: Motion, frames: Collection[int]):
+        """frames: all at which the subject's centre is asked for."""
+        self._subject, self._footage, self._motion = subject, footage, motion
+        self._centres = {frame: subject.centre(frame) for frame in frames}
+        if any(centre is None for centre in self._centres.values()):
             raise TrackingError(EMPTY)
-        self._centres = {frame: motions.centre(shape) for frame, shape in shapes.items()}
         self._parts: dict[int, tuple[Part, float]] = {}
-        self._doubted: dict[int, int | None] = {}
 
     def part(self, frame: int) -> tuple[Part, float]:
-        """What the region covers at a frame, and how surely its corners are those of the region, up to 1: less where
-        they are far from it. TrackingError: there is nothing to follow."""
+        """What is seen of the subject at a frame, and how surely its corners are those of the subject, up to 1.
+        TrackingError: there is nothing to follow."""
         if frame not in self._parts:
             self._parts[frame] = self._part(frame)
         return self._parts[frame]
 
+    @abstractmethod
     def _part(self, frame: int) -> tuple[Part, float]:
-        shape, (width, height) = self._region.at(frame), self._footage.size
-        covered = scribbles.rasterise([replace(shape, shutter=0)], width, height) > 0
-        if not covered.any():
-            raise TrackingError(OUTSIDE)
-        picture, away = self._footage.picture(frame), registration.distances(covered)
-        for reach in [share * height for share in _REACHES[shape.kind]]:
-            part = Part(picture, _falloff(away, reach))
-            if len(part.points) >= _ENOUGH:
-                break
-        if len(part.points) < registration.FEWEST[self._motion]:
-            raise TrackingError(FEW)
-        near = _falloff(away[part.points.imag.astype(int), part.points.real.astype(int)], _NEAR * height).sum()
-        return part, float(np.clip(near / _ENOUGH_NEAR, _FAR, 1))
+        """As `part`, which keeps it."""
 
-    def both_ways(self, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
-        yield Tracked(start, self._region.placement(start), 1.0)
-        self._doubted = self._doubts(start, sorted(anchors), {*frames, *anchors})
+    @abstractmethod
+    def _pursuit(self, start: int) -> tuple[int, Pursuit, float]:
+        """The frame whose look is searched for from `start` on, the pursuit of it, and what that is worth."""
+
+    def both_ways(self, start: int, frames: range, anchors: Collection[int]) -> Iterator[Tracked]:
+        """As `follow`. TrackingError, at once: nothing can be tracked from there."""
+        self.part(start)
+        return self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
+
+    def _both_ways(self, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
+        yield Tracked(start, self._subject.placement(start), 1.0)
         for rest in (range(start + 1, frames.stop), range(start - 1, frames.start - 1, -1)):
             anchor = next((frame for frame in rest if frame in anchors), None)
             if anchor is None:
@@ -223,27 +237,28 @@ class _Track:
                 there[found.frame] = found
                 yield found
         if self._has_part(anchor):  # or what was found from the start alone has to do
-            returning = self._from(anchor, range(anchor - step, start, -step))
+            returning = list(self._from(anchor, range(anchor - step, start, -step)))
             back = {found.frame: found for found in returning if not found.fault}
+            faults += [found for found in returning if found.fault]
         for frame in range(start + step, anchor, step):
             share = (frame - start) / (anchor - start)
             if blended := _blended(there.get(frame), back.get(frame), share):
                 yield blended
-        yield Tracked(anchor, self._region.placement(anchor), 1.0)
-        yield from (fault for fault in faults if fault.frame not in back)
+        yield Tracked(anchor, self._subject.placement(anchor), 1.0)
+        yield from (fault for fault in faults if fault.frame not in there | back)
 
     def _from(self, start: int, frames: range) -> Iterator[Tracked]:
         """Frames one after another, away from `start`."""
         self._footage.want(frames)
         origin, pursuit, worth = self._pursuit(start)
-        last, shown, lost = Tracked(start, self._region.placement(start), 1.0), start, []
+        last, shown, lost = Tracked(start, self._subject.placement(start), 1.0), start, []
         for frame in frames:
-            picture = self._footage.picture(frame)
+            self._footage.picture(frame)  # in the order in which they are read, before cuts are looked for
             if self._footage.cut(shown, frame):
                 fault = pursuit.reason if lost else SHOT_ENDS
                 yield Tracked((lost or [frame])[0], last.placement, 0.0, fault)
                 return
-            found, shown = pursuit.next(picture), frame
+            found, shown = pursuit.next(frame), frame
             if found is None:
                 lost.append(frame)
                 if len(lost) > PATIENCE:
@@ -256,15 +271,65 @@ class _Track:
         if lost:
             yield Tracked(lost[0], last.placement, 0.0, pursuit.reason)
 
+    def _has_part(self, frame: int) -> bool:
+        try:
+            self.part(frame)
+        except TrackingError:
+            return False
+        return True
+
+    def _carried(self, origin: int, frame: int, motion: Similarity, near: Placement) -> Placement:
+        before, after = self._centres[origin], self._centres[frame]
+        moved = motions.carried(self._subject.placement(origin), motion, before, after, self._footage.size)
+        return motions.unwound(moved, near)
+
+    def _bridged(self, last: Tracked, found: Tracked, lost: list[int]) -> Iterator[Tracked]:
+        """Frames at which the subject was not seen, on a straight way between those beside them, however the shape is
+        redrawn meanwhile."""
+        for missing in lost:
+            share = (missing - last.frame) / (found.frame - last.frame)
+            centre = (1 - share) * self._centres[last.frame] + share * self._centres[found.frame]
+            straight = motions.between(last.placement, found.placement, share)
+            x, y = (float(number) for number in straight.location + centre - self._centres[missing])
+            yield Tracked(missing, replace(straight, location=(x, y)), 0.0)
+
+
+class _RegionTrack(Track):
+    """Tracks what a region covers."""
+
+    def __init__(self, region: Region, *arguments):
+        super().__init__(region, *arguments)
+        self._doubted: dict[int, int | None] = {}
+
+    def _part(self, frame: int) -> tuple[Part, float]:
+        """Corners far from the region are less surely its own; those of a pattern may be those of its next period."""
+        shape, (width, height) = self._subject.at(frame), self._footage.size
+        covered = scribbles.rasterise([replace(shape, shutter=0)], width, height) > 0
+        if not covered.any():
+            raise TrackingError(OUTSIDE)
+        picture, away = self._footage.picture(frame), registration.distances(covered)
+        for reach in [share * height for share in _REACHES[shape.kind]]:
+            part = Part(picture, _falloff(away, reach))
+            if len(part.points) >= _ENOUGH:
+                break
+        if len(part.points) < registration.FEWEST[self._motion]:
+            raise TrackingError(FEW)
+        near = _falloff(away[part.points.imag.astype(int), part.points.real.astype(int)], _NEAR * height).sum()
+        unlike = (1 - part.rival(_AROUND * width)) / (1 - registration.ALIKE)
+        return part, float(np.clip(near / _ENOUGH_NEAR, _FAR, 1) * np.clip(unlike, _FAR, 1))
+
+    def _both_ways(self, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
+        self._doubted = self._doubts(start, sorted(anchors), {*frames, *anchors})
+        yield from super()._both_ways(start, frames, anchors)
+
     def _pursuit(self, start: int) -> tuple[int, _Pursuit, float]:
-        """The frame whose look is searched for from `start` on, the pursuit of it, and what that is worth."""
         origin = self._doubted.get(start, start)
         if origin is None:
             part, worth = self.part(start)
-            return start, _Pursuit(part, self._footage.picture(start), self._motion), _UNLIKE * worth
+            return start, _Pursuit(part, self._footage, start, self._motion), _UNLIKE * worth
         part, worth = self.part(origin)
         known = None if origin == start else self._known(origin, start)
-        return origin, _Pursuit(part, self._footage.picture(origin), self._motion, known), worth
+        return origin, _Pursuit(part, self._footage, origin, self._motion, known), worth
 
     def _doubts(self, start: int, anchors: list[int], shown: set[int]) -> dict[int, int | None]:
         """Of `start` and the anchors beside it those where something else may lie over the subject, each with a frame
@@ -307,11 +372,11 @@ class _Track:
         behind = range(other + step, other + step * (PATIENCE + 1), step)
         behind = list(takewhile(shown.__contains__, behind))
         self._footage.want(behind)
-        pursuit = _Pursuit(self.part(frame)[0], self._footage.picture(frame), self._motion, self._known(frame, other))
+        pursuit = _Pursuit(self.part(frame)[0], self._footage, frame, self._motion, self._known(frame, other))
         for each in behind:
             if self._footage.cut(each - step, each):
                 break
-            found = pursuit.next(self._footage.picture(each))
+            found = pursuit.next(each)
             if found and found[1] >= SURE:
                 return True
         return False
@@ -319,32 +384,11 @@ class _Track:
     def _cut(self, frame: int, other: int) -> bool:
         return any(self._footage.cut(*pair) for pair in pairwise(range(min(frame, other), max(frame, other) + 1)))
 
-    def _has_part(self, frame: int) -> bool:
-        try:
-            self.part(frame)
-        except TrackingError:
-            return False
-        return True
-
     def _known(self, frame: int, other: int) -> Similarity:
         """The motion from one frame to another, both of which have a right placement."""
-        placements, centres = zip(*((self._region.placement(f), self._centres[f]) for f in (frame, other)), strict=True)
+        both = ((self._subject.placement(each), self._centres[each]) for each in (frame, other))
+        placements, centres = zip(*both, strict=True)
         return motions.motion_between(*placements, *centres, self._footage.size)
-
-    def _carried(self, origin: int, frame: int, motion: Similarity, near: Placement) -> Placement:
-        before, after = self._centres[origin], self._centres[frame]
-        moved = motions.carried(self._region.placement(origin), motion, before, after, self._footage.size)
-        return motions.unwound(moved, near)
-
-    def _bridged(self, last: Tracked, found: Tracked, lost: list[int]) -> Iterator[Tracked]:
-        """Frames at which the subject was not seen, on a straight way between those beside them, however the shape is
-        redrawn meanwhile."""
-        for missing in lost:
-            share = (missing - last.frame) / (found.frame - last.frame)
-            centre = (1 - share) * self._centres[last.frame] + share * self._centres[found.frame]
-            straight = motions.between(last.placement, found.placement, share)
-            x, y = (float(number) for number in straight.location + centre - self._centres[missing])
-            yield Tracked(missing, replace(straight, location=(x, y)), 0.0)
 
 
 class _Pursuit:
@@ -352,19 +396,20 @@ class _Pursuit:
 
     reason: why it was not found in the last one"""
 
-    def __init__(self, part: Part, picture: np.ndarray, motion: Motion, known: Similarity | None = None):
-        """picture: the part's; known: the motion up to a picture in which the part is, but cannot be seen; the next one
+    def __init__(self, part: Part, footage: Footage, frame: int, motion: Motion, known: Similarity | None = None):
+        """frame: the part's; known: the motion up to a frame in which the part is, but cannot be seen; the next one
         comes after that. None: it comes after the part's."""
-        self._first, self._motion, self.reason = part, motion, COVERED
+        self._first, self._footage, self._motion, self.reason = part, footage, motion, COVERED
         # the motion up to the last picture in which it was found, and its last step
         self._known, self._speed = known or Similarity(), Similarity()
         self._missed = 0 if known is None else 1  # for how many pictures it was not found
         self._look = _Look(part, Similarity(), 1.0)  # how it looked later, if it is no longer like the first
-        self._seen = picture, Similarity(), 1.0  # the last picture in which it was found, the motion, its confidence
+        # the last picture in which it was found, the motion, its confidence
+        self._seen = footage.picture(frame), Similarity(), 1.0
 
-    def next(self, picture: np.ndarray) -> tuple[Similarity, float] | None:
-        """The motion from the first picture, and its confidence; None: it is not there."""
-        missed = self._missed
+    def next(self, frame: int) -> tuple[Similarity, float] | None:
+        """The motion from the first picture to a frame's, and its confidence; None: it is not there."""
+        picture, missed = self._footage.picture(frame), self._missed
         found = None if missed else self._found(picture, self._speed.after(self._known))
         if found is None:
             self._look_anew()
@@ -416,7 +461,7 @@ class _Pursuit:
 
     def _found_elsewhere(self, picture, missed: int, *looks: _Look) -> tuple[Similarity, float] | None:
         """As `_found`, of all places where it may be by now; only if it looks as it did first, or as in other looks."""
-        radius = 0.05 * picture.shape[1] * (1 + missed / 4)
+        radius = _AROUND * picture.shape[1] * (1 + missed / 4)
         found = []
         for look in (_Look(self._first, Similarity(), 1.0), *looks):
             from_there = self._known.after(look.motion.inverse())

@@ -499,7 +499,7 @@ def test_only_what_renders_by_its_keys_can_be_keyed(effect):
     """The renderer evaluates F-curves itself, as the effect's scene is another: keys on anything else would do
     nothing, or for the window leave the bars behind. Confidence is there to be looked at."""
     region_edits.add_region(effect, effect.shutters[1])
-    groups = effect, effect.shutters[0], effect.shutters[0].bars[0], effect.regions[0]
+    groups = effect, effect.shutters[0], effect.shutters[0].bars[0], effect.regions[0], effect.camera
     can = {
         (type(group).__name__, prop.identifier)
         for group in groups
@@ -511,7 +511,7 @@ def test_only_what_renders_by_its_keys_can_be_keyed(effect):
         *(("ShutterRegion", name) for name in ("width", "location", "rotation", "scale", "confidence")),
         *(("ShutterEffect", name) for name in ("position", "interpolation", "light", "exposure", "edges")),
         *(("ShutterEffect", name) for name in ("aggregate", "border", "stop_at_cuts", "edge_aware", "source_time")),
-        *(("ShutterEffect", f"camera_{name}") for name in ("location", "rotation", "scale")),
+        *(("ShutterCamera", name) for name in ("location", "rotation", "scale", "confidence")),
     }
 
 

@@ -101,6 +101,8 @@ def following_recipes(draw, longest=6):
     named = [dataclasses.replace(region, name=f"{region.name[:9]}{i}") for i, region in enumerate(found.regions)]
     followed = st.sampled_from([None, recipes.CAMERA, *(region.name for region in named)])
     shutters = [dataclasses.replace(shutter, follow=draw(followed)) for shutter in found.shutters]
+    trails = st.none() | numbers(0, 10) | value_keys(0, 10)
+    shutters = [dataclasses.replace(shutter, trail=draw(trails)) if shutter.follow else shutter for shutter in shutters]
     return dataclasses.replace(found, shutters=shutters, regions=named)
 
 

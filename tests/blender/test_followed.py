@@ -2,11 +2,13 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from support import read_picture, recipe, request, write_frames
 
+from shutter_addon.core import following as followings
 from shutter_addon.core import light
 from shutter_addon.core import recipe as recipes
 
@@ -112,7 +114,7 @@ def test_the_camera_and_nothing_left_behind(shown):
     edit, effect, strip, found = shown(following({}, "camera", camera=camera), velocity, 9)
     assert levels_off(found, velocity) <= 0.6
     recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(following({}, "camera"))))
-    assert tuple(effect.camera_location) == (0, 0)
+    assert tuple(effect.camera.location) == (0, 0)
     assert request(edit, effect, strip, 9).state.following is None
 
 
@@ -134,11 +136,37 @@ def test_a_region_that_is_renamed_or_removed(shown):
     assert request(edit, effect, strip, 9).state.following is None
 
 
+def test_the_trails_length_is_keyed(shown):
+    """Bars in Blender are those of the recipe; of what is not keyed, too, and of what has no length."""
+    velocity, keys = (3, 0), {frame: place((frame - 1) ** 2 / COUNT, (3, 0)) for frame in range(1, COUNT + 1)}
+    data = following(keys, position="center")
+    shutter = data["shutters"][0]
+    shutter["trail"] = [{"frame": 5, "value": 0.05}, {"frame": 15, "value": 0.3}]
+    edit, effect, strip, found = shown(data, velocity, 10)
+    bars = core_bars(data, 10)
+    assert found.state.bars == pytest.approx(bars, rel=1e-5)
+    assert 1 < bars.sum() / bars.max() < WINDOW - 0.5
+    shutter["trail"] = 0.175
+    assert core_bars(data, 10) == pytest.approx(bars)
+    effect.shutters[0].length = "FRAMES"
+    assert np.array_equal(request(edit, effect, strip, 10).state.bars, np.ones((1, WINDOW)))
+    effect.shutters[0].length, effect.shutters[0].follow = "MOTION", "NOTHING"
+    assert np.array_equal(request(edit, effect, strip, 10).state.bars, np.ones((1, WINDOW)))
+
+
+def core_bars(data, frame):
+    source = SimpleNamespace(count=COUNT, width=WIDTH, height=HEIGHT)
+    effect = recipes.parse(json.dumps(data)).effect(WIDTH / HEIGHT)
+    shown = lambda other: min(max(round(other) - 1, 0), COUNT - 1)  # noqa: E731
+    return followings.followed(effect, effect.at(frame), frame, frame - 1, 1, source, shown).bars
+
+
 def test_the_command_follows(command, tmp_path):
     """Through the sequencer; chunks have the same bits as the film."""
     velocity = 2, -1
     first = write_frames(tmp_path / "in", [codes(index, velocity) for index in range(COUNT)])
     data = following({frame: place(frame - 1, velocity) for frame in (1, COUNT)})
+    data["shutters"][0]["trail"] = 0.1
     command(first, "--output", tmp_path / "film", "--frames", "8:10", recipe=data)
     command(first, "--output", tmp_path / "chunk", "--frames", "10:10", recipe=data)
     for number in (8, 9, 10):

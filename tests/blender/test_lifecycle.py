@@ -170,9 +170,11 @@ def test_undo_brings_an_effect_back_and_redo_removes_it_again(bpy, edit, add, re
 
 
 @pytest.mark.parametrize("cut", [True, False])
-def test_pasted_strips_have_their_effect(bpy, edit, add, render, cut):
+def test_pasted_strips_have_their_effect(bpy, edit, add, images, render, cut):
     """Blender's clipboard does not hold the scenes that strips show."""
     add()
+    clip = bpy.data.movieclips.load(str(images))
+    edit.virtual_shutter.effects[0].regions[0].follow_clip = edit.virtual_shutter.effects[0].camera.follow_clip = clip
     before = render(edit, [1, 5, 9, 20])
     assert not np.array_equal(before[1], before[20])
     for s in edit.sequence_editor.strips:
@@ -189,6 +191,8 @@ def test_pasted_strips_have_their_effect(bpy, edit, add, render, cut):
             update(bpy)
     shown = render(edit, [frame + 100 for frame in before] + [frame + 200 for frame in before])
     assert [effect.start for effect in edit.virtual_shutter.effects] == ([101, 201] if cut else [1, 101, 201])
+    assert all(effect.regions[0].follow_clip == clip for effect in edit.virtual_shutter.effects)
+    assert all(effect.camera.follow_clip == clip for effect in edit.virtual_shutter.effects)
     for frame, picture in before.items():
         assert np.array_equal(shown[frame + 100], picture)
         assert np.array_equal(shown[frame + 200], picture)

@@ -5,7 +5,7 @@ import pytest
 from support import write_frames
 
 from shutter_addon.blender.data import annotations, fcurves, selection, strips, validation
-from shutter_addon.blender.editing import add_effect, follow_track, region_edits, shutter_edits, track_region
+from shutter_addon.blender.editing import add_effect, bar_edits, follow_track, region_edits, shutter_edits, track_region
 from shutter_addon.blender.editing.motion_keys import MotionKeys
 from shutter_addon.core.motions import Placement
 from shutter_addon.media import tracking
@@ -226,13 +226,17 @@ def placed(bpy, frame):
     return [curve.evaluate(frame) for curve in curves]
 
 
+@pytest.mark.parametrize("is_keyed", [False, True])
 @pytest.mark.parametrize("motion", ["LOCATION", "SCALE"])
-def test_frames_outside_of_what_was_tracked_stay_where_they_are(bpy, edit, region, motion):
+def test_frames_outside_of_what_was_tracked_stay_where_they_are(bpy, edit, region, motion, is_keyed):
     """Forward from a mended frame, and until another one, between keys that an earlier track has thinned."""
     track(bpy)
     before = {frame: placed(bpy, frame) for frame in range(11, 31)}
     edit.frame_set(18)
-    region.location[1] += 12 / SIZE[1]
+    for _drag in range(2):
+        region.location[1] += 6 / SIZE[1]
+        if is_keyed:  # as its handle does
+            region_edits.key_region(active(bpy)[1], 0)
     _edit, effect, strip = active(bpy)
     frames = track_region.frames_to_track(edit, strip, "FORWARD", 20)
     steps = track_region.track(edit, effect, strip, 0, frames, motion)
@@ -245,6 +249,50 @@ def test_frames_outside_of_what_was_tracked_stay_where_they_are(bpy, edit, regio
         for frame in outside:
             assert placed(bpy, frame) == pytest.approx(before[frame], abs=1e-5)
     assert placed(bpy, 20)[1] == pytest.approx(before[20][1] + 12 / SIZE[1], abs=1.5 / SIZE[1])
+
+
+def test_what_was_tracked_before_is_forgotten_once_it_is_tracked_from_there(bpy, edit, region):
+    """A second track from a mended frame leaves those before it where the first one has put them."""
+    track(bpy)
+    edit.frame_set(18)
+    region.location[1] += 12 / SIZE[1]
+    region_edits.key_region(active(bpy)[1], 0)
+    track(bpy)
+    before = {frame: placed(bpy, frame) for frame in range(11, 31)}
+    track(bpy, "FORWARD")
+    for frame in range(11, 19):
+        assert placed(bpy, frame) == pytest.approx(before[frame], abs=1e-5)
+
+
+def test_keys_are_set_at_the_edits_frame(bpy, edit, region):
+    """The scene of the window may be another one, at another frame."""
+    other = bpy.data.scenes.new("other")
+    other.frame_set(25)
+    bpy.context.window.scene = other
+    effect = edit.virtual_shutter.effects[0]
+    region_edits.key_region(effect, 0)
+    bar_edits.key_bars(effect, 0)
+    curves = fcurves.curves_under(edit, effect.path_from_id())
+    assert {key.co[0] for curve in curves for key in curve.keyframe_points} == {11}
+    assert bar_edits.unkey_bars(effect, 0)
+
+
+def test_a_gap_keeps_the_keys_that_were_made_there(bpy, edit, region):
+    track(bpy, all_keys=True)
+    effect = active(bpy)[1]
+    before = {frame: placed(bpy, frame) for frame in range(16, 26)}
+    found = {frame: Placement((0.0, 0.5), 0.0, 1.0) for frame in (*range(11, 16), *range(26, 31))}
+    MotionKeys(effect, 0, "SCALE").write(found, dict.fromkeys(found, 1.0))
+    assert {frame: placed(bpy, frame) for frame in before} == before
+    assert track_region.confidence_at(effect, 0, 20) > 0.5
+
+
+def test_a_gap_that_was_never_tracked_is_not_sure(bpy, edit, region):
+    effect = active(bpy)[1]
+    found = dict.fromkeys((11, 12, 20), Placement((0.0, 0.5), 0.0, 1.0))
+    MotionKeys(effect, 0, "SCALE").write(found, dict.fromkeys(found, 1.0))
+    assert [track_region.confidence_at(effect, 0, frame) for frame in (12, 13, 19, 20)] == [1, 0, 0, 1]
+    assert track_region.next_unsure(effect, 0, 11) == 13
 
 
 def test_a_made_key_that_the_editor_has_dragged_is_the_editors(bpy, edit, region):
@@ -415,9 +463,10 @@ def test_forward_from_a_covered_frame_is_never_surely_wrong(bpy, edit, tmp_path)
 
 
 def test_every_sentence_of_the_tracker_can_be_translated():
-    from shutter_addon.media import tracking
+    from shutter_addon.media import camera_tracking, tracking
 
-    said = {words for name, words in vars(tracking).items() if name.isupper() and isinstance(words, str)}
+    named = vars(tracking) | vars(camera_tracking)
+    said = {words for name, words in named.items() if name.isupper() and isinstance(words, str)}
     assert len(said) > 5
     assert said == set(track_region._FAULTS)
 
@@ -439,6 +488,8 @@ def test_what_the_editor_keys_is_sure(bpy, edit, region):
     keys.write({}, dict.fromkeys(range(13, 16), 0.3))
     move(bpy, 14, 3)
     assert [track_region.confidence_at(effect, 0, frame) for frame in (13, 14, 15)] == pytest.approx([0.3, 1, 0.3])
+    keys.write({}, dict.fromkeys(range(13, 16), 0.2))
+    assert track_region.confidence_at(effect, 0, 14) == pytest.approx(0.2)
 
 
 # The operators
@@ -668,6 +719,14 @@ def test_it_says_that_the_track_has_changed(bpy, edit, region, clip):
     clip.tracking.objects[0].tracks["middle"].markers.find_frame(10).mute = True
     revision.changed()
     assert follow_track.is_changed(region)
+
+
+def test_what_was_tracked_since_is_not_followed_anew(bpy, edit, region, clip):
+    set_up(region, clip, "TRACK", "middle")
+    call(bpy, "follow")
+    track(bpy)
+    assert not bpy.ops.shutter.follow_update.poll()
+    assert not follow_track.is_changed(active(bpy)[1].regions[0])
 
 
 def test_an_editors_key_mends_what_is_followed(bpy, edit, region, clip):

@@ -13,7 +13,7 @@ from support import recipe, write_frames
 from shutter_addon.blender import command as program
 from shutter_addon.core import motions
 from shutter_addon.core import recipe as recipes
-from shutter_addon.media import tracking
+from shutter_addon.media import camera_tracking, tracking
 
 ROOT = Path(__file__).parents[2]
 WIDTH, HEIGHT, COUNT = 160, 120, 12
@@ -126,15 +126,51 @@ def test_what_a_keyed_time_shows_is_tracked(track, film, tmp_path):
     assert last.location == pytest.approx(expected(1, 12), abs=0.4 / WIDTH)
 
 
-def test_where_it_ends_is_said(track, film, tmp_path):
+@pytest.mark.parametrize("start", [1, 20, 31])
+@pytest.mark.parametrize("subject", ["region", "camera"])
+def test_between_filmed_frames_it_goes_straight(track, film, tmp_path, subject, start):
+    """From frame to frame by a quarter of a filmed one's time, as in-between frames do; from one of these as well. The
+    region is redrawn meanwhile."""
+    moved = [[[0.45, 0.5], [0.75, 0.5]], [[0.6, 0.35], [0.6, 0.65]]]
+    given = plain(keys=[{"frame": 1}, {"frame": 30, "strokes": moved}])
+    given |= {"inbetween": 4, "time": [{"frame": 1, "value": 1}, {"frame": 45, "value": 12}]}
+    options = ("--region", "cross") if subject == "region" else ("--camera",)
+    options += ("--frame", start, "--all-keys", "--output", tmp_path / "t.json")
+    if subject == "camera":
+        given["regions"] = []
+    assert track(film, *options, recipe=given) == (0, "")
+    effect = recipes.load(tmp_path / "t.json").effect(WIDTH / HEIGHT)
+    places = {}
+    for frame in range(1, 46):
+        moving = effect.regions[1] if subject == "region" else effect.camera
+        places[frame] = np.add(moving.placement(frame).location, moving.centre(frame))
+    for frame, place in places.items():
+        assert place - places[start] == pytest.approx(expected(frame / 4, start / 4), abs=0.3 / WIDTH), frame
+
+
+def test_what_is_shown_twice_is_tracked_once(track, film, tmp_path):
+    """There and back through the same frames, and a jump of four of them."""
+    keyed = [{"frame": n, "value": v, "ease": "linear"} for n, v in ((1, 6), (11, 11), (23, 5), (24, 1))]
+    given = plain() | {"time": keyed, "inbetween": 2}
+    options = ("--region", "cross", "--frame", 1, "--all-keys", "--report", tmp_path / "r.json")
+    assert track(film, *options, "--output", tmp_path / "t.json", recipe=given) == (0, "")
+    found = {key.frame: key.location for key in keys(tmp_path / "t.json")}
+    for frame, index in ((11, 11), (23, 5), (24, 1), (10, 10.5), (13, 10)):
+        assert found[frame] == pytest.approx(expected(index, 6), abs=0.4 / WIDTH)
+
+
+@pytest.mark.parametrize(
+    ("shown", "last"), [({}, 6), ({"inbetween": 4, "time": [{"frame": 1, "value": 1}, {"frame": 45, "value": 12}]}, 21)]
+)
+def test_where_it_ends_is_said(track, tmp_path, shown, last):
     rng = np.random.default_rng(1)
     shots = [rng.integers(0, 256, (12, 16, 3), dtype=np.uint8).repeat(10, 0).repeat(10, 1) for _ in range(2)]
     first = write_frames(tmp_path / "two", np.stack([shots[n // 6] for n in range(12)]))
     options = ("--region", "cross", "--frame", 3, "--output", tmp_path / "t.json", "--report", tmp_path / "r.json")
-    code, said = track(first, *options)
-    assert (code, said) == (0, "Virtual Shutter: cross: tracked to frame 6, where the shot ends")
-    assert json.loads((tmp_path / "r.json").read_text())["stops"] == [{"frame": 7, "reason": tracking.SHOT_ENDS}]
-    assert [key.frame for key in keys(tmp_path / "t.json")] == [1, 3, 6]
+    code, said = track(first, *options, recipe=plain() | shown)
+    assert (code, said) == (0, f"Virtual Shutter: cross: tracked to frame {last}, where the shot ends")
+    assert json.loads((tmp_path / "r.json").read_text())["stops"] == [{"frame": last + 1, "reason": tracking.SHOT_ENDS}]
+    assert [key.frame for key in keys(tmp_path / "t.json")] == [1, 3, last]
 
 
 def test_bad_input_is_one_sentence_and_writes_nothing(track, film, tmp_path):
@@ -146,6 +182,9 @@ def test_bad_input_is_one_sentence_and_writes_nothing(track, film, tmp_path):
         (flat, (*cross, "--frame", 2), plain(), tracking.FEW),
         (one, (*cross, "--frame", 1), plain(), tracking.ALONE),
         (film, (*cross, "--frame", 3), far, tracking.OUTSIDE),
+        (flat, ("--camera", "--frame", 2), plain(), f"camera: {camera_tracking.BARE}"),
+        (film, ("--frame", 3), plain(), "track: either --region NAME or --camera, one of the two"),
+        (film, (*cross, "--camera", "--frame", 3), plain(), "track: either --region NAME or --camera, one of the two"),
         (film, ("--region", "circle", "--frame", 3), plain(), 'there is no region "circle"'),
         (film, (*cross, "--frame", 13), plain(), "--frame: 13 is not within the frames 1:12"),
         (film, (*cross, "--frame", 3, "--frames", "4:9"), plain(), "--frame: 3 is not within the frames 4:9"),
@@ -158,6 +197,24 @@ def test_bad_input_is_one_sentence_and_writes_nothing(track, film, tmp_path):
         assert said.endswith(end)
         assert "\n" not in said
         assert not output.exists()
+
+
+def test_the_camera_gets_keys_that_a_shutter_follows(track, film, tmp_path):
+    """The wall goes by, and a region has nothing to do with it."""
+    given = plain(strokes=[[[0.5, 0.5]]]) | {"camera": [{"frame": 20, "location": [0.5, 0]}]}
+    options = ("--camera", "--frame", 5, "--output", tmp_path / "t.json", "--report", tmp_path / "r.json")
+    assert track(film, *options, recipe=given) == (0, "")
+    before, after = (recipes.load(tmp_path / name) for name in ("recipe.json", "t.json"))
+    camera = after.effect(WIDTH / HEIGHT).camera
+    shift = np.subtract(camera.placement(12).location, camera.placement(1).location)
+    assert shift == pytest.approx(expected(12, 1), abs=0.3 / WIDTH)
+    assert camera.placement(5).location == (0.5, 0), "as it was"
+    assert [key.frame for key in after.camera] == [1, 5, 12, 13, 20]
+    assert (after.regions, after.shutters) == (before.regions, before.shutters)
+    told = json.loads((tmp_path / "r.json").read_text())
+    assert (told["camera"], "region" in told, len(told["frames"])) == (True, False, COUNT)
+    assert track(film, *options, "--all-keys", recipe=given) == (0, "")
+    assert [key.frame for key in recipes.load(tmp_path / "t.json").camera] == [*range(1, COUNT + 2), 20]
 
 
 def test_what_is_read_is_not_written_over(track, film, tmp_path):

@@ -58,6 +58,13 @@ def test_time_that_turns_back():
     assert found == pytest.approx(np.array([STEP]))  # before and after as near: after
 
 
+def test_of_frames_passed_over_the_nearest_time_counts():
+    """It is passed over a quarter of a frame before, and shown a frame after."""
+    shown = lambda other: 14 if other < 12 else 11  # noqa: E731
+    found = shifts(made(STRAIGHT, "center"), [11], frame=12, index=10, shown=shown)
+    assert found == pytest.approx(np.array([-0.25]) * STEP)
+
+
 def test_what_is_never_shown_lies_as_the_nearest_that_is():
     found = shifts(made(STRAIGHT), range(10, 16), frame=11, index=10, shown=lambda other: min(int(other) - 1, 12))
     assert found == pytest.approx(np.array([0, 1, 2, 2, 2, 2]) * STEP)

@@ -73,6 +73,10 @@ def name_both(data, name):
     data["regions"] = [data["regions"][0] | {"name": name} for _ in range(2)]
 
 
+def trailing(data, trail):
+    data["shutters"][0].update(follow="camera", trail=trail)
+
+
 def broken(change):
     data = copy.deepcopy(EXAMPLE)
     change(data)
@@ -182,6 +186,14 @@ def broken(change):
             lambda d: (d["shutters"][0].update(follow="camera"), name_both(d, "camera")),
             'shutters[0].follow: "camera" is the camera, and regions[0] as well',
         ),
+        (
+            lambda d: d["shutters"][0].update(trail=0.1),
+            "shutters[0].trail: the shutter follows nothing that could move so far",
+        ),
+        (lambda d: trailing(d, -0.1), "shutters[0].trail: -0.1 is not 0 to 1000"),
+        (lambda d: trailing(d, "long"), 'shutters[0].trail: "long" is not a number, nor a list of keys'),
+        (lambda d: trailing(d, []), "shutters[0].trail: empty: there is no key"),
+        (lambda d: trailing(d, [{"frame": 1, "value": 1001}]), "shutters[0].trail[0].value: 1001 is not 0 to 1000"),
         (lambda d: d.update(camera=[{"frame": 1}, {"frame": 1}]), "camera[1].frame: 1 does not follow 1"),
         (lambda d: d.update(camera=[{"frame": 1, "location": [0, 2e3]}]), "camera[0].location[1]: 2000 is not"),
         (lambda d: d.update(camera=[{"frame": 1, "strokes": []}]), "camera[0]: unknown field strokes"),

@@ -79,10 +79,15 @@ def make(seed: int) -> Case:
     if kind.is_lossy:  # which leaves light where there is no cover, and that has no code
         recipe["light"] = "linear"
     frame = int(rng.integers(1, count + 1))
+    add_motion(np.random.default_rng([seed, 1]), recipe, count)
     if "time" in recipe:
         # Halfway between two source frames nobody can tell which is shown.
         last = max(count, int(recipe["time"][-1]["frame"]))
-        clear = [f for f in range(1, last + 1) if abs(time_at(recipe, f) % 1 - 0.5) > 1e-3]
+        is_clear = {f: abs(time_at(recipe, f) % 1 - 0.5) > 1e-3 for f in range(1 - 4 * 24, last + 4 * 24 + 1)}
+        clear = [f for f in range(1, last + 1) if is_clear[f]]
+        if follows(recipe):
+            reach = 4 * recipe["window"]
+            clear = [f for f in clear if all(is_clear[g] for g in range(f - reach, f + reach + 1))]
         frame = int(rng.choice(clear))
     uncovered = recipe["light"] == "linear"
     stored = random_footage(rng, kind, (count, height, width), uncovered)
@@ -91,6 +96,40 @@ def make(seed: int) -> Case:
 
 
 # Recipes
+
+
+def follows(recipe: dict) -> bool:
+    """Whether a shutter follows anything."""
+    return any("follow" in shutter for shutter in recipe["shutters"])
+
+
+def add_motion(rng, recipe: dict, count: int) -> None:
+    """What shutters follow and how far, in most recipes, and edges of the footage that regions keep to."""
+    for i, region in enumerate(recipe["regions"]):
+        region["name"] = f"R{i}"
+    if rng.random() < 0.2:
+        recipe["edge_aware"] = choose(rng, 1.0, round(rng.random(), 3), random_numbers(rng, count, 1))
+    if rng.random() < 0.4:
+        return
+    keyed = sorted({-4, *frames(rng, count, 6), count + 6})  # so that it moves all the time
+    recipe["camera"] = [random_camera_key(rng, frame) for frame in keyed]
+    moving = ["camera", "camera", *(region["name"] for region in recipe["regions"] if "keys" in region)]
+    for shutter in recipe["shutters"]:
+        if rng.random() < 0.8:
+            shutter["follow"] = choose(rng, *moving)
+            if rng.random() < 0.4:
+                shutter["trail"] = choose(rng, 0.0, round(rng.uniform(0, 0.5), 4), random_numbers(rng, count, 0.8))
+
+
+def random_numbers(rng, count: int, most: float) -> list[dict]:
+    return [{"frame": f, "value": round(rng.uniform(0, most), 4), **ease(rng)} for f in frames(rng, count, 3)]
+
+
+def random_camera_key(rng, frame: int) -> dict:
+    key = {"frame": frame, "location": rounded(rng.normal(0, 0.15, 2)), **ease(rng)}
+    if rng.random() < 0.5:
+        key |= {"rotation": round(rng.normal(0, 20), 3), "scale": round(rng.uniform(0.7, 1.4), 4)}
+    return key
 
 
 def choose(rng, *options):

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from cases import Case, make, write, write_image
 from OpenImageIO import ImageBuf
-from reference import coefficients, picture, shown, time_at, to_encoded
+from reference import coefficients, labels_at, number_at, picture, showing, shown, time_at, to_encoded
 
 ROOT = Path(__file__).resolve().parents[2]
 PICTURE, COEFFICIENTS = 0.5 / 255, 1 / 255
@@ -49,6 +49,7 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
     """How far each device is off, as {device: (picture, coefficients)}. DifferenceError: too far; what differs is left
     in the folder."""
     from shutter_addon.compute.renderer import Renderer
+    from shutter_addon.core import following
     from shutter_addon.core import recipe as recipes
     from shutter_addon.media import open_source
 
@@ -60,25 +61,46 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
             index, direction = shown(recipe, case.frame, source.count)
             if abs(parsed.time_at(case.frame) - time_at(recipe, case.frame)) > 1e-9:
                 raise DifferenceError(f"{told(case)}: another source time")
-        state = parsed.at(case.frame, source.width / source.height)
+        shows = showing(recipe, case.frame, index, direction, source.count)
+        effect = parsed.effect(source.width / source.height)
+        state = following.followed(effect, effect.at(case.frame), case.frame, index, direction, source, shows)
+        exact = exact_coefficients(case, source, index)
         for name, device in devices.items():
             renderer = Renderer(device, source)
             made, mix = renderer.picture(index, state, direction), renderer.coefficients(index, state, direction)
             with device.current():
                 renderer.release_window()
             right = picture(recipe, case.frame, footage, index, direction, mix)
-            found[name] = judge(case, name, folder, made, right, mix)
+            found[name] = judge(case, name, folder, made, right, mix, exact)
     return found
+
+
+def exact_coefficients(case: Case, source, index: int) -> np.ndarray:
+    """The reference's; along edges the core's own, of the guide that the product has, as that is no matter of
+    precision."""
+    from shutter_addon.compute.guide import Guides, guiding
+    from shutter_addon.core import exact_diffusion
+
+    recipe, size = json.loads(case.recipe), (source.width, source.height)
+    strength = number_at(recipe.get("edge_aware", 0), case.frame)
+    if not strength:
+        return coefficients(recipe, case.frame, *size)
+    labels = labels_at(recipe, case.frame, *size) + 1
+    guide = Guides(source).guide(guiding(index, 1, range(source.count)), recipe["aggregate"])
+    return exact_diffusion.solve(labels, len(recipe["shutters"]), guide, strength)
 
 
 def check_films(cases: list[Case], folder: Path) -> tuple[dict, list[DifferenceError]]:
     """How far the frames are off that the command renders through Blender's sequencer, from footage that runs forward:
     {seed: (picture, coefficients)}, and what is too far off."""
+    from shutter_addon.media import open_source
+
     found, errors = {}, []
     with tempfile.TemporaryDirectory() as files:
         places = [Path(files) / str(case.seed) for case in cases]
-        render([film(case, place) for case, place in zip(cases, places, strict=True)])
-        for case, place in zip(cases, places, strict=True):
+        commands = [film(case, place) for case, place in zip(cases, places, strict=True)]
+        render(commands)
+        for case, place, (_, footage_path, *_) in zip(cases, places, commands, strict=True):
             recipe, footage = json.loads(case.recipe), case.footage()
             made, mix = (read_image(place / kind / f"{case.frame:04d}.exr") for kind in ("film", "weights"))
             made = np.stack([made.get(name, np.ones_like(made["R"])) for name in "RGBA"], axis=-1)
@@ -86,7 +108,9 @@ def check_films(cases: list[Case], folder: Path) -> tuple[dict, list[DifferenceE
             index, direction = shown(recipe, case.frame, len(footage.samples))
             right = picture(recipe, case.frame, footage, index, direction, mix)
             try:
-                found[case.seed] = judge(case, "film", folder, made, right, mix)
+                with open_source(Path(footage_path)) as source:
+                    exact = exact_coefficients(case, source, index)
+                found[case.seed] = judge(case, "film", folder, made, right, mix, exact)
             except DifferenceError as error:
                 errors.append(error)
     return found, errors
@@ -133,10 +157,9 @@ def samples_of(case: Case, source) -> np.ndarray:
     return case.stored
 
 
-def judge(case: Case, way: str, folder: Path, made, right, mix) -> tuple[float, float]:
+def judge(case: Case, way: str, folder: Path, made, right, mix, exact) -> tuple[float, float]:
     """How far a picture is off from the reference's Result, and coefficients from exact ones."""
     made = np.where(right.doubtful[..., None], right.picture, made)
-    exact = coefficients(json.loads(case.recipe), case.frame, *case.stored.shape[2:0:-1])
     mix, exact = np.moveaxis(mix, 0, -1), np.moveaxis(exact, 0, -1)
     return (
         within(PICTURE, light_apart(made, right.picture), case, f"{way}-picture", folder, made, right.picture),

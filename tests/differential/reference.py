@@ -12,6 +12,11 @@ What neither the paper nor the manual says is taken from the product; these are 
 - of a shutter that "shorten" leaves nothing of, the frame is shown that is nearest to the middle of its exposure, and
   of two that are as near the window's earlier one;
 - a line's width does not grow with its region;
+- frames are seen between pixels by Catmull and Rom's cubic, kept between the four pixels around, if they are opaque,
+  and linearly otherwise;
+- a frame that is never shown within four windows lies as the nearest of those that the window may show, the earlier of
+  two; of two times that are as near, the later counts;
+- a trail's length is that of the fastest corner of what is followed; a bar has half of the ways to the frames beside;
 - a premultiplied colour without cover (alpha 0) is light that is added to what lies below (as in Blender). What it is
   among encoded values, nothing says; there this is no reference.
 
@@ -117,6 +122,16 @@ def bars_at(shutter, frame, interpolation):
 
 def strokes_at(region, frame, aspect):
     """A region's strokes as complex numbers at a frame: fractions of the picture's height, the origin lower left."""
+    strokes = drawn_at(region, frame, aspect)
+    if not region.get("keys"):
+        return strokes
+    centre, (x, y, rotation, scale) = middle(strokes), placement(region["keys"], frame)
+    turn, away = scale * np.exp(1j * np.radians(rotation)), x * aspect + 1j * y
+    return [centre + turn * (stroke - centre) + away for stroke in strokes]
+
+
+def drawn_at(region, frame, aspect):
+    """A region's strokes before they are moved."""
     keys = region.get("keys", [])
     drawings = [key for key in keys if "strokes" in key]
     if not keys or "strokes" not in keys[0]:
@@ -126,18 +141,22 @@ def strokes_at(region, frame, aspect):
     if u > 0:
         others = [as_complex(stroke, aspect) for stroke in b["strokes"]]
         strokes = [moved(s, others[i], u) if i < len(others) else s for i, s in enumerate(strokes)]
-    if not keys:
-        return strokes
+    return strokes
+
+
+def middle(strokes):
+    """The centre of the box around strokes."""
     points = np.concatenate(strokes)
-    centre = complex(points.real.min() + points.real.max(), points.imag.min() + points.imag.max()) / 2
+    return complex(points.real.min() + points.real.max(), points.imag.min() + points.imag.max()) / 2
+
+
+def placement(keys, frame):
+    """Location x and y, rotation and scale at a frame."""
     a, b, u = between(keys, frame)
-
-    def value(name, default):
-        return (1 - u) * np.array(a.get(name, default), float) + u * np.array(b.get(name, default), float)
-
-    turn = value("scale", 1) * np.exp(1j * np.radians(value("rotation", 0)))
-    away = as_complex([value("location", (0, 0))], aspect)[0]
-    return [centre + turn * (stroke - centre) + away for stroke in strokes]
+    first, second = (
+        np.array([*key.get("location", (0, 0)), key.get("rotation", 0), key.get("scale", 1)], float) for key in (a, b)
+    )
+    return (1 - u) * first + u * second
 
 
 def _ease(keys):
@@ -257,6 +276,162 @@ def inverse(sums, z):
     return last - 1 + (z - before) / np.where(after > before, after - before, 1)
 
 
+# What exposures follow
+
+
+def showing(recipe, frame, index, direction, count):
+    """Which source frame is shown at other timeline frames, as a function, where at this one it is `index`."""
+    if recipe.get("time"):
+        return lambda other: shown(recipe, other, count)[0]
+    return lambda other: min(max(index + direction * int(other - frame), 0), count - 1)
+
+
+def shown_times(recipe, frame, index, direction, count):
+    """When the source frames that a window may show are shown, the nearest time to a timeline frame: {source: time}."""
+    where, reach = positions(recipe, index, direction), 4 * recipe["window"]
+    beyond = recipe["window"] if option(recipe, "edges") == "mirror" else 0
+    wanted = range(max(min(*where, index) - beyond, 0), min(max(*where, index) + beyond, count - 1) + 1)
+    shows, found = showing(recipe, frame, index, direction, count), [(0.0, 0.0, index)]
+    for start in range(frame - reach, frame + reach):
+        a, b = (index if time == frame else shows(time) for time in (start, start + 1))
+        for source in range(min(a, b), max(a, b) + 1) if a != b else ():
+            time = start + (source - a) / (b - a)
+            found.append((abs(time - frame), -time, source))
+    times = {source: -time if apart else frame for apart, time, source in sorted(found, reverse=True)}
+    times = {source: time for source, time in times.items() if source in wanted}
+    return {source: times[min(sorted(times), key=lambda other: abs(other - source))] for source in wanted}
+
+
+def subject(recipe, name):
+    """A function of a timeline frame that tells of what is followed its centre and its placement, and its corners."""
+    if name == "camera":
+        keys = recipe.get("camera", [])
+        return lambda frame, aspect: (aspect / 2 + 0.5j, placement(keys, frame) if keys else STILL)
+    region = next(region for region in recipe["regions"] if region["name"] == name)
+    keys = region.get("keys")
+    return lambda frame, aspect: (
+        middle(drawn_at(region, frame, aspect)),
+        placement(keys, frame) if keys else STILL,
+    )
+
+
+STILL = np.array([0.0, 0, 0, 1])
+
+
+def motion(tells, frame, time, aspect):
+    """(turn, shift) of the points of the picture, in heights of it, from a timeline frame to a time after or before,
+    straight between whole frames."""
+    low = int(np.floor(time))
+    (c0, p0), (c1, p1) = (tells(low + k, aspect) for k in (0, 1))
+    share = time - low
+    start, end = tells(frame, aspect), ((1 - share) * c0 + share * c1, (1 - share) * p0 + share * p1)
+    (z0, turn0), (z1, turn1) = (
+        (centre + x * aspect + 1j * y, scale * np.exp(1j * np.radians(rotation)))
+        for centre, (x, y, rotation, scale) in (start, end)
+    )
+    return turn1 / turn0, z1 - turn1 / turn0 * z0
+
+
+def motions(recipe, frame, index, direction, count, aspect):
+    """Turns and shifts (N, L), by which each shutter sees the frames of the window; None: none follows anything."""
+    if not any("follow" in shutter for shutter in recipe["shutters"]):
+        return None
+    times = shown_times(recipe, frame, index, direction, count)
+    edges = "mirror" if option(recipe, "edges") == "mirror" else "hold"
+    seen = [at_edges(edges, place, count) for place in positions(recipe, index, direction)]
+
+    def of(shutter):
+        if "follow" not in shutter:
+            return [(1, 0)] * len(seen)
+        tells = subject(recipe, shutter["follow"])
+        return [motion(tells, frame, times[source], aspect) for source in seen]
+
+    found = [of(shutter) for shutter in recipe["shutters"]]
+    return np.moveaxis(np.array(found, complex), -1, 0)
+
+
+def trailed(recipe, shutter, bars, frame, turns, shifts, shown_time, aspect):
+    """A shutter's bars (L,), open while what it follows moves by its trail: in a span that grows until it does."""
+    if "trail" not in shutter:
+        return bars
+    name, length = shutter["follow"], number_at(shutter["trail"], frame)
+    if name == "camera":
+        corners = np.array([0, aspect, 1j, aspect + 1j])
+    else:
+        region = next(region for region in recipe["regions"] if region["name"] == name)
+        points = np.concatenate(strokes_at(region, frame, aspect))
+        corners = np.array(
+            [x + 1j * y for x in (points.real.min(), points.real.max()) for y in (points.imag.min(), points.imag.max())]
+        )
+    places = turns[:, None] * corners + shifts[:, None]
+    steps = [max(abs(b - a)) for a, b in pairwise(places)] or [0.0]
+    own = [(a + b) / 2 for a, b in pairwise([steps[0], *steps, steps[-1]])][: len(bars)]
+    first, last = np.flatnonzero(bars > 1e-9 * bars.sum())[[0, -1]] + (0, 1)
+    about = min(max(shown_time, first), last)
+
+    def span(width):
+        start = about - (about - first) / (last - first) * width
+        start = min(max(start, 0), len(bars) - width)
+        return start, start + width
+
+    def way(start, end):
+        return sum(overlap(start, end, k, k + 1) * step for k, step in enumerate(own))
+
+    low, high = 0.001, float(len(bars))
+    if way(*span(high)) >= length:
+        for _ in range(HALVINGS):
+            width = (low + high) / 2
+            low, high = (width, high) if way(*span(width)) < length else (low, width)
+    start, end = span(high)
+    scale = (end - start) / (last - first)
+    edges = [start + (j - first) * scale for j in range(len(bars) + 1)]
+    spans = list(pairwise(edges))
+
+    def exposed(k):
+        return sum(bar * overlap(*own, k, k + 1) for bar, own in zip(bars, spans, strict=True)) / scale
+
+    return np.array([exposed(k) for k in range(len(bars))])
+
+
+def overlap(a, b, c, d):
+    return max(min(b, d) - max(a, c), 0.0)
+
+
+def number_at(value, frame):
+    """A number at a frame, which may have keys."""
+    if not isinstance(value, list):
+        return value
+    a, b, u = between(value, frame)
+    return (1 - u) * a["value"] + u * b["value"]
+
+
+def sampled(light, places, is_sharp):
+    """A frame's light (H, W, 4) at places (H, W), complex in heights of the picture from the lower left corner on."""
+    height, width = light.shape[:2]
+    x = (places.real * height - 0.5).clip(-9, width + 9)
+    y = (height - places.imag * height - 0.5).clip(-9, height + 9)
+    column, row = np.floor(x), np.floor(y)
+
+    def pixel(i, j):
+        return light[(row + j).clip(0, height - 1).astype(int), (column + i).clip(0, width - 1).astype(int)]
+
+    corners = np.array([pixel(i, j) for i in (0, 1) for j in (0, 1)])
+    taps = range(-1, 3) if is_sharp else (0, 1)
+    weigh = cubic if is_sharp else linear
+    total = sum((weigh(x - column - i) * weigh(y - row - j))[..., None] * pixel(i, j) for i in taps for j in taps)
+    return total.clip(corners.min(axis=0), corners.max(axis=0))
+
+
+def linear(t):
+    return 1 - np.abs(t)
+
+
+def cubic(t):
+    """Keys' kernel, with the slopes of Catmull and Rom."""
+    t = np.abs(t)
+    return np.where(t < 1, 1.5 * t**3 - 2.5 * t**2 + 1, np.where(t < 2, -0.5 * t**3 + 2.5 * t**2 - 4 * t + 2, 0))
+
+
 # Pictures
 
 
@@ -312,16 +487,25 @@ def picture(recipe, frame, footage, index, direction, given=None):
     count, height, width, _ = footage.samples.shape
     mix = coefficients(recipe, frame, width, height) if given is None else np.asarray(given, float)
     mix = mix / mix.sum(axis=0)
-    blocks = mix.shape[1:]
+    blocks, aspect = mix.shape[1:], width / height
     mix = mix.reshape(len(mix), -1)
     bars = np.array([bars_at(shutter, frame, option(recipe, "interpolation")) for shutter in recipe["shutters"]])
+    where, moves = positions(recipe, index, direction), motions(recipe, frame, index, direction, count, aspect)
+    if moves is not None:
+        shown_time = np.abs(np.array(where) - index).argmin() + 0.5
+        bars = np.array(
+            [
+                trailed(recipe, shutter, own, frame, *move, shown_time, aspect)
+                for shutter, own, move in zip(recipe["shutters"], bars, np.moveaxis(moves, 1, 0), strict=True)
+            ]
+        )
     exposures = bars.sum(axis=1)
     if option(recipe, "interpolation") == "displacement":
-        weights = displaced(bars, mix)
-    else:
-        weights = (bars / exposures[:, None]).T @ mix
-    frames = [at_edges(option(recipe, "edges"), p, count) for p in positions(recipe, index, direction)]
-    weights, doubtful = shortened(weights, frames)
+        parts = displaced(bars, mix)[None]
+    else:  # a picture of each shutter, mixed
+        parts = (bars / exposures[:, None])[..., None] * mix[:, None]
+    frames = [at_edges(option(recipe, "edges"), place, count) for place in where]
+    parts, doubtful = shortened(parts, frames, mix)
     gain = np.ones(mix.shape[1])
     if option(recipe, "exposure") == "weighted":
         gain = exposures @ mix / exposures[0]
@@ -330,28 +514,43 @@ def picture(recipe, frame, footage, index, direction, given=None):
         block = option(recipe, "aggregate")
         return values.reshape(blocks).repeat(block, 0).repeat(block, 1)[:height, :width]
 
+    y, x = np.mgrid[:height, :width] + 0.5
+    own = (x + 1j * (height - y)) / height
+
+    def place(i, k):
+        """Where the pixels lie in frame k of the window, by shutter i, or where positions are mixed."""
+        if len(parts) > 1:
+            return moves[0, i, k] * own + moves[1, i, k]
+        return sum(of_pixels(c) * (turn * own + shift) for c, turn, shift in zip(mix, *moves[:, :, k], strict=True))
+
     total = np.zeros((height, width, 4))
-    for weight, seen in zip(weights, frames, strict=True):
-        if seen is not None and weight.any():
-            total += of_pixels(weight)[..., None] * summed(footage, seen, option(recipe, "light"))
+    for k, seen in enumerate(frames):
+        if seen is None:
+            continue
+        light = summed(footage, seen, option(recipe, "light"))
+        for i, weights in enumerate(parts):
+            if weights[k].any():
+                there = light if moves is None else sampled(light, place(i, k), footage.alpha == "opaque")
+                total += of_pixels(weights[k])[..., None] * there
     colour, alpha = total[..., :3], total[..., 3:]
     if option(recipe, "light") == "encoded":
         colour = to_linear(colour / covering(alpha)) * covering(alpha)
     return Result(np.concatenate([colour * of_pixels(gain)[..., None], alpha], axis=-1), of_pixels(doubtful))
 
 
-def shortened(weights, frames):
-    """Weights (L, n) without frames that are left out (None): what remains is normalised, or the nearest frame is
-    shown. And where that is doubtful (n,)."""
+def shortened(parts, frames, mix):
+    """The weights (M, L, n) of M pictures without frames that are left out (None): what remains is normalised, or the
+    nearest frame is shown, of several pictures with the weights `mix`. And where that is doubtful (n,)."""
     there = np.array([seen is not None for seen in frames])
     if there.all():
-        return weights, np.zeros(weights.shape[1], bool)
-    kept, places = weights * there[:, None], np.flatnonzero(there)
-    share = kept.sum(axis=0)
+        return parts, np.zeros(parts.shape[-1], bool)
+    kept, places = parts * there[:, None], np.flatnonzero(there)
+    share = kept.sum(axis=(0, 1))
     is_lost = share <= NOTHING
-    middle = (np.arange(len(frames)) + 0.5) @ weights - EARLIER
+    middle = (np.arange(len(frames)) + 0.5) @ parts.sum(axis=0) - EARLIER
     apart = np.abs(middle - (places[:, None] + 0.5))
     alone = np.arange(len(frames))[:, None] == places[apart.argmin(axis=0)]
     first, second = np.sort(np.concatenate([apart, np.full_like(apart[:1], np.inf)]), axis=0)[:2]
     doubtful = is_lost & (second - first < ROUNDING) | (share > NOTHING / 100) & (share < ROUNDING)
-    return np.where(is_lost, alone, kept / np.where(is_lost, 1, share)), doubtful
+    shares = mix[:, None] if len(parts) > 1 else 1
+    return np.where(is_lost, alone * shares, kept / np.where(is_lost, 1, share)), doubtful

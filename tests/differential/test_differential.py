@@ -11,7 +11,8 @@ from cases import KINDS, make
 from compare import PICTURE, DifferenceError, can_be_a_film, check, check_films, open_devices, within
 from reference import DEFAULTS, picture, shown
 
-from shutter_addon.core import compositor, keyframes, light, scribbles, shutters
+from shutter_addon.compute import cpu, resampling
+from shutter_addon.core import compositor, following, keyframes, light, scribbles, shutters, trails
 
 SEEDS = range(200)
 BATCH = 20
@@ -83,10 +84,14 @@ def test_recipes_have_all_that_a_recipe_may_have():
         way = shown(recipe, case.frame, len(case.stored))[1]
         seen.update([("shutters", len(recipe["shutters"])), ("time", way), ("direction", case.direction)])
         seen.update([("footage", case.kind)])
+        seen.update(("follow", shutter["follow"] == "camera") for shutter in recipe["shutters"] if "follow" in shutter)
+        seen.update(("trail", type(shutter["trail"])) for shutter in recipe["shutters"] if "trail" in shutter)
+        seen.update([("edge_aware", type(recipe.get("edge_aware")))])
         found = picture(recipe, case.frame, case.footage(), case.index, case.direction)
         doubtful.append(found.doubtful.mean())
     values = {"position": 3, "interpolation": 2, "light": 2, "exposure": 2, "edges": 3, "aggregate": 3, "border": 2}
     values |= {"ease": 4, "redrawn": 2, "kind": 2, "shutters": 6, "time": 2, "direction": 2, "footage": len(KINDS)}
+    values |= {"follow": 2, "trail": 2, "edge_aware": 3}
     assert Counter(name for name, _ in seen) == values
     assert min(seen.values()) >= 10
     assert np.mean(doubtful) < 0.01
@@ -100,9 +105,13 @@ FAULTS = {
     "no displacement": (shutters, "displace", shutters.mix),
     "another curve": (light, "to_linear", lambda code: np.sign(code) * np.abs(code) ** 2.2),
     "an edge twice": (compositor, "source_frames", lambda *given: twice(*given)),
+    "nothing followed": (following, "followed", lambda effect, state, *_: state),
+    "a dull filter": (resampling, "_weights", lambda t, sharp: {-1: 0 * t, 0: 1 - t, 1: t, 2: 0 * t}),
+    "trails of no length": (trails, "with_length", lambda bars, *_: bars),
+    "edges passed over": (cpu.Solver, "solve", lambda solver, labels, count, *_, warm: solve(solver, labels, count)),
     "not normalised": (compositor, "source_frames", lambda options, places, shot: places.clip(0, shot.stop - 1)),
 }
-eased, source_frames = keyframes.eased, compositor.source_frames
+eased, source_frames, solve = keyframes.eased, compositor.source_frames, cpu.Solver.solve
 
 
 def twice(options, positions, shot):
@@ -116,7 +125,7 @@ def twice(options, positions, shot):
 def test_planted_faults_are_found(monkeypatch, fault, tmp_path):
     """Each makes some pictures wrong, which is told, with what repeats it, and left to be seen."""
     monkeypatch.setattr(*FAULTS[fault])
-    errors = [error for error in differences(range(60), open_devices(["cpu"]), tmp_path) if "/255 off" in error]
+    errors = [error for error in differences(range(40), open_devices(["cpu"]), tmp_path) if "/255 off" in error]
     assert errors
     for error in errors:
         told, again = error.splitlines()

@@ -232,6 +232,16 @@ def test_a_subject_that_stays_covered_ends_it(subject, ground, monkeypatch):
     assert max(errors(tracked, truth, "lasso").values()) <= 1
 
 
+def test_a_gap_between_two_keys_has_a_fault_on_each_side(passing, monkeypatch):
+    monkeypatch.setattr(tracking, "PATIENCE", 3)
+    source, _ = passing
+    keys = Keys((4.0, 20.0), ((0.0, 0.0), (40 / WIDTH, -8 / HEIGHT)), ("linear",) * 2)
+    given = region("lasso", location=keys)
+    tracked, faults = followed(source, "lasso", 4, range(4, 24), region=given, anchors={20})
+    assert faults == {10: tracking.COVERED, 14: tracking.COVERED}
+    assert set(tracked) == {*range(4, 10), *range(15, 21)}
+
+
 def test_a_subject_that_leaves_the_picture_and_comes_back(subject, ground):
     def path(t):
         return (-340 * np.sin(np.pi * np.clip((t - 5) / 18, 0, 1)),)
@@ -254,6 +264,19 @@ def test_a_subject_without_corners_is_never_sure(subject, ground):
     tracked, _ = followed(source, "line", 4)
     off = errors(tracked, truth, "line")
     assert max(off.values()) > 2
+    assert sure(tracked) == {4}
+
+
+@pytest.mark.parametrize("kind", EVERY)
+def test_a_pattern_that_repeats_itself_is_never_sure(ground, kind):
+    """Shaded checks that go by so quickly that the next period is nearer than their own place."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    shading = cv2.GaussianBlur(np.random.default_rng(0).normal(0, 120, (HEIGHT, WIDTH)), (0, 0), 6)
+    checks = cv2.GaussianBlur(60 + 120.0 * ((x // 8 + y // 8) % 2) + shading, (0, 0), 1)
+    cloth = np.dstack([checks] * 3).clip(0, 255).astype(np.uint8)
+    source, truth = film(cloth, ground, lambda t: (10 * t,), 10, 4)
+    tracked, _ = followed(source, kind, 4)
+    assert max(errors(tracked, truth, kind).values()) > 10
     assert sure(tracked) == {4}
 
 
@@ -348,6 +371,35 @@ def test_deep_and_linear_pictures_look_alike(subject):
     )
     for other in others:
         assert np.abs(plain.astype(int) - other).max() <= 1
+
+
+class CutOut(Film):
+    """Frames (n, H, W, 4) with a straight alpha."""
+
+    alpha = "straight"
+
+    def read(self, index):
+        return self.frames[index]
+
+
+@pytest.mark.parametrize("kind", EVERY)
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_colours_that_are_hidden_mislead_nobody(subject, ground, kind, dtype):
+    """A weak subject that moves; beyond its edge, colours of a still ground with an alpha of 0."""
+    weak, mask = cv2.GaussianBlur(subject, (0, 0), 3), ellipse(MIDDLE, RADII)
+    truth = [motion(4 * (n - 3)) for n in range(8)]
+    frames = []
+    for way in truth:
+        over = warped(mask, way, cv2.BORDER_CONSTANT)[..., None]
+        colours = np.where(over > 0.5, warped(weak, way), ground)
+        frames.append(np.dstack([colours, np.rint(255 * over)]).astype(np.uint8))
+    over_black = Film([np.rint(frame[..., :3] * (frame[..., 3:] / 255)).astype(np.uint8) for frame in frames])
+    given = CutOut([frame / np.float32(255) if dtype == np.float32 else frame for frame in frames])
+    pictures = [tracking.Footage(source, lambda frame: frame).picture(0) for source in (over_black, given)]
+    assert np.abs(np.subtract(*pictures, dtype=int)).max() <= 1
+    tracked, faults = followed(given, kind, 3)
+    assert not faults
+    assert max(errors(tracked, truth, kind).values()) <= 0.5
 
 
 FAR = [np.array([[3.0, 3.0], [4.0, 4.0]])]

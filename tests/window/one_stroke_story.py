@@ -41,6 +41,8 @@ def kinds():
     from bpy_extras.anim_utils import action_get_channelbag_for_slot as bag_of
 
     data = story.edit().animation_data
+    if data is None:
+        return {}
     curve = bag_of(data.action, data.action_slot).fcurves.find("virtual_shutter.effects[0].regions[0].location")
     return {int(key.co[0]): key.type for key in curve.keyframe_points}
 
@@ -142,20 +144,20 @@ def escaped():
     driver.saw(escaped=kinds(), frame=story.edit().frame_current)
 
 
-def rendered():
+def rendered(frames=RENDERED):
     edit = story.edit()
     edit.render.image_settings.media_type = "IMAGE"
     edit.render.image_settings.file_format = "PNG"
     edit.render.dither_intensity = 0
     edit.render.filepath = str(driver.OUT / "final_")
-    edit.frame_start, edit.frame_end, edit.frame_step = RENDERED.start, RENDERED.stop - 1, RENDERED.step
+    edit.frame_start, edit.frame_end, edit.frame_step = frames.start, frames.stop - 1, frames.step
     done = []
     # The preview's pictures of the effect are renders of its own scene.
     bpy.app.handlers.render_complete.append(lambda scene, *_: scene.name == "Edit" and done.append(True))
     with driver.override("PREVIEW"):
         bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
     yield from driver.until(lambda: done, "the render ends", 200)
-    for frame in RENDERED:
+    for frame in frames:
         driver.saw(rendered=frame, stroke=stroke_at(frame))
 
 
@@ -166,18 +168,23 @@ def stroke_at(frame):
     return points.mean(axis=0).tolist()
 
 
-def told():
+def begun(shown=SHOWN):
+    """The stroke is drawn, and the sidebar shows its buttons. shown: the frames that the strip is trimmed to."""
     yield from story.opened()
     story.edit().render.resolution_x, story.edit().render.resolution_y, story.edit().frame_end = 768, 576, 100
     yield from roomier()
     yield from story.movie_added()
     movie = story.edit().sequence_editor.strips_all[0]
-    movie.left_handle, movie.right_handle = SHOWN.start, SHOWN.stop
+    movie.left_handle, movie.right_handle = shown.start, shown.stop
     story.edit().frame_set(FRAME)
     yield from story.effect_added()
     story.effect().active_shutter = 1
     yield from drawn()
     driver.shot("1_stroke")
+
+
+def told():
+    yield from begun()
     yield from tracked()
     yield from ended()
     yield 1.0

@@ -96,6 +96,30 @@ def test_one_stroke(tmp_path):
             assert apart.max() > 60, frame
 
 
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_a_panning_shot(backend, tmp_path):
+    """A walker before a still camera: she is sharp, and the street, which stands still, streaks. A dragged bar shows at
+    once."""
+    footage = ROOT / "assets" / "walkers.mp4"
+    given = {"footage": shutil.copy(footage, tmp_path), "packages": packages(tmp_path / "packages")}
+    seen, console = tell("panning_story.py", backend, linked(tmp_path), **given)
+    assert "Traceback" not in console
+    facts = {name: entry[name] for entry in seen for name in entry}
+    assert facts["panned"] == [["Sharp", "REGION", "Sharp", [1] * 8], ["Long", "NOTHING", "", [1] * 8]]
+    steps = {entry["step"]: crop(tmp_path, entry) for entry in seen if "step" in entry}
+    height = steps["2_tracked"].shape[0]
+    tracked, panned, back, bars = (steps[name][: height * 3 // 4] for name in sorted(steps))  # above the bar editor
+    assert np.abs(tracked - panned).max() > 100
+    assert_alike(back, panned, tmp_path / "back_difference.png")
+    assert np.abs(bars - back).max() > 30
+    with open_source(footage) as source:
+        apart = np.abs(pixels(tmp_path / "final_0070.png") - source.read(69)[..., :3])
+    x, y = facts["stroke"]
+    row, column = round((1 - y) * apart.shape[0]), round(x * apart.shape[1])
+    assert apart[row - 2 : row + 3, column - 2 : column + 3].max() <= 40
+    assert apart[:60].max() > 120
+
+
 def packages(folder):
     """A folder of what tracking needs besides what the Blender of a distribution has."""
     import cv2

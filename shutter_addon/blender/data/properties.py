@@ -80,9 +80,9 @@ KINDS = (
 )
 
 MOTIONS = (
-    ("LOCATION", "Location", "The region is moved"),
-    ("ROTATION", "Location, Rotation", "The region is moved and turned"),
-    ("SCALE", "Location, Rotation, Scale", "The region is moved, turned and scaled"),
+    ("LOCATION", "Location", "It is moved"),
+    ("ROTATION", "Location, Rotation", "It is moved and turned"),
+    ("SCALE", "Location, Rotation, Scale", "It is moved, turned and scaled"),
 )
 FOLLOWED = (
     ("TRACK", "Track", "A single track, which moves the region and does not turn it"),
@@ -94,6 +94,11 @@ FOLLOWS = (
     ("NOTHING", "Nothing", "The exposure stays where it is in the picture"),
     ("REGION", "Region", "The exposure moves with a region: what the region moves with stays sharp"),
     ("CAMERA", "Camera", "The exposure moves with what the camera sees, as if the camera had stood still"),
+)
+
+LENGTHS = (
+    ("FRAMES", "Frames", "The bars say for how many frames the shutter is open"),
+    ("MOTION", "Motion", "The shutter is open while what it follows moves by a set length; the bars are the shape"),
 )
 
 # The renderer asks the F-curves itself: keys on these would show, and not render.
@@ -192,6 +197,24 @@ class Shutter(PropertyGroup):
     follow_region: StringProperty(
         name="Followed Region", description="Name of the region that the exposure moves with", update=_changed
     )
+    length: EnumProperty(
+        name="Length",
+        description="What says how long the exposure is",
+        items=LENGTHS,
+        update=_changed,
+        options=_UNKEYED,
+    )
+    trail: FloatProperty(
+        name="Trail Length",
+        description="How far what is followed moves while the shutter is open, as a fraction of the picture's height",
+        default=0.1,
+        min=0.0,
+        max=MAX_DISTANCE,
+        soft_max=1.0,
+        precision=3,
+        step=1,
+        update=_changed,
+    )
 
 
 class TrackStop(PropertyGroup):
@@ -204,7 +227,45 @@ class TrackStop(PropertyGroup):
     fault: StringProperty()
 
 
-class ShutterRegion(PropertyGroup):
+class _Tracked:
+    """What tracking has found of a region or of the camera, and how it is tracked."""
+
+    confidence: FloatProperty(
+        name="Confidence",
+        description="How sure tracking was of where it is",
+        subtype="PERCENTAGE",
+        default=100.0,
+        min=0.0,
+        max=100.0,
+    )
+    stops: CollectionProperty(type=TrackStop)
+    motion: EnumProperty(
+        name="Motion",
+        description="Which channels Track and Follow key",
+        items=MOTIONS,
+        default="SCALE",
+        options=_UNKEYED,
+        translation_context=CONTEXT,
+    )
+    track_until: IntProperty(
+        name="Until",
+        description="Timeline frame at which tracking stops; 0 is the end of the strip",
+        options=_UNKEYED,
+        translation_context=CONTEXT,
+    )
+    track_all_keys: BoolProperty(
+        name="All Keys",
+        description="Keep a key at every tracked frame, in place of those that the motion needs within a pixel",
+        options=_UNKEYED,
+    )
+    follow_clip: PointerProperty(
+        name="Clip",
+        description="Movie clip of the source's footage, in which something is tracked",
+        type=bpy.types.MovieClip,
+    )
+
+
+class ShutterRegion(_Tracked, PropertyGroup):
     name: StringProperty(name="Name", description="Name of the region", default="Region", set_transform=_shortened)
     shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=_changed)
     layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=_changed)
@@ -249,39 +310,6 @@ class ShutterRegion(PropertyGroup):
         max=MAX_SCALE,
         update=_changed,
     )
-    confidence: FloatProperty(
-        name="Confidence",
-        description="How sure tracking was of where the region is",
-        subtype="PERCENTAGE",
-        default=100.0,
-        min=0.0,
-        max=100.0,
-    )
-    stops: CollectionProperty(type=TrackStop)
-    motion: EnumProperty(
-        name="Motion",
-        description="Which channels Track and Follow key",
-        items=MOTIONS,
-        default="SCALE",
-        options=_UNKEYED,
-        translation_context=CONTEXT,
-    )
-    track_until: IntProperty(
-        name="Until",
-        description="Timeline frame at which tracking stops; 0 is the end of the strip",
-        options=_UNKEYED,
-        translation_context=CONTEXT,
-    )
-    track_all_keys: BoolProperty(
-        name="All Keys",
-        description="Keep a key at every tracked frame, in place of those that the motion needs within a pixel",
-        options=_UNKEYED,
-    )
-    follow_clip: PointerProperty(
-        name="Clip",
-        description="Movie clip of the source's footage, in which something is tracked",
-        type=bpy.types.MovieClip,
-    )
     follow_kind: EnumProperty(
         name="Follow", description="What the region follows", items=FOLLOWED, default="TRACK", options=_UNKEYED
     )
@@ -293,6 +321,35 @@ class ShutterRegion(PropertyGroup):
     # keys were made from.
     follow_frame: FloatProperty(name="Follow From", min=-2 * MAX_FRAME, max=2 * MAX_FRAME, options={"HIDDEN"})
     follow_stamp: StringProperty(options={"HIDDEN"})
+
+
+class ShutterCamera(_Tracked, PropertyGroup):
+    name: StringProperty(name="Name", description="Name of the camera's animation channels", default="Camera")
+    location: FloatVectorProperty(
+        name="Location",
+        description="Where what the camera sees has moved to, as a fraction of the picture",
+        subtype="XYZ",
+        size=2,
+        min=-MAX_DISTANCE,
+        max=MAX_DISTANCE,
+        update=_changed,
+    )
+    rotation: FloatProperty(
+        name="Rotation",
+        description="Rotation of what the camera sees, about the picture's center",
+        subtype="ANGLE",
+        min=-math.radians(MAX_DEGREES),
+        max=math.radians(MAX_DEGREES),
+        update=_changed,
+    )
+    scale: FloatProperty(
+        name="Scale",
+        description="Scale of what the camera sees, about the picture's center",
+        default=1.0,
+        min=-MAX_SCALE,
+        max=MAX_SCALE,
+        update=_changed,
+    )
 
 
 class ShutterEffect(PropertyGroup):
@@ -359,31 +416,7 @@ class ShutterEffect(PropertyGroup):
         max=1.0,
         update=_changed,
     )
-    camera_location: FloatVectorProperty(
-        name="Camera Location",
-        description="Where what the camera sees has moved to, as a fraction of the picture",
-        subtype="XYZ",
-        size=2,
-        min=-MAX_DISTANCE,
-        max=MAX_DISTANCE,
-        update=_changed,
-    )
-    camera_rotation: FloatProperty(
-        name="Camera Rotation",
-        description="Rotation of what the camera sees, about the picture's center",
-        subtype="ANGLE",
-        min=-math.radians(MAX_DEGREES),
-        max=math.radians(MAX_DEGREES),
-        update=_changed,
-    )
-    camera_scale: FloatProperty(
-        name="Camera Scale",
-        description="Scale of what the camera sees, about the picture's center",
-        default=1.0,
-        min=-MAX_SCALE,
-        max=MAX_SCALE,
-        update=_changed,
-    )
+    camera: PointerProperty(name="Camera", description="How what the camera sees moves", type=ShutterCamera)
     bars_per_frame: IntProperty(
         name="Bars per Frame",
         description="How many bars of the window stand for a source frame",
@@ -432,7 +465,7 @@ class ShutterScene(PropertyGroup):
     identity: StringProperty()
 
 
-classes = (ShutterBar, Shutter, TrackStop, ShutterRegion, ShutterEffect, ShutterScene)
+classes = (ShutterBar, Shutter, TrackStop, ShutterRegion, ShutterCamera, ShutterEffect, ShutterScene)
 
 
 def register():

@@ -11,8 +11,15 @@ def copy_properties(old, new) -> None:
             getattr(new, name).clear()
             for item in getattr(old, name):
                 copy_properties(item, getattr(new, name).add())
+        elif is_group(old, name):
+            copy_properties(getattr(old, name), getattr(new, name))
         elif not prop.is_readonly:
             store(new, name, stored(old, name))
+
+
+def is_group(struct, name: str) -> bool:
+    """Whether a property is a property group within a struct."""
+    return name != "rna_type" and isinstance(getattr(struct, name), PropertyGroup)
 
 
 def stored(group, name: str):

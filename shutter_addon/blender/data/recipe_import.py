@@ -28,9 +28,9 @@ def apply(edit, effect, strip, source: recipe.Recipe) -> None:
     path = effect.path_from_id()
     effect.use_source_time = bool(source.time)
     if source.time:
-        _set_number(edit, effect, "source_time", source.time, first)
-    _set_number(edit, effect, "edge_aware", source.edge_aware, first)
-    _set_moves(edit, effect, path, "camera_", source.camera, first, group=effect.name)
+        _set_number(edit, effect, path, "source_time", source.time, first, group=effect.name)
+    _set_number(edit, effect, path, "edge_aware", source.edge_aware, first, group=effect.name)
+    _set_moves(edit, effect.camera, f"{path}.camera", source.camera, first, group=effect.camera.name)
     for i, shutter in enumerate(source.shutters):
         _add_shutter(edit, effect, f"{path}.shutters[{i}]", shutter, first)
     colors = {shutter.name: shutter.color for shutter in source.shutters}
@@ -38,19 +38,21 @@ def apply(edit, effect, strip, source: recipe.Recipe) -> None:
         _add_region(edit, effect, strip, f"{path}.regions[{i}]", region, colors[region.shutter], first)
 
 
-def _set_number(edit, effect, name: str, value: recipe.Keyable, first: float) -> None:
+def _set_number(edit, owner, path: str, name: str, value: recipe.Keyable, first: float, **curve) -> None:
+    """A number of a property group, or its keys."""
     if not isinstance(value, list):
-        setattr(effect, name, value)
+        setattr(owner, name, value)
         return
-    setattr(effect, name, value[0].value)
+    setattr(owner, name, value[0].value)
     keys = [(key.frame + first, key.value, key.ease) for key in value]
-    fcurves.set_keys(edit, f"{effect.path_from_id()}.{name}", 0, keys, group=effect.name)
+    fcurves.set_keys(edit, f"{path}.{name}", 0, keys, **curve)
 
 
 def _check_keys(source: recipe.Recipe, first: float) -> None:
     """EffectError: keys would lie beyond Blender's timeline, or on the same frame, as it counts in float32."""
-    edge_aware = source.edge_aware if isinstance(source.edge_aware, list) else []
-    for keys in (source.time, edge_aware, source.camera, *(part.keys for part in (*source.shutters, *source.regions))):
+    numbers = [source.edge_aware, *(shutter.trail for shutter in source.shutters)]
+    keyed = [source.time, source.camera, *(number for number in numbers if isinstance(number, list))]
+    for keys in (*keyed, *(part.keys for part in (*source.shutters, *source.regions))):
         frames = np.array([key.frame + first for key in keys], dtype=np.float32)
         if (wrong := np.flatnonzero(np.abs(frames) > limits.MAX_FRAME)).size:
             sentence = rpt_("frame {frame} of the recipe: a key cannot lie beyond Blender's timeline")
@@ -65,6 +67,7 @@ def clear(edit, effect) -> None:
     fcurves.remove_curves(edit, effect.path_from_id() + ".")
     effect.shutters.clear()
     effect.regions.clear()
+    effect.camera.stops.clear()
     effect.active_shutter = effect.active_region = 0
     if effect.scene.annotation is not None:
         for layer in list(effect.scene.annotation.layers):
@@ -77,6 +80,9 @@ def _add_shutter(edit, effect, path: str, source: recipe.Shutter, first: float) 
     if source.follow is not None:
         shutter.follow = "CAMERA" if source.follow == recipe.CAMERA else "REGION"
         shutter.follow_region = "" if source.follow == recipe.CAMERA else source.follow
+    if source.trail is not None:
+        shutter.length = "MOTION"
+        _set_number(edit, shutter, path, "trail", source.trail, first)
     for weight in source.bars if source.bars is not None else source.keys[0].bars:
         shutter.bars.add().weight = weight
     if source.keys:
@@ -90,15 +96,13 @@ def _add_region(edit, effect, strip, path: str, source: recipe.Region, color, fi
     region.name, region.shutter, region.width = source.name, source.shutter, source.width
     region.kind = source.kind.upper()
     region.layer = _draw(effect, strip, source, color, first)
-    _set_moves(edit, region, path, "", source.keys, first)
+    _set_moves(edit, region, path, source.keys, first)
 
 
-def _set_moves(edit, moving, path: str, prefix: str, keys: list, first: float, **curve) -> None:
-    """Location, rotation and scale of a property group, whose names have a prefix, and their keys."""
+def _set_moves(edit, moving, path: str, keys: list, first: float, **curve) -> None:
+    """Location, rotation and scale of a region or of the camera, and their keys."""
     start = keys[0] if keys else recipe.CameraKey(0)
-    setattr(moving, f"{prefix}location", start.location)
-    setattr(moving, f"{prefix}rotation", np.radians(start.rotation))
-    setattr(moving, f"{prefix}scale", start.scale)
+    moving.location, moving.rotation, moving.scale = start.location, np.radians(start.rotation), start.scale
     if not keys:
         return
     channels = {
@@ -109,7 +113,7 @@ def _set_moves(edit, moving, path: str, prefix: str, keys: list, first: float, *
     }
     for (name, index), value in channels.items():
         numbers = [(key.frame + first, value(key), key.ease) for key in keys]
-        fcurves.set_keys(edit, f"{path}.{prefix}{name}", index, numbers, **curve)
+        fcurves.set_keys(edit, f"{path}.{name}", index, numbers, **curve)
 
 
 def _draw(effect, strip, source: recipe.Region, color, first: float) -> str:

@@ -47,6 +47,11 @@ def effect_of_item(item):
     return item.id_data.path_resolve(path[: path.index("]") + 1])
 
 
+def moving(effect, index: int | None):
+    """The region of an index; None: the camera. What both can do, functions take by such an index."""
+    return effect.camera if index is None else effect.regions[index]
+
+
 def active_shutter(effect):
     """The shutter that is chosen in the list, or None."""
     return effect.shutters[effect.active_shutter] if 0 <= effect.active_shutter < len(effect.shutters) else None

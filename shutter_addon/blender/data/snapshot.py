@@ -128,11 +128,7 @@ def read(edit, effect, strip, frames, *, thorough: bool = False) -> model.Effect
         for i, region in enumerate(effect.regions)
         if region.shutter in names
     )
-    camera = model.Camera(
-        _channel(curves, effect, path, "camera_location", around),
-        _channel(curves, effect, path, "camera_rotation", around, np.degrees),
-        _channel(curves, effect, path, "camera_scale", around),
-    )
+    camera = _camera(curves, effect, around)
     return model.Effect(
         tuple(
             _shutter(
@@ -197,6 +193,11 @@ def region_at(edit, effect, strip, index: int, frames) -> model.Region:
     curves, path = Curves(edit), f"{effect.path_from_id()}.regions[{index}]"
     placement = _placement(curves, effect, strip, frames)
     return _region(curves, path, effect, effect.regions[index], 0, placement, frames)
+
+
+def camera_at(edit, effect, frames) -> model.Camera:
+    """The camera as plain data, its channels sampled at timeline frames; as region_at."""
+    return _camera(Curves(edit), effect, frames)
 
 
 @contextmanager
@@ -286,7 +287,9 @@ def _shutter(
     bars = _tried(_bars, curves, path, shutter, options, frames, thorough)
     if isinstance(bars, EffectError):
         bars = keyframes.Bars(keyframes.Constant(bars))
-    return model.Shutter(shutter.name, tuple(shutter.color), bars, follow)
+    is_trail = follow is not None and validation.word(shutter, "length") == "MOTION"
+    trail = _channel(curves, shutter, path, "trail", frames) if is_trail else None
+    return model.Shutter(shutter.name, tuple(shutter.color), bars, follow, trail)
 
 
 def _bars(curves: Curves, path: str, shutter, options: keyframes.Channel, frames, thorough: bool) -> keyframes.Bars:
@@ -360,6 +363,15 @@ def _region(curves: Curves, path: str, effect, region, shutter: int, placement, 
         channel("location"),
         channel("rotation", np.degrees),
         channel("scale"),
+    )
+
+
+def _camera(curves: Curves, effect, frames) -> model.Camera:
+    path = effect.camera.path_from_id()
+    return model.Camera(
+        _channel(curves, effect.camera, path, "location", frames),
+        _channel(curves, effect.camera, path, "rotation", frames, np.degrees),
+        _channel(curves, effect.camera, path, "scale", frames),
     )
 
 

@@ -15,12 +15,20 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...core.limits import MAX_FRAME
 from ...core.messages import EffectError
 
-_PLACES = {"": n_('effect "{name}"'), "shutters": n_('shutter "{name}"'), "regions": n_('region "{name}"')}
+_PLACES = {
+    "": n_('effect "{name}"'),
+    "shutters": n_('shutter "{name}"'),
+    "regions": n_('region "{name}"'),
+    "camera": n_('camera of effect "{name}"'),
+}
 
 
 def place(group) -> str:
-    """The effect, shutter, bar or region that a property group is, in the user's words."""
+    """The effect, shutter, bar, region or camera that a property group is, in the user's words."""
     path = group.path_from_id()
+    if path.endswith(".camera"):
+        words = _PLACES["camera"]
+        return rpt_(words).format(name=group.id_data.path_resolve(path.removesuffix(".camera")).name)
     found = re.match(r".*?effects\[\d+\](?:\.(shutters|regions)\[\d+\])?", path)
     words = rpt_(_PLACES[found[1] or ""]).format(name=group.id_data.path_resolve(found[0]).name)
     bar = re.search(r"\.bars\[(\d+)\]$", path)
@@ -58,9 +66,15 @@ def check(items, name: str, found: np.ndarray) -> None:
 def check_region(region) -> None:
     """EffectError: a property of a region, as it stands, is outside of its range."""
     word(region, "kind")
-    for name in ("width", "location", "rotation", "scale"):
-        for value in np.atleast_1d(getattr(region, name)):
-            number(region, name, float(value))
+    number(region, "width")
+    check_placement(region)
+
+
+def check_placement(moving) -> None:
+    """EffectError: a number of where a region or the camera is, as it stands, is outside of its range."""
+    for name in ("location", "rotation", "scale"):
+        for value in np.atleast_1d(getattr(moving, name)):
+            number(moving, name, float(value))
 
 
 def word(group, name: str, value: float | None = None) -> str:

@@ -51,8 +51,10 @@ def key_bars(effect, index: int) -> None:
     path, group = f"{effect.path_from_id()}.shutters[{index}].bars", effect.shutters[index].name
     # Between keys the bars stand where their F-curves are, a cross-fade: the picture is made with others.
     set_bars(effect.shutters[index], bars_now(effect, index))
+    edit = effect.id_data
     for k in range(len(effect.shutters[index].bars)):
-        effect.id_data.keyframe_insert(f"{path}[{k}].weight", group=group)
+        # Without a frame Blender takes that of the window's scene, which may be another one.
+        edit.keyframe_insert(f"{path}[{k}].weight", group=group, frame=edit.frame_current)
 
 
 def unkey_bars(effect, index: int) -> bool:
@@ -66,7 +68,7 @@ def unkey_bars(effect, index: int) -> bool:
 
 def _deleted(edit, path: str) -> bool:
     try:
-        return edit.keyframe_delete(path)
+        return edit.keyframe_delete(path, frame=edit.frame_current)
     except RuntimeError:  # no key at this frame
         return False
 

@@ -17,7 +17,7 @@ from ...core.motions import Placement, Similarity
 from ..data import annotations, revision, snapshot, source_media, strips, validation
 from ..data.validation import EffectError
 from ..rendering import session
-from . import region_edits
+from . import motion_keys
 from .motion_keys import MotionKeys
 
 Points = dict[str, complex]  # where markers are in the picture, in pixels as motions.Similarity counts them
@@ -30,7 +30,7 @@ def follow(edit, effect, strip, index: int) -> None:
     points = _points(edit, effect, strip, index, start)
     keys = _keys(effect, index)
     keys.hold(start, start)
-    region_edits.key_region(effect, index, keys.channels())
+    motion_keys.insert(effect, index, keys.channels())
     effect.regions[index].follow_frame = start - effect.start
     _key(edit, effect, strip, index, points)
 
@@ -55,7 +55,8 @@ def _key(edit, effect, strip, index: int, points: dict[int, Points]) -> None:
     keys = _keys(effect, index)
     known = sorted({start, *(frame for frame in keys.edited(range(min(points), max(points) + 1)) if frame in points)})
     shape = snapshot.region_at(edit, effect, strip, index, points)
-    placements = _followed(shape, points, known, start, size)
+    moves = {frame: _motions(points, frame) for frame in known}
+    placements = followed(shape, sorted(points), moves, start, size)
     kept = motions.thinned(placements, motions.offsets(shape.unmoved(start)), size, known)
     frames = range(min(placements), max(placements) + 1)
     confidence = {frame: float(frame in placements) for frame in frames}
@@ -109,19 +110,20 @@ def _missing(clip, name: str) -> str:
 
 
 def _track_markers(track) -> tuple[str, np.ndarray, np.ndarray]:
-    frames, shown = _frames(track.markers)
+    frames, shown = marker_frames(track.markers)
     places = np.empty(2 * len(frames), np.float32)
     track.markers.foreach_get("co", places)
     return track.name, frames[shown], places.reshape(-1, 2)[shown] + np.array(track.offset, np.float32)
 
 
 def _corners(plane) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    frames, shown = _frames(plane.markers)
+    frames, shown = marker_frames(plane.markers)
     places = np.array([[tuple(corner) for corner in marker.corners] for marker in plane.markers], np.float32)
     return [(str(k), frames[shown], places[shown, k]) for k in range(4)]
 
 
-def _frames(markers) -> tuple[np.ndarray, np.ndarray]:
+def marker_frames(markers) -> tuple[np.ndarray, np.ndarray]:
+    """The frames (n,) of markers, ascending, and which of them are not muted."""
     frames, muted = np.empty(len(markers), np.int32), np.empty(len(markers), bool)
     markers.foreach_get("frame", frames)
     markers.foreach_get("mute", muted)
@@ -133,10 +135,10 @@ def _points(edit, effect, strip, index: int, start: int) -> dict[int, Points]:
     MediaError: there is nothing that it can follow from the frame `start` on."""
     region = effect.regions[index]
     validation.check_region(region)
-    region_edits.check_curves(effect, index)
+    motion_keys.check_curves(effect, index)
     validation.word(region, "motion")
     tracks, size = _markers(region), annotations.picture_size(effect)
-    times = _clip_times(edit, effect, strip, region.follow_clip)
+    times = clip_times(edit, effect, strip, region.follow_clip)
     found = {frame: _points_at(tracks, time, size) for frame, time in times.items()}
     found = {frame: points for frame, points in found.items() if points}
     if start not in found:
@@ -150,8 +152,9 @@ def _points(edit, effect, strip, index: int, start: int) -> dict[int, Points]:
     return found
 
 
-def _clip_times(edit, effect, strip, clip) -> dict[int, float]:
-    """By timeline frame of the strip what it shows, in the clip's frames: in-between frames lie between two of them."""
+def clip_times(edit, effect, strip, clip) -> dict[int, float]:
+    """By timeline frame of the strip what it shows, in the clip's frames: in-between frames lie between two of them.
+    EffectError, MediaError: the strip does not show the clip's footage."""
     frames = range(strip.left_handle, strip.right_handle)
     source = strips.source_of(edit, effect, strip)
     _check_footage(source, clip)
@@ -195,14 +198,11 @@ def _place_at(frames: np.ndarray, places: np.ndarray, time: float) -> np.ndarray
 
 
 class _Follower:
-    """Carries a region along the points that it follows.
+    """Carries a region or the camera along what it follows; arguments as of `followed`."""
 
-    shape: a core.effect.Region; known: the frames, ascending, at which its placement is known"""
-
-    def __init__(self, shape, points: dict[int, Points], known: list[int], size):
-        self._shape, self._known, self._size = shape, known, size
-        self._centres = {frame: motions.centre(shape.unmoved(frame)) for frame in points}
-        self._moves = {frame: _motions(points, frame) for frame in known}
+    def __init__(self, subject, frames: list[int], moves: dict[int, dict[int, Similarity]], size):
+        self._subject, self._known, self._moves, self._size = subject, sorted(moves), moves, size
+        self._centres = {frame: subject.centre(frame) for frame in frames}
 
     def at(self, frame: int, near: Placement) -> Placement | None:
         """The placement at a frame, its rotation next to another one's: between two known frames blended from both.
@@ -219,13 +219,17 @@ class _Follower:
         if motion is None:
             return None
         centres = self._centres[origin], self._centres[frame]
-        return motions.unwound(motions.carried(self._shape.placement(origin), motion, *centres, self._size), near)
+        return motions.unwound(motions.carried(self._subject.placement(origin), motion, *centres, self._size), near)
 
 
-def _followed(shape, points: dict[int, Points], known: list[int], start: int, size) -> dict[int, Placement]:
-    """By frame the placement of a region that is moved as the points are, from those at known frames."""
-    follower, result = _Follower(shape, points, known, size), {start: shape.placement(start)}
-    frames = sorted(points)
+def followed(
+    subject, frames: list[int], moves: dict[int, dict[int, Similarity]], start: int, size
+) -> dict[int, Placement]:
+    """By frame the placement of a region or the camera, carried from the frames at which that is known.
+
+    subject: a core.effect.Region or Camera; frames: ascending; moves: by frame at which the placement is known, `start`
+    among them, the motions of the picture to other frames"""
+    follower, result = _Follower(subject, frames, moves, size), {start: subject.placement(start)}
     for way in ([f for f in frames if f > start], [f for f in reversed(frames) if f < start]):
         near = result[start]
         for frame in way:

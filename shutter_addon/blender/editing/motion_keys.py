@@ -1,34 +1,48 @@
-"""Keys of a region's motion: those that tracking has made, among those of the editor, who mends it by more of them.
+"""Keys of the motion of a region or of the camera: those that tracking has made, among those of the editor, who mends
+it by more of them.
 
 What was made has Blender's key type Generated, which editors show in a colour of its own, and the value that it was
 made with. All other keys are the editor's: they keep frame and value, and are linear where a made key follows.
+
+A key that the editor sets bends the frames around it, as keys do, until tracking begins at it: then frames that are not
+tracked again are where tracking had left them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise, zip_longest
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.motions import Placement
-from ..data import fcurves
+from ..data import fcurves, selection, validation
+from ..data.validation import EffectError
 
 MADE = "GENERATED"
 _MADE = bpy.types.Keyframe.bl_rna.properties["type"].enum_items[MADE].value
 # What Blender gives each key as the overshoot of the ease Back, which linear keys have no use for: a made key keeps
-# there the value that it was made with, so that one which the editor has moved is told from it.
+# there the value that it was made with, so that one which the editor has moved is told from it. Keys that the editor
+# has set keep what was tracked there before.
 NOTHING_KEPT = np.float32(1.70158)
-# The region's channels, and how many of their components a motion has.
+# The channels, and how many of their components a motion has.
 _COMPONENTS = (("location", 0), ("location", 1), ("rotation", 0), ("scale", 0))
+CHANNELS = ("location", "rotation", "scale")
+_LOCKED = n_('{place}: the F-curve of "{channel}" is locked')
+_MUTED = n_('{place}: the F-curve of "{channel}" is muted')
 _COUNTS = {"LOCATION": 2, "ROTATION": 3, "SCALE": 4}
 
 
 @dataclass(frozen=True)
 class MotionKeys:
-    """The keys of an effect's region for a motion (properties.MOTIONS); frames are timeline frames of the edit."""
+    """The keys of a region, or of the camera (index as for selection.moving), for a motion (properties.MOTIONS); frames
+    are timeline frames of the edit."""
 
     effect: bpy.types.PropertyGroup
-    index: int
+    index: int | None
     motion: str
 
     def edited(self, frames: range) -> list[int]:
@@ -39,38 +53,47 @@ class MotionKeys:
         return sorted(int(frame) for frame in found if frame in frames)
 
     def are_made(self) -> bool:
-        """Whether any key of the region's location was made."""
+        """Whether any key of the location was made."""
         curve = self._curve("location")
         return curve is not None and bool(_read(curve)[1].any())
 
+    def are_several(self) -> bool:
+        """Whether a channel of the motion has keys at more than one frame: with one alone the region stands still."""
+        curves = (self._curve(name, component) for name, component in _COMPONENTS[: _COUNTS[self.motion]])
+        return any(len(curve.keyframe_points) > 1 for curve in filter(None, curves))
+
     def channels(self) -> list[str]:
-        """The region's channels that the motion has, and those that have keys already."""
+        """The channels that the motion has, and those that have keys already."""
         count = _COUNTS[self.motion]
         found = (name for k, (name, component) in enumerate(_COMPONENTS) if k < count or self._curve(name, component))
         return list(dict.fromkeys(found))
 
     def hold(self, first: int, last: int) -> None:
-        """Keys what was tracked right before and after these frames where it is there: it stays, whatever becomes of
-        the keys between."""
+        """Keys what was tracked right before and after these frames where tracking has left it: it stays, whatever
+        becomes of the keys between, and wherever the editor has moved the first and the last of them."""
         tracked = self.confidence()[0]
-        for frame in tracked[np.isin(tracked, (first - 1, last + 1))].tolist():
-            for curve in filter(None, (self._curve(name, component) for name, component in _COMPONENTS)):
-                if not curve.is_empty and frame not in fcurves.points_of(curve)[:, 0]:
-                    _insert(curve, frame, curve.evaluate(frame))
+        beside = tracked[np.isin(tracked, (first - 1, last + 1))].tolist()
+        for curve in filter(None, (self._curve(name, component) for name, component in _COMPONENTS)):
+            for frame, value in _as_tracked(curve, (first, last), beside).items():
+                _insert(curve, frame, value)
 
     def write(self, placements: Mapping[int, Placement], confidence: Mapping[int, float]) -> None:
-        """Makes keys at these frames, in place of all that were made from the first frame of the confidence to its
-        last, of the channels that are not keyed as well. Other frames that were tracked stay as they are.
+        """Makes keys at some of the frames that have a confidence, in place of all that were made at these, of the
+        channels that are not keyed as well. Other frames that were tracked stay as they are; those between, which never
+        were, have no confidence at all: it is 0.
 
         confidence: 0 to 1 by frame"""
-        within = min(confidence), max(confidence)
-        self.hold(*within)
+        for first, last in runs(confidence):
+            self.hold(first, last)
         for k, (name, component) in enumerate(_COMPONENTS):
             is_keyed = k < _COUNTS[self.motion]
             values = {frame: _values(placement)[k] for frame, placement in placements.items()} if is_keyed else {}
             if (curve := self._curve(name, component, new=is_keyed)) is not None:
-                _replace(curve, values, *within)
-        _replace(self._curve("confidence", new=True), {f: 100 * share for f, share in confidence.items()}, *within)
+                _replace(curve, values, confidence)
+        known = {*confidence, *self.confidence()[0].tolist()}
+        between = dict.fromkeys(set(range(min(confidence), max(confidence))) - known, 0.0)
+        every = between | {frame: 100 * share for frame, share in confidence.items()}
+        _replace(self._curve("confidence", new=True), every, every)
 
     def confidence(self) -> tuple[np.ndarray, np.ndarray]:
         """The frames (n,) that have a confidence, ascending, and what it is, 0 to 1."""
@@ -79,15 +102,86 @@ class MotionKeys:
         return points[:, 0], points[:, 1] / 100
 
     def _curve(self, name: str, component: int = 0, *, new: bool = False):
-        edit, path = self.effect.id_data, f"{self.effect.path_from_id()}.regions[{self.index}].{name}"
+        moving = selection.moving(self.effect, self.index)
+        edit, path = self.effect.id_data, f"{moving.path_from_id()}.{name}"
         if new:
-            return fcurves.ensure_curve(edit, path, component, self.effect.regions[self.index].name)
+            return fcurves.ensure_curve(edit, path, component, moving.name)
         return fcurves.find_curve(edit, path, component)
 
 
-def placement_now(region) -> Placement:
-    """Where a region is as its properties stand: at the current frame, keyed or not."""
-    return Placement(tuple(region.location), float(np.degrees(region.rotation)), region.scale)
+def placement_now(moving) -> Placement:
+    """Where a region or the camera is as its properties stand: at the current frame, keyed or not."""
+    return Placement(tuple(moving.location), float(np.degrees(moving.rotation)), moving.scale)
+
+
+def check_curves(effect, index: int | None) -> None:
+    """EffectError: an F-curve of where a region or the camera is cannot be keyed, or its keys would do nothing."""
+    moving = selection.moving(effect, index)
+    for name in (*CHANNELS, "confidence"):
+        for curve in fcurves.curves_under(effect.id_data, f"{moving.path_from_id()}.{name}"):
+            for part in filter(None, (curve, curve.group)):
+                if part.lock or part.mute:
+                    sentence = _LOCKED if part.lock else _MUTED
+                    label = iface_(moving.bl_rna.properties[name].name)
+                    raise EffectError(rpt_(sentence).format(place=validation.place(moving), channel=label))
+
+
+def insert(effect, index: int | None, channels=CHANNELS, *, keep_tracked: bool = False) -> None:
+    """Keys channels of a region or of the camera at the edit's current frame; where tracking has made a key, it is the
+    editor's from now on, and sure. EffectError: as check_curves says.
+
+    keep_tracked: whether the keys keep what was tracked there, for the next MotionKeys.hold"""
+    check_curves(effect, index)
+    edit, moving = effect.id_data, selection.moving(effect, index)
+    path, frame = moving.path_from_id(), edit.frame_current
+    for name in channels:
+        tracked = [_tracked_value(curve, frame) for curve in fcurves.curves_under(edit, f"{path}.{name}")]
+        # Without a frame Blender takes that of the window's scene, which may be another one.
+        edit.keyframe_insert(f"{path}.{name}", group=moving.name, frame=frame)
+        curves = fcurves.curves_under(edit, f"{path}.{name}")
+        for curve, value in zip_longest(curves, tracked, fillvalue=NOTHING_KEPT):
+            for key in _keys_at(curve, frame):
+                key.type, key.back = "KEYFRAME", value if keep_tracked else NOTHING_KEPT
+    for curve in fcurves.curves_under(edit, f"{path}.confidence"):
+        for key in _keys_at(curve, frame):
+            key.back = key.co[1] = 100
+        curve.update()
+
+
+def runs(frames: Iterable[int]) -> list[tuple[int, int]]:
+    """The first and the last of each stretch of frames without a gap, ascending."""
+    ordered = sorted(frames)
+    ends = [i for i, (frame, after) in enumerate(pairwise(ordered)) if after != frame + 1]
+    firsts, lasts = [0, *(i + 1 for i in ends)], [*ends, len(ordered) - 1]
+    return [(ordered[first], ordered[last]) for first, last in zip(firsts, lasts, strict=True)]
+
+
+def _keys_at(curve, frame: int) -> list:
+    return [key for key in curve.keyframe_points if key.co[0] == frame]
+
+
+def _tracked_value(curve, frame: int) -> float:
+    """What tracking has made of a frame, for a key that the editor sets there; of the editor's key there, what it
+    keeps."""
+    for key in _keys_at(curve, frame):
+        if key.type != MADE:
+            return key.back
+    return NOTHING_KEPT if curve.is_empty else curve.evaluate(frame)
+
+
+def _as_tracked(curve, edited: tuple[int, int], frames: list[float]) -> dict[float, float]:
+    """The values of an F-curve at frames without a key, with what tracking said of two frames that the editor may have
+    keyed since; it is forgotten after this."""
+    moved = []
+    for key in (key for frame in set(edited) for key in _keys_at(curve, frame)):
+        if key.type != MADE and key.back != NOTHING_KEPT:
+            moved.append((key, key.co[1], key.interpolation))
+            key.co_ui[1], key.back, key.interpolation = key.back, NOTHING_KEPT, "LINEAR"
+    keyed = fcurves.points_of(curve)[:, 0]
+    values = {frame: curve.evaluate(frame) for frame in frames if not curve.is_empty and frame not in keyed}
+    for key, value, ease in moved:
+        key.co_ui[1], key.interpolation = value, ease
+    return values
 
 
 def _values(placement: Placement) -> tuple[float, ...]:
@@ -95,13 +189,13 @@ def _values(placement: Placement) -> tuple[float, ...]:
     return *placement.location, np.radians(placement.rotation), placement.scale
 
 
-def _replace(curve, values: dict[int, float], first: int, last: int) -> None:
-    """Makes keys of these values by frame, in place of those that were made from the first frame to the last."""
+def _replace(curve, values: dict[int, float], found: Iterable[int]) -> None:
+    """Makes keys of these values by frame, in place of those that were made at the frames that were found."""
     points, (frames, made) = curve.keyframe_points, _read(curve)
-    within = (frames >= first) & (frames <= last)
+    within = np.isin(frames, list(found))
     edited = within & ~made
     if values:
-        for i in np.flatnonzero(edited & (frames < last)).tolist():
+        for i in np.flatnonzero(edited & (frames < max(found))).tolist():
             points[i].interpolation = "LINEAR"
     for i in np.flatnonzero(within & made)[::-1].tolist():
         points.remove(points[i], fast=True)

@@ -1,20 +1,10 @@
 """An effect's regions and their annotation layers: added, removed, moved, keyed."""
 
 import numpy as np
-from bpy.app.translations import pgettext_iface as iface_
-from bpy.app.translations import pgettext_n as n_
-from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..data import fcurves
 from ..data.annotations import annotation, layer_of
 from ..data.consistency import choose_region, color_layers, forget_followed, unique
-from ..data.validation import EffectError
-from . import collection_edits
-from .motion_keys import NOTHING_KEPT
-
-CHANNELS = ("location", "rotation", "scale")
-_LOCKED = n_('region "{region}": the F-curve of "{channel}" is locked')
-_MUTED = n_('region "{region}": the F-curve of "{channel}" is muted')
+from . import collection_edits, motion_keys
 
 
 def add_region(effect, shutter, kind: str = "LINE", name: str = ""):
@@ -89,31 +79,6 @@ def free_layers(effect, annotation) -> list:
     return [layer for layer in annotation.layers if layer.info not in taken] if annotation else []
 
 
-def check_curves(effect, index: int) -> None:
-    """EffectError: an F-curve of where a region is cannot be keyed, or its keys would do nothing."""
-    edit, region, path = effect.id_data, effect.regions[index], f"{effect.path_from_id()}.regions[{index}]"
-    for name in (*CHANNELS, "confidence"):
-        for curve in fcurves.curves_under(edit, f"{path}.{name}"):
-            for part in filter(None, (curve, curve.group)):
-                if part.lock or part.mute:
-                    sentence = _LOCKED if part.lock else _MUTED
-                    label = iface_(region.bl_rna.properties[name].name)
-                    raise EffectError(rpt_(sentence).format(channel=label, region=region.name))
-
-
-def key_region(effect, index: int, channels=CHANNELS) -> None:
-    """Keys a region's channels at the current frame; where tracking has made a key, it is the editor's from now on, and
-    sure. EffectError: as check_curves says."""
-    check_curves(effect, index)
-    edit, path = effect.id_data, f"{effect.path_from_id()}.regions[{index}]"
-    for name in channels:
-        edit.keyframe_insert(f"{path}.{name}", group=effect.regions[index].name)
-        for curve in fcurves.curves_under(edit, f"{path}.{name}"):
-            for key in curve.keyframe_points:
-                if key.co[0] == edit.frame_current_final:
-                    key.type, key.back = "KEYFRAME", NOTHING_KEPT
-    for curve in fcurves.curves_under(edit, f"{path}.confidence"):
-        for key in curve.keyframe_points:
-            if key.co[0] == edit.frame_current_final:
-                key.co[1] = 100
-        curve.update()
+def key_region(effect, index: int) -> None:
+    """Keys where the editor has put a region at the current frame. EffectError: it cannot be keyed."""
+    motion_keys.insert(effect, index, keep_tracked=True)

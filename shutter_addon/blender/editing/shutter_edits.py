@@ -72,12 +72,3 @@ def move_shutter(effect, index: int, to: int) -> None:
     """Moves a shutter in the list; whichever comes first is the default."""
     collection_edits.move(effect, "shutters", index, to)
     effect.active_shutter = to
-
-
-# Bars
-
-
-# Regions
-
-
-# Collections

@@ -1,12 +1,13 @@
-"""A region that is tracked through what its strip shows, from where it is at the current frame on.
+"""A region, or the camera, that is tracked through what its strip shows, from where it is at the current frame on.
 
-A key comes with every frame that is tracked, so that the preview can go along; at the end they are thinned to those
-that the motion needs within a pixel of the picture.
+What is tracked has an index as for selection.moving. A key comes with every frame that is tracked, so that the preview
+can go along; at the end they are thinned to those that the motion needs within a pixel of the picture.
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import bpy
@@ -14,18 +15,18 @@ import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import limits, motions
-from ...core.effect import Region
+from ...core import limits, motions, region_keys
+from ...core.effect import Camera, Region
 from ...core.keyframes import Samples
-from ...media import tracking
+from ...media import camera_tracking, tracking
 from ...media.tracking import Tracked
-from ..data import annotations, snapshot, validation
+from ..data import annotations, selection, snapshot, validation
 from ..data.validation import EffectError
 from ..rendering import session
-from . import region_edits
+from . import motion_keys
 from .motion_keys import MotionKeys, placement_now
 
-# Sentences of media/tracking.py, which are looked up where they are shown.
+# Sentences of media/tracking.py and media/camera_tracking.py, which are looked up where they are shown.
 _FAULTS = (
     n_("the shot ends here"),
     n_("the subject is covered, or looks too different"),
@@ -35,6 +36,8 @@ _FAULTS = (
     n_("the region lies outside the picture"),
     n_("there is no other frame to track"),
     n_("the frame lies outside what can be tracked"),
+    n_("what the regions leave of the picture has too few corners to follow"),
+    n_("the picture is too unlike those before"),
 )
 
 _replacements = 0  # how often Blender's data has been replaced, by undo or by another file
@@ -47,16 +50,16 @@ def data_replaced() -> None:
 
 
 class Target(NamedTuple):
-    """A region that is tracked: found again before each step, as anything may happen to Blender's data in between.
+    """What is tracked: found again before each step, as anything may happen to Blender's data in between.
 
     scene: session_uid of the effect's scene; known: what would change if another region took its place"""
 
     scene: int
-    index: int
+    index: int | None
     known: tuple
 
     @classmethod
-    def of(cls, effect, index: int) -> "Target":
+    def of(cls, effect, index: int | None) -> "Target":
         return cls(effect.scene.session_uid, index, cls._known(effect, index))
 
     def effect(self):
@@ -64,13 +67,23 @@ class Target(NamedTuple):
         for scene in bpy.data.scenes:
             for effect in scene.virtual_shutter.effects:
                 if effect.scene and effect.scene.session_uid == self.scene:
-                    is_there = self.index < len(effect.regions) and self._known(effect, self.index) == self.known
-                    return effect if is_there else None
+                    is_there = self.index is None or self.index < len(effect.regions)
+                    return effect if is_there and self._known(effect, self.index) == self.known else None
         return None
 
     @staticmethod
-    def _known(effect, index: int) -> tuple:
-        return _replacements, effect.id_data.session_uid, effect.start, effect.regions[index].layer
+    def _known(effect, index: int | None) -> tuple:
+        layer = None if index is None else effect.regions[index].layer
+        return _replacements, effect.id_data.session_uid, effect.start, layer
+
+
+class _Subject(NamedTuple):
+    """follow: as tracking.follow behind its region; points: (n, 2) that tell how far thinned keys are off, from its
+    centre on; tolerance: how far they may be, in pixels of the source"""
+
+    follow: Callable
+    points: Callable[[], np.ndarray]
+    tolerance: float = 1.0
 
 
 def frames_to_track(edit, strip, direction: str, until: int = 0) -> range:
@@ -90,29 +103,33 @@ def frames_to_track(edit, strip, direction: str, until: int = 0) -> range:
     return range(current if direction == "FORWARD" else first, (current if direction == "BACKWARD" else last) + 1)
 
 
-def track(edit, effect, strip, index: int, frames: range, motion: str, *, all_keys: bool = False) -> Iterator[int]:
-    """Tracks a region from the current frame through timeline frames (frames_to_track). Gives each frame once it is
-    keyed. Closed early, it keeps what it has. It ends without another key where the region is not there any more.
+def track(
+    edit, effect, strip, index: int | None, frames: range, motion: str, *, all_keys: bool = False
+) -> Iterator[int]:
+    """Tracks a region or the camera from the current frame through timeline frames (frames_to_track). Gives each frame
+    once it is keyed. Closed early, it keeps what it has. It ends without another key where the region is not there any
+    more.
 
     motion: one of properties.MOTIONS; all_keys: keys are not thinned
     EffectError, MediaError: it cannot be tracked; where no frame has come yet, nothing has changed."""
-    validation.check_region(effect.regions[index])
-    region_edits.check_curves(effect, index)
+    moving = selection.moving(effect, index)
+    (validation.check_placement if index is None else validation.check_region)(moving)
+    motion_keys.check_curves(effect, index)
     start, keys = edit.frame_current, MotionKeys(effect, index, motion)
     # Those beyond the frames that are tracked tell how the subject looks as well.
     anchors = [frame for frame in keys.edited(range(strip.left_handle, strip.right_handle)) if frame != start]
-    here, known = Tracked(start, placement_now(effect.regions[index]), 1.0), sorted({*frames, *anchors})
-    shape = _standing(snapshot.region_at(edit, effect, strip, index, known), here)
+    here, known = Tracked(start, placement_now(moving), 1.0), sorted({*frames, *anchors})
+    subject = (_camera if index is None else _region)(edit, effect, strip, index, known, here)
     found, stops = {start: here}, []
     reach = (
         max((a for a in anchors if frames[0] <= a < start), default=frames[0]),
         min((a for a in anchors if start < a <= frames[-1]), default=frames[-1]),
     )
     shown, target = snapshot.take(edit, effect, strip, known), Target.of(effect, index)
-    del edit, effect, strip, keys  # which may not outlive the first step
+    del edit, effect, strip, keys, moving  # which may not outlive the first step
     with session.open_source(shown) as source:
         try:
-            for tracked in _followed(shape, shown, source, start, frames, motion, anchors):
+            for tracked in _followed(subject, shown, source, start, frames, motion, anchors):
                 if tracked.fault:
                     stops.append(tracked)
                 elif tracked.frame != start:
@@ -121,7 +138,7 @@ def track(edit, effect, strip, index: int, frames: range, motion: str, *, all_ke
                     keys = MotionKeys(effect, index, motion)
                     if len(found) == 1:
                         keys.hold(start, start)
-                        region_edits.key_region(effect, index, keys.channels())
+                        motion_keys.insert(effect, index, keys.channels())
                     found[tracked.frame] = tracked
                     beside = found.get(tracked.frame + (-1 if tracked.frame > start else 1), tracked)
                     _write(keys, [beside, tracked], [beside, tracked])
@@ -129,29 +146,32 @@ def track(edit, effect, strip, index: int, frames: range, motion: str, *, all_ke
         finally:
             if len(found) > 1 and (effect := target.effect()) is not None:
                 keys = MotionKeys(effect, index, motion)
-                kept = found if all_keys else _thinned(effect, shape, found, {start, *anchors})
+                ends = {frame for run in motion_keys.runs(found) for frame in run}
+                kept = found if all_keys else _thinned(effect, subject, found, {start, *anchors, *ends})
                 _write(keys, [found[frame] for frame in kept], found.values())
                 _mark(effect, index, found, stops, reach)
+                if index is not None:
+                    effect.regions[index].follow_stamp = ""  # what it followed would undo this
     if len(found) == 1:
         raise EffectError(rpt_(stops[0].fault))
 
 
-def stops(effect, index: int) -> list[tuple[int, str, bool]]:
-    """The timeline frames at which tracking of a region stopped, ascending, why, in the user's language, and whether
-    that is a fault: the end of a shot is none."""
-    known = [stop for stop in effect.regions[index].stops if math.isfinite(effect.start + stop.frame)]
+def stops(effect, index: int | None) -> list[tuple[int, str, bool]]:
+    """The timeline frames at which tracking stopped, ascending, why, in the user's language, and whether that is a
+    fault: the end of a shot is none."""
+    known = [stop for stop in selection.moving(effect, index).stops if math.isfinite(effect.start + stop.frame)]
     return sorted(
         (round(effect.start + stop.frame), rpt_(stop.fault), stop.fault != tracking.SHOT_ENDS) for stop in known
     )
 
 
-def confidence_at(effect, index: int, frame: float) -> float | None:
-    """How sure tracking was of a region at a timeline frame, 0 to 1; None: it was not tracked there."""
+def confidence_at(effect, index: int | None, frame: float) -> float | None:
+    """How sure tracking was of a timeline frame, 0 to 1; None: it did not come there."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
     return next(iter(confidence[frames == frame].tolist()), None)
 
 
-def next_unsure(effect, index: int, frame: float) -> int | None:
+def next_unsure(effect, index: int | None, frame: float) -> int | None:
     """The least sure timeline frame of the first stretch of unsure ones that begins after a frame, or None."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
     unsure = (frames <= limits.MAX_FRAME) & (confidence < tracking.SURE)
@@ -162,19 +182,32 @@ def next_unsure(effect, index: int, frame: float) -> int | None:
     return int(frames[begins[0] + confidence[begins[0] : begins[0] + stretch].argmin()])
 
 
-def unsure_among(effect, index: int, frames) -> int:
+def unsure_among(effect, index: int | None, frames) -> int:
     """Of how many of these timeline frames tracking was not sure."""
     known, confidence = MotionKeys(effect, index, "LOCATION").confidence()
     return int((np.isin(known, list(frames)) & (confidence < tracking.SURE)).sum())
 
 
-def _standing(region: Region, here: Tracked) -> Region:
-    """The region, which is where the editor has put it, keyed or not."""
+def _region(edit, effect, strip, index: int, frames, here: Tracked) -> _Subject:
+    shape = _standing(snapshot.region_at(edit, effect, strip, index, frames), here)
+    return _Subject(partial(tracking.follow, shape), lambda: motions.offsets(shape.unmoved(here.frame)))
+
+
+def _camera(edit, effect, strip, _index, frames, here: Tracked) -> _Subject:
+    """The camera, and all regions, which are left out."""
+    camera = _standing(snapshot.camera_at(edit, effect, frames), here)
+    regions = [snapshot.region_at(edit, effect, strip, i, frames) for i in range(len(effect.regions))]
+    follow = partial(camera_tracking.follow_camera, camera, regions)
+    return _Subject(follow, lambda: region_keys.CORNERS, region_keys.STEADY)
+
+
+def _standing(moving: Region | Camera, here: Tracked) -> Region | Camera:
+    """A region or the camera, which is where the editor has put it, keyed or not."""
     x, y = here.placement.location
     values = {"location": (x, y), "rotation": here.placement.rotation, "scale": here.placement.scale}
-    channels = {name: getattr(region, name) for name in values}
+    channels = {name: getattr(moving, name) for name in values}
     return replace(
-        region,
+        moving,
         **{
             name: replace(channel, values=channel.values | {here.frame: values[name]})
             for name, channel in channels.items()
@@ -183,37 +216,36 @@ def _standing(region: Region, here: Tracked) -> Region:
     )
 
 
-def _followed(shape: Region, shown, source, start: int, frames: range, motion: str, anchors) -> Iterator[Tracked]:
+def _followed(subject: _Subject, shown, source, start: int, frames: range, motion: str, anchors) -> Iterator[Tracked]:
     """As tracking.follow, its sentences in the user's language."""
     with snapshot.translated():
         try:
             footage = tracking.Footage(source, lambda frame: session.source_index(shown, frame, source)[0])
-            yield from tracking.follow(shape, footage, start, frames, motion=motion.lower(), anchors=anchors)
+            yield from subject.follow(footage, start, frames, motion=motion.lower(), anchors=anchors)
         except tracking.TrackingError as error:
             raise EffectError(rpt_(str(error))) from None
 
 
-def _thinned(effect, shape: Region, found: dict[int, Tracked], kept: set[int]) -> list[int]:
-    points = motions.offsets(shape.unmoved(next(iter(found))))
-    placements = {frame: tracked.placement for frame, tracked in found.items()}
-    return motions.thinned(placements, points, annotations.picture_size(effect), kept)
+def _thinned(effect, subject: _Subject, found: dict[int, Tracked], kept: set[int]) -> list[int]:
+    placements, size = {frame: each.placement for frame, each in found.items()}, annotations.picture_size(effect)
+    return motions.thinned(placements, subject.points(), size, kept, subject.tolerance)
 
 
 def _write(keys: MotionKeys, kept: Iterable[Tracked], found: Iterable[Tracked]) -> None:
     keys.write({t.frame: t.placement for t in kept}, {t.frame: t.confidence for t in found})
 
 
-def _mark(effect, index: int, found: dict[int, Tracked], stops: list[Tracked], reach: tuple[int, int]) -> None:
+def _mark(effect, index: int | None, found: dict[int, Tracked], stops: list[Tracked], reach: tuple[int, int]) -> None:
     """Notes where tracking stopped, in place of what was noted of frames that it came through, and of those behind a
     stop up to where it was to go.
 
     reach: the first and the last frame that it was to track"""
-    region, start = effect.regions[index], next(iter(found))
+    moving, start = selection.moving(effect, index), next(iter(found))
     ways = {stop.frame > start for stop in stops}
     first, last = reach[0] if False in ways else min(found), reach[1] if True in ways else max(found)
-    for i in reversed(range(len(region.stops))):
-        if first <= effect.start + region.stops[i].frame <= last:
-            region.stops.remove(i)
+    for i in reversed(range(len(moving.stops))):
+        if first <= effect.start + moving.stops[i].frame <= last:
+            moving.stops.remove(i)
     for stop in stops:
-        new = region.stops.add()
+        new = moving.stops.add()
         new.frame, new.forward, new.fault = stop.frame - effect.start, stop.frame > start, stop.fault

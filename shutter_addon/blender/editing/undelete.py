@@ -3,6 +3,8 @@
 Blender's clipboard holds a Scene strip without its scene, and outlives the file that the strip was cut from.
 """
 
+import bpy
+
 from ..data import fcurves, property_copy
 from . import add_effect
 
@@ -54,13 +56,18 @@ def restore(edit, identity: str):
 
 
 def _plain(struct) -> dict:
-    """A struct of Blender's with all that is in it as plain data; what it points to is left out."""
+    """A struct of Blender's with all that is in it as plain data; of what it points to, the session_uid of clips."""
     plain = {}
     for prop in struct.bl_rna.properties:
         name = prop.identifier
         if prop.type == "COLLECTION":
             plain[name] = [_plain(item) for item in getattr(struct, name)]
-        elif prop.type != "POINTER" and name != "co_ui":  # setting that one moves a key's handles
+        elif property_copy.is_group(struct, name):
+            plain[name] = _plain(getattr(struct, name))
+        elif prop.type == "POINTER":
+            if isinstance(clip := getattr(struct, name), bpy.types.MovieClip):
+                plain[name] = clip.session_uid
+        elif name != "co_ui":  # setting that one moves a key's handles
             value = property_copy.stored(struct, name)
             plain[name] = tuple(value) if getattr(prop, "is_array", False) else value
     return plain
@@ -71,6 +78,10 @@ def _fill(struct, plain: dict) -> None:
         if isinstance(value, list):
             for item in value:
                 _fill(_add(getattr(struct, name), name, item), item)
+        elif isinstance(value, dict):
+            _fill(getattr(struct, name), value)
+        elif struct.bl_rna.properties[name].type == "POINTER":
+            setattr(struct, name, next((clip for clip in bpy.data.movieclips if clip.session_uid == value), None))
         elif not struct.is_property_readonly(name):
             property_copy.store(struct, name, value)
 

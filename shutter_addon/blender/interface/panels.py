@@ -54,6 +54,8 @@ class SHUTTER_MT_presets(Menu):
 
     def draw(self, _context):
         self.layout.operator_enum("shutter.preset", "preset")
+        self.layout.separator()
+        self.layout.operator("shutter.tripod", icon="CON_CAMERASOLVER")
 
 
 class SHUTTER_MT_shutters(Menu):
@@ -118,15 +120,16 @@ class _Shutters:
 
 
 def _draw_follow(layout, effect, shutter) -> None:
-    """What the exposure moves with."""
+    """What the exposure moves with, and what says how long it is."""
     layout.prop(shutter, "follow")
     if shutter.follow == "REGION":
         layout.prop_search(shutter, "follow_region", effect, "regions", text="Region")
-    elif shutter.follow == "CAMERA":
-        column = layout.column(align=True)
-        column.prop(effect, "camera_location", text="Location")
-        column.prop(effect, "camera_rotation", text="Rotation")
-        column.prop(effect, "camera_scale", text="Scale")
+    if shutter.follow != "NOTHING":
+        layout.prop(shutter, "length")
+        if shutter.length == "MOTION":
+            layout.prop(shutter, "trail")
+    if shutter.follow == "CAMERA":
+        _draw_tracking(layout, effect, None)
 
 
 def _draw_live(layout, context):
@@ -185,7 +188,7 @@ class _Regions(_WithEffect):
         region = selection.active_region(effect)
         if region is None:
             return
-        _draw_tracking(layout, effect, region)
+        _draw_tracking(layout, effect, effect.active_region)
         row = layout.split(factor=0.4)
         row.alignment = "RIGHT"
         row.label(text="Shutter")
@@ -204,25 +207,30 @@ class _Regions(_WithEffect):
         layout.operator("shutter.region_key", text="Insert Keyframes", icon="KEY_HLT")
 
 
-def _draw_tracking(layout, effect, region) -> None:
-    """The buttons; how sure tracking was of the current frame, and where it stopped."""
+def _draw_tracking(layout, effect, index: int | None) -> None:
+    """Of a region or the camera (selection.moving) the buttons; how sure tracking was of the current frame, and where
+    it stopped."""
+    track = "shutter.track_camera" if index is None else "shutter.track"
     row = layout.row(align=True)
     for direction, _name, _description, icon, _number in track_operators.DIRECTIONS:
-        button = row.operator("shutter.track", text="Track" if direction == "BOTH" else "", icon=icon)
+        button = row.operator(
+            track, text=("Track Camera" if index is None else "Track") if direction == "BOTH" else "", icon=icon
+        )
         button.direction = direction
-    index = effect.active_region
+    if index is not None:
+        layout.operator("shutter.panning_shot", icon="CON_FOLLOWTRACK")
     confidence = track_region.confidence_at(effect, index, effect.id_data.frame_current)
     if confidence is not None:
         row = layout.row(align=True)
         text = iface_("Confidence: {percent} %").format(percent=f"{100 * confidence:.0f}")
         row.label(text=text, icon="CHECKMARK" if confidence >= SURE else "ERROR", translate=False)
-        row.operator("shutter.track_look")
+        row.operator(f"{track}_look")
     for frame, reason, is_fault in track_region.stops(effect, index):
         row = layout.row(align=True)
         row.label(text=reason, icon="ERROR" if is_fault else "INFO", translate=False)
         place = row.row()
         place.ui_units_x = 2.5
-        place.operator("shutter.track_look", text=str(frame), translate=False).frame = frame
+        place.operator(f"{track}_look", text=str(frame), translate=False).frame = frame
 
 
 class _WithRegion(_WithEffect):
@@ -239,9 +247,12 @@ class _Track(_WithRegion):
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
-        region = selection.active_region(selection.active(context)[1])
-        for name in ("motion", "track_until", "track_all_keys"):
-            layout.prop(region, name)
+        _draw_track_options(layout, selection.active_region(selection.active(context)[1]))
+
+
+def _draw_track_options(layout, moving) -> None:
+    for name in ("motion", "track_until", "track_all_keys"):
+        layout.prop(moving, name)
 
 
 class _Follow(_WithRegion):
@@ -270,6 +281,30 @@ def _draw_tracks(layout, region, tracking) -> None:
     if region.follow_kind != "OBJECT" and holder is not None:
         kind = "plane_tracks" if region.follow_kind == "PLANE" else "tracks"
         layout.prop_search(region, "follow_track", holder, kind)
+
+
+class _Camera(_WithEffect):
+    """Its numbers, and how they are found; the shutter that follows it has the buttons that track it."""
+
+    bl_label = "Camera"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and any(
+            shutter.follow == "CAMERA" for shutter in selection.active(context)[1].shutters
+        )
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        camera = selection.active(context)[1].camera
+        column = layout.column(align=True)
+        for name in ("location", "rotation", "scale"):
+            column.prop(camera, name)
+        _draw_track_options(layout, camera)
+        layout.prop(camera, "follow_clip")
+        layout.operator("shutter.follow_stabilization", icon="TRACKER")
 
 
 class _Bars(_WithEffect):
@@ -416,6 +451,10 @@ class STRIP_PT_shutter_follow(_Follow, _InProperties, Panel):
     bl_parent_id = "STRIP_PT_shutter"
 
 
+class STRIP_PT_shutter_camera(_Camera, _InProperties, Panel):
+    bl_parent_id = "STRIP_PT_shutter"
+
+
 class STRIP_PT_shutter_bars(_Bars, _InProperties, Panel):
     bl_parent_id = "STRIP_PT_shutter"
 
@@ -441,6 +480,10 @@ class SEQUENCER_PT_shutter_track(_Track, _InSidebar, Panel):
 
 
 class SEQUENCER_PT_shutter_follow(_Follow, _InSidebar, Panel):
+    bl_parent_id = "SEQUENCER_PT_shutter"
+
+
+class SEQUENCER_PT_shutter_camera(_Camera, _InSidebar, Panel):
     bl_parent_id = "SEQUENCER_PT_shutter"
 
 
@@ -483,6 +526,7 @@ classes = (
     STRIP_PT_shutter_regions,
     STRIP_PT_shutter_track,
     STRIP_PT_shutter_follow,
+    STRIP_PT_shutter_camera,
     STRIP_PT_shutter_bars,
     STRIP_PT_shutter_options,
     STRIP_PT_shutter_inbetween,
@@ -490,6 +534,7 @@ classes = (
     SEQUENCER_PT_shutter_regions,
     SEQUENCER_PT_shutter_track,
     SEQUENCER_PT_shutter_follow,
+    SEQUENCER_PT_shutter_camera,
     SEQUENCER_PT_shutter_bars,
     SEQUENCER_PT_shutter_options,
     SEQUENCER_PT_shutter_inbetween,

@@ -1,4 +1,5 @@
-"""Operators that key a region by the footage: as what it covers moves, or as something tracked in a movie clip does."""
+"""Operators that key a region or the camera by the footage: as what is seen moves, or as a movie clip's tracks do; and
+those that make a panning shot of that, or a tripod."""
 
 import time
 
@@ -9,9 +10,9 @@ from bpy.types import Operator
 
 from ..data import selection, validation
 from ..data.properties import CONTEXT
-from ..editing import follow_track, track_region
+from ..editing import bar_edits, follow_stabilization, follow_track, panning_shot, track_region, tripod
 from ..rendering.session import FAULTS
-from .operators import _OfRegion, redraw, refused
+from .operators import _OfEffect, _OfRegion, _OfShutter, redraw, refused
 
 # Seconds of work, at least, from one look at the window to the next.
 _TICK = 0.05
@@ -23,66 +24,79 @@ DIRECTIONS = (
 )
 
 
-class SHUTTER_OT_track(_OfRegion, Operator):
-    """Key the active region by what it covers here, up to your own keys (Esc stops and keeps the tracked frames)"""
+# Blender would use again what a button was pressed with before.
+_DIRECTION = EnumProperty(
+    name="Direction",
+    description="Where tracking goes from the current frame",
+    items=DIRECTIONS,
+    default="BOTH",
+    options={"SKIP_SAVE"},
+    translation_context=CONTEXT,
+)
 
-    bl_idname = "shutter.track"
-    bl_label = "Track Region"
+
+class _Tracks:
+    """Tracks what has an `index`, as for selection.moving, from the current frame in a `direction` of DIRECTIONS."""
+
     bl_options = {"UNDO"}
 
-    # Blender would use again what a button was pressed with before.
-    direction: EnumProperty(
-        name="Direction",
-        description="Where tracking goes from the current frame",
-        items=DIRECTIONS,
-        default="BOTH",
-        options={"SKIP_SAVE"},
-        translation_context=CONTEXT,
-    )
+    def index(self, effect) -> int | None:
+        return effect.active_region
+
+    def ended(self, context) -> None:
+        """Called once all is tracked, and not after Esc. EffectError: what comes after tracking cannot be done."""
 
     def invoke(self, context, _event):
-        if bpy.app.background:
-            return self.execute(context)
+        return self._run(context, float("inf") if bpy.app.background else _TICK)
+
+    def execute(self, context):
+        return self._run(context, float("inf"))
+
+    def _run(self, context, seconds: float):
+        """Tracks for a while, and then whenever Blender has time."""
         try:
             self._begin(context)
-            self._go_on(_TICK)
+            goes_on = self._go_on(seconds)
         except FAULTS as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        if not goes_on:
+            return self._finish(context)
         self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
         context.window_manager.progress_begin(0, len(self._frames))
         context.window_manager.modal_handler_add(self)
         self._show(context)
         return {"RUNNING_MODAL"}
 
-    def execute(self, context):
-        try:
-            self._begin(context)
-            self._go_on(float("inf"))
-        except FAULTS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        self._tell()
-        redraw(context)
-        return {"FINISHED"}
-
     def modal(self, context, event):
         if self._target.effect() is None:  # undone or removed in another window, or another file was loaded
             self.cancel(context)
             return {"CANCELLED"}
-        is_stopped = event.type == "ESC" and event.value == "PRESS"
+        is_stopped = is_ended = event.type == "ESC" and event.value == "PRESS"
         if event.type == "TIMER":
             # What it takes to draw a frame, tracking takes at least as well.
-            is_stopped = not self._go_on(max(_TICK, time.perf_counter() - self._shown))
+            try:
+                is_ended = not self._go_on(max(_TICK, time.perf_counter() - self._shown))
+            except Exception:  # Blender ends the operator then, and asks for no `cancel`
+                self.cancel(context)
+                raise
             self._show(context)
-        if not is_stopped:
+        if not is_ended:
             return {"RUNNING_MODAL"}
         self.cancel(context)
         if self.direction == "BOTH":
             self._go_to(self._start)
+        return self._finish(context, is_stopped)
+
+    def _finish(self, context, is_stopped: bool = False):
         self._tell()
+        try:
+            if not is_stopped and self._target.effect() is not None:
+                self.ended(context)
+        except FAULTS as error:
+            self.report({"ERROR"}, str(error))
         redraw(context)
-        return {"FINISHED"}
+        return {"FINISHED"}  # what was tracked can be undone
 
     def cancel(self, context):
         """It has ended, or its window was closed."""
@@ -93,10 +107,11 @@ class SHUTTER_OT_track(_OfRegion, Operator):
 
     def _begin(self, context):
         edit, effect, strip = selection.active(context)
-        index, region = effect.active_region, selection.active_region(effect)
+        index = self.index(effect)
+        moving = selection.moving(effect, index)
         self._target, self._start, self._done = track_region.Target.of(effect, index), edit.frame_current, set()
-        self._frames = track_region.frames_to_track(edit, strip, self.direction, region.track_until)
-        motion, all_keys = validation.word(region, "motion"), region.track_all_keys
+        self._frames = track_region.frames_to_track(edit, strip, self.direction, moving.track_until)
+        motion, all_keys = validation.word(moving, "motion"), moving.track_all_keys
         self._steps = track_region.track(edit, effect, strip, index, self._frames, motion, all_keys=all_keys)
 
     def _go_on(self, seconds: float) -> bool:
@@ -128,7 +143,7 @@ class SHUTTER_OT_track(_OfRegion, Operator):
         self._shown = time.perf_counter()
 
     def _tell(self):
-        if (effect := self._target.effect()) is None:
+        if (effect := self._target.effect()) is None or not self._done:
             return
         sentence = rpt_("Frames {first} to {last} are tracked, {unsure} of them unsure")
         unsure = track_region.unsure_among(effect, self._target.index, self._done)
@@ -140,11 +155,72 @@ class SHUTTER_OT_track(_OfRegion, Operator):
                 self.report({"WARNING" if is_fault else "INFO"}, sentence.format(frame=frame, fault=fault))
 
 
-class SHUTTER_OT_track_look(_OfRegion, Operator):
-    """Go to a frame that tracking is not sure of"""
+class SHUTTER_OT_track(_Tracks, _OfRegion, Operator):
+    """Key the active region by what it covers here, up to your own keys (Esc stops and keeps the tracked frames)"""
 
-    bl_idname = "shutter.track_look"
-    bl_label = "Next Unsure Frame"
+    bl_idname = "shutter.track"
+    bl_label = "Track Region"
+
+    direction: _DIRECTION
+
+
+class SHUTTER_OT_track_camera(_Tracks, _OfEffect, Operator):
+    """Key the camera by what the regions leave free, up to your own keys (Esc stops and keeps the tracked frames)"""
+
+    bl_idname = "shutter.track_camera"
+    bl_label = "Track Camera"
+
+    direction: _DIRECTION
+
+    def index(self, _effect):
+        return None
+
+
+class SHUTTER_OT_panning_shot(_Tracks, _OfRegion, Operator):
+    """Keep what the active region moves with sharp while all else streaks (tracks the region unless it has keys)"""
+
+    bl_idname = "shutter.panning_shot"
+    bl_label = "Panning Shot"
+
+    direction = "BOTH"
+
+    def _begin(self, context):
+        edit, effect, strip = selection.active(context)
+        index = effect.active_region
+        if panning_shot.is_ready(edit, effect, strip, index):
+            self._target, self._steps, self._done = track_region.Target.of(effect, index), iter(()), set()
+        else:
+            super()._begin(context)
+
+    def ended(self, context):
+        panning_shot.set_up(self._target.effect(), self._target.index, bar_edits.auto_key(context))
+
+
+class SHUTTER_OT_tripod(_Tracks, _OfShutter, Operator):
+    """Expose for long as if the camera had stood still (tracks the camera unless it has keys)"""
+
+    bl_idname = "shutter.tripod"
+    bl_label = "Tripod"
+
+    direction = "BOTH"
+
+    def index(self, _effect):
+        return None
+
+    def _begin(self, context):
+        effect = selection.active(context)[1]
+        if tripod.is_ready(effect):
+            self._target, self._steps, self._done = track_region.Target.of(effect, None), iter(()), set()
+        else:
+            super()._begin(context)
+
+    def ended(self, context):
+        tripod.set_up(self._target.effect(), bar_edits.auto_key(context))
+
+
+class _Looks:
+    """Goes to a frame at which tracking of what has an `index` is not sure."""
+
     bl_options = {"REGISTER"}
 
     frame: IntProperty(
@@ -153,12 +229,15 @@ class SHUTTER_OT_track_look(_OfRegion, Operator):
         options={"SKIP_SAVE"},
     )
 
+    def index(self, effect) -> int | None:
+        return effect.active_region
+
     def change(self, _context, effect):
         edit = effect.id_data
         if self.properties.is_property_set("frame"):
             edit.frame_set(self.frame)
             return {"FINISHED"}
-        frame = track_region.next_unsure(effect, effect.active_region, edit.frame_current)
+        frame = track_region.next_unsure(effect, self.index(effect), edit.frame_current)
         if frame is None:
             self.report({"INFO"}, "No other stretch of unsure frames lies ahead")
             return {"CANCELLED"}
@@ -166,25 +245,43 @@ class SHUTTER_OT_track_look(_OfRegion, Operator):
         return {"FINISHED"}
 
 
-class _Follows(_OfRegion):
-    """Keys the region by what it is set to follow."""
+class SHUTTER_OT_track_look(_Looks, _OfRegion, Operator):
+    """Go to a frame that tracking is not sure of"""
+
+    bl_idname = "shutter.track_look"
+    bl_label = "Next Unsure Frame"
+
+
+class SHUTTER_OT_track_camera_look(_Looks, _OfEffect, Operator):
+    """Go to a frame that tracking is not sure of"""
+
+    bl_idname = "shutter.track_camera_look"
+    bl_label = "Next Unsure Frame"
+
+    def index(self, _effect):
+        return None
+
+
+class _Follows:
+    """Keys a region or the camera by what it is set to follow."""
 
     def change(self, context, effect):
         try:
-            self.key(*selection.active(context), effect.active_region)
+            self.key(*selection.active(context))
         except FAULTS as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return None
 
 
-class SHUTTER_OT_follow(_Follows, Operator):
+class SHUTTER_OT_follow(_Follows, _OfRegion, Operator):
     """Key the active region by a track of a movie clip, from where the region is at this frame"""
 
     bl_idname = "shutter.follow"
     bl_label = "Follow"
 
-    key = staticmethod(follow_track.follow)
+    def key(self, edit, effect, strip):
+        follow_track.follow(edit, effect, strip, effect.active_region)
 
     @classmethod
     def possible(cls, effect):
@@ -193,13 +290,14 @@ class SHUTTER_OT_follow(_Follows, Operator):
         return selection.active_region(effect).follow_clip is not None or refused(cls, rpt_("Choose a clip first"))
 
 
-class SHUTTER_OT_follow_update(_Follows, Operator):
+class SHUTTER_OT_follow_update(_Follows, _OfRegion, Operator):
     """Key the active region anew by what it follows, after the track has changed"""
 
     bl_idname = "shutter.follow_update"
     bl_label = "Update"
 
-    key = staticmethod(follow_track.update)
+    def key(self, edit, effect, strip):
+        follow_track.update(edit, effect, strip, effect.active_region)
 
     @classmethod
     def possible(cls, effect):
@@ -210,7 +308,30 @@ class SHUTTER_OT_follow_update(_Follows, Operator):
         )
 
 
-classes = (SHUTTER_OT_track, SHUTTER_OT_track_look, SHUTTER_OT_follow, SHUTTER_OT_follow_update)
+class SHUTTER_OT_follow_stabilization(_Follows, _OfEffect, Operator):
+    """Key the camera by the 2D stabilization of a movie clip, from where the camera is at this frame"""
+
+    bl_idname = "shutter.follow_stabilization"
+    bl_label = "Follow Stabilization"
+
+    key = staticmethod(follow_stabilization.follow)
+
+    @classmethod
+    def possible(cls, effect):
+        return effect.camera.follow_clip is not None or refused(cls, rpt_("Choose a clip first"))
+
+
+classes = (
+    SHUTTER_OT_track,
+    SHUTTER_OT_track_camera,
+    SHUTTER_OT_panning_shot,
+    SHUTTER_OT_tripod,
+    SHUTTER_OT_track_look,
+    SHUTTER_OT_track_camera_look,
+    SHUTTER_OT_follow,
+    SHUTTER_OT_follow_update,
+    SHUTTER_OT_follow_stabilization,
+)
 
 
 def register():

@@ -345,7 +345,7 @@ def source_index(snapshot: Snapshot, frame: float, source: ShotSource) -> tuple[
     runs backward there. EffectError: it cannot be known."""
     if snapshot.effect.time is not None:
         time, backward = snapshot.effect.time.at(frame)
-        return retiming.nearest(time - 1, source), backward
+        return retiming.nearest(time - 1, source.step, source.count), backward
     with translated():
         return retiming.source_frame(snapshot.timing, frame, source), snapshot.timing.use_reverse_frames
 

@@ -579,11 +579,11 @@ MESSAGES = {
     ("Virtual Shutter", "Motion"): "Bewegung",
     ("*", "Which channels Track and Follow key"): "Welchen Kanälen Verfolgen und Folgen Schlüsselbilder geben",
     ("Virtual Shutter", "Location"): "Position",
-    ("*", "The region is moved"): "Die Region wird bewegt",
+    ("*", "It is moved"): "Es wird bewegt",
     ("Virtual Shutter", "Location, Rotation"): "Position, Rotation",
-    ("*", "The region is moved and turned"): "Die Region wird bewegt und gedreht",
+    ("*", "It is moved and turned"): "Es wird bewegt und gedreht",
     ("Virtual Shutter", "Location, Rotation, Scale"): "Position, Rotation, Skalierung",
-    ("*", "The region is moved, turned and scaled"): "Die Region wird bewegt, gedreht und skaliert",
+    ("*", "It is moved, turned and scaled"): "Es wird bewegt, gedreht und skaliert",
     ("Virtual Shutter", "Until"): "Bis",
     (
         "*",
@@ -601,7 +601,7 @@ MESSAGES = {
     ): "Bilder {first} bis {last} sind verfolgt, {unsure} davon unsicher",
     ("*", "Tracking stopped at frame {frame}: {fault}"): "Das Verfolgen hielt bei Bild {frame} an: {fault}",
     ("*", "Confidence"): "Sicherheit",
-    ("*", "How sure tracking was of where the region is"): "Wie sicher beim Verfolgen war, wo die Region ist",
+    ("*", "How sure tracking was of where it is"): "Wie sicher das Verfolgen war, wo es ist",
     ("*", "Confidence: {percent} %"): "Sicherheit: {percent} %",
     ("Operator", "Next Unsure Frame"): "Nächstes unsicheres Bild",
     ("*", "Go to a frame that tracking is not sure of"): "Zu einem Bild gehen, das beim Verfolgen unsicher ist",
@@ -620,12 +620,12 @@ MESSAGES = {
     ): "das aktuelle Bild liegt außerhalb des Verschluss-Streifens",
     (
         "*",
-        'region "{region}": the F-curve of "{channel}" is locked',
-    ): "Region „{region}“: die F-Kurve von „{channel}“ ist gesperrt",
+        '{place}: the F-curve of "{channel}" is locked',
+    ): "{place}: die F-Kurve von „{channel}“ ist gesperrt",
     (
         "*",
-        'region "{region}": the F-curve of "{channel}" is muted',
-    ): "Region „{region}“: die F-Kurve von „{channel}“ ist stummgeschaltet",
+        '{place}: the F-curve of "{channel}" is muted',
+    ): "{place}: die F-Kurve von „{channel}“ ist stummgeschaltet",
     ("*", "the shot ends here"): "die Einstellung endet hier",
     (
         "*",
@@ -637,6 +637,37 @@ MESSAGES = {
     ("*", "the region lies outside the picture"): "die Region liegt außerhalb des Bildes",
     ("*", "there is no other frame to track"): "es gibt kein anderes Bild zum Verfolgen",
     ("*", "the frame lies outside what can be tracked"): "das Bild liegt außerhalb dessen, was verfolgt werden kann",
+    (
+        "*",
+        "what the regions leave of the picture has too few corners to follow",
+    ): "was die Regionen vom Bild übrig lassen, hat zu wenige Ecken, denen zu folgen wäre",
+    ("*", "the picture is too unlike those before"): "das Bild ist denen davor zu unähnlich",
+    ("Operator", "Track Camera"): "Kamera verfolgen",
+    (
+        "*",
+        "Key the camera by what the regions leave free, up to your own keys (Esc stops and keeps the tracked frames)",
+    ): "Der Kamera Schlüsselbilder nach allem geben, was die Regionen frei lassen, bis zu eigenen Schlüsselbildern "
+    "(Esc hält an und behält die verfolgten Bilder)",
+    ("Operator", "Tripod"): "Stativ",
+    (
+        "*",
+        "Expose for long as if the camera had stood still (tracks the camera unless it has keys)",
+    ): "Lange belichten, als hätte die Kamera still gestanden (verfolgt sie, wenn sie keine Schlüsselbilder hat)",
+    ("Operator", "Follow Stabilization"): "Der Stabilisierung folgen",
+    (
+        "*",
+        "Key the camera by the 2D stabilization of a movie clip, from where the camera is at this frame",
+    ): "Der Kamera Schlüsselbilder nach der 2D-Stabilisierung eines Filmclips geben, von ihrem Ort in diesem Bild aus",
+    ("*", 'clip "{clip}" has no 2D stabilization'): "Clip „{clip}“ hat keine 2D-Stabilisierung",
+    ("*", 'camera of effect "{name}"'): "Kamera des Effekts „{name}“",
+    ("*", "How what the camera sees moves"): "Wie sich bewegt, was die Kamera sieht",
+    ("*", "Name of the camera's animation channels"): "Name der Animationskanäle der Kamera",
+    ("Operator", "Panning Shot"): "Mitzieher",
+    (
+        "*",
+        "Keep what the active region moves with sharp while all else streaks (tracks the region unless it has keys)",
+    ): "Scharf halten, womit sich die aktive Region bewegt, und alles andere verwischen "
+    "(verfolgt die Region, falls sie keine Schlüsselbilder hat)",
     ("*", "Nothing"): "Nichts",
     ("*", "Camera"): "Kamera",
     ("*", "What the exposure moves with"): "Womit sich die Belichtung mitbewegt",
@@ -657,17 +688,32 @@ MESSAGES = {
         "*",
         "Name of the region that the exposure moves with",
     ): "Name der Region, mit der sich die Belichtung bewegt",
-    ("*", "Camera Location"): "Position der Kamera",
+    ("*", "Length"): "Länge",
+    ("*", "Frames"): "Bilder",
+    ("*", "Motion"): "Bewegung",
+    ("*", "What says how long the exposure is"): "Was sagt, wie lang die Belichtung ist",
+    (
+        "*",
+        "The bars say for how many frames the shutter is open",
+    ): "Die Balken sagen, wie viele Bilder lang der Verschluss offen ist",
+    (
+        "*",
+        "The shutter is open while what it follows moves by a set length; the bars are the shape",
+    ): "Der Verschluss ist offen, während sich das, womit er sich mitbewegt, um eine gegebene Länge bewegt; "
+    "die Balken sind die Form",
+    ("*", "Trail Length"): "Länge der Spur",
+    (
+        "*",
+        "How far what is followed moves while the shutter is open, as a fraction of the picture's height",
+    ): "Wie weit sich bei offenem Verschluss bewegt, was verfolgt wird, als Bruchteil der Bildhöhe",
     (
         "*",
         "Where what the camera sees has moved to, as a fraction of the picture",
     ): "Wohin sich bewegt hat, was die Kamera sieht, als Bruchteil des Bildes",
-    ("*", "Camera Rotation"): "Drehung der Kamera",
     (
         "*",
         "Rotation of what the camera sees, about the picture's center",
     ): "Drehung dessen, was die Kamera sieht, um die Bildmitte",
-    ("*", "Camera Scale"): "Skalierung der Kamera",
     (
         "*",
         "Scale of what the camera sees, about the picture's center",

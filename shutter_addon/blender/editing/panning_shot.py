@@ -1,0 +1,34 @@
+"""A panning shot, as of a camera that pans with its subject: that is sharp, and all that stands still streaks."""
+
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...core import presets
+from ..data import consistency, snapshot, validation
+from ..data.validation import EffectError
+from . import bar_edits, shutter_edits
+from .motion_keys import MotionKeys
+
+
+def is_ready(edit, effect, strip, index: int) -> bool:
+    """Whether a region has keys of motion; without, it has to be tracked first. EffectError: it has keys, and no
+    strokes that could be followed."""
+    if not MotionKeys(effect, index, "SCALE").are_several():
+        return False
+    if not snapshot.strokes_at(edit, effect, strip, index, edit.frame_current):
+        raise EffectError(rpt_("the region has no strokes to follow"))
+    return True
+
+
+def set_up(effect, index: int, key: bool = False) -> None:
+    """Has a region's shutter follow it, open for a whole window that lies around the frame. The shutter becomes the
+    default, so that it holds wherever no other one has a region.
+
+    key: keys the bars at the current frame. EffectError: the window has no length, and nothing has changed."""
+    region, bars = effect.regions[index], presets.bars("ANGLE_360", validation.number(effect, "window"))
+    region.name = consistency.unique(region.name, {other.name for other in effect.regions if other != region})
+    place = effect.shutters.find(region.shutter)
+    shutter = effect.shutters[place]
+    shutter.follow, shutter.follow_region = "REGION", region.name
+    effect.position = "CENTER"
+    bar_edits.paint(effect, place, bars, key)
+    shutter_edits.move_shutter(effect, place, 0)

@@ -1,0 +1,27 @@
+"""A tripod, for footage that was held in the hand: an exposure for which the camera stands still."""
+
+from ...core import presets
+from ..data import validation
+from . import bar_edits
+from .motion_keys import MotionKeys
+
+
+def is_ready(effect) -> bool:
+    """Whether the camera has keys of motion, and those that were tracked reach the current frame, whose shot may be
+    another one; without, it has to be tracked first."""
+    keys = MotionKeys(effect, None, "SCALE")
+    tracked = keys.confidence()[0]
+    return keys.are_several() and (not len(tracked) or effect.id_data.frame_current in tracked)
+
+
+def set_up(effect, key: bool = False) -> None:
+    """Has the active shutter follow the camera, open for a whole window that lies around the frame. Where it has no
+    region, and so holds nowhere, the default one takes its place.
+
+    key: keys the bars at the current frame. EffectError: the window has no length, and nothing has changed."""
+    bars = presets.bars("ANGLE_360", validation.number(effect, "window"))
+    name = effect.shutters[effect.active_shutter].name
+    if not any(region.shutter == name for region in effect.regions):
+        effect.active_shutter = 0
+    effect.shutters[effect.active_shutter].follow, effect.position = "CAMERA", "CENTER"
+    bar_edits.paint(effect, effect.active_shutter, bars, key)

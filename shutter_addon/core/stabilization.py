@@ -1,0 +1,133 @@
+"""How Blender's 2D stabilization lays the picture of a movie clip at each frame, from tracks and settings.
+
+Each track says by how much it is away from where it was at the anchor frame; one that begins later starts from what the
+others say there. The picture is shifted back by their weighted mean, and turned and scaled back about the markers'
+mean. Where no track has a marker, it is laid as between the frames beside. Places are complex, x + iy in heights of the
+picture, y up.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from .motions import Similarity
+
+_LEAST_WEIGHT = 0.005  # below it a track is none
+# Heights of the picture that are added to a marker's distance from the pivot: near to that it says little of scale.
+_BIAS = 0.01
+
+
+@dataclass(frozen=True)
+class Track:
+    """markers: places by frame; weight: 0 to 1 at a frame; location, turn: what it is used for"""
+
+    markers: dict[int, complex]
+    weight: Callable[[int], float]
+    location: bool
+    turn: bool
+
+    def frames(self) -> list[int]:
+        """Those at which it says something, ascending."""
+        return [frame for frame in sorted(self.markers) if self.weight(frame) >= _LEAST_WEIGHT]
+
+
+class Measured(NamedTuple):
+    """How the picture has moved since the anchor frame: shifted; turned in radians and scaled, about a pivot."""
+
+    shift: complex
+    pivot: complex
+    angle: float
+    log_scale: float
+
+    def between(self, other: Measured, share: float) -> Measured:
+        return Measured(*((1 - share) * mine + share * its for mine, its in zip(self, other, strict=True)))
+
+
+class Base(NamedTuple):
+    """What is added to a track's shift, angle and logarithm of the scale."""
+
+    shift: complex
+    angle: float
+    log_scale: float
+
+
+class Stabilization:
+    """turned, scaled: whether the tracks for rotation say that, and scale as well."""
+
+    def __init__(self, tracks: Collection[Track], anchor: int, *, turned: bool, scaled: bool):
+        self._turned, self._scaled = turned, scaled
+        self._bases: list[tuple[Track, Base]] = []
+        near = [(min(frames, key=lambda f: (abs(f - anchor), f)), t) for t in tracks if (frames := t.frames())]
+        location = [track for track in tracks if track.location]
+        known = sorted({frame for track in location for frame in track.frames()})
+        before = max((frame for frame in known if frame <= anchor), default=known[0] if known else anchor)
+        frame, there = anchor, Measured(0, _mean(location, before) or 0, 0.0, 0.0)
+        for reference, track in sorted(near, key=lambda each: abs(each[0] - anchor)):
+            if reference != frame:
+                frame, there = reference, self._averaged(reference) or Measured(0, there.pivot, 0.0, 0.0)
+            away = track.markers[reference] - there.pivot
+            base = there.shift - track.markers[reference], there.angle - cmath.phase(away)
+            self._bases.append((track, Base(*base, there.log_scale - math.log(abs(away) + _BIAS))))
+        self.frames = known  # at which a track for the location has a marker, ascending
+
+    def at(self, frame: int) -> Measured | None:
+        """None: there are no tracks for the location."""
+        if not self.frames:
+            return None
+        lower = max((f for f in self.frames if f <= frame), default=self.frames[0])
+        upper = min((f for f in self.frames if f >= frame), default=self.frames[-1])
+        if lower == upper:
+            return self._averaged(lower)
+        return self._averaged(lower).between(self._averaged(upper), (frame - lower) / (upper - lower))
+
+    def _averaged(self, frame: int) -> Measured | None:
+        """None: no track that is known so far has a marker there."""
+        seen = [(t, base, t.weight(frame), t.markers[frame]) for t, base in self._bases if frame in t.markers]
+        located = [(weight, place, base.shift + place) for track, base, weight, place in seen if track.location]
+        total = sum(weight for weight, *_ in located)
+        if total <= _LEAST_WEIGHT:
+            return None
+        pivot = sum(weight * place for weight, place, _ in located) / total
+        shift = sum(weight * offset for weight, _, offset in located) / total
+        angle = log_scale = total = 0.0
+        for track, base, weight, place in seen if self._turned else ():
+            if track.turn and weight > _LEAST_WEIGHT:
+                away = place - pivot
+                share = weight * -math.expm1(-(abs(away) ** 2))
+                total += share
+                angle += share * cmath.phase(away * cmath.rect(1, base.angle))
+                log_scale += share * (math.log(abs(away) + _BIAS) + base.log_scale)
+        if not total:
+            return Measured(shift, pivot, 0.0, 0.0)
+        return Measured(shift, pivot, angle / total, log_scale / total if self._scaled else 0.0)
+
+
+def _mean(tracks: list[Track], frame: int) -> complex | None:
+    """The weighted mean of the markers at a frame."""
+    found = [(track.weight(frame), track.markers[frame]) for track in tracks if frame in track.markers]
+    total = sum(weight for weight, _ in found)
+    return sum(weight * place for weight, place in found) / total if total > _LEAST_WEIGHT else None
+
+
+class Settings(NamedTuple):
+    """How much is taken back, 0 to 1 each, and where the picture is to lie then."""
+
+    location: float = 1.0
+    rotation: float = 1.0
+    scale: float = 1.0
+    target: complex = 0j
+    target_angle: float = 0.0
+    target_scale: float = 1.0
+
+
+def laid(measured: Measured, settings: Settings) -> Similarity:
+    """How the stabilized picture is laid, y up."""
+    shift = settings.target - settings.location * measured.shift
+    angle = settings.target_angle - settings.rotation * measured.angle
+    scale = (settings.target_scale or 1.0) * math.exp(-settings.scale * measured.log_scale)
+    turn = cmath.rect(scale, angle)
+    return Similarity(turn, shift + measured.pivot - turn * measured.pivot)

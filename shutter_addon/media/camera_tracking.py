@@ -1,0 +1,112 @@
+"""How the camera has moved, by what stands still in front of it: the whole picture but what regions cover.
+
+Every frame is compared with one and the same, the anchor, as long as enough of that is seen; then with the last frame
+before. So a camera that shakes does not drift, and one that pans drifts by one comparison for every picture that it
+has passed: what a window shows at once is right, what it comes back to after a turn is a little elsewhere. No bpy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..core import scribbles
+from ..core.effect import Camera, Region
+from ..core.motions import Similarity
+from . import registration, tracking
+from .registration import Motion, Part
+from .tracking import Footage, Tracked, TrackingError
+
+BARE = "what the regions leave of the picture has too few corners to follow"
+UNLIKE = "the picture is too unlike those before"
+
+_ANEW = 0.6  # below this confidence the last frame is compared as well, and becomes the anchor if that is surer
+_LEAST = 0.12  # below it nothing was found
+_MARGIN = 0.02  # heights of the picture about a region, where corners may be those of its edge
+
+
+def follow_camera(
+    camera: Camera,
+    regions: Sequence[Region],
+    footage: Footage,
+    start: int,
+    frames: range,
+    *,
+    motion: Motion = "scale",
+    anchors: Collection[int] = (),
+) -> Iterator[Tracked]:
+    """Where what the camera sees is at frames of the timeline, as tracking.follow has it of a region.
+
+    camera: its placement is evaluated at `start` and at anchors
+    regions: what they cover is left out; evaluated at any of the frames"""
+    tracking.check_frames(start, frames)
+    return _CameraTrack(camera, regions, footage, motion, {*frames, *anchors}).both_ways(start, frames, anchors)
+
+
+class _CameraTrack(tracking.Track):
+    def __init__(self, camera: Camera, regions: Sequence[Region], *arguments):
+        super().__init__(camera, *arguments)
+        self._regions = regions
+
+    def _part(self, frame: int) -> tuple[Part, float]:
+        width, height = self._footage.size
+        shapes = [replace(region.at(frame), shutter=0) for region in self._regions]
+        covered = scribbles.rasterise(shapes, width, height) > 0
+        free = registration.distances(covered) > _MARGIN * height if covered.any() else ~covered
+        if not free.any():
+            raise TrackingError(BARE)
+        part = Part(self._footage.picture(frame), free.astype(np.float32))
+        if len(part.points) < registration.FEWEST[self._motion]:
+            raise TrackingError(BARE)
+        return part, 1.0
+
+    def _pursuit(self, start: int) -> tuple[int, _Pursuit, float]:
+        return start, _Pursuit(lambda frame: self._part(frame)[0], self._footage, start, self._motion), 1.0
+
+
+class _Pursuit:
+    """The motion of what stands still, from one frame to others after it."""
+
+    reason = UNLIKE
+
+    def __init__(self, part_at: Callable[[int], Part], footage: Footage, frame: int, motion: Motion):
+        """part_at: what of a frame stands still; TrackingError: too little"""
+        self._part_at, self._footage, self._motion = part_at, footage, motion
+        self._anchor = part_at(frame), frame, Similarity()  # with the motion from the first frame to it
+        self._last = frame, Similarity()  # where it was found last
+        self._speed = Similarity()
+
+    def next(self, frame: int) -> tuple[Similarity, float] | None:
+        """The motion from the first frame, and its confidence; None: it is not found."""
+        picture, (before, known) = self._footage.picture(frame), self._last
+        found = self._found(picture, self._anchor)
+        if found[1] < _ANEW and before != self._anchor[1] and (anchor := self._anchor_at(before, known)):
+            anew = self._found(picture, anchor)
+            if anew[1] > found[1]:
+                self._anchor, found = anchor, anew
+        if found[1] < _LEAST:
+            self._speed = Similarity()
+            return None
+        self._speed = found[0].after(known.inverse()) if abs(frame - before) == 1 else Similarity()
+        self._last = frame, found[0]
+        return found
+
+    def _found(self, picture: np.ndarray, anchor: tuple[Part, int, Similarity]) -> tuple[Similarity, float]:
+        """The surer one of two looks: where it would be if it went on, and where it was last."""
+        part, _, motion = anchor
+        known, found = self._last[1], []
+        for guess in (self._speed.after(known), known):
+            match = part.find(picture, guess.after(motion.inverse()), self._motion)
+            sure = tracking.confidence(match, picture)
+            found.append((match.motion.after(motion) if match else known, sure))
+            if sure >= _ANEW:
+                break
+        return max(found, key=lambda each: each[1])
+
+    def _anchor_at(self, frame: int, motion: Similarity) -> tuple[Part, int, Similarity] | None:
+        try:
+            return self._part_at(frame), frame, motion
+        except TrackingError:
+            return None

@@ -1,0 +1,107 @@
+"""Tracking through filmed frames, each of them once and in their order, whichever a strip shows and how often.
+
+Where it shows in-between frames, what is tracked goes straight from filmed frame to filmed frame, as it does in these.
+No bpy.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ..core import motions, scribbles
+from ..core.effect import Camera, Region
+from ..core.motions import Placement
+from .tracking import Tracked
+
+
+class FilmedFrames:
+    """The filmed frames that timeline frames show, by their places among these, from 0 on.
+
+    indices: which ones; frames: all places; start: that of the timeline frame from which is tracked"""
+
+    def __init__(self, times: Mapping[int, float], start: int):
+        """times: by timeline frame, in filmed frames from 0 on; a fraction stands for an in-between frame.
+        start: one of the timeline frames"""
+        self._times, self._begin = times, start
+        nearest: dict[int, tuple] = {}
+        for frame, time in times.items():
+            for index in {math.floor(time), math.ceil(time)}:
+                key = abs(time - index), abs(frame - start), frame
+                nearest[index] = min(key, nearest.get(index, key))
+        index = round(times[start])
+        nearest[index] = (0, 0, start)
+        self.indices = sorted(nearest)
+        self.frames = range(len(self.indices))
+        self._places = {index: place for place, index in enumerate(self.indices)}
+        self._timeline = [nearest[index][-1] for index in self.indices]
+        self.start = self._places[index]
+
+    def index_at(self, place: int) -> int:
+        return self.indices[place]
+
+    def seen(self, subject: Region | Camera) -> _Seen:
+        """A subject as tracking asks for it, at places in place of timeline frames."""
+        return _Seen(subject, self._timeline)
+
+    def on_timeline(self, subject: Region | Camera, tracked: Iterable[Tracked], size) -> Iterator[Tracked]:
+        """What was tracked by places, by timeline frames: the start, those behind it, those before it. A direction that
+        ends early ends with a fault; size: width and height of the picture."""
+        found, faults = {}, {}
+        for each in tracked:
+            if each.fault:
+                faults[each.frame > self.start] = each.fault
+            else:
+                found[each.frame] = each
+        first, centre = subject.placement(self._begin), subject.centre(self._begin)
+        # where the frame is an in-between one, a filmed one beside it was tracked from as if it were that
+        origin = (self._between(subject, self._begin, found) or found[self.start]).placement
+        yield Tracked(self._begin, first, 1.0)
+        for rest in (range(self._begin + 1, max(self._times) + 1), range(self._begin - 1, min(self._times) - 1, -1)):
+            for frame in rest:
+                there = self._between(subject, frame, found)
+                if there is None:
+                    lost = next(place for place in self._beside(frame) if place not in found)
+                    yield Tracked(frame, first, 0.0, faults[lost > self.start])
+                    break
+                after = subject.centre(frame)
+                motion = motions.motion_between(origin, there.placement, centre, after, size)
+                moved = motions.unwound(motions.carried(first, motion, centre, after, size), there.placement)
+                yield replace(there, placement=moved)
+
+    def _beside(self, frame: int) -> tuple[int, int]:
+        """The places of the filmed frames beside what a timeline frame shows; one twice, where it shows that."""
+        time = self._times[frame]
+        return self._places[math.floor(time)], self._places[math.ceil(time)]
+
+    def _between(self, subject, frame: int, found: Mapping[int, Tracked]) -> Tracked | None:
+        """Where it is at a timeline frame, by the filmed frames beside that; None: one of them was not tracked."""
+        beside = [found.get(place) for place in self._beside(frame)]
+        if None in beside:
+            return None
+        placements = [self._placed(subject, each, frame) for each in beside]
+        placement = motions.between(*placements, self._times[frame] % 1)
+        return Tracked(frame, placement, min(each.confidence for each in beside))
+
+    def _placed(self, subject, tracked: Tracked, frame: int) -> Placement:
+        """A placement in another timeline frame's drawing, which may lie elsewhere."""
+        moved = np.add(tracked.placement.location, subject.centre(self._timeline[tracked.frame]))
+        x, y = (float(number) for number in moved - subject.centre(frame))
+        return replace(tracked.placement, location=(x, y))
+
+
+class _Seen:
+    def __init__(self, subject: Region | Camera, frames: list[int]):
+        self._subject, self._frames = subject, frames
+
+    def at(self, place: int) -> scribbles.Shape:
+        return self._subject.at(self._frames[place])
+
+    def placement(self, place: int) -> Placement:
+        return self._subject.placement(self._frames[place])
+
+    def centre(self, place: int) -> np.ndarray | None:
+        return self._subject.centre(self._frames[place])

@@ -1,0 +1,333 @@
+"""The camera's keys: tracked, by the button Tripod, and from the 2D stabilization of a movie clip."""
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+from support import write_frames
+
+from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips, validation
+from shutter_addon.blender.editing import (
+    add_effect,
+    follow_stabilization,
+    motion_keys,
+    region_edits,
+    shutter_edits,
+    track_region,
+)
+from shutter_addon.core import motions
+from shutter_addon.core.motions import Similarity
+from shutter_addon.media import camera_tracking, registration, tracking
+
+SIZE = WIDTH, HEIGHT = 240, 160
+COUNT = 12
+CENTRE = np.array([0.5, 0.5])
+ENDS = np.array([0, WIDTH, HEIGHT * 1j, WIDTH + HEIGHT * 1j])
+RNG = np.random.default_rng(8)
+
+
+def texture(width, height):
+    """Smooth noise, full of corners."""
+    noise = cv2.GaussianBlur(RNG.random((height, width, 3)).astype(np.float32), (0, 0), 2)
+    return (255 * np.clip(noise * 4 - 1.5, 0, 1)).astype(np.uint8)
+
+
+WALL, SUBJECT = texture(400, 300), texture(160, 110)
+
+
+def seen_from(index):
+    """The motion from the wall to what a shaken camera shows of it in a source frame."""
+    turn = (1 + 0.01 * math.sin(index)) * np.exp(1j * np.radians(2 * math.sin(1.3 * index)))
+    return Similarity(complex(turn), complex(120 + 80j - turn * (200 + 6 * math.sin(2 * index) + 150j)))
+
+
+def picture(index):
+    """The wall, and a subject before it that goes its own way."""
+    frame = cv2.warpAffine(WALL, registration.matrix(seen_from(index)), SIZE, flags=cv2.INTER_CUBIC)
+    left = 20 + 3 * index
+    frame[25:135, left : left + 160] = SUBJECT
+    return frame
+
+
+@pytest.fixture(scope="module")
+def frames(tmp_path_factory):
+    return write_frames(tmp_path_factory.mktemp("shaken"), [picture(i) for i in range(COUNT)])
+
+
+@pytest.fixture
+def effect(edit, frames):
+    """On a strip from frame 11 on; at its first frame the active region, a lasso, surrounds the subject."""
+    return new_effect(edit, new_source(edit, frames))
+
+
+def new_source(edit, first):
+    edit.render.resolution_x, edit.render.resolution_y = SIZE
+    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 11)
+    for path in sorted(first.parent.iterdir())[1:]:
+        source.elements.append(path.name)
+    return source
+
+
+def new_effect(edit, source):
+    strip, effect = add_effect.add_effect(edit, source)
+    shutter_edits.start(effect)
+    selection.choose(edit, strip)
+    edit.frame_set(16)
+    region = region_edits.add_region(effect, effect.shutters[1], "LASSO")
+    stroke = annotations.layer_of(effect, region).frames.new(11).strokes.new()
+    stroke.display_mode = "2DSPACE"
+    stroke.points.add(4)
+    corners = ((-102, 57), (62, 57), (62, -57), (-102, -57))
+    stroke.points.foreach_set("co", [value for x, y in corners for value in (x, y, 0.0)])
+    for frame in (11, 11 + COUNT):
+        region.location = 3 * (frame - 11) / WIDTH, 0
+        region.keyframe_insert("location", frame=frame)
+    for curve in fcurves.curves_under(edit, region.path_from_id()):
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+    return effect
+
+
+def active(bpy):
+    return selection.active(bpy.context)
+
+
+def call(bpy, name, **settings):
+    """Calls an operator as a menu does, with its step of undo."""
+    return getattr(bpy.ops.shutter, name)("EXEC_DEFAULT", True, **settings)
+
+
+def keys(bpy, channel="location"):
+    """By F-curve of a channel of the camera: (frame, value, type) of its keys."""
+    edit, effect, _strip = active(bpy)
+    path = f"{effect.camera.path_from_id()}.{channel}"
+    return [[(*key.co, key.type) for key in curve.keyframe_points] for curve in fcurves.curves_under(edit, path)]
+
+
+def everything(bpy):
+    """All that tracking the camera changes."""
+    _edit, effect, _strip = active(bpy)
+    camera = effect.camera
+    stops = [(stop.frame, stop.forward, stop.fault) for stop in camera.stops]
+    shutters = [(shutter.follow, tuple(consistency.bars(shutter))) for shutter in effect.shutters]
+    numbers = tuple(camera.location), camera.rotation, camera.scale, camera.confidence
+    channels = [keys(bpy, channel) for channel in ("location", "rotation", "scale", "confidence")]
+    return numbers, stops, channels, shutters, effect.position, effect.active_shutter
+
+
+def placements(bpy):
+    """By timeline frame, of all that the strip has."""
+    edit, effect, strip = active(bpy)
+    shown = range(strip.left_handle, strip.right_handle)
+    camera = snapshot.camera_at(edit, effect, shown)
+    return {frame: camera.placement(frame) for frame in shown}
+
+
+def apart(found, expected, start):
+    """Pixels by which a corner of the picture is off at most, at frames after another one; expected: by frame the
+    motion from what stands still to what the strip shows."""
+    moved = {frame: motions.motion_between(found[start], found[frame], CENTRE, CENTRE, SIZE) for frame in expected}
+    true = {frame: expected[frame].after(expected[start].inverse()) for frame in expected}
+    return max(np.abs(moved[frame](ENDS) - true[frame](ENDS)).max() for frame in expected)
+
+
+TRUTH = {11 + index: seen_from(index) for index in range(COUNT)}
+
+
+def test_the_camera_is_tracked_behind_what_regions_cover(bpy, effect):
+    edit, effect, strip = active(bpy)
+    assert set(track_region.track(edit, effect, strip, None, range(11, 23), "SCALE")) == TRUTH.keys() - {16}
+    assert apart(placements(bpy), TRUTH, 16) < 0.6
+    kinds = {frame: kind for frame, _value, kind in keys(bpy)[0]}
+    assert kinds.pop(16) == "KEYFRAME"
+    assert set(kinds.values()) == {"GENERATED"}
+    assert len(keys(bpy, "confidence")[0]) == COUNT
+    assert keys(bpy)[0][0][0] == 11
+
+
+def test_without_the_region_it_goes_with_the_subject(bpy, effect):
+    region_edits.remove_region(effect, 0)
+    edit, effect, strip = active(bpy)
+    list(track_region.track(edit, effect, strip, None, range(11, 23), "SCALE"))
+    assert apart(placements(bpy), TRUTH, 16) > 5
+
+
+def test_closed_early_it_keeps_what_it_has(bpy, effect):
+    edit, effect, strip = active(bpy)
+    steps = track_region.track(edit, effect, strip, None, range(16, 23), "SCALE", all_keys=True)
+    assert [next(steps), next(steps)] == [17, 18]
+    steps.close()
+    assert [frame for frame, *_ in keys(bpy)[0]] == [16, 17, 18]
+
+
+@pytest.mark.parametrize("name", ["track_camera", "tripod"])
+def test_the_buttons_are_one_step_of_undo(bpy, effect, name):
+    effect.camera.track_until = 18
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="before")
+    before = everything(bpy)
+    assert call(bpy, name) == {"FINISHED"}
+    after = everything(bpy)
+    assert (after[2] != before[2], after[3:] != before[3:]) == (True, name == "tripod")
+    bpy.ops.ed.undo()
+    assert everything(bpy) == before
+    bpy.ops.ed.redo()
+    assert everything(bpy) == after
+
+
+@pytest.mark.parametrize("has_region", [True, False])
+def test_a_tripod_is_for_the_shutter_that_is_seen(bpy, effect, has_region):
+    if not has_region:
+        region_edits.remove_region(effect, 0)
+    effect.camera.track_until = 18
+    assert call(bpy, "tripod") == {"FINISHED"}
+    effect = active(bpy)[1]
+    index = int(has_region)
+    assert [shutter.follow == "CAMERA" for shutter in effect.shutters] == [index == 0, index == 1]
+    assert (effect.active_shutter, effect.position) == (index, "CENTER")
+    assert consistency.bars(effect.shutters[index]) == pytest.approx(np.ones(effect.window))
+
+
+def refuses(bpy, name, sentence):
+    before = everything(bpy)
+    with pytest.raises(RuntimeError, match=sentence):
+        call(bpy, name)
+    assert everything(bpy) == before
+
+
+@pytest.mark.parametrize("name", ["track_camera", "tripod"])
+def test_what_cannot_be_tracked_is_said_and_changes_nothing(bpy, edit, effect, tmp_path, name):
+    motion_keys.insert(effect, None)
+    (curve,) = fcurves.curves_under(edit, f"{effect.camera.path_from_id()}.rotation")
+    curve.lock = True
+    refuses(bpy, name, 'camera of effect "Shutter": the F-curve of "Rotation" is locked')
+    curve.lock = False
+    edit.frame_set(5)
+    refuses(bpy, name, "the current frame is outside of the Shutter strip")
+    edit.frame_set(16)
+    strips.source_of(*active(bpy)).directory = "/nowhere/"
+    refuses(bpy, name, "no such file")
+
+
+@pytest.mark.parametrize(("count", "sentence"), [(3, camera_tracking.BARE), (1, tracking.ALONE)])
+def test_a_flat_wall_and_a_single_frame(bpy, edit, tmp_path, count, sentence):
+    new_effect(edit, new_source(edit, write_frames(tmp_path / "wall", np.full((count, *SIZE[::-1], 3), 90, np.uint8))))
+    edit.frame_set(11)
+    refuses(bpy, "track_camera", sentence)
+
+
+def test_it_stops_at_a_cut(bpy, edit, tmp_path):
+    dark = texture(WIDTH, HEIGHT) // 4
+    shots = [*(picture(i) for i in range(8)), *(np.roll(dark, i, axis=1) for i in range(8))]
+    effect = new_effect(edit, new_source(edit, write_frames(tmp_path / "cut", shots)))
+    assert call(bpy, "track_camera") == {"FINISHED"}
+    assert keys(bpy)[0][-1][0] == 18
+    assert track_region.stops(effect, None) == [(19, "the shot ends here", False)]
+
+
+def test_a_button_goes_to_the_frames_that_need_a_look(bpy, edit, effect):
+    track = motion_keys.MotionKeys(effect, None, "SCALE")
+    track.write({11: motions.Placement(), 15: motions.Placement()}, {11: 1.0, 12: 0.4, 13: 0.2, 14: 0.9, 15: 1.0})
+    edit.frame_set(11)
+    call(bpy, "track_camera_look")
+    assert edit.frame_current == 13
+
+
+def test_a_copy_of_the_effect_has_the_cameras_keys_and_stops(bpy, edit, effect):
+    from shutter_addon.blender.data.property_copy import copy_properties
+
+    effect.camera.location, effect.camera.track_all_keys = (0.25, 0), True
+    effect.camera.stops.add().frame = 7
+    new = edit.virtual_shutter.effects.add()
+    copy_properties(edit.virtual_shutter.effects[0], new)
+    assert (new.camera.location[0], new.camera.track_all_keys, new.camera.stops[0].frame) == (0.25, True, 7)
+
+
+# From a movie clip
+
+
+TRACKS = {  # weight, frames of the clip, place, and how far it strays
+    "a": (1.0, range(1, COUNT + 1), (0.2, 0.3), 0.0),
+    "b": (0.5, range(1, 7), (0.8, 0.4), 0.01),
+    "c": (0.8, range(3, COUNT + 1), (0.4, 0.8), 0.0),
+    "d": (0.3, (1, 2, 3, 7, 8), (0.7, 0.7), 0.005),
+}
+
+
+@pytest.fixture
+def clip(bpy, frames):
+    """A clip of the same footage with four tracks that stabilize it, of which three begin late, end early, or stray."""
+    clip = bpy.data.movieclips.load(str(frames))
+    holder, settings = clip.tracking.objects[0], clip.tracking.stabilization
+    for name, (weight, marked, (x, y), stray) in TRACKS.items():
+        track = holder.tracks.new(name=name, frame=marked[0])
+        track.weight_stab, track.select = weight, True
+        for frame in marked:
+            turn = (1 + 0.02 * frame) * np.exp(1j * (0.06 * math.sin(frame) + 0.02 * frame))
+            place = complex((x - 0.5) * WIDTH / HEIGHT, y - 0.5) * turn + complex(
+                0.05 * math.sin(2 * frame), 0.03 * math.cos(frame)
+            )
+            at = place.real * HEIGHT / WIDTH + 0.5 + stray * math.sin(3 * frame), place.imag + 0.5
+            track.markers.insert_frame(frame, co=at)
+    settings.use_2d_stabilization = settings.use_stabilize_rotation = settings.use_stabilize_scale = True
+    window = bpy.context.window_manager.windows[0]
+    area = window.screen.areas[0]
+    kind, area.type = area.type, "CLIP_EDITOR"
+    area.spaces.active.clip = clip
+    with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
+        bpy.ops.clip.stabilize_2d_add()
+        bpy.ops.clip.stabilize_2d_rotation_add()
+    area.type = kind
+    return clip
+
+
+@pytest.mark.parametrize("kind", ["plain", "partly", "scaled", "shifted"])
+def test_it_lays_the_picture_as_blender_does(bpy, edit, render, clip, kind):
+    """Blender's own stabilized strip beside a warp of its frames, and the anchor's where there are no markers."""
+    settings = clip.tracking.stabilization
+    if kind == "partly":
+        settings.anchor_frame = 4
+        settings.influence_location, settings.influence_rotation, settings.influence_scale = 0.7, 0.5, 0.3
+        settings.target_position, settings.target_rotation = (0.05, -0.02), 0.1
+    settings.use_autoscale = kind == "scaled"
+    settings.use_stabilize_rotation = kind != "shifted"
+    edit.render.resolution_x, edit.render.resolution_y = SIZE
+    strip = edit.sequence_editor.strips.new_clip("clip", clip, 1, 1)
+    strip.stabilize2d = True
+    shown = render(edit, [2, 5, 8, COUNT], "8")
+    for frame, picture_there in shown.items():
+        laid = follow_stabilization._shifted(clip, SIZE)(frame).inverse()
+        expected = cv2.warpAffine(picture(frame - 1), registration.matrix(laid), SIZE).astype(float)
+        inside = cv2.warpAffine(np.ones((HEIGHT, WIDTH), np.uint8), registration.matrix(laid), SIZE)
+        inside = cv2.erode(inside, np.ones((5, 5), np.uint8), borderValue=0) > 0
+        off = np.abs(picture_there[..., :3] - expected)[inside]
+        assert inside.mean() > 0.3
+        assert off.mean() < 4, "of the two filters"
+        still = np.abs(picture_there[..., :3] - picture(frame - 1).astype(float))[inside]
+        assert still.mean() > 15, "it is not left as it was"
+
+
+def test_the_camera_follows_a_clips_stabilization(bpy, edit, effect, clip):
+    effect.camera.follow_clip = clip
+    before = everything(bpy)
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="before")
+    assert call(bpy, "follow_stabilization") == {"FINISHED"}
+    laid = follow_stabilization._shifted(bpy.data.movieclips[0], SIZE)
+    assert apart(placements(bpy), {frame: laid(frame - 10) for frame in TRUTH}, 16) < 0.3
+    assert {kind for *_, kind in keys(bpy)[0]} == {"GENERATED", "KEYFRAME"}
+    bpy.ops.ed.undo()
+    assert everything(bpy) == before
+
+
+def test_a_clip_that_is_not_stabilized_is_refused(bpy, edit, effect, clip):
+    effect.camera.follow_clip = clip
+    clip.tracking.stabilization.use_2d_stabilization = False
+    refuses(bpy, "follow_stabilization", "has no 2D stabilization")
+    clip.tracking.stabilization.use_2d_stabilization = True
+    edit.frame_set(40)
+    refuses(bpy, "follow_stabilization", "the current frame is outside of the Shutter strip")
+    effect.camera.follow_clip = None
+    with pytest.raises(validation.EffectError, match="Choose a clip first"):
+        follow_stabilization.follow(*active(bpy))

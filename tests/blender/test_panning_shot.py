@@ -1,0 +1,136 @@
+"""The button Panning Shot: tracks what was not tracked, and has the whole picture's exposure follow it."""
+
+import numpy as np
+import pytest
+from support import request, write_frames
+from test_region_tracking import COUNT, SIZE, active, call, centre, drawn, keys, move, new_source, picture
+
+from shutter_addon.blender.data import annotations
+from shutter_addon.blender.editing import region_edits, shutter_edits
+from shutter_addon.blender.rendering import session
+from shutter_addon.core import light
+
+FRAME = 20  # on the timeline, of the source's frame 9
+
+
+@pytest.fixture(scope="module")
+def frames(tmp_path_factory):
+    return write_frames(tmp_path_factory.mktemp("passing"), [picture(i) for i in range(COUNT)])
+
+
+@pytest.fixture
+def region(bpy, edit, frames):
+    yield drawn(edit, new_source(edit, frames))
+    session.forget()
+
+
+def everything(bpy):
+    """All that the button changes."""
+    effect = active(bpy)[1]
+    shutters = [(s.name, s.follow, s.follow_region, [bar.weight for bar in s.bars]) for s in effect.shutters]
+    names = [(region.name, region.shutter) for region in effect.regions]
+    return shutters, names, effect.position, [keys(bpy, channel) for channel in ("location", "rotation", "confidence")]
+
+
+def refuses(bpy, sentence):
+    before = everything(bpy)
+    with pytest.raises(RuntimeError, match=sentence):
+        call(bpy, "panning_shot")
+    assert everything(bpy) == before
+
+
+def levels_off(bpy, frame):
+    """How far the subject, and what is behind it, is at most from the shown frame, in 8-bit levels."""
+    found = request(*active(bpy), frame)
+    off = np.abs(255 * light.to_encoded(found.picture()[..., :3].astype(float)) - picture(found.index)).max(axis=2)
+    x, y = centre(found.index).round().astype(int)
+    return off[y - 8 : y + 9, x - 8 : x + 9].max(), off[-25:, 60:-60].max()
+
+
+def test_one_click_tracks_and_follows_and_one_undo_takes_it_back(bpy, region):
+    bpy.ops.ed.undo_push(message="before")
+    before = everything(bpy)
+    assert call(bpy, "panning_shot") == {"FINISHED"}
+    shutters, names, position, _curves = after = everything(bpy)
+    assert shutters[0] == ("Sharp", "REGION", "Sharp", [1.0] * 8), "the region's shutter is the default"
+    assert shutters[1][:2] == ("Long", "NOTHING")
+    assert (names, position) == ([("Sharp", "Sharp")], "CENTER")
+    assert len(keys(bpy, "confidence")[0]) == COUNT, "all of the strip is tracked"
+    bpy.ops.ed.undo()
+    assert everything(bpy) == before
+    bpy.ops.ed.redo()
+    assert everything(bpy) == after
+
+
+def test_the_subject_is_sharp_and_all_behind_it_streaks(bpy, region):
+    call(bpy, "panning_shot")
+    bpy.context.scene.frame_set(FRAME)
+    subject, behind = levels_off(bpy, FRAME)
+    assert subject < 12
+    assert behind > 60
+    active(bpy)[1].shutters[0].follow = "NOTHING"
+    subject, behind = levels_off(bpy, FRAME)
+    assert subject > 60
+    assert behind <= 1
+
+
+def test_keys_of_motion_are_kept(bpy, region):
+    for frame, index in ((11, 0), (30, 19)):
+        move(bpy, frame, index)
+    before = keys(bpy)
+    call(bpy, "panning_shot")
+    assert keys(bpy) == before
+    assert not keys(bpy, "confidence"), "nothing was tracked"
+    assert active(bpy)[1].shutters[0].follow_region == "Sharp"
+
+
+def test_a_single_key_is_no_motion(bpy, region):
+    move(bpy, 11, 0)
+    call(bpy, "panning_shot")
+    assert len(keys(bpy, "confidence")[0]) == COUNT
+
+
+def test_with_auto_keying_the_bars_are_keyed(bpy, edit, region):
+    for frame, index in ((11, 0), (30, 19)):
+        move(bpy, frame, index)
+    edit.tool_settings.use_keyframe_insert_auto = True
+    call(bpy, "panning_shot")
+    edit.tool_settings.use_keyframe_insert_auto = False
+    weights = edit.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
+    assert sum(curve.data_path.startswith("virtual_shutter.effects[0].shutters[0].bars") for curve in weights) == 8
+
+
+def test_other_shutters_keep_their_regions_and_a_name_is_one_regions(bpy, region):
+    """Two regions of one name cannot be told apart by a shutter that follows one."""
+    effect = active(bpy)[1]
+    region_edits.add_region(effect, shutter_edits.add_shutter(effect, "Other"), name="Other")
+    effect.regions[1].name = "Sharp"
+    effect.active_shutter, effect.active_region = 1, 0
+    for frame, index in ((11, 0), (30, 19)):
+        move(bpy, frame, index)
+    call(bpy, "panning_shot")
+    assert [shutter.name for shutter in effect.shutters] == ["Sharp", "Long", "Other"]
+    assert [(other.name, other.shutter) for other in effect.regions] == [("Sharp.001", "Sharp"), ("Sharp", "Other")]
+    assert effect.shutters[0].follow_region == "Sharp.001"
+    assert (effect.active_shutter, effect.active_region) == (0, 0)
+
+
+def test_what_cannot_be_followed_is_said(bpy, edit, region):
+    effect = active(bpy)[1]
+    edit.frame_set(5)
+    refuses(bpy, "the current frame is outside of the Shutter strip")
+    edit.frame_set(11)
+    layer = annotations.layer_of(effect, region)
+    layer.frames.remove(layer.frames[0])
+    refuses(bpy, "the region has no strokes to follow")
+    for frame, index in ((11, 0), (30, 19)):
+        move(bpy, frame, index)
+    refuses(bpy, "the region has no strokes to follow")
+    region_edits.remove_region(effect, 0)
+    refuses(bpy, "The shutter has no region: draw one")
+
+
+def test_a_flat_wall_cannot_be_followed(bpy, edit, tmp_path):
+    wall = write_frames(tmp_path / "wall", np.full((4, *SIZE[::-1], 3), 90, np.uint8))
+    drawn(edit, new_source(edit, wall))
+    refuses(bpy, "there are too few corners to follow")

@@ -1,0 +1,190 @@
+"""Exposures that are open while what they follow moves by a set length."""
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from shutter_addon.core import compositor, following, recipe, shutters, trails
+
+WINDOW = 24
+SOURCE = SimpleNamespace(count=60, width=160, height=100)
+
+
+def brute(bars, way, length, shown):
+    """The bars by growing the span bit by bit, and by sampling the accumulation."""
+    first, last = shutters.open_span(bars)
+    window, shown = len(bars), min(max(shown, first), last)
+    widths = np.linspace(1e-3, window, 20_001)
+    starts = np.clip(shown - (shown - first) / (last - first) * widths, 0, window - widths)
+    moved = np.interp(starts + widths, range(window + 1), way) - np.interp(starts, range(window + 1), way)
+    width = np.interp(length, moved, widths)
+    start = np.interp(length, moved, starts)
+    times = start + width * (np.arange(100_000) + 0.5) / 100_000
+    own = bars[(first + (times - start) * (last - first) / width).astype(int)]
+    return np.bincount(times.astype(int), own, window) * bars.sum() / own.sum()
+
+
+weights = arrays(np.float64, st.integers(1, 12), elements=st.floats(0, 1)).map(lambda bars: bars * (bars > 0.2))
+
+
+@settings(max_examples=60, deadline=None)
+@given(weights.filter(np.any), st.floats(0, 1), st.integers(0, 2**32))
+def test_any_bars(bars, length, seed):
+    rng = np.random.default_rng(seed)
+    way = np.cumsum([0, *rng.uniform(0.01, 0.2, len(bars))])
+    shown = rng.integers(len(bars)) + 0.5
+    found = trails.with_length(bars, way, length, shown)
+    assert (found >= 0).all()
+    assert found.sum() == pytest.approx(bars.sum())
+    assert found == pytest.approx(brute(bars, way, length, shown), abs=2e-3 * bars.sum())
+
+
+def open_frames(bars):
+    """The length of a box."""
+    return bars.sum() / bars.max()
+
+
+def test_half_the_length_is_half_the_span():
+    box, way = np.ones(WINDOW), np.linspace(0, 1, WINDOW + 1)
+    spans = [open_frames(trails.with_length(box, way, length, 11.5)) for length in (0.1, 0.2, 0.4, 0.8)]
+    assert spans == pytest.approx([0.1 * WINDOW, 0.2 * WINDOW, 0.4 * WINDOW, 0.8 * WINDOW])
+
+
+def test_the_shape_stays():
+    """A shutter that is twice as long in half the frames."""
+    bars = np.repeat([1.0, 0, 2, 3], 4)
+    found = trails.with_length(bars, np.linspace(0, 1, 17), 0.5, 0)
+    assert found == pytest.approx(np.repeat([2.0, 0, 4, 6, 0, 0, 0, 0], 2))
+
+
+def test_limits():
+    box, way = np.ones(WINDOW), np.linspace(0, 1, WINDOW + 1)
+    still = np.zeros(WINDOW + 1)
+    quarter = np.r_[np.ones(6), np.zeros(18)]
+    assert trails.with_length(box, way, 2, 11.5) == pytest.approx(box)  # there are no more frames
+    assert trails.with_length(box, still, 0.1, 11.5) == pytest.approx(box)
+    assert trails.with_length(quarter, still, 0.1, 0.5) == pytest.approx(np.full(WINDOW, 0.25))
+    assert trails.with_length(box, way, 0, 11.5) == pytest.approx(WINDOW * np.eye(WINDOW)[11])  # the shown frame
+    assert trails.with_length(box, still, 0, 11.5) == pytest.approx(WINDOW * np.eye(WINDOW)[11])
+    late_mover = np.r_[np.zeros(20), np.arange(5) / 4]
+    assert trails.with_length(box, late_mover, 0, 0.5) == pytest.approx(WINDOW * np.eye(WINDOW)[0])
+    assert trails.with_length(box, way, 1e-9, 11.5) == pytest.approx(WINDOW * np.eye(WINDOW)[11])
+    late = np.r_[np.zeros(20), np.ones(4)]
+    assert trails.with_length(late, way, 0, 0.5) == pytest.approx(4 * np.eye(WINDOW)[20])  # the nearest open one
+    assert trails.with_length(np.ones(1), np.zeros(2), 0.3, 0.5).tolist() == [1]
+
+
+def test_what_rounding_leaves_does_not_open_a_bar():
+    bars, way = np.r_[np.ones(4), np.zeros(4)], np.linspace(0, 1, 9)
+    noisy = bars + np.r_[np.zeros(4), 1e-15, np.zeros(3)]
+    assert trails.with_length(noisy, way, 0.25, 0.5) == pytest.approx(trails.with_length(bars, way, 0.25, 0.5))
+
+
+def test_no_jumps():
+    """A span grows past frames little by little."""
+    box, way = np.ones(WINDOW), np.cumsum([0, *np.linspace(0.01, 0.1, WINDOW)])
+    found = np.array([trails.with_length(box, way, length, 0.5) / WINDOW for length in np.linspace(0.05, 1.3, 2000)])
+    assert np.abs(np.diff(found, axis=0)).max() < 0.02
+
+
+def test_the_fastest_of_the_points_counts():
+    centre, turn = 5 + 5j, np.exp(0.1j * np.arange(5))
+    places = centre + turn[:, None] * (np.array([0, 1, 3 + 4j]))
+    chord = 5 * abs(np.exp(0.1j) - 1)
+    assert trails.travelled(places) == pytest.approx(chord * np.arange(6))
+    assert trails.travelled(places[:1]).tolist() == [0, 0]
+
+
+# Of a subject that grows faster and faster, by its keys; a border that stands still behind it streaks.
+
+SPEEDS = np.linspace(0.5, 4, SOURCE.count)  # pixels a frame
+WAY = np.cumsum(SPEEDS) - SPEEDS[0]
+
+
+def accelerating(trail, position="center", bars=(1.0,) * WINDOW, edges="hold", follow="car"):
+    places = [(x / SOURCE.width, 0.0) for x in WAY]
+    keys = [recipe.RegionKey(frame, place) for frame, place in enumerate(places, 1)]
+    region = recipe.Region("S", "car", strokes=[[(0.1, 0.4), (0.2, 0.6)]], keys=keys)
+    camera = [recipe.CameraKey(key.frame, key.location) for key in keys]
+    shutter = recipe.Shutter("S", bars=list(bars), follow=follow, trail=trail)
+    return recipe.Recipe(1, len(bars), [shutter], [region], position=position, edges=edges, camera=camera)
+
+
+def followed(source, frame, direction=1):
+    effect = source.effect(SOURCE.width / SOURCE.height)
+    index = frame - 1 if direction > 0 else SOURCE.count - frame
+    shown = lambda other: index + direction * round(other - frame)  # noqa: E731
+    return following.followed(effect, effect.at(frame), frame, index, direction, SOURCE, shown), index
+
+
+def streak(source, frame):
+    """How wide a border is in the picture that lies still in the footage: of an even ramp, 6 ∫ F (1 − F) dx."""
+    state, index = followed(source, frame)
+    still = np.broadcast_to((np.arange(400) > 200)[None, :, None], (1, 400, 4)).astype(float)
+    still[..., 3] = 1
+    frames = compositor.window_indices(state.options, index, range(SOURCE.count))
+    moves = state.following.at(frames)
+    picture = compositor.compose(state, [still] * len(frames), frames >= 0, np.ones((1, 1, 400)), moves)
+    grey = picture[0, :, 0]
+    return 6 * (grey * (1 - grey)).sum()
+
+
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+def test_the_streak_stays_as_long_while_the_subject_speeds_up(position):
+    frames = [25, 29, 33, 36]
+    lengths = [streak(accelerating(0.2, position), frame) for frame in frames]
+    assert lengths == pytest.approx([20] * 4, rel=0.05)
+    grown = [streak(accelerating(None, position), frame) for frame in frames]
+    assert grown[-1] > 1.2 * grown[0]
+
+
+@pytest.mark.parametrize(("follow", "edges"), [("car", "hold"), ("camera", "shorten")])
+def test_beyond_the_clips_ends_all_stands_still(follow, edges):
+    """At the clip's last frame the exposure has the frames before alone, as many more of them."""
+    state, _ = followed(accelerating(0.1, follow=follow, edges=edges), SOURCE.count)
+    before = np.arange(WINDOW) - state.options.before <= 0
+    span = state.bars[0] / state.bars[0].max()
+    assert (span[before].sum() - 0.5) * SPEEDS[-3] == pytest.approx(10, rel=0.05)
+
+
+def test_keys_of_the_length():
+    keyed = accelerating([recipe.ValueKey(20, 0.1), recipe.ValueKey(40, 0.3)])
+    for frame, length in ((20, 0.1), (30, 0.2), (40, 0.3)):
+        assert np.array_equal(followed(keyed, frame)[0].bars, followed(accelerating(length), frame)[0].bars)
+
+
+def test_a_reversed_source():
+    """The same moments are exposed, whichever way they run."""
+    bars = (1.0,) * 23  # as many before the shown frame as after it
+    forward, index = followed(accelerating(0.2, bars=bars), 30)
+    keys = [recipe.CameraKey(frame, (x / SOURCE.width, 0)) for frame, x in enumerate(WAY[::-1], 1)]
+    shutter = recipe.Shutter("S", bars=list(bars), follow="camera", trail=0.2)
+    backward, same = followed(recipe.Recipe(1, 23, [shutter], position="center", camera=keys), 31, direction=-1)
+    assert same == index
+    assert backward.bars[0] == pytest.approx(forward.bars[0, ::-1])
+
+
+def test_in_between_frames_count_as_the_parts_of_one():
+    plain, _ = followed(accelerating(0.2), 40)
+    source = replace(accelerating(0.2, bars=(1.0,) * 4 * WINDOW), inbetween=4)
+    effect, fine = source.effect(1.6), SimpleNamespace(count=4 * SOURCE.count, width=160, height=100)
+    state = following.followed(effect, effect.at(40), 40, 156, 1, fine, lambda other: 4 * round(other - 1))
+    assert open_frames(state.bars[0]) == pytest.approx(4 * open_frames(plain.bars[0]), rel=0.03)
+
+
+def test_frames_change_no_bit():
+    state, _ = followed(accelerating(None), 30)
+    assert np.array_equal(state.bars, accelerating(None).effect(1.6).at(30).bars)
+
+
+def test_a_recipe_of_it_comes_back():
+    for trail in (0.25, [recipe.ValueKey(1, 0.1), recipe.ValueKey(9, 0.3, "bezier")]):
+        source = accelerating(trail)
+        assert recipe.parse(recipe.dump(source)) == source
+    assert json.loads(recipe.dump(accelerating(None)))["shutters"][0].get("trail") is None

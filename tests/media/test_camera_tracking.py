@@ -1,0 +1,169 @@
+"""Tracking the camera against films in which it is known: a picture seen through a camera that shakes, turns and pans,
+and a subject in front of it that has a motion of its own."""
+
+from functools import cache
+
+import cv2
+import numpy as np
+import pytest
+from test_tracking import ASSETS, HEIGHT, MIDDLE, PIXEL, SIZE, WIDTH, Film, ellipse, still, warped
+
+from shutter_addon.core import motions
+from shutter_addon.core.effect import STILL_CAMERA, Camera, Drawings, Region
+from shutter_addon.core.keyframes import Constant, Keys
+from shutter_addon.core.motions import Placement, Similarity
+from shutter_addon.media import camera_tracking, open_source, tracking
+from shutter_addon.media.cuts import ShotSource
+
+ENDS = np.array([0, WIDTH - 1, 1j * (HEIGHT - 1), WIDTH - 1 + 1j * (HEIGHT - 1)])
+CENTRE = np.array([0.5, 0.5])
+RADII = 185, 120  # of the subject, which covers more than half of the picture
+VELOCITY = 4  # of the subject across the picture, in pixels
+
+
+@cache
+def scenery():
+    """A wide picture: a film's frame and its mirror image, 960 pixels."""
+    with open_source(ASSETS / "bigbuckbunny.mp4") as source:
+        picture = source.read(60)[..., :3]
+    half = cv2.resize(picture, SIZE, interpolation=cv2.INTER_AREA)
+    return np.concatenate([half, half[:, ::-1]], axis=1)
+
+
+def seen_from(frame, pan):
+    """The motion from the scenery to what a shaken camera sees of it."""
+    turn = (1 + 0.02 * np.sin(frame / 5)) * np.exp(1j * np.radians(2 * np.sin(1.3 * frame)))
+    middle = complex(WIDTH, HEIGHT) / 2
+    place = 270 + pan * frame + 10 * np.sin(2.1 * frame) + 1j * (HEIGHT / 2 + 6 * np.cos(1.7 * frame))
+    return Similarity(complex(turn), complex(middle - turn * place))
+
+
+def film(count, pan=0.0, subject=None):
+    """Its frames, and the true motion of the scenery since the first one."""
+    frames = []
+    for n in range(count):
+        frame = warped(scenery(), seen_from(n, pan)).astype(np.float32)
+        if subject is not None:
+            aside = Similarity(1, complex(VELOCITY * (n - count / 2), 0))
+            over = warped(ellipse(MIDDLE, RADII), aside, cv2.BORDER_CONSTANT)[..., None]
+            frame += over * (warped(subject, aside) - frame)
+        frame += np.random.default_rng(n).normal(0, 2, frame.shape)
+        frames.append(np.clip(np.rint(frame), 0, 255).astype(np.uint8))
+    return Film(frames), [seen_from(n, pan).after(seen_from(0, pan).inverse()) for n in range(count)]
+
+
+def lasso(count):
+    """A region around the subject."""
+    turns = np.linspace(0, 6.1, 24)
+    points = MIDDLE + RADII[0] * np.cos(turns) + 1j * RADII[1] * np.sin(turns)
+    shape = np.stack([points.real / WIDTH, 1 - points.imag / HEIGHT], axis=1)
+    way = [(VELOCITY * (n - count / 2) / WIDTH, 0.0) for n in (0, count)]
+    drawings = Drawings((0.0,), ([shape],), ("linear",), WIDTH / HEIGHT)
+    location = Keys((0, count), tuple(way), ("linear", "linear"))
+    return Region("subject", 0, Constant("lasso"), Constant(0.0), drawings, location, Constant(0.0), Constant(1.0))
+
+
+def tracked(source, regions=(), start=0, camera=STILL_CAMERA, **options):
+    """The placements by frame, and the faults by frame."""
+    footage = tracking.Footage(source, lambda frame: frame)
+    found = list(camera_tracking.follow_camera(camera, regions, footage, start, range(source.count), **options))
+    return {f.frame: f for f in found if not f.fault}, {f.frame: f.fault for f in found if f.fault}
+
+
+def error(found, truth, first, second):
+    """By how many pixels of 640 a corner of the picture is off, from one frame to another."""
+    placements = (found[frame].placement for frame in (first, second))
+    motion = motions.motion_between(*placements, CENTRE, CENTRE, SIZE)
+    return np.abs(motion(ENDS) - truth[second].after(truth[first].inverse())(ENDS)).max() / PIXEL
+
+
+def test_a_shaken_camera_is_found_behind_a_subject_that_covers_most_of_it():
+    source, truth = film(16, subject=still("walkers.mp4", 10))
+    found, faults = tracked(source, [lasso(16)], start=6)
+    assert (faults, found.keys()) == ({}, set(range(16)))
+    assert max(error(found, truth, 6, frame) for frame in found) < 1
+    assert min(each.confidence for each in found.values()) > tracking.SURE
+    mistaken, _ = tracked(source, start=6)
+    assert max(error(mistaken, truth, 6, frame) for frame in mistaken) > 10
+
+
+def test_a_shaken_camera_does_not_drift():
+    source, truth = film(40)
+    found, _ = tracked(source)
+    assert max(error(found, truth, 0, frame) for frame in found) < 0.15
+
+
+def test_a_camera_that_pans_is_found_from_later_frames():
+    """It leaves all that the first frame has; from each frame to the tenth behind it, it is right."""
+    source, truth = film(44, pan=14)
+    found, faults = tracked(source)
+    assert (faults, len(found)) == ({}, 44)
+    assert abs(truth[-1].shift) > WIDTH
+    assert max(error(found, truth, frame, frame + 10) for frame in range(34)) < 0.4
+
+
+@pytest.mark.parametrize(("motion", "turned", "scaled"), [("location", 0, 0), ("rotation", 1, 0), ("scale", 1, 1)])
+def test_only_what_is_asked_for_changes(motion, turned, scaled):
+    found, _ = tracked(film(6)[0], motion=motion)
+    placements = [each.placement for each in found.values()]
+    assert (np.ptp([p.rotation for p in placements]) > 0.5) == turned
+    assert (np.ptp([p.scale for p in placements]) > 0.005) == scaled
+    assert np.ptp([p.location[0] for p in placements]) > 0.01
+
+
+def test_frames_that_show_nothing_of_it_are_bridged_and_many_end_it():
+    source, truth = film(12)
+    for n in (4, 5):
+        source.frames[n][:] = 255
+    found, faults = tracked(source)
+    assert faults == {}
+    assert [n for n, each in found.items() if each.confidence == 0] == [4, 5]
+    assert max(error(found, truth, 0, n) for n in (3, 6, 11)) < 0.3
+    black = [np.zeros_like(source.frames[0])] * 30
+    found, faults = tracked(Film([*film(4)[0].frames, *black]))
+    assert (max(found), faults) == (3, {4: camera_tracking.UNLIKE})
+
+
+def test_no_motion_crosses_a_cut():
+    shots = [film(8)[0].frames, Film([still("walkers.mp4", n) for n in range(10, 18)]).frames]
+    found, faults = tracked(ShotSource(Film([*shots[0], *shots[1]])), start=10)
+    assert (set(found), faults) == (set(range(8, 16)), {7: tracking.SHOT_ENDS})
+
+
+def test_it_goes_on_from_where_it_is_and_meets_a_key_that_is_right():
+    """Between the start and the other key both count."""
+    truth = film(11)[1]
+    start, key = Placement((0.1, -0.2), 30.0, 2.0), Placement((0.1, 0.1), 30.0, 2.0)
+    keys = [Keys((2, 10), ends, ("linear",) * 2) for ends in zip(*map(numbers, (start, key)), strict=True)]
+    found, _ = tracked(film(11)[0], start=2, camera=Camera(*keys), anchors=[10])
+    assert (found[2].placement, found[10].placement) == (start, key)
+    assert error(found, truth, 2, 3) > 5, "which has to come to the key"
+    free, _ = tracked(film(11)[0], start=2, camera=Camera(*keys))
+    assert max(error(free, truth, 2, n) for n in free) < 0.15
+
+
+def numbers(placement):
+    return placement.location, placement.rotation, placement.scale
+
+
+FLAT = Film([np.full((HEIGHT, WIDTH, 3), 90, np.uint8)] * 3)
+ALL = [np.array([(-1, -1), (2, -1), (2, 2), (-1, 2)])]
+
+
+def everywhere():
+    drawings = Drawings((0.0,), (ALL,), ("linear",), WIDTH / HEIGHT)
+    return Region("all", 0, *map(Constant, ("lasso", 0.0)), drawings, *map(Constant, ((0.0, 0.0), 0.0, 1.0)))
+
+
+@pytest.mark.parametrize(
+    ("source", "regions", "start", "fault"),
+    [
+        (FLAT, [], 0, camera_tracking.BARE),
+        (film(2)[0], [everywhere()], 0, camera_tracking.BARE),
+        (Film(FLAT.frames[:1]), [], 0, tracking.ALONE),
+        (FLAT, [], 3, tracking.NOT_SHOWN),
+    ],
+)
+def test_what_cannot_be_tracked_is_one_sentence(source, regions, start, fault):
+    with pytest.raises(tracking.TrackingError, match=f"^{fault}$"):
+        tracked(source, regions, start)
