@@ -57,11 +57,11 @@ def curve(points, count=6):
 
 def scribbled(shutter, points, kind="LINE"):
     story.effect().active_shutter = shutter
-    with story.override("PREVIEW"):
+    with driver.override("PREVIEW"):
         bpy.ops.shutter.draw("INVOKE_DEFAULT", True, new=True, kind=kind)
     yield 0.5
     yield from driver.drag(story.preview(), curve(on_picture(points)))
-    with story.override("PREVIEW"):
+    with driver.override("PREVIEW"):
         bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
     yield
 
@@ -82,13 +82,13 @@ def published(name, *pictures):
 
 
 def preset(name):
-    with story.override("PREVIEW"):
+    with driver.override("PREVIEW"):
         bpy.ops.shutter.preset("EXEC_DEFAULT", True, preset=name)
     yield 0.5
 
 
 def region_keyed():
-    with story.override("PREVIEW"):
+    with driver.override("PREVIEW"):
         bpy.ops.shutter.region_key("EXEC_DEFAULT", True)
     yield 0.5
 
@@ -120,7 +120,7 @@ def pictures():
     story.edit().frame_set(FRAME)
     story.effect().window = WINDOW
     for view, show in (("SEQUENCER", bpy.ops.sequencer.view_all), ("PREVIEW", bpy.ops.sequencer.view_all_preview)):
-        with story.override(view):
+        with driver.override(view):
             show()
     yield 1.0
     story.effect().active_shutter = 1

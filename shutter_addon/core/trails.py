@@ -49,6 +49,7 @@ def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) 
     bends += [(boundaries - about) / share for share in (-before, 1 - before) if share]
     widths = np.unique(np.concatenate(bends).clip(0, len(bars)))
     moved = np.interp(starts(widths) + widths, boundaries, way) - np.interp(starts(widths), boundaries, way)
+    moved = np.maximum.accumulate(moved)  # by rounding alone would it fall
     # Backward, for of widths that add no motion the least counts: a trail of no length is a still frame.
     width = np.interp(-length, -moved[::-1], widths[::-1]) if length <= moved[-1] else len(bars)
     width = max(float(width), _SHORTEST)
