@@ -63,7 +63,8 @@ class _CameraTrack(tracking.Track):
         return part, 1.0
 
     def _pursuit(self, start: int) -> tuple[int, _Pursuit, float]:
-        return start, _Pursuit(lambda frame: self._part(frame)[0], self._footage, start, self._motion), 1.0
+        worth = tracking.distinctness(self.part(start)[0], self._footage.size[0])
+        return start, _Pursuit(lambda frame: self._part(frame)[0], self._footage, start, self._motion), worth
 
 
 class _Pursuit:

@@ -54,6 +54,7 @@ _AROUND = 0.05  # widths of the picture around its place within which it is soug
 # So far from it corners still are its own, and so many have to be; what others may say of it, for they may belong to
 # something else.
 _NEAR, _ENOUGH_NEAR, _FAR = 0.03, 3, 0.3
+_REPEATED = 0.3  # what a part is worth that looks like what is beside it
 
 
 class TrackingError(MediaError, ValueError):
@@ -315,8 +316,7 @@ class _RegionTrack(Track):
         if len(part.points) < registration.FEWEST[self._motion]:
             raise TrackingError(FEW)
         near = _falloff(away[part.points.imag.astype(int), part.points.real.astype(int)], _NEAR * height).sum()
-        unlike = (1 - part.rival(_AROUND * width)) / (1 - registration.ALIKE)
-        return part, float(np.clip(near / _ENOUGH_NEAR, _FAR, 1) * np.clip(unlike, _FAR, 1))
+        return part, min(float(np.clip(near / _ENOUGH_NEAR, _FAR, 1)), distinctness(part, width))
 
     def _both_ways(self, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
         self._doubted = self._doubts(start, sorted(anchors), {*frames, *anchors})
@@ -507,6 +507,11 @@ def confidence(match: Match | None, picture: np.ndarray) -> float:
     likeness = max(match.likeness, 0.0)
     factors = likeness / 0.6, match.share / (0.9 - 0.6 * likeness), match.visible / 0.6
     return float(np.prod([min(factor, 1.0) for factor in factors])) / (1 + (error / 0.7) ** 2)
+
+
+def distinctness(part: Part, width: int) -> float:
+    """How sure it is that a part is not taken for what is beside it in a picture of that width, up to 1."""
+    return float(np.clip((1 - part.rival(_AROUND * width)) / (1 - registration.ALIKE), _REPEATED, 1))
 
 
 def _falloff(away: np.ndarray, reach: float) -> np.ndarray:

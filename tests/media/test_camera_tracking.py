@@ -102,6 +102,17 @@ def test_a_camera_that_pans_is_found_from_later_frames():
     assert max(error(found, truth, frame, frame + 10) for frame in range(34)) < 0.4
 
 
+def test_a_wall_that_repeats_itself_is_never_sure():
+    """A pan along a chequered wall, so quick that the next period is nearer."""
+    y, x = np.mgrid[:HEIGHT, : 2 * WIDTH]
+    checks = cv2.GaussianBlur(60 + 120.0 * ((x // 8 + y // 8) % 2), (0, 0), 1)
+    wall = np.dstack([checks] * 3).round().astype(np.uint8)
+    source = Film([wall[:, 10 * n : 10 * n + WIDTH] for n in range(5)])
+    found, _ = tracked(source)
+    assert max(abs(found[n].placement.location[0] * WIDTH + 10 * n) for n in found) > 10
+    assert [n for n in found if found[n].confidence >= tracking.SURE] == [0]
+
+
 @pytest.mark.parametrize(("motion", "turned", "scaled"), [("location", 0, 0), ("rotation", 1, 0), ("scale", 1, 1)])
 def test_only_what_is_asked_for_changes(motion, turned, scaled):
     found, _ = tracked(film(6)[0], motion=motion)
