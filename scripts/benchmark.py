@@ -27,12 +27,13 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from shutter_addon.compute import cpu, diffusion, diffusion_gpu, edge_diffusion_gpu, gpu, guide
+from shutter_addon.compute import cpu, diffusion, diffusion_gpu, edge_diffusion, edge_diffusion_gpu, gpu, guide
 from shutter_addon.compute.gl import GLDevice
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.passes import LOCAL_ROW, Image, Pass
@@ -290,16 +291,11 @@ class Case:
 
     def _edges_error(self) -> float:
         """Of what was solved last, along edges."""
-        count, settings = len(self.state.bars), ("LAST_CYCLES", "CYCLES", "ENOUGH")
+        count = len(self.state.bars)
         got = self.compositor.coefficients(self.edges, count).copy()
-        usual = [getattr(edge_diffusion_gpu, name) for name in settings]
-        try:
-            for name, value in zip(settings, ((4,) * 8, (4,) * 16, 0), strict=True):
-                setattr(edge_diffusion_gpu, name, value)
+        many = mock.patch.multiple(edge_diffusion_gpu, LAST_CYCLES=(4,) * 8, CYCLES=(4,) * 16)
+        with many, mock.patch.object(edge_diffusion, "ENOUGH", 0):
             self.diffuse("edges")
-        finally:
-            for name, value in zip(settings, usual, strict=True):
-                setattr(edge_diffusion_gpu, name, value)
         return float(np.abs(self.compositor.coefficients(self.edges, count) - got).max() * 255)
 
     def release(self) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.conductances import cell_side, resistances
 from .diffusion_gpu import CHANGED, FINISH, GRID, GRIDS, LABELS, NOTHING, READ, STORED, Diffusion, tile_pass
-from .edge_diffusion import CYCLES, ENOUGH, SWEEPS, TWICE, first_solved
+from .edge_diffusion import CYCLES, SWEEPS, TWICE, first_solved, is_enough
 from .passes import LOCAL_ROW, Image, Pass
 
 # Where the guide's cells are larger than pixels: the iterations of conjugate gradients in each cycle, first of cycles
@@ -84,10 +84,13 @@ class EdgeDiffusion(Diffusion):
         if side > 1:
             self._cycles_near()
             self._list_tiles(labels, 0)
+        last = 0.0
         for iterations in CYCLES if side == 1 else LAST_CYCLES:
             self._visit(0, iterations)
-            if side == 1 and self._change() < ENOUGH:
-                break
+            if side == 1:
+                before, last = last, self._change()
+                if is_enough(last, before):
+                    break
         self._run(FINISH, self._grids[0], "near", 64, nothing=NOTHING)
         return self._grids[0].textures["solution"]
 

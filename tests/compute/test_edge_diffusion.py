@@ -49,6 +49,12 @@ def noise(level, width=WIDTH, height=HEIGHT, seed=0):
     return (0.5 + level * np.random.default_rng(seed).standard_normal((height, width, 3))).astype(np.float32)
 
 
+def specks(share, blur, width=WIDTH, height=HEIGHT, seed=0):
+    """Single pixels of the full contrast, which only many cycles solve."""
+    picture = (np.random.default_rng(seed).random((height, width)) < share).astype(np.float32)
+    return grey(cv2.GaussianBlur(picture, (0, 0), blur))
+
+
 def walls(gap, width=WIDTH, height=HEIGHT, thick=1):
     y, x = np.mgrid[:height, :width]
     return grey((y % gap < thick) | (x % gap < thick))
@@ -154,6 +160,8 @@ SCENES = {
     "little noise": (dots(), 5, noise(0.01)),
     "some noise": (dots(), 5, noise(0.02)),
     "more noise": (dots(), 5, noise(0.03)),
+    "specks": (dots(4, 5, 169, 50), 4, specks(0.2, 0.1, 169, 50)),
+    "soft specks": (dots(4, 5, 125, 82), 4, specks(0.3, 0.25, 125, 82)),
     "walls, 2": (dots(), 5, walls(2)),
     "walls, 3": (dots(), 5, walls(3)),
     "walls, 4": (dots(), 5, walls(4)),
