@@ -15,8 +15,8 @@ import numpy as np
 from ..core.conductances import cell_side, conductances
 from .diffusion import COLOURS, finished, galerkin, inner, missing, padded, part, smooth
 
-# Cycles where the guide's cells are pixels, at most, and the iterations of conjugate gradients in each: frames of films at
-# 640 × 360 take four, specks of single pixels some forty. And cycles where the cells are larger, so that on pixels
+# Cycles where the guide's cells are pixels, at most, and the iterations of conjugate gradients in each: frames of films
+# at 640 × 360 take four, specks of single pixels some forty. And cycles where the cells are larger, so that on pixels
 # conductances are smooth.
 CYCLES = (4,) * 48
 SMOOTH_CYCLES = (5, 3, 2, 2)
