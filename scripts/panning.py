@@ -47,7 +47,7 @@ def main() -> int:
     return 0
 
 
-def measure(folder: Path, samples: int = 128) -> list[dict]:
+def measure(folder: Path, samples: int = 64) -> list[dict]:
     """A row for each picture. samples: of the truth, for each pixel."""
     footage = scene.footage(folder / "footage")
     truth = codes(scene.truth(folder / "truth", samples))

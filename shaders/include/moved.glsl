@@ -1,8 +1,8 @@
 // Frames that are not seen where a pixel lies, but where what its shutters follow was: one resampling a frame.
 // frames: some of the window's, in layers; or with PACKED packed_frames, as shaders/pack.glsl makes them.
 // moves: a row for each of the window's frames and of `motions`, of which there are several where pictures are mixed: the
-// frame's layer (−1: it is not among these) and whether it is there at all; then a texel for each of the SHUTTERS: turn − 1
-// and shift, real and imaginary parts. seen_first to seen_last: the window's frames that are there.
+// frame's layer (−1: it is not among these) and whether it is there at all; then a texel for each motion that is mixed, one
+// per shutter, MIXED of them: turn − 1 and shift, real and imaginary parts. seen_first to seen_last: the window's frames that are there.
 // table: as for compose.glsl, a row for each frame and motion; from row `parts` on, one for each motion: 1 for its shutters.
 // SEVERAL: other passes have other frames. CONTINUED: what those before have summed is in `summed`; UNFINISHED: another
 // one follows. SHARP: as in core.compositor.seen.
@@ -108,14 +108,19 @@ vec2 moved_by(vec4 move, ivec2 pixel)
 // (turn − 1, shift) of a quad's pixels, a column each.
 mat4 moves_of(int quad, int row)
 {
+#if MIXED == 1
+  vec4 own = imageLoad(moves, ivec3(1, row, 0));
+  return mat4(own, own, own, own);
+#else
   mat4 sum = mat4(0.0);
-  for (int i = 0; i < SHUTTERS; i++) {
+  for (int i = 0; i < MIXED; i++) {
     vec4 own = imageLoad(moves, ivec3(1 + i, row, 0));
     for (int pixel = 0; pixel < 4; pixel++) {
       sum[pixel] += c[quad * GROUPS + i / 4][pixel][i % 4] * own;
     }
   }
   return sum;
+#endif
 }
 
 void expose(int quad, int frame, vec4 weight)

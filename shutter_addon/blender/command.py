@@ -281,7 +281,7 @@ def _followed(arguments, source_recipe, index: int | None, medium, frames: range
     found = list(filmed.on_timeline(subject, tracked, footage.size))
     stops = [each for each in found if each.fault]
     if len(found) - len(stops) < 2:
-        raise tracking.TrackingError(stops[0].fault)
+        raise tracking.TrackingError(stops[0].fault if stops else tracking.ALONE)
     return {each.frame: each for each in found if not each.fault}, stops
 
 

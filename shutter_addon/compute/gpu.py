@@ -99,6 +99,7 @@ def composition_of_moved(
     way: str,
     quads: int,
     shutters: int,
+    mixed: int,
     packed: bool,
     decode: int,
     shortened: bool,
@@ -109,7 +110,8 @@ def composition_of_moved(
 ) -> Pass:
     """The pass of a way, "frames", "walk" or "value", where shutters follow something.
 
-    quads: of pixels that an invocation composes; packed: as PackedFrames are; shortened: frames are left out
+    quads: of pixels that an invocation composes; mixed: motions that are mixed for a pixel; packed: as PackedFrames are
+    shortened: frames are left out
     sharp: how frames are resampled (core.compositor.seen)
     at: whether passes over other frames come before and after; the others as for `composition`"""
     continued, unfinished = at
@@ -129,6 +131,7 @@ def composition_of_moved(
             "QUADS": quads,
             "GROUPS": -(-shutters // 4),
             "SHUTTERS": shutters,
+            "MIXED": mixed,
             "SUMS": 0,
             "TILED": 0,
             "EDGES": 2 if shortened else 0,
@@ -178,12 +181,21 @@ def frames_iterations(values: np.ndarray, span: tuple[int, int]) -> int:
     return int(frames.sum()) + len(start) + span[1] - span[0]
 
 
-def _moved_way(options: Options, values: np.ndarray, span: tuple[int, int]) -> str:
-    """The way to compose where shutters follow something; arguments as for way_of."""
+def _moved_way(
+    options: Options, values: np.ndarray, span: tuple[int, int], motions: int, mixed: int, quads: int
+) -> tuple[str, int]:
+    """The way to compose where shutters follow something, and how many quads of pixels, `quads` at most, an invocation
+    can compose by it; arguments as for way_of and composition_of_moved.
+
+    motions: those that a frame is seen by"""
+    frames = span[1] - span[0]
+    mixing = frames * motions * (mixed if mixed > 1 else 0)
     if options.interpolation == "value":
-        return "value"
-    loops = frames_iterations(values, span) + span[1] - span[0]
-    return "frames" if loops <= _MOST_ITERATIONS else "walk"
+        return "value", quads if frames * (1 + motions) + quads * mixing <= _MOST_ITERATIONS else 1
+    loops = frames_iterations(values, span) + frames
+    if loops + mixing > _MOST_ITERATIONS:
+        return "walk", 1
+    return "frames", quads if loops + quads * mixing <= _MOST_ITERATIONS else 1
 
 
 def _filled_rows(rows: int) -> float:
@@ -341,7 +353,7 @@ class GPUCompositor:
         values, moves = moved_tables(state, frames)
         motions, there = len(moves) // len(frames), np.flatnonzero(frames >= 0)
         shortened, packed = bool((frames[first:last] < 0).any()), isinstance(window, PackedFrames)
-        way = _moved_way(options, values[: len(values) - motions], (first, last))
+        mixed = moves.shape[1] - 1
         given = {"size": (width, height), "top": 0, "height": height, "block_bits": (block - 1).bit_length()}
         given |= {"first": first, "last": last, "rows": len(values) - 1 - motions, "motions": motions}
         given |= {"seen_first": int(there[0]), "seen_last": int(there[-1]), "parts": len(values) - motions}
@@ -358,11 +370,13 @@ class GPUCompositor:
             sums = sums[::-1]
             images["picture"] = self._texture(sums[0], width, height, 1, "rgba32f") if at[1] else window.picture
             # What has more to do for a pixel takes long to compile for many.
-            quads = BLOCK // 4 if packed and way != "walk" and not (shortened or any(at)) else 1
+            most = BLOCK // 4 if packed and not (shortened or any(at)) else 1
+            way, quads = _moved_way(options, values[: len(values) - motions], (first, last), motions, mixed, most)
             program = composition_of_moved(
                 way,
                 quads,
                 len(state.bars),
+                mixed,
                 packed,
                 0 if packed else decoding(window.transfer, options.light),
                 shortened,

@@ -45,8 +45,8 @@ def _bars(bars) -> np.ndarray:
 
 
 def moved_tables(state: FrameState, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The table of `table` and that of the moves (L · motions, 1 + N, 4) float32 which shaders/include/moved.glsl
-    describes, its first number of each row 0.
+    """The table of `table` and that of the moves (L · motions, 1 + N, 4) float32, by value (L · motions, 2, 4), which
+    shaders/include/moved.glsl describes, its first number of each row 0.
 
     By displacement there is one motion, in which the shutters' own are mixed; by value one for all shutters that move
     alike: the table has a row for each frame and motion. Behind these it has one for each motion, 1 for its shutters.
@@ -58,14 +58,13 @@ def moved_tables(state: FrameState, frames: np.ndarray) -> tuple[np.ndarray, np.
     if state.options.interpolation == "value":
         kinds, kind = np.unique(numbers.reshape(-1, len(state.bars)), axis=1, return_inverse=True)
         own = np.eye(kinds.shape[1])[:, kind]
-        numbers = kinds.reshape(*numbers.shape[:2], -1, 1).transpose(0, 2, 1, 3).repeat(len(state.bars), axis=3)
-        numbers = numbers.reshape(-1, *numbers.shape[2:])
+        numbers = kinds.reshape(*numbers.shape[:2], -1).swapaxes(1, 2).reshape(-1, 4, 1)
         bars = _bars(state.bars)
         values = np.concatenate([values[:1], (bars[:, None] * padded(own)).reshape(-1, *bars.shape[1:])])
     parts = np.zeros((len(own), *values.shape[1:]), np.float32)
     grouped = padded(own)
     parts[:, : grouped.shape[1]] = grouped
-    moves = np.zeros((len(numbers), 1 + len(state.bars), 4), np.float32)
+    moves = np.zeros((len(numbers), 1 + numbers.shape[2], 4), np.float32)
     moves[:, 1:] = numbers.swapaxes(1, 2)
     moves[:, 0, 1] = (frames >= 0).repeat(len(own))
     return np.concatenate([values, parts]).astype(np.float32), moves

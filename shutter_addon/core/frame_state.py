@@ -69,10 +69,14 @@ class Following:
         """Hashable, and equal for equal motions."""
         return self.first, self.turns.tobytes(), self.shifts.tobytes()
 
+    def moving(self) -> np.ndarray:
+        """The numbers of the shutters that follow what moves."""
+        return np.flatnonzero((self.turns != 1).any(axis=0) | self.shifts.any(axis=0))
+
     def of(self, chosen) -> Following | None:
         """That of some shutters alone; None: none of them moves."""
-        turns, shifts = self.turns[:, chosen], self.shifts[:, chosen]
-        return Following(self.first, turns, shifts) if (turns != 1).any() or shifts.any() else None
+        found = Following(self.first, self.turns[:, chosen], self.shifts[:, chosen])
+        return found if found.moving().size else None
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ for tiled in (True, False):
     PASSES += [window.accumulation(1, again, False, tiled) for again in (True, False)]
 PASSES += [window.packing(1, True)]
 PASSES += [
-    gpu.composition_of_moved(way, 2, 3, packed, 1, shortened, False, False, True, (True, False))
+    gpu.composition_of_moved(way, 2, 3, 3, packed, 1, shortened, False, False, True, (True, False))
     for way in ("frames", "walk", "value")
     for packed, shortened in ((True, True), (False, False))
 ]

@@ -115,12 +115,13 @@ def _renamed(shutter, new: str, old: str, _is_set) -> str:
     return consistency.rename(selection.effect_of_item(shutter), old, new)
 
 
-def _shortened(region, new: str, old: str, _is_set) -> str:
+def _shortened(region, new: str, old: str, is_set) -> str:
     """As recipes have names. Blender's own `maxlen` counts bytes, of which a character takes up to four."""
     new = new[:MAX_NAME]
-    # Blender takes long to find an item's place among many: only where the name counts.
+    # Blender takes long to find an item's place among many: only where the name counts. The default name of a region
+    # that has none yet is nobody's.
     effects = region.id_data.virtual_shutter.effects
-    if any(shutter.follow_region == old for effect in effects for shutter in effect.shutters):
+    if is_set and any(shutter.follow_region == old for effect in effects for shutter in effect.shutters):
         consistency.rename_followed(selection.effect_of_item(region), old, new)
     return new
 

@@ -62,6 +62,11 @@ class MotionKeys:
         curves = (self._curve(name, component) for name, component in _COMPONENTS[: _COUNTS[self.motion]])
         return any(len(curve.keyframe_points) > 1 for curve in filter(None, curves))
 
+    def reach(self, frame: int) -> bool:
+        """Whether there are keys of a motion, and tracking, if any of them come from it, has come through a frame."""
+        tracked = self.confidence()[0]
+        return self.are_several() and (not len(tracked) or frame in tracked)
+
     def channels(self) -> list[str]:
         """The channels that the motion has, and those that have keys already."""
         count = _COUNTS[self.motion]

@@ -10,9 +10,9 @@ from .motion_keys import MotionKeys
 
 
 def is_ready(edit, effect, strip, index: int) -> bool:
-    """Whether a region has keys of motion; without, it has to be tracked first. EffectError: it has keys, and no
-    strokes that could be followed."""
-    if not MotionKeys(effect, index, "SCALE").are_several():
+    """Whether a region has keys of motion, and those that were tracked reach the current frame; without, it has to be
+    tracked first. EffectError: it has keys, and no strokes that could be followed."""
+    if not MotionKeys(effect, index, "SCALE").reach(edit.frame_current):
         return False
     if not snapshot.strokes_at(edit, effect, strip, index, edit.frame_current):
         raise EffectError(rpt_("the region has no strokes to follow"))
@@ -28,7 +28,7 @@ def set_up(effect, index: int, key: bool = False) -> None:
     region.name = consistency.unique(region.name, {other.name for other in effect.regions if other != region})
     place = effect.shutters.find(region.shutter)
     shutter = effect.shutters[place]
-    shutter.follow, shutter.follow_region = "REGION", region.name
+    shutter.follow, shutter.follow_region, shutter.length = "REGION", region.name, "FRAMES"
     effect.position = "CENTER"
     bar_edits.paint(effect, place, bars, key)
     shutter_edits.move_shutter(effect, place, 0)

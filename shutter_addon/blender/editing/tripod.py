@@ -9,9 +9,7 @@ from .motion_keys import MotionKeys
 def is_ready(effect) -> bool:
     """Whether the camera has keys of motion, and those that were tracked reach the current frame, whose shot may be
     another one; without, it has to be tracked first."""
-    keys = MotionKeys(effect, None, "SCALE")
-    tracked = keys.confidence()[0]
-    return keys.are_several() and (not len(tracked) or effect.id_data.frame_current in tracked)
+    return MotionKeys(effect, None, "SCALE").reach(effect.id_data.frame_current)
 
 
 def set_up(effect, key: bool = False) -> None:
@@ -23,5 +21,6 @@ def set_up(effect, key: bool = False) -> None:
     name = effect.shutters[effect.active_shutter].name
     if not any(region.shutter == name for region in effect.regions):
         effect.active_shutter = 0
-    effect.shutters[effect.active_shutter].follow, effect.position = "CAMERA", "CENTER"
+    shutter = effect.shutters[effect.active_shutter]
+    shutter.follow, shutter.length, effect.position = "CAMERA", "FRAMES", "CENTER"
     bar_edits.paint(effect, effect.active_shutter, bars, key)

@@ -231,7 +231,10 @@ def _show_source(quad, found: Shown, request, right: float) -> None:
     options = replace(request.state.options, step=1)  # no in-between frames come first in reverse
     still = np.zeros((1, options.window))
     still[0, options.before] = 1
-    plain = replace(request, state=FrameState(options, still))
+    # The shown frame lies where it is for all that move. Without a motion, other frames would have to be read for it.
+    following = request.state.following
+    moving = following and following.of([following.moving()[0]])
+    plain = replace(request, state=FrameState(options, still, following=moving))
     plain.prefetch()
     texture = request.renderer.draw(plain.index, plain.state, plain.direction)
     quad.draw("show_picture", {"picture": texture}, 0.0, right, opacity=found.strip.blend_alpha)

@@ -95,6 +95,8 @@ class _Tracks:
                 self.ended(context)
         except FAULTS as error:
             self.report({"ERROR"}, str(error))
+            if not self._done:
+                return {"CANCELLED"}
         redraw(context)
         return {"FINISHED"}  # what was tracked can be undone
 
