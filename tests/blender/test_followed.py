@@ -118,6 +118,15 @@ def test_the_camera_and_nothing_left_behind(shown):
     assert request(edit, effect, strip, 9).state.following is None
 
 
+def test_a_region_called_as_new_ones_are_is_followed(shown):
+    """Regions that are named after it once had its name as well."""
+    data = following({1: (0, 0)}, follow="Region")
+    data["regions"] = [region({1: (0, 0)}), region({1: (0, 0)}) | {"name": "Region"}]
+    _edit, effect, _strip, _request = shown(data, 0, 1)
+    assert [each.name for each in effect.regions] == ["car", "Region"]
+    assert effect.shutters[0].follow_region == "Region"
+
+
 def test_a_region_that_is_renamed_or_removed(shown):
     from shutter_addon.blender.data import snapshot
     from shutter_addon.blender.editing import region_edits
