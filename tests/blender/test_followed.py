@@ -122,7 +122,7 @@ def test_a_region_called_as_new_ones_are_is_followed(shown):
     """Regions that are named after it once had its name as well."""
     data = following({1: (0, 0)}, follow="Region")
     data["regions"] = [region({1: (0, 0)}), region({1: (0, 0)}) | {"name": "Region"}]
-    _edit, effect, _strip, _request = shown(data, 0, 1)
+    _edit, effect, _strip, _request = shown(data, (4, 0), 10)
     assert [each.name for each in effect.regions] == ["car", "Region"]
     assert effect.shutters[0].follow_region == "Region"
 
