@@ -15,14 +15,13 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from panning import codes, run
+from panning import exposed, run, unfollowing
 from quality import similarity
 
 from gallery import handheld as scene
@@ -52,7 +51,6 @@ def measure(folder: Path) -> dict:
     corner of the picture is from where the scene's camera has it, in pixels, at the worst frame."""
     footage, steady = scene.footage(folder / "footage"), scene.steady(folder / "steady")
     following = tracked(footage, folder)
-    plain = replace(following, shutters=[replace(shutter, follow=None) for shutter in following.shutters])
     truth = encoded(scene.exposed(steady))
     with open_source(footage) as source:
         single = source.read(scene.FRAME - 1)[..., :3].astype(np.float32)
@@ -60,8 +58,8 @@ def measure(folder: Path) -> dict:
     seen = seen_by_all(following, size)
     pictures = {
         "a single frame": encoded(single),
-        "plain exposure": exposed(footage, plain, folder / "plain"),
-        "following the camera": exposed(footage, following, folder / "following"),
+        "plain exposure": exposed(footage, unfollowing(following), scene.FRAME, folder / "plain"),
+        "following the camera": exposed(footage, following, scene.FRAME, folder / "following"),
     }
     rows = [
         {"picture": name, "seen": similarity(picture, truth, seen), "all": similarity(picture, truth)}
@@ -105,14 +103,6 @@ def off(effect: recipe.Recipe, size) -> float:
     return max(
         float(np.abs(motion(effect, frame, size)(corners) - scene.seen(frame, corners, size)).max()) for frame in frames
     )
-
-
-def exposed(footage: Path, effect: recipe.Recipe, folder: Path) -> np.ndarray:
-    """The picture of an effect at the shown frame, by the command."""
-    folder.mkdir(exist_ok=True)
-    (folder / "recipe.json").write_text(recipe.dump(effect), encoding="utf-8")
-    run("render", footage, "--recipe", folder / "recipe.json", "--output", folder, "--frames", scene.FRAME)
-    return codes(folder / f"{scene.FRAME:04}.png")
 
 
 if __name__ == "__main__":

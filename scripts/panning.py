@@ -54,11 +54,10 @@ def measure(folder: Path, samples: int = 64) -> list[dict]:
     covered = codes(scene.mask(folder / "mask"))[..., 0] >= 188  # half of the light
     still = codes(footage, scene.FRAME - 1)
     following = tracked(footage, folder)
-    plain = replace(following, shutters=[replace(shutter, follow=None) for shutter in following.shutters])
     pictures = {
         "a single frame": still,
-        "plain exposure": exposed(footage, plain, folder / "plain"),
-        "panning shot": exposed(footage, following, folder / "following"),
+        "plain exposure": exposed(footage, unfollowing(following), scene.FRAME, folder / "plain"),
+        "panning shot": exposed(footage, following, scene.FRAME, folder / "following"),
         "Cycles, panning": truth,
     }
     return [
@@ -80,12 +79,17 @@ def tracked(footage: Path, folder: Path) -> recipe.Recipe:
     return recipe.load(folder / "tracked.json")
 
 
-def exposed(footage: Path, effect: recipe.Recipe, folder: Path) -> np.ndarray:
-    """The picture of an effect at the shown frame, by the command."""
+def unfollowing(effect: recipe.Recipe) -> recipe.Recipe:
+    """The effect with shutters that follow nothing."""
+    return replace(effect, shutters=[replace(shutter, follow=None) for shutter in effect.shutters])
+
+
+def exposed(footage: Path, effect: recipe.Recipe, frame: int, folder: Path) -> np.ndarray:
+    """The picture of an effect at a frame, by the command."""
     folder.mkdir(exist_ok=True)
     (folder / "recipe.json").write_text(recipe.dump(effect), encoding="utf-8")
-    run("render", footage, "--recipe", folder / "recipe.json", "--output", folder, "--frames", scene.FRAME)
-    return codes(folder / f"{scene.FRAME:04}.png")
+    run("render", footage, "--recipe", folder / "recipe.json", "--output", folder, "--frames", frame)
+    return codes(folder / f"{frame:04}.png")
 
 
 def run(*arguments) -> None:

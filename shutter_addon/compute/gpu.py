@@ -354,6 +354,8 @@ class GPUCompositor:
         motions, there = len(moves) // len(frames), np.flatnonzero(frames >= 0)
         shortened, packed = bool((frames[first:last] < 0).any()), isinstance(window, PackedFrames)
         mixed = moves.shape[1] - 1
+        most = BLOCK // 4 if packed and not shortened else 1
+        way, quads = _moved_way(options, values[: len(values) - motions], (first, last), motions, mixed, most)
         given = {"size": (width, height), "top": 0, "height": height, "block_bits": (block - 1).bit_length()}
         given |= {"first": first, "last": last, "rows": len(values) - 1 - motions, "motions": motions}
         given |= {"seen_first": int(there[0]), "seen_last": int(there[-1]), "parts": len(values) - motions}
@@ -370,11 +372,9 @@ class GPUCompositor:
             sums = sums[::-1]
             images["picture"] = self._texture(sums[0], width, height, 1, "rgba32f") if at[1] else window.picture
             # What has more to do for a pixel takes long to compile for many.
-            most = BLOCK // 4 if packed and not (shortened or any(at)) else 1
-            way, quads = _moved_way(options, values[: len(values) - motions], (first, last), motions, mixed, most)
             program = composition_of_moved(
                 way,
-                quads,
+                1 if any(at) else quads,
                 len(state.bars),
                 mixed,
                 packed,
@@ -386,7 +386,7 @@ class GPUCompositor:
                 at,
             )
             images["packed_frames"] = stack
-            extent = width, -(-height // (4 * quads))
+            extent = width, -(-height // (4 * program.defines["QUADS"]))
             self.device.run(program, extent, textures={"frames": stack}, images=images, **given)
         return window.picture
 

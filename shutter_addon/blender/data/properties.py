@@ -266,6 +266,31 @@ class _Tracked:
     )
 
 
+def _location(description: str):
+    return FloatVectorProperty(
+        name="Location",
+        description=description,
+        subtype="XYZ",
+        size=2,
+        min=-MAX_DISTANCE,
+        max=MAX_DISTANCE,
+        update=_changed,
+    )
+
+
+def _rotation(description: str):
+    limit = math.radians(MAX_DEGREES)
+    return FloatProperty(
+        name="Rotation", description=description, subtype="ANGLE", min=-limit, max=limit, update=_changed
+    )
+
+
+def _scale(description: str):
+    return FloatProperty(
+        name="Scale", description=description, default=1.0, min=-MAX_SCALE, max=MAX_SCALE, update=_changed
+    )
+
+
 class ShutterRegion(_Tracked, PropertyGroup):
     name: StringProperty(name="Name", description="Name of the region", default="Region", set_transform=_shortened)
     shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=_changed)
@@ -286,31 +311,9 @@ class ShutterRegion(_Tracked, PropertyGroup):
         soft_max=0.5,
         update=_changed,
     )
-    location: FloatVectorProperty(
-        name="Location",
-        description="Distance from where the region was drawn, as a fraction of the picture",
-        subtype="XYZ",
-        size=2,
-        min=-MAX_DISTANCE,
-        max=MAX_DISTANCE,
-        update=_changed,
-    )
-    rotation: FloatProperty(
-        name="Rotation",
-        description="Rotation about the region's center",
-        subtype="ANGLE",
-        min=-math.radians(MAX_DEGREES),
-        max=math.radians(MAX_DEGREES),
-        update=_changed,
-    )
-    scale: FloatProperty(
-        name="Scale",
-        description="Scale about the region's center",
-        default=1.0,
-        min=-MAX_SCALE,
-        max=MAX_SCALE,
-        update=_changed,
-    )
+    location: _location("Distance from where the region was drawn, as a fraction of the picture")
+    rotation: _rotation("Rotation about the region's center")
+    scale: _scale("Scale about the region's center")
     follow_kind: EnumProperty(
         name="Follow", description="What the region follows", items=FOLLOWED, default="TRACK", options=_UNKEYED
     )
@@ -326,31 +329,9 @@ class ShutterRegion(_Tracked, PropertyGroup):
 
 class ShutterCamera(_Tracked, PropertyGroup):
     name: StringProperty(name="Name", description="Name of the camera's animation channels", default="Camera")
-    location: FloatVectorProperty(
-        name="Location",
-        description="Where what the camera sees has moved to, as a fraction of the picture",
-        subtype="XYZ",
-        size=2,
-        min=-MAX_DISTANCE,
-        max=MAX_DISTANCE,
-        update=_changed,
-    )
-    rotation: FloatProperty(
-        name="Rotation",
-        description="Rotation of what the camera sees, about the picture's center",
-        subtype="ANGLE",
-        min=-math.radians(MAX_DEGREES),
-        max=math.radians(MAX_DEGREES),
-        update=_changed,
-    )
-    scale: FloatProperty(
-        name="Scale",
-        description="Scale of what the camera sees, about the picture's center",
-        default=1.0,
-        min=-MAX_SCALE,
-        max=MAX_SCALE,
-        update=_changed,
-    )
+    location: _location("Where what the camera sees has moved to, as a fraction of the picture")
+    rotation: _rotation("Rotation of what the camera sees, about the picture's center")
+    scale: _scale("Scale of what the camera sees, about the picture's center")
 
 
 class ShutterEffect(PropertyGroup):

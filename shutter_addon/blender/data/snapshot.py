@@ -351,27 +351,27 @@ def check_bar_count(shutter, window: int) -> None:
 
 
 def _region(curves: Curves, path: str, effect, region, shutter: int, placement, frames) -> model.Region:
-    def channel(name, change=lambda value: value):
-        return _channel(curves, region, path, name, frames, change)
-
     return model.Region(
         region.name,
         shutter,
         keyframes.Constant(_tried(lambda: validation.word(region, "kind").lower())),
-        channel("width"),
+        _channel(curves, region, path, "width", frames),
         _drawings(curves, path, effect, region, placement, frames),
-        channel("location"),
-        channel("rotation", np.degrees),
-        channel("scale"),
+        *_moves(curves, region, path, frames),
     )
 
 
 def _camera(curves: Curves, effect, frames) -> model.Camera:
     path = effect.camera.path_from_id()
-    return model.Camera(
-        _channel(curves, effect.camera, path, "location", frames),
-        _channel(curves, effect.camera, path, "rotation", frames, np.degrees),
-        _channel(curves, effect.camera, path, "scale", frames),
+    return model.Camera(*_moves(curves, effect.camera, path, frames))
+
+
+def _moves(curves: Curves, moving, path: str, frames) -> tuple[keyframes.Channel, ...]:
+    """Location, rotation and scale of a region or of the camera."""
+    return (
+        _channel(curves, moving, path, "location", frames),
+        _channel(curves, moving, path, "rotation", frames, np.degrees),
+        _channel(curves, moving, path, "scale", frames),
     )
 
 

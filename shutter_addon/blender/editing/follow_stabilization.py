@@ -33,8 +33,7 @@ def follow(edit, effect, strip) -> None:
     shifted = _shifted(camera.follow_clip, size)
     seen = {frame: shifted(time) for frame, time in times.items()}
     keys = MotionKeys(effect, None, _motion(camera.follow_clip.tracking.stabilization))
-    keys.hold(start, start)
-    motion_keys.insert(effect, None, keys.channels())
+    keys.begin(start)
     frames = sorted(times)
     known = {start, *keys.edited(range(frames[0], frames[-1] + 1))}
     moves = {origin: {frame: seen[frame].after(seen[origin].inverse()) for frame in frames} for origin in known}

@@ -28,9 +28,7 @@ def follow(edit, effect, strip, index: int) -> None:
     it cannot be followed, and nothing has changed."""
     start = edit.frame_current
     points = _points(edit, effect, strip, index, start)
-    keys = _keys(effect, index)
-    keys.hold(start, start)
-    motion_keys.insert(effect, index, keys.channels())
+    _keys(effect, index).begin(start)
     effect.regions[index].follow_frame = start - effect.start
     _key(edit, effect, strip, index, points)
 

@@ -82,6 +82,12 @@ class MotionKeys:
             for frame, value in _as_tracked(curve, (first, last), beside).items():
                 _insert(curve, frame, value)
 
+    def begin(self, frame: int) -> None:
+        """Makes the edit's current frame, at which it begins, the editor's; what was tracked beside it stays there.
+        EffectError: as check_curves says."""
+        self.hold(frame, frame)
+        insert(self.effect, self.index, self.channels())
+
     def write(self, placements: Mapping[int, Placement], confidence: Mapping[int, float]) -> None:
         """Makes keys at some of the frames that have a confidence, in place of all that were made at these, of the
         channels that are not keyed as well. Other frames that were tracked stay as they are; those between, which never

@@ -137,8 +137,7 @@ def track(
                         return
                     keys = MotionKeys(effect, index, motion)
                     if len(found) == 1:
-                        keys.hold(start, start)
-                        motion_keys.insert(effect, index, keys.channels())
+                        keys.begin(start)
                     found[tracked.frame] = tracked
                     beside = found.get(tracked.frame + (-1 if tracked.frame > start else 1), tracked)
                     _write(keys, [beside, tracked], [beside, tracked])

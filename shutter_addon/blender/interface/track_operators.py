@@ -43,6 +43,10 @@ class _Tracks:
     def index(self, effect) -> int | None:
         return effect.active_region
 
+    def is_ready(self, edit, effect, strip) -> bool:
+        """Whether nothing has to be tracked. EffectError: what comes after tracking cannot be done."""
+        return False
+
     def ended(self, context) -> None:
         """Called once all is tracked, and not after Esc. EffectError: what comes after tracking cannot be done."""
 
@@ -112,6 +116,9 @@ class _Tracks:
         index = self.index(effect)
         moving = selection.moving(effect, index)
         self._target, self._start, self._done = track_region.Target.of(effect, index), edit.frame_current, set()
+        if self.is_ready(edit, effect, strip):
+            self._steps = iter(())
+            return
         self._frames = track_region.frames_to_track(edit, strip, self.direction, moving.track_until)
         motion, all_keys = validation.word(moving, "motion"), moving.track_all_keys
         self._steps = track_region.track(edit, effect, strip, index, self._frames, motion, all_keys=all_keys)
@@ -157,6 +164,13 @@ class _Tracks:
                 self.report({"WARNING" if is_fault else "INFO"}, sentence.format(frame=frame, fault=fault))
 
 
+class _OfCamera:
+    """The camera, in place of a region."""
+
+    def index(self, _effect):
+        return None
+
+
 class SHUTTER_OT_track(_Tracks, _OfRegion, Operator):
     """Key the active region by what it covers here, up to your own keys (Esc stops and keeps the tracked frames)"""
 
@@ -166,16 +180,13 @@ class SHUTTER_OT_track(_Tracks, _OfRegion, Operator):
     direction: _DIRECTION
 
 
-class SHUTTER_OT_track_camera(_Tracks, _OfEffect, Operator):
+class SHUTTER_OT_track_camera(_OfCamera, _Tracks, _OfEffect, Operator):
     """Key the camera by what the regions leave free, up to your own keys (Esc stops and keeps the tracked frames)"""
 
     bl_idname = "shutter.track_camera"
     bl_label = "Track Camera"
 
     direction: _DIRECTION
-
-    def index(self, _effect):
-        return None
 
 
 class SHUTTER_OT_panning_shot(_Tracks, _OfRegion, Operator):
@@ -186,19 +197,14 @@ class SHUTTER_OT_panning_shot(_Tracks, _OfRegion, Operator):
 
     direction = "BOTH"
 
-    def _begin(self, context):
-        edit, effect, strip = selection.active(context)
-        index = effect.active_region
-        if panning_shot.is_ready(edit, effect, strip, index):
-            self._target, self._steps, self._done = track_region.Target.of(effect, index), iter(()), set()
-        else:
-            super()._begin(context)
+    def is_ready(self, edit, effect, strip):
+        return panning_shot.is_ready(edit, effect, strip, effect.active_region)
 
     def ended(self, context):
         panning_shot.set_up(self._target.effect(), self._target.index, bar_edits.auto_key(context))
 
 
-class SHUTTER_OT_tripod(_Tracks, _OfShutter, Operator):
+class SHUTTER_OT_tripod(_OfCamera, _Tracks, _OfShutter, Operator):
     """Expose for long as if the camera had stood still (tracks the camera unless it has keys)"""
 
     bl_idname = "shutter.tripod"
@@ -206,15 +212,8 @@ class SHUTTER_OT_tripod(_Tracks, _OfShutter, Operator):
 
     direction = "BOTH"
 
-    def index(self, _effect):
-        return None
-
-    def _begin(self, context):
-        effect = selection.active(context)[1]
-        if tripod.is_ready(effect):
-            self._target, self._steps, self._done = track_region.Target.of(effect, None), iter(()), set()
-        else:
-            super()._begin(context)
+    def is_ready(self, _edit, effect, _strip):
+        return tripod.is_ready(effect)
 
     def ended(self, context):
         tripod.set_up(self._target.effect(), bar_edits.auto_key(context))
@@ -254,14 +253,11 @@ class SHUTTER_OT_track_look(_Looks, _OfRegion, Operator):
     bl_label = "Next Unsure Frame"
 
 
-class SHUTTER_OT_track_camera_look(_Looks, _OfEffect, Operator):
+class SHUTTER_OT_track_camera_look(_OfCamera, _Looks, _OfEffect, Operator):
     """Go to a frame that tracking is not sure of"""
 
     bl_idname = "shutter.track_camera_look"
     bl_label = "Next Unsure Frame"
-
-    def index(self, _effect):
-        return None
 
 
 class _Follows:
