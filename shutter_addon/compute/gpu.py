@@ -13,6 +13,7 @@ from .device import Device
 from .diffusion_gpu import Diffusion
 from .edge_diffusion import follows_edges
 from .edge_diffusion_gpu import EdgeDiffusion
+from .matting import Matting
 from .passes import LOCAL_ROW, Image, Pass
 from .tables import moved_tables, padded, table
 from .window import BLOCK, TILE, Frames, PackedFrames, Sums, WholeFrames, decoding, open_window
@@ -288,6 +289,10 @@ class GPUCompositor:
     def solver(self) -> Solver:
         """A new solver. Its solution is valid until its next solve."""
         return Solver(self.device)
+
+    def matting(self) -> Matting:
+        """What lays mattes over coefficients. What it gives is valid until its next."""
+        return Matting(self.device)
 
     def constant(self, values: np.ndarray):
         """Coefficients (N,) of the whole picture, as a texture of one texel. Valid until the next call."""

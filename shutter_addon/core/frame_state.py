@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from . import scribbles
+from .mattes import Matte
 
 Interpolation = Literal["displacement", "value"]
 Light = Literal["linear", "encoded"]
@@ -87,6 +88,7 @@ class FrameState:
     shapes: of the scribbles, where they are at this frame, the later over the earlier
     reference: the exposure (sum of bars) of full brightness where exposure is "weighted"; None: the default shutter's
     following: what exposures follow; None: nothing that moves
+    mattes: laid over what the scribbles give, the later over the earlier
     """
 
     options: Options
@@ -94,6 +96,7 @@ class FrameState:
     shapes: tuple[scribbles.Shape, ...] = ()
     reference: float | None = None
     following: Following | None = None
+    mattes: tuple[Matte, ...] = ()
 
     @property
     def gains(self) -> np.ndarray:
@@ -110,7 +113,8 @@ class FrameState:
         """Hashable, and equal for states that give the same picture of the same frames."""
         shapes = ((s.shutter, s.kind, s.width, *(stroke.tobytes() for stroke in s.strokes)) for s in self.shapes)
         bars = self.bars.shape, self.bars.tobytes()
-        return self.options, *bars, self.reference, self.following and self.following.key, tuple(shapes)
+        following = self.following and self.following.key
+        return self.options, *bars, self.reference, following, self.mattes, tuple(shapes)
 
     def alone(self, chosen: int) -> FrameState:
         """The state of a picture in which one shutter, `chosen`, is everywhere."""

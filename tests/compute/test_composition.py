@@ -73,9 +73,9 @@ def device(request):
     return open_compositor(request.param)[0]
 
 
-def composed(device, source, moment, index, direction=1, shot=None):
+def composed(device, source, moment, index, direction=1, shot=None, mattes=None):
     """A device's picture, and the reference's with the same coefficients."""
-    renderer = Renderer(device, source)
+    renderer = Renderer(device, source, mattes)
     picture = renderer.picture(index, moment, direction)
     c = renderer.coefficients(index, moment, direction)
     block = moment.options.aggregate
@@ -89,8 +89,8 @@ def composed(device, source, moment, index, direction=1, shot=None):
     return picture, expected
 
 
-def check(device, source, moment, index, direction=1, shot=None):
-    picture, expected = composed(device, source, moment, index, direction, shot)
+def check(device, source, moment, index, direction=1, shot=None, mattes=None):
+    picture, expected = composed(device, source, moment, index, direction, shot, mattes)
     # Light above white differs in proportion: compare it relatively.
     difference = np.abs(light.to_encoded(picture.astype(np.float64)) - light.to_encoded(expected))
     assert (difference / np.maximum(1, np.abs(expected))).max() <= LEVEL

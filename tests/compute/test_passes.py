@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from shutter_addon.compute import diffusion_gpu, edge_diffusion_gpu, gpu, window
+from shutter_addon.compute import diffusion_gpu, edge_diffusion_gpu, gpu, matting, window
 from shutter_addon.compute.passes import SHADERS, Pass, body
 
 PASSES = [
@@ -19,7 +19,7 @@ PASSES += [
 for tiled in (True, False):
     PASSES += [gpu.composition_of_sums(4, 2, True, tiled, False)]
     PASSES += [window.accumulation(1, again, False, tiled) for again in (True, False)]
-PASSES += [window.packing(1, True)]
+PASSES += [window.packing(1, True), matting.BLEND]
 PASSES += [
     gpu.composition_of_moved(way, 2, 3, 3, packed, 1, shortened, False, False, True, (True, False))
     for way in ("frames", "walk", "value")
