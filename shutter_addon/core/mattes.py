@@ -41,7 +41,7 @@ class FileFrame:
     """A frame of a file.
 
     offset: from the filmed frame of the source that is shown to the matte's, both counted from 0
-    time: what says which frame it is in place of the source: a timeline frame, from 0 on, to which `offset` is added;
+    time: frames since the one that shows frame `offset`, which count in place of the source's
     timing: or a strip of the edit, which shows the frame at the timeline frame `time`"""
 
     file: MatteFile
@@ -55,6 +55,25 @@ class FileFrame:
         if self.timing is not None:
             return source_frame(self.timing, self.time, source)
         return (shown if self.time is None else math.floor(self.time)) + self.offset
+
+
+@dataclass(frozen=True)
+class FileFrames:
+    """Channel of the frames of a file: as the source shows its own, `offset` frames on.
+
+    first: the timeline frame that shows the file's frame `offset`, and later ones those behind it, in place of that
+    timing: or a strip of the edit, that shows the file as this says"""
+
+    file: MatteFile
+    offset: int = 0
+    first: float | None = None
+    timing: StripTiming | None = None
+
+    def at(self, frame: float) -> FileFrame:
+        """What is shown at a timeline frame."""
+        if self.timing is not None:
+            return FileFrame(self.file, 0, frame, self.timing)
+        return FileFrame(self.file, self.offset, None if self.first is None else frame - self.first)
 
 
 @dataclass(frozen=True)
