@@ -144,8 +144,9 @@ def _render(arguments) -> None:
             if arguments.save and film_output.is_movie(output) and "#" in output.name:
                 raise film_output.OutputError(f"{output}: in a saved edit, Blender takes # for the frames' numbers")
         frames = _frames(arguments.frames, new_edit.length(medium, source_recipe))
-        film_output.spare(_written(arguments, file_format, frames), [path, *_files(medium), arguments.recipe])
-        edit = new_edit.make_edit(path, medium, source_recipe)
+        read = path, *_files(medium), arguments.recipe, *_mattes(source_recipe, arguments.recipe.parent)
+        film_output.spare(_written(arguments, file_format, frames), read)
+        edit = new_edit.make_edit(path, medium, source_recipe, arguments.recipe.parent)
     edit.frame_start, edit.frame_end = frames
     if output:
         film_output.set_output(edit, output, file_format, alpha=medium.alpha != "opaque")
@@ -179,6 +180,16 @@ def _files(medium) -> list[Path]:
     files = medium.files
     beside = by_number(files[0]) if len(files) > 1 else None
     return [*files, *(map(beside, range(len(files))) if beside else ())]
+
+
+def _mattes(source_recipe, folder: Path) -> list[Path]:
+    """The files of a recipe's mattes; folder: where the recipe lies. MediaError: there are none."""
+    paths = {folder / region.path for region in source_recipe.regions if isinstance(region, recipe.MatteRegion)}
+    found = []
+    for path in sorted(paths):
+        with MatteFile(path).open() as matte:
+            found += matte.files
+    return found
 
 
 def _opened(path: Path):
@@ -256,7 +267,11 @@ def _region_index(arguments, source_recipe) -> int:
     names = [region.name for region in source_recipe.regions]
     if arguments.region not in names:
         raise film_output.OutputError(f'{arguments.recipe}: there is no region "{arguments.region}"')
-    return names.index(arguments.region)
+    index = names.index(arguments.region)
+    if not isinstance(source_recipe.regions[index], recipe.Region):
+        sentence = f'region "{arguments.region}" is a matte or a ramp, and has no strokes to track'
+        raise film_output.OutputError(f"{arguments.recipe}: {sentence}")
+    return index
 
 
 def _followed(arguments, source_recipe, index: int | None, medium, frames: range) -> tuple[dict, list]:
@@ -270,7 +285,8 @@ def _followed(arguments, source_recipe, index: int | None, medium, frames: range
         footage = tracking.Footage(shots, filmed.index_at)
         what = footage, filmed.start, filmed.frames
         if index is None:
-            regions = [filmed.seen(region) for region in effect.regions]
+            drawn = [region for region in effect.regions if isinstance(region, Region)]
+            regions = [filmed.seen(region) for region in drawn]
             steps = camera_tracking.follow_camera(filmed.seen(subject), regions, *what, motion=arguments.motion)
         else:
             steps = tracking.follow(filmed.seen(subject), *what, motion=arguments.motion)
@@ -314,7 +330,8 @@ def _write_track(arguments, result, tracked: dict, stops: list) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         film_output.clear_up(path.parent)
     with atomic_write.writing(arguments.output) as part:
-        part.write_text(recipe.dump(result), encoding="utf-8")
+        moved = recipe.moved(result, arguments.recipe.parent, arguments.output.parent)
+        part.write_text(recipe.dump(moved), encoding="utf-8")
         if arguments.report:
             with atomic_write.writing(arguments.report) as other:
                 other.write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 from collections import Counter
 from collections.abc import Callable
@@ -314,6 +315,25 @@ def with_inbetween(source: Recipe, factor: int) -> Recipe:
         ) from None
     window = -(-source.window * factor // source.inbetween)
     return replace(source, window=window, shutters=found, inbetween=factor)
+
+
+def moved(source: Recipe, old: Path, new: Path) -> Recipe:
+    """The same effect for a recipe in another folder: relative paths of mattes lead to the same files."""
+
+    def rebased(region):
+        if not isinstance(region, MatteRegion) or Path(region.path).is_absolute():
+            return region
+        return replace(region, path=relative(old / region.path, new))
+
+    return replace(source, regions=[rebased(region) for region in source.regions])
+
+
+def relative(path: Path, folder: Path) -> str:
+    """The path of a matte, as a recipe in a folder has it: relative, if there is such a one."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:  # on another drive
+        return Path(os.path.abspath(path)).as_posix()
 
 
 def load(path: str | Path) -> Recipe:

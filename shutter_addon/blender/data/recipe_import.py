@@ -1,21 +1,29 @@
 """A recipe into Blender's data: shutters, regions, strokes, keys and options."""
 
+from pathlib import Path
+
+import bpy
 import numpy as np
 from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core import limits, recipe
+from ...media import MediaError, open_source
+from ...media.files import check_file, check_name
+from ...media.sequence import IMAGE_SUFFIXES
 from . import fcurves, geometry
 from .annotations import annotation, picture_size
 from .snapshot import OPTIONS
 from .validation import EffectError
 
 
-def apply(edit, effect, strip, source: recipe.Recipe) -> None:
-    """Replaces the effect's data and keys by a recipe, whose frame 1 is the strip's first. EffectError: its keys cannot
-    lie there; nothing has changed."""
+def apply(edit, effect, strip, source: recipe.Recipe, folder: Path = Path()) -> None:
+    """Replaces the effect's data and keys by a recipe, whose frame 1 is the strip's first; folder: where it lies, which
+    its mattes' paths begin at. EffectError: its keys cannot lie there; MediaError: it has no such mattes; nothing has
+    changed."""
     first = strip.left_handle - 1
     _check_keys(source, first)
+    images = {region.path: matte_image(folder / region.path) for region in source.regions if _is_matte(region)}
     clear(edit, effect)
     # Bars per frame before the factor, which else would change the window.
     effect.bars_per_frame, effect.inbetween = source.inbetween, str(source.inbetween)
@@ -35,7 +43,11 @@ def apply(edit, effect, strip, source: recipe.Recipe) -> None:
         _add_shutter(edit, effect, f"{path}.shutters[{i}]", shutter, first)
     colors = {shutter.name: shutter.color for shutter in source.shutters}
     for i, region in enumerate(source.regions):
-        _add_region(edit, effect, strip, f"{path}.regions[{i}]", region, colors[region.shutter], first)
+        where = f"{path}.regions[{i}]"
+        if isinstance(region, recipe.Region):
+            _add_region(edit, effect, strip, where, region, colors[region.shutter], first)
+        else:
+            _add_matte(edit, effect, where, region, images, first)
 
 
 def _set_number(edit, owner, path: str, name: str, value: recipe.Keyable, first: float, **curve) -> None:
@@ -48,9 +60,28 @@ def _set_number(edit, owner, path: str, name: str, value: recipe.Keyable, first:
     fcurves.set_keys(edit, f"{path}.{name}", 0, keys, **curve)
 
 
+def _is_matte(region: recipe.AnyRegion) -> bool:
+    return isinstance(region, recipe.MatteRegion)
+
+
+def matte_image(path: str | Path):
+    """The movie, image sequence or picture at a path, to which a region can point. MediaError: there is none."""
+    path = check_file(path)
+    if path.suffix.lower() in IMAGE_SUFFIXES and open_source(path).count > 1:
+        image = bpy.data.images.load(check_name(path))  # not one that is there, which may be no sequence
+        image.source = "SEQUENCE"
+        return image
+    try:
+        return bpy.data.images.load(check_name(path), check_existing=True)
+    except RuntimeError as error:
+        raise MediaError(f"{path.name}: Blender cannot read it ({error})") from None
+
+
 def _check_keys(source: recipe.Recipe, first: float) -> None:
     """EffectError: keys would lie beyond Blender's timeline, or on the same frame, as it counts in float32."""
+    mattes = [region for region in source.regions if not isinstance(region, recipe.Region)]
     numbers = [source.edge_aware, *(shutter.trail for shutter in source.shutters)]
+    numbers += [number for region in mattes for number in (region.opacity, region.width)]
     keyed = [source.time, source.camera, *(number for number in numbers if isinstance(number, list))]
     for keys in (*keyed, *(part.keys for part in (*source.shutters, *source.regions))):
         frames = np.array([key.frame + first for key in keys], dtype=np.float32)
@@ -96,6 +127,25 @@ def _add_region(edit, effect, strip, path: str, source: recipe.Region, color, fi
     region.name, region.shutter, region.width = source.name, source.shutter, source.width
     region.kind = source.kind.upper()
     region.layer = _draw(effect, strip, source, color, first)
+    _set_moves(edit, region, path, source.keys, first)
+
+
+def _add_matte(
+    edit, effect, path: str, source: recipe.MatteRegion | recipe.RampRegion, images: dict, first: float
+) -> None:
+    region = effect.regions.add()
+    region.name, region.shutter, region.kind = source.name, source.shutter, source.kind.upper()
+    region.invert, region.blend = source.invert, source.blend.upper()
+    if isinstance(source, recipe.RampRegion):
+        region.ramp = source.ramp.upper()
+    else:
+        region.matte, region.image = "IMAGE", images[source.path]
+        region.offset, region.timing = source.offset, source.timing.upper()
+        is_named = source.channel not in recipe.CHANNELS
+        region.channel = "NAMED" if is_named else source.channel.upper()
+        region.channel_name = source.channel if is_named else ""
+    _set_number(edit, region, path, "opacity", source.opacity, first)
+    _set_number(edit, region, path, "feather", source.width, first)
     _set_moves(edit, region, path, source.keys, first)
 
 

@@ -8,6 +8,7 @@ from .validation import EffectError
 
 ENGINE = "VIRTUAL_SHUTTER"
 SOURCES = ("MOVIE", "IMAGE", "MOVIECLIP")
+MATTES = ("MATTE", "RAMP")  # kinds of regions that have no strokes
 
 
 def effect_strips(edit) -> list:
@@ -103,6 +104,12 @@ def invalidate(edit, scene=None) -> None:
 
 
 def drawn_regions(effect) -> list:
-    """The regions that have a shutter, in order: those that an effect's state has shapes of."""
+    """The regions of strokes that have a shutter, in order: those that an effect's state has shapes of."""
     names = {shutter.name for shutter in effect.shutters}
-    return [region for region in effect.regions if region.shutter in names]
+    return [region for region in effect.regions if region.shutter in names and region.kind not in MATTES]
+
+
+def matte_regions(effect) -> list:
+    """The regions of mattes and ramps that have a shutter, in order: those that lie over the others."""
+    names = {shutter.name for shutter in effect.shutters}
+    return [region for region in effect.regions if region.shutter in names and region.kind in MATTES]

@@ -1,0 +1,79 @@
+"""What the mattes and ramps of an effect show, as plain data (core.mattes.Content)."""
+
+import os
+from pathlib import Path
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...core import keyframes, mattes
+from ...core.effect import PlacedRamp
+from ...media.matte_files import MatteFile
+from . import matte_strips, source_media, strip_timing, strips, validation
+from .validation import EffectError
+
+def content(edit, effect, strip, region, moves, frames) -> keyframes.Channel:
+    """The channel of a matte or a ramp, sampled at timeline frames; strip: the effect strip that shows it, moves:
+    channels of the region's location, rotation and scale. EffectError, MediaError: there is none."""
+    if region.kind == "RAMP":
+        ramp = validation.word(region, "ramp")
+        if ramp != "LUMINANCE":
+            return PlacedRamp(ramp.lower(), *moves)
+        return mattes.FileFrames(_of_strip(strips.source_of(edit, effect, strip), "luminance"))
+    matte = validation.word(region, "matte")
+    if matte == "STRIP":
+        return _strip_frames(region, frames)
+    first = strip.left_handle if validation.word(region, "timing") == "TIMELINE" else None
+    return mattes.FileFrames(image_file(region), validation.number(region, "offset"), first)
+
+
+def channel(region) -> str:
+    """The channel that is read of a matte, as a recipe has it. EffectError: it has no name."""
+    word = validation.word(region, "channel")
+    if word != "NAMED":
+        return word.lower()
+    if not region.channel_name:
+        raise EffectError(rpt_("{place}: its channel has no name").format(place=validation.place(region)))
+    return region.channel_name
+
+
+def image_path(region) -> Path:
+    """The file of a matte that is an image. EffectError: it has none."""
+    place, image = validation.place(region), region.image
+    if image is None:
+        raise EffectError(rpt_("{place}: it has no matte file").format(place=place))
+    if image.source not in ("FILE", "SEQUENCE", "MOVIE") or image.packed_file or not image.filepath:
+        sentence = rpt_('{place}: image "{image}" is not a movie, image sequence or picture on disk')
+        raise EffectError(sentence.format(place=place, image=image.name))
+    return Path(bpy.path.abspath(image.filepath, library=image.library))
+
+
+def image_file(region) -> MatteFile:
+    """A matte that is an image, to be read. EffectError: it has no file."""
+    path = image_path(region)
+    files = (path,) if region.image.source == "FILE" else None
+    folder = path.parent if region.image.source == "SEQUENCE" else path
+    return MatteFile(path, files, channel(region), (_stamp(path), _stamp(folder)))
+
+
+def _strip_frames(region, frames) -> keyframes.Channel:
+    parts, word = matte_strips.strips_of(region), channel(region)
+    shown = {part.name: mattes.FileFrames(_of_strip(part, word), timing=strip_timing.timing_of(part)) for part in parts}
+    if len(parts) == 1:
+        return shown[parts[0].name]
+    return keyframes.Samples({f: shown[matte_strips.part_at(parts, f).name].at(f) for f in frames})
+
+
+def _of_strip(strip, word: str) -> MatteFile:
+    """A channel of what a movie, image or clip strip reads. MediaError: it has no files."""
+    spec = source_media.spec(strip)
+    return MatteFile(spec.path, spec.files, word, spec.key)
+
+
+def _stamp(path: Path):
+    """Tells a file or a folder that has changed from what it was; None: there is none."""
+    try:
+        status = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return status.st_mtime_ns, status.st_size

@@ -1,0 +1,66 @@
+"""Mattes of an effect for its recipe: files by their path, strips and masks as pictures written beside the recipe."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from ...core import mattes, recipe
+from ...media.matte_files import write_matte
+from ...media.matte_values import MatteValues
+from ..data import matte_content, recipe_export, snapshot, strips, validation
+from . import session
+
+
+def export(edit, effect, strip, path: Path) -> None:
+    """Saves an effect as a recipe at a path; what a recipe cannot point to lies in a folder beside it, "NAME mattes".
+    RecipeError, one of session.FAULTS: it cannot be rendered as it stands, or a matte cannot be read or written.
+    OSError: the recipe cannot be written."""
+    regions = strips.matte_regions(effect)
+    # The recipe is made before anything is written, and once more with what was.
+    recipe_export.recipe_of(edit, effect, strip, [_ramp(region) for region in regions])
+    words = [_words(edit, effect, strip, region, path, number) for number, region in enumerate(regions, 1)]
+    recipe.save(recipe_export.recipe_of(edit, effect, strip, words), path)
+
+
+def _ramp(region) -> recipe.RampRegion:
+    kind = validation.word(region, "ramp") if region.kind == "RAMP" else "LINEAR"
+    return recipe.RampRegion(region.shutter, "ramp", kind.lower())
+
+
+def _words(edit, effect, strip, region, path: Path, number: int) -> recipe.MatteRegion | recipe.RampRegion:
+    if region.kind == "RAMP":
+        return _ramp(region)
+    if region.matte == "IMAGE":
+        file, channel = matte_content.image_path(region), matte_content.channel(region)
+        words = {"channel": channel, "offset": region.offset, "timing": region.timing.lower()}
+        return recipe.MatteRegion(region.shutter, "matte", recipe.relative(file, path.parent), **words)
+    name = re.sub(r"[^\w. -]", "_", region.name).strip(". ") or "Matte"
+    folder = path.with_name(f"{path.stem} mattes") / f"{number} {name}"
+    first = _write(edit, effect, strip, region, folder)
+    return recipe.MatteRegion(region.shutter, "matte", recipe.relative(first, path.parent), timing="timeline")
+
+
+def _write(edit, effect, strip, region, folder: Path) -> Path:
+    """Writes what a matte shows at each timeline frame of the effect strip, or one picture, if it shows that at all of
+    them; the first one's path."""
+    frames = range(strip.left_handle, strip.right_handle)
+    shown = snapshot.take(edit, effect, strip, frames)
+    content = snapshot.region_at(edit, effect, strip, list(effect.regions).index(region), frames).content
+    folder.mkdir(parents=True, exist_ok=True)
+    written: list[tuple[object, np.ndarray]] = []
+    with session.open_source(shown) as source:
+        values = MatteValues(source.width, source.height, source.step)
+        for number, frame in enumerate(frames, 1):
+            with snapshot.translated():
+                matte = mattes.Matte(0, content.at(frame))
+                ((key, array),) = values.values((matte,), session.source_index(shown, frame, source)[0], 1)
+            written.append((key, number))
+            write_matte(folder / f"{number:04d}.png", array)
+        values.close()
+    if len({key for key, _ in written}) == 1:
+        for number in range(2, len(frames) + 1):
+            (folder / f"{number:04d}.png").unlink()
+    return folder / "0001.png"
