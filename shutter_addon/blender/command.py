@@ -22,11 +22,13 @@ import bpy
 from ..compute.device import NoDeviceError
 from ..compute.renderer import DEVICES
 from ..core import atomic_write, recipe, region_keys, retiming
+from ..core.effect import Region
 from ..core.messages import sentence, signed
 from ..media import MediaError, PrefetchSource, camera_tracking, filmed_frames, open_source, registration, tracking
 from ..media.completeness import is_whole_blend, why_short
 from ..media.cuts import ShotSource
 from ..media.files import check_name
+from ..media.matte_files import MatteFile
 from ..media.sequence import by_number
 from .data import inbetween_settings, snapshot, source_media, strips, validation
 from .editing import new_edit

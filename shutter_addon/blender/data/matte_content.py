@@ -12,6 +12,7 @@ from ...media.matte_files import MatteFile
 from . import matte_strips, source_media, strip_timing, strips, validation
 from .validation import EffectError
 
+
 def content(edit, effect, strip, region, moves, frames) -> keyframes.Channel:
     """The channel of a matte or a ramp, sampled at timeline frames; strip: the effect strip that shows it, moves:
     channels of the region's location, rotation and scale. EffectError, MediaError: there is none."""

@@ -351,9 +351,7 @@ class ShutterRegion(_Tracked, PropertyGroup):
         set=matte_strips.choose_strip,
         options={"SKIP_SAVE"},
     )
-    mask: PointerProperty(
-        name="Mask", description="Mask that is the matte", type=bpy.types.Mask, update=_changed
-    )
+    mask: PointerProperty(name="Mask", description="Mask that is the matte", type=bpy.types.Mask, update=_changed)
     channel: EnumProperty(
         name="Channel",
         description="What of the matte says how much of the shutter a pixel gets",
@@ -383,7 +381,11 @@ class ShutterRegion(_Tracked, PropertyGroup):
         options=_UNKEYED,
     )
     blend: EnumProperty(
-        name="Blend", description="How the matte lies over other regions", items=BLENDS, update=_changed, options=_UNKEYED
+        name="Blend",
+        description="How the matte lies over other regions",
+        items=BLENDS,
+        update=_changed,
+        options=_UNKEYED,
     )
     opacity: FloatProperty(
         name="Opacity",
@@ -404,9 +406,7 @@ class ShutterRegion(_Tracked, PropertyGroup):
         step=1,
         update=_changed,
     )
-    ramp: EnumProperty(
-        name="Ramp", description="How the ramp runs", items=RAMPS, update=_changed, options=_UNKEYED
-    )
+    ramp: EnumProperty(name="Ramp", description="How the ramp runs", items=RAMPS, update=_changed, options=_UNKEYED)
     width: FloatProperty(
         name="Width",
         description="Width of the lines as a fraction of the picture's height",

@@ -20,7 +20,7 @@ from ...core.effect import Camera, Region
 from ...core.keyframes import Samples
 from ...media import camera_tracking, tracking
 from ...media.tracking import Tracked
-from ..data import annotations, selection, snapshot, validation
+from ..data import annotations, selection, snapshot, strips, validation
 from ..data.validation import EffectError
 from ..rendering import session
 from . import motion_keys

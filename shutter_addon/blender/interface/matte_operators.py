@@ -7,6 +7,7 @@ from bpy.props import EnumProperty
 from bpy.types import Operator
 from bpy_extras.io_utils import ImportHelper
 
+from ...core.recipe import RecipeError
 from ...media import MediaError
 from ..data import matte_strips, recipe_import, selection, strips, validation
 from ..data.properties import RAMPS
@@ -31,7 +32,7 @@ class SHUTTER_OT_matte_add(_AddsRegion, ImportHelper, Operator):
     def change(self, _context, effect):
         try:
             image = recipe_import.matte_image(bpy.path.abspath(chosen_file(self)))
-        except (MediaError, recipe_import.recipe.RecipeError) as error:
+        except (MediaError, RecipeError) as error:
             raise validation.EffectError(str(error)) from None
         region_edits.add_matte(effect, selection.active_shutter(effect), name=image.name, image=image)
 
@@ -78,7 +79,8 @@ class SHUTTER_OT_matte_mask(_AddsRegion, Operator):
     @classmethod
     def possible(cls, effect):
         return super().possible(effect) and (
-            bool(bpy.data.masks) or refused(cls, rpt_("There is no mask: draw one in the Mask mode of an image or clip"))
+            bool(bpy.data.masks)
+            or refused(cls, rpt_("There is no mask: draw one in the Mask mode of an image or clip"))
         )
 
     def change(self, _context, effect):

@@ -358,7 +358,9 @@ class SHUTTER_OT_draw(_OfShutter, Operator):
         description="Start a new region instead of adding strokes to the active one",
         options={"SKIP_SAVE"},
     )
-    kind: EnumProperty(name="Type", description="How the strokes cover the picture", items=STROKES, options={"SKIP_SAVE"})
+    kind: EnumProperty(
+        name="Type", description="How the strokes cover the picture", items=STROKES, options={"SKIP_SAVE"}
+    )
 
     @classmethod
     def possible(cls, effect):

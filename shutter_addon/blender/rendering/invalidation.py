@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ...media import MediaError
-from ..data import fcurves, geometry, revision, snapshot, source_media, strips
+from ..data import fcurves, geometry, matte_content, matte_strips, revision, snapshot, source_media, strips
 from ..data.snapshot import Snapshot, SourceFiles
 from ..data.validation import EffectError
 from . import render_job, session
@@ -107,6 +107,8 @@ def _signature(edit, effect, strip, looked: dict):
     for region in effect.regions:
         yield region.shutter
         yield from _strokes(effect.scene.annotation, region.layer)
+        if region.kind == "MATTE":
+            yield from _matte(region)
     path = effect.path_from_id()
     for curve in fcurves.curves_under(edit, path + "."):
         yield curve.data_path.removeprefix(path), curve.array_index, curve.mute, curve.extrapolation
@@ -141,10 +143,26 @@ def _strokes(annotation, layer: str):
             yield _bytes(stroke.points, "co", 3, np.float32)
 
 
-def _source(effect, source, looked: dict):
+def _matte(region):
+    """What a matte shows, but for properties of the region."""
+    try:
+        if region.matte == "IMAGE":
+            yield matte_content.image_file(region)
+        for part in matte_strips.strips_of(region) if region.matte == "STRIP" else ():
+            yield from _timing(part)
+            yield source_media.media_key(part)
+    except (MediaError, EffectError) as error:
+        yield str(error)
+
+
+def _timing(source):
     yield tuple(getattr(source, name) for name in _TIMING)
-    yield source_media.reading(source)
     yield tuple(key.timeline_frame for key in getattr(source, "retiming_keys", ()))
+
+
+def _source(effect, source, looked: dict):
+    yield from _timing(source)
+    yield source_media.reading(source)
     try:
         files = snapshot.source_files(effect, source, session.settings().inbetween)
     except (MediaError, EffectError) as error:

@@ -1,0 +1,329 @@
+"""Mattes and ramps in Blender: files, strips of the edit, as they are trimmed and retimed, and what becomes of them."""
+
+import json
+
+import numpy as np
+import pytest
+from support import read_picture, recipe, request, write_frames
+
+from shutter_addon.core import recipe as recipes
+
+WIDTH, HEIGHT, COUNT = 48, 32, 12
+OPTIONS = {"light": "encoded", "interpolation": "value"}
+
+
+@pytest.fixture(scope="module")
+def footage(tmp_path_factory):
+    """Frames of one grey each, 10 levels apart; the first one's path."""
+    frames = [np.full((HEIGHT, WIDTH, 3), 20 + 10 * i, np.uint8) for i in range(COUNT)]
+    return write_frames(tmp_path_factory.mktemp("footage"), frames)
+
+
+def values(index):
+    """What frame `index` of a matte says (H, W), 0 to 255: not the same anywhere, nor at any two frames."""
+    y, x = np.indices((HEIGHT, WIDTH))
+    return ((x * 5 + y * 3 + index * 17) % 256).astype(np.uint8)
+
+
+@pytest.fixture
+def matte(tmp_path):
+    """Its first file."""
+    return write_frames(tmp_path / "matte", [np.stack([values(i)] * 3, axis=-1) for i in range(COUNT)], "m")
+
+
+def region(path=None, **fields):
+    kind = {"kind": "matte", "path": str(path)} if path else {"kind": "ramp"}
+    return {"name": "m", "shutter": "S1", **kind, **fields}
+
+
+def data(*regions, **options):
+    """Where a matte is 1, the frame after the shown one is seen, else the shown one."""
+    return recipe(2, [1, 0], [0, 1], regions=regions, **OPTIONS | options)
+
+
+@pytest.fixture
+def shown(bpy, edit, footage):
+    """Makes an effect of a recipe; its strip, the effect, and a function that gives the coefficients of its second
+    shutter (H, W), as the pictures at a timeline frame show them."""
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import add_effect
+    from shutter_addon.blender.rendering import session
+    from shutter_addon.core import light
+
+    def show(content, change=lambda source: None):
+        source = edit.sequence_editor.strips.new_image("images", str(footage), 1, 1)
+        for i in range(2, COUNT + 1):
+            source.elements.append(f"f{i:04d}.png")
+        change(source)
+        strip, effect = add_effect.add_effect(edit, source)
+        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(content)))
+
+        def coefficients(frame):
+            asked = request(edit, effect, strip, frame)
+            levels = 255 * light.to_encoded(asked.picture()[..., 0].astype(float))
+            return (levels - (20 + 10 * asked.index)) / 10
+
+        return strip, effect, coefficients
+
+    yield show
+    session.forget()
+
+
+def strip_of(edit, path, frame=1, count=COUNT, name="matte"):
+    found = edit.sequence_editor.strips.new_image(name, str(path), 4, frame)
+    for i in range(2, count + 1):
+        found.elements.append(f"m{i:04d}.png")
+    return found
+
+
+def close(found, expected):
+    """To a hundredth: a picture's levels lie ten apart."""
+    return np.abs(found - expected).max() < 0.01
+
+
+def test_a_file_follows_the_footage(shown, matte):
+    """Trimmed and in reverse, the matte's frames stay with those they belong to."""
+
+    def change(source):
+        source.left_handle = 4
+        source.use_reverse_frames = True
+
+    _strip, _effect, coefficients = shown(data(region(matte)), change)
+    for frame in (4, 7, 11):
+        # the last frame has none after it
+        assert close(coefficients(frame), -values(COUNT - frame) / 255)
+
+
+def test_the_timeline_and_an_offset(shown, matte):
+    def change(source):
+        source.left_handle = 4
+
+    content = data(region(matte, timing="timeline", offset=2))
+    _strip, _effect, coefficients = shown(content, change)
+    assert close(coefficients(6), values(6 - 4 + 2) / 255)
+    assert close(coefficients(11), values(9) / 255)
+
+
+def test_before_and_behind_its_frames_a_matte_holds(shown, matte):
+    _strip, _effect, coefficients = shown(data(region(matte, offset=8)))
+    assert close(coefficients(9), values(COUNT - 1) / 255)
+    _strip.id_data.virtual_shutter.effects[0].regions[0].offset = -3
+    assert close(coefficients(2), values(0) / 255)
+
+
+def test_one_picture_holds_for_the_film(shown, matte):
+    (matte.parent / "m0002.png").unlink()
+    still = matte.rename(matte.with_name("still.png"))
+    _strip, effect, coefficients = shown(data(region(still)))
+    assert effect.regions[0].image.source == "FILE"
+    for frame in (1, 8):
+        assert close(coefficients(frame), values(0) / 255)
+
+
+@pytest.mark.parametrize("channel", ["red", "green", "blue", "alpha", "luminance"])
+def test_channels(shown, tmp_path, channel):
+    rng = np.random.default_rng(1)
+    picture = rng.integers(0, 256, (HEIGHT, WIDTH, 4)).astype(np.uint8)
+    path = write_frames(tmp_path / "c", [picture], "c")
+    _strip, _effect, coefficients = shown(data(region(path, channel=channel)))
+    samples = dict(zip(("red", "green", "blue", "alpha"), np.moveaxis(picture / 255, -1, 0), strict=True))
+    samples["luminance"] = picture[..., :3] @ [0.2126, 0.7152, 0.0722] / 255
+    assert close(coefficients(3), samples[channel])
+
+
+def test_keyed_opacity_invert_and_order(shown, matte):
+    keys = [{"frame": 2, "value": 0}, {"frame": 10, "value": 1}]
+    regions = region(matte, opacity=keys), region(matte, invert=True, opacity=0.5, offset=3, name="n")
+    _strip, effect, coefficients = shown(data(*regions))
+    first, second = values(5) / 255 * 0.5, (1 - values(8) / 255) * 0.5
+    assert close(coefficients(6), first * (1 - second) + second)
+    effect.regions[1].blend = "ADD"
+    assert close(coefficients(6), np.minimum(first + second, 1))
+
+
+def test_a_strip_is_read_as_it_is_trimmed_muted_and_retimed(edit, shown, matte):
+    strip, effect, coefficients = shown(data(region(matte)))
+    own = strip_of(edit, matte, 5)
+    own.mute, own.use_reverse_frames = True, True
+    effect.regions[0].matte = "STRIP"
+    effect.regions[0].strip_name = own.name
+    assert close(coefficients(7), values(COUNT - 3) / 255)
+    assert close(coefficients(2), values(COUNT - 1) / 255)  # before it begins
+    own.use_reverse_frames = False
+    assert close(coefficients(7), values(2) / 255)
+    own.name = "another name"
+    assert effect.regions[0].strip_name == "another name"
+    assert close(coefficients(7), values(2) / 255)
+    right = own.split(frame=8, split_method="SOFT")
+    right.content_start -= 2
+    assert close(coefficients(7), values(2) / 255)
+    assert close(coefficients(9), values(6) / 255)
+    for part in (own, right):
+        edit.sequence_editor.strips.remove(part)
+    with pytest.raises(Exception, match='region "m": its matte strip was deleted'):
+        coefficients(7)
+
+
+def test_sentences_for_what_is_not_there(bpy, edit, shown, matte):
+    strip, effect, coefficients = shown(data(region(matte)))
+    one = effect.regions[0]
+    matte.with_name("m0006.png").write_bytes(b"no picture")
+    with pytest.raises(Exception, match="m0006.png"):
+        coefficients(6)
+    assert close(coefficients(7), values(6) / 255)
+    one.channel = "NAMED"
+    with pytest.raises(Exception, match='region "m": its channel has no name'):
+        coefficients(7)
+    one.channel_name = "Depth.Z"
+    with pytest.raises(Exception, match="m0001.png: has no channel Depth.Z"):
+        coefficients(7)
+    one.channel, one.image = "RED", None
+    with pytest.raises(Exception, match='region "m": it has no matte file'):
+        coefficients(7)
+    one.image = bpy.data.images.new("generated", 4, 4)
+    with pytest.raises(Exception, match='image "generated" is not a movie, image sequence or picture on disk'):
+        coefficients(7)
+    one.matte = "STRIP"
+    with pytest.raises(Exception, match='region "m": it has no matte strip'):
+        coefficients(7)
+    own = edit.sequence_editor.strips.new_effect("color", "COLOR", 6, 1, length=5)
+    one.strip_name = own.name
+    with pytest.raises(Exception, match='its matte strip "color" is not a movie, image or clip strip'):
+        coefficients(7)
+    one.matte = "MASK"
+    with pytest.raises(Exception, match='region "m": it has no mask'):
+        coefficients(7)
+    one.opacity = 0
+    one.kind = "RAMP"
+    assert close(coefficients(7), 0)
+
+
+def test_a_recipe_whose_matte_is_missing_changes_nothing(shown, matte):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.media import MediaError
+
+    strip, effect, coefficients = shown(data(region(matte)))
+    gone = recipes.parse(json.dumps(data(region(matte.with_name("gone.png")))))
+    with pytest.raises(MediaError, match="gone.png: no such file"):
+        recipe_import.apply(strip.id_data, effect, strip, gone)
+    assert close(coefficients(3), values(2) / 255)
+
+
+def test_drawn_regions_stay_beside_mattes(shown, matte):
+    stroke = {"shutter": "S1", "strokes": [[[0.5, 0], [0.5, 1]]], "width": 0.2, "name": "s"}
+    content = data(region(matte, opacity=0.5), stroke, border=True)
+    _strip, _effect, coefficients = shown(content)
+    found, m = coefficients(3), values(2) / 255 * 0.5
+    assert close(found[:, WIDTH // 2], (m + (1 - m))[:, WIDTH // 2])
+    assert close(found[:, 0], m[:, 0])
+
+
+def test_copies_have_mattes_of_their_own(bpy, edit, shown, matte):
+    from shutter_addon.blender.editing import lifecycle
+
+    strip, effect, coefficients = shown(data(region(matte)))
+    own = strip_of(edit, matte, 3)
+    effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
+    copy = edit.copy()
+    lifecycle.update()
+    (other,) = copy.virtual_shutter.effects
+    assert other.regions[0].strip_name == own.name
+    own.name = "renamed"
+    assert other.regions[0].strip_name == "matte"
+    assert close(coefficients(5), values(2) / 255)
+
+
+def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.rendering import matte_export
+
+    content = data(
+        region(matte, offset=1, channel="green", opacity=0.25),
+        region(matte, name="strip/1", width=0.0),
+        region(ramp="radial", keys=[{"frame": 1, "location": [0.25, 0]}], blend="add", name="r"),
+        region(ramp="luminance", opacity=0.5, name="l"),
+    )
+    strip, effect, coefficients = shown(content)
+    own = strip_of(edit, matte, 3, 6)
+    effect.regions[1].matte, effect.regions[1].strip_name = "STRIP", own.name
+    (tmp_path / "out").mkdir()
+    matte_export.export(edit, effect, strip, tmp_path / "out" / "r.json")
+    saved = recipes.load(tmp_path / "out" / "r.json")
+    assert saved.regions[0].path == "../matte/m0001.png"
+    assert saved.regions[0] == recipes.parse(json.dumps(content)).regions[0].__class__(
+        **{**vars(recipes.parse(json.dumps(content)).regions[0]), "path": "../matte/m0001.png"}
+    )
+    assert saved.regions[1].path == "r mattes/2 strip_1/0001.png"
+    before = [coefficients(frame) for frame in (1, 4, 10)]
+    edit.sequence_editor.strips.remove(own)
+    recipe_import.apply(edit, effect, strip, saved, tmp_path / "out")
+    for frame, expected in zip((1, 4, 10), before, strict=True):
+        assert close(coefficients(frame), expected)
+    again = tmp_path / "out" / "again.json"
+    matte_export.export(edit, effect, strip, again)
+    assert recipes.load(again) == saved
+
+
+def test_a_still_strip_is_exported_as_one_picture(edit, shown, matte, tmp_path):
+    from shutter_addon.blender.rendering import matte_export
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    own = edit.sequence_editor.strips.new_image("still", str(matte), 4, 1)
+    effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
+    matte_export.export(edit, effect, strip, tmp_path / "r.json")
+    assert [path.name for path in (tmp_path / "r mattes" / "1 m").iterdir()] == ["0001.png"]
+    assert np.abs(read_picture(tmp_path / "r mattes" / "1 m" / "0001.png")[..., 0] - values(0)).max() < 0.01
+
+
+def test_a_time_map_shows_each_column_at_its_moment(bpy, edit, shown):
+    from shutter_addon.blender.editing import time_map
+
+    content = data(light="encoded", interpolation="value")
+    strip, effect, coefficients = shown(content | {"window": 9, "shutters": [{"name": "A", "bars": [1] * 9}]})
+    region_ = time_map.add(effect, "LINEAR")
+    assert [shutter.name for shutter in effect.shutters][0] == "First"
+    assert region_.shutter == "Last"
+    found = coefficients(2)
+    # a column at x shows 8x frames later, between two frames both in proportion
+    assert close(found, np.broadcast_to(8 * (np.arange(WIDTH) + 0.5) / WIDTH, found.shape))
+
+
+def test_what_panels_tell(edit, shown, matte):
+    from shutter_addon.blender.rendering import matte_look
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    one = effect.regions[0]
+
+    def look():
+        return tuple(matte_look.look(edit, effect, strip, one))
+
+    assert look() == (f"{WIDTH} × {HEIGHT}, {COUNT} frames", "", "")
+    one.offset = 1
+    assert look()[2] == "Shorter than the film: its last frame holds"
+    one.matte, one.strip_name = "STRIP", strip_of(edit, matte, 1, 4).name
+    assert look() == (f"{WIDTH} × {HEIGHT}, 4 frames", "", "The strip ends before the Shutter strip: its last frame holds")
+    one.channel = "NAMED"
+    assert look() == ("", 'region "m": its channel has no name', "")
+
+
+def test_weights_are_read_back(tmp_path, footage):
+    """What `--weights` writes gives the same picture as mattes, for each shutter but the default one."""
+    from shutter_addon.blender import command
+
+    stroke = {"name": "s", "shutter": "S1", "strokes": [[[0.3, 0.2], [0.4, 0.9]]]}
+    content = recipe(4, [1, 0, 0, 0], [0, 0, 0, 1], [1, 1, 1, 1], border=True, regions=[stroke])
+    content["regions"].append({"name": "l", "shutter": "S2", "kind": "lasso", "strokes": [[[0.6, 0.2], [0.9, 0.3], [0.7, 0.8]]]})
+    (tmp_path / "r.json").write_text(json.dumps(content))
+    base = ["render", str(footage), "--frames", "2:4"]
+    weights = tmp_path / "weights"
+    assert command.main([*base, "--recipe", str(tmp_path / "r.json"), "--output", str(tmp_path / "a"), "--weights", str(weights)]) == 0
+    mattes = [
+        {"shutter": name, "kind": "matte", "path": "weights/0002.exr", "offset": -1, "channel": name, "blend": "add"}
+        for name in ("S1", "S2")
+    ]
+    (tmp_path / "m.json").write_text(json.dumps(content | {"regions": mattes, "border": False}))
+    assert command.main([*base, "--recipe", str(tmp_path / "m.json"), "--output", str(tmp_path / "b")]) == 0
+    for frame in range(2, 5):
+        first, second = (read_picture(tmp_path / folder / f"{frame:04d}.png") for folder in "ab")
+        assert np.abs(first - second).max() <= 1
+        assert np.ptp(first) > 15
