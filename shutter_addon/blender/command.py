@@ -186,11 +186,11 @@ def _files(medium) -> list[Path]:
 
 def _mattes(source_recipe, folder: Path) -> list[Path]:
     """The files of a recipe's mattes; folder: where the recipe lies. MediaError: there are none."""
-    paths = {folder / region.path for region in source_recipe.regions if isinstance(region, recipe.MatteRegion)}
     found = []
-    for path in sorted(paths):
-        with MatteFile(path).open() as matte:
-            found += matte.files
+    for region in source_recipe.regions:
+        if isinstance(region, recipe.MatteRegion):
+            with MatteFile(folder / region.path, region.channel).open() as matte:
+                found += matte.files
     return found
 
 

@@ -6,8 +6,8 @@ from collections.abc import Hashable
 
 import numpy as np
 
+from ..core.matte_grid import feathered, fitted
 from ..core.mattes import FileFrame, Matte, MatteFile, MatteSource
-from .mattes import feathered, fitted
 
 
 class MatteValues:

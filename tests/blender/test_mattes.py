@@ -91,7 +91,7 @@ def test_a_file_follows_the_footage(shown, matte):
     _strip, _effect, coefficients = shown(data(region(matte)), change)
     for frame in (4, 7, 11):
         # the last frame has none after it
-        assert close(coefficients(frame), -values(COUNT - frame) / 255)
+        assert close(-coefficients(frame), values(COUNT - frame) / 255)
 
 
 def test_the_timeline_and_an_offset(shown, matte):
@@ -301,7 +301,11 @@ def test_what_panels_tell(edit, shown, matte):
     one.offset = 1
     assert look()[2] == "Shorter than the film: its last frame holds"
     one.matte, one.strip_name = "STRIP", strip_of(edit, matte, 1, 4).name
-    assert look() == (f"{WIDTH} × {HEIGHT}, 4 frames", "", "The strip ends before the Shutter strip: its last frame holds")
+    assert look() == (
+        f"{WIDTH} × {HEIGHT}, 4 frames",
+        "",
+        "The strip ends before the Shutter strip: its last frame holds",
+    )
     one.channel = "NAMED"
     assert look() == ("", 'region "m": its channel has no name', "")
 
@@ -312,11 +316,18 @@ def test_weights_are_read_back(tmp_path, footage):
 
     stroke = {"name": "s", "shutter": "S1", "strokes": [[[0.3, 0.2], [0.4, 0.9]]]}
     content = recipe(4, [1, 0, 0, 0], [0, 0, 0, 1], [1, 1, 1, 1], border=True, regions=[stroke])
-    content["regions"].append({"name": "l", "shutter": "S2", "kind": "lasso", "strokes": [[[0.6, 0.2], [0.9, 0.3], [0.7, 0.8]]]})
+    content["regions"].append(
+        {"name": "l", "shutter": "S2", "kind": "lasso", "strokes": [[[0.6, 0.2], [0.9, 0.3], [0.7, 0.8]]]}
+    )
     (tmp_path / "r.json").write_text(json.dumps(content))
     base = ["render", str(footage), "--frames", "2:4"]
     weights = tmp_path / "weights"
-    assert command.main([*base, "--recipe", str(tmp_path / "r.json"), "--output", str(tmp_path / "a"), "--weights", str(weights)]) == 0
+    assert (
+        command.main(
+            [*base, "--recipe", str(tmp_path / "r.json"), "--output", str(tmp_path / "a"), "--weights", str(weights)]
+        )
+        == 0
+    )
     mattes = [
         {"shutter": name, "kind": "matte", "path": "weights/0002.exr", "offset": -1, "channel": name, "blend": "add"}
         for name in ("S1", "S2")

@@ -2,20 +2,22 @@
 
 import os
 from pathlib import Path
+from typing import NamedTuple
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import keyframes, mattes
+from ...core import keyframes, mattes, retiming
 from ...core.effect import PlacedRamp
 from ...media.matte_files import MatteFile
-from . import matte_strips, source_media, strip_timing, strips, validation
+from . import inbetween_settings, matte_strips, source_media, strip_timing, strips, validation
 from .validation import EffectError
 
 
-def content(edit, effect, strip, region, moves, frames) -> keyframes.Channel:
+def content(edit, effect, strip, region, moves, frames, time: keyframes.Channel | None) -> keyframes.Channel:
     """The channel of a matte or a ramp, sampled at timeline frames; strip: the effect strip that shows it, moves:
-    channels of the region's location, rotation and scale. EffectError, MediaError: there is none."""
+    channels of the region's location, rotation and scale, time: as of core.effect.Effect. EffectError, MediaError:
+    there is none."""
     if region.kind == "RAMP":
         ramp = validation.word(region, "ramp")
         if ramp != "LUMINANCE":
@@ -24,6 +26,8 @@ def content(edit, effect, strip, region, moves, frames) -> keyframes.Channel:
     matte = validation.word(region, "matte")
     if matte == "STRIP":
         return _strip_frames(region, frames)
+    if matte == "MASK":
+        return _mask_shapes(edit, effect, strip, region, frames, time)
     first = strip.left_handle if validation.word(region, "timing") == "TIMELINE" else None
     return mattes.FileFrames(image_file(region), validation.number(region, "offset"), first)
 
@@ -54,7 +58,53 @@ def image_file(region) -> MatteFile:
     path = image_path(region)
     files = (path,) if region.image.source == "FILE" else None
     folder = path.parent if region.image.source == "SEQUENCE" else path
-    return MatteFile(path, files, channel(region), (_stamp(path), _stamp(folder)))
+    return MatteFile(path, channel(region), files, (_stamp(path), _stamp(folder)))
+
+
+def _mask_shapes(edit, effect, strip, region, frames, time) -> keyframes.Channel:
+    """A mask's shapes at the source's frames, of which the first is the mask's start, as a Mask strip on it has it."""
+    mask = region.mask
+    if mask is None:
+        raise EffectError(rpt_("{place}: it has no mask").format(place=validation.place(region)))
+    source = strips.source_of(edit, effect, strip)
+    medium, timing = _Medium.of(source, inbetween_settings.factor(effect)), strip_timing.timing_of(source)
+
+    def shape(frame):
+        if time is None:
+            index = retiming.source_frame(timing, frame, medium)
+        else:
+            index = retiming.nearest(time.at(frame)[0] - 1, medium.step, medium.count)
+        from . import mask_data
+
+        return mask_data.mask_at(mask, mask.frame_start + index / medium.step)
+
+    return keyframes.Samples({frame: _tried(shape, frame) for frame in frames})
+
+
+class _Medium(NamedTuple):
+    """A source's length and rate as its strip has them, for core.retiming; nothing is opened."""
+
+    filmed: int
+    step: int
+    fps: float
+
+    @classmethod
+    def of(cls, source, step: int) -> "_Medium":
+        clip = source.clip if source.type == "MOVIECLIP" else None
+        fps = clip.fps if clip and clip.source == "MOVIE" else getattr(source, "fps", 0.0) if not clip else 0.0
+        return cls(source.content_duration, step, fps * step)
+
+    @property
+    def count(self) -> int:
+        return (self.filmed - 1) * self.step + 1
+
+
+def _tried(function, *arguments):
+    """The result, or the EffectError in its place, which is raised where the value is asked for."""
+    try:
+        return function(*arguments)
+    except EffectError as error:
+        return error
 
 
 def _strip_frames(region, frames) -> keyframes.Channel:
@@ -68,7 +118,7 @@ def _strip_frames(region, frames) -> keyframes.Channel:
 def _of_strip(strip, word: str) -> MatteFile:
     """A channel of what a movie, image or clip strip reads. MediaError: it has no files."""
     spec = source_media.spec(strip)
-    return MatteFile(spec.path, spec.files, word, spec.key)
+    return MatteFile(spec.path, word, spec.files, spec.key)
 
 
 def _stamp(path: Path):

@@ -8,8 +8,9 @@ from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core import limits, recipe
-from ...media import MediaError, open_source
-from ...media.files import check_file, check_name
+from ...media import MediaError
+from ...media.files import check_name
+from ...media.matte_files import MatteFile
 from ...media.sequence import IMAGE_SUFFIXES
 from . import fcurves, geometry
 from .annotations import annotation, picture_size
@@ -23,7 +24,8 @@ def apply(edit, effect, strip, source: recipe.Recipe, folder: Path = Path()) -> 
     changed."""
     first = strip.left_handle - 1
     _check_keys(source, first)
-    images = {region.path: matte_image(folder / region.path) for region in source.regions if _is_matte(region)}
+    mattes = [region for region in source.regions if isinstance(region, recipe.MatteRegion)]
+    images = {region.path: matte_image(folder / region.path, region.channel) for region in mattes}
     clear(edit, effect)
     # Bars per frame before the factor, which else would change the window.
     effect.bars_per_frame, effect.inbetween = source.inbetween, str(source.inbetween)
@@ -60,14 +62,12 @@ def _set_number(edit, owner, path: str, name: str, value: recipe.Keyable, first:
     fcurves.set_keys(edit, f"{path}.{name}", 0, keys, **curve)
 
 
-def _is_matte(region: recipe.AnyRegion) -> bool:
-    return isinstance(region, recipe.MatteRegion)
-
-
-def matte_image(path: str | Path):
-    """The movie, image sequence or picture at a path, to which a region can point. MediaError: there is none."""
-    path = check_file(path)
-    if path.suffix.lower() in IMAGE_SUFFIXES and open_source(path).count > 1:
+def matte_image(path: str | Path, channel: str = "luminance"):
+    """The movie, image sequence or picture at a path, to which a region can point. MediaError: there is none, or none
+    with such a channel."""
+    with MatteFile(Path(path), channel).open() as matte:
+        path, count = matte.path, matte.count
+    if path.suffix.lower() in IMAGE_SUFFIXES and count > 1:
         image = bpy.data.images.load(check_name(path))  # not one that is there, which may be no sequence
         image.source = "SEQUENCE"
         return image

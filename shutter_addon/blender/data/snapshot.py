@@ -115,6 +115,7 @@ def read(edit, effect, strip, frames, *, thorough: bool = False) -> model.Effect
     followed = {shutter.follow_region for shutter in effect.shutters if shutter.follow == "REGION"}
     around = _around(effect, frames)
     placement = _placement(curves, effect, strip, around)
+    time = _source_time(curves, path, effect, around) if effect.use_source_time else None
     regions = tuple(
         _any_region(
             curves,
@@ -125,6 +126,7 @@ def read(edit, effect, strip, frames, *, thorough: bool = False) -> model.Effect
             names.index(region.shutter),
             placement,
             around if region.name in followed else frames,
+            time,
         )
         for i, region in enumerate(effect.regions)
         if region.shutter in names
@@ -145,7 +147,7 @@ def read(edit, effect, strip, frames, *, thorough: bool = False) -> model.Effect
         ),
         regions,
         options,
-        _source_time(curves, path, effect, around) if effect.use_source_time else None,
+        time,
         _channel(curves, effect, path, "edge_aware", frames),
         camera,
     )
@@ -196,7 +198,8 @@ def region_at(edit, effect, strip, index: int, frames) -> model.Region | model.M
     frame."""
     curves, path = Curves(edit), f"{effect.path_from_id()}.regions[{index}]"
     placement = _placement(curves, effect, strip, frames)
-    return _any_region(curves, path, effect, strip, effect.regions[index], 0, placement, frames)
+    time = _source_time(curves, effect.path_from_id(), effect, frames) if effect.use_source_time else None
+    return _any_region(curves, path, effect, strip, effect.regions[index], 0, placement, frames, time)
 
 
 def camera_at(edit, effect, frames) -> model.Camera:
@@ -355,12 +358,12 @@ def check_bar_count(shutter, window: int) -> None:
 
 
 def _any_region(
-    curves: Curves, path: str, effect, strip, region, shutter: int, placement, frames
+    curves: Curves, path: str, effect, strip, region, shutter: int, placement, frames, time
 ) -> model.Region | model.MatteRegion:
     if region.kind not in strips.MATTES:
         return _region(curves, path, effect, region, shutter, placement, frames)
     moves = _moves(curves, region, path, frames)
-    content = _tried(matte_content.content, effect.id_data, effect, strip, region, moves, frames)
+    content = _tried(matte_content.content, effect.id_data, effect, strip, region, moves, frames, time)
     blend = _tried(validation.word, region, "blend")
     if faults := [found for found in (content, blend) if isinstance(found, UserError)]:
         content, blend = keyframes.Constant(faults[0]), "OVER"
