@@ -142,7 +142,7 @@ def test_keyed_opacity_invert_and_order(shown, matte):
 
 
 def test_a_strip_is_read_as_it_is_trimmed_muted_and_retimed(edit, shown, matte):
-    strip, effect, coefficients = shown(data(region(matte)))
+    _strip, effect, coefficients = shown(data(region(matte)))
     own = strip_of(edit, matte, 5)
     own.mute, own.use_reverse_frames = True, True
     effect.regions[0].matte = "STRIP"
@@ -165,7 +165,7 @@ def test_a_strip_is_read_as_it_is_trimmed_muted_and_retimed(edit, shown, matte):
 
 
 def test_sentences_for_what_is_not_there(bpy, edit, shown, matte):
-    strip, effect, coefficients = shown(data(region(matte)))
+    _strip, effect, coefficients = shown(data(region(matte)))
     one = effect.regions[0]
     matte.with_name("m0006.png").write_bytes(b"no picture")
     with pytest.raises(Exception, match="m0006.png"):
@@ -221,7 +221,7 @@ def test_drawn_regions_stay_beside_mattes(shown, matte):
 def test_copies_have_mattes_of_their_own(bpy, edit, shown, matte):
     from shutter_addon.blender.editing import lifecycle
 
-    strip, effect, coefficients = shown(data(region(matte)))
+    _strip, effect, coefficients = shown(data(region(matte)))
     own = strip_of(edit, matte, 3)
     effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
     copy = edit.copy()
@@ -279,9 +279,9 @@ def test_a_time_map_shows_each_column_at_its_moment(bpy, edit, shown):
     from shutter_addon.blender.editing import time_map
 
     content = data(light="encoded", interpolation="value")
-    strip, effect, coefficients = shown(content | {"window": 9, "shutters": [{"name": "A", "bars": [1] * 9}]})
+    _strip, effect, coefficients = shown(content | {"window": 9, "shutters": [{"name": "A", "bars": [1] * 9}]})
     region_ = time_map.add(effect, "LINEAR")
-    assert [shutter.name for shutter in effect.shutters][0] == "First"
+    assert next(shutter.name for shutter in effect.shutters) == "First"
     assert region_.shutter == "Last"
     found = coefficients(2)
     # a column at x shows 8x frames later, between two frames both in proportion
@@ -332,8 +332,7 @@ def test_weights_are_read_back(tmp_path, footage):
         {"shutter": name, "kind": "matte", "path": "weights/0002.exr", "offset": -1, "channel": name, "blend": "add"}
         for name in ("S1", "S2")
     ]
-    (tmp_path / "m.json").write_text(json.dumps(content | {"regions": mattes, "border": False}))
-    assert command.main([*base, "--recipe", str(tmp_path / "m.json"), "--output", str(tmp_path / "b")]) == 0
+    render("b", content | {"regions": mattes, "border": False})
     for frame in range(2, 5):
         first, second = (read_picture(tmp_path / folder / f"{frame:04d}.png") for folder in "ab")
         assert np.abs(first - second).max() <= 1

@@ -35,7 +35,8 @@ def test_a_turned_ramp_goes_from_corner_to_corner(rotation):
     gradient = -np.gradient(found.astype(float))[0][5, 5], np.gradient(found.astype(float))[1][5, 5]  # up, right
     assert np.arctan2(*gradient) % (2 * np.pi) == pytest.approx(turn % (2 * np.pi), abs=1e-3)
     half = np.hypot(*gradient) / 2  # the outermost pixels' centres lie within half a pixel's diagonal
-    assert 0 <= found.min() <= 2 * half and 1 - 2 * half <= found.max() <= 1
+    assert 0 <= found.min() <= 2 * half
+    assert 1 - 2 * half <= found.max() <= 1
 
 
 def test_a_ramp_is_placed_about_the_pictures_centre():
@@ -60,7 +61,8 @@ def test_an_angle_goes_round_clockwise_from_the_top():
     assert at(found, centre[0] + 10, centre[1]) == pytest.approx(0.25, abs=1e-3)
     assert at(found, centre[0], centre[1] + 10) == pytest.approx(0.5, abs=1e-3)
     assert at(found, centre[0] - 10, centre[1]) == pytest.approx(0.75, abs=1e-3)
-    assert found[3, WIDTH // 2] < 0.02 and found[3, WIDTH // 2 - 1] > 0.98  # either side of the top
+    assert found[3, WIDTH // 2] < 0.02
+    assert found[3, WIDTH // 2 - 1] > 0.98
     turned = Ramp("angle", rotation=90).values(WIDTH, HEIGHT)  # counter-clockwise: it starts on the left
     assert at(turned, centre[0], centre[1] - 10) == pytest.approx(0.25, abs=1e-3)
 
@@ -71,7 +73,9 @@ def test_values_stay_within_0_and_1():
         kind = ("linear", "radial", "angle")[rng.integers(3)]
         numbers = tuple(rng.normal(0, 3, 2)), rng.normal(0, 1e4), rng.normal(0, 2) * (rng.random() > 0.1)
         found = Ramp(kind, *numbers).values(9, 14)
-        assert found.dtype == np.float32 and found.min() >= 0 and found.max() <= 1
+        assert found.dtype == np.float32
+        assert found.min() >= 0
+        assert found.max() <= 1
 
 
 class Opened:
@@ -92,4 +96,5 @@ def test_blended_leaves_what_it_is_given():
     coefficients = np.array([1.0, 0.0]).reshape(2, 1, 1)
     matte = mattes.Matte(1, Ramp("linear"))
     found = mattes.blended(coefficients, (matte,), [matte.content.values(4, 2)])
-    assert found.shape == (2, 2, 4) and coefficients.ravel().tolist() == [1, 0]
+    assert found.shape == (2, 2, 4)
+    assert coefficients.ravel().tolist() == [1, 0]
