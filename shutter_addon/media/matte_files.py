@@ -39,19 +39,14 @@ class MatteSource:
     Values are samples as they are stored: no transfer function, no colour space, alpha neither multiplied nor divided;
     a movie's range is expanded to 0 … 1. Luminance is that of Rec.709's weights, and of a grey file its grey.
 
-    path: the movie, or the first image; width, height: pixels; count, filmed: of frames, 1 for a still picture
-    fps: frames per second, None for images; files: the movie, or those of the frames
+    path: the movie, or the first image; width, height: pixels; count: of frames, 1 for a still picture
     """
-
-    step = 1  # as of a source without in-between frames
 
     def __init__(self, path, channel="luminance", *, files=None):
         """As MatteFile has them."""
         self._frames = open_channel(path, channel, files=files)
         self.path, self.count = self._frames.path, self._frames.count
-        self.filmed = self.count
         self.width, self.height = self._frames.width, self._frames.height
-        self.fps, self.files = self._frames.fps, self._frames.files
 
     def read(self, index: int) -> np.ndarray:
         """The values of a frame, a new array (height, width) float32, 0 … 1, top row first; what is no number is 0.
@@ -77,29 +72,10 @@ def _values(samples: np.ndarray) -> np.ndarray:
         return np.ones(samples.shape[:2], np.float32)
     values = samples[..., 0]
     if samples.shape[2] == 3:
-        values = sum(samples[..., i] * REC709[i] for i in range(3))
+        values = samples[..., 0] * REC709[0]
+        for i in (1, 2):
+            values += samples[..., i] * REC709[i]
     if samples.dtype.kind == "u":
         return values / np.float32(np.iinfo(samples.dtype).max)
     values = np.fmax(values.astype(np.float32), 0)  # unlike `maximum`, it gives 0 for what is no number
     return np.minimum(values, 1, out=values)
-
-
-def write_matte(path: Path, values: np.ndarray) -> None:
-    """Writes values (h, w) float32, 0 to 1, as a grey PNG of 16 bits, whole or not at all. MediaError: it cannot be."""
-    import OpenImageIO
-
-    from ..core import atomic_write
-    from .errors import MediaError
-    from .files import check_name
-
-    height, width = values.shape
-    spec = OpenImageIO.ImageSpec(width, height, 1, OpenImageIO.UINT16)
-    samples = np.rint(values * np.float32(65535)).astype(np.uint16)
-    try:
-        with atomic_write.writing(path) as part:
-            output = OpenImageIO.ImageOutput.create(check_name(part))
-            written = output.open(check_name(part), spec) and output.write_image(samples[..., None])
-            if not (output.close() and written):
-                raise MediaError(f"{path}: {output.geterror() or 'cannot be written'}")
-    except OSError as error:
-        raise MediaError(f"{path}: cannot be written ({error.strerror or error})") from None
