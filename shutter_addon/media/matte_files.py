@@ -39,14 +39,19 @@ class MatteSource:
     Values are samples as they are stored: no transfer function, no colour space, alpha neither multiplied nor divided;
     a movie's range is expanded to 0 … 1. Luminance is that of Rec.709's weights, and of a grey file its grey.
 
-    path: the movie, or the first image; width, height: pixels; count: of frames, 1 for a still picture
+    path: the movie, or the first image; width, height: pixels; count, filmed: of frames, 1 for a still picture
+    fps: frames per second, None for images; files: the movie, or those of the frames
     """
+
+    step = 1  # as of a source without in-between frames
 
     def __init__(self, path, channel="luminance", *, files=None):
         """As MatteFile has them."""
         self._frames = open_channel(path, channel, files=files)
         self.path, self.count = self._frames.path, self._frames.count
+        self.filmed = self.count
         self.width, self.height = self._frames.width, self._frames.height
+        self.fps, self.files = self._frames.fps, self._frames.files
 
     def read(self, index: int) -> np.ndarray:
         """The values of a frame, a new array (height, width) float32, 0 … 1, top row first; what is no number is 0.

@@ -130,8 +130,10 @@ class SequenceChannel:
     window, since mattes are often cropped to what they cover: what its data window leaves out is 0. Where that is
     larger all around, it is the picture, as in Blender.
 
-    path: the first file; width, height: pixels; count: of frames
+    path: the first file; width, height: pixels; count: of frames; fps: none
     """
+
+    fps = None
 
     def __init__(self, path, channel, *, files=None):
         """channel: one of CHANNELS, or the name of one of the files' own. MediaError: they have none of that name."""
@@ -140,6 +142,11 @@ class SequenceChannel:
         self._found = partial(_channel_named, channel)
         with _opened(self.path, self._found) as (image, spec, _positions):
             _, _, self.width, self.height = _picture_window(image, spec, self.path)
+
+    @property
+    def files(self):
+        """The file of each frame."""
+        return [self._files[index] for index in range(self.count)]
 
     def read(self, index):
         """The samples (height, width, n) that the channel is made of, top row first: n is 3, RGB, for the luminance of

@@ -11,7 +11,7 @@ from footage import cut_file, damage_frame, make_movie, rotate_movie, save_image
 from OpenImageIO import ImageOutput, ImageSpec
 
 from shutter_addon.media import MediaError, open_source
-from shutter_addon.media.exr import write_exr
+from shutter_addon.media.image_writing import write_exr
 from shutter_addon.media.matte_files import MatteFile, MatteSource
 
 LEVEL = 1 / 255

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core import mattes, recipe
-from ...media.matte_files import write_matte
+from ...media.image_writing import write_grey
 from ...media.matte_values import MatteValues
 from ..data import matte_content, recipe_export, snapshot, strips, validation
 from . import session
@@ -58,7 +58,7 @@ def _write(edit, effect, strip, region, folder: Path) -> Path:
                 matte = mattes.Matte(0, content.at(frame))
                 ((key, array),) = values.values((matte,), session.source_index(shown, frame, source)[0], 1)
             written.append((key, number))
-            write_matte(folder / f"{number:04d}.png", array)
+            write_grey(folder / f"{number:04d}.png", array)
         values.close()
     if len({key for key, _ in written}) == 1:
         for number in range(2, len(frames) + 1):

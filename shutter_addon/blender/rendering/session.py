@@ -22,7 +22,7 @@ from ...core.frame_state import FrameState
 from ...core.messages import EffectError
 from ...media import MediaError, cuts
 from ...media.cuts import ShotSource
-from ...media.exr import write_exr
+from ...media.image_writing import write_exr
 from ...media.inbetween import InbetweenSource
 from ...media.matte_values import MatteValues
 from ...media.prefetch import PrefetchSource
