@@ -19,40 +19,37 @@ _BLOCK = 1 << 15
 def fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: bool, overlap: bool) -> None:
     """Sets the pixels of `value` (h, w) that polygons (n, 2) fill to 1, by the rules of Blender's solvers.
 
-    CDT fills what the polygons together go around, by their winding number, and without `holes` also what they enclose.
-    SWEEP_LINE fills what lies inside an odd number of polygons, or without `holes` of any by itself; with `overlap`
-    each is first cut down to its outer loops.
+    CDT fills all that the polygons enclose together; with `holes` only what they go around, by their winding number.
+    SWEEP_LINE fills each polygon by itself; with `holes` what lies inside an odd number of them; with `overlap` each is
+    first cut down to its outer loops.
     """
-    if solver == "CDT":
-        _fill_together(value, polygons, lambda winding: winding != 0, not holes)
+    if solver == "SWEEP_LINE":
+        loops = [loop for polygon in polygons for loop in (_outer_loops(polygon) if overlap else [polygon])]
+        for group in [loops] if holes else [[loop] for loop in loops]:
+            _fill_together(value, group, lambda winding: winding % 2 != 0)
         return
-    if overlap:
-        polygons = [loop for polygon in polygons for loop in _outer_loops(polygon)]
-    for group in [polygons] if holes else [[polygon] for polygon in polygons]:
-        _fill_together(value, group, lambda winding: winding % 2 != 0, False)
+    for group in [polygons] if holes else [[loop] for loop in polygons + _outer_borders(polygons)]:
+        _fill_together(value, group, lambda winding: winding != 0)
 
 
-def _fill_together(value: np.ndarray, polygons: list[np.ndarray], rule, enclosed: bool) -> None:
+def _fill_together(value: np.ndarray, polygons: list[np.ndarray], rule) -> None:
+    """Sets the pixels to 1 whose winding number is one by the rule."""
     height, width = value.shape
-    rows = (-height, 2 * height) if enclosed else (0, height)
-    row, left, right, winding = _spans(polygons, height, rows)
+    row, left, right, winding = _spans(polygons, height)
     inside = rule(winding)
-    if enclosed:
-        inside[~inside] = _enclosed(row, left, right, ~inside)
-    inside &= (row >= 0) & (row < height)
-    start = np.ceil(np.clip(left * width - 0.5, 0, width)).astype(int)
-    stop = np.floor(np.clip(right * width + 0.5, 0, width)).astype(int)
-    for y, a, b in zip(row[inside].tolist(), start[inside].tolist(), stop[inside].tolist(), strict=True):
+    start = np.ceil(np.clip(left[inside] * width - 0.5, 0, width)).astype(int)
+    stop = np.floor(np.clip(right[inside] * width + 0.5, 0, width)).astype(int)
+    for y, a, b in zip(row[inside].tolist(), start.tolist(), stop.tolist(), strict=True):
         value[y, a:b] = 1
 
 
-def _spans(polygons: list[np.ndarray], height: int, rows: tuple[int, int]):
+def _spans(polygons: list[np.ndarray], height: int):
     """Along the middle of each row of pixels, what lies between two edges that follow each other: row, left, right and
     winding number (n,) each, in order."""
     none = np.zeros((0, 2))
     start = np.concatenate([none, *polygons])
     end = np.concatenate([none, *(np.roll(p, -1, axis=0) for p in polygons)])
-    edge, row, x = _at_rows(start, end, height, rows)
+    edge, row, x = _at_rows(start, end, height)
     order = np.lexsort((x, row))
     row, x = row[order], x[order]
     winding = np.cumsum(np.where(end[:, 1] > start[:, 1], 1, -1)[edge[order]])
@@ -60,10 +57,10 @@ def _spans(polygons: list[np.ndarray], height: int, rows: tuple[int, int]):
     return row[:-1][same], x[:-1][same], x[1:][same], winding[:-1][same]
 
 
-def _at_rows(start: np.ndarray, end: np.ndarray, height: int, rows: tuple[int, int]):
-    """Where edges (n, 2) cross the middles of the rows from the first to before the last: index of edge, row, x."""
+def _at_rows(start: np.ndarray, end: np.ndarray, height: int):
+    """Where edges (n, 2) cross the middles of rows of pixels: index of edge, row, x (m,) each."""
     lowest, highest = np.minimum(start[:, 1], end[:, 1]), np.maximum(start[:, 1], end[:, 1])
-    first, last = (np.clip(np.ceil(y * height - 0.5), *rows).astype(int) for y in (lowest, highest))
+    first, last = (np.clip(np.ceil(y * height - 0.5), 0, height).astype(int) for y in (lowest, highest))
     edge, row = _ranges(first, last)
     share = ((row + 0.5) / height - start[edge, 1]) / (end[edge, 1] - start[edge, 1])
     return edge, row, start[edge, 0] + (end[edge, 0] - start[edge, 0]) * share
@@ -76,25 +73,55 @@ def _ranges(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return index, np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts - first, counts)
 
 
-def _enclosed(row, left, right, empty) -> np.ndarray:
-    """Which of the empty spans the others shut in: no way leads outside from them, up, down or along a row."""
-    rows = dict.fromkeys(range(row.min(initial=0) - 1, row.max(initial=0) + 2), ((-np.inf, np.inf, None),))
-    for y in np.unique(row).tolist():
-        here = row == y
-        rows[y] = ((-np.inf, left[here][0], None), (right[here][-1], np.inf, None))
-    places = np.flatnonzero(empty).tolist()
-    for index, place in enumerate(places):
-        rows[int(row[place])] += ((left[place], right[place], index),)
-    shut = np.ones(len(places), bool)
-    reached = [(y, span) for y, spans in rows.items() for span in spans if span[2] is None] if places else []
-    while reached:
-        y, (a, b, _) = reached.pop()
-        for beside in (y - 1, y + 1):
-            for span in rows.get(beside, ()):
-                if span[2] is not None and shut[span[2]] and span[0] < b and a < span[1]:
-                    shut[span[2]] = False
-                    reached.append((beside, span))
-    return shut
+def _outer_borders(polygons: list[np.ndarray]) -> list[np.ndarray]:
+    """The outer borders of all groups of polygons that cross one another or themselves."""
+    start = np.concatenate([np.zeros((0, 2)), *polygons])
+    end = np.concatenate([np.zeros((0, 2)), *(np.roll(p, -1, axis=0) for p in polygons)])
+    first, second, at, other = crossings(start, end)
+    if not len(first):
+        return []
+    count, meetings = len(start), np.arange(len(first))
+    points = np.concatenate([start, start[first] + (end - start)[first] * at[:, None]])
+    behind = np.concatenate(
+        [np.roll(part, -1) for part in np.split(np.arange(count), np.cumsum([*map(len, polygons)]))]
+    )
+    # The parts that crossings leave of each edge, as pairs of indices into the points.
+    edge = np.concatenate([np.arange(count), first, second])
+    corner = np.concatenate([np.arange(count), count + meetings, count + meetings])
+    order = np.lexsort((np.concatenate([np.full(count, -1.0), at, other]), edge))
+    edge, corner = edge[order], corner[order]
+    following = np.where(np.append(edge[1:] == edge[:-1], False), np.roll(corner, -1), behind[edge])
+    angle = np.arctan2(*(end - start)[edge].T[::-1])
+    ways: dict = {}  # by point: the parts that begin or end there, as (the other point, direction)
+    for a, b, turn in zip(corner.tolist(), following.tolist(), angle.tolist(), strict=True):
+        ways.setdefault(a, []).append((b, turn))
+        ways.setdefault(b, []).append((a, turn + np.pi))
+    return [points[walk] for walk in _walks_around(points, ways)]
+
+
+def _walks_around(points: np.ndarray, ways: dict) -> list[list[int]]:
+    """Walks around the groups of points that ways connect, with the outside to the right."""
+    walks, seen = [], set()
+    for start in np.argsort(points[:, 0], kind="stable").tolist():
+        if start in seen:
+            continue
+        group = [start]
+        seen.add(start)
+        for point in group:
+            beside = {there for there, _ in ways[point]} - seen
+            group += beside
+            seen |= beside
+        walk, here, back, steps = [], start, np.pi, set()
+        while True:
+            # The way farthest to the right is the next one counterclockwise from that back.
+            there, turn = min(ways[here], key=lambda way: (way[1] - back - 1e-9) % (2 * np.pi))
+            if (here, there) in steps:
+                break
+            steps.add((here, there))
+            walk.append(here)
+            here, back = there, turn + np.pi
+        walks.append(walk)
+    return walks
 
 
 def _outer_loops(polygon: np.ndarray) -> list[np.ndarray]:
@@ -145,7 +172,7 @@ def _triangle_rows(quads: np.ndarray, width: int, height: int):
     """The pixels that quads (n, 4, 2) cover, row by row: quad, row, first pixel and that behind the last, (m,) each."""
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     start, end = triangles.reshape(-1, 2), np.roll(triangles, -1, axis=1).reshape(-1, 2)
-    edge, row, x = _at_rows(start, end, height, (0, height))
+    edge, row, x = _at_rows(start, end, height)
     # A row that crosses a triangle crosses two of its edges.
     order = np.lexsort((x, row, edge // 3))
     triangle, row, x = (edge // 3)[order], row[order], np.clip(x[order] * width, -1, width + 1)

@@ -98,9 +98,10 @@ def _smooth_offset(spline, points, weights, segment, u, edge) -> np.ndarray:
         moved[after],
     )
     feather = _bezier(*(corner[segment] for corner in hull), u)
+    # Feather points scale what there is; where there is none, they make none.
     plain = weights[segment] * (1 - u) + weights[after][segment] * u
-    # Where there is no feather to scale, none is made.
-    scale = np.divide(_widths(spline, weights, segment, u), plain, out=np.ones_like(plain), where=plain != 0)
+    scaled = np.array([len(feather) > 0 for feather in spline.feathers])[segment] & (plain != 0)
+    scale = np.divide(_widths(spline, weights, segment, u), plain, out=np.ones_like(plain), where=scaled)
     return edge + (feather - edge) * scale[:, None]
 
 
@@ -170,8 +171,8 @@ def _without_loops(outline: np.ndarray, cyclic: bool) -> np.ndarray:
     for i, j in sorted(zip(second.tolist(), first.tolist(), strict=True)):
         if j >= i - 1 or (i + 1) % count == j or not (cyclic or i < count - 1):
             continue
-        a, b, at, _ = crossings(outline[[i, j]], outline[[(i + 1) % count, j + 1]])
-        if not len(a):
+        found, _, at, _ = crossings(outline[[i, j]], outline[[(i + 1) % count, j + 1]])
+        if not len(found):
             continue
         meeting = outline[i] + (outline[(i + 1) % count] - outline[i]) * at[0]
         inner = np.arange(count)

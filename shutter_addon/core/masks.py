@@ -71,7 +71,7 @@ class MaskLayer:
 
 @dataclass(frozen=True)
 class MaskShape:
-    """A mask as it stands at one frame: the layers that are rendered, from the lowest up. Equal masks cover the same."""
+    """A mask as it stands at one frame: the layers that are rendered, from the lowest up."""
 
     layers: tuple[MaskLayer, ...]
 
