@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from .mask_outlines import crossings
+from .mask_outlines import crossings, ranges
 
 # Pixels that are computed at once: what their numbers take stays in a processor's cache.
 _BLOCK = 1 << 15
@@ -61,16 +61,9 @@ def _at_rows(start: np.ndarray, end: np.ndarray, height: int):
     """Where edges (n, 2) cross the middles of rows of pixels: index of edge, row, x (m,) each."""
     lowest, highest = np.minimum(start[:, 1], end[:, 1]), np.maximum(start[:, 1], end[:, 1])
     first, last = (np.clip(np.ceil(y * height - 0.5), 0, height).astype(int) for y in (lowest, highest))
-    edge, row = _ranges(first, last)
+    edge, row = ranges(first, last)
     share = ((row + 0.5) / height - start[edge, 1]) / (end[edge, 1] - start[edge, 1])
     return edge, row, start[edge, 0] + (end[edge, 0] - start[edge, 0]) * share
-
-
-def _ranges(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All whole numbers from first to before last (n,): the index of the range each is of, and the number."""
-    counts = np.maximum(last - first, 0)
-    index = np.repeat(np.arange(len(counts)), counts)
-    return index, np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts - first, counts)
 
 
 def _outer_borders(polygons: list[np.ndarray]) -> list[np.ndarray]:
@@ -158,7 +151,7 @@ def feather(value: np.ndarray, quads: np.ndarray, falloff) -> None:
     quad, row, start, stop = _triangle_rows(quads, width, height)
     bounds = np.searchsorted(np.cumsum(np.maximum(stop - start, 0)), np.arange(0, len(quad) and flat.size * 64, _BLOCK))
     for a, b in pairwise(np.unique([*bounds, len(quad)]).tolist()):
-        span, x = _ranges(start[a:b], stop[a:b])
+        span, x = ranges(start[a:b], stop[a:b])
         y, of = row[a:b][span], quad[a:b][span]
         pixel = y * width + x
         open_ = flat[pixel] < 1

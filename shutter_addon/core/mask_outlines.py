@@ -189,9 +189,12 @@ def crossings(starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndar
     do not cross."""
     ways = ends - starts
     lowest, highest = np.minimum(starts, ends), np.maximum(starts, ends)
-    first, second = np.nonzero(
-        np.triu((lowest[:, None] <= highest[None]).all(2) & (lowest[None] <= highest[:, None]).all(2), 1)
-    )
+    # In the order of their left ends, a segment can meet those that follow until one begins behind its right end.
+    order = np.argsort(lowest[:, 0], kind="stable")
+    reach = np.searchsorted(lowest[order, 0], highest[order, 0], side="right")
+    here, there = (order[place] for place in ranges(np.arange(len(order)) + 1, reach))
+    near = (lowest[here, 1] <= highest[there, 1]) & (lowest[there, 1] <= highest[here, 1])
+    first, second = np.sort([here[near], there[near]], axis=0)
     a, b, gap = ways[first], ways[second], starts[second] - starts[first]
     area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -200,6 +203,13 @@ def crossings(starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndar
     shared = (ends[first] == starts[second]).all(1) | (ends[second] == starts[first]).all(1)
     cross = (at >= 0) & (at <= 1) & (other >= 0) & (other <= 1) & ~shared
     return first[cross], second[cross], at[cross], other[cross]
+
+
+def ranges(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All whole numbers from first to before last (n,): the index of the range each is of, and the number."""
+    counts = np.maximum(last - first, 0)
+    index = np.repeat(np.arange(len(counts)), counts)
+    return index, np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts - first, counts)
 
 
 def _normalized(vectors: np.ndarray) -> np.ndarray:
