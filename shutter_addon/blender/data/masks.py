@@ -210,7 +210,11 @@ def _parent_matrix(parent, origin: np.ndarray, corners: np.ndarray, frame: float
     track = tracked.plane_tracks.get(parent.sub_parent)
     if track is None or not len(track.markers):
         return matrix
-    now = _between_markers(track, "corners", 8, frame - clip.frame_start + 1).reshape(4, 2)
+    # Here Blender does not ask on which frame the clip starts.
+    now = _between_markers(track, "corners", 8, frame).reshape(4, 2)
+    if clip.size[0] and to_mask[0, 0] < 1:
+        # Blender takes the inverse for pictures higher than wide, where planes move their children less than they do.
+        to_mask = np.linalg.inv(to_mask)
     return to_mask @ mask_handles.homography(corners, now) @ np.linalg.inv(to_mask)
 
 
