@@ -75,6 +75,10 @@ class MaskShape:
 
     layers: tuple[MaskLayer, ...]
 
+    def values(self, width: int, height: int) -> np.ndarray:
+        """As `coverage`."""
+        return coverage(self, width, height)
+
 
 def coverage(mask: MaskShape, width: int, height: int) -> np.ndarray:
     """What a mask covers of a picture: (height, width) float32, 0 to 1, the top row first."""
