@@ -14,6 +14,8 @@ from .mask_outlines import crossings, ranges
 
 # Pixels that are computed at once: what their numbers take stays in a processor's cache.
 _BLOCK = 1 << 14
+# By so many pixels quads overlap, so that rounding opens no seam between them.
+_SEAM = 1e-6
 
 
 def fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: bool, overlap: bool) -> None:
@@ -189,8 +191,8 @@ def _quad_rows(quads: np.ndarray, width: int, height: int):
         met = (low <= middle) & (middle < high)
         np.minimum(left, x, out=left, where=met)
         np.maximum(right, x, out=right, where=met)
-    start = np.ceil(np.clip(left * width - 0.5, 0, width)).astype(int)
-    stop = np.floor(np.clip(right * width + 0.5, 0, width)).astype(int)
+    start = np.ceil(np.clip(left * width - 0.5 - _SEAM, 0, width)).astype(int)
+    stop = np.floor(np.clip(right * width + 0.5 + _SEAM, 0, width)).astype(int)
     some = stop > start
     return index[part[some]], row[some], start[some], stop[some]
 
