@@ -25,14 +25,14 @@ def mask(bpy, edit):
 @pytest.fixture
 def assert_as_the_strip(bpy, edit, render, capsys):
     """Compares a mask with what its strip shows at frames; read from another frame, so that nothing stands there."""
-    from shutter_addon.blender.data import masks
+    from shutter_addon.blender.data import mask_reading
 
     def compare(mask, frames, size=(161, 90)):
         edit.render.resolution_x, edit.render.resolution_y = size
         edit.sequence_editor.strips.new_mask("mask", mask, 1, 1)
         shown = render(edit, frames)
         edit.frame_set(77)
-        found = {f: 255 * coverage(masks.mask_at(mask, mask.frame_start + f - 1), *size) for f in frames}
+        found = {f: 255 * coverage(mask_reading.mask_at(mask, mask.frame_start + f - 1), *size) for f in frames}
         assert edit.frame_current == 77
         differences = np.array([np.abs(found[f] - shown[f][..., 0]) for f in frames])
         with capsys.disabled():
@@ -237,7 +237,7 @@ def test_a_linked_mask(bpy, mask, assert_as_the_strip, mask_editor, clip, edit, 
 
 
 def test_reading_leaves_the_mask_as_it_is(bpy, mask, mask_editor, clip, edit):
-    from shutter_addon.blender.data import masks
+    from shutter_addon.blender.data import mask_reading
 
     layer = mask.layers.new(name="L")
     spline = draw(layer, blob(random.Random(2), 5), 0.05)
@@ -248,43 +248,43 @@ def test_reading_leaves_the_mask_as_it_is(bpy, mask, mask_editor, clip, edit):
             spline.points[0].select = True
             bpy.ops.mask.shape_key_insert()
     stood = [tuple(point.co) for point in spline.points]
-    shapes = [masks.mask_at(mask, frame) for frame in (5, 17.5, 30, 100)]
+    shapes = [mask_reading.mask_at(mask, frame) for frame in (5, 17.5, 30, 100)]
     assert [tuple(point.co) for point in spline.points] == stood
     assert [shape.layers[0].splines[0].points[0][1][0] for shape in shapes] == pytest.approx([0.1, 0.35, 0.6, 0.6])
     assert shapes[2] == shapes[3] != shapes[0]
     # A point that came later leaves shape keys without effect.
     spline.points.add(1)
-    assert len(masks.mask_at(mask, 5).layers[0].splines[0].points) == 6
+    assert len(mask_reading.mask_at(mask, 5).layers[0].splines[0].points) == 6
 
 
 def test_another_blender_is_refused(bpy, mask, mask_editor, clip, monkeypatch):
-    from shutter_addon.blender.data import masks
+    from shutter_addon.blender.data import mask_reading
     from shutter_addon.blender.data.validation import EffectError
 
     draw(mask.layers.new(name="L"), blob(random.Random(2), 5))
 
     class Longer(ctypes.Structure):
         _fields_ = tuple(
-            (name, ctypes.c_char * 256 if name == "name" else kind) for name, kind in masks._Layer._fields_
+            (name, ctypes.c_char * 256 if name == "name" else kind) for name, kind in mask_reading._Layer._fields_
         )
 
-    masks.mask_at(mask, 5)
-    monkeypatch.setattr(masks, "_Layer", Longer)
+    mask_reading.mask_at(mask, 5)
+    monkeypatch.setattr(mask_reading, "_Layer", Longer)
     with pytest.raises(EffectError, match='mask "M": it cannot be read in this version of Blender'):
-        masks.mask_at(mask, 5)
+        mask_reading.mask_at(mask, 5)
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 1e20])
 def test_numbers_that_are_none_are_refused(bpy, mask, value):
-    from shutter_addon.blender.data import masks
+    from shutter_addon.blender.data import mask_reading
     from shutter_addon.blender.data.validation import EffectError
 
     layer = mask.layers.new(name="L")
     spline = draw(layer, blob(random.Random(2), 5))
     spline.points[2].co = (value, 0.5)
     with pytest.raises(EffectError, match='mask "M": a point, a feather or an opacity is not a usable number'):
-        masks.mask_at(mask, 5)
+        mask_reading.mask_at(mask, 5)
     spline.points[2].co = (0.5, 0.5)
     layer.alpha = value
     with pytest.raises(EffectError, match="not a usable number"):
-        masks.mask_at(mask, 5)
+        mask_reading.mask_at(mask, 5)
