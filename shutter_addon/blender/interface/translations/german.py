@@ -114,6 +114,14 @@ MESSAGES = {
     ): "Streifen „{strip}“ liegt bei den Bildern {first} bis {last}, wo keine Zeitleiste ist",
     (
         "*",
+        'mask "{mask}": a point, a feather or an opacity is not a usable number',
+    ): "Maske „{mask}“: ein Punkt, eine weiche Kante oder eine Deckkraft ist keine brauchbare Zahl",
+    (
+        "*",
+        'mask "{mask}": it cannot be read in this version of Blender',
+    ): "Maske „{mask}“ ist in dieser Version von Blender nicht lesbar",
+    (
+        "*",
         'strip "{strip}": its retiming keys cannot be read in this version of Blender',
     ): "Streifen „{strip}“: seine Retiming-Schlüssel sind in dieser Version von Blender nicht lesbar",
     (
