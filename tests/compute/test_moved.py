@@ -7,8 +7,10 @@ import pytest
 from test_composition import SHAPES, check, device, footage, state  # noqa: F401
 
 from shutter_addon.compute import window
+from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.core.frame_state import Following
+from shutter_addon.core.scribbles import Shape
 
 
 def motions(rng, count, shutters, followers, size=(37, 23)):
@@ -67,6 +69,15 @@ def test_many_shutters(device):  # noqa: F811
     rng = np.random.default_rng(34)
     source, moment = footage(rng), state(rng, count=6)
     check(device, source, following(rng, source, moment, (0, 4, 5)), 3)
+
+
+def test_most_shutters_and_frames(gpu_device):
+    """More turns of loops than a software renderer goes through, were each pixel to pass all pieces."""
+    rng = np.random.default_rng(40)
+    source = footage(rng, count=256, size=(16, 4))
+    shapes = tuple(Shape(i, "line", 0, (np.array([[x, 0.1], [x, 0.9]]),)) for i, x in enumerate(rng.random(32)))
+    moment = replace(state(rng, 256, shapes, 32), bars=rng.random((32, 256)))
+    check(GPUCompositor(gpu_device), source, following(rng, source, moment, range(32)), 0)
 
 
 @pytest.mark.parametrize("resident", [True, False])
