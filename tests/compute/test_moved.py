@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_composition import SHAPES, check, device, footage, state  # noqa: F401
+from test_composition import SHAPES, check, device, few_pieces, footage, state  # noqa: F401
+from test_shots import SHOTS, shots_of
 
 from shutter_addon.compute import window
 from shutter_addon.compute.gpu import GPUCompositor
@@ -49,6 +50,16 @@ def test_ends_of_the_clip(device, interpolation, edges, index, direction):  # no
     moment.bars[1, : 8 if index > 9 else 14] = 0  # of which nothing is left beyond the end
     moment.bars[1, -1] = 0.5
     check(device, source, following(rng, source, moment, (0, 1)), index, direction)
+
+
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize(("index", "direction"), [(5, 1), (12, -1), (13, 1)])
+def test_windows_end_at_cuts(device, edges, index, direction):  # noqa: F811
+    """What is seen of a frame of the shot in place of one beyond, lies where that frame has it."""
+    rng = np.random.default_rng(41)
+    source, options = shots_of(np.uint8), {"edges": edges, "position": "center"}
+    for moment in (state(rng, **options), few_pieces(rng, 12, **options)):
+        check(device, source, following(rng, source, moment, (0, 1)), index, direction, SHOTS[index])
 
 
 @pytest.mark.parametrize("alpha", ["straight", "premultiplied"])
