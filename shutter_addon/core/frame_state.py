@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -87,6 +87,8 @@ class FrameState:
     shapes: of the scribbles, where they are at this frame, the later over the earlier
     reference: the exposure (sum of bars) of full brightness where exposure is "weighted"; None: the default shutter's
     following: what exposures follow; None: nothing that moves
+    open_for: by shutter whose trail has a length, the frames from its first open time to its last: for who is told of
+    it, as its bars say what is exposed
     """
 
     options: Options
@@ -94,6 +96,7 @@ class FrameState:
     shapes: tuple[scribbles.Shape, ...] = ()
     reference: float | None = None
     following: Following | None = None
+    open_for: dict[int, float] = field(default_factory=dict)
 
     @property
     def gains(self) -> np.ndarray:

@@ -168,6 +168,8 @@ def test_a_region_that_is_renamed_or_removed(shown):
 
 def test_the_trails_length_is_keyed(shown):
     """Bars in Blender are those of the recipe; of what is not keyed, too, and of what has no length."""
+    from shutter_addon.blender.editing import bar_edits
+
     velocity, keys = (3, 0), {frame: place((frame - 1) ** 2 / COUNT, (3, 0)) for frame in range(1, COUNT + 1)}
     data = following(keys, position="center")
     shutter = data["shutters"][0]
@@ -178,6 +180,13 @@ def test_the_trails_length_is_keyed(shown):
     assert 1 < bars.sum() / bars.max() < WINDOW - 0.5
     shutter["trail"] = 0.175
     assert core_bars(data, 10) == pytest.approx(bars)
+    for frame, shutter["trail"] in ((10, 0.175), (12, 0.225)):
+        edit.frame_set(frame)
+        bars = core_bars(data, frame)
+        open_for = f"{bars.sum() / bars.max():.3g}"
+        assert bar_edits.open_for(edit, effect, strip, 0) == f"Open for {open_for} of {WINDOW} frames here"
+    edit.frame_set(COUNT + 1)
+    assert bar_edits.open_for(edit, effect, strip, 0) is None, "nothing is shown there"
     effect.shutters[0].length = "FRAMES"
     assert np.array_equal(request(edit, effect, strip, 10).state.bars, np.ones((1, WINDOW)))
     effect.shutters[0].length, effect.shutters[0].follow = "MOTION", "NOTHING"
