@@ -22,6 +22,7 @@ MESSAGES = {
     ("*", "and {count} more, in the bar editor"): "und {count} weitere, im Balkeneditor",
     ("*", "{angle}°, 1 frame of light"): "{angle}°, Licht von 1 Bild",
     ("*", "{angle}°, {frames} frames of light"): "{angle}°, Licht von {frames} Bildern",
+    ("*", "Open for {frames} of {window} frames here"): "Hier {frames} von {window} Bildern lang offen",
     ("*", "All bars are zero: the shutter never opens"): "Alle Balken sind null: Der Verschluss öffnet nie",
     # Names of what is new
     ("*", "Shutter {source}"): "Verschluss {source}",
