@@ -47,8 +47,13 @@ def feathered(values: np.ndarray, width: float) -> np.ndarray:
 
 
 def _resampled(values: np.ndarray, down: Taps, across: Taps) -> np.ndarray:
-    rows = _weighted(values, *down)
-    return np.ascontiguousarray(_weighted(np.ascontiguousarray(rows.T), *across).T)
+    if len(across[0]) > values.shape[1]:  # turned twice before it is large, or after it is small
+        return _weighted(_turned(_weighted(_turned(values), *across)), *down)
+    return _turned(_weighted(_turned(_weighted(values, *down)), *across))
+
+
+def _turned(values: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(values.T)
 
 
 def _weighted(values: np.ndarray, indices: np.ndarray, weights: np.ndarray) -> np.ndarray:
