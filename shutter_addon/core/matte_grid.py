@@ -26,8 +26,7 @@ def fitted(values: np.ndarray, width: int, height: int, block: int = 1) -> np.nd
         return values
     rows, columns = values.shape
     scale = min(width / columns, height / rows)
-    result = _resampled(values, *(_cells(_fit(*axis, scale), block) for axis in ((rows, height), (columns, width))))
-    return np.minimum(result, 1, out=result)
+    return _resampled(values, *(_cells(_fit(*axis, scale), block) for axis in ((rows, height), (columns, width))))
 
 
 def feathered(values: np.ndarray, width: float) -> np.ndarray:
@@ -57,7 +56,7 @@ def _turned(values: np.ndarray) -> np.ndarray:
 
 
 def _weighted(values: np.ndarray, indices: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Rows (rows, w) that are weighted sums of others."""
+    """Rows (rows, w) that are weighted sums of others, 1 at most."""
     result = np.empty((len(indices), values.shape[1]), np.float32)
     weights = weights.astype(np.float32)[:, :, None]
     for start in range(0, len(indices), _ROWS):
@@ -67,6 +66,7 @@ def _weighted(values: np.ndarray, indices: np.ndarray, weights: np.ndarray) -> n
             part = values[indices[rows, tap]]
             part *= weights[rows, tap]
             total += part
+        np.minimum(total, 1, out=total)  # weights are rounded
     return result
 
 
