@@ -1,4 +1,4 @@
-"""A matte's values on the picture's grid: fitted to it, and feathered. Pure NumPy, float32; both are separable."""
+"""A matte's values on the picture's grid: fitted to it, feathered, by blocks of pixels. Pure NumPy, and separable."""
 
 from __future__ import annotations
 
@@ -14,19 +14,18 @@ _REACH = 3.3  # standard deviations
 _ROWS = 32  # at a time; a processor's cache holds them
 
 
-def fitted(values: np.ndarray, width: int, height: int, block: int = 1) -> np.ndarray:
+def fitted(values: np.ndarray, width: int, height: int) -> np.ndarray:
     """A matte scaled to fit a picture, its aspect kept, in the middle, with black around it.
 
     values: (h, w) float32, 0 … 1; width, height: of the picture, in pixels
-    block: the result has the means of cells of so many pixels, (⌈height/block⌉, ⌈width/block⌉); the last are cut
     A pixel is the mean of what it covers where the matte is reduced, and interpolated linearly where it is enlarged;
     one that the matte's edge crosses is black in proportion. The matte itself where nothing is to be done.
     """
-    if values.shape == (height, width) and block == 1:
+    if values.shape == (height, width):
         return values
     rows, columns = values.shape
     scale = min(width / columns, height / rows)
-    return _resampled(values, *(_cells(_fit(*axis, scale), block) for axis in ((rows, height), (columns, width))))
+    return _resampled(values, _fit(rows, height, scale), _fit(columns, width, scale))
 
 
 def feathered(values: np.ndarray, width: float) -> np.ndarray:
@@ -43,6 +42,14 @@ def feathered(values: np.ndarray, width: float) -> np.ndarray:
     coarse = _resampled(values, *(_means(length, step) for length in values.shape))
     coarse = _resampled(coarse, *(_gaussian(length, narrower) for length in coarse.shape))
     return _resampled(coarse, *(_lines(length, step) for length in values.shape))
+
+
+def block_means(values: np.ndarray, block: int) -> np.ndarray:
+    """Means (⌈h/block⌉, ⌈w/block⌉) float32 of blocks of values (h, w), of which the last may be cut. The values
+    themselves where a block is one value."""
+    if block == 1:
+        return values
+    return _resampled(values, *(_blocks(length, block) for length in values.shape))
 
 
 def _resampled(values: np.ndarray, down: Taps, across: Taps) -> np.ndarray:
@@ -88,14 +95,11 @@ def _fit(length: int, size: int, scale: float) -> Taps:
     return indices.clip(0, length - 1)[:, used], weights[:, used]
 
 
-def _cells(taps: Taps, block: int) -> Taps:
-    """Means of `block` rows at a time, the last ones of those that are left."""
-    if block == 1:
-        return taps
-    indices, weights = (np.pad(each, ((0, -len(each) % block), (0, 0))) for each in taps)
-    cells = len(indices) // block
-    present = np.minimum(block, len(taps[0]) - block * np.arange(cells))
-    return indices.reshape(cells, -1), weights.reshape(cells, -1) / present[:, None]
+def _blocks(length: int, block: int) -> Taps:
+    """Blocks of rows, the last of those that are left."""
+    indices = np.arange(0, length, block)[:, None] + np.arange(block)
+    present = indices < length
+    return indices.clip(0, length - 1), present / present.sum(axis=1, keepdims=True)
 
 
 def _gaussian(length: int, sigma: float) -> Taps:
