@@ -36,12 +36,11 @@ def feathered(values: np.ndarray, width: float) -> np.ndarray:
     sigma = width / EDGE_SIGMAS
     step = max(1, int(sigma / _COARSE))
     if step == 1:
-        return _resampled(values, *(_gaussian(length, sigma) for length in values.shape))
+        return _blurred(values, sigma)
     # Coarse cells and lines between them widen an edge as well, by a quarter of the square of a cell on average.
     narrower = math.sqrt((sigma / step) ** 2 - 1 / 4)
     coarse = _resampled(values, *(_means(length, step) for length in values.shape))
-    coarse = _resampled(coarse, *(_gaussian(length, narrower) for length in coarse.shape))
-    return _resampled(coarse, *(_lines(length, step) for length in values.shape))
+    return _resampled(_blurred(coarse, narrower), *(_lines(length, step) for length in values.shape))
 
 
 def block_means(values: np.ndarray, block: int) -> np.ndarray:
@@ -56,6 +55,11 @@ def _resampled(values: np.ndarray, down: Taps, across: Taps) -> np.ndarray:
     if len(across[0]) > values.shape[1]:  # turned twice before it is large, or after it is small
         return _weighted(_turned(_weighted(_turned(values), *across)), *down)
     return _turned(_weighted(_turned(_weighted(values, *down)), *across))
+
+
+def _blurred(values: np.ndarray, sigma: float) -> np.ndarray:
+    kernel = _gaussian(sigma)
+    return _turned(_convolved(_turned(_convolved(values, kernel)), kernel))
 
 
 def _turned(values: np.ndarray) -> np.ndarray:
@@ -74,6 +78,23 @@ def _weighted(values: np.ndarray, indices: np.ndarray, weights: np.ndarray) -> n
             part *= weights[rows, tap]
             total += part
         np.minimum(total, 1, out=total)  # weights are rounded
+    return result
+
+
+def _convolved(values: np.ndarray, kernel: np.ndarray) -> np.ndarray:
+    """As `_weighted`, with the same weights everywhere: those of a row itself and of those at distances 1, 2, …"""
+    reach = len(kernel) - 1
+    padded = np.pad(values, ((reach, reach), (0, 0)), "edge")
+    result = np.empty_like(values)
+    for start in range(0, len(values), _ROWS):
+        total, row = result[start : start + _ROWS], start + reach
+        np.multiply(padded[row : row + len(total)], kernel[0], out=total)
+        for distance in range(1, reach + 1):
+            before, after = row - distance, row + distance
+            part = padded[before : before + len(total)] + padded[after : after + len(total)]
+            part *= kernel[distance]
+            total += part
+        np.minimum(total, 1, out=total)
     return result
 
 
@@ -102,13 +123,12 @@ def _blocks(length: int, block: int) -> Taps:
     return indices.clip(0, length - 1), present / present.sum(axis=1, keepdims=True)
 
 
-def _gaussian(length: int, sigma: float) -> Taps:
-    """Each pixel's share is what it covers of the Gaussian, so that a hard edge becomes the error function itself."""
+def _gaussian(sigma: float) -> np.ndarray:
+    """Weights float32 of a pixel and of those at distances 1, 2, …: what they cover of the Gaussian, so that a hard
+    edge becomes the error function itself."""
     reach = math.ceil(_REACH * sigma)
-    ends = np.array([math.erf((i - 0.5) / (sigma * math.sqrt(2))) for i in range(-reach, reach + 2)])
-    weights = np.diff(ends) / (ends[-1] - ends[0])
-    indices = np.arange(length)[:, None] + np.arange(-reach, reach + 1)
-    return indices.clip(0, length - 1), np.broadcast_to(weights, indices.shape)
+    ends = np.array([math.erf((i - 0.5) / (sigma * math.sqrt(2))) for i in range(reach + 2)])
+    return (np.diff(ends) / (2 * ends[-1])).astype(np.float32)
 
 
 def _means(length: int, step: int) -> Taps:
