@@ -124,7 +124,7 @@ def test_a_corner_and_its_place(width):
     assert np.abs(feathered(values, width) - np.outer(down, across)).max() < 1.5 * LEVEL
 
 
-@pytest.mark.parametrize("width", [4, 18.7, 25, 60])
+@pytest.mark.parametrize("width", [4, 8.5, 18.7, 25, 60])
 def test_the_pictures_edges_go_on(width):
     """As if the picture were larger all around."""
     values = noise(40, 30, 3)
