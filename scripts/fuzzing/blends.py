@@ -68,7 +68,7 @@ def run(folder):
         bpy.ops.wm.open_mainfile(filepath=path)
     bpy.context.view_layer.update()
     _draw(bpy)
-    _export(bpy)
+    trial.forked(lambda: _export(bpy))  # mattes are read in threads
     code = {trial.forked(lambda name=name: _render(bpy, folder / "out" / name, plan["frame"]))[0] for name in "ab"}
     if len(code) > 1:
         raise trial.Fault("a frame is rendered once and refused once")
