@@ -329,13 +329,14 @@ class ShutterRegion(_Tracked, PropertyGroup):
     layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=_changed)
     kind: EnumProperty(
         name="Type",
-        description="How the strokes cover the picture",
+        description="What says where the shutter holds",
         items=KINDS,
         update=_changed,
         options=_UNKEYED,
+        translation_context=CONTEXT,
     )
     matte: EnumProperty(
-        name="Matte", description="What the matte is", items=MATTE_SOURCES, update=_changed, options=_UNKEYED
+        name="From", description="What the matte is", items=MATTE_SOURCES, update=_changed, options=_UNKEYED
     )
     image: PointerProperty(
         name="File",
@@ -386,6 +387,7 @@ class ShutterRegion(_Tracked, PropertyGroup):
         items=BLENDS,
         update=_changed,
         options=_UNKEYED,
+        translation_context=CONTEXT,
     )
     opacity: FloatProperty(
         name="Opacity",
@@ -405,6 +407,7 @@ class ShutterRegion(_Tracked, PropertyGroup):
         precision=3,
         step=1,
         update=_changed,
+        translation_context=CONTEXT,
     )
     ramp: EnumProperty(name="Ramp", description="How the ramp runs", items=RAMPS, update=_changed, options=_UNKEYED)
     width: FloatProperty(

@@ -74,7 +74,8 @@ def matte_image(path: str | Path, channel: str = "luminance"):
     try:
         return bpy.data.images.load(check_name(path), check_existing=True)
     except RuntimeError as error:
-        raise MediaError(f"{path.name}: Blender cannot read it ({error})") from None
+        sentence = rpt_("{file}: Blender cannot read it ({error})")
+        raise MediaError(sentence.format(file=path.name, error=error)) from None
 
 
 def _check_keys(source: recipe.Recipe, first: float) -> None:
