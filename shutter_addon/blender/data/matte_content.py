@@ -28,7 +28,7 @@ def content(edit, effect, strip, region, moves, frames, time: keyframes.Channel 
         return _strip_frames(region, frames)
     if matte == "MASK":
         return _mask_shapes(edit, effect, strip, region, frames, time)
-    first = strip.left_handle if validation.word(region, "timing") == "TIMELINE" else None
+    first = strips.origin(strip) if validation.word(region, "timing") == "TIMELINE" else None
     return mattes.FileFrames(image_file(region), validation.number(region, "offset"), first)
 
 

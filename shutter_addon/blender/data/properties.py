@@ -98,7 +98,7 @@ CHANNELS = (
 )
 TIMINGS = (
     ("SOURCE", "Footage", "The matte's frames belong to those of the footage, however that is trimmed and retimed"),
-    ("TIMELINE", "Timeline", "The matte plays along the timeline, from the Shutter strip's start"),
+    ("TIMELINE", "Timeline", "The matte plays along the timeline, from where the Shutter strip starts untrimmed"),
 )
 BLENDS = (
     ("OVER", "Over", "What is beneath shares what the matte leaves"),

@@ -421,6 +421,10 @@ MESSAGES = {
     ("*", "Named"): "Benannt",
     ("*", "A channel of an EXR file, by its name"): "Ein Kanal einer EXR-Datei, nach seinem Namen",
     ("*", "Channel Name"): "Kanalname",
+    (
+        "*",
+        "Name of a channel of an EXR file; empty for the luminance",
+    ): "Name eines Kanals einer EXR-Datei; leer für die Leuchtdichte",
     ("*", "Name of the channel in the EXR file"): "Name des Kanals in der EXR-Datei",
     ("*", "Invert"): "Invertieren",
     ("*", "The shutter gets what the matte leaves"): "Der Verschluss bekommt, was die Matte übrig lässt",
@@ -434,8 +438,8 @@ MESSAGES = {
     ("*", "Timeline"): "Zeitleiste",
     (
         "*",
-        "The matte plays along the timeline, from the Shutter strip's start",
-    ): "Die Matte läuft mit der Zeitleiste, vom Anfang des Verschlussstreifens an",
+        "The matte plays along the timeline, from where the Shutter strip starts untrimmed",
+    ): "Die Matte läuft mit der Zeitleiste, vom ungetrimmten Anfang des Verschlussstreifens an",
     ("*", "Offset"): "Versatz",
     ("*", "Frames by which the matte is ahead"): "Bilder, um die die Matte voraus ist",
     ("Virtual Shutter", "Blend"): "Mischmodus",
