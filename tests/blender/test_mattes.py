@@ -280,7 +280,7 @@ def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
     own = strip_of(edit, matte, 3, 6)
     effect.regions[1].matte, effect.regions[1].strip_name = "STRIP", own.name
     (tmp_path / "out").mkdir()
-    matte_export.export(edit, effect, strip, tmp_path / "out" / "r.json")
+    recipes.save(matte_export.recipe_for(edit, effect, strip, tmp_path / "out" / "r.json"), tmp_path / "out" / "r.json")
     saved = recipes.load(tmp_path / "out" / "r.json")
     assert saved.regions[0].path == "../matte/m0001.png"
     assert saved.regions[0] == recipes.parse(json.dumps(content)).regions[0].__class__(
@@ -293,7 +293,7 @@ def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
     for frame, expected in zip((1, 4, 10), before, strict=True):
         assert close(coefficients(frame), expected)
     again = tmp_path / "out" / "again.json"
-    matte_export.export(edit, effect, strip, again)
+    recipes.save(matte_export.recipe_for(edit, effect, strip, again), again)
     assert recipes.load(again) == saved
 
 
@@ -303,7 +303,7 @@ def test_a_still_strip_is_exported_as_one_picture(edit, shown, matte, tmp_path):
     strip, effect, _coefficients = shown(data(region(matte)))
     own = edit.sequence_editor.strips.new_image("still", str(matte), 4, 1)
     effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
-    matte_export.export(edit, effect, strip, tmp_path / "r.json")
+    recipes.save(matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json"), tmp_path / "r.json")
     assert [path.name for path in (tmp_path / "r mattes" / "1 m").iterdir()] == ["0001.png"]
     assert np.abs(read_picture(tmp_path / "r mattes" / "1 m" / "0001.png")[..., 0] - values(0)).max() < 0.01
 
