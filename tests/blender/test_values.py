@@ -99,6 +99,11 @@ def identify_another(effect, kind):
     new().virtual_shutter_source = effect.source
 
 
+def follow_camera(effect):
+    """By a length of motion."""
+    effect.shutters[0].follow, effect.shutters[0].length = "CAMERA", "MOTION"
+
+
 def use_time(effect, value):
     effect.use_source_time = True
     unkey(effect, "source_time")
@@ -136,6 +141,31 @@ IMPOSSIBLE = {
     "rotation": (lambda e: raw(e.regions[0], "rotation", INF), 'region "Face": Rotation is inf, not -360000 to 360000'),
     "location": (lambda e: raw(e.regions[0], "location", [0.0, NAN]), 'region "Face": Location is nan'),
     "width": (lambda e: raw(e.regions[0], "width", -1.0), 'region "Face": Width is -1'),
+    "follow": (lambda e: raw(e.shutters[0], "follow", 9), 'shutter "Long": Follow is none of its choices'),
+    "length": (
+        lambda e: follow_camera(e) or raw(e.shutters[0], "length", 7),
+        'shutter "Long": Length is none of its choices',
+    ),
+    "trail": (
+        lambda e: follow_camera(e) or raw(e.shutters[0], "trail", -1.0),
+        'shutter "Long": Trail Length is -1, not 0 to 1000',
+    ),
+    "keyed nan trail": (
+        lambda e: follow_camera(e) or key(e.shutters[0], "trail", (1, NAN), (9, NAN)),
+        'shutter "Long": Trail Length is nan',
+    ),
+    "camera": (
+        lambda e: follow_camera(e) or raw(e.camera, "location", [0.0, NAN]),
+        'camera of effect "Shutter": Location is nan',
+    ),
+    "keyed nan camera": (
+        lambda e: follow_camera(e) or key(e.camera, "rotation", (1, NAN), (9, NAN)),
+        'camera of effect "Shutter": Rotation is nan',
+    ),
+    "a far key of the camera": (
+        lambda e: follow_camera(e) or key(e.camera, "scale", (1, 1), (3e9, 1)),
+        'camera of effect "Shutter": Scale has a keyframe at frame 3e+09',
+    ),
     "follow edges": (lambda e: raw(e, "edge_aware", 1.5), 'effect "Shutter": Follow Edges is 1.5, not 0 to 1'),
     "keyed nan edges": (lambda e: key(e, "edge_aware", (1, NAN), (9, NAN)), 'effect "Shutter": Follow Edges is nan'),
     "source time": (lambda e: use_time(e, NAN), 'effect "Shutter": Source Time is nan'),
@@ -352,7 +382,14 @@ def test_random_values(bpy, edit, effect, seed):
 
 def corrupt(rng, effect):
     """Gives a random property of the effect, or of what belongs to it, a random value, or a random F-curve."""
-    groups = [effect, *effect.shutters, *effect.regions, *effect.shutters[0].bars, *effect.shutters[1].bars]
+    groups = [
+        effect,
+        effect.camera,
+        *effect.shutters,
+        *effect.regions,
+        *effect.shutters[0].bars,
+        *effect.shutters[1].bars,
+    ]
     natives = [strip_of(effect).transform, strip_of(effect).crop, source_of(effect), strip_of(effect)]
     group = rng.choice(groups[:1] * 6 + groups + natives * 2)
     names = [
