@@ -118,8 +118,7 @@ def test_a_cut_of_the_effect_changes_nothing(shown, matte, tmp_path):
     lifecycle.update()
     assert right.scene == strip.scene
     assert close(request(strip.id_data, effect, right, 9).coefficients(), before)
-    matte_export.export(strip.id_data, effect, right, tmp_path / "r.json")
-    saved = recipes.load(tmp_path / "r.json")
+    saved = matte_export.recipe_for(strip.id_data, effect, right, tmp_path / "r.json")
     assert saved.regions[0].offset == 1 + 6  # frame 1 of this recipe is the seventh of the strip as it was
     recipe_import.apply(strip.id_data, effect, right, saved, tmp_path)
     assert close(request(strip.id_data, effect, right, 9).coefficients(), before)
