@@ -110,6 +110,21 @@ def use_time(effect, value):
     effect.source_time = value
 
 
+def ramp(effect, kind="RAMP", **values):
+    """A new ramp or matte of the second shutter."""
+    from shutter_addon.blender.editing import region_edits
+
+    return region_edits.add_matte(effect, effect.shutters[1], kind, "Ramp", **values)
+
+
+def image(effect):
+    """A new matte, the footage's own first frame."""
+    import bpy
+
+    source = source_of(effect)
+    return ramp(effect, "MATTE", image=bpy.data.images.load(source.directory + source.elements[0].filename))
+
+
 IMPOSSIBLE = {
     "window -5": (lambda e: raw(e, "window", -5), 'effect "Shutter": Window is -5, not 1 to 256'),
     "window 0": (lambda e: raw(e, "window", 0), 'effect "Shutter": Window is 0'),
@@ -141,6 +156,17 @@ IMPOSSIBLE = {
     "rotation": (lambda e: raw(e.regions[0], "rotation", INF), 'region "Face": Rotation is inf, not -360000 to 360000'),
     "location": (lambda e: raw(e.regions[0], "location", [0.0, NAN]), 'region "Face": Location is nan'),
     "width": (lambda e: raw(e.regions[0], "width", -1.0), 'region "Face": Width is -1'),
+    "opacity": (lambda e: raw(ramp(e), "opacity", 1.5), 'region "Ramp": Opacity is 1.5, not 0 to 1'),
+    "keyed nan feather": (lambda e: key(ramp(e), "feather", (1, NAN), (9, NAN)), 'region "Ramp": Feather is nan'),
+    "a ramp": (lambda e: raw(ramp(e), "ramp", 9), 'region "Ramp": Ramp is none of its choices'),
+    "a ramp's place": (lambda e: raw(ramp(e), "location", [0.0, INF]), 'region "Ramp": Location is inf'),
+    "blend": (lambda e: raw(ramp(e), "blend", -1), 'region "Ramp": Blend is none of its choices'),
+    "matte": (lambda e: raw(ramp(e, "MATTE"), "matte", 7), 'region "Ramp": Matte is none of its choices'),
+    "no matte": (lambda e: ramp(e, "MATTE"), 'region "Ramp": it has no matte file'),
+    "no matte strip": (lambda e: raw(ramp(e, "MATTE", matte="STRIP"), "strip", "x"), "its matte strip was deleted"),
+    "channel": (lambda e: raw(ramp(e, "MATTE", matte="STRIP", strip_name="images"), "channel", 9), "Channel is none"),
+    "offset": (lambda e: raw(image(e), "offset", 2**31 - 1), 'region "Ramp": Offset is 2.147484e+09, not'),
+    "timing": (lambda e: raw(image(e), "timing", 5), 'region "Ramp": Frames Of is none of its choices'),
     "follow": (lambda e: raw(e.shutters[0], "follow", 9), 'shutter "Long": Follow is none of its choices'),
     "length": (
         lambda e: follow_camera(e) or raw(e.shutters[0], "length", 7),
