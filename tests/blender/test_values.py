@@ -6,6 +6,7 @@ import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -446,12 +447,11 @@ def rendered(scene):
 
 
 def exported(edit, effect):
-    from shutter_addon.blender.data import recipe_export
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import matte_export, session
     from shutter_addon.core.recipe import RecipeError
 
-    with suppress(*session.FAULTS, RecipeError):
-        recipe_export.recipe_of(edit, effect, strip_of(effect))
+    with suppress(*session.FAULTS, RecipeError), TemporaryDirectory() as folder:
+        matte_export.recipe_for(edit, effect, strip_of(effect), Path(folder, "r.json"))
 
 
 class Layout:
