@@ -4,9 +4,10 @@ import json
 
 import numpy as np
 import pytest
-from support import read_picture, recipe, request, write_frames
+from support import read_picture, recipe, request, sequencer, write_frames
 
 from shutter_addon.core import recipe as recipes
+from shutter_addon.media.image_writing import write_exr
 
 WIDTH, HEIGHT, COUNT = 48, 32, 12
 OPTIONS = {"light": "encoded", "interpolation": "value"}
@@ -102,6 +103,37 @@ def test_the_timeline_and_an_offset(shown, matte):
     _strip, _effect, coefficients = shown(content, change)
     assert close(coefficients(6), values(6 - 4 + 2) / 255)
     assert close(coefficients(11), values(9) / 255)
+
+
+def test_a_cut_of_the_effect_changes_nothing(shown, matte, tmp_path):
+    """Neither with the timeline's frames nor with the footage's."""
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import lifecycle
+    from shutter_addon.blender.rendering import matte_export
+
+    regions = region(matte, timing="timeline", offset=1, opacity=0.5), region(matte, opacity=0.5, name="n")
+    strip, effect, _coefficients = shown(data(*regions))
+    before = request(strip.id_data, effect, strip, 9).coefficients()
+    right = strip.split(frame=7, split_method="SOFT")
+    lifecycle.update()
+    assert right.scene == strip.scene
+    assert close(request(strip.id_data, effect, right, 9).coefficients(), before)
+    saved = matte_export.recipe_for(strip.id_data, effect, right, tmp_path / "r.json")
+    assert saved.regions[0].offset == 1 + 6  # frame 1 of this recipe is the seventh of the strip as it was
+    recipe_import.apply(strip.id_data, effect, right, saved, tmp_path)
+    assert close(request(strip.id_data, effect, right, 9).coefficients(), before)
+
+
+def test_a_file_without_colours_has_a_channel_by_name(bpy, edit, shown, tmp_path):
+    """As the files of `--weights`."""
+    write_exr(tmp_path / "0001.exr", np.full((HEIGHT, WIDTH, 1), 0.25, np.float32), ["S1"])
+    strip, effect, coefficients = shown(data())
+    edit.sequence_editor.active_strip, effect.active_shutter = strip, 1
+    with sequencer(bpy):
+        with pytest.raises(RuntimeError, match="no colour channels, only S1"):
+            bpy.ops.shutter.matte_add(filepath=str(tmp_path / "0001.exr"))
+        bpy.ops.shutter.matte_add(filepath=str(tmp_path / "0001.exr"), channel_name="S1")
+    assert close(coefficients(2), 0.25)
 
 
 def test_before_and_behind_its_frames_a_matte_holds(shown, matte):

@@ -27,8 +27,8 @@ def content(edit, effect, strip, region, moves, frames, time: keyframes.Channel 
     if matte == "STRIP":
         return _strip_frames(region, frames)
     if matte == "MASK":
-        return _mask_reading(edit, effect, strip, region, frames, time)
-    first = strip.left_handle if validation.word(region, "timing") == "TIMELINE" else None
+        return _mask_shapes(edit, effect, strip, region, frames, time)
+    first = strips.origin(strip) if validation.word(region, "timing") == "TIMELINE" else None
     return mattes.FileFrames(image_file(region), validation.number(region, "offset"), first)
 
 
@@ -61,7 +61,7 @@ def image_file(region) -> MatteFile:
     return MatteFile(path, channel(region), files, (_stamp(path), _stamp(folder)))
 
 
-def _mask_reading(edit, effect, strip, region, frames, time) -> keyframes.Channel:
+def _mask_shapes(edit, effect, strip, region, frames, time) -> keyframes.Channel:
     """A mask's shapes at the source's frames, of which the first is the mask's start, as a Mask strip on it has it."""
     mask = region.mask
     if mask is None:

@@ -98,7 +98,7 @@ CHANNELS = (
 )
 TIMINGS = (
     ("SOURCE", "Footage", "The matte's frames belong to those of the footage, however that is trimmed and retimed"),
-    ("TIMELINE", "Timeline", "The matte plays along the timeline, from the Shutter strip's start"),
+    ("TIMELINE", "Timeline", "The matte plays along the timeline, from where the Shutter strip starts untrimmed"),
 )
 BLENDS = (
     ("OVER", "Over", "What is beneath shares what the matte leaves"),
@@ -329,13 +329,14 @@ class ShutterRegion(_Tracked, PropertyGroup):
     layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=_changed)
     kind: EnumProperty(
         name="Type",
-        description="How the strokes cover the picture",
+        description="What says where the shutter holds",
         items=KINDS,
         update=_changed,
         options=_UNKEYED,
+        translation_context=CONTEXT,
     )
     matte: EnumProperty(
-        name="Matte", description="What the matte is", items=MATTE_SOURCES, update=_changed, options=_UNKEYED
+        name="From", description="What the matte is", items=MATTE_SOURCES, update=_changed, options=_UNKEYED
     )
     image: PointerProperty(
         name="File",
@@ -386,6 +387,7 @@ class ShutterRegion(_Tracked, PropertyGroup):
         items=BLENDS,
         update=_changed,
         options=_UNKEYED,
+        translation_context=CONTEXT,
     )
     opacity: FloatProperty(
         name="Opacity",
@@ -405,6 +407,7 @@ class ShutterRegion(_Tracked, PropertyGroup):
         precision=3,
         step=1,
         update=_changed,
+        translation_context=CONTEXT,
     )
     ramp: EnumProperty(name="Ramp", description="How the ramp runs", items=RAMPS, update=_changed, options=_UNKEYED)
     width: FloatProperty(

@@ -12,7 +12,7 @@ from ...media import MediaError
 from ...media.files import check_name
 from ...media.matte_files import MatteFile
 from ...media.sequence import IMAGE_SUFFIXES
-from . import fcurves, geometry
+from . import fcurves, geometry, strips
 from .annotations import annotation, picture_size
 from .snapshot import OPTIONS
 from .validation import EffectError
@@ -49,7 +49,7 @@ def apply(edit, effect, strip, source: recipe.Recipe, folder: Path = Path()) -> 
         if isinstance(region, recipe.Region):
             _add_region(edit, effect, strip, where, region, colors[region.shutter], first)
         else:
-            _add_matte(edit, effect, where, region, images, first)
+            _add_matte(edit, effect, strip, where, region, images, first)
 
 
 def _set_number(edit, owner, path: str, name: str, value: recipe.Keyable, first: float, **curve) -> None:
@@ -74,7 +74,8 @@ def matte_image(path: str | Path, channel: str = "luminance"):
     try:
         return bpy.data.images.load(check_name(path), check_existing=True)
     except RuntimeError as error:
-        raise MediaError(f"{path.name}: Blender cannot read it ({error})") from None
+        sentence = rpt_("{file}: Blender cannot read it ({error})")
+        raise MediaError(sentence.format(file=path.name, error=error)) from None
 
 
 def _check_keys(source: recipe.Recipe, first: float) -> None:
@@ -131,7 +132,7 @@ def _add_region(edit, effect, strip, path: str, source: recipe.Region, color, fi
 
 
 def _add_matte(
-    edit, effect, path: str, source: recipe.MatteRegion | recipe.RampRegion, images: dict, first: float
+    edit, effect, strip, path: str, source: recipe.MatteRegion | recipe.RampRegion, images: dict, first: float
 ) -> None:
     region = effect.regions.add()
     region.name, region.shutter, region.kind = source.name, source.shutter, source.kind.upper()
@@ -140,7 +141,9 @@ def _add_matte(
         region.ramp = source.ramp.upper()
     else:
         region.matte, region.image = "IMAGE", images[source.path]
-        region.offset, region.timing = source.offset, source.timing.upper()
+        # Blender's offset counts from the strip's untrimmed start, a recipe's from the strip's first frame.
+        region.offset = source.offset - (strips.skipped(strip) if source.timing == "timeline" else 0)
+        region.timing = source.timing.upper()
         is_named = source.channel not in recipe.CHANNELS
         region.channel = "NAMED" if is_named else source.channel.upper()
         region.channel_name = source.channel if is_named else ""

@@ -1,5 +1,7 @@
 """Effect strips: a Scene strip above its source, and the scene, data and source that belong to it."""
 
+import math
+
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
@@ -54,6 +56,11 @@ def find_edit(scene):
 def origin(strip) -> float:
     """Timeline frame at which the strip's untrimmed content would start: the same for all parts of a cut strip."""
     return strip.content_start - strip.content_trim_start
+
+
+def skipped(strip) -> int:
+    """How many frames of its content a strip leaves out before the first that it shows."""
+    return math.floor(strip.left_handle - origin(strip))
 
 
 def timeline_frame(strip, scene_frame: float) -> float:

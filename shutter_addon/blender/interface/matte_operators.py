@@ -3,10 +3,11 @@
 import bpy
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import EnumProperty
+from bpy.props import EnumProperty, StringProperty
 from bpy.types import Operator
 from bpy_extras.io_utils import ImportHelper
 
+from ...core.limits import MAX_CHANNEL
 from ...core.recipe import RecipeError
 from ...media import MediaError
 from ..data import matte_strips, recipe_import, selection, strips, validation
@@ -29,12 +30,21 @@ class SHUTTER_OT_matte_add(_AddsRegion, ImportHelper, Operator):
     bl_idname = "shutter.matte_add"
     bl_label = "Matte from File"
 
+    channel_name: StringProperty(
+        name="Channel Name",
+        description="Name of a channel of an EXR file; empty for the luminance",
+        maxlen=MAX_CHANNEL,
+        options={"SKIP_SAVE"},
+    )
+
     def change(self, _context, effect):
+        name = self.channel_name
         try:
-            image = recipe_import.matte_image(bpy.path.abspath(chosen_file(self)))
+            image = recipe_import.matte_image(bpy.path.abspath(chosen_file(self)), name or "luminance")
         except (MediaError, RecipeError) as error:
             raise validation.EffectError(str(error)) from None
-        region_edits.add_matte(effect, selection.active_shutter(effect), name=image.name, image=image)
+        channel = {"channel": "NAMED", "channel_name": name} if name else {}
+        region_edits.add_matte(effect, selection.active_shutter(effect), name=image.name, image=image, **channel)
 
 
 _strip_items = []

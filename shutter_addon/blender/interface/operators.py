@@ -359,7 +359,11 @@ class SHUTTER_OT_draw(_OfShutter, Operator):
         options={"SKIP_SAVE"},
     )
     kind: EnumProperty(
-        name="Type", description="How the strokes cover the picture", items=STROKES, options={"SKIP_SAVE"}
+        name="Type",
+        description="How the strokes cover the picture",
+        items=STROKES,
+        translation_context=CONTEXT,
+        options={"SKIP_SAVE"},
     )
 
     @classmethod

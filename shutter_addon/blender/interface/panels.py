@@ -241,7 +241,7 @@ class _Regions(_WithEffect):
 
 def _draw_matte(layout, look, region) -> None:
     """What the matte is, and what is wrong with it."""
-    layout.prop(region, "matte", text="From")
+    layout.prop(region, "matte")
     if region.matte == "IMAGE":
         layout.template_ID(region, "image", open="image.open")
         if region.image is not None:

@@ -34,7 +34,9 @@ def _words(edit, effect, strip, region, path: Path, number: int) -> recipe.Matte
         return _ramp(region)
     if region.matte == "IMAGE":
         file, channel = matte_content.image_path(region), matte_content.channel(region)
-        words = {"channel": channel, "offset": region.offset, "timing": region.timing.lower()}
+        # A recipe's timeline begins with the strip, trimmed as it is.
+        offset = region.offset + (strips.skipped(strip) if region.timing == "TIMELINE" else 0)
+        words = {"channel": channel, "offset": offset, "timing": region.timing.lower()}
         return recipe.MatteRegion(region.shutter, "matte", recipe.relative(file, path.parent), **words)
     name = re.sub(r"[^\w. -]", "_", region.name).strip(". ") or "Matte"
     folder = path.with_name(f"{path.stem} mattes") / f"{number} {name}"

@@ -8,7 +8,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from ...core.mattes import FileFrames
 from ...core.messages import UserError
 from ...media.matte_files import MatteFile
-from ..data import matte_strips, revision, snapshot
+from ..data import matte_strips, revision, snapshot, strips
 
 _looks = revision.UntilChange()
 
@@ -58,10 +58,7 @@ def _note(strip, region, content, count: int) -> str:
         )
     if not isinstance(content, FileFrames) or count == 1:
         return ""
-    wanted = strip.right_handle - strip.left_handle
-    if content.first is None:
-        wanted += strip.content_trim_start
-    if content.offset + wanted <= count:
+    if content.offset + strip.right_handle - strips.origin(strip) <= count:
         return ""
     return iface_("Shorter than the film: its last frame holds")
 
