@@ -136,7 +136,7 @@ class Camera:
 
     def corners(self, _frame: float) -> np.ndarray:
         """The picture's (4, 2), in fractions of it."""
-        return np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+        return motions.PICTURE
 
 
 STILL_CAMERA = Camera(*map(keyframes.Constant, ((0.0, 0.0), 0.0, 1.0)))
