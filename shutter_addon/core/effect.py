@@ -19,7 +19,6 @@ from .motions import Placement
 
 _CLOSED = 'shutter "{name}" at frame {frame}: {fault}'
 _TOO_MANY = 'region "{name}": more than {most} points with those before it'
-_CORNERS = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 _FAR = 'region "{name}": a point of its strokes is nowhere near the picture'
 
 
@@ -152,7 +151,7 @@ class MatteRegion:
 
     def corners(self, _frame: float) -> np.ndarray:
         """The picture's (4, 2), in fractions of it."""
-        return _CORNERS
+        return motions.PICTURE
 
 
 @dataclass(frozen=True)
@@ -187,7 +186,7 @@ class Camera:
 
     def corners(self, _frame: float) -> np.ndarray:
         """The picture's (4, 2), in fractions of it."""
-        return _CORNERS
+        return motions.PICTURE
 
 
 STILL_CAMERA = Camera(*map(keyframes.Constant, ((0.0, 0.0), 0.0, 1.0)))
