@@ -67,8 +67,8 @@ def run(folder):
         bpy.ops.wm.save_as_mainfile(filepath=path)
         bpy.ops.wm.open_mainfile(filepath=path)
     bpy.context.view_layer.update()
-    _draw(bpy)
-    trial.forked(lambda: _export(bpy))  # mattes are read in threads
+    for task in (_draw, _export):  # which use threads
+        trial.forked(lambda task=task: task(bpy))
     code = {trial.forked(lambda name=name: _render(bpy, folder / "out" / name, plan["frame"]))[0] for name in "ab"}
     if len(code) > 1:
         raise trial.Fault("a frame is rendered once and refused once")
