@@ -13,6 +13,8 @@ _FEWEST, _MOST = 4, 32
 _REACH = 0.05
 # The round ends of an open spline that is not filled have a point every two pixels, in these limits.
 _CAP_POINTS = 8, 64
+# Segments that are compared at once with all others that may cross them.
+_SEGMENTS = 1 << 11
 
 
 def outlines(spline, width: int, height: int) -> tuple[np.ndarray, np.ndarray] | None:
@@ -192,9 +194,14 @@ def crossings(starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndar
     # In the order of their left ends, a segment can meet those that follow until one begins behind its right end.
     order = np.argsort(lowest[:, 0], kind="stable")
     reach = np.searchsorted(lowest[order, 0], highest[order, 0], side="right")
-    here, there = (order[place] for place in ranges(np.arange(len(order)) + 1, reach))
-    near = (lowest[here, 1] <= highest[there, 1]) & (lowest[there, 1] <= highest[here, 1])
-    first, second = np.sort([here[near], there[near]], axis=0)
+    found = [np.zeros((2, 0), int)]
+    for a in range(0, len(order), _SEGMENTS):
+        part = np.arange(a, min(a + _SEGMENTS, len(order)))
+        here, there = ranges(part + 1, reach[part])
+        here, there = order[here + a], order[there]
+        near = (lowest[here, 1] <= highest[there, 1]) & (lowest[there, 1] <= highest[here, 1])
+        found.append(np.stack([here[near], there[near]]))
+    first, second = np.sort(np.concatenate(found, axis=1), axis=0)
     a, b, gap = ways[first], ways[second], starts[second] - starts[first]
     area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):

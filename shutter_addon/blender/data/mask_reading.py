@@ -136,8 +136,7 @@ def _checked(mask, numbers) -> np.ndarray:
 def _keyed_points(mask, layer, frame: float) -> np.ndarray | None:
     """The points of all splines of a layer (n, 8) by its shape keys; None where it has none that fit.
 
-    Shape keys are held before the first and behind the last; points added since leave them without effect, as in
-    Blender. EffectError: not in this Blender.
+    Shape keys are held before the first and behind the last. EffectError: not in this Blender.
     """
     shapes = _shapes(mask, layer)
     if not shapes:
