@@ -40,12 +40,17 @@ def outlines(spline, width: int, height: int) -> tuple[np.ndarray, np.ndarray] |
     return edge, feather
 
 
-def _steps(spline, points: np.ndarray, weights: np.ndarray, larger: int) -> int:
-    """Points that a segment is cut into: one in four pixels of the longest segment, more where its feather changes."""
+def longest_segment(points: np.ndarray, cyclic: bool) -> float:
+    """Of the segments of a spline (n, 3, 2), the length of the longest, along its handles."""
     following = np.roll(points, -1, axis=0)
     hull = np.stack([points[:, 1], points[:, 2], following[:, 0], following[:, 1]], axis=1)
     lengths = np.linalg.norm(np.diff(hull, axis=1), axis=2).sum(axis=1)
-    longest = lengths[: None if spline.cyclic else -1].max() * larger
+    return float(lengths[: None if cyclic else -1].max(initial=0))
+
+
+def _steps(spline, points: np.ndarray, weights: np.ndarray, larger: int) -> int:
+    """Points that a segment is cut into: one in four pixels of the longest segment, more where its feather changes."""
+    longest = (spline.longest or longest_segment(points, spline.cyclic)) * larger
     steepest = 0.0
     for weight, feather in zip(weights, spline.feathers, strict=True):
         u, factor = np.array([(0.0, weight), *feather]).T

@@ -11,6 +11,7 @@ from support import write_frames
 from shutter_addon.core.masks import coverage
 
 AVERAGE = 0.5  # what a picture may differ by, in 8-bit levels: Blender cuts off fractions
+ASTRAY = 0.001  # share of pixels that may differ by more than 8 levels
 FRAMES = 1, 11, 21, 31, 41
 
 
@@ -38,6 +39,7 @@ def assert_as_the_strip(bpy, edit, render, capsys):
         with capsys.disabled():
             print(f" {differences.mean((1, 2)).max():.3f}/{differences.max():.0f}", end="")
         assert differences.mean((1, 2)).max() <= AVERAGE
+        assert (differences > 8).mean((1, 2)).max() <= ASTRAY
         return shown
 
     return compare
@@ -188,7 +190,7 @@ def test_shape_keys_and_keyed_opacity(bpy, mask, assert_as_the_strip, mask_edito
                 for point in (point for spline in layer.splines for point in spline.points):
                     point.select = True
                     point.co = (point.co[0] + dice.uniform(-0.06, 0.06), point.co[1] + dice.uniform(-0.06, 0.06))
-                    point.handle_left = (point.handle_left[0] + dice.uniform(-0.05, 0.05), point.handle_left[1])
+                    point.handle_left = (point.co[0] + dice.uniform(-0.2, 0.2), point.co[1] + dice.uniform(-0.2, 0.2))
                     point.weight *= dice.uniform(0.5, 1.5)
             assert bpy.ops.mask.shape_key_insert() == {"FINISHED"}
     layers[0].keyframe_insert("alpha", frame=10)

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import mask_handles
+from ...core import mask_handles, mask_outlines
 from ...core.masks import MaskLayer, MaskShape, MaskSpline
 from . import fcurves
 from .validation import EffectError
@@ -89,7 +89,9 @@ def _spline_at(mask, spline, frame: float, keyed: np.ndarray | None) -> MaskSpli
     types = np.stack([_numbers(spline, f"handle_{side}_type", np.int32) for side in ("left", "right")], axis=1)
     selected = _numbers(spline, "select_left_handle", bool)
     points = mask_handles.with_handles(points, types, selected, spline.use_cyclic)
+    longest = 0.0
     if any(point.parent.id for point in spline.points):
+        longest = mask_outlines.longest_segment(points, spline.use_cyclic)
         points = _parented(mask, spline, points, frame)
         anew = np.isin(types[:, 0], (mask_handles.AUTO, mask_handles.VECTOR))
         again = mask_handles.with_handles(points, types, selected, spline.use_cyclic)
@@ -104,6 +106,7 @@ def _spline_at(mask, spline, frame: float, keyed: np.ndarray | None) -> MaskSpli
         offset_mode=spline.offset_mode,
         weight_interpolation=spline.weight_interpolation,
         collapse=spline.use_self_intersection_check,
+        longest=longest,
     )
 
 
