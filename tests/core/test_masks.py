@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from shutter_addon.core import mask_filling, mask_handles
 from shutter_addon.core.masks import MaskLayer, MaskShape, MaskSpline, coverage
@@ -233,6 +235,30 @@ def test_sizes_that_no_picture_has(far):
     corners = np.array([(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)]) * far - far / 3
     value = covered([straight(corners, far / 10)], (32, 18))
     assert np.isfinite(value).all()
+    assert value.min() >= 0
+    assert value.max() <= 1
+
+
+# On a coarse grid points coincide, lines lie on one another and cross in corners.
+grid = st.tuples(st.integers(-1, 5), st.integers(-1, 5)).map(lambda place: (place[0] / 4, place[1] / 4))
+
+
+@settings(max_examples=60)
+@given(st.lists(st.lists(grid, min_size=1, max_size=6), min_size=1, max_size=3), st.data())
+def test_no_mask_is_too_odd(polygons, data):
+    splines = [
+        straight(
+            corners,
+            data.draw(st.sampled_from([0, 0.1, -0.1, 2])),
+            cyclic=data.draw(st.booleans()),
+            fill=data.draw(st.booleans()),
+            offset_mode=data.draw(st.sampled_from(["EVEN", "SMOOTH"])),
+            collapse=data.draw(st.booleans()),
+        )
+        for corners in polygons
+    ]
+    options = {name: data.draw(st.booleans()) for name in ("holes", "overlap", "invert")}
+    value = covered(splines, (16, 12), fill_solver=data.draw(st.sampled_from(["CDT", "SWEEP_LINE"])), **options)
     assert value.min() >= 0
     assert value.max() <= 1
 

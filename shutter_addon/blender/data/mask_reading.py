@@ -6,7 +6,7 @@ from Blender's memory, and checked against what the API has.
 
 import ctypes
 from bisect import bisect_right
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import bpy
 import numpy as np
@@ -96,11 +96,12 @@ def _spline_at(mask, spline, frame: float, keyed: np.ndarray | None) -> MaskSpli
         anew = np.isin(types[:, 0], (mask_handles.AUTO, mask_handles.VECTOR))
         again = mask_handles.with_handles(points, types, selected, spline.use_cyclic)
         points = np.where(anew[:, None, None], again, points)
-    _checked(mask, points), _checked(mask, weights)
+    feathers = tuple(tuple((f.u, f.weight) for f in point.feather_points) for point in spline.points)
+    _checked(mask, [*points.flat, *weights, *chain(*chain(*feathers))])
     return MaskSpline(
         points=tuple(tuple(map(tuple, point)) for point in points.tolist()),
         weights=tuple(weights.tolist()),
-        feathers=tuple(_feather_points(mask, point) for point in spline.points),
+        feathers=feathers,
         cyclic=spline.use_cyclic,
         fill=spline.use_fill,
         offset_mode=spline.offset_mode,
@@ -120,11 +121,6 @@ def _numbers(spline, name: str, kind, size: int = 1) -> np.ndarray:
     found = np.empty(len(spline.points) * size, kind)
     spline.points.foreach_get(name, found)
     return found if size == 1 else found.reshape(-1, size)
-
-
-def _feather_points(mask, point) -> tuple[tuple[float, float], ...]:
-    found = [(feather.u, feather.weight) for feather in point.feather_points]
-    return tuple(map(tuple, _checked(mask, found).tolist()))
 
 
 def _checked(mask, numbers) -> np.ndarray:
@@ -178,8 +174,7 @@ def _unreadable(mask) -> EffectError:
 
 def _parented(mask, spline, points: np.ndarray, frame: float) -> np.ndarray:
     """The points (n, 3, 2) where their parents have moved them."""
-    matrices: dict = {}
-    points = points.copy()
+    children: dict = {}  # what moves points, and which
     for index, point in enumerate(spline.points):
         parent = point.parent
         if parent.id is None or parent.id_type != "MOVIECLIP":
@@ -187,13 +182,13 @@ def _parented(mask, spline, points: np.ndarray, frame: float) -> np.ndarray:
         raw = _Parent.from_address(parent.as_pointer())
         names = parent.parent.encode(), parent.sub_parent.encode()
         if raw.id != parent.id.as_pointer() or (raw.object, raw.track) != names:
-            raise EffectError(
-                rpt_('mask "{mask}": it cannot be read in this version of Blender').format(mask=mask.name)
-            )
-        key = (raw.id, parent.type, *names, *raw.origin, *raw.corners)
-        if key not in matrices:
-            matrices[key] = _parent_matrix(parent, np.array(raw.origin), np.reshape(raw.corners, (4, 2)), frame)
-        points[index] = mask_handles.moved(points[index], matrices[key])
+            raise _unreadable(mask)
+        key = (raw.id, parent.type, *names, tuple(raw.origin), tuple(raw.corners))
+        children.setdefault(key, (parent, []))[1].append(index)
+    points = points.copy()
+    for (*_, origin, corners), (parent, here) in children.items():
+        matrix = _parent_matrix(parent, np.array(origin), np.reshape(corners, (4, 2)), frame)
+        points[here] = mask_handles.moved(points[here], matrix)
     return points
 
 
