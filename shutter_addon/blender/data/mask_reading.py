@@ -90,9 +90,10 @@ def _spline_at(mask, spline, frame: float, keyed: np.ndarray | None) -> MaskSpli
     selected = _numbers(spline, "select_left_handle", bool)
     points = mask_handles.with_handles(points, types, selected, spline.use_cyclic)
     longest = 0.0
-    if any(point.parent.id for point in spline.points):
+    if families := _families(mask, spline):
         longest = mask_outlines.longest_segment(points, spline.use_cyclic)
-        points = _parented(mask, spline, points, frame)
+        for parent, raw, here in families:
+            points[here] = mask_handles.moved(points[here], _parent_matrix(parent, raw, frame))
         anew = np.isin(types[:, 0], (mask_handles.AUTO, mask_handles.VECTOR))
         again = mask_handles.with_handles(points, types, selected, spline.use_cyclic)
         points = np.where(anew[:, None, None], again, points)
@@ -172,27 +173,25 @@ def _unreadable(mask) -> EffectError:
     return EffectError(rpt_('mask "{mask}": it cannot be read in this version of Blender').format(mask=mask.name))
 
 
-def _parented(mask, spline, points: np.ndarray, frame: float) -> np.ndarray:
-    """The points (n, 3, 2) where their parents have moved them."""
-    children: dict = {}  # what moves points, and which
+def _families(mask, spline) -> list[tuple[bpy.types.MaskParent, _Parent, list[int]]]:
+    """The tracks of clips that are parents of a spline's points: each as Python has it and as it lies in memory, and the
+    indices of its children. EffectError: not in this Blender."""
+    children: dict = {}
     for index, point in enumerate(spline.points):
-        parent = point.parent
-        if parent.id is None or parent.id_type != "MOVIECLIP":
-            continue
-        raw = _Parent.from_address(parent.as_pointer())
+        memory = ctypes.string_at(point.parent.as_pointer(), ctypes.sizeof(_Parent))
+        children.setdefault(memory, []).append(index)
+    families = []
+    for memory, here in children.items():
+        parent, raw = spline.points[here[0]].parent, _Parent.from_buffer_copy(memory)
         names = parent.parent.encode(), parent.sub_parent.encode()
-        if raw.id != parent.id.as_pointer() or (raw.object, raw.track) != names:
+        if raw.id != (parent.id and parent.id.as_pointer()) or (raw.object, raw.track) != names:
             raise _unreadable(mask)
-        key = (raw.id, parent.type, *names, tuple(raw.origin), tuple(raw.corners))
-        children.setdefault(key, (parent, []))[1].append(index)
-    points = points.copy()
-    for (*_, origin, corners), (parent, here) in children.items():
-        matrix = _parent_matrix(parent, np.array(origin), np.reshape(corners, (4, 2)), frame)
-        points[here] = mask_handles.moved(points[here], matrix)
-    return points
+        if parent.id is not None and parent.id_type == "MOVIECLIP":
+            families.append((parent, raw, here))
+    return families
 
 
-def _parent_matrix(parent, origin: np.ndarray, corners: np.ndarray, frame: float) -> np.ndarray:
+def _parent_matrix(parent, raw: _Parent, frame: float) -> np.ndarray:
     """How a track (3, 3) has moved its children since they got it, in mask space; no motion where there is none."""
     clip, matrix = parent.id, np.eye(3)
     tracked = clip.tracking.objects.get(parent.parent)
@@ -203,7 +202,7 @@ def _parent_matrix(parent, origin: np.ndarray, corners: np.ndarray, frame: float
         track = tracked.tracks.get(parent.sub_parent)
         if track is not None and len(track.markers):
             at = _between_markers(track, "co", 2, frame - clip.frame_start + 1, _halved) + track.offset
-            matrix[:2, 2] = mask_handles.moved(at, to_mask) - origin
+            matrix[:2, 2] = mask_handles.moved(at, to_mask) - raw.origin
         return matrix
     track = tracked.plane_tracks.get(parent.sub_parent)
     if track is None or not len(track.markers):
@@ -213,7 +212,7 @@ def _parent_matrix(parent, origin: np.ndarray, corners: np.ndarray, frame: float
     if clip.size[0] and to_mask[0, 0] < 1:
         # Blender takes the inverse for pictures higher than wide, where planes move their children less than they do.
         to_mask = np.linalg.inv(to_mask)
-    return to_mask @ mask_handles.homography(corners, now) @ np.linalg.inv(to_mask)
+    return to_mask @ mask_handles.homography(np.reshape(raw.corners, (4, 2)), now) @ np.linalg.inv(to_mask)
 
 
 def _between_markers(track, name: str, size: int, frame: float, find) -> np.ndarray:
