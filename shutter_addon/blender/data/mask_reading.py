@@ -174,7 +174,7 @@ def _unreadable(mask) -> EffectError:
 
 
 def _families(mask, spline) -> list[tuple[bpy.types.MaskParent, _Parent, list[int]]]:
-    """The tracks of clips that are parents of a spline's points: each as Python has it and as it lies in memory, and the
+    """The tracks of clips that are parents of a spline's points: each as Python has it, as it lies in memory, and the
     indices of its children. EffectError: not in this Blender."""
     children: dict = {}
     for index, point in enumerate(spline.points):
