@@ -128,8 +128,8 @@ def _outer_loops(polygon: np.ndarray) -> list[np.ndarray]:
     count, meetings = len(polygon), np.arange(len(first))
     place = np.concatenate([np.arange(count), first + at, second + other])
     corner = np.concatenate([np.arange(count), count + meetings, count + meetings])
-    start = place - (np.argmin(polygon[:, 0]) - 1)
-    way = corner[np.lexsort((corner, np.where(start < 0, start + count, start)))].tolist()
+    behind = (place - np.argmin(polygon[:, 0])) % count
+    way = corner[np.lexsort((corner, behind))].tolist()
     following, inside = {}, False
     for here, there in pairwise([*way, way[0]]):
         inside ^= here >= count

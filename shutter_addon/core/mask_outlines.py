@@ -13,6 +13,8 @@ _FEWEST, _MOST = 4, 32
 _REACH = 0.05
 # The round ends of an open spline that is not filled have a point every two pixels, in these limits.
 _CAP_POINTS = 8, 64
+# Segments that are compared at once with all others that may cross them.
+_SEGMENTS = 1 << 11
 
 
 def outlines(spline, width: int, height: int) -> tuple[np.ndarray, np.ndarray] | None:
@@ -38,12 +40,17 @@ def outlines(spline, width: int, height: int) -> tuple[np.ndarray, np.ndarray] |
     return edge, feather
 
 
-def _steps(spline, points: np.ndarray, weights: np.ndarray, larger: int) -> int:
-    """Points that a segment is cut into: one in four pixels of the longest segment, more where its feather changes."""
+def longest_segment(points: np.ndarray, cyclic: bool) -> float:
+    """Of the segments of a spline (n, 3, 2), the length of the longest, along its handles."""
     following = np.roll(points, -1, axis=0)
     hull = np.stack([points[:, 1], points[:, 2], following[:, 0], following[:, 1]], axis=1)
     lengths = np.linalg.norm(np.diff(hull, axis=1), axis=2).sum(axis=1)
-    longest = lengths[: None if spline.cyclic else -1].max() * larger
+    return float(lengths[: None if cyclic else -1].max(initial=0))
+
+
+def _steps(spline, points: np.ndarray, weights: np.ndarray, larger: int) -> int:
+    """Points that a segment is cut into: one in four pixels of the longest segment, more where its feather changes."""
+    longest = (spline.longest or longest_segment(points, spline.cyclic)) * larger
     steepest = 0.0
     for weight, feather in zip(weights, spline.feathers, strict=True):
         u, factor = np.array([(0.0, weight), *feather]).T
@@ -192,9 +199,14 @@ def crossings(starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndar
     # In the order of their left ends, a segment can meet those that follow until one begins behind its right end.
     order = np.argsort(lowest[:, 0], kind="stable")
     reach = np.searchsorted(lowest[order, 0], highest[order, 0], side="right")
-    here, there = (order[place] for place in ranges(np.arange(len(order)) + 1, reach))
-    near = (lowest[here, 1] <= highest[there, 1]) & (lowest[there, 1] <= highest[here, 1])
-    first, second = np.sort([here[near], there[near]], axis=0)
+    found = [np.zeros((2, 0), int)]
+    for a in range(0, len(order), _SEGMENTS):
+        part = np.arange(a, min(a + _SEGMENTS, len(order)))
+        here, there = ranges(part + 1, reach[part])
+        here, there = order[here + a], order[there]
+        near = (lowest[here, 1] <= highest[there, 1]) & (lowest[there, 1] <= highest[here, 1])
+        found.append(np.stack([here[near], there[near]]))
+    first, second = np.sort(np.concatenate(found, axis=1), axis=0)
     a, b, gap = ways[first], ways[second], starts[second] - starts[first]
     area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):

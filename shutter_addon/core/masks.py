@@ -43,6 +43,8 @@ class MaskSpline:
     feathers: for each point, the feather points ((u, factor), …) of the segment that follows it, u ascending; the
     factors multiply the points' weights
     collapse: whether loops of the feather's outline are taken out
+    longest: the length of its longest segment before its parents moved it, by which all are cut into straight ones; 0:
+    as it lies
     """
 
     points: tuple[tuple[tuple[float, float], ...], ...]
@@ -53,6 +55,7 @@ class MaskSpline:
     offset_mode: str = "EVEN"  # EVEN | SMOOTH
     weight_interpolation: str = "EASE"  # EASE | LINEAR
     collapse: bool = False
+    longest: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ from support import write_frames
 
 from shutter_addon.core.masks import coverage
 
-AVERAGE = 1.0  # what a picture may differ by, in 8-bit levels
+AVERAGE = 0.5  # what a picture may differ by, in 8-bit levels: Blender cuts off fractions
+ASTRAY = 0.001  # share of pixels that may differ by more than 8 levels
 FRAMES = 1, 11, 21, 31, 41
 
 
@@ -38,6 +39,7 @@ def assert_as_the_strip(bpy, edit, render, capsys):
         with capsys.disabled():
             print(f" {differences.mean((1, 2)).max():.3f}/{differences.max():.0f}", end="")
         assert differences.mean((1, 2)).max() <= AVERAGE
+        assert (differences > 8).mean((1, 2)).max() <= ASTRAY
         return shown
 
     return compare
@@ -152,6 +154,27 @@ def test_splines_that_cross(mask, assert_as_the_strip, name, solver, holes):
     assert_as_the_strip(mask, (1,))
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("solver", ["CDT", "SWEEP_LINE"])
+def test_a_spline_that_crosses_itself(mask, assert_as_the_strip, seed, solver):
+    dice = random.Random(seed)
+    layer = mask.layers.new(name="L")
+    layer.fill_solver = solver
+    draw(layer, blob(dice, 7, scattered=True))
+    assert_as_the_strip(mask, (1,))
+
+
+@pytest.mark.parametrize("fill", [False, True])
+def test_loops_of_a_feather_are_taken_out(mask, assert_as_the_strip, fill):
+    layer = mask.layers.new(name="L")
+    corners = [(0.2, 0.3), (0.2, 0.7), (0.45, 0.7), (0.48, 0.45), (0.52, 0.45), (0.55, 0.7), (0.8, 0.7), (0.8, 0.3)]
+    spline = draw(layer, corners, 0.12, use_fill=fill)
+    with_loops = assert_as_the_strip(mask, (1,), (160, 90))
+    spline.use_self_intersection_check = True
+    without = assert_as_the_strip(mask, (1,), (161, 90))
+    assert np.abs(without[1][:, :160] - with_loops[1]).mean() > 1
+
+
 @pytest.mark.parametrize("size", [(161, 90), (90, 161)])
 def test_shape_keys_and_keyed_opacity(bpy, mask, assert_as_the_strip, mask_editor, clip, edit, size):
     dice = random.Random(3)
@@ -167,7 +190,7 @@ def test_shape_keys_and_keyed_opacity(bpy, mask, assert_as_the_strip, mask_edito
                 for point in (point for spline in layer.splines for point in spline.points):
                     point.select = True
                     point.co = (point.co[0] + dice.uniform(-0.06, 0.06), point.co[1] + dice.uniform(-0.06, 0.06))
-                    point.handle_left = (point.handle_left[0] + dice.uniform(-0.05, 0.05), point.handle_left[1])
+                    point.handle_left = (point.co[0] + dice.uniform(-0.2, 0.2), point.co[1] + dice.uniform(-0.2, 0.2))
                     point.weight *= dice.uniform(0.5, 1.5)
             assert bpy.ops.mask.shape_key_insert() == {"FINISHED"}
     layers[0].keyframe_insert("alpha", frame=10)
@@ -184,7 +207,7 @@ def test_parents(bpy, mask, assert_as_the_strip, mask_editor, clip, edit, kind, 
     clip = clip(*picture, start=4)
     frames = *range(1, gap[0]), *range(gap[1], 43)
     layer = mask.layers.new(name="L")
-    for types in ("AUTO", "ALIGNED"):
+    for types in ("AUTO", "AUTO", "ALIGNED"):
         draw(layer, blob(dice, 6, 0.15), 0.03, (types, types))
     track = clip.tracking.tracks.new(name="Träck", frame=1)
     tracks = [track, *(clip.tracking.tracks.new(name="T", frame=1) for _ in range(3))]
@@ -203,15 +226,14 @@ def test_parents(bpy, mask, assert_as_the_strip, mask_editor, clip, edit, kind, 
                 plane.markers.delete_frame(marker.frame)
             clip.tracking.plane_tracks.active = plane
             for frame in frames:
-                low, high = 0.3 + 0.002 * frame, 0.7 - 0.003 * frame
-                plane.markers.insert_frame(frame).corners = [[low, 0.3], [0.7, low], [0.7, 0.7], [0.3, high]]
+                low, high = 0.3 + 0.004 * frame, 0.7 + 0.01 * frame
+                plane.markers.insert_frame(frame).corners = [[low, 0.3], [0.7, low], [high, 0.7], [0.3, high]]
             space.mode, space.mask = "MASK", mask
         else:
             clip.tracking.tracks.active = track
-        for point in layer.splines[0].points:
-            point.select = True
-        for point in layer.splines[1].points[:3]:
-            point.select = True
+        for spline, count in zip(layer.splines, (6, 3, 3), strict=True):
+            for point in spline.points[:count]:
+                point.select = True
         assert bpy.ops.mask.parent_set() == {"FINISHED"}
     assert layer.splines[0].points[0].parent.type == kind
     shown = assert_as_the_strip(mask, (1, 8, 20, 31, 44), (120, 90))
@@ -252,9 +274,11 @@ def test_reading_leaves_the_mask_as_it_is(bpy, mask, mask_editor, clip, edit):
     assert [tuple(point.co) for point in spline.points] == stood
     assert [shape.layers[0].splines[0].points[0][1][0] for shape in shapes] == pytest.approx([0.1, 0.35, 0.6, 0.6])
     assert shapes[2] == shapes[3] != shapes[0]
-    # A point that came later leaves shape keys without effect.
-    spline.points.add(1)
-    assert len(mask_reading.mask_at(mask, 5).layers[0].splines[0].points) == 6
+    # Shape keys that do not fit have no effect.
+    mask_reading._shapes(mask, layer)[0].points = 4
+    assert mask_reading.mask_at(mask, 5) == shapes[2]
+    mask_reading._shapes(mask, layer)[0].points = 5
+    assert mask_reading.mask_at(mask, 5) == shapes[0]
 
 
 def test_another_blender_is_refused(bpy, mask, mask_editor, clip, monkeypatch):

@@ -5,8 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from shutter_addon.core import mask_handles
+from shutter_addon.core import mask_filling, mask_handles
 from shutter_addon.core.masks import MaskLayer, MaskShape, MaskSpline, coverage
 
 SIZES = [(96, 54), (54, 96), (61, 61)]
@@ -124,9 +126,21 @@ def test_feather_points_widen_their_segment(interpolation):
     share = np.clip(1 - np.abs(x - 0.5) / 0.25, 0, 1)
     share = share if interpolation == "LINEAR" else share**2 * (3 - 2 * share)
     expected = np.clip(1 - (y - 0.65) / (0.05 + 0.1 * share), 0, 1)
-    above = (np.abs(x - 0.5) < 0.23) & (y > 0.65)
-    # A value is that along the normal; between quads it bends a little.
-    assert np.abs(value - expected)[above].mean() < 0.01
+    above = (np.abs(x - 0.5) < 0.23) & (y > 0.65) & (y < 0.8)
+    # Between the normals of two points of the outline, values bend a little.
+    assert np.abs(value - expected)[above].mean() < 0.004
+
+
+def test_quads_that_are_twisted_are_two_triangles():
+    quads = np.array(
+        [[(0.2, 0.2), (0.8, 0.8), (0.8, 0.2), (0.2, 0.8)], [(0.1, 0.9), (0.5, 0.92), (0.9, 0.9), (0.5, 0.95)]]
+    )
+    value = np.zeros((100, 100), np.float32)
+    mask_filling.feather(value, quads, np.ones_like)
+    points = places((100, 100))[::-1]
+    triangles = [quad[list(corners)] for quad in quads for corners in ((0, 1, 2), (0, 2, 3))]
+    inside = np.any([winding(list(triangle), points) != 0 for triangle in triangles], axis=0)
+    assert np.count_nonzero(value.astype(bool) != inside) < 100
 
 
 CROSSED = {
@@ -225,6 +239,30 @@ def test_sizes_that_no_picture_has(far):
     assert value.max() <= 1
 
 
+# On a coarse grid points coincide, lines lie on one another and cross in corners.
+grid = st.tuples(st.integers(-1, 5), st.integers(-1, 5)).map(lambda place: (place[0] / 4, place[1] / 4))
+
+
+@settings(max_examples=60)
+@given(st.lists(st.lists(grid, min_size=1, max_size=6), min_size=1, max_size=3), st.data())
+def test_no_mask_is_too_odd(polygons, data):
+    splines = [
+        straight(
+            corners,
+            data.draw(st.sampled_from([0, 0.1, -0.1, 2])),
+            cyclic=data.draw(st.booleans()),
+            fill=data.draw(st.booleans()),
+            offset_mode=data.draw(st.sampled_from(["EVEN", "SMOOTH"])),
+            collapse=data.draw(st.booleans()),
+        )
+        for corners in polygons
+    ]
+    options = {name: data.draw(st.booleans()) for name in ("holes", "overlap", "invert")}
+    value = covered(splines, (16, 12), fill_solver=data.draw(st.sampled_from(["CDT", "SWEEP_LINE"])), **options)
+    assert value.min() >= 0
+    assert value.max() <= 1
+
+
 def test_masks_are_keys():
     mask = MaskShape((MaskLayer((straight(RECTANGLE, 0.05),)),))
     same, other = (MaskShape((MaskLayer((straight(RECTANGLE, weight),)),)) for weight in (0.05, 0.06))
@@ -241,6 +279,13 @@ def test_automatic_handles_of_four_points_make_a_circle():
     reach = np.linalg.norm(made[:, [0, 2]] - centre[:, None], axis=2)
     assert reach == pytest.approx(0.2 * 0.5523, abs=1e-3)
     assert np.sum((made[:, 2] - made[:, 0]) * (centre - 0.5), axis=1) == pytest.approx(0, abs=1e-12)
+
+
+def test_automatic_handles_reach_at_most_five_times_as_far_as_the_other_side():
+    middle = np.array([(0.0, 0.0), (0.1, 0.0), (2.1, 0.0)])
+    types = np.full((3, 2), mask_handles.AUTO)
+    made = mask_handles.with_handles(np.stack([middle] * 3, axis=1), types, np.zeros(3, bool), False)
+    assert made[1, :, 0] == pytest.approx([0.1 - 0.2 / 5.1228, 0.1, 0.1 + 1 / 5.1228])
 
 
 def test_vector_handles_point_at_the_neighbours_and_free_ones_stay():

@@ -6,13 +6,13 @@ from Blender's memory, and checked against what the API has.
 
 import ctypes
 from bisect import bisect_right
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import mask_handles
+from ...core import mask_handles, mask_outlines
 from ...core.masks import MaskLayer, MaskShape, MaskSpline
 from . import fcurves
 from .validation import EffectError
@@ -89,21 +89,26 @@ def _spline_at(mask, spline, frame: float, keyed: np.ndarray | None) -> MaskSpli
     types = np.stack([_numbers(spline, f"handle_{side}_type", np.int32) for side in ("left", "right")], axis=1)
     selected = _numbers(spline, "select_left_handle", bool)
     points = mask_handles.with_handles(points, types, selected, spline.use_cyclic)
-    if any(point.parent.id for point in spline.points):
-        points = _parented(mask, spline, points, frame)
+    longest = 0.0
+    if families := _families(mask, spline):
+        longest = mask_outlines.longest_segment(points, spline.use_cyclic)
+        for parent, raw, here in families:
+            points[here] = mask_handles.moved(points[here], _parent_matrix(parent, raw, frame))
         anew = np.isin(types[:, 0], (mask_handles.AUTO, mask_handles.VECTOR))
         again = mask_handles.with_handles(points, types, selected, spline.use_cyclic)
         points = np.where(anew[:, None, None], again, points)
-    _checked(mask, points), _checked(mask, weights)
+    feathers = tuple(tuple((f.u, f.weight) for f in point.feather_points) for point in spline.points)
+    _checked(mask, [*points.flat, *weights, *chain(*chain(*feathers))])
     return MaskSpline(
         points=tuple(tuple(map(tuple, point)) for point in points.tolist()),
         weights=tuple(weights.tolist()),
-        feathers=tuple(_feather_points(mask, point) for point in spline.points),
+        feathers=feathers,
         cyclic=spline.use_cyclic,
         fill=spline.use_fill,
         offset_mode=spline.offset_mode,
         weight_interpolation=spline.weight_interpolation,
         collapse=spline.use_self_intersection_check,
+        longest=longest,
     )
 
 
@@ -119,11 +124,6 @@ def _numbers(spline, name: str, kind, size: int = 1) -> np.ndarray:
     return found if size == 1 else found.reshape(-1, size)
 
 
-def _feather_points(mask, point) -> tuple[tuple[float, float], ...]:
-    found = [(feather.u, feather.weight) for feather in point.feather_points]
-    return tuple(map(tuple, _checked(mask, found).tolist()))
-
-
 def _checked(mask, numbers) -> np.ndarray:
     """Numbers of a mask. EffectError: one is none, or too far off."""
     numbers = np.asarray(numbers, np.float64)
@@ -136,8 +136,7 @@ def _checked(mask, numbers) -> np.ndarray:
 def _keyed_points(mask, layer, frame: float) -> np.ndarray | None:
     """The points of all splines of a layer (n, 8) by its shape keys; None where it has none that fit.
 
-    Shape keys are held before the first and behind the last; points added since leave them without effect, as in
-    Blender. EffectError: not in this Blender.
+    Shape keys are held before the first and behind the last. EffectError: not in this Blender.
     """
     shapes = _shapes(mask, layer)
     if not shapes:
@@ -174,28 +173,25 @@ def _unreadable(mask) -> EffectError:
     return EffectError(rpt_('mask "{mask}": it cannot be read in this version of Blender').format(mask=mask.name))
 
 
-def _parented(mask, spline, points: np.ndarray, frame: float) -> np.ndarray:
-    """The points (n, 3, 2) where their parents have moved them."""
-    matrices: dict = {}
-    points = points.copy()
+def _families(mask, spline) -> list[tuple[bpy.types.MaskParent, _Parent, list[int]]]:
+    """The tracks of clips that are parents of a spline's points: each as Python has it, as it lies in memory, and the
+    indices of its children. EffectError: not in this Blender."""
+    children: dict = {}
     for index, point in enumerate(spline.points):
-        parent = point.parent
-        if parent.id is None or parent.id_type != "MOVIECLIP":
-            continue
-        raw = _Parent.from_address(parent.as_pointer())
+        memory = ctypes.string_at(point.parent.as_pointer(), ctypes.sizeof(_Parent))
+        children.setdefault(memory, []).append(index)
+    families = []
+    for memory, here in children.items():
+        parent, raw = spline.points[here[0]].parent, _Parent.from_buffer_copy(memory)
         names = parent.parent.encode(), parent.sub_parent.encode()
-        if raw.id != parent.id.as_pointer() or (raw.object, raw.track) != names:
-            raise EffectError(
-                rpt_('mask "{mask}": it cannot be read in this version of Blender').format(mask=mask.name)
-            )
-        key = (raw.id, parent.type, *names, *raw.origin, *raw.corners)
-        if key not in matrices:
-            matrices[key] = _parent_matrix(parent, np.array(raw.origin), np.reshape(raw.corners, (4, 2)), frame)
-        points[index] = mask_handles.moved(points[index], matrices[key])
-    return points
+        if raw.id != (parent.id and parent.id.as_pointer()) or (raw.object, raw.track) != names:
+            raise _unreadable(mask)
+        if parent.id is not None and parent.id_type == "MOVIECLIP":
+            families.append((parent, raw, here))
+    return families
 
 
-def _parent_matrix(parent, origin: np.ndarray, corners: np.ndarray, frame: float) -> np.ndarray:
+def _parent_matrix(parent, raw: _Parent, frame: float) -> np.ndarray:
     """How a track (3, 3) has moved its children since they got it, in mask space; no motion where there is none."""
     clip, matrix = parent.id, np.eye(3)
     tracked = clip.tracking.objects.get(parent.parent)
@@ -206,7 +202,7 @@ def _parent_matrix(parent, origin: np.ndarray, corners: np.ndarray, frame: float
         track = tracked.tracks.get(parent.sub_parent)
         if track is not None and len(track.markers):
             at = _between_markers(track, "co", 2, frame - clip.frame_start + 1, _halved) + track.offset
-            matrix[:2, 2] = mask_handles.moved(at, to_mask) - origin
+            matrix[:2, 2] = mask_handles.moved(at, to_mask) - raw.origin
         return matrix
     track = tracked.plane_tracks.get(parent.sub_parent)
     if track is None or not len(track.markers):
@@ -216,7 +212,7 @@ def _parent_matrix(parent, origin: np.ndarray, corners: np.ndarray, frame: float
     if clip.size[0] and to_mask[0, 0] < 1:
         # Blender takes the inverse for pictures higher than wide, where planes move their children less than they do.
         to_mask = np.linalg.inv(to_mask)
-    return to_mask @ mask_handles.homography(corners, now) @ np.linalg.inv(to_mask)
+    return to_mask @ mask_handles.homography(np.reshape(raw.corners, (4, 2)), now) @ np.linalg.inv(to_mask)
 
 
 def _between_markers(track, name: str, size: int, frame: float, find) -> np.ndarray:
