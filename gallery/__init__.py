@@ -12,4 +12,5 @@ NAMES = (
     "one_stroke",
     "handheld",
     "panning",
+    "time_map",
 )
