@@ -77,29 +77,10 @@ def _values(samples: np.ndarray) -> np.ndarray:
         return np.ones(samples.shape[:2], np.float32)
     values = samples[..., 0]
     if samples.shape[2] == 3:
-        values = sum(samples[..., i] * REC709[i] for i in range(3))
+        values = samples[..., 0] * REC709[0]
+        for i in (1, 2):
+            values += samples[..., i] * REC709[i]
     if samples.dtype.kind == "u":
         return values / np.float32(np.iinfo(samples.dtype).max)
     values = np.fmax(values.astype(np.float32), 0)  # unlike `maximum`, it gives 0 for what is no number
     return np.minimum(values, 1, out=values)
-
-
-def write_matte(path: Path, values: np.ndarray) -> None:
-    """Writes values (h, w) float32, 0 to 1, as a grey PNG of 16 bits, whole or not at all. MediaError: it cannot be."""
-    import OpenImageIO
-
-    from ..core import atomic_write
-    from .errors import MediaError
-    from .files import check_name
-
-    height, width = values.shape
-    spec = OpenImageIO.ImageSpec(width, height, 1, OpenImageIO.UINT16)
-    samples = np.rint(values * np.float32(65535)).astype(np.uint16)
-    try:
-        with atomic_write.writing(path) as part:
-            output = OpenImageIO.ImageOutput.create(check_name(part))
-            written = output.open(check_name(part), spec) and output.write_image(samples[..., None])
-            if not (output.close() and written):
-                raise MediaError(f"{path}: {output.geterror() or 'cannot be written'}")
-    except OSError as error:
-        raise MediaError(f"{path}: cannot be written ({error.strerror or error})") from None

@@ -20,6 +20,11 @@ class MatteValues:
         self._sources: dict[MatteFile, MatteSource] = {}
         self._made: list[tuple[Hashable, np.ndarray]] = []
 
+    @classmethod
+    def of(cls, source) -> MatteValues:
+        """For the pictures of a source, as core.mattes has them: a ShotSource."""
+        return cls(source.width, source.height, source.step)
+
     def values(self, mattes: tuple[Matte, ...], index: int, block: int) -> list[tuple[Hashable, np.ndarray]]:
         """As MatteReader.values. EffectError, MediaError: those of a file cannot be had."""
         files = {matte.content.file for matte in mattes if isinstance(matte.content, FileFrame)}

@@ -143,15 +143,14 @@ class MovieChannel(MovieSource):
 
 
 def _is_grey(frame):
-    """Whether the frame is grey, or so nearly that its luma is the luminance of its RGB within half a level of 255."""
-    bits = frame.format.components[0].bits
-    if frame.format.name.startswith("gray"):
+    """Whether a frame's luma is the luminance of its RGB: it has no chroma, or a neutral one, as grey pictures get."""
+    name, bits = frame.format.name, frame.format.components[0].bits
+    if name.startswith("gray"):
         return True
-    if not _PLANAR_YUV.fullmatch(frame.format.name):
+    if not _PLANAR_YUV.fullmatch(name):
         return False
-    middle, most = 1 << (bits - 1), 1 << (bits - 8)
-    colours = [samples_of(plane, np.uint8 if bits == 8 else np.uint16) for plane in list(frame.planes)[1:3]]
-    return all(each.min() >= middle - most and each.max() <= middle + most for each in colours)
+    neutral, dtype = 1 << (bits - 1), np.uint8 if bits == 8 else np.uint16
+    return all((samples_of(plane, dtype) == neutral).all() for plane in list(frame.planes)[1:3])
 
 
 def _round(x):

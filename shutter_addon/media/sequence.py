@@ -37,7 +37,7 @@ class ImageFiles:
     the file before it holds. Where more than MISSING in a row are, the sequence ends, and `left_out` says so. With
     `files` (an image strip's list) frame i is files[i].
 
-    path: the first file; count: of frames
+    path: the first file; files: those there are, in order; count: of frames
     """
 
     def __init__(self, path, files=None):
@@ -46,26 +46,21 @@ class ImageFiles:
         self.left_out = ""
         if files is None:
             self.path = check_file(path)
-            self._starts, self._files, beyond = _numbered(path)
+            self._starts, self.files, beyond = _numbered(path)
             if beyond:
-                last = self._files[-1].name
+                last = self.files[-1].name
                 self.left_out = f"{path.name}: the sequence ends with {last}; too many numbers lie before {beyond.name}"
         else:
             folder = path if path.is_dir() else path.parent
-            self._files = [folder / file for file in files]
-            if not self._files:
+            self.files = [folder / file for file in files]
+            if not self.files:
                 raise MediaError(f"{path.name}: an image sequence without files")
-            self._starts = range(len(self._files))
-            self.path = check_file(self._files[0])
+            self._starts = range(len(self.files))
+            self.path = check_file(self.files[0])
         self.count = self._starts[-1] + 1
 
     def __getitem__(self, index):
-        return self._files[bisect.bisect_right(self._starts, index) - 1]
-
-    @property
-    def different(self):
-        """Each file once."""
-        return dict.fromkeys(self._files)
+        return self.files[bisect.bisect_right(self._starts, index) - 1]
 
 
 class SequenceSource(FrameSource):
@@ -84,7 +79,7 @@ class SequenceSource(FrameSource):
             self.width, self.height = spec.width, spec.height
             self.dtype = _dtype(spec)
         self.transfer = "linear" if self.path.suffix.lower() in LINEAR_SUFFIXES else "srgb"
-        has_alpha = len(layer) in ALPHA or any(map(_has_alpha, self._files.different))
+        has_alpha = len(layer) in ALPHA or any(map(_has_alpha, dict.fromkeys(self._files.files)))
         self.alpha = (alpha or self._usual_alpha()) if has_alpha else "opaque"
         self.options = {}
 
@@ -165,7 +160,7 @@ class SequenceChannel:
             _check_size_like_first(self, path, window[2:])
             if not positions:
                 return np.empty((self.height, self.width, 0), np.uint8)
-            return _placed(_samples(image, spec, positions, path), spec, window)
+            return _in_window(_samples(image, spec, positions, path), spec, window)
 
     def close(self):
         """Nothing stays open between frames."""
@@ -179,35 +174,22 @@ def _check_size_like_first(sequence, path, size, window=""):
 
 def _picture_window(image, spec, path):
     """(x, y, width, height) of what a SequenceChannel shows of an image."""
-    data = spec.x, spec.y, spec.width, spec.height
-    display = spec.full_x, spec.full_y, spec.full_width, spec.full_height
-    if image.format_name() != "openexr" or _intersection(data, display) == display:
-        return data
-    check_size(path.name, *display[2:])
-    return display
+    if image.format_name() != "openexr" or spec.roi.contains(spec.roi_full):
+        return spec.x, spec.y, spec.width, spec.height
+    check_size(path.name, spec.full_width, spec.full_height)
+    return spec.full_x, spec.full_y, spec.full_width, spec.full_height
 
 
-def _placed(samples, spec, window):
-    """An image's samples in a window, 0 beside them."""
-    data = spec.x, spec.y, spec.width, spec.height
-    if data == window:
+def _in_window(samples, spec, window):
+    """An image's samples in a window (x, y, width, height), 0 beside them."""
+    x, y, width, height = window
+    if window == (spec.x, spec.y, spec.width, spec.height):
         return samples
-    picture = np.zeros((window[3], window[2], samples.shape[2]), samples.dtype)
-    common = _intersection(data, window)
-    picture[_within(common, window)] = samples[_within(common, data)]
+    rows, columns = np.arange(height) + y - spec.y, np.arange(width) + x - spec.x
+    down, across = (rows >= 0) & (rows < spec.height), (columns >= 0) & (columns < spec.width)
+    picture = np.zeros((height, width, samples.shape[2]), samples.dtype)
+    picture[np.ix_(down, across)] = samples[np.ix_(rows[down], columns[across])]
     return picture
-
-
-def _intersection(a, b):
-    """Of two windows (x, y, width, height)."""
-    starts = [max(a[i], b[i]) for i in (0, 1)]
-    return *starts, *(max(0, min(a[i] + a[i + 2], b[i] + b[i + 2]) - starts[i]) for i in (0, 1))
-
-
-def _within(part, window):
-    """The slices of a window's array that show a part of it."""
-    x, y = part[0] - window[0], part[1] - window[1]
-    return slice(y, y + part[3]), slice(x, x + part[2])
 
 
 def _numbered(path):

@@ -10,7 +10,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...core import keyframes, mattes, retiming
 from ...core.effect import PlacedRamp
 from ...media.matte_files import MatteFile
-from . import inbetween_settings, matte_strips, source_media, strip_timing, strips, validation
+from . import inbetween_settings, mask_shapes, matte_strips, source_media, strip_timing, strips, validation
 from .validation import EffectError
 
 
@@ -74,9 +74,7 @@ def _mask_shapes(edit, effect, strip, region, frames, time) -> keyframes.Channel
             index = retiming.source_frame(timing, frame, medium)
         else:
             index = retiming.nearest(time.at(frame)[0] - 1, medium.step, medium.count)
-        from . import mask_data
-
-        return mask_data.mask_at(mask, mask.frame_start + index / medium.step)
+        return mask_shapes.mask_at(mask, mask.frame_start + index / medium.step)
 
     return keyframes.Samples({frame: _tried(shape, frame) for frame in frames})
 

@@ -22,7 +22,7 @@ from ...core.frame_state import FrameState
 from ...core.messages import EffectError
 from ...media import MediaError, cuts
 from ...media.cuts import ShotSource
-from ...media.exr import write_exr
+from ...media.image_writing import write_exr
 from ...media.inbetween import InbetweenSource
 from ...media.matte_values import MatteValues
 from ...media.prefetch import PrefetchSource
@@ -217,7 +217,7 @@ class RenderSession:
             if renderer is not None:
                 self.run(renderer.close)
             source = open_source(snapshot)
-            renderer = Renderer(self._compositor, source, MatteValues(source.width, source.height, source.step))
+            renderer = Renderer(self._compositor, source, MatteValues.of(source))
         self._renderers[snapshot.scene] = key, renderer
         while len(self._renderers) > _KEPT:
             self.run(self._renderers.pop(next(iter(self._renderers)))[1].close)
