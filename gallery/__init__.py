@@ -13,4 +13,5 @@ NAMES = (
     "handheld",
     "panning",
     "time_map",
+    "object_matte",
 )
