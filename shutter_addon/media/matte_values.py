@@ -6,7 +6,7 @@ from collections.abc import Hashable
 
 import numpy as np
 
-from ..core.matte_grid import feathered, fitted
+from ..core.matte_grid import block_means, feathered, fitted
 from ..core.mattes import FileFrame, Matte, MatteFile, MatteSource
 
 
@@ -51,19 +51,10 @@ class MatteValues:
         else:
             values = matte.content.values(*self._size)
         values = feathered(values, matte.feather * self._size[1])
-        return _means(1 - values if matte.invert else values, block)
+        return block_means(1 - values if matte.invert else values, block)
 
     def close(self) -> None:
         """Closes the files; they are opened again when they are needed."""
         for source in self._sources.values():
             source.close()
         self._sources.clear()
-
-
-def _means(values: np.ndarray, block: int) -> np.ndarray:
-    """The means (h, w) over blocks of block × block values; the last ones may be cut."""
-    if block == 1:
-        return values
-    counts = [np.add.reduceat(np.ones(n, np.float32), np.arange(0, n, block)) for n in values.shape]
-    rows, columns = (np.arange(0, n, block) for n in values.shape)
-    return np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1) / np.outer(*counts)

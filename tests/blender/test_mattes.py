@@ -275,6 +275,54 @@ def test_a_still_strip_is_exported_as_one_picture(edit, shown, matte, tmp_path):
     assert np.abs(read_picture(tmp_path / "r mattes" / "1 m" / "0001.png")[..., 0] - values(0)).max() < 0.01
 
 
+@pytest.fixture
+def mask(bpy, edit):
+    """All of the picture and more, whose opacity goes from 0 at its start, frame 5, to 1 eleven frames later."""
+    made = bpy.data.masks.new("mask")
+    made.frame_start = 5
+    layer = made.layers.new(name="layer")
+    spline = layer.splines.new()
+    spline.points.add(3)
+    for point, corner in zip(spline.points, ((-1, -1), (2, -1), (2, 2), (-1, 2)), strict=True):
+        point.co = point.handle_left = point.handle_right = corner
+        point.handle_left_type = point.handle_right_type = "VECTOR"
+    spline.use_cyclic = True
+    for frame, alpha in ((5, 0.0), (16, 1.0)):
+        layer.alpha = alpha
+        made.keyframe_insert('layers["layer"].alpha', frame=frame)
+    (curve,) = made.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
+    for key in curve.keyframe_points:
+        key.interpolation = "LINEAR"
+    return made
+
+
+@pytest.mark.parametrize("time", [None, [{"frame": 1, "value": 11}, {"frame": 11, "value": 1}]])
+def test_a_mask_is_evaluated_at_the_shown_frame(shown, mask, time):
+    """Of a source that runs backward, by its strip or by keys."""
+    content = data(region(ramp="linear"), **({"time": time} if time else {}))
+    _strip, effect, coefficients = shown(content, lambda source: setattr(source, "use_reverse_frames", not time))
+    one = effect.regions[0]
+    one.kind, one.matte, one.mask = "MATTE", "MASK", mask
+    for frame in (3, 6):
+        index = 11 - frame if time else COUNT - frame
+        assert close(-coefficients(frame), np.full((HEIGHT, WIDTH), index / 11))
+
+
+def test_a_mask_is_exported_as_pictures(shown, mask, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.rendering import matte_export
+
+    strip, effect, coefficients = shown(data(region(ramp="linear", opacity=0.5)))
+    one = effect.regions[0]
+    one.kind, one.matte, one.mask = "MATTE", "MASK", mask
+    expected = coefficients(7)
+    saved = matte_export.recipe_for(strip.id_data, effect, strip, tmp_path / "r.json")
+    recipe_import.apply(strip.id_data, effect, strip, saved, tmp_path)
+    assert effect.regions[0].matte == "IMAGE"
+    assert close(coefficients(7), expected)
+    assert close(coefficients(7), np.full((HEIGHT, WIDTH), 0.5 * 6 / 11))
+
+
 def test_a_time_map_shows_each_column_at_its_moment(bpy, edit, shown):
     from shutter_addon.blender.editing import time_map
 

@@ -111,7 +111,7 @@ FAULTS = {
     "an edge twice": (compositor, "source_frames", lambda *given: twice(*given)),
     "nothing followed": (following, "followed", lambda effect, state, *_: state),
     "a dull filter": (resampling, "_weights", lambda t, sharp: {-1: 0 * t, 0: 1 - t, 1: t, 2: 0 * t}),
-    "trails of no length": (trails, "with_length", lambda bars, *_: bars),
+    "trails of no length": (trails, "with_length", lambda bars, *_: (bars, len(bars))),
     "edges passed over": (cpu.Solver, "solve", lambda solver, labels, count, *_, warm: solve(solver, labels, count)),
     "mattes in another order": (mattes, "blended", lambda c, shown, values: blended(c, shown[::-1], values[::-1])),
     "hard mattes": (matte_values, "feathered", lambda values, width: values),
