@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from ..core.mattes import Matte
@@ -12,13 +14,19 @@ from .passes import LOCAL_ROW, Image, Pass
 MOST = 8
 
 _READ = {"reads": True, "writes": False}
-BLEND = Pass(
-    "matte_blend",
-    images={"under": Image("rgba32f", **_READ), "values": Image("r32f", **_READ), "over": Image("rgba32f")},
-    constants={"size": "ivec2", "beneath": "ivec2", "count": "int"},
-    blocks={"table": MOST},
-    local_size=LOCAL_ROW,
-)
+
+
+@cache
+def blend_pass(count: int, adds: bool) -> Pass:
+    """Lays so many mattes; adds: any by the blend "add"."""
+    return Pass(
+        "matte_blend",
+        images={"under": Image("rgba32f", **_READ), "values": Image("r32f", **_READ), "over": Image("rgba32f")},
+        constants={"size": "ivec2", "beneath": "ivec2"},
+        defines={"COUNT": count, "ADDS": int(adds)},
+        blocks={"table": MOST},
+        local_size=LOCAL_ROW,
+    )
 
 
 class Matting:
@@ -48,13 +56,12 @@ class Matting:
                     self._held[layer] = key
             over = self._texture(ends[0], (width, height, beneath.size[2]), "rgba32f")
             self._device.run(
-                BLEND,
+                blend_pass(len(some), any(matte.blend == "add" for matte, _ in some)),
                 over.size,
                 images={"under": beneath, "values": values, "over": over},
                 blocks={"table": table},
                 size=(width, height),
                 beneath=beneath.size[:2],
-                count=len(some),
             )
             beneath, ends = over, ends[::-1]
         return beneath

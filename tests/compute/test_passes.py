@@ -19,7 +19,7 @@ PASSES += [
 for tiled in (True, False):
     PASSES += [gpu.composition_of_sums(4, 2, True, tiled, False)]
     PASSES += [window.accumulation(1, again, False, tiled) for again in (True, False)]
-PASSES += [window.packing(1, True), matting.BLEND]
+PASSES += [window.packing(1, True), *(matting.blend_pass(2, adds) for adds in (False, True))]
 PASSES += [
     gpu.composition_of_moved(way, 2, 3, 3, packed, 1, shortened, False, False, True, (True, False))
     for way in ("frames", "search", "value")
