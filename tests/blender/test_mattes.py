@@ -334,3 +334,53 @@ def test_weights_are_read_back(tmp_path, footage):
         first, second = (read_picture(tmp_path / folder / f"{frame:04d}.png") for folder in "ab")
         assert np.abs(first - second).max() <= 1
         assert np.ptp(first) > 15
+
+
+@pytest.fixture
+def mask(bpy, shown, matte):
+    """A mask that is the first region's matte: a triangle."""
+    _strip, effect, _coefficients = shown(data(region(matte)))
+    mask = bpy.data.masks.new("Mask")
+    spline = mask.layers.new().splines.new()
+    spline.points.add(2)
+    for point, co in zip(spline.points, ((0.2, 0.2), (0.8, 0.2), (0.5, 0.7)), strict=True):
+        point.co = co
+        point.handle_left = point.handle_right = co
+    spline.use_cyclic = True
+    effect.regions[0].matte, effect.regions[0].mask = "MASK", mask
+    return mask
+
+
+def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, mask):
+    from shutter_addon.blender.rendering import invalidation
+
+    layer = mask.layers[0]
+    point = layer.splines[0].points[0]
+    clip = bpy.data.movieclips.load(str(matte))
+    track = clip.tracking.tracks.new(name="T", frame=1)
+
+    def parented():
+        parent = point.parent
+        parent.id_type, parent.id, parent.parent, parent.sub_parent = "MOVIECLIP", clip, "Camera", "T"
+
+    def keyed():
+        layer.keyframe_insert("alpha", frame=1)
+
+    def tracked():
+        track.markers.insert_frame(4).co = 0.5, 0.6
+
+    changes = {
+        "point": lambda: setattr(point, "co", (0.1, 0.3)),
+        "feather": lambda: setattr(point, "weight", 0.1),
+        "start": lambda: setattr(mask, "frame_start", 5),
+        "layer": lambda: setattr(layer, "invert", True),
+        "opacity": keyed,
+        "parent": parented,
+        "marker": tracked,
+        "removed": lambda: bpy.data.masks.remove(mask),
+    }
+    invalidation.invalidate_changed(edit)
+    for name, change in changes.items():
+        change()
+        assert invalidation.invalidate_changed(edit), name
+        assert not invalidation.invalidate_changed(edit), name
