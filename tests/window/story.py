@@ -222,9 +222,9 @@ def saved_and_loaded():
     yield from seen("9_loaded")
 
 
-def in_agreement():
+def in_agreement(frame=70):
     """Live preview, sequencer's picture and final render of one frame, pixel by pixel at full size."""
-    edit().frame_set(70)
+    edit().frame_set(frame)
     area = driver.area_of("SEQUENCE_EDITOR", "PREVIEW")
     space = area.spaces.active
     space.show_overlays = space.show_gizmo = space.show_region_ui = False
