@@ -16,8 +16,7 @@ FRAME, LATER, RENDERED = 50, 60, 55
 # In fractions of the picture.
 CORNERS = (0.25, 0.25), (0.55, 0.25), (0.55, 0.75), (0.25, 0.75)
 MOVED = (0.8, 0.75)  # where the third one is taken
-MENU = 423  # where the arrow beside Draw stands in the sidebar, in pixels below its upper edge
-MASK_ENTRY = 3
+FROM_MASK = 3  # the entry in the menu of regions
 
 
 def clip():
@@ -29,22 +28,10 @@ def on_clip(x, y):
     return clip().view2d.view_to_region(x, y, clip=False)
 
 
-def edge_moved(area, right: int, up: int):
-    """Moves an area's right or upper edge by pixels."""
-    window = bpy.context.window_manager.windows[0]
-    x = area.x + (area.width if right else area.width // 2)
-    y = area.y + (area.height if up else area.height // 2)
-    driver.xdotool("mousemove", x, window.height - 1 - y)  # where no region is active
-    yield 0.5
-    with bpy.context.temp_override(window=window):
-        bpy.ops.screen.area_move(x=x, y=y, delta=right + up)
-    yield 0.5
-
-
 def mask_editor_opened():
     """A clip editor with the footage beside the preview, larger than the file browser that was there."""
-    yield from edge_moved(driver.area_of("SEQUENCE_EDITOR", "SEQUENCER"), 0, -296)
-    yield from edge_moved(driver.area_of("FILE_BROWSER"), 200, 0)
+    yield from driver.edge_moved(driver.area_of("SEQUENCE_EDITOR", "SEQUENCER"), 0, -296)
+    yield from driver.edge_moved(driver.area_of("FILE_BROWSER"), 200, 0)
     area = driver.area_of("FILE_BROWSER")
     area.type = "CLIP_EDITOR"
     space = area.spaces.active
@@ -106,16 +93,7 @@ def dragged(start, end):
 
 
 def made_a_matte():
-    """By the menu beside Draw."""
-    sidebar = driver.region_of(driver.area_of("SEQUENCE_EDITOR", "PREVIEW"), "UI")
-    driver.click(sidebar, sidebar.width * 0.855, sidebar.height - MENU)
-    yield 0.8
-    driver.key(*["Down"] * MASK_ENTRY)
-    yield 0.3
-    driver.key("Right")
-    yield 0.5
-    driver.shot("menu")
-    driver.key("Return")
+    yield from story.chosen_beside_draw(FROM_MASK)
     yield from driver.until(lambda: len(story.effect().regions), "the menu adds a region")
     (region,) = story.effect().regions
     assert (region.kind, region.matte, region.mask, region.shutter) == ("MATTE", "MASK", mask(), "Sharp")

@@ -142,6 +142,22 @@ def preset_chosen():
     yield 0.5
 
 
+def sidebar():
+    return driver.region_of(driver.area_of("SEQUENCE_EDITOR", "PREVIEW"), "UI")
+
+
+def chosen_beside_draw(entry):
+    """The first of an entry's own menu, in the menu of regions; the sidebar is as high as it needs."""
+    driver.click(sidebar(), sidebar().width * 0.855, sidebar().height - 423)
+    yield 0.8
+    driver.key(*["Down"] * entry)
+    yield 0.3
+    driver.key("Right")
+    yield 0.5
+    driver.shot("menu")
+    driver.key("Return")
+
+
 def bars():
     return [round(bar.weight, 4) for bar in effect().shutters[1].bars]
 
