@@ -3,6 +3,8 @@ Then its panels are drawn, it is exported, and a frame is rendered, twice."""
 
 import json
 import math
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 
 import numpy as np
@@ -88,7 +90,7 @@ def _edit(bpy, folder, data):
         source.elements.append(f"f{number:04d}.png")
     source.right_handle = 41
     strip, effect = add_effect.add_effect(edit, source)
-    recipe_import.apply(edit, effect, strip, recipe.parse(json.dumps(data)))
+    recipe_import.apply(edit, effect, strip, recipe.parse(json.dumps(data)), folder)
     selection.choose(edit, strip)
     return edit.name, source.name
 
@@ -249,13 +251,14 @@ def _draw(bpy):
 
 
 def _export(bpy):
-    from shutter_addon.blender.data import recipe_export, selection, validation
+    from shutter_addon.blender.data import selection, validation
+    from shutter_addon.blender.rendering import matte_export
     from shutter_addon.core.recipe import RecipeError
     from shutter_addon.media import MediaError
 
     if found := selection.active(bpy.context):
-        with trial.only(validation.EffectError, RecipeError, MediaError):
-            recipe_export.recipe_of(*found)
+        with trial.only(validation.EffectError, RecipeError, MediaError), TemporaryDirectory() as folder:
+            matte_export.recipe_for(*found, Path(folder, "r.json"))
 
 
 def _render(bpy, folder, frame: int) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -89,6 +89,8 @@ class FrameState:
     reference: the exposure (sum of bars) of full brightness where exposure is "weighted"; None: the default shutter's
     following: what exposures follow; None: nothing that moves
     mattes: laid over what the scribbles give, the later over the earlier
+    open_for: by shutter whose trail has a length, the frames from its first open time to its last: for who is told of
+    it, as its bars say what is exposed
     """
 
     options: Options
@@ -97,6 +99,7 @@ class FrameState:
     reference: float | None = None
     following: Following | None = None
     mattes: tuple[Matte, ...] = ()
+    open_for: dict[int, float] = field(default_factory=dict)
 
     @property
     def gains(self) -> np.ndarray:

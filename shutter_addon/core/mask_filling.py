@@ -13,7 +13,9 @@ import numpy as np
 from .mask_outlines import crossings, ranges
 
 # Pixels that are computed at once: what their numbers take stays in a processor's cache.
-_BLOCK = 1 << 15
+_BLOCK = 1 << 14
+# By so many pixels quads overlap, so that rounding opens no seam between them.
+_SEAM = 1e-6
 
 
 def fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: bool, overlap: bool) -> None:
@@ -148,41 +150,64 @@ def feather(value: np.ndarray, quads: np.ndarray, falloff) -> None:
     last two, between them by mean value coordinates, and `falloff` of all."""
     height, width = value.shape
     flat = value.reshape(-1)
-    quad, row, start, stop = _triangle_rows(quads, width, height)
-    bounds = np.searchsorted(np.cumsum(np.maximum(stop - start, 0)), np.arange(0, len(quad) and flat.size * 64, _BLOCK))
-    for a, b in pairwise(np.unique([*bounds, len(quad)]).tolist()):
+    quad, row, start, stop = _quad_rows(quads, width, height)
+    x_of, y_of = np.ascontiguousarray(quads.transpose(2, 1, 0), np.float32)
+    last = np.cumsum(stop - start)
+    blocks = np.searchsorted(last, np.arange(0, last[-1] if len(last) else 0, _BLOCK))
+    for a, b in pairwise(np.unique([*blocks, len(quad)]).tolist()):
         span, x = ranges(start[a:b], stop[a:b])
-        y, of = row[a:b][span], quad[a:b][span]
-        pixel = y * width + x
-        open_ = flat[pixel] < 1
-        x, y, of, pixel = x[open_], y[open_], of[open_], pixel[open_]
-        corners = quads[of].astype(np.float32)
-        at = np.stack([(x + 0.5) / width, (y + 0.5) / height], axis=-1).astype(np.float32)
-        np.maximum.at(flat, pixel, falloff(_nearness(corners, at)))
+        pixel = row[a:b][span] * width + x
+        bare = np.flatnonzero(flat[pixel] < 1)
+        span, x, pixel = span[bare] + a, x[bare], pixel[bare]
+        of = quad[span]
+        ways_x = np.take(x_of, of, axis=1) - (x.astype(np.float32) + np.float32(0.5)) / np.float32(width)
+        ways_y = np.take(y_of, of, axis=1) - (row[span].astype(np.float32) + np.float32(0.5)) / np.float32(height)
+        np.maximum.at(flat, pixel, falloff(_nearness(ways_x, ways_y)))
 
 
-def _triangle_rows(quads: np.ndarray, width: int, height: int):
-    """The pixels that quads (n, 4, 2) cover, row by row: quad, row, first pixel and that behind the last, (m,) each."""
-    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    start, end = triangles.reshape(-1, 2), np.roll(triangles, -1, axis=1).reshape(-1, 2)
-    edge, row, x = _at_rows(start, end, height)
-    # A row that crosses a triangle crosses two of its edges.
-    order = np.lexsort((x, row, edge // 3))
-    triangle, row, x = (edge // 3)[order], row[order], np.clip(x[order] * width, -1, width + 1)
-    left, right = x[::2], x[1::2]
-    first, stop = np.ceil(left - 0.5).astype(int), np.floor(right + 0.5).astype(int)
-    return triangle[::2] % max(len(quads), 1), row[::2], np.maximum(first, 0), np.minimum(stop, width)
+def _quad_rows(quads: np.ndarray, width: int, height: int):
+    """The pixels that quads (n, 4, 2) cover, row by row: quad, row, first pixel and that behind the last, (m,) each.
+
+    A quad is its two triangles on the sides of the way between its first and its third corner, as in Blender, which
+    matters where they are not side by side.
+    """
+    sides = np.roll(quads, -1, axis=1) - quads
+    following = np.roll(sides, -1, axis=1)
+    turns = sides[..., 0] * following[..., 1] - sides[..., 1] * following[..., 0]
+    convex = (turns >= 0).all(axis=1) | (turns <= 0).all(axis=1)
+    others = np.flatnonzero(~convex)
+    parts = np.concatenate([quads[convex], quads[others][:, [0, 1, 2, 2]], quads[others][:, [0, 2, 3, 3]]])
+    index = np.concatenate([np.flatnonzero(convex), others, others])
+    y = parts[..., 1]
+    first, last = (np.ceil(np.clip(edge * height - 0.5, 0, height)).astype(int) for edge in (y.min(1), y.max(1)))
+    part, row = ranges(first, last)
+    middle = (row + 0.5) / height
+    left, right = np.full(len(row), np.inf), np.full(len(row), -np.inf)
+    for corner in range(4):
+        (ax, ay), (bx, by) = parts[:, corner].T, parts[:, (corner + 1) % 4].T
+        slope = np.divide(bx - ax, by - ay, out=np.zeros_like(ax), where=by != ay)
+        low, high = np.minimum(ay, by)[part], np.maximum(ay, by)[part]
+        x = ax[part] + (middle - ay[part]) * slope[part]
+        met = (low <= middle) & (middle < high)
+        np.minimum(left, x, out=left, where=met)
+        np.maximum(right, x, out=right, where=met)
+    start = np.ceil(np.clip(left * width - 0.5 - _SEAM, 0, width)).astype(int)
+    stop = np.floor(np.clip(right * width + 0.5 + _SEAM, 0, width)).astype(int)
+    some = stop > start
+    return index[part[some]], row[some], start[some], stop[some]
 
 
-def _nearness(corners: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """How near points (n, 2) in quads (n, 4, 2) are to their first two corners: 0 to 1 (n,), by mean value
-    coordinates."""
-    x, y = corners[..., 0].T - at[:, 0], corners[..., 1].T - at[:, 1]
+def _nearness(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """How near points are to the first two corners of quads: 0 to 1 (n,), by mean value coordinates; x, y (4, n): the
+    ways from the points to the corners."""
     lengths = np.sqrt(x * x + y * y)
-    after = [1, 2, 3, 0]
-    area = x * y[after] - y * x[after]
-    far = lengths * lengths[after] - (x * x[after] + y * y[after])
-    tangents = np.divide(np.abs(far), np.abs(area), out=np.zeros_like(far), where=area != 0)
-    weights = (tangents + tangents[[3, 0, 1, 2]]) / np.maximum(lengths, np.float32(1e-7))
-    near, total = weights[0] + weights[1], weights.sum(axis=0)
+    tangents = []
+    for a, b in ((0, 1), (1, 2), (2, 3), (3, 0)):
+        area = x[a] * y[b] - y[a] * x[b]
+        far = lengths[a] * lengths[b] - (x[a] * x[b] + y[a] * y[b])
+        tangents.append(np.abs(np.divide(far, area, out=np.zeros_like(far), where=area != 0)))
+    np.maximum(lengths, np.float32(1e-7), out=lengths)
+    near = (tangents[3] + tangents[0]) / lengths[0] + (tangents[0] + tangents[1]) / lengths[1]
+    away = (tangents[1] + tangents[2]) / lengths[2] + (tangents[2] + tangents[3]) / lengths[3]
+    total = near + away
     return np.divide(near, total, out=np.full_like(near, 0.5), where=total > 0)

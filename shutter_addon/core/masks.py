@@ -91,12 +91,12 @@ def coverage(mask: MaskShape, width: int, height: int) -> np.ndarray:
 def _blend(layer: MaskLayer, below: np.ndarray, value: np.ndarray) -> np.ndarray:
     """A layer's value (h, w) over what lies below."""
     alpha = np.float32(layer.alpha)
-    if layer.blend != "REPLACE":
+    if layer.blend != "REPLACE" and alpha != 1:
         value = value * alpha
     if layer.invert:
         value = 1 - value
     both = below + (value - below) * alpha if layer.blend == "REPLACE" else _BLENDS[layer.blend](below, value)
-    return np.clip(both, 0, 1)
+    return np.clip(both, 0, 1, out=both)
 
 
 def _layer_value(layer: MaskLayer, width: int, height: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""A matte's values on the picture's grid: fitted to it, and feathered. Pure NumPy, float32; both are separable."""
+"""A matte's values on the picture's grid: fitted to it, feathered, by blocks of pixels. Pure NumPy, and separable."""
 
 from __future__ import annotations
 
@@ -14,20 +14,18 @@ _REACH = 3.3  # standard deviations
 _ROWS = 32  # at a time; a processor's cache holds them
 
 
-def fitted(values: np.ndarray, width: int, height: int, block: int = 1) -> np.ndarray:
+def fitted(values: np.ndarray, width: int, height: int) -> np.ndarray:
     """A matte scaled to fit a picture, its aspect kept, in the middle, with black around it.
 
     values: (h, w) float32, 0 … 1; width, height: of the picture, in pixels
-    block: the result has the means of cells of so many pixels, (⌈height/block⌉, ⌈width/block⌉); the last are cut
     A pixel is the mean of what it covers where the matte is reduced, and interpolated linearly where it is enlarged;
     one that the matte's edge crosses is black in proportion. The matte itself where nothing is to be done.
     """
-    if values.shape == (height, width) and block == 1:
+    if values.shape == (height, width):
         return values
     rows, columns = values.shape
     scale = min(width / columns, height / rows)
-    result = _resampled(values, *(_cells(_fit(*axis, scale), block) for axis in ((rows, height), (columns, width))))
-    return np.minimum(result, 1, out=result)
+    return _resampled(values, _fit(rows, height, scale), _fit(columns, width, scale))
 
 
 def feathered(values: np.ndarray, width: float) -> np.ndarray:
@@ -38,21 +36,38 @@ def feathered(values: np.ndarray, width: float) -> np.ndarray:
     sigma = width / EDGE_SIGMAS
     step = max(1, int(sigma / _COARSE))
     if step == 1:
-        return _resampled(values, *(_gaussian(length, sigma) for length in values.shape))
+        return _blurred(values, sigma)
     # Coarse cells and lines between them widen an edge as well, by a quarter of the square of a cell on average.
     narrower = math.sqrt((sigma / step) ** 2 - 1 / 4)
     coarse = _resampled(values, *(_means(length, step) for length in values.shape))
-    coarse = _resampled(coarse, *(_gaussian(length, narrower) for length in coarse.shape))
-    return _resampled(coarse, *(_lines(length, step) for length in values.shape))
+    return _resampled(_blurred(coarse, narrower), *(_lines(length, step) for length in values.shape))
+
+
+def block_means(values: np.ndarray, block: int) -> np.ndarray:
+    """Means (⌈h/block⌉, ⌈w/block⌉) float32 of blocks of values (h, w), of which the last may be cut. The values
+    themselves where a block is one value."""
+    if block == 1:
+        return values
+    return _resampled(values, *(_blocks(length, block) for length in values.shape))
 
 
 def _resampled(values: np.ndarray, down: Taps, across: Taps) -> np.ndarray:
-    rows = _weighted(values, *down)
-    return np.ascontiguousarray(_weighted(np.ascontiguousarray(rows.T), *across).T)
+    if len(across[0]) > values.shape[1]:  # turned twice before it is large, or after it is small
+        return _weighted(_turned(_weighted(_turned(values), *across)), *down)
+    return _turned(_weighted(_turned(_weighted(values, *down)), *across))
+
+
+def _blurred(values: np.ndarray, sigma: float) -> np.ndarray:
+    kernel = _gaussian(sigma)
+    return _turned(_convolved(_turned(_convolved(values, kernel)), kernel))
+
+
+def _turned(values: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(values.T)
 
 
 def _weighted(values: np.ndarray, indices: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Rows (rows, w) that are weighted sums of others."""
+    """Rows (rows, w) that are weighted sums of others, 1 at most."""
     result = np.empty((len(indices), values.shape[1]), np.float32)
     weights = weights.astype(np.float32)[:, :, None]
     for start in range(0, len(indices), _ROWS):
@@ -62,6 +77,24 @@ def _weighted(values: np.ndarray, indices: np.ndarray, weights: np.ndarray) -> n
             part = values[indices[rows, tap]]
             part *= weights[rows, tap]
             total += part
+        np.minimum(total, 1, out=total)  # weights are rounded
+    return result
+
+
+def _convolved(values: np.ndarray, kernel: np.ndarray) -> np.ndarray:
+    """As `_weighted`, with the same weights everywhere: those of a row itself and of those at distances 1, 2, …"""
+    reach = len(kernel) - 1
+    padded = np.pad(values, ((reach, reach), (0, 0)), "edge")
+    result = np.empty_like(values)
+    for start in range(0, len(values), _ROWS):
+        total, row = result[start : start + _ROWS], start + reach
+        np.multiply(padded[row : row + len(total)], kernel[0], out=total)
+        for distance in range(1, reach + 1):
+            before, after = row - distance, row + distance
+            part = padded[before : before + len(total)] + padded[after : after + len(total)]
+            part *= kernel[distance]
+            total += part
+        np.minimum(total, 1, out=total)
     return result
 
 
@@ -83,23 +116,19 @@ def _fit(length: int, size: int, scale: float) -> Taps:
     return indices.clip(0, length - 1)[:, used], weights[:, used]
 
 
-def _cells(taps: Taps, block: int) -> Taps:
-    """Means of `block` rows at a time, the last ones of those that are left."""
-    if block == 1:
-        return taps
-    indices, weights = (np.pad(each, ((0, -len(each) % block), (0, 0))) for each in taps)
-    cells = len(indices) // block
-    present = np.minimum(block, len(taps[0]) - block * np.arange(cells))
-    return indices.reshape(cells, -1), weights.reshape(cells, -1) / present[:, None]
+def _blocks(length: int, block: int) -> Taps:
+    """Blocks of rows, the last of those that are left."""
+    indices = np.arange(0, length, block)[:, None] + np.arange(block)
+    present = indices < length
+    return indices.clip(0, length - 1), present / present.sum(axis=1, keepdims=True)
 
 
-def _gaussian(length: int, sigma: float) -> Taps:
-    """Each pixel's share is what it covers of the Gaussian, so that a hard edge becomes the error function itself."""
+def _gaussian(sigma: float) -> np.ndarray:
+    """Weights float32 of a pixel and of those at distances 1, 2, …: what they cover of the Gaussian, so that a hard
+    edge becomes the error function itself."""
     reach = math.ceil(_REACH * sigma)
-    ends = np.array([math.erf((i - 0.5) / (sigma * math.sqrt(2))) for i in range(-reach, reach + 2)])
-    weights = np.diff(ends) / (ends[-1] - ends[0])
-    indices = np.arange(length)[:, None] + np.arange(-reach, reach + 1)
-    return indices.clip(0, length - 1), np.broadcast_to(weights, indices.shape)
+    ends = np.array([math.erf((i - 0.5) / (sigma * math.sqrt(2))) for i in range(reach + 2)])
+    return (np.diff(ends) / (2 * ends[-1])).astype(np.float32)
 
 
 def _means(length: int, step: int) -> Taps:

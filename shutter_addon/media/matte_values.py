@@ -6,7 +6,7 @@ from collections.abc import Hashable
 
 import numpy as np
 
-from ..core.matte_grid import feathered, fitted
+from ..core.matte_grid import block_means, feathered, fitted
 from ..core.mattes import FileFrame, Matte, MatteFile, MatteSource
 
 
@@ -19,6 +19,11 @@ class MatteValues:
         self._size, self._step = (width, height), step
         self._sources: dict[MatteFile, MatteSource] = {}
         self._made: list[tuple[Hashable, np.ndarray]] = []
+
+    @classmethod
+    def of(cls, source) -> MatteValues:
+        """For the pictures of a source, as core.mattes has them: a ShotSource."""
+        return cls(source.width, source.height, source.step)
 
     def values(self, mattes: tuple[Matte, ...], index: int, block: int) -> list[tuple[Hashable, np.ndarray]]:
         """As MatteReader.values. EffectError, MediaError: those of a file cannot be had."""
@@ -46,19 +51,10 @@ class MatteValues:
         else:
             values = matte.content.values(*self._size)
         values = feathered(values, matte.feather * self._size[1])
-        return _means(1 - values if matte.invert else values, block)
+        return block_means(1 - values if matte.invert else values, block)
 
     def close(self) -> None:
         """Closes the files; they are opened again when they are needed."""
         for source in self._sources.values():
             source.close()
         self._sources.clear()
-
-
-def _means(values: np.ndarray, block: int) -> np.ndarray:
-    """The means (h, w) over blocks of block × block values; the last ones may be cut."""
-    if block == 1:
-        return values
-    counts = [np.add.reduceat(np.ones(n, np.float32), np.arange(0, n, block)) for n in values.shape]
-    rows, columns = (np.arange(0, n, block) for n in values.shape)
-    return np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1) / np.outer(*counts)

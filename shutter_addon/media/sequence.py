@@ -340,7 +340,9 @@ def _samples(image, spec, layer, path):
     """The layer's samples (height, width, channels)."""
     kinds = {np.uint8: "uint8", np.uint16: "uint16", np.float16: "half", np.float32: "float"}
     kind, first, stop = kinds[_dtype(spec).type], min(layer), max(layer) + 1
-    if image.format_name() == "openexr" and str(spec.channelformat(layer[0])) == "uint":
+    if image.format_name() != "openexr":  # they hold a pixel's channels together: some take longer than all
+        first, stop = 0, max(stop, min(spec.nchannels, 4))
+    elif str(spec.channelformat(layer[0])) == "uint":
         kind = "uint"  # whole numbers of an EXR stand for themselves
     samples = image.read_image(image.current_subimage(), 0, first, stop, kind)
     if samples is None or image.has_error or samples.size != spec.height * spec.width * (stop - first):

@@ -247,7 +247,7 @@ def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
     own = strip_of(edit, matte, 3, 6)
     effect.regions[1].matte, effect.regions[1].strip_name = "STRIP", own.name
     (tmp_path / "out").mkdir()
-    matte_export.export(edit, effect, strip, tmp_path / "out" / "r.json")
+    recipes.save(matte_export.recipe_for(edit, effect, strip, tmp_path / "out" / "r.json"), tmp_path / "out" / "r.json")
     saved = recipes.load(tmp_path / "out" / "r.json")
     assert saved.regions[0].path == "../matte/m0001.png"
     assert saved.regions[0] == recipes.parse(json.dumps(content)).regions[0].__class__(
@@ -260,7 +260,7 @@ def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
     for frame, expected in zip((1, 4, 10), before, strict=True):
         assert close(coefficients(frame), expected)
     again = tmp_path / "out" / "again.json"
-    matte_export.export(edit, effect, strip, again)
+    recipes.save(matte_export.recipe_for(edit, effect, strip, again), again)
     assert recipes.load(again) == saved
 
 
@@ -270,9 +270,57 @@ def test_a_still_strip_is_exported_as_one_picture(edit, shown, matte, tmp_path):
     strip, effect, _coefficients = shown(data(region(matte)))
     own = edit.sequence_editor.strips.new_image("still", str(matte), 4, 1)
     effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
-    matte_export.export(edit, effect, strip, tmp_path / "r.json")
+    recipes.save(matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json"), tmp_path / "r.json")
     assert [path.name for path in (tmp_path / "r mattes" / "1 m").iterdir()] == ["0001.png"]
     assert np.abs(read_picture(tmp_path / "r mattes" / "1 m" / "0001.png")[..., 0] - values(0)).max() < 0.01
+
+
+@pytest.fixture
+def mask(bpy, edit):
+    """All of the picture and more, whose opacity goes from 0 at its start, frame 5, to 1 eleven frames later."""
+    made = bpy.data.masks.new("mask")
+    made.frame_start = 5
+    layer = made.layers.new(name="layer")
+    spline = layer.splines.new()
+    spline.points.add(3)
+    for point, corner in zip(spline.points, ((-1, -1), (2, -1), (2, 2), (-1, 2)), strict=True):
+        point.co = point.handle_left = point.handle_right = corner
+        point.handle_left_type = point.handle_right_type = "VECTOR"
+    spline.use_cyclic = True
+    for frame, alpha in ((5, 0.0), (16, 1.0)):
+        layer.alpha = alpha
+        made.keyframe_insert('layers["layer"].alpha', frame=frame)
+    (curve,) = made.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
+    for key in curve.keyframe_points:
+        key.interpolation = "LINEAR"
+    return made
+
+
+@pytest.mark.parametrize("time", [None, [{"frame": 1, "value": 11}, {"frame": 11, "value": 1}]])
+def test_a_mask_is_evaluated_at_the_shown_frame(shown, mask, time):
+    """Of a source that runs backward, by its strip or by keys."""
+    content = data(region(ramp="linear"), **({"time": time} if time else {}))
+    _strip, effect, coefficients = shown(content, lambda source: setattr(source, "use_reverse_frames", not time))
+    one = effect.regions[0]
+    one.kind, one.matte, one.mask = "MATTE", "MASK", mask
+    for frame in (3, 6):
+        index = 11 - frame if time else COUNT - frame
+        assert close(-coefficients(frame), np.full((HEIGHT, WIDTH), index / 11))
+
+
+def test_a_mask_is_exported_as_pictures(shown, mask, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.rendering import matte_export
+
+    strip, effect, coefficients = shown(data(region(ramp="linear", opacity=0.5)))
+    one = effect.regions[0]
+    one.kind, one.matte, one.mask = "MATTE", "MASK", mask
+    expected = coefficients(7)
+    saved = matte_export.recipe_for(strip.id_data, effect, strip, tmp_path / "r.json")
+    recipe_import.apply(strip.id_data, effect, strip, saved, tmp_path)
+    assert effect.regions[0].matte == "IMAGE"
+    assert close(coefficients(7), expected)
+    assert close(coefficients(7), np.full((HEIGHT, WIDTH), 0.5 * 6 / 11))
 
 
 def test_a_time_map_shows_each_column_at_its_moment(bpy, edit, shown):
@@ -337,7 +385,7 @@ def test_weights_are_read_back(tmp_path, footage):
 
 
 @pytest.fixture
-def mask(bpy, shown, matte):
+def triangle(bpy, shown, matte):
     """A mask that is the first region's matte: a triangle."""
     _strip, effect, _coefficients = shown(data(region(matte)))
     mask = bpy.data.masks.new("Mask")
@@ -351,10 +399,10 @@ def mask(bpy, shown, matte):
     return mask
 
 
-def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, mask):
+def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, triangle):
     from shutter_addon.blender.rendering import invalidation
 
-    layer = mask.layers[0]
+    layer = triangle.layers[0]
     point = layer.splines[0].points[0]
     clip = bpy.data.movieclips.load(str(matte))
     track = clip.tracking.tracks.new(name="T", frame=1)
@@ -372,12 +420,12 @@ def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, mask):
     changes = {
         "point": lambda: setattr(point, "co", (0.1, 0.3)),
         "feather": lambda: setattr(point, "weight", 0.1),
-        "start": lambda: setattr(mask, "frame_start", 5),
+        "start": lambda: setattr(triangle, "frame_start", 5),
         "layer": lambda: setattr(layer, "invert", True),
         "opacity": keyed,
         "parent": parented,
         "marker": tracked,
-        "removed": lambda: bpy.data.masks.remove(mask),
+        "removed": lambda: bpy.data.masks.remove(triangle),
     }
     invalidation.invalidate_changed(edit)
     for name, change in changes.items():

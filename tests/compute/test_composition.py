@@ -285,7 +285,7 @@ def test_long_windows_of_shutters_far_apart(device, count):
 
 @pytest.mark.parametrize("edges", ["hold", "shorten"])
 @pytest.mark.parametrize("stored", ["uint8", "float32"])
-def test_walks_through_pieces(gpu_device, monkeypatch, edges, stored):
+def test_each_pixel_looks_up_its_pieces(gpu_device, monkeypatch, edges, stored):
     monkeypatch.setattr(gpu, "_MOST_ITERATIONS", 0)
     rng = np.random.default_rng(19)
     source = footage(rng, dtype=np.dtype(stored), transfer="linear" if stored == "float32" else "srgb")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from shutter_addon.core.matte_grid import EDGE_SIGMAS, feathered, fitted
+from shutter_addon.core.matte_grid import EDGE_SIGMAS, block_means, feathered, fitted
 
 LEVEL = 1 / 255
 SIZES = [  # of the matte, and of the picture
@@ -47,24 +47,31 @@ def reference(values, width, height):
     return down @ values.astype(np.float64) @ across.T
 
 
-def block_means(values, block):
-    height, width = values.shape
-    cells = [
-        [values[y : y + block, x : x + block].mean() for x in range(0, width, block)] for y in range(0, height, block)
-    ]
-    return np.array(cells)
-
-
-@pytest.mark.parametrize("block", [1, 2, 4])
 @pytest.mark.parametrize(("size", "picture"), SIZES)
-def test_fitted(size, picture, block):
+def test_fitted(size, picture):
     values = noise(*size)
-    result = fitted(values, *picture, block)
+    result = fitted(values, *picture)
     assert result.dtype == np.float32
     assert result.flags.c_contiguous
-    expected = block_means(reference(values, *picture), block)
-    assert result.shape == expected.shape
-    assert np.abs(result - expected).max() < 1e-5
+    assert result.shape == picture[::-1]
+    assert np.abs(result - reference(values, *picture)).max() < 1e-5
+
+
+@pytest.mark.parametrize("block", [2, 4])
+@pytest.mark.parametrize("size", [(64, 36), (63, 37), (5, 3), (1, 1)])
+def test_block_means(size, block):
+    values = noise(*size)
+    result = block_means(values, block)
+    assert result.dtype == np.float32
+    rows, columns = range(0, size[1], block), range(0, size[0], block)
+    assert result.shape == (len(rows), len(columns))
+    expected = [[values[y : y + block, x : x + block].mean(dtype=float) for x in columns] for y in rows]
+    assert np.abs(result - expected).max() < 1e-6
+
+
+def test_blocks_of_one():
+    values = noise(8, 8)
+    assert block_means(values, 1) is values
 
 
 def test_the_same_size_is_the_same_array():
@@ -117,15 +124,15 @@ def test_a_corner_and_its_place(width):
     assert np.abs(feathered(values, width) - np.outer(down, across)).max() < 1.5 * LEVEL
 
 
-@pytest.mark.parametrize("width", [4, 25, 60])
+@pytest.mark.parametrize("width", [4, 8.5, 18.7, 25, 60])
 def test_the_pictures_edges_go_on(width):
     """As if the picture were larger all around."""
     values = noise(40, 30, 3)
     values[:, :12] = 1
     large = feathered(np.pad(values, 100, "edge"), width)[100:-100, 100:-100]
     assert np.abs(feathered(values, width) - large).max() < 1.5 * LEVEL
-    white = np.ones((30, 40), np.float32)
-    assert np.abs(feathered(white, width) - 1).max() < 1e-5
+    white = feathered(np.ones((30, 40), np.float32), width)
+    assert 1 - 1e-5 < white.min() <= white.max() <= 1
 
 
 def test_a_feather_of_no_width():

@@ -272,6 +272,11 @@ def in_agreement(frame=70):
     with driver.override("PREVIEW"):
         bpy.ops.screen.back_to_previous()
     yield 1.0
+    yield from rendered()  # after the preview has filled the sequencer's cache
+
+
+def rendered():
+    """The current frame, as with F12: a job on another thread."""
     render = edit().render
     render.image_settings.media_type = "IMAGE"
     render.image_settings.file_format = "PNG"
@@ -279,7 +284,6 @@ def in_agreement(frame=70):
     render.filepath = str(driver.OUT / "final.png")
     done = []
     bpy.app.handlers.render_complete.append(lambda *_: done.append(True))
-    # As with F12: a job on another thread, after the preview has filled the sequencer's cache.
     with driver.override("PREVIEW"):
         bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
     yield from driver.until(lambda: done, "the render ends", 30)

@@ -10,7 +10,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...core import keyframes, mattes, retiming
 from ...core.effect import PlacedRamp
 from ...media.matte_files import MatteFile
-from . import inbetween_settings, mask_shapes, matte_strips, source_media, strip_timing, strips, validation
+from . import inbetween_settings, mask_reading, matte_strips, source_media, strip_timing, strips, validation
 from .validation import EffectError
 
 
@@ -27,7 +27,7 @@ def content(edit, effect, strip, region, moves, frames, time: keyframes.Channel 
     if matte == "STRIP":
         return _strip_frames(region, frames)
     if matte == "MASK":
-        return _mask_shapes(edit, effect, strip, region, frames, time)
+        return _mask_reading(edit, effect, strip, region, frames, time)
     first = strip.left_handle if validation.word(region, "timing") == "TIMELINE" else None
     return mattes.FileFrames(image_file(region), validation.number(region, "offset"), first)
 
@@ -61,7 +61,7 @@ def image_file(region) -> MatteFile:
     return MatteFile(path, channel(region), files, (_stamp(path), _stamp(folder)))
 
 
-def _mask_shapes(edit, effect, strip, region, frames, time) -> keyframes.Channel:
+def _mask_reading(edit, effect, strip, region, frames, time) -> keyframes.Channel:
     """A mask's shapes at the source's frames, of which the first is the mask's start, as a Mask strip on it has it."""
     mask = region.mask
     if mask is None:
@@ -74,7 +74,7 @@ def _mask_shapes(edit, effect, strip, region, frames, time) -> keyframes.Channel
             index = retiming.source_frame(timing, frame, medium)
         else:
             index = retiming.nearest(time.at(frame)[0] - 1, medium.step, medium.count)
-        return mask_shapes.mask_at(mask, mask.frame_start + index / medium.step)
+        return mask_reading.mask_at(mask, mask.frame_start + index / medium.step)
 
     return keyframes.Samples({frame: _tried(shape, frame) for frame in frames})
 

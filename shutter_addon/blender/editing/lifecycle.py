@@ -35,7 +35,8 @@ def update(updated=None) -> bool:
     _identify()
     if not render_job.runs():  # a film keeps its size
         follow_sources()
-    return any([invalidation.invalidate_changed(edit) for edit in _edits()])
+    changed = [invalidation.invalidate_changed(edit) for edit in _edits()]
+    return any(changed)
 
 
 def mend() -> None:

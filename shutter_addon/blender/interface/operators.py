@@ -543,7 +543,7 @@ class SHUTTER_OT_recipe_export(_OfEffect, ExportHelper, Operator):
         edit, _effect, strip = selection.active(context)
         try:
             path = chosen_file(self)
-            matte_export.export(edit, effect, strip, Path(path))
+            recipe.save(matte_export.recipe_for(edit, effect, strip, Path(path)), path)
         except (recipe.RecipeError, *FAULTS) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -137,6 +137,10 @@ class _Shutters:
         row = layout.row()
         row.active = not bars.any()
         row.label(text=bar_edits.summary(bars), icon="NONE" if bars.any() else "ERROR", translate=False)
+        if words := bar_edits.open_for(*found, effect.active_shutter):
+            row = layout.row()
+            row.active = False
+            row.label(text=words, translate=False)
 
 
 def _draw_follow(layout, effect, shutter) -> None:

@@ -172,6 +172,12 @@ def _key(context, effect, index: int) -> None:
         show(lambda menu, _context: menu.layout.label(text=sentence, translate=False), icon="ERROR")
 
 
+def _is_drawing(context) -> bool:
+    """Whether the preview's tool draws strokes, or erases them."""
+    tool = context.workspace.tools.from_space_sequencer(context.space_data.view_type)
+    return tool is not None and tool.idname.startswith("builtin.annotate")
+
+
 class SHUTTER_GGT_region(GizmoGroup):
     bl_idname = "SHUTTER_GGT_region"
     bl_label = "Shutter Region"
@@ -182,7 +188,8 @@ class SHUTTER_GGT_region(GizmoGroup):
     @classmethod
     def poll(cls, context):
         settings, found = context.window_manager.virtual_shutter, selection.active(context)
-        if settings.live and settings.probe:  # a handle under the pointer would take it from the probe
+        # A handle under the pointer would take it from the probe, and a stroke from the pen.
+        if (settings.live and settings.probe) or _is_drawing(context):
             return False
         return found is not None and found[0].is_editable and selection.active_region(found[1]) is not None
 

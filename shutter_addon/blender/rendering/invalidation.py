@@ -11,7 +11,7 @@ from ...media import MediaError
 from ..data import (
     fcurves,
     geometry,
-    mask_shapes,
+    mask_reading,
     matte_content,
     matte_strips,
     revision,
@@ -171,8 +171,8 @@ def _matte(region):
 
 
 def _mask(mask):
-    yield mask.frame_start, mask_shapes.mask_at(mask, mask.frame_start)
-    yield from mask_shapes.motion(mask)
+    yield mask.frame_start, mask_reading.mask_at(mask, mask.frame_start)
+    yield from mask_reading.motion(mask)
     for curve in fcurves.curves_under(mask, ""):
         yield curve.data_path
         yield from _curve(curve)

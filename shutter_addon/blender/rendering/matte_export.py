@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
+from contextlib import closing
 from pathlib import Path
-
-import numpy as np
 
 from ...core import mattes, recipe
 from ...media.image_writing import write_grey
@@ -14,15 +13,15 @@ from ..data import matte_content, recipe_export, snapshot, strips, validation
 from . import session
 
 
-def export(edit, effect, strip, path: Path) -> None:
-    """Saves an effect as a recipe at a path; what a recipe cannot point to lies in a folder beside it, "NAME mattes".
-    RecipeError, one of session.FAULTS: it cannot be rendered as it stands, or a matte cannot be read or written.
-    OSError: the recipe cannot be written."""
+def recipe_for(edit, effect, strip, path: Path) -> recipe.Recipe:
+    """An effect as a recipe that is to lie at a path. What it cannot point to is written into a folder beside it, "NAME
+    mattes". One of session.FAULTS: the effect cannot be rendered as it stands, or a matte cannot be read or written.
+    OSError: there can be no such folder."""
     regions = strips.matte_regions(effect)
-    # The recipe is made before anything is written, and once more with what was.
+    # Once before anything is written.
     recipe_export.recipe_of(edit, effect, strip, [_ramp(region) for region in regions])
     words = [_words(edit, effect, strip, region, path, number) for number, region in enumerate(regions, 1)]
-    recipe.save(recipe_export.recipe_of(edit, effect, strip, words), path)
+    return recipe_export.recipe_of(edit, effect, strip, words)
 
 
 def _ramp(region) -> recipe.RampRegion:
@@ -50,17 +49,16 @@ def _write(edit, effect, strip, region, folder: Path) -> Path:
     shown = snapshot.take(edit, effect, strip, frames)
     content = snapshot.region_at(edit, effect, strip, list(effect.regions).index(region), frames).content
     folder.mkdir(parents=True, exist_ok=True)
-    written: list[tuple[object, np.ndarray]] = []
-    with session.open_source(shown) as source:
-        values = MatteValues(source.width, source.height, source.step)
+    keys = []
+    with closing(session.open_source(shown)) as source, closing(MatteValues.of(source)) as values:
         for number, frame in enumerate(frames, 1):
             with snapshot.translated():
                 matte = mattes.Matte(0, content.at(frame))
-                ((key, array),) = values.values((matte,), session.source_index(shown, frame, source)[0], 1)
-            written.append((key, number))
+            ((key, array),) = values.values((matte,), session.source_index(shown, frame, source)[0], 1)
+            keys.append(key)
             write_grey(folder / f"{number:04d}.png", array)
-        values.close()
-    if len({key for key, _ in written}) == 1:
-        for number in range(2, len(frames) + 1):
-            (folder / f"{number:04d}.png").unlink()
+    kept = 1 if len(set(keys)) == 1 else len(keys)
+    for file in folder.glob("[0-9]*.png"):  # of a longer film, exported before
+        if file.stem.isdecimal() and int(file.stem) > kept:
+            file.unlink()
     return folder / "0001.png"

@@ -217,7 +217,7 @@ class RenderSession:
             if renderer is not None:
                 self.run(renderer.close)
             source = open_source(snapshot)
-            renderer = Renderer(self._compositor, source, MatteValues(source.width, source.height, source.step))
+            renderer = Renderer(self._compositor, source, MatteValues.of(source))
         self._renderers[snapshot.scene] = key, renderer
         while len(self._renderers) > _KEPT:
             self.run(self._renderers.pop(next(iter(self._renderers)))[1].close)

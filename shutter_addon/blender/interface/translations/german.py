@@ -22,6 +22,7 @@ MESSAGES = {
     ("*", "and {count} more, in the bar editor"): "und {count} weitere, im Balkeneditor",
     ("*", "{angle}°, 1 frame of light"): "{angle}°, Licht von 1 Bild",
     ("*", "{angle}°, {frames} frames of light"): "{angle}°, Licht von {frames} Bildern",
+    ("*", "Open for {frames} of {window} frames here"): "Hier {frames} von {window} Bildern lang offen",
     ("*", "All bars are zero: the shutter never opens"): "Alle Balken sind null: Der Verschluss öffnet nie",
     # Names of what is new
     ("*", "Shutter {source}"): "Verschluss {source}",
@@ -112,6 +113,14 @@ MESSAGES = {
         "*",
         'strip "{strip}" lies at frames {first} to {last}, where no timeline is',
     ): "Streifen „{strip}“ liegt bei den Bildern {first} bis {last}, wo keine Zeitleiste ist",
+    (
+        "*",
+        'mask "{mask}": a point, a feather or an opacity is not a usable number',
+    ): "Maske „{mask}“: ein Punkt, eine weiche Kante oder eine Deckkraft ist keine brauchbare Zahl",
+    (
+        "*",
+        'mask "{mask}": it cannot be read in this version of Blender',
+    ): "Maske „{mask}“ ist in dieser Version von Blender nicht lesbar",
     (
         "*",
         'strip "{strip}": its retiming keys cannot be read in this version of Blender',

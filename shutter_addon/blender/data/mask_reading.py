@@ -5,6 +5,7 @@ from Blender's memory, and checked against what the API has.
 """
 
 import ctypes
+from bisect import bisect_right
 from collections.abc import Iterator
 from itertools import pairwise
 
@@ -219,27 +220,27 @@ def _parent_matrix(parent, origin: np.ndarray, corners: np.ndarray, frame: float
     if parent.type == "POINT_TRACK":
         track = tracked.tracks.get(parent.sub_parent)
         if track is not None and len(track.markers):
-            at = _between_markers(track, "co", 2, frame - clip.frame_start + 1) + track.offset
+            at = _between_markers(track, "co", 2, frame - clip.frame_start + 1, _halved) + track.offset
             matrix[:2, 2] = mask_handles.moved(at, to_mask) - origin
         return matrix
     track = tracked.plane_tracks.get(parent.sub_parent)
     if track is None or not len(track.markers):
         return matrix
     # Here Blender does not ask on which frame the clip starts.
-    now = _between_markers(track, "corners", 8, frame).reshape(4, 2)
+    now = _between_markers(track, "corners", 8, frame, _last_until).reshape(4, 2)
     if clip.size[0] and to_mask[0, 0] < 1:
         # Blender takes the inverse for pictures higher than wide, where planes move their children less than they do.
         to_mask = np.linalg.inv(to_mask)
     return to_mask @ mask_handles.homography(corners, now) @ np.linalg.inv(to_mask)
 
 
-def _between_markers(track, name: str, size: int, frame: float) -> np.ndarray:
+def _between_markers(track, name: str, size: int, frame: float, find) -> np.ndarray:
     """A property (size,) of a track's marker at a frame of the clip: what lies between those of two consecutive frames,
-    and in gaps the one before."""
+    elsewhere that of the one which `find` finds."""
     frames, values = _markers(track, name, size)
     values = values.astype(np.float64)
     whole = int(frame)
-    here = max(int(np.searchsorted(frames, whole, side="right")) - 1, 0)
+    here = min(max(find(frames.tolist(), whole), 0), len(frames) - 1)
     if here + 1 < len(frames) and frames[here + 1] == frames[here] + 1:
         return values[here] + (values[here + 1] - values[here]) * (frame - whole)
     return values[here]
@@ -251,6 +252,21 @@ def _markers(track, name: str, size: int) -> tuple[np.ndarray, np.ndarray]:
     track.markers.foreach_get("frame", frames)
     track.markers.foreach_get(name, values.reshape(-1))
     return frames, values
+
+
+def _last_until(frames: list[int], frame: int) -> int:
+    return bisect_right(frames, frame) - 1
+
+
+def _halved(frames: list[int], frame: int) -> int:
+    """The search of Blender for a track's marker: in gaps it ends on either side of them, by the number of markers."""
+    left, right = 0, len(frames)
+    while left < right:
+        middle = (left + right) // 2
+        if frames[middle] == frame:
+            return middle
+        left, right = (middle + 1, right) if frames[middle] < frame else (left, middle - 1)
+    return right
 
 
 def _mask_from_clip(clip) -> np.ndarray:
