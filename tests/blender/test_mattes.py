@@ -164,6 +164,27 @@ def test_a_strip_is_read_as_it_is_trimmed_muted_and_retimed(edit, shown, matte):
         coefficients(7)
 
 
+def test_a_copy_of_a_strip_is_another_matte(bpy, edit, shown, matte):
+    """Of the source, given other files, and of a matte; the parts of one that was cut are one."""
+    _strip, effect, _coefficients = shown(data(region(matte), region(matte, name="n")))
+    strips = edit.sequence_editor.strips
+    own = strip_of(edit, matte, 3)
+    own.virtual_shutter_source = effect.source
+    one, other = effect.regions
+    for each in (one, other):
+        each.matte, each.strip_name = "STRIP", own.name
+        assert each.strip_name == own.name
+    copy = strip_of(edit, matte, 1, name="copy")
+    copy.virtual_shutter_source, copy.virtual_shutter_matte = own.virtual_shutter_source, own.virtual_shutter_matte
+    other.strip_name = copy.name
+    assert (one.strip_name, other.strip_name) == (own.name, copy.name)
+    right = copy.split(frame=6, split_method="SOFT")
+    one.strip_name = right.name
+    assert one.strip == other.strip
+    strips.remove(copy)
+    assert other.strip_name == right.name
+
+
 def test_sentences_for_what_is_not_there(bpy, edit, shown, matte):
     _strip, effect, coefficients = shown(data(region(matte)))
     one = effect.regions[0]
