@@ -1,11 +1,13 @@
 """Mattes and ramps in Blender: files, strips of the edit, as they are trimmed and retimed, and what becomes of them."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
 from support import read_picture, recipe, request, write_frames
 
+from shutter_addon.core import light
 from shutter_addon.core import recipe as recipes
 
 WIDTH, HEIGHT, COUNT = 48, 32, 12
@@ -48,7 +50,6 @@ def shown(bpy, edit, footage):
     from shutter_addon.blender.data import recipe_import
     from shutter_addon.blender.editing import add_effect
     from shutter_addon.blender.rendering import session
-    from shutter_addon.core import light
 
     def show(content, change=lambda source: None):
         source = edit.sequence_editor.strips.new_image("images", str(footage), 1, 1)
@@ -162,6 +163,41 @@ def test_a_strip_is_read_as_it_is_trimmed_muted_and_retimed(edit, shown, matte):
         edit.sequence_editor.strips.remove(part)
     with pytest.raises(Exception, match='region "m": its matte strip was deleted'):
         coefficients(7)
+
+
+def test_a_file_is_moved_with_its_mattes(bpy, edit, shown, matte, footage, tmp_path):
+    """Chosen after the file was saved, and before that; then appended to another file, and linked."""
+    from shutter_addon.blender.data import recipe_import, strips
+
+    first = tmp_path / "here"
+    first.mkdir()
+    for folder in (matte.parent, footage.parent):
+        shutil.copytree(folder, first / folder.name)
+    edit.name = "Edit"
+    content = data(region(first / "matte" / "m0001.png"))
+    shown(content, lambda source: setattr(source, "directory", str(first / footage.parent.name)))
+    bpy.ops.wm.save_as_mainfile(filepath=str(first / "edit.blend"))
+    (effect,) = edit.virtual_shutter.effects
+    recipe_import.apply(edit, effect, strips.effect_strips(edit)[0], recipes.parse(json.dumps(content)))
+    assert effect.regions[0].image.filepath == "//matte/m0001.png"
+    bpy.ops.wm.save_mainfile()
+    first.rename(tmp_path / "there")
+    moved = str(tmp_path / "there" / "edit.blend")
+
+    def assert_shown():
+        edit = bpy.data.scenes["Edit"]
+        (effect,) = edit.virtual_shutter.effects
+        asked = request(edit, effect, strips.effect_strips(edit)[0], 3)
+        levels = 255 * light.to_encoded(asked.picture()[..., 0].astype(float))
+        assert close((levels - (20 + 10 * asked.index)) / 10, values(2) / 255)
+
+    bpy.ops.wm.open_mainfile(filepath=moved)
+    assert_shown()
+    for link in (False, True):
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        with bpy.data.libraries.load(moved, link=link) as (_there, here):
+            here.scenes = ["Edit"]
+        assert_shown()
 
 
 def test_a_copy_of_a_strip_is_another_matte(bpy, edit, shown, matte):

@@ -3,7 +3,7 @@
 import bpy
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import EnumProperty
+from bpy.props import BoolProperty, EnumProperty
 from bpy.types import Operator
 from bpy_extras.io_utils import ImportHelper
 
@@ -28,6 +28,11 @@ class SHUTTER_OT_matte_add(_AddsRegion, ImportHelper, Operator):
 
     bl_idname = "shutter.matte_add"
     bl_label = "Matte from File"
+
+    # What the file browser shows.
+    filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
     def change(self, _context, effect):
         try:
