@@ -35,8 +35,9 @@ def _update(scene=None, *_):
     revision.changed()
     if render_job.runs() and bpy.app.is_job_running("RENDER"):
         job_snapshots.look(render_job.film())
-    if not render_job.cancelling():
-        lifecycle.update(scene)
+    # Blender draws a preview again for most of what has changed, but not for a shape key of a mask.
+    if not render_job.cancelling() and lifecycle.update(scene):
+        preview_areas.redraw(bpy.context)
 
 
 @persistent

@@ -1,11 +1,13 @@
 """Mattes and ramps in Blender: files, strips of the edit, as they are trimmed and retimed, and what becomes of them."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
 from support import read_picture, recipe, request, sequencer, write_frames
 
+from shutter_addon.core import light
 from shutter_addon.core import recipe as recipes
 from shutter_addon.media.image_writing import write_exr
 
@@ -49,7 +51,6 @@ def shown(bpy, edit, footage):
     from shutter_addon.blender.data import recipe_import
     from shutter_addon.blender.editing import add_effect
     from shutter_addon.blender.rendering import session
-    from shutter_addon.core import light
 
     def show(content, change=lambda source: None):
         source = edit.sequence_editor.strips.new_image("images", str(footage), 1, 1)
@@ -194,6 +195,62 @@ def test_a_strip_is_read_as_it_is_trimmed_muted_and_retimed(edit, shown, matte):
         edit.sequence_editor.strips.remove(part)
     with pytest.raises(Exception, match='region "m": its matte strip was deleted'):
         coefficients(7)
+
+
+def test_a_file_is_moved_with_its_mattes(bpy, edit, shown, matte, footage, tmp_path):
+    """Chosen after the file was saved, and before that; then appended to another file, and linked."""
+    from shutter_addon.blender.data import recipe_import, strips
+
+    first = tmp_path / "here"
+    first.mkdir()
+    for folder in (matte.parent, footage.parent):
+        shutil.copytree(folder, first / folder.name)
+    edit.name = "Edit"
+    content = data(region(first / "matte" / "m0001.png"))
+    shown(content, lambda source: setattr(source, "directory", str(first / footage.parent.name)))
+    bpy.ops.wm.save_as_mainfile(filepath=str(first / "edit.blend"))
+    (effect,) = edit.virtual_shutter.effects
+    recipe_import.apply(edit, effect, strips.effect_strips(edit)[0], recipes.parse(json.dumps(content)))
+    assert effect.regions[0].image.filepath == "//matte/m0001.png"
+    bpy.ops.wm.save_mainfile()
+    first.rename(tmp_path / "there")
+    moved = str(tmp_path / "there" / "edit.blend")
+
+    def assert_shown():
+        edit = bpy.data.scenes["Edit"]
+        (effect,) = edit.virtual_shutter.effects
+        asked = request(edit, effect, strips.effect_strips(edit)[0], 3)
+        levels = 255 * light.to_encoded(asked.picture()[..., 0].astype(float))
+        assert close((levels - (20 + 10 * asked.index)) / 10, values(2) / 255)
+
+    bpy.ops.wm.open_mainfile(filepath=moved)
+    assert_shown()
+    for link in (False, True):
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        with bpy.data.libraries.load(moved, link=link) as (_there, here):
+            here.scenes = ["Edit"]
+        assert_shown()
+
+
+def test_a_copy_of_a_strip_is_another_matte(bpy, edit, shown, matte):
+    """Of the source, given other files, and of a matte; the parts of one that was cut are one."""
+    _strip, effect, _coefficients = shown(data(region(matte), region(matte, name="n")))
+    strips = edit.sequence_editor.strips
+    own = strip_of(edit, matte, 3)
+    own.virtual_shutter_source = effect.source
+    one, other = effect.regions
+    for each in (one, other):
+        each.matte, each.strip_name = "STRIP", own.name
+        assert each.strip_name == own.name
+    copy = strip_of(edit, matte, 1, name="copy")
+    copy.virtual_shutter_source, copy.virtual_shutter_matte = own.virtual_shutter_source, own.virtual_shutter_matte
+    other.strip_name = copy.name
+    assert (one.strip_name, other.strip_name) == (own.name, copy.name)
+    right = copy.split(frame=6, split_method="SOFT")
+    one.strip_name = right.name
+    assert one.strip == other.strip
+    strips.remove(copy)
+    assert other.strip_name == right.name
 
 
 def test_sentences_for_what_is_not_there(bpy, edit, shown, matte):
@@ -414,3 +471,53 @@ def test_weights_are_read_back(tmp_path, footage):
         first, second = (read_picture(tmp_path / folder / f"{frame:04d}.png") for folder in "ab")
         assert np.abs(first - second).max() <= 1
         assert np.ptp(first) > 15
+
+
+@pytest.fixture
+def triangle(bpy, shown, matte):
+    """A mask that is the first region's matte: a triangle."""
+    _strip, effect, _coefficients = shown(data(region(matte)))
+    mask = bpy.data.masks.new("Mask")
+    spline = mask.layers.new().splines.new()
+    spline.points.add(2)
+    for point, co in zip(spline.points, ((0.2, 0.2), (0.8, 0.2), (0.5, 0.7)), strict=True):
+        point.co = co
+        point.handle_left = point.handle_right = co
+    spline.use_cyclic = True
+    effect.regions[0].matte, effect.regions[0].mask = "MASK", mask
+    return mask
+
+
+def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, triangle):
+    from shutter_addon.blender.rendering import invalidation
+
+    layer = triangle.layers[0]
+    point = layer.splines[0].points[0]
+    clip = bpy.data.movieclips.load(str(matte))
+    track = clip.tracking.tracks.new(name="T", frame=1)
+
+    def parented():
+        parent = point.parent
+        parent.id_type, parent.id, parent.parent, parent.sub_parent = "MOVIECLIP", clip, "Camera", "T"
+
+    def keyed():
+        layer.keyframe_insert("alpha", frame=1)
+
+    def tracked():
+        track.markers.insert_frame(4).co = 0.5, 0.6
+
+    changes = {
+        "point": lambda: setattr(point, "co", (0.1, 0.3)),
+        "feather": lambda: setattr(point, "weight", 0.1),
+        "start": lambda: setattr(triangle, "frame_start", 5),
+        "layer": lambda: setattr(layer, "invert", True),
+        "opacity": keyed,
+        "parent": parented,
+        "marker": tracked,
+        "removed": lambda: bpy.data.masks.remove(triangle),
+    }
+    invalidation.invalidate_changed(edit)
+    for name, change in changes.items():
+        change()
+        assert invalidation.invalidate_changed(edit), name
+        assert not invalidation.invalidate_changed(edit), name

@@ -6,6 +6,7 @@ from Blender's memory, and checked against what the API has.
 
 import ctypes
 from bisect import bisect_right
+from collections.abc import Iterator
 from itertools import chain, pairwise
 
 import bpy
@@ -59,6 +60,20 @@ def mask_at(mask: bpy.types.Mask, frame: float) -> MaskShape:
     """
     layers = [layer for layer in mask.layers if not layer.hide_render]
     return MaskShape(tuple(_layer_at(mask, layer, frame) for layer in layers))
+
+
+def motion(mask: bpy.types.Mask) -> Iterator[tuple]:
+    """What lets a mask differ from frame to frame, F-curves apart: its shape keys, and the markers of its parents.
+    EffectError: as `mask_at`."""
+    for layer in mask.layers:
+        for shape in _shapes(mask, layer):
+            yield shape.frame, np.ctypeslib.as_array(shape.data, (shape.points, _SHAPE_NUMBERS)).tobytes()
+    points = [point for layer in mask.layers for spline in layer.splines for point in spline.points]
+    for clip, name, track in {(p.parent.id, p.parent.parent, p.parent.sub_parent) for p in points}:
+        tracked = clip.tracking.objects.get(name) if isinstance(clip, bpy.types.MovieClip) else None
+        for tracks, place, size in ((tracked.tracks, "co", 2), (tracked.plane_tracks, "corners", 8)) if tracked else ():
+            if track in tracks:
+                yield tuple(numbers.tobytes() for numbers in _markers(tracks[track], place, size))
 
 
 def _layer_at(mask, layer, frame: float) -> MaskLayer:
@@ -218,15 +233,21 @@ def _parent_matrix(parent, raw: _Parent, frame: float) -> np.ndarray:
 def _between_markers(track, name: str, size: int, frame: float, find) -> np.ndarray:
     """A property (size,) of a track's marker at a frame of the clip: what lies between those of two consecutive frames,
     elsewhere that of the one which `find` finds."""
-    frames, values = np.empty(len(track.markers), np.int32), np.empty(len(track.markers) * size, np.float32)
-    track.markers.foreach_get("frame", frames)
-    track.markers.foreach_get(name, values)
-    values = values.reshape(-1, size).astype(np.float64)
+    frames, values = _markers(track, name, size)
+    values = values.astype(np.float64)
     whole = int(frame)
     here = min(max(find(frames.tolist(), whole), 0), len(frames) - 1)
     if here + 1 < len(frames) and frames[here + 1] == frames[here] + 1:
         return values[here] + (values[here + 1] - values[here]) * (frame - whole)
     return values[here]
+
+
+def _markers(track, name: str, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Of a track's markers the frames (n,), and a property (n, size)."""
+    frames, values = np.empty(len(track.markers), np.int32), np.empty((len(track.markers), size), np.float32)
+    track.markers.foreach_get("frame", frames)
+    track.markers.foreach_get(name, values.reshape(-1))
+    return frames, values
 
 
 def _last_until(frames: list[int], frame: int) -> int:

@@ -14,15 +14,27 @@ def strip_name(region) -> str:
 
 
 def choose_strip(region, name: str) -> None:
-    """Makes a strip a region's matte, by its name; no strip, where none is called so."""
+    """Makes a strip a region's matte, by its name, with the other parts of it, if it was cut; no strip, where none is
+    called so."""
     editor = region.id_data.sequence_editor
     strip = editor and editor.strips_all.get(name)
     if strip is None:
         region.strip = ""
         return
-    if not strip.virtual_shutter_source:
-        strip.virtual_shutter_source = uuid.uuid4().hex
-    region.strip = strip.virtual_shutter_source
+    known = strip.virtual_shutter_matte
+    same = [other for other in editor.strips_all if known and other.virtual_shutter_matte == known]
+    parts = [strip, *(other for other in same if _is_part(other, strip))]
+    if len(parts) != len(same):  # it has no identity yet, or that of a strip which it is a copy of
+        identity = uuid.uuid4().hex
+        for part in parts:
+            part.virtual_shutter_matte = identity
+    region.strip = strip.virtual_shutter_matte
+
+
+def _is_part(other, strip) -> bool:
+    """Whether a strip and another one that has its identity were cut from one."""
+    overlap = min(other.right_handle, strip.right_handle) - max(other.left_handle, strip.left_handle)
+    return strips.origin(other) == strips.origin(strip) and overlap <= 0
 
 
 def strips_of(region) -> list:
@@ -47,4 +59,4 @@ def part_at(parts: list, frame: float):
 def _parts(region) -> list:
     editor = region.id_data.sequence_editor
     strips_all = editor.strips_all if editor and region.strip else ()
-    return [strip for strip in strips_all if strip.virtual_shutter_source == region.strip]
+    return [strip for strip in strips_all if strip.virtual_shutter_matte == region.strip]

@@ -564,6 +564,8 @@ def register():
     bpy.types.Scene.virtual_shutter = PointerProperty(type=ShutterScene)
     # A strip cannot be pointed to and may be renamed: the source strip carries the identity that effects look for.
     bpy.types.Strip.virtual_shutter_source = StringProperty(options={"HIDDEN"})
+    # And that which mattes look for: apart, as a source that is duplicated and given other files may be one.
+    bpy.types.Strip.virtual_shutter_matte = StringProperty(options={"HIDDEN"})
     # The effect strip carries its scene's: Blender's clipboard drops the scene itself.
     bpy.types.Strip.virtual_shutter_effect = StringProperty(options={"HIDDEN"})
     # That the source was muted when the effect was made, and shall show again when it goes.
@@ -571,7 +573,7 @@ def register():
 
 
 def unregister():
-    for name in ("source", "effect", "muted"):
+    for name in ("source", "matte", "effect", "muted"):
         delattr(bpy.types.Strip, f"virtual_shutter_{name}")
     del bpy.types.Scene.virtual_shutter
     for cls in reversed(classes):

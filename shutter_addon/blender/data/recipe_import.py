@@ -1,5 +1,6 @@
 """A recipe into Blender's data: shutters, regions, strokes, keys and options."""
 
+from contextlib import suppress
 from pathlib import Path
 
 import bpy
@@ -67,15 +68,24 @@ def matte_image(path: str | Path, channel: str = "luminance"):
     with such a channel."""
     with MatteFile(Path(path), channel).open() as matte:
         path, count = matte.path, matte.count
+    name = _kept(check_name(path))
     if path.suffix.lower() in IMAGE_SUFFIXES and count > 1:
-        image = bpy.data.images.load(check_name(path))  # not one that is there, which may be no sequence
+        image = bpy.data.images.load(name)  # not one that is there, which may be no sequence
         image.source = "SEQUENCE"
         return image
     try:
-        return bpy.data.images.load(check_name(path), check_existing=True)
+        return bpy.data.images.load(name, check_existing=True)
     except RuntimeError as error:
         sentence = rpt_("{file}: Blender cannot read it ({error})")
         raise MediaError(sentence.format(file=path.name, error=error)) from None
+
+
+def _kept(name: str) -> str:
+    """A path as Blender keeps those that are chosen: relative to the saved file, if the preferences say so."""
+    if bpy.data.filepath and bpy.context.preferences.filepaths.use_relative_paths:
+        with suppress(ValueError):  # another drive
+            return bpy.path.relpath(name)
+    return name
 
 
 def _check_keys(source: recipe.Recipe, first: float) -> None:

@@ -14,12 +14,13 @@ EFFECTS = "virtual_shutter.effects"
 _layer_names: dict[int, list[str]] = {}  # by session_uid of an annotation, as they were at the last update
 
 
-def update(updated=None) -> None:
-    """Brings the effects of all edits in line with their strips. A second call changes nothing.
+def update(updated=None) -> bool:
+    """Brings the effects of all edits in line with their strips, and gives whether any of their pictures has changed. A
+    second call changes nothing.
 
     updated: the scene whose depsgraph is being updated, which must not go now."""
     if bpy.app.is_job_running("RENDER"):
-        return
+        return False
     edits = _edits()
     for edit in edits:
         _reconnect(edit)
@@ -34,8 +35,8 @@ def update(updated=None) -> None:
     _identify()
     if not render_job.runs():  # a film keeps its size
         follow_sources()
-    for edit in _edits():
-        invalidation.invalidate_changed(edit)
+    changed = [invalidation.invalidate_changed(edit) for edit in _edits()]
+    return any(changed)
 
 
 def mend() -> None:

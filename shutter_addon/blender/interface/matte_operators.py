@@ -3,7 +3,7 @@
 import bpy
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import EnumProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy.types import Operator
 from bpy_extras.io_utils import ImportHelper
 
@@ -36,6 +36,10 @@ class SHUTTER_OT_matte_add(_AddsRegion, ImportHelper, Operator):
         maxlen=MAX_CHANNEL,
         options={"SKIP_SAVE"},
     )
+    # What the file browser shows.
+    filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
     def change(self, _context, effect):
         name = self.channel_name

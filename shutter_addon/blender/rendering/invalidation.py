@@ -8,7 +8,17 @@ import bpy
 import numpy as np
 
 from ...media import MediaError
-from ..data import fcurves, geometry, matte_content, matte_strips, revision, snapshot, source_media, strips
+from ..data import (
+    fcurves,
+    geometry,
+    mask_reading,
+    matte_content,
+    matte_strips,
+    revision,
+    snapshot,
+    source_media,
+    strips,
+)
 from ..data.snapshot import Snapshot, SourceFiles
 from ..data.validation import EffectError
 from . import render_job, session
@@ -111,18 +121,21 @@ def _signature(edit, effect, strip, looked: dict):
             yield from _matte(region)
     path = effect.path_from_id()
     for curve in fcurves.curves_under(edit, path + "."):
-        yield curve.data_path.removeprefix(path), curve.array_index, curve.mute, curve.extrapolation
-        yield from _keys(curve.keyframe_points)
-        for modifier in curve.modifiers:
-            yield from (
-                repr(getattr(modifier, p.identifier)) for p in modifier.bl_rna.properties if p.type != "POINTER"
-            )
+        yield curve.data_path.removeprefix(path)
+        yield from _curve(curve)
     transform = strip.transform
     # As words: "not a number" is never the same again.
     yield repr([getattr(transform, name) for name in geometry.TRANSFORM]), repr(tuple(transform.origin))
     yield strip.use_flip_x, strip.use_flip_y  # scribbles lie mirrored with it
     if (source := strips.nearest_source(edit, effect, strip)) is not None:
         yield from _source(effect, source, looked)
+
+
+def _curve(curve):
+    yield curve.array_index, curve.mute, curve.extrapolation
+    yield from _keys(curve.keyframe_points)
+    for modifier in curve.modifiers:
+        yield from (repr(getattr(modifier, p.identifier)) for p in modifier.bl_rna.properties if p.type != "POINTER")
 
 
 def _keys(points):
@@ -151,8 +164,18 @@ def _matte(region):
         for part in matte_strips.strips_of(region) if region.matte == "STRIP" else ():
             yield from _timing(part)
             yield source_media.media_key(part)
+        if region.matte == "MASK" and region.mask is not None:
+            yield from _mask(region.mask)
     except (MediaError, EffectError) as error:
         yield str(error)
+
+
+def _mask(mask):
+    yield mask.frame_start, mask_reading.mask_at(mask, mask.frame_start)
+    yield from mask_reading.motion(mask)
+    for curve in fcurves.curves_under(mask, ""):
+        yield curve.data_path
+        yield from _curve(curve)
 
 
 def _timing(source):
