@@ -70,7 +70,10 @@ class SHUTTER_MT_regions(Menu):
         layout = self.layout
         layout.operator("shutter.matte_add", icon="FILE_MOVIE")
         layout.operator_menu_enum("shutter.matte_strip", "strip", icon="SEQUENCE")
-        layout.operator_menu_enum("shutter.matte_mask", "mask", icon="MOD_MASK")
+        if bpy.data.masks:
+            layout.operator_menu_enum("shutter.matte_mask", "mask", icon="MOD_MASK")
+        else:
+            layout.operator("shutter.matte_mask", icon="MOD_MASK")  # greyed out; its tooltip says why
         layout.operator_menu_enum("shutter.ramp_add", "ramp", icon="IPO_EASE_IN_OUT")
         layout.separator()
         layout.operator_menu_enum("shutter.time_map", "ramp", icon="TIME")
