@@ -23,5 +23,5 @@ void main()
   uvec2 light = packed_light(uvec3(ivec3(color * whole + 0.5)));
 #endif
   uvec2 sum = sum_at(place, known);
-  imageStore(sums, ivec3(place, next), uvec4(BACK != 0 ? minus(sum, light) : plus(sum, light), 0u, 0u));
+  imageStore(sums, ivec3(place, next), halves_of(BACK != 0 ? minus(sum, light) : plus(sum, light)));
 }

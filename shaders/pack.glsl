@@ -24,5 +24,5 @@ void main()
   }
   place -= BEFORE;
   imageStore(packed_frames, ivec3(place + BEFORE, layer),
-             uvec4(packed_at(place), packed_at(place + ivec2(0, 1)), 0u, 0u));
+             halves_of(uvec2(packed_at(place), packed_at(place + ivec2(0, 1)))));
 }

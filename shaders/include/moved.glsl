@@ -36,8 +36,8 @@ struct Column {
 
 Column column_at(ivec2 place, int layer)
 {
-  uvec2 upper = imageLoad(packed_frames, ivec3(place, layer)).rg;
-  uvec2 lower = imageLoad(packed_frames, ivec3(place + ivec2(0, 2), layer)).rg;
+  uvec2 upper = words_of(imageLoad(packed_frames, ivec3(place, layer)));
+  uvec2 lower = words_of(imageLoad(packed_frames, ivec3(place + ivec2(0, 2), layer)));
   return Column(unpacked_color(upper.x), unpacked_color(upper.y), unpacked_color(lower.x), unpacked_color(lower.y));
 }
 

@@ -1,5 +1,7 @@
 // Running sums along time: a pixel's sum at position p is the light of all frames before p, three fields of 21 bits in
 // one word of 64. Only differences are taken, which are exact however often the sums have wrapped around.
+#include "halves.glsl"
+
 const uint FIELD = 0x1FFFFFu;
 
 uvec2 minus(uvec2 a, uvec2 b)
@@ -38,5 +40,5 @@ ivec2 place_of_sums(ivec2 pixel)
 // imageLoad: a software renderer's texelFetch of whole numbers takes three times as long.
 uvec2 sum_at(ivec2 place, int layer)
 {
-  return imageLoad(sums, ivec3(place, layer)).rg;
+  return words_of(imageLoad(sums, ivec3(place, layer)));
 }

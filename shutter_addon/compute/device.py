@@ -42,14 +42,14 @@ class Device(Protocol):
     def texture(self, width: int, height: int, layers: int, kind: str) -> Texture:
         """A texture array of undefined content. NoDeviceError: the device has no room for it.
 
-        kind: the format as in GLSL: rgba8, rgba16, rgba16f, rgba32f, r32f, r16ui or rg32ui. Passes read rgba8 and
+        kind: the format as in GLSL: rgba8, rgba16, rgba16f, rgba16ui, rgba32f, r32f or r16ui. Passes read rgba8 and
         rgba16 as 0 … 1, all others as they are, and none with filtering."""
 
     def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
         """Fills a layer, or its first rows, with a C-contiguous array (rows, width[, components]) of the format's type.
 
         opaque: every alpha in the array is full; a device may then send the colours alone.
-        TypeError: the device neither writes nor reads this format, only passes do (rg32ui on Blender's GPU)."""
+        TypeError: the device neither writes nor reads this format, only passes do (rgba16ui on Blender's GPU)."""
 
     def read(self, texture: Texture) -> np.ndarray:
         """A copy of the texture (layers, height, width, components) in the format's type, after all passes that were

@@ -23,7 +23,7 @@ FORMATS = {
     "rgba32f": (4, "f4", np.float32),
     "r32f": (1, "f4", np.float32),
     "r16ui": (1, "u2", np.uint16),
-    "rg32ui": (2, "u4", np.uint32),
+    "rgba16ui": (4, "u2", np.uint16),
 }
 
 

@@ -26,7 +26,7 @@ _READ = Image("rgba32f", reads=True, writes=False)
 _IMAGES = {"picture": Image("rgba32f"), "coefficients": _READ}
 _PLACE = {"size": "ivec2"} | dict.fromkeys(("top", "height", "block_bits"), "int")
 _LAYERS = dict.fromkeys(("origin", "direction", "layers", "lowest", "lowest_layer"), "int")
-_OF_SUMS = {"sums": Image("rg32ui", reads=True, writes=False)}
+_OF_SUMS = {"sums": Image("rgba16ui", reads=True, writes=False)}
 _UNIT = {"held": "int", "unit": "float"}
 # Constants that only some passes use: Blender's `gpu` has no others.
 _OF_WAY = {"pieces": ("rows",), "value": ("first", "last")} | dict.fromkeys(
@@ -117,7 +117,7 @@ def composition_of_moved(
     at: whether passes over other frames come before and after; the others as for `composition`"""
     continued, unfinished = at
     images = _IMAGES | {"table": _READ, "moves": _READ} | ({"summed": _READ} if continued else {})
-    images |= {"packed_frames": Image("rg32ui", reads=True, writes=False)} if packed else {}
+    images |= {"packed_frames": Image("rgba16ui", reads=True, writes=False)} if packed else {}
     numbers = ("motions", *_OF_WAY[way], *(("seen_first", "seen_last", "parts") if shortened else ()))
     return Pass(
         f"compose_{way}",

@@ -212,7 +212,7 @@ class WholeFrames(Frames):
 class PackedFrames(WholeFrames):
     """A window of whole opaque 8-bit frames, in the light that is summed and quick to read (shaders/pack.glsl)."""
 
-    _kind = "rg32ui"
+    _kind = "rgba16ui"
 
     def __init__(self, device: Device, source: FrameSource, capacity: int):
         super().__init__(device, source, capacity)
@@ -246,7 +246,7 @@ def packing(decode: int, squared: bool) -> Pass:
     return Pass(
         "pack",
         samplers={"frame": "sampler2DArray"},
-        images={"packed_frames": Image("rg32ui")},
+        images={"packed_frames": Image("rgba16ui")},
         constants={"size": "ivec2", "layer": "int"},
         defines={"DECODE": decode, "SQUARED": int(squared)},
         local_size=(64, 1, 1),
@@ -286,7 +286,7 @@ def accumulation(decode: int, again: bool, back: bool, tiled: bool) -> Pass:
     return Pass(
         "accumulate",
         samplers={} if again else {"frame": "sampler2DArray"},
-        images={"sums": Image("rg32ui", reads=True)},
+        images={"sums": Image("rgba16ui", reads=True)},
         constants={"size": "ivec2", "known": "int", "next": "int"}
         | ({"before": "int", "after": "int"} if again else {"top": "int", "whole": "float"}),
         defines={"DECODE": decode, "AGAIN": int(again), "BACK": int(back), "TILED": int(tiled)},
@@ -295,7 +295,7 @@ def accumulation(decode: int, again: bool, back: bool, tiled: bool) -> Pass:
 
 
 class Sums(RunningSums, Window):
-    """A window of running sums of opaque 8-bit frames, in textures rg32ui: three fields of 21 bits for each pixel.
+    """A window of running sums of opaque 8-bit frames, in textures rgba16ui: three fields of 21 bits for each pixel.
 
     whole: what white is in a field
     tiled: whether pixels are stored tile by tile, in TILE
@@ -309,7 +309,7 @@ class Sums(RunningSums, Window):
         # Neighbouring pixels read different layers. In tiles, what a workgroup reads of a layer is one run of memory.
         self.tiled = stores_rows(device) and _in_tiles(source.width, 1)[0] <= device.max_size
         self._sent = None
-        self._allocate("rg32ui", 8)
+        self._allocate("rgba16ui", 8)
         try:
             self._sent = device.texture(source.width, source.height, 1, "rgba8")
         except NoDeviceError:

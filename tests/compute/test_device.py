@@ -58,19 +58,19 @@ def test_opaque_pixels_hold_what_was_written(gpu_device, kind):
         texture.release()
 
 
-def test_pairs_of_whole_numbers_are_exact_or_refused(gpu_device):
+def test_fours_of_whole_numbers_are_exact_or_refused(gpu_device):
     """Blender would leave them uninitialised."""
-    pairs = np.random.default_rng(2).integers(0, 1 << 32, (2, 5, 3, 2), dtype=np.uint32)
+    fours = np.random.default_rng(2).integers(0, 1 << 16, (2, 5, 3, 4), dtype=np.uint16)
     with gpu_device.current():
-        texture = gpu_device.texture(3, 5, 2, "rg32ui")
+        texture = gpu_device.texture(3, 5, 2, "rgba16ui")
         if hasattr(texture, "kind"):  # Blender's
-            for refused in (lambda: gpu_device.write(texture, pairs[0]), lambda: gpu_device.read(texture)):
-                with pytest.raises(TypeError, match="rg32ui: such a texture is written and read by passes alone"):
+            for refused in (lambda: gpu_device.write(texture, fours[0]), lambda: gpu_device.read(texture)):
+                with pytest.raises(TypeError, match="rgba16ui: such a texture is written and read by passes alone"):
                     refused()
         else:
-            for layer, values in enumerate(pairs):
+            for layer, values in enumerate(fours):
                 gpu_device.write(texture, values, layer)
-            assert np.array_equal(gpu_device.read(texture), pairs)
+            assert np.array_equal(gpu_device.read(texture), fours)
         texture.release()
 
 

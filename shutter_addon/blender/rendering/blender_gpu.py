@@ -29,7 +29,7 @@ _FORMATS = {
     "rgba32f": (np.float32, "RGBA32F", _AS_IT_IS),
     "r32f": (np.float32, "R32F", _AS_IT_IS),
     "r16ui": (np.uint16, "R32F", _WHOLE),
-    "rg32ui": None,  # of passes alone: floats do not hold it, and Blender reads whole numbers of one component only
+    "rgba16ui": None,  # of passes alone: floats do not hold it, and Blender reads whole numbers of one component only
 }
 
 

@@ -1,0 +1,38 @@
+"""All passes, each in the forms that differ in what they bind or compile."""
+
+import itertools
+
+from shutter_addon.compute import diffusion_gpu, edge_diffusion_gpu, gpu, matting, window
+from shutter_addon.compute.passes import Pass
+
+_WAYS = ("frames", "search", "value")
+
+
+def _declared():
+    for module in (diffusion_gpu, edge_diffusion_gpu):
+        yield from (value for value in vars(module).values() if isinstance(value, Pass))
+
+
+def _composing():
+    for way, edges in itertools.product(("pieces", *_WAYS), (1, 2)):
+        yield gpu.composition(way, 3, "frames", 1, edges, True, False)
+    for way, stored in itertools.product(_WAYS, ("sums", "tiles")):
+        yield gpu.composition(way, 3, stored, 1, 2, True, False)
+    for rows, groups, back, tiled in ((1, 1, False, True), (4, 2, True, False), (32, 4, True, True)):
+        yield gpu.composition_of_sums(rows, groups, back, tiled, True)
+    for way, packed in itertools.product(_WAYS, (True, False)):
+        for at in ((True, False), (False, True)):
+            yield gpu.composition_of_moved(way, 1, 3, 3, packed, 1, packed, False, False, True, at)
+        yield gpu.composition_of_moved(way, 4, 5, 1, packed, 1, False, True, True, False, (False, False))
+
+
+def _filling():
+    for tiled, again in itertools.product((True, False), (True, False)):
+        yield window.accumulation(1, again, tiled, tiled)
+    yield window.packing(1, True)
+    yield window.packing(2, False)
+    for adds in (False, True):
+        yield matting.blend_pass(2, adds)
+
+
+PASSES = list(dict.fromkeys((*_declared(), *_composing(), *_filling())))
