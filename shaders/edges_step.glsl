@@ -8,8 +8,8 @@ void main()
   if (!inside(p.xy, size)) {
     return;
   }
-  vec4 power = imageLoad(sums, ivec3(0, 0, p.z));
-  vec4 answer = imageLoad(sums, ivec3(2, 0, p.z));
+  vec4 power = texelFetch(sums, ivec3(0, 0, p.z), 0);
+  vec4 answer = texelFetch(sums, ivec3(2, 0, p.z), 0);
   vec4 way = vec4(lessThan(answer, vec4(0.0))) * power / max(-answer, vec4(1e-37));
   imageStore(solution, p, imageLoad(solution, p) + way * imageLoad(values, p));
   imageStore(result, p, imageLoad(result, p) + way * imageLoad(right, p));

@@ -46,7 +46,7 @@ ivec2 corner(int n, ivec2 grid)
   if (n >= last) {
     return grid;
   }
-  int tile = int(imageLoad(tiles, ivec3(n & 255, n >> 8, 0)).r);
+  int tile = int(texelFetch(tiles, ivec3(n & 255, n >> 8, 0), 0).r);
   return 4 * ivec2(tile & 4095, tile >> 12);
 }
 

@@ -183,7 +183,7 @@ void store(int quad, int pixel, float gain)
 #endif
   ivec3 stored = ivec3(at.x, height - 1 - at.y, 0);
 #if CONTINUED
-  color += imageLoad(summed, stored);
+  color += texelFetch(summed, stored, 0);
 #endif
 #if !UNFINISHED
 #  if ENCODED

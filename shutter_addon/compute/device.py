@@ -42,7 +42,7 @@ class Device(Protocol):
     def texture(self, width: int, height: int, layers: int, kind: str) -> Texture:
         """A texture array of undefined content. NoDeviceError: the device has no room for it.
 
-        kind: the format as in GLSL: rgba8, rgba16, rgba16f, rgba16ui, rgba32f, r32f or r16ui. Passes read rgba8 and
+        kind: the format as in GLSL: rgba8, rgba16, rgba16f, rgba16ui, rgba32f, r32f or r32ui. Passes read rgba8 and
         rgba16 as 0 … 1, all others as they are, and none with filtering."""
 
     def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:

@@ -52,15 +52,22 @@ _COLOURS = ((0, 0), (1, 1), (0, 1), (1, 0))
 READ = Image("rgba32f", reads=True, writes=False)
 STORED = Image("rgba32f")
 CHANGED = Image("rgba32f", reads=True)
-_TILES = {"tiles": Image("r32f", reads=True, writes=False)}
-LABELS = {"labels": Image("r16ui", reads=True, writes=False)}
+LABELS = {"labels": Image("r32ui", reads=True, writes=False)}
 GRID = {"first": "int", "last": "int", "size": "ivec2"}
 GRIDS = {**GRID, "coarse": "ivec2"}
 
 
-def tile_pass(name: str, reads: tuple[str, ...], images: dict[str, Image], constants: dict[str, str]) -> Pass:
-    """A pass over a list of tiles. It reads all textures as images: texelFetch is far slower on a software renderer."""
-    return Pass(name, images={**_TILES, **dict.fromkeys(reads, READ), **images}, constants=constants)
+def tile_pass(
+    name: str,
+    reads: tuple[str, ...],
+    images: dict[str, Image],
+    constants: dict[str, str],
+    sampled: tuple[str, ...] = (),
+) -> Pass:
+    """A pass over a list of tiles. It reads textures as images, as texelFetch is far slower on a software renderer, but
+    for `sampled` and the list: Vulkan guarantees four images."""
+    samplers = dict.fromkeys(("tiles", *sampled), "sampler2DArray")
+    return Pass(name, samplers=samplers, images={**dict.fromkeys(reads, READ), **images}, constants=constants)
 
 
 _START = tile_pass("diffuse_start", (), {**LABELS, "solution": STORED, "own": STORED}, {**GRID, "warm": "int"})
@@ -75,7 +82,7 @@ _SMOOTH_FINEST = tile_pass("diffuse_smooth_finest", (), {**LABELS, "solution": C
 _SMOOTH = tile_pass("diffuse_smooth", ("stencil", "right"), {"solution": CHANGED}, {**GRID, "colour": "ivec2"})
 _PROLONG = tile_pass("diffuse_prolong", ("from", "coarser", "weights"), {"to": STORED}, {**GRIDS, "amount": "float"})
 _RESTRICT_FINEST = tile_pass("diffuse_restrict_finest", ("own", "weights"), {"next": STORED}, GRIDS)
-_RESTRICT = tile_pass("diffuse_restrict", ("stencil", "own", "weights", "right"), {"next": STORED}, GRIDS)
+_RESTRICT = tile_pass("diffuse_restrict", ("stencil", "own", "weights"), {"next": STORED}, GRIDS, ("right",))
 _COARSER = {"weights": _WEIGHTS, "coarsen": _COARSEN, "restrict": _RESTRICT}
 _SOLVE = Pass(
     "diffuse_solve",
@@ -96,7 +103,7 @@ class _Grid:
 
     textures, rgba32f but for the labels:
         solution, own, right: U, W and f, four shutters per layer; the finest grid has no f
-        stencil: the operator A; the finest grid has r16ui labels in its place
+        stencil: the operator A; the finest grid has r32ui labels in its place
         weights: P, what each cell takes of the coarse cells around it
 
     Tiles of the last solve, as bool arrays (rows, columns):
@@ -127,7 +134,7 @@ class _Grid:
         self.textures = {name: device.texture(width, height, layers, "rgba32f") for name in ("solution", "own")}
         self.textures["weights"] = device.texture(width, height, 1, "rgba32f")
         if self.finest:
-            self.textures["labels"] = device.texture(width, height, 1, "r16ui")
+            self.textures["labels"] = device.texture(width, height, 1, "r32ui")
         else:
             self.textures["right"] = device.texture(width, height, layers, "rgba32f")
             self.textures["stencil"] = device.texture(width, height, 3, "rgba32f")
@@ -159,7 +166,7 @@ class Diffusion:
         """
         warm = self._prepare(labels.shape, count) and warm
         finest = self._grids[0]
-        self._device.write(finest.textures["labels"], np.ascontiguousarray(labels, dtype=np.uint16))
+        self._device.write(finest.textures["labels"], np.ascontiguousarray(labels, dtype=np.uint32))
         self._list_tiles(labels, next(k for k, grid in enumerate(self._grids) if max(grid.size) <= WHOLE))
         self._start(int(warm))
         self._coarsen()
@@ -339,6 +346,7 @@ class Diffusion:
         self._device.run(
             program,
             (cells, rows, layers),
+            textures={name: given[name] for name in program.samplers},
             images={name: given[name] for name in program.images},
             **{name: given[name] for name in program.constants},
         )

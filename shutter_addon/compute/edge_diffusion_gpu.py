@@ -32,7 +32,7 @@ _ADD = tile_pass("edges_add", ("coarser", "weights"), {"solution": CHANGED}, GRI
 _ZERO = Pass("edges_zero", images={"values": STORED}, constants={"size": "ivec2"})
 _MISSING = tile_pass("edges_missing", ("stencil", "right", "values"), {"result": STORED}, {**GRID, "amount": "float"})
 _TURN = tile_pass("edges_turn", ("values", "sums"), {"result": CHANGED}, {**GRID, "fresh": "int"})
-_STEP = tile_pass("edges_step", ("values", "right", "sums"), {"solution": CHANGED, "result": CHANGED}, GRID)
+_STEP = tile_pass("edges_step", ("values", "right"), {"solution": CHANGED, "result": CHANGED}, GRID, ("sums",))
 _DOT = Pass(
     "edges_dot",
     images={"values": READ, "right": READ, "result": STORED},
@@ -74,7 +74,7 @@ class EdgeDiffusion(Diffusion):
         self._solved = min(first_solved(side), len(self._grids) - 1)
         self._sweeps = SWEEPS if side == 1 else SMOOTH_SWEEPS
         self._provide(guide.shape[:2])
-        self._device.write(self._grids[0].textures["labels"], np.ascontiguousarray(labels, dtype=np.uint16))
+        self._device.write(self._grids[0].textures["labels"], np.ascontiguousarray(labels, dtype=np.uint32))
         self._device.write(self._more["resistances"], resistances(guide, strength)[..., None])
         self._list_tiles(labels, 0 if side == 1 else self._solved, anew=True)
         placed = {"guided": guide.shape[1::-1], "side": side, "resistances": self._more["resistances"]}

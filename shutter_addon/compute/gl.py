@@ -22,7 +22,7 @@ FORMATS = {
     "rgba16f": (4, "f2", np.float16),
     "rgba32f": (4, "f4", np.float32),
     "r32f": (1, "f4", np.float32),
-    "r16ui": (1, "u2", np.uint16),
+    "r32ui": (1, "u4", np.uint32),
     "rgba16ui": (4, "u2", np.uint16),
 }
 

@@ -116,12 +116,13 @@ def composition_of_moved(
     sharp: how frames are resampled (core.compositor.seen)
     at: whether passes over other frames come before and after; the others as for `composition`"""
     continued, unfinished = at
-    images = _IMAGES | {"table": _READ, "moves": _READ} | ({"summed": _READ} if continued else {})
+    images = {"picture": Image("rgba32f"), "table": _READ, "moves": _READ}
     images |= {"packed_frames": Image("rgba16ui", reads=True, writes=False)} if packed else {}
+    sampled = ("coefficients", *(("summed",) if continued else ()), *(() if packed else ("frames",)))
     numbers = ("motions", *_OF_WAY[way], *(("seen_first", "seen_last", "parts") if shortened else ()))
     return Pass(
         f"compose_{way}",
-        samplers={} if packed else {"frames": "sampler2DArray"},
+        samplers=dict.fromkeys(sampled, "sampler2DArray"),
         images=images,
         constants=_PLACE | dict.fromkeys(numbers, "int"),
         defines={
@@ -299,8 +300,8 @@ class GPUCompositor:
         return self._filled("constant", padded(values).astype(np.float32)[:, None, None, :], "rgba32f")
 
     def labels(self, values: np.ndarray):
-        """Labels (H, W) uint16 as a texture r16ui. Valid until the next call."""
-        return self._filled("labels", values[None, ..., None], "r16ui")
+        """Labels (H, W) uint16 as a texture r32ui. Valid until the next call."""
+        return self._filled("labels", values.astype(np.uint32)[None, ..., None], "r32ui")
 
     def coefficients(self, handle, count: int) -> np.ndarray:
         """Coefficients (N, h, w) float32 of `count` shutters, read from a texture of a solver or of `constant`."""
@@ -392,7 +393,7 @@ class GPUCompositor:
             )
             images["packed_frames"] = stack
             extent = width, -(-height // (4 * program.defines["QUADS"]))
-            self.device.run(program, extent, textures={"frames": stack}, images=images, **given)
+            self.device.run(program, extent, textures={**images, "frames": stack}, images=images, **given)
         return window.picture
 
     def _texture(self, name: str, width: int, height: int, layers: int, kind: str):

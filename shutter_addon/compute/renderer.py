@@ -95,7 +95,7 @@ class Renderer:
             return self._mixture(index, state, direction, quick=True), state.options.aggregate, count
 
     def drawn_labels(self, state: FrameState):
-        """Labels on the device, a GPU: (texture array r16ui, block), top row first, each texel for block × block
+        """Labels on the device, a GPU: (texture array r32ui, block), top row first, each texel for block × block
         pixels. It is valid until the next call of any method."""
         with self.compositor.current():
             return self.compositor.labels(self.labels(state)), state.options.aggregate

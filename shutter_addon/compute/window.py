@@ -290,7 +290,7 @@ def accumulation(decode: int, again: bool, back: bool, tiled: bool) -> Pass:
         constants={"size": "ivec2", "known": "int", "next": "int"}
         | ({"before": "int", "after": "int"} if again else {"top": "int", "whole": "float"}),
         defines={"DECODE": decode, "AGAIN": int(again), "BACK": int(back), "TILED": int(tiled)},
-        local_size=(64, TILE[1], 1),
+        local_size=(32, TILE[1], 1),
     )
 
 

@@ -13,7 +13,7 @@ KINDS = {
     "rgba16f": np.float16,
     "rgba32f": np.float32,
     "r32f": np.float32,
-    "r16ui": np.uint16,
+    "r32ui": np.uint32,
 }
 
 

@@ -28,7 +28,7 @@ _FORMATS = {
     "rgba16f": (np.float16, "RGBA32F", _AS_IT_IS),
     "rgba32f": (np.float32, "RGBA32F", _AS_IT_IS),
     "r32f": (np.float32, "R32F", _AS_IT_IS),
-    "r16ui": (np.uint16, "R32F", _WHOLE),
+    "r32ui": (np.uint32, "R32F", _WHOLE),
     "rgba16ui": None,  # of passes alone: floats do not hold it, and Blender reads whole numbers of one component only
 }
 

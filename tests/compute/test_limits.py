@@ -1,0 +1,102 @@
+"""Passes keep to what every device has on which they may run: the least of OpenGL 4.3, Vulkan 1.3 and Metal."""
+
+import math
+import re
+
+import pytest
+from all_passes import PASSES
+
+from shutter_addon.compute.passes import body
+
+# Images, samplers and uniform blocks of a pass; bytes of a block, and of all constants; invocations of a workgroup
+# along each axis, and in all.
+LIMITS = {
+    # The OpenGL Graphics System, version 4.3 (core profile), its tables of implementation dependent values:
+    # MAX_COMPUTE_IMAGE_UNIFORMS, MAX_COMPUTE_TEXTURE_IMAGE_UNITS, MAX_COMPUTE_UNIFORM_BLOCKS, MAX_UNIFORM_BLOCK_SIZE,
+    # MAX_COMPUTE_UNIFORM_COMPONENTS (512 of four bytes), MAX_COMPUTE_WORK_GROUP_SIZE and _INVOCATIONS.
+    "OpenGL 4.3": (8, 16, 12, 16384, 2048, (1024, 1024, 64), 1024),
+    # Vulkan 1.3, "Required Limits": maxPerStageDescriptorStorageImages, maxPerStageDescriptorSampledImages,
+    # maxPerStageDescriptorUniformBuffers, maxUniformBufferRange, maxPushConstantsSize, maxComputeWorkGroupSize and
+    # maxComputeWorkGroupInvocations.
+    "Vulkan 1.3": (4, 16, 12, 16384, 128, (128, 128, 64), 128),
+    # What Blender's Metal backend binds (mtl_shader_generate.hh, mtl_capabilities.hh): images in 8 slots, samplers in
+    # 64 behind them, blocks in 13, and all constants in one block of 4 KB. Workgroups: Apple's Metal Feature Set Tables,
+    # "GPU implementation limits by family", from Apple4 on; less for a kernel that takes many registers, which is
+    # another reason to stay far below.
+    "Metal": (8, 64, 13, 65536, 4096, (1024, 1024, 1024), 1024),
+}
+BYTES = {"int": 4, "float": 4, "ivec2": 8, "vec2": 8}
+# Apple's reference, MTLReadWriteTextureTier2: all Macs have it on which Blender 5 runs. The first line is tier 1.
+METAL_LOADS_AND_STORES = {
+    *("r32f", "r32ui", "r32i"),
+    *(f"{size}{kind}" for size in ("rgba16", "r16") for kind in ("f", "ui", "i")),
+    *(f"{size}{kind}" for size in ("rgba8", "r8") for kind in ("", "ui", "i")),
+    *("rgba32f", "rgba32ui", "rgba32i"),
+}
+# SPIR-V, "Image Format": those that need the capability Shader alone. All others need Vulkan's optional feature
+# shaderStorageImageExtendedFormats.
+VULKAN_STORES = {
+    *(f"rgba{bits}{kind}" for bits in (8, 16, 32) for kind in ("i", "ui")),
+    *("rgba32f", "rgba16f", "r32f", "rgba8", "rgba8_snorm", "r32i", "r32ui"),
+}
+# What some device lacks, or Blender's Python: 64 and 16 bits, subgroups and their size, memory of a workgroup, atomics.
+MISSING = re.compile(
+    r"\b(?:double|dvec\d|dmat\w+|u?int(?:16|64)_t|shared|barrier|subgroup\w*|gl_Sub\w+|\w*[aA]tomic\w*)\b"
+)
+# Words of C++14 and of the Metal Shading Language that GLSL leaves free: Blender gives Metal our names as they are.
+# `st` and `texture` are its own macros.
+WORDS_OF_METAL = set(
+    re.findall(
+        r"\w+",
+        """alignas alignof and and_eq asm auto bitand bitor catch char class compl concept constexpr const_cast decltype
+        delete dynamic_cast enum explicit export extern friend goto inline long mutable namespace new noexcept not
+        not_eq nullptr operator or or_eq private protected public register reinterpret_cast requires short signed sizeof
+        static static_assert static_cast template this thread_local throw try typedef typeid typename union unsigned
+        using virtual volatile wchar_t xor xor_eq
+        constant device fragment half kernel metal ray_data sampler st texture thread threadgroup
+        threadgroup_imageblock uchar ushort vertex visible""",
+    )
+)
+NAMED = re.compile(r"\b(?:void|bool|u?int|float|[biu]?vec[234]|mat[234]|Column)\s+(\w+)")
+
+each_pass = pytest.mark.parametrize("program", PASSES, ids=lambda program: program.name)
+
+
+def code(program) -> str:
+    return re.sub(r"//.*", "", body(program.name))
+
+
+@pytest.mark.parametrize("api", LIMITS)
+@each_pass
+def test_passes_are_within_the_limits_of(api, program):
+    images, samplers, blocks, block_bytes, constant_bytes, size, invocations = LIMITS[api]
+    assert len(program.images) <= images
+    assert len(program.samplers) <= samplers
+    assert len(program.blocks) <= blocks
+    assert all(16 * length <= block_bytes for length in program.blocks.values())
+    assert sum(BYTES[kind] for kind in program.constants.values()) <= constant_bytes
+    assert all(own <= most for own, most in zip(program.local_size, size, strict=True))
+    assert math.prod(program.local_size) <= invocations
+
+
+@each_pass
+def test_images_that_are_loaded_and_stored_are_of_a_format_that_metal_has_so(program):
+    for name, image in program.images.items():
+        assert not (image.reads and image.writes) or image.format in METAL_LOADS_AND_STORES, name
+
+
+@each_pass
+def test_images_have_a_format_that_every_vulkan_has(program):
+    assert {image.format for image in program.images.values()} <= VULKAN_STORES
+
+
+@each_pass
+def test_a_source_has_nothing_that_some_device_lacks(program):
+    assert not MISSING.findall(code(program))
+
+
+@each_pass
+def test_no_name_is_a_word_of_metal(program):
+    named = {*NAMED.findall(code(program)), *program.constants, *program.samplers, *program.images, *program.blocks}
+    assert named
+    assert not named & WORDS_OF_METAL
