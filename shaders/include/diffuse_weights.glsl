@@ -4,16 +4,6 @@
 // Where a dot lies on a coarse cell, that cell stands for those around the dot: they take a little of it, or coarser
 // grids would know of nothing as near. Beyond the last coarse cell, up to the frame's edge, a cell has that one alone.
 
-// How closely a cell follows those around it.
-float follows(float c[9], float diagonal)
-{
-  float total = 0.0;
-  for (int k = 0; k < 9; k++) {
-    total += c[k];
-  }
-  return diagonal > 0.0 ? clamp(total / diagonal, 0.0, 1.0) : 0.0;
-}
-
 bool is_fixed(ivec2 i)
 {
   return inside(i, size) && !is_free(i);
@@ -31,15 +21,21 @@ vec2 between(ivec2 i, bool in_row)
   float c[9];
   float diagonal;
   couplings(i, c, diagonal);
+  float coupled = 0.0;
+  for (int k = 0; k < 9; k++) {
+    coupled += c[k];
+  }
+  // How closely the cell follows those around it.
+  float follows = diagonal > 0.0 ? clamp(coupled / diagonal, 0.0, 1.0) : 0.0;
   ivec2 along = in_row ? ivec2(1, 0) : ivec2(0, 1);
   ivec2 before = i - along;
   ivec2 after = i + along;
   if (!inside(after, size)) {
-    return vec2(follows(c, diagonal), 0.0);
+    return vec2(follows, 0.0);
   }
   bvec2 dots = bvec2(is_dot(before, along.yx), is_dot(after, along.yx));
   if (any(dots)) {
-    return follows(c, diagonal) * mix(vec2(is_free(before), is_free(after)) * 2.0 / 3.0, vec2(1.0 / 6.0), dots);
+    return follows * mix(vec2(is_free(before), is_free(after)) * 2.0 / 3.0, vec2(1.0 / 6.0), dots);
   }
   vec2 ends = in_row ? vec2(c[0] + c[3] + c[6], c[2] + c[5] + c[8]) : vec2(c[0] + c[1] + c[2], c[6] + c[7] + c[8]);
   // What holds the cell is taken to lie on the side that pulls less, and for the rest beside the line, where it holds

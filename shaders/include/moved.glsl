@@ -38,7 +38,12 @@ Column column_at(ivec2 place, int layer)
 {
   uvec2 upper = words_of(imageLoad(packed_frames, ivec3(place, layer)));
   uvec2 lower = words_of(imageLoad(packed_frames, ivec3(place + ivec2(0, 2), layer)));
-  return Column(unpacked_color(upper.x), unpacked_color(upper.y), unpacked_color(lower.x), unpacked_color(lower.y));
+  Column column;
+  column.a = unpacked_color(upper.x);
+  column.b = unpacked_color(upper.y);
+  column.c = unpacked_color(lower.x);
+  column.d = unpacked_color(lower.y);
+  return column;
 }
 
 vec3 column_light(Column column, vec4 y)

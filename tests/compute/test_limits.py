@@ -20,9 +20,9 @@ LIMITS = {
     # maxComputeWorkGroupInvocations.
     "Vulkan 1.3": (4, 16, 12, 16384, 128, (128, 128, 64), 128),
     # What Blender's Metal backend binds (mtl_shader_generate.hh, mtl_capabilities.hh): images in 8 slots, samplers in
-    # 64 behind them, blocks in 13, and all constants in one block of 4 KB. Workgroups: Apple's Metal Feature Set Tables,
-    # "GPU implementation limits by family", from Apple4 on; less for a kernel that takes many registers, which is
-    # another reason to stay far below.
+    # 64 behind them, blocks in 13, and all constants in one block of 4 KB. Workgroups: Apple's Metal Feature Set
+    # Tables, "GPU implementation limits by family", from Apple4 on; less for a kernel that takes many registers, which
+    # is another reason to stay far below.
     "Metal": (8, 64, 13, 65536, 4096, (1024, 1024, 1024), 1024),
 }
 BYTES = {"int": 4, "float": 4, "ivec2": 8, "vec2": 8}
@@ -100,3 +100,11 @@ def test_no_name_is_a_word_of_metal(program):
     named = {*NAMED.findall(code(program)), *program.constants, *program.samplers, *program.images, *program.blocks}
     assert named
     assert not named & WORDS_OF_METAL
+
+
+@each_pass
+def test_a_source_is_as_cpp_takes_it(program):
+    """Blender makes C++ of it by macros: there, arrays are no values, and a struct without a constructor has none."""
+    text = code(program)
+    assert not re.findall(r"[(,]\s*(?:in\s+)?(?!out|inout)\w+\s+\w+\[", text)
+    assert not [name for name in re.findall(r"\bstruct\s+(\w+)", text) if re.search(rf"\b{name}\(", text)]
