@@ -29,7 +29,7 @@ void main()
     c += share * vec4(equal(shutters, ivec4(shutter)));
   }
   // A matte's frame is mostly like the one before, and on a software renderer storing is what takes time.
-  if (any(notEqual(c, imageLoad(before, p)))) {
+  if (any(notEqual(c, imageLoad(over, p)))) {
     imageStore(over, p, c);
   }
 }

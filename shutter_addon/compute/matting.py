@@ -24,8 +24,7 @@ def blend_pass(count: int, adds: bool) -> Pass:
         images={
             "under": Image("rgba32f", **_READ),
             "values": Image("r32f", **_READ),
-            "before": Image("rgba32f", **_READ),  # what `over` holds
-            "over": Image("rgba32f"),
+            "over": Image("rgba32f", reads=True),
         },
         constants={"size": "ivec2", "beneath": "ivec2"},
         defines={"COUNT": count, "ADDS": int(adds)},
@@ -63,7 +62,7 @@ class Matting:
             self._device.run(
                 blend_pass(len(some), any(matte.blend == "add" for matte, _ in some)),
                 over.size,
-                images={"under": beneath, "values": values, "before": over, "over": over},
+                images={"under": beneath, "values": values, "over": over},
                 blocks={"table": table},
                 size=(width, height),
                 beneath=beneath.size[:2],

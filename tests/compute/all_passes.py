@@ -1,5 +1,6 @@
 """All passes, each in the forms that differ in what they bind or compile."""
 
+import importlib.util
 import itertools
 
 from shutter_addon.compute import diffusion_gpu, edge_diffusion_gpu, gpu, matting, window
@@ -36,4 +37,13 @@ def _filling():
         yield matting.blend_pass(2, adds)
 
 
-PASSES = list(dict.fromkeys((*_declared(), *_composing(), *_filling())))
+def _unpacking():
+    if importlib.util.find_spec("bpy"):
+        from shutter_addon.blender.rendering import blender_gpu
+
+        for kind, sent in blender_gpu.FORMATS.items():
+            if sent is not None:
+                yield blender_gpu.unpacking(kind, sent[2])
+
+
+PASSES = list(dict.fromkeys((*_declared(), *_composing(), *_filling(), *_unpacking())))

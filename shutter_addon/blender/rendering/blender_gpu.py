@@ -22,7 +22,7 @@ from ...compute.passes import LOCAL_ROW, Image, Pass, body
 _TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
 _AS_IT_IS, _WHOLE, _OPAQUE_BYTES, _PAIRS_OF_BYTES, _SIXTEEN_BITS = range(5)
 # Format (as in GLSL): NumPy's type of what is written and read, the format sent, how shaders/unpack.glsl unpacks it.
-_FORMATS = {
+FORMATS = {
     "rgba8": (np.uint8, "RG32F", _PAIRS_OF_BYTES),
     "rgba16": (np.uint16, "RGBA32F", _SIXTEEN_BITS),
     "rgba16f": (np.float16, "RGBA32F", _AS_IT_IS),
@@ -72,7 +72,7 @@ class BlenderDevice:
         size, data = (width, height), _buffer("FLOAT", _packed(array, packing))
         sent = gpu.types.GPUTexture(size, layers=1, format=sent_format, data=data)
         self.run(
-            _unpack(texture.kind, packing),
+            unpacking(texture.kind, packing),
             size,
             textures={"sent": Texture(sent, (*size, 1), sent_format.lower())},
             images={"stored": texture},
@@ -144,7 +144,7 @@ def opens_in_background() -> bool:
 
 
 @cache
-def _unpack(kind: str, packing: int) -> Pass:
+def unpacking(kind: str, packing: int) -> Pass:
     return Pass(
         "unpack",
         {"sent": "sampler2DArray"},
@@ -156,9 +156,9 @@ def _unpack(kind: str, packing: int) -> Pass:
 
 
 def _exchanged(texture: Texture) -> tuple:
-    """The entry of _FORMATS. TypeError: Blender neither sends nor reads such a texture; asked to read one, it leaves
+    """The entry of FORMATS. TypeError: Blender neither sends nor reads such a texture; asked to read one, it leaves
     the memory as it was, without an error."""
-    if (found := _FORMATS[texture.kind]) is None:
+    if (found := FORMATS[texture.kind]) is None:
         raise TypeError(f"{texture.kind}: such a texture is written and read by passes alone on Blender's GPU")
     return found
 
