@@ -1,6 +1,7 @@
 """Mattes and ramps in Blender: files, strips of the edit, as they are trimmed and retimed, and what becomes of them."""
 
 import json
+import os
 import shutil
 
 import numpy as np
@@ -362,6 +363,62 @@ def test_a_still_strip_is_exported_as_one_picture(edit, shown, matte, tmp_path):
     recipes.save(matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json"), tmp_path / "r.json")
     assert [path.name for path in (tmp_path / "r mattes" / "1 m").iterdir()] == ["0001.png"]
     assert np.abs(read_picture(tmp_path / "r mattes" / "1 m" / "0001.png")[..., 0] - values(0)).max() < 0.01
+
+
+def test_a_single_picture_among_numbered_ones_is_exported_as_one(shown, matte, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.rendering import matte_export
+
+    strip, effect, coefficients = shown(data(region(matte)))
+    effect.regions[0].image.source = "FILE"
+    saved = matte_export.recipe_for(strip.id_data, effect, strip, tmp_path / "r.json")
+    recipe_import.apply(strip.id_data, effect, strip, saved, tmp_path)
+    assert close(coefficients(5), values(0) / 255)
+
+
+def test_an_export_spares_what_it_reads(edit, shown, matte, tmp_path):
+    """A strip of the pictures that an export has written."""
+    from shutter_addon.blender.rendering import matte_export
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    one = effect.regions[0]
+    one.matte, one.strip_name = "STRIP", strip_of(edit, matte).name
+    matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json")
+    written = tmp_path / "r mattes" / "1 m" / "0001.png"
+    one.strip_name = edit.sequence_editor.strips.new_image("again", str(written), 5, 1).name
+    with pytest.raises(Exception, match="1 m: its pictures are read by the effect"):
+        matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json")
+    assert matte_export.recipe_for(edit, effect, strip, tmp_path / "other.json").regions
+
+
+def test_an_export_through_a_linked_folder(shown, matte, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.rendering import matte_export
+
+    (tmp_path / "there" / "deep").mkdir(parents=True)
+    (tmp_path / "link").symlink_to(tmp_path / "there" / "deep")
+    strip, effect, coefficients = shown(data(region(matte)))
+    saved = matte_export.recipe_for(strip.id_data, effect, strip, tmp_path / "link" / "r.json")
+    recipe_import.apply(strip.id_data, effect, strip, saved, tmp_path / "link")
+    assert close(coefficients(3), values(2) / 255)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere it is the name of a server")
+def test_two_slashes_before_a_path(shown, matte):
+    """Which Blender takes for the folder of its file."""
+    _strip, _effect, coefficients = shown(data(region(f"/{matte}")))
+    assert close(coefficients(3), values(2) / 255)
+
+
+def test_a_path_longer_than_blenders(shown, matte, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.media import MediaError
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    folder = tmp_path / "/".join(["d" * 200] * 6)
+    shutil.copytree(matte.parent, folder)
+    with pytest.raises(MediaError, match=r"m0001\.png: Blender cannot read it"):
+        recipe_import.apply(strip.id_data, effect, strip, recipes.parse(json.dumps(data(region(matte.name)))), folder)
 
 
 @pytest.fixture
