@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 
+import av
 import numpy as np
 import pytest
 from support import read_picture, recipe, request, sequencer, write_frames
@@ -286,6 +287,35 @@ def test_sentences_for_what_is_not_there(bpy, edit, shown, matte):
     one.opacity = 0
     one.kind = "RAMP"
     assert close(coefficients(7), 0)
+
+
+def test_a_frame_that_is_written_again_is_read_again(shown, matte):
+    """In its file, which leaves the first file and the folder as they are."""
+    from shutter_addon.blender.data import source_media
+
+    _strip, _effect, coefficients = shown(data(region(matte)))
+    assert close(coefficients(6), values(5) / 255)
+    matte.with_name("m0006.png").write_bytes(matte.read_bytes())
+    source_media.look_again()
+    assert close(coefficients(6), values(0) / 255)
+
+
+def test_the_stream_of_a_movie_strip(edit, shown, tmp_path):
+    path = tmp_path / "two.mkv"
+    with av.open(str(path), "w") as out:
+        streams = [out.add_stream("ffv1", rate=25) for _ in range(2)]
+        for stream in streams:
+            stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "gray"
+        for stream, grey in zip(streams, (51, 102), strict=True):
+            frame = av.VideoFrame.from_ndarray(np.full((HEIGHT, WIDTH), grey, np.uint8), "gray")
+            out.mux([*stream.encode(frame), *stream.encode()])
+    _strip, effect, coefficients = shown(data(region(ramp="linear")))
+    own = edit.sequence_editor.strips.new_movie("movie", str(path), 4, 1)
+    one = effect.regions[0]
+    one.kind, one.matte, one.strip_name = "MATTE", "STRIP", own.name
+    assert close(coefficients(1), 0.2)
+    own.stream_index = 1
+    assert close(coefficients(1), 0.4)
 
 
 def test_a_recipe_whose_matte_is_missing_changes_nothing(shown, matte):

@@ -1,6 +1,7 @@
 """What the mattes and ramps of an effect show, as plain data (core.mattes.Content)."""
 
 import os
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,7 +10,9 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core import keyframes, mattes, retiming
 from ...core.effect import PlacedRamp
+from ...media import MediaError
 from ...media.matte_files import MatteFile
+from ...media.sequence import ImageFiles
 from . import inbetween_settings, mask_reading, matte_strips, source_media, strip_timing, strips, validation
 from .validation import EffectError
 
@@ -58,7 +61,20 @@ def image_file(region) -> MatteFile:
     path = image_path(region)
     files = (path,) if region.image.source == "FILE" else None
     folder = path.parent if region.image.source == "SEQUENCE" else path
-    return MatteFile(path, channel(region), files, (_stamp(path), _stamp(folder)))
+    stamp = _stamp(path), _stamp(folder)
+    if region.image.source == "SEQUENCE":
+        listed = _listed(path, stamp)
+        stamp = *stamp, source_media.between((region.image.session_uid,), len(listed), listed.__getitem__)
+    return MatteFile(path, channel(region), files, stamp=stamp)
+
+
+@lru_cache(64)
+def _listed(path: Path, _stamp) -> list[Path]:
+    """The files of an image sequence, listed anew where its folder has changed."""
+    try:
+        return ImageFiles(path).files
+    except MediaError:  # which whoever reads it is told
+        return []
 
 
 def _mask_shapes(edit, effect, strip, region, frames, time) -> keyframes.Channel:
@@ -116,7 +132,7 @@ def _strip_frames(region, frames) -> keyframes.Channel:
 def _of_strip(strip, word: str) -> MatteFile:
     """A channel of what a movie, image or clip strip reads. MediaError: it has no files."""
     spec = source_media.spec(strip)
-    return MatteFile(spec.path, word, spec.files, spec.key)
+    return MatteFile(spec.path, word, spec.files, spec.options["stream"], spec.key)
 
 
 def _stamp(path: Path):
