@@ -73,6 +73,13 @@ def shown(bpy, edit, footage):
     session.forget()
 
 
+def doubled(bpy, edit, source):
+    """A strip at twice its speed."""
+    source.select, edit.sequence_editor.active_strip = True, source
+    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+        bpy.ops.sequencer.retiming_segment_speed_set(speed=200)
+
+
 def strip_of(edit, path, frame=1, count=COUNT, name="matte"):
     found = edit.sequence_editor.strips.new_image(name, str(path), 4, frame)
     for i in range(2, count + 1):
@@ -484,6 +491,15 @@ def test_a_mask_is_evaluated_at_the_shown_frame(shown, mask, time):
         assert close(-coefficients(frame), np.full((HEIGHT, WIDTH), index / 11))
 
 
+def test_a_mask_over_footage_that_is_retimed(bpy, edit, shown, mask):
+    """Whose strip is not as long as it is."""
+    _strip, effect, coefficients = shown(data(region(ramp="linear")), lambda source: doubled(bpy, edit, source))
+    one = effect.regions[0]
+    one.kind, one.matte, one.mask = "MATTE", "MASK", mask
+    for frame in (2, 4):
+        assert close(coefficients(frame), np.full((HEIGHT, WIDTH), 2 * (frame - 1) / 11))
+
+
 def test_a_mask_is_exported_as_pictures(shown, mask, tmp_path):
     from shutter_addon.blender.data import recipe_import
     from shutter_addon.blender.rendering import matte_export
@@ -558,6 +574,26 @@ def test_weights_are_read_back(tmp_path, footage):
         first, second = (read_picture(tmp_path / folder / f"{frame:04d}.png") for folder in "ab")
         assert np.abs(first - second).max() <= 1
         assert np.ptp(first) > 15
+
+
+@pytest.mark.parametrize(("kind", "short"), [("fast", True), ("trimmed", False), ("keyed", True), ("timeline", False)])
+def test_a_panel_tells_of_a_matte_shorter_than_what_is_shown(bpy, edit, shown, matte, kind, short):
+    """A matte of 7 frames, and 6 of the film: at twice its speed, as it is, or backward by keys, from the eleventh."""
+    from shutter_addon.blender.rendering import matte_look
+
+    def change(source):
+        if kind == "fast":
+            doubled(bpy, edit, source)
+
+    for path in list(matte.parent.iterdir()):
+        if int(path.stem[1:]) > 7:
+            path.unlink()
+    keys = {"time": [{"frame": 1, "value": 11}, {"frame": 11, "value": 1}]} if kind == "keyed" else {}
+    timing = "timeline" if kind == "timeline" else "source"
+    strip, effect, _coefficients = shown(data(region(matte, timing=timing), **keys), change)
+    strip.right_handle = 7
+    note = matte_look.look(edit, effect, strip, effect.regions[0]).note
+    assert note == ("Shorter than the film: its last frame holds" if short else "")
 
 
 @pytest.fixture

@@ -1,6 +1,8 @@
 """What the mattes and ramps of an effect show, as plain data (core.mattes.Content)."""
 
 import os
+from collections.abc import Callable
+from contextlib import closing
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -82,21 +84,30 @@ def _mask_shapes(edit, effect, strip, region, frames, time) -> keyframes.Channel
     mask = region.mask
     if mask is None:
         raise EffectError(rpt_("{place}: it has no mask").format(place=validation.place(region)))
-    source = strips.source_of(edit, effect, strip)
-    medium, timing = _Medium.of(source, inbetween_settings.factor(effect)), strip_timing.timing_of(source)
+    filmed = shown_frame(edit, effect, strip, time)
 
     def shape(frame):
-        if time is None:
-            index = retiming.source_frame(timing, frame, medium)
-        else:
-            index = retiming.nearest(time.at(frame)[0] - 1, medium.step, medium.count)
-        return mask_reading.mask_at(mask, mask.frame_start + index / medium.step)
+        return mask_reading.mask_at(mask, mask.frame_start + filmed(frame))
 
     return keyframes.Samples({frame: _tried(shape, frame) for frame in frames})
 
 
+def shown_frame(edit, effect, strip, time: keyframes.Channel | None) -> Callable[[float], float]:
+    """What gives the source's frame that an effect strip shows at a timeline frame: filmed ones counted from 0, those
+    between them in parts. time: as of `content`. EffectError, MediaError: it cannot be known."""
+    source = strips.source_of(edit, effect, strip)
+    medium, timing = _Medium.of(source, inbetween_settings.factor(effect)), strip_timing.timing_of(source)
+
+    def shown(frame):
+        if time is None:
+            return retiming.source_frame(timing, frame, medium) / medium.step
+        return retiming.nearest(time.at(frame)[0] - 1, medium.step, medium.count) / medium.step
+
+    return shown
+
+
 class _Medium(NamedTuple):
-    """A source's length and rate as its strip has them, for core.retiming; nothing is opened."""
+    """A source's length and rate, for core.retiming."""
 
     filmed: int
     step: int
@@ -104,13 +115,22 @@ class _Medium(NamedTuple):
 
     @classmethod
     def of(cls, source, step: int) -> "_Medium":
-        clip = source.clip if source.type == "MOVIECLIP" else None
-        fps = clip.fps if clip and clip.source == "MOVIE" else getattr(source, "fps", 0.0) if not clip else 0.0
-        return cls(source.content_duration, step, fps * step)
+        """MediaError: it cannot be read."""
+        spec = source_media.spec(source)
+        filmed, fps = (len(spec.files), 0.0) if spec.files else _movie(spec)
+        return cls(filmed, step, fps * step)
 
     @property
     def count(self) -> int:
         return (self.filmed - 1) * self.step + 1
+
+
+@lru_cache(64)
+def _movie(spec: source_media.SourceSpec) -> tuple[int, float]:
+    """Length and rate of a movie. A strip tells how long it is itself, which is another length once it is retimed.
+    MediaError: it cannot be read."""
+    with closing(spec.open()) as movie:
+        return movie.count, float(movie.fps)
 
 
 def _tried(function, *arguments):
