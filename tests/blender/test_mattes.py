@@ -1,8 +1,10 @@
 """Mattes and ramps in Blender: files, strips of the edit, as they are trimmed and retimed, and what becomes of them."""
 
 import json
+import os
 import shutil
 
+import av
 import numpy as np
 import pytest
 from support import read_picture, recipe, request, sequencer, write_frames
@@ -69,6 +71,13 @@ def shown(bpy, edit, footage):
 
     yield show
     session.forget()
+
+
+def doubled(bpy, edit, source):
+    """A strip at twice its speed."""
+    source.select, edit.sequence_editor.active_strip = True, source
+    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+        bpy.ops.sequencer.retiming_segment_speed_set(speed=200)
 
 
 def strip_of(edit, path, frame=1, count=COUNT, name="matte"):
@@ -287,6 +296,35 @@ def test_sentences_for_what_is_not_there(bpy, edit, shown, matte):
     assert close(coefficients(7), 0)
 
 
+def test_a_frame_that_is_written_again_is_read_again(shown, matte):
+    """In its file, which leaves the first file and the folder as they are."""
+    from shutter_addon.blender.data import source_media
+
+    _strip, _effect, coefficients = shown(data(region(matte)))
+    assert close(coefficients(6), values(5) / 255)
+    matte.with_name("m0006.png").write_bytes(matte.read_bytes())
+    source_media.look_again()
+    assert close(coefficients(6), values(0) / 255)
+
+
+def test_the_stream_of_a_movie_strip(edit, shown, tmp_path):
+    path = tmp_path / "two.mkv"
+    with av.open(str(path), "w") as out:
+        streams = [out.add_stream("ffv1", rate=25) for _ in range(2)]
+        for stream in streams:
+            stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "gray"
+        for stream, grey in zip(streams, (51, 102), strict=True):
+            frame = av.VideoFrame.from_ndarray(np.full((HEIGHT, WIDTH), grey, np.uint8), "gray")
+            out.mux([*stream.encode(frame), *stream.encode()])
+    _strip, effect, coefficients = shown(data(region(ramp="linear")))
+    own = edit.sequence_editor.strips.new_movie("movie", str(path), 4, 1)
+    one = effect.regions[0]
+    one.kind, one.matte, one.strip_name = "MATTE", "STRIP", own.name
+    assert close(coefficients(1), 0.2)
+    own.stream_index = 1
+    assert close(coefficients(1), 0.4)
+
+
 def test_a_recipe_whose_matte_is_missing_changes_nothing(shown, matte):
     from shutter_addon.blender.data import recipe_import
     from shutter_addon.media import MediaError
@@ -364,6 +402,62 @@ def test_a_still_strip_is_exported_as_one_picture(edit, shown, matte, tmp_path):
     assert np.abs(read_picture(tmp_path / "r mattes" / "1 m" / "0001.png")[..., 0] - values(0)).max() < 0.01
 
 
+def test_a_single_picture_among_numbered_ones_is_exported_as_one(shown, matte, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.rendering import matte_export
+
+    strip, effect, coefficients = shown(data(region(matte)))
+    effect.regions[0].image.source = "FILE"
+    saved = matte_export.recipe_for(strip.id_data, effect, strip, tmp_path / "r.json")
+    recipe_import.apply(strip.id_data, effect, strip, saved, tmp_path)
+    assert close(coefficients(5), values(0) / 255)
+
+
+def test_an_export_spares_what_it_reads(edit, shown, matte, tmp_path):
+    """A strip of the pictures that an export has written."""
+    from shutter_addon.blender.rendering import matte_export
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    one = effect.regions[0]
+    one.matte, one.strip_name = "STRIP", strip_of(edit, matte).name
+    matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json")
+    written = tmp_path / "r mattes" / "1 m" / "0001.png"
+    one.strip_name = edit.sequence_editor.strips.new_image("again", str(written), 5, 1).name
+    with pytest.raises(Exception, match="1 m: its pictures are read by the effect"):
+        matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json")
+    assert matte_export.recipe_for(edit, effect, strip, tmp_path / "other.json").regions
+
+
+def test_an_export_through_a_linked_folder(shown, matte, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.rendering import matte_export
+
+    (tmp_path / "there" / "deep").mkdir(parents=True)
+    (tmp_path / "link").symlink_to(tmp_path / "there" / "deep")
+    strip, effect, coefficients = shown(data(region(matte)))
+    saved = matte_export.recipe_for(strip.id_data, effect, strip, tmp_path / "link" / "r.json")
+    recipe_import.apply(strip.id_data, effect, strip, saved, tmp_path / "link")
+    assert close(coefficients(3), values(2) / 255)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere it is the name of a server")
+def test_two_slashes_before_a_path(shown, matte):
+    """Which Blender takes for the folder of its file."""
+    _strip, _effect, coefficients = shown(data(region(f"/{matte}")))
+    assert close(coefficients(3), values(2) / 255)
+
+
+def test_a_path_longer_than_blenders(shown, matte, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.media import MediaError
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    folder = tmp_path / "/".join(["d" * 200] * 6)
+    shutil.copytree(matte.parent, folder)
+    with pytest.raises(MediaError, match=r"m0001\.png: Blender cannot read it"):
+        recipe_import.apply(strip.id_data, effect, strip, recipes.parse(json.dumps(data(region(matte.name)))), folder)
+
+
 @pytest.fixture
 def mask(bpy, edit):
     """All of the picture and more, whose opacity goes from 0 at its start, frame 5, to 1 eleven frames later."""
@@ -395,6 +489,15 @@ def test_a_mask_is_evaluated_at_the_shown_frame(shown, mask, time):
     for frame in (3, 6):
         index = 11 - frame if time else COUNT - frame
         assert close(-coefficients(frame), np.full((HEIGHT, WIDTH), index / 11))
+
+
+def test_a_mask_over_footage_that_is_retimed(bpy, edit, shown, mask):
+    """Whose strip is not as long as it is."""
+    _strip, effect, coefficients = shown(data(region(ramp="linear")), lambda source: doubled(bpy, edit, source))
+    one = effect.regions[0]
+    one.kind, one.matte, one.mask = "MATTE", "MASK", mask
+    for frame in (2, 4):
+        assert close(coefficients(frame), np.full((HEIGHT, WIDTH), 2 * (frame - 1) / 11))
 
 
 def test_a_mask_is_exported_as_pictures(shown, mask, tmp_path):
@@ -471,6 +574,26 @@ def test_weights_are_read_back(tmp_path, footage):
         first, second = (read_picture(tmp_path / folder / f"{frame:04d}.png") for folder in "ab")
         assert np.abs(first - second).max() <= 1
         assert np.ptp(first) > 15
+
+
+@pytest.mark.parametrize(("kind", "short"), [("fast", True), ("trimmed", False), ("keyed", True), ("timeline", False)])
+def test_a_panel_tells_of_a_matte_shorter_than_what_is_shown(bpy, edit, shown, matte, kind, short):
+    """A matte of 7 frames, and 6 of the film: at twice its speed, as it is, or backward by keys, from the eleventh."""
+    from shutter_addon.blender.rendering import matte_look
+
+    def change(source):
+        if kind == "fast":
+            doubled(bpy, edit, source)
+
+    for path in list(matte.parent.iterdir()):
+        if int(path.stem[1:]) > 7:
+            path.unlink()
+    keys = {"time": [{"frame": 1, "value": 11}, {"frame": 11, "value": 1}]} if kind == "keyed" else {}
+    timing = "timeline" if kind == "timeline" else "source"
+    strip, effect, _coefficients = shown(data(region(matte, timing=timing), **keys), change)
+    strip.right_handle = 7
+    note = matte_look.look(edit, effect, strip, effect.regions[0]).note
+    assert note == ("Shorter than the film: its last frame holds" if short else "")
 
 
 @pytest.fixture

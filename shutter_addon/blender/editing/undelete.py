@@ -9,6 +9,8 @@ from ..data import fcurves, property_copy
 from . import add_effect
 
 _MOST = 64
+# What an effect points to, besides its scene: the type, and the collection of bpy.data that holds it.
+_POINTED = {"MovieClip": "movieclips", "Image": "images", "Mask": "masks"}
 _effects: dict = {}
 
 
@@ -56,7 +58,8 @@ def restore(edit, identity: str):
 
 
 def _plain(struct) -> dict:
-    """A struct of Blender's with all that is in it as plain data; of what it points to, the session_uid of clips."""
+    """A struct of Blender's with all that is in it as plain data; of what it points to, the session_uid of clips,
+    images and masks."""
     plain = {}
     for prop in struct.bl_rna.properties:
         name = prop.identifier
@@ -65,9 +68,10 @@ def _plain(struct) -> dict:
         elif property_copy.is_group(struct, name):
             plain[name] = _plain(getattr(struct, name))
         elif prop.type == "POINTER":
-            if isinstance(clip := getattr(struct, name), bpy.types.MovieClip):
-                plain[name] = clip.session_uid
-        elif name != "co_ui":  # setting that one moves a key's handles
+            if _collection(prop) is not None and (pointed := getattr(struct, name)) is not None:
+                plain[name] = pointed.session_uid
+        # "co_ui" moves a key's handles; what is not saved only shows another property
+        elif name != "co_ui" and not prop.is_skip_save:
             value = property_copy.stored(struct, name)
             plain[name] = tuple(value) if getattr(prop, "is_array", False) else value
     return plain
@@ -81,9 +85,16 @@ def _fill(struct, plain: dict) -> None:
         elif isinstance(value, dict):
             _fill(getattr(struct, name), value)
         elif struct.bl_rna.properties[name].type == "POINTER":
-            setattr(struct, name, next((clip for clip in bpy.data.movieclips if clip.session_uid == value), None))
+            among = _collection(struct.bl_rna.properties[name])
+            setattr(struct, name, next((pointed for pointed in among if pointed.session_uid == value), None))
         elif not struct.is_property_readonly(name):
             property_copy.store(struct, name, value)
+
+
+def _collection(prop):
+    """What a pointer's clips, images or masks lie in; None: it points to something else."""
+    name = _POINTED.get(prop.fixed_type.identifier)
+    return name and getattr(bpy.data, name)
 
 
 def _add(collection, name: str, item: dict):

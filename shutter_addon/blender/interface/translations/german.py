@@ -495,6 +495,10 @@ MESSAGES = {
         '{place}: its matte strip "{strip}" is not a movie, image or clip strip',
     ): "{place}: ihr Mattenstreifen „{strip}“ ist kein Film-, Bild- oder Clipstreifen",
     ("*", "{file}: Blender cannot read it ({error})"): "{file}: Blender kann es nicht lesen ({error})",
+    (
+        "*",
+        "{folder}: its pictures are read by the effect; choose another name for the recipe",
+    ): "{folder}: der Effekt liest Bilder darin; wählen Sie einen anderen Namen für das Rezept",
     ("*", "{place}: it has no mask"): "{place}: sie hat keine Maske",
     # Options
     ("Virtual Shutter", "Window"): "Zeitfenster",
