@@ -425,6 +425,25 @@ def test_a_time_map_shows_each_column_at_its_moment(bpy, edit, shown):
     assert close(found, np.broadcast_to(8 * (np.arange(WIDTH) + 0.5) / WIDTH, found.shape))
 
 
+def test_handles_of_a_ramp(bpy, edit, shown, monkeypatch):
+    """About the middle of the line that it runs along."""
+    from shutter_addon.blender.data import geometry, selection
+    from shutter_addon.blender.interface import region_gizmo
+
+    strip, effect, _coefficients = shown(data(region(ramp="linear")))
+    selection.choose(edit, strip)
+    effect.active_shutter, ramp = 1, effect.regions[0]
+    ramp.location, ramp.rotation, ramp.scale = (0.1, 0), np.pi / 2, 0.5
+    # Without a window, a region has no pixels.
+    monkeypatch.setattr(geometry, "picture_to_region", lambda *_: np.eye(3))
+    with sequencer(bpy):
+        where = region_gizmo.place(bpy.context)
+        assert np.allclose(where.centre, (0.6, 0.5))
+        assert np.allclose(where.corner, (0.6, 0.5 + 0.125 * WIDTH / HEIGHT))
+        ramp.ramp = "LUMINANCE"
+        assert region_gizmo.place(bpy.context) is None
+
+
 def test_what_panels_tell(edit, shown, matte):
     from shutter_addon.blender.rendering import matte_look
 
@@ -441,7 +460,7 @@ def test_what_panels_tell(edit, shown, matte):
     assert look() == (
         f"{WIDTH} × {HEIGHT}, 4 frames",
         "",
-        "The strip ends before the Shutter strip: its last frame holds",
+        "Ends before the film: its last frame holds",
     )
     one.channel = "NAMED"
     assert look() == ("", 'region "m": its channel has no name', "")
