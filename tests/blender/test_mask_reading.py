@@ -3,6 +3,7 @@
 import ctypes
 import random
 from contextlib import contextmanager
+from itertools import product
 
 import numpy as np
 import pytest
@@ -141,12 +142,13 @@ CROSSED = {
 }
 
 
-@pytest.mark.parametrize("name", CROSSED)
-@pytest.mark.parametrize("solver", ["CDT", "SWEEP_LINE"])
+# Blender's sweep line loses parts of splines that cross one another: with it, they are not as in Blender.
+@pytest.mark.parametrize(
+    ("name", "solver"),
+    [*product(CROSSED, ["CDT"]), *product(sorted(CROSSED.keys() - {"against"}), ["SWEEP_LINE"])],
+)
 @pytest.mark.parametrize("holes", [False, True])
 def test_splines_that_cross(mask, assert_as_the_strip, name, solver, holes):
-    if (name, solver) == ("against", "SWEEP_LINE"):
-        pytest.skip("Blender's sweep line loses parts of splines that cross one another")
     layer = mask.layers.new(name="L")
     layer.fill_solver, layer.use_fill_holes = solver, holes
     for corners in CROSSED[name]:

@@ -66,6 +66,8 @@ def _mask_shapes(edit, effect, strip, region, frames, time) -> keyframes.Channel
     mask = region.mask
     if mask is None:
         raise EffectError(rpt_("{place}: it has no mask").format(place=validation.place(region)))
+    if not mask_reading.moves(mask):
+        return keyframes.Constant(_tried(mask_reading.mask_at, mask, mask.frame_start))
     source = strips.source_of(edit, effect, strip)
     medium, timing = _Medium.of(source, inbetween_settings.factor(effect)), strip_timing.timing_of(source)
 
