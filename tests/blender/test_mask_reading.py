@@ -19,9 +19,9 @@ FRAMES = 1, 11, 21, 31, 41
 @pytest.fixture
 def mask(bpy, edit):
     """An empty mask, whose first frame is no other number's."""
-    made = bpy.data.masks.new("M")
-    made.frame_start, made.frame_end = 5, 60
-    return made
+    mask = bpy.data.masks.new("M")
+    mask.frame_start, mask.frame_end = 5, 60
+    return mask
 
 
 @pytest.fixture
@@ -68,10 +68,10 @@ def mask_editor(bpy, edit):
 def clip(bpy, edit, tmp_path):
     def load(width, height, start=1):
         frames = np.zeros((45, height, width, 3), np.uint8)
-        loaded = bpy.data.movieclips.load(str(write_frames(tmp_path / f"clip{width}", frames)))
-        loaded.frame_start = start
-        assert tuple(loaded.size) == (width, height)
-        return loaded
+        clip = bpy.data.movieclips.load(str(write_frames(tmp_path / f"clip{width}", frames)))
+        clip.frame_start = start
+        assert tuple(clip.size) == (width, height)
+        return clip
 
     return load
 

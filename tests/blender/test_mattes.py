@@ -367,9 +367,9 @@ def test_a_still_strip_is_exported_as_one_picture(edit, shown, matte, tmp_path):
 @pytest.fixture
 def mask(bpy, edit):
     """All of the picture and more, whose opacity goes from 0 at its start, frame 5, to 1 eleven frames later."""
-    made = bpy.data.masks.new("mask")
-    made.frame_start = 5
-    layer = made.layers.new(name="layer")
+    mask = bpy.data.masks.new("mask")
+    mask.frame_start = 5
+    layer = mask.layers.new(name="layer")
     spline = layer.splines.new()
     spline.points.add(3)
     for point, corner in zip(spline.points, ((-1, -1), (2, -1), (2, 2), (-1, 2)), strict=True):
@@ -378,11 +378,11 @@ def mask(bpy, edit):
     spline.use_cyclic = True
     for frame, alpha in ((5, 0.0), (16, 1.0)):
         layer.alpha = alpha
-        made.keyframe_insert('layers["layer"].alpha', frame=frame)
-    (curve,) = made.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
+        mask.keyframe_insert('layers["layer"].alpha', frame=frame)
+    (curve,) = mask.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
     for key in curve.keyframe_points:
         key.interpolation = "LINEAR"
-    return made
+    return mask
 
 
 @pytest.mark.parametrize("time", [None, [{"frame": 1, "value": 11}, {"frame": 11, "value": 1}]])
