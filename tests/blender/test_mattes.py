@@ -507,6 +507,34 @@ def triangle(bpy, shown, matte):
     return mask
 
 
+def test_cut_and_pasted_effects_have_their_mattes(bpy, edit, shown, matte, mask):
+    """The strip that is a matte is cut and pasted as well, and has another name by then."""
+    from shutter_addon.blender.data import strips
+
+    _strip, effect, coefficients = shown(data(region(matte), region(matte, name="n"), region(matte, name="o")))
+    own, image = strip_of(edit, matte, 3), effect.regions[0].image
+    effect.regions[1].matte, effect.regions[1].strip_name = "STRIP", own.name
+    effect.regions[2].matte, effect.regions[2].mask, effect.regions[2].opacity = "MASK", mask, 0.5
+    before = coefficients(7)
+    for strip in edit.sequence_editor.strips:
+        strip.select = True
+    edit.frame_set(1)
+    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+        bpy.ops.sequencer.copy()
+        bpy.ops.sequencer.delete()
+        bpy.context.view_layer.update()
+        assert not edit.virtual_shutter.effects
+        edit.sequence_editor.strips.new_effect("matte", "COLOR", 8, 1, length=5)
+        bpy.ops.sequencer.paste()
+        bpy.context.view_layer.update()
+    (effect,) = edit.virtual_shutter.effects
+    assert (effect.regions[0].image, effect.regions[2].mask) == (image, mask)
+    assert effect.regions[1].strip_name == "matte.001"
+    asked = request(edit, effect, strips.effect_strips(edit)[0], 7)
+    levels = 255 * light.to_encoded(asked.picture()[..., 0].astype(float))
+    assert close((levels - (20 + 10 * asked.index)) / 10, before)
+
+
 def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, triangle):
     from shutter_addon.blender.data import revision
     from shutter_addon.blender.rendering import invalidation
