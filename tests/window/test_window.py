@@ -126,7 +126,7 @@ def test_a_mask_as_a_matte(tmp_path):
     assert "Traceback" not in console
     assert "Error" not in next(entry["background"] for entry in seen if "background" in entry)
     steps = {entry["step"]: crop(tmp_path, entry) for entry in seen if "step" in entry}
-    effect, matte, redo, earlier, dragged, _result = (steps[name] for name in sorted(steps))
+    effect, matte, redo, earlier, dragged = (steps[name] for name in sorted(steps))
     assert_alike(redo, matte, tmp_path / "redo_difference.png")
     for before, after in ((effect, matte), (matte, earlier), (matte, dragged)):
         assert (np.abs(before - after).max(axis=2) > 30).mean() > 0.01
