@@ -271,8 +271,8 @@ def _first_colours(image, path):
 
 
 def _channel_named(channel, image, path):
-    """(spec, positions) of a channel: three for the luminance of colours, none for the alpha of an opaque image. One that
-    an EXR calls "red" itself is that one: coefficients have the names of shutters."""
+    """(spec, positions) of a channel: three for the luminance of colours, none for the alpha of an opaque image.
+    What an EXR calls "red" itself is that: coefficients have the names of shutters."""
     names, part, is_exr = [], 0, image.format_name() == "openexr"
     while (is_exr or channel not in CHANNELS) and image.seek_subimage(part, 0):
         spec = image.spec()
