@@ -28,5 +28,8 @@ void main()
 #endif
     c += share * vec4(equal(shutters, ivec4(shutter)));
   }
-  imageStore(over, p, c);
+  // A matte's frame is mostly like the one before, and on a software renderer storing is what takes time.
+  if (any(notEqual(c, imageLoad(before, p)))) {
+    imageStore(over, p, c);
+  }
 }

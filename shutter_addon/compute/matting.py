@@ -21,7 +21,12 @@ def blend_pass(count: int, adds: bool) -> Pass:
     """Lays so many mattes; adds: any by the blend "add"."""
     return Pass(
         "matte_blend",
-        images={"under": Image("rgba32f", **_READ), "values": Image("r32f", **_READ), "over": Image("rgba32f")},
+        images={
+            "under": Image("rgba32f", **_READ),
+            "values": Image("r32f", **_READ),
+            "before": Image("rgba32f", **_READ),  # what `over` holds
+            "over": Image("rgba32f"),
+        },
         constants={"size": "ivec2", "beneath": "ivec2"},
         defines={"COUNT": count, "ADDS": int(adds)},
         blocks={"table": MOST},
@@ -58,7 +63,7 @@ class Matting:
             self._device.run(
                 blend_pass(len(some), any(matte.blend == "add" for matte, _ in some)),
                 over.size,
-                images={"under": beneath, "values": values, "over": over},
+                images={"under": beneath, "values": values, "before": over, "over": over},
                 blocks={"table": table},
                 size=(width, height),
                 beneath=beneath.size[:2],

@@ -84,6 +84,8 @@ def _mask_shapes(edit, effect, strip, region, frames, time) -> keyframes.Channel
     mask = region.mask
     if mask is None:
         raise EffectError(rpt_("{place}: it has no mask").format(place=validation.place(region)))
+    if not mask_reading.moves(mask):
+        return keyframes.Constant(_tried(mask_reading.mask_at, mask, mask.frame_start))
     filmed = shown_frame(edit, effect, strip, time)
 
     def shape(frame):

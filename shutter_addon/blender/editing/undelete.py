@@ -9,7 +9,7 @@ from ..data import fcurves, property_copy
 from . import add_effect
 
 _MOST = 64
-# What an effect points to, besides its scene: the type, and the collection of bpy.data that holds it.
+# What effects point to, and where bpy.data has it.
 _POINTED = {"MovieClip": "movieclips", "Image": "images", "Mask": "masks"}
 _effects: dict = {}
 
@@ -58,8 +58,7 @@ def restore(edit, identity: str):
 
 
 def _plain(struct) -> dict:
-    """A struct of Blender's with all that is in it as plain data; of what it points to, the session_uid of clips,
-    images and masks."""
+    """A struct of Blender's with all that is in it as plain data; of what it points to, the session_uid."""
     plain = {}
     for prop in struct.bl_rna.properties:
         name = prop.identifier
@@ -68,10 +67,9 @@ def _plain(struct) -> dict:
         elif property_copy.is_group(struct, name):
             plain[name] = _plain(getattr(struct, name))
         elif prop.type == "POINTER":
-            if _collection(prop) is not None and (pointed := getattr(struct, name)) is not None:
-                plain[name] = pointed.session_uid
-        # "co_ui" moves a key's handles; what is not saved only shows another property
-        elif name != "co_ui" and not prop.is_skip_save:
+            if getattr(struct, name) is not None and prop.fixed_type.identifier in _POINTED:
+                plain[name] = getattr(struct, name).session_uid
+        elif name != "co_ui" and not prop.is_skip_save:  # setting co_ui moves a key's handles
             value = property_copy.stored(struct, name)
             plain[name] = tuple(value) if getattr(prop, "is_array", False) else value
     return plain
@@ -84,17 +82,11 @@ def _fill(struct, plain: dict) -> None:
                 _fill(_add(getattr(struct, name), name, item), item)
         elif isinstance(value, dict):
             _fill(getattr(struct, name), value)
-        elif struct.bl_rna.properties[name].type == "POINTER":
-            among = _collection(struct.bl_rna.properties[name])
-            setattr(struct, name, next((pointed for pointed in among if pointed.session_uid == value), None))
+        elif (prop := struct.bl_rna.properties[name]).type == "POINTER":
+            found = getattr(bpy.data, _POINTED[prop.fixed_type.identifier])
+            setattr(struct, name, next((each for each in found if each.session_uid == value), None))
         elif not struct.is_property_readonly(name):
             property_copy.store(struct, name, value)
-
-
-def _collection(prop):
-    """What a pointer's clips, images or masks lie in; None: it points to something else."""
-    name = _POINTED.get(prop.fixed_type.identifier)
-    return name and getattr(bpy.data, name)
 
 
 def _add(collection, name: str, item: dict):

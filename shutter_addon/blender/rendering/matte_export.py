@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from contextlib import closing
@@ -9,7 +10,7 @@ from pathlib import Path
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import mattes, recipe
+from ...core import atomic_write, mattes, recipe
 from ...media.image_writing import write_grey
 from ...media.matte_values import MatteValues
 from ...media.sequence import ImageFiles
@@ -84,20 +85,32 @@ def _words(edit, effect, strip, region, folder: Path | None, path: Path) -> reci
 def _write(edit, effect, strip, region, folder: Path) -> Path:
     """Writes what a matte shows at each timeline frame of the effect strip, or one picture, if it shows that at all of
     them; the first one's path."""
-    frames = range(strip.left_handle, strip.right_handle)
+    folder.mkdir(parents=True, exist_ok=True)
+    with atomic_write.part_folder(folder) as part:
+        keys = _write_frames(edit, effect, strip, region, part)
+        kept = 1 if len(set(keys)) == 1 else len(keys)
+        for number in range(1, kept + 1):
+            os.replace(part / _name(number), folder / _name(number))
+    for file in folder.glob("[0-9]*.png"):  # of a longer film, exported before
+        if file.stem.isdecimal() and int(file.stem) > kept:
+            file.unlink()
+    return folder / _name(1)
+
+
+def _name(number: int) -> str:
+    return f"{number:04d}.png"
+
+
+def _write_frames(edit, effect, strip, region, folder: Path) -> list:
+    """Writes what a matte shows at each timeline frame of the effect strip; a key for each, equal for equal ones."""
+    frames, keys = range(strip.left_handle, strip.right_handle), []
     shown = snapshot.take(edit, effect, strip, frames)
     content = snapshot.region_at(edit, effect, strip, list(effect.regions).index(region), frames).content
-    folder.mkdir(parents=True, exist_ok=True)
-    keys = []
     with closing(session.open_source(shown)) as source, closing(MatteValues.of(source)) as values:
         for number, frame in enumerate(frames, 1):
             with snapshot.translated():
                 matte = mattes.Matte(0, content.at(frame))
             ((key, array),) = values.values((matte,), session.source_index(shown, frame, source)[0], 1)
             keys.append(key)
-            write_grey(folder / f"{number:04d}.png", array)
-    kept = 1 if len(set(keys)) == 1 else len(keys)
-    for file in folder.glob("[0-9]*.png"):  # of a longer film, exported before
-        if file.stem.isdecimal() and int(file.stem) > kept:
-            file.unlink()
-    return folder / "0001.png"
+            write_grey(folder / _name(number), array)
+    return keys

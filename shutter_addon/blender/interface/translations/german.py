@@ -478,10 +478,7 @@ MESSAGES = {
     ("*", "{width} × {height}, {count} frames"): "{width} × {height}, {count} Bilder",
     ("*", "{width} × {height}, one picture"): "{width} × {height}, ein Bild",
     ("*", "Shorter than the film: its last frame holds"): "Kürzer als der Film: Ihr letztes Bild bleibt stehen",
-    (
-        "*",
-        "The strip ends before the Shutter strip: its last frame holds",
-    ): "Der Streifen endet vor dem Verschlussstreifen: Sein letztes Bild bleibt stehen",
+    ("*", "Ends before the film: its last frame holds"): "Endet vor dem Film: Sein letztes Bild bleibt stehen",
     ("*", "{place}: it has no matte file"): "{place}: sie hat keine Mattendatei",
     (
         "*",
