@@ -694,3 +694,37 @@ def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, triangle):
         bpy.context.view_layer.update()  # whose handler looks for what has changed
         assert revision.number() > number + 1, name
         assert not invalidation.invalidate_changed(edit), name
+
+
+def test_a_copy_of_a_matte_strip_is_no_part_of_it(edit, shown, matte):
+    _strip, effect, coefficients = shown(data(region(matte)))
+    own = strip_of(edit, matte, 3, 4)
+    effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
+    copy = strip_of(edit, matte, 7, 6, "copy")
+    copy.virtual_shutter_matte = own.virtual_shutter_matte  # as Blender's Duplicate has it
+    assert close(coefficients(5), values(2) / 255)
+    assert close(coefficients(11), values(3) / 255)  # its last one holds
+    edit.sequence_editor.strips.remove(own)
+    assert close(coefficients(11), values(4) / 255)
+
+
+def test_a_pasted_effect_has_the_matte_strip_beside_it(bpy, edit, shown, matte):
+    from shutter_addon.blender.data import snapshot
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    own = strip_of(edit, matte, 3)
+    effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
+    copy = strip_of(edit, matte, 19, name="copy")
+    copy.virtual_shutter_matte = own.virtual_shutter_matte
+    strip.content_start += 16  # nearer to the copy than to its own
+    content = snapshot.region_at(edit, effect, strip, 0, (18.0,)).content
+    assert content.timing.content_start == copy.content_start
+
+
+def test_a_sequence_is_one_image_however_often_it_is_imported(bpy, shown, matte):
+    from shutter_addon.blender.data import recipe_import
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    images = len(bpy.data.images)
+    recipe_import.apply(strip.id_data, effect, strip, recipes.parse(json.dumps(data(region(matte), region(matte)))))
+    assert len(bpy.data.images) == images

@@ -30,7 +30,7 @@ def content(edit, effect, strip, region, moves, frames, time: keyframes.Channel 
         return mattes.FileFrames(_of_strip(strips.source_of(edit, effect, strip), "luminance"))
     matte = validation.word(region, "matte")
     if matte == "STRIP":
-        return _strip_frames(region, frames)
+        return _strip_frames(strip, region, frames)
     if matte == "MASK":
         return _mask_shapes(edit, effect, strip, region, frames, time)
     first = strips.origin(strip) if validation.word(region, "timing") == "TIMELINE" else None
@@ -143,8 +143,8 @@ def _tried(function, *arguments):
         return error
 
 
-def _strip_frames(region, frames) -> keyframes.Channel:
-    parts, word = matte_strips.strips_of(region), channel(region)
+def _strip_frames(strip, region, frames) -> keyframes.Channel:
+    parts, word = matte_strips.parts_for(region, strip), channel(region)
     shown = {part.name: mattes.FileFrames(_of_strip(part, word), timing=strip_timing.timing_of(part)) for part in parts}
     if len(parts) == 1:
         return shown[parts[0].name]

@@ -71,6 +71,8 @@ def matte_image(path: str | Path, channel: str = "luminance"):
         path, count = matte.path, matte.count
     name = _kept(check_name(path))
     is_sequence = path.suffix.lower() in IMAGE_SUFFIXES and count > 1
+    if is_sequence and (known := _sequence_at(name)) is not None:
+        return known
     try:
         image = bpy.data.images.load(name, check_existing=not is_sequence)  # one that is there may be no sequence
     except RuntimeError as error:  # its path is longer than Blender's may be
@@ -79,6 +81,12 @@ def matte_image(path: str | Path, channel: str = "luminance"):
     if is_sequence:
         image.source = "SEQUENCE"
     return image
+
+
+def _sequence_at(name: str):
+    """The image that is the sequence at a path already, or None."""
+    own = [image for image in bpy.data.images if image.source == "SEQUENCE" and image.library is None]
+    return next((image for image in own if bpy.path.abspath(image.filepath) == bpy.path.abspath(name)), None)
 
 
 def _kept(name: str) -> str:

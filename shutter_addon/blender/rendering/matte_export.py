@@ -57,7 +57,7 @@ def _read(edit, effect, strip, regions) -> Iterator[Path]:
         if region.kind == "MATTE" and region.matte == "IMAGE":
             yield matte_content.image_path(region)
         elif region.kind == "MATTE" and region.matte == "STRIP":
-            yield from (source_media.spec(part).path for part in matte_strips.strips_of(region))
+            yield from (source_media.spec(part).path for part in matte_strips.parts_for(region, strip))
 
 
 def _spare(folders: list[Path | None], read: Iterator[Path]) -> None:

@@ -52,7 +52,7 @@ def _look(edit, effect, strip, index: int) -> Look:
 def _note(edit, effect, strip, region, content, count: int) -> str:
     """That a matte is shorter than what it is for."""
     if region.matte == "STRIP":
-        ends = max(part.right_handle for part in matte_strips.strips_of(region))
+        ends = max(part.right_handle for part in matte_strips.parts_for(region, strip))
         return iface_("Ends before the film: its last frame holds") if ends < strip.right_handle else ""
     if not isinstance(content, FileFrames) or count == 1:
         return ""
