@@ -91,10 +91,10 @@ class Ramp:
 
     def values(self, width: int, height: int) -> np.ndarray:
         """(height, width) float32, 0 to 1, top row first."""
-        scale = math.copysign(max(abs(self.scale), _SMALLEST), self.scale)
+        scale = max(abs(self.scale), _SMALLEST)
         x = np.arange(width) + 0.5 - width * (0.5 + self.location[0])
         y = height * (0.5 - self.location[1]) - (np.arange(height)[:, None] + 0.5)
-        turn = math.radians(self.rotation)
+        turn = math.radians(self.rotation) + (math.pi if self.scale < 0 else 0)
         cos, sin = math.cos(turn), math.sin(turn)
         along, across = x * cos + y * sin, y * cos - x * sin
         if self.kind == "angle":

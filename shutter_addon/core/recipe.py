@@ -11,6 +11,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, is_dataclass, replace
 from functools import cache, partial
 from itertools import pairwise
@@ -330,10 +331,12 @@ def moved(source: Recipe, old: Path, new: Path) -> Recipe:
 
 def relative(path: Path, folder: Path) -> str:
     """The path of a matte, as a recipe in a folder has it: relative, if there is such a one."""
-    try:
-        return Path(os.path.relpath(path, folder)).as_posix()
-    except ValueError:  # on another drive
-        return Path(os.path.abspath(path)).as_posix()
+    with suppress(ValueError):  # on another drive
+        found = os.path.relpath(path, folder)
+        # ".." leads out of where a linked folder really lies
+        if os.path.realpath(os.path.join(folder, found)) == os.path.realpath(path):
+            return Path(found).as_posix()
+    return Path(os.path.abspath(path)).as_posix()
 
 
 def load(path: str | Path) -> Recipe:

@@ -20,17 +20,19 @@ class MatteFile:
     path: a movie, a still picture, or the first file of an image sequence
     channel: luminance, red, green, blue, alpha, or the name of a channel of an EXR
     files: the names of an image strip's files, one per frame, in place of those found beside `path`
+    stream: which of a movie's video streams, as a movie strip counts them
     stamp: tells a file from another one that took its place
     """
 
     path: Path
     channel: str = "luminance"
     files: tuple[str, ...] | None = None
+    stream: int = 0
     stamp: Hashable = None
 
     def open(self) -> MatteSource:
         """MediaError: it cannot be read, or has no such channel."""
-        return MatteSource(self.path, self.channel, files=self.files)
+        return MatteSource(self.path, self.channel, files=self.files, stream=self.stream)
 
 
 class MatteSource:
@@ -45,9 +47,9 @@ class MatteSource:
 
     step = 1  # as of a source without in-between frames
 
-    def __init__(self, path, channel="luminance", *, files=None):
+    def __init__(self, path, channel="luminance", *, files=None, stream=0):
         """As MatteFile has them."""
-        self._frames = open_channel(path, channel, files=files)
+        self._frames = open_channel(path, channel, files=files, stream=stream)
         self.path, self.count = self._frames.path, self._frames.count
         self.filmed = self.count
         self.width, self.height = self._frames.width, self._frames.height

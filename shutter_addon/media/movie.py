@@ -121,11 +121,11 @@ class MovieSource(FrameSource):
 class MovieChannel(MovieSource):
     """One channel of a movie's frames: those of MovieSource, whose attributes it has."""
 
-    def __init__(self, path, channel):
+    def __init__(self, path, channel, *, stream=0):
         """channel: one of CHANNELS. MediaError: it is another one, or the movie cannot be read."""
         if channel not in CHANNELS:
             raise no_channel(check_file(path), channel, CHANNELS)
-        super().__init__(path)
+        super().__init__(path, stream=stream)
         self._channel = channel
 
     def read(self, index):

@@ -40,13 +40,13 @@ def open_source(
         raise
 
 
-def open_channel(path, channel, *, files=None) -> SequenceChannel | MovieChannel:
+def open_channel(path, channel, *, files=None, stream=0) -> SequenceChannel | MovieChannel:
     """Opens what `open_source` opens, for one channel alone. MediaError: it cannot be read, or has no such channel.
 
-    channel: one of channels.CHANNELS, or the name of a channel of the images' own"""
+    channel: one of channels.CHANNELS, or the name of a channel of the images' own; files, stream: as of open_source"""
     path = Path(path)
     if _is_movie(path, files):
-        return _movies(path).MovieChannel(path, channel)
+        return _movies(path).MovieChannel(path, channel, stream=stream)
     return SequenceChannel(path, channel, files=files)
 
 

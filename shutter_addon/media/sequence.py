@@ -271,22 +271,23 @@ def _first_colours(image, path):
 
 
 def _channel_named(channel, image, path):
-    """(spec, positions) of a channel: three for the luminance of colours, none for the alpha of an opaque image."""
-    if channel in CHANNELS:
-        spec, layer = _first_colours(image, path)
-        colours, alpha = (layer[:-1], layer[-1:]) if len(layer) in ALPHA else (layer, [])
-        if channel == "alpha":
-            return spec, alpha
-        return spec, colours if channel == "luminance" else (3 * colours)[CHANNELS[channel]]
-    names, part = [], 0
-    while image.seek_subimage(part, 0):
+    """(spec, positions) of a channel: three for the luminance of colours, none for the alpha of an opaque image.
+    What an EXR calls "red" itself is that: coefficients have the names of shutters."""
+    names, part, is_exr = [], 0, image.format_name() == "openexr"
+    while (is_exr or channel not in CHANNELS) and image.seek_subimage(part, 0):
         spec = image.spec()
         if not spec.deep:
             if channel in spec.channelnames:
                 return spec, [spec.channelnames.index(channel)]
             names += spec.channelnames
         part += 1
-    raise no_channel(path, channel, names if image.format_name() == "openexr" else CHANNELS)
+    if channel not in CHANNELS:
+        raise no_channel(path, channel, names if is_exr else CHANNELS)
+    spec, layer = _first_colours(image, path)
+    colours, alpha = (layer[:-1], layer[-1:]) if len(layer) in ALPHA else (layer, [])
+    if channel == "alpha":
+        return spec, alpha
+    return spec, colours if channel == "luminance" else (3 * colours)[CHANNELS[channel]]
 
 
 def _colour_channels(names):

@@ -3,6 +3,7 @@
 import ctypes
 import random
 from contextlib import contextmanager
+from itertools import product
 
 import numpy as np
 import pytest
@@ -18,13 +19,13 @@ FRAMES = 1, 11, 21, 31, 41
 @pytest.fixture
 def mask(bpy, edit):
     """An empty mask, whose first frame is no other number's."""
-    made = bpy.data.masks.new("M")
-    made.frame_start, made.frame_end = 5, 60
-    return made
+    mask = bpy.data.masks.new("M")
+    mask.frame_start, mask.frame_end = 5, 60
+    return mask
 
 
 @pytest.fixture
-def assert_as_the_strip(bpy, edit, render, capsys):
+def assert_as_the_strip(bpy, edit, render):
     """Compares a mask with what its strip shows at frames; read from another frame, so that nothing stands there."""
     from shutter_addon.blender.data import mask_reading
 
@@ -36,8 +37,7 @@ def assert_as_the_strip(bpy, edit, render, capsys):
         found = {f: 255 * coverage(mask_reading.mask_at(mask, mask.frame_start + f - 1), *size) for f in frames}
         assert edit.frame_current == 77
         differences = np.array([np.abs(found[f] - shown[f][..., 0]) for f in frames])
-        with capsys.disabled():
-            print(f" {differences.mean((1, 2)).max():.3f}/{differences.max():.0f}", end="")
+        print(f"{differences.mean((1, 2)).max():.3f} on average, {differences.max():.0f} at most")
         assert differences.mean((1, 2)).max() <= AVERAGE
         assert (differences > 8).mean((1, 2)).max() <= ASTRAY
         return shown
@@ -67,10 +67,10 @@ def mask_editor(bpy, edit):
 def clip(bpy, edit, tmp_path):
     def load(width, height, start=1):
         frames = np.zeros((45, height, width, 3), np.uint8)
-        loaded = bpy.data.movieclips.load(str(write_frames(tmp_path / f"clip{width}", frames)))
-        loaded.frame_start = start
-        assert tuple(loaded.size) == (width, height)
-        return loaded
+        clip = bpy.data.movieclips.load(str(write_frames(tmp_path / f"clip{width}", frames)))
+        clip.frame_start = start
+        assert tuple(clip.size) == (width, height)
+        return clip
 
     return load
 
@@ -141,12 +141,13 @@ CROSSED = {
 }
 
 
-@pytest.mark.parametrize("name", CROSSED)
-@pytest.mark.parametrize("solver", ["CDT", "SWEEP_LINE"])
+# Blender's sweep line loses parts of splines that cross one another: with it, they are not as in Blender.
+@pytest.mark.parametrize(
+    ("name", "solver"),
+    [*product(CROSSED, ["CDT"]), *product(sorted(CROSSED.keys() - {"against"}), ["SWEEP_LINE"])],
+)
 @pytest.mark.parametrize("holes", [False, True])
 def test_splines_that_cross(mask, assert_as_the_strip, name, solver, holes):
-    if (name, solver) == ("against", "SWEEP_LINE"):
-        pytest.skip("Blender's sweep line loses parts of splines that cross one another")
     layer = mask.layers.new(name="L")
     layer.fill_solver, layer.use_fill_holes = solver, holes
     for corners in CROSSED[name]:

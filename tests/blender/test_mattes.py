@@ -1,8 +1,10 @@
 """Mattes and ramps in Blender: files, strips of the edit, as they are trimmed and retimed, and what becomes of them."""
 
 import json
+import os
 import shutil
 
+import av
 import numpy as np
 import pytest
 from support import read_picture, recipe, request, sequencer, write_frames
@@ -69,6 +71,13 @@ def shown(bpy, edit, footage):
 
     yield show
     session.forget()
+
+
+def doubled(bpy, edit, source):
+    """A strip at twice its speed."""
+    source.select, edit.sequence_editor.active_strip = True, source
+    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+        bpy.ops.sequencer.retiming_segment_speed_set(speed=200)
 
 
 def strip_of(edit, path, frame=1, count=COUNT, name="matte"):
@@ -287,6 +296,35 @@ def test_sentences_for_what_is_not_there(bpy, edit, shown, matte):
     assert close(coefficients(7), 0)
 
 
+def test_a_frame_that_is_written_again_is_read_again(shown, matte):
+    """In its file, which leaves the first file and the folder as they are."""
+    from shutter_addon.blender.data import source_media
+
+    _strip, _effect, coefficients = shown(data(region(matte)))
+    assert close(coefficients(6), values(5) / 255)
+    matte.with_name("m0006.png").write_bytes(matte.read_bytes())
+    source_media.look_again()
+    assert close(coefficients(6), values(0) / 255)
+
+
+def test_the_stream_of_a_movie_strip(edit, shown, tmp_path):
+    path = tmp_path / "two.mkv"
+    with av.open(str(path), "w") as out:
+        streams = [out.add_stream("ffv1", rate=25) for _ in range(2)]
+        for stream in streams:
+            stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "gray"
+        for stream, grey in zip(streams, (51, 102), strict=True):
+            frame = av.VideoFrame.from_ndarray(np.full((HEIGHT, WIDTH), grey, np.uint8), "gray")
+            out.mux([*stream.encode(frame), *stream.encode()])
+    _strip, effect, coefficients = shown(data(region(ramp="linear")))
+    own = edit.sequence_editor.strips.new_movie("movie", str(path), 4, 1)
+    one = effect.regions[0]
+    one.kind, one.matte, one.strip_name = "MATTE", "STRIP", own.name
+    assert close(coefficients(1), 0.2)
+    own.stream_index = 1
+    assert close(coefficients(1), 0.4)
+
+
 def test_a_recipe_whose_matte_is_missing_changes_nothing(shown, matte):
     from shutter_addon.blender.data import recipe_import
     from shutter_addon.media import MediaError
@@ -364,12 +402,68 @@ def test_a_still_strip_is_exported_as_one_picture(edit, shown, matte, tmp_path):
     assert np.abs(read_picture(tmp_path / "r mattes" / "1 m" / "0001.png")[..., 0] - values(0)).max() < 0.01
 
 
+def test_a_single_picture_among_numbered_ones_is_exported_as_one(shown, matte, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.rendering import matte_export
+
+    strip, effect, coefficients = shown(data(region(matte)))
+    effect.regions[0].image.source = "FILE"
+    saved = matte_export.recipe_for(strip.id_data, effect, strip, tmp_path / "r.json")
+    recipe_import.apply(strip.id_data, effect, strip, saved, tmp_path)
+    assert close(coefficients(5), values(0) / 255)
+
+
+def test_an_export_spares_what_it_reads(edit, shown, matte, tmp_path):
+    """A strip of the pictures that an export has written."""
+    from shutter_addon.blender.rendering import matte_export
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    one = effect.regions[0]
+    one.matte, one.strip_name = "STRIP", strip_of(edit, matte).name
+    matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json")
+    written = tmp_path / "r mattes" / "1 m" / "0001.png"
+    one.strip_name = edit.sequence_editor.strips.new_image("again", str(written), 5, 1).name
+    with pytest.raises(Exception, match="1 m: its pictures are read by the effect"):
+        matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json")
+    assert matte_export.recipe_for(edit, effect, strip, tmp_path / "other.json").regions
+
+
+def test_an_export_through_a_linked_folder(shown, matte, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.rendering import matte_export
+
+    (tmp_path / "there" / "deep").mkdir(parents=True)
+    (tmp_path / "link").symlink_to(tmp_path / "there" / "deep")
+    strip, effect, coefficients = shown(data(region(matte)))
+    saved = matte_export.recipe_for(strip.id_data, effect, strip, tmp_path / "link" / "r.json")
+    recipe_import.apply(strip.id_data, effect, strip, saved, tmp_path / "link")
+    assert close(coefficients(3), values(2) / 255)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere it is the name of a server")
+def test_two_slashes_before_a_path(shown, matte):
+    """Which Blender takes for the folder of its file."""
+    _strip, _effect, coefficients = shown(data(region(f"/{matte}")))
+    assert close(coefficients(3), values(2) / 255)
+
+
+def test_a_path_longer_than_blenders(shown, matte, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.media import MediaError
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    folder = tmp_path / "/".join(["d" * 200] * 6)
+    shutil.copytree(matte.parent, folder)
+    with pytest.raises(MediaError, match=r"m0001\.png: Blender cannot read it"):
+        recipe_import.apply(strip.id_data, effect, strip, recipes.parse(json.dumps(data(region(matte.name)))), folder)
+
+
 @pytest.fixture
 def mask(bpy, edit):
     """All of the picture and more, whose opacity goes from 0 at its start, frame 5, to 1 eleven frames later."""
-    made = bpy.data.masks.new("mask")
-    made.frame_start = 5
-    layer = made.layers.new(name="layer")
+    mask = bpy.data.masks.new("mask")
+    mask.frame_start = 5
+    layer = mask.layers.new(name="layer")
     spline = layer.splines.new()
     spline.points.add(3)
     for point, corner in zip(spline.points, ((-1, -1), (2, -1), (2, 2), (-1, 2)), strict=True):
@@ -378,11 +472,11 @@ def mask(bpy, edit):
     spline.use_cyclic = True
     for frame, alpha in ((5, 0.0), (16, 1.0)):
         layer.alpha = alpha
-        made.keyframe_insert('layers["layer"].alpha', frame=frame)
-    (curve,) = made.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
+        mask.keyframe_insert('layers["layer"].alpha', frame=frame)
+    (curve,) = mask.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
     for key in curve.keyframe_points:
         key.interpolation = "LINEAR"
-    return made
+    return mask
 
 
 @pytest.mark.parametrize("time", [None, [{"frame": 1, "value": 11}, {"frame": 11, "value": 1}]])
@@ -395,6 +489,15 @@ def test_a_mask_is_evaluated_at_the_shown_frame(shown, mask, time):
     for frame in (3, 6):
         index = 11 - frame if time else COUNT - frame
         assert close(-coefficients(frame), np.full((HEIGHT, WIDTH), index / 11))
+
+
+def test_a_mask_over_footage_that_is_retimed(bpy, edit, shown, mask):
+    """Whose strip is not as long as it is."""
+    _strip, effect, coefficients = shown(data(region(ramp="linear")), lambda source: doubled(bpy, edit, source))
+    one = effect.regions[0]
+    one.kind, one.matte, one.mask = "MATTE", "MASK", mask
+    for frame in (2, 4):
+        assert close(coefficients(frame), np.full((HEIGHT, WIDTH), 2 * (frame - 1) / 11))
 
 
 def test_a_mask_is_exported_as_pictures(shown, mask, tmp_path):
@@ -425,6 +528,25 @@ def test_a_time_map_shows_each_column_at_its_moment(bpy, edit, shown):
     assert close(found, np.broadcast_to(8 * (np.arange(WIDTH) + 0.5) / WIDTH, found.shape))
 
 
+def test_handles_of_a_ramp(bpy, edit, shown, monkeypatch):
+    """About the middle of the line that it runs along."""
+    from shutter_addon.blender.data import geometry, selection
+    from shutter_addon.blender.interface import region_gizmo
+
+    strip, effect, _coefficients = shown(data(region(ramp="linear")))
+    selection.choose(edit, strip)
+    effect.active_shutter, ramp = 1, effect.regions[0]
+    ramp.location, ramp.rotation, ramp.scale = (0.1, 0), np.pi / 2, 0.5
+    # Without a window, a region has no pixels.
+    monkeypatch.setattr(geometry, "picture_to_region", lambda *_: np.eye(3))
+    with sequencer(bpy):
+        where = region_gizmo.place(bpy.context)
+        assert np.allclose(where.centre, (0.6, 0.5))
+        assert np.allclose(where.corner, (0.6, 0.5 + 0.125 * WIDTH / HEIGHT))
+        ramp.ramp = "LUMINANCE"
+        assert region_gizmo.place(bpy.context) is None
+
+
 def test_what_panels_tell(edit, shown, matte):
     from shutter_addon.blender.rendering import matte_look
 
@@ -441,7 +563,7 @@ def test_what_panels_tell(edit, shown, matte):
     assert look() == (
         f"{WIDTH} × {HEIGHT}, 4 frames",
         "",
-        "The strip ends before the Shutter strip: its last frame holds",
+        "Ends before the film: its last frame holds",
     )
     one.channel = "NAMED"
     assert look() == ("", 'region "m": its channel has no name', "")
@@ -473,6 +595,26 @@ def test_weights_are_read_back(tmp_path, footage):
         assert np.ptp(first) > 15
 
 
+@pytest.mark.parametrize(("kind", "short"), [("fast", True), ("trimmed", False), ("keyed", True), ("timeline", False)])
+def test_a_panel_tells_of_a_matte_shorter_than_what_is_shown(bpy, edit, shown, matte, kind, short):
+    """A matte of 7 frames, and 6 of the film: at twice its speed, as it is, or backward by keys, from the eleventh."""
+    from shutter_addon.blender.rendering import matte_look
+
+    def change(source):
+        if kind == "fast":
+            doubled(bpy, edit, source)
+
+    for path in list(matte.parent.iterdir()):
+        if int(path.stem[1:]) > 7:
+            path.unlink()
+    keys = {"time": [{"frame": 1, "value": 11}, {"frame": 11, "value": 1}]} if kind == "keyed" else {}
+    timing = "timeline" if kind == "timeline" else "source"
+    strip, effect, _coefficients = shown(data(region(matte, timing=timing), **keys), change)
+    strip.right_handle = 7
+    note = matte_look.look(edit, effect, strip, effect.regions[0]).note
+    assert note == ("Shorter than the film: its last frame holds" if short else "")
+
+
 @pytest.fixture
 def triangle(bpy, shown, matte):
     """A mask that is the first region's matte: a triangle."""
@@ -488,7 +630,36 @@ def triangle(bpy, shown, matte):
     return mask
 
 
+def test_cut_and_pasted_effects_have_their_mattes(bpy, edit, shown, matte, mask):
+    """The strip that is a matte is cut and pasted as well, and has another name by then."""
+    from shutter_addon.blender.data import strips
+
+    _strip, effect, coefficients = shown(data(region(matte), region(matte, name="n"), region(matte, name="o")))
+    own, image = strip_of(edit, matte, 3), effect.regions[0].image
+    effect.regions[1].matte, effect.regions[1].strip_name = "STRIP", own.name
+    effect.regions[2].matte, effect.regions[2].mask, effect.regions[2].opacity = "MASK", mask, 0.5
+    before = coefficients(7)
+    for strip in edit.sequence_editor.strips:
+        strip.select = True
+    edit.frame_set(1)
+    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+        bpy.ops.sequencer.copy()
+        bpy.ops.sequencer.delete()
+        bpy.context.view_layer.update()
+        assert not edit.virtual_shutter.effects
+        edit.sequence_editor.strips.new_effect("matte", "COLOR", 8, 1, length=5)
+        bpy.ops.sequencer.paste()
+        bpy.context.view_layer.update()
+    (effect,) = edit.virtual_shutter.effects
+    assert (effect.regions[0].image, effect.regions[2].mask) == (image, mask)
+    assert effect.regions[1].strip_name == "matte.001"
+    asked = request(edit, effect, strips.effect_strips(edit)[0], 7)
+    levels = 255 * light.to_encoded(asked.picture()[..., 0].astype(float))
+    assert close((levels - (20 + 10 * asked.index)) / 10, before)
+
+
 def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, triangle):
+    from shutter_addon.blender.data import revision
     from shutter_addon.blender.rendering import invalidation
 
     layer = triangle.layers[0]
@@ -504,7 +675,7 @@ def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, triangle):
         layer.keyframe_insert("alpha", frame=1)
 
     def tracked():
-        track.markers.insert_frame(4).co = 0.5, 0.6
+        track.markers.insert_frame(9).co = 0.5, 0.6
 
     changes = {
         "point": lambda: setattr(point, "co", (0.1, 0.3)),
@@ -518,6 +689,42 @@ def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, triangle):
     }
     invalidation.invalidate_changed(edit)
     for name, change in changes.items():
+        number = revision.number()
         change()
-        assert invalidation.invalidate_changed(edit), name
+        bpy.context.view_layer.update()  # whose handler looks for what has changed
+        assert revision.number() > number + 1, name
         assert not invalidation.invalidate_changed(edit), name
+
+
+def test_a_copy_of_a_matte_strip_is_no_part_of_it(edit, shown, matte):
+    _strip, effect, coefficients = shown(data(region(matte)))
+    own = strip_of(edit, matte, 3, 4)
+    effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
+    copy = strip_of(edit, matte, 7, 6, "copy")
+    copy.virtual_shutter_matte = own.virtual_shutter_matte  # as Blender's Duplicate has it
+    assert close(coefficients(5), values(2) / 255)
+    assert close(coefficients(11), values(3) / 255)  # its last one holds
+    edit.sequence_editor.strips.remove(own)
+    assert close(coefficients(11), values(4) / 255)
+
+
+def test_a_pasted_effect_has_the_matte_strip_beside_it(bpy, edit, shown, matte):
+    from shutter_addon.blender.data import snapshot
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    own = strip_of(edit, matte, 3)
+    effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
+    copy = strip_of(edit, matte, 19, name="copy")
+    copy.virtual_shutter_matte = own.virtual_shutter_matte
+    strip.content_start += 16  # nearer to the copy than to its own
+    content = snapshot.region_at(edit, effect, strip, 0, (18.0,)).content
+    assert content.timing.content_start == copy.content_start
+
+
+def test_a_sequence_is_one_image_however_often_it_is_imported(bpy, shown, matte):
+    from shutter_addon.blender.data import recipe_import
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    images = len(bpy.data.images)
+    recipe_import.apply(strip.id_data, effect, strip, recipes.parse(json.dumps(data(region(matte), region(matte)))))
+    assert len(bpy.data.images) == images

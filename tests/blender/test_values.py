@@ -162,7 +162,7 @@ IMPOSSIBLE = {
     "a ramp": (lambda e: raw(ramp(e), "ramp", 9), 'region "Ramp": Ramp is none of its choices'),
     "a ramp's place": (lambda e: raw(ramp(e), "location", [0.0, INF]), 'region "Ramp": Location is inf'),
     "blend": (lambda e: raw(ramp(e), "blend", -1), 'region "Ramp": Blend is none of its choices'),
-    "matte": (lambda e: raw(ramp(e, "MATTE"), "matte", 7), 'region "Ramp": Matte is none of its choices'),
+    "matte": (lambda e: raw(ramp(e, "MATTE"), "matte", 7), 'region "Ramp": From is none of its choices'),
     "no matte": (lambda e: ramp(e, "MATTE"), 'region "Ramp": it has no matte file'),
     "no matte strip": (lambda e: raw(ramp(e, "MATTE", matte="STRIP"), "strip", "x"), "its matte strip was deleted"),
     "channel": (lambda e: raw(ramp(e, "MATTE", matte="STRIP", strip_name="images"), "channel", 9), "Channel is none"),

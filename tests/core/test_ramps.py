@@ -67,6 +67,13 @@ def test_an_angle_goes_round_clockwise_from_the_top():
     assert at(turned, centre[0], centre[1] - 10) == pytest.approx(0.25, abs=1e-3)
 
 
+@pytest.mark.parametrize("kind", ["linear", "radial", "angle"])
+def test_a_negative_scale_turns_a_ramp_round(kind):
+    place = {"location": (0.1, 0.05), "rotation": 20.0}
+    found, turned = Ramp(kind, scale=-0.5, **place), Ramp(kind, scale=0.5, **place | {"rotation": 200.0})
+    assert np.abs(found.values(WIDTH, HEIGHT) - turned.values(WIDTH, HEIGHT)).max() < 1e-6
+
+
 def test_values_stay_within_0_and_1():
     rng = np.random.default_rng(1)
     for _ in range(50):

@@ -120,6 +120,14 @@ def test_coefficients_that_were_written(tmp_path):
         assert np.array_equal(values_of(tmp_path / "0001.exr", name), values[..., i])
 
 
+@pytest.mark.parametrize("names", [["red", "alpha"], ["R", "G", "B", "red", "alpha"]])
+def test_coefficients_of_shutters_that_are_called_as_colours_are(tmp_path, names):
+    values = noise(len(names)).astype(np.float32)
+    write_exr(tmp_path / "0001.exr", values, names)
+    for name in ("red", "alpha"):
+        assert np.array_equal(values_of(tmp_path / "0001.exr", name), values[..., names.index(name)])
+
+
 def test_a_channel_of_another_part(tmp_path):
     """The first part that has it; whole numbers stand for themselves."""
     path, values = tmp_path / "a.exr", noise(1).astype(np.float32)

@@ -148,8 +148,6 @@ def told():
     yield from keyed()
     yield from story.seen("4_dragged")
     bpy.context.window_manager.virtual_shutter.view = "RESULT"
-    yield from story.seen("5_result")
-    driver.saw(points=points())
     yield from story.in_agreement(RENDERED)
     yield from in_background(RENDERED)
 

@@ -78,6 +78,7 @@ def told():
     yield from driver.edge_moved(driver.area_of("SEQUENCE_EDITOR", "SEQUENCER"), 0, -296)
     yield from story.movie_added()
     yield from story.effect_added()
+    bpy.context.window_manager.virtual_shutter.view = "COEFFICIENTS"
     yield from story.seen("1_effect")
     yield from mapped()
     yield from story.seen("2_linear")
@@ -87,8 +88,10 @@ def told():
     yield from story.seen("3_turned")
     yield from made_radial()
     yield from story.seen("4_radial")
+    bpy.context.window_manager.virtual_shutter.view = "RESULT"
+    yield from story.seen("5_result")
     yield from played()
-    yield from story.seen("4_radial_played")
+    yield from story.seen("5_result_played")
     yield from story.rendered()
 
 

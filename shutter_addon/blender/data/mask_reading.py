@@ -76,6 +76,11 @@ def motion(mask: bpy.types.Mask) -> Iterator[tuple]:
                 yield tuple(numbers.tobytes() for numbers in _markers(tracks[track], place, size))
 
 
+def moves(mask: bpy.types.Mask) -> bool:
+    """Whether a mask may differ from frame to frame. EffectError: as `mask_at`."""
+    return bool(fcurves.curves_under(mask, "")) or next(motion(mask), None) is not None
+
+
 def _layer_at(mask, layer, frame: float) -> MaskLayer:
     keyed = _keyed_points(mask, layer, frame)
     splines, at = [], 0

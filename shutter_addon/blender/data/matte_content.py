@@ -1,6 +1,9 @@
 """What the mattes and ramps of an effect show, as plain data (core.mattes.Content)."""
 
 import os
+from collections.abc import Callable
+from contextlib import closing
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,7 +12,9 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core import keyframes, mattes, retiming
 from ...core.effect import PlacedRamp
+from ...media import MediaError
 from ...media.matte_files import MatteFile
+from ...media.sequence import ImageFiles
 from . import inbetween_settings, mask_reading, matte_strips, source_media, strip_timing, strips, validation
 from .validation import EffectError
 
@@ -25,7 +30,7 @@ def content(edit, effect, strip, region, moves, frames, time: keyframes.Channel 
         return mattes.FileFrames(_of_strip(strips.source_of(edit, effect, strip), "luminance"))
     matte = validation.word(region, "matte")
     if matte == "STRIP":
-        return _strip_frames(region, frames)
+        return _strip_frames(strip, region, frames)
     if matte == "MASK":
         return _mask_shapes(edit, effect, strip, region, frames, time)
     first = strips.origin(strip) if validation.word(region, "timing") == "TIMELINE" else None
@@ -58,7 +63,20 @@ def image_file(region) -> MatteFile:
     path = image_path(region)
     files = (path,) if region.image.source == "FILE" else None
     folder = path.parent if region.image.source == "SEQUENCE" else path
-    return MatteFile(path, channel(region), files, (_stamp(path), _stamp(folder)))
+    stamp = _stamp(path), _stamp(folder)
+    if region.image.source == "SEQUENCE":
+        listed = _listed(path, stamp)
+        stamp = *stamp, source_media.between((region.image.session_uid,), len(listed), listed.__getitem__)
+    return MatteFile(path, channel(region), files, stamp=stamp)
+
+
+@lru_cache(64)
+def _listed(path: Path, _stamp) -> list[Path]:
+    """The files of an image sequence, listed anew where its folder has changed."""
+    try:
+        return ImageFiles(path).files
+    except MediaError:  # which whoever reads it is told
+        return []
 
 
 def _mask_shapes(edit, effect, strip, region, frames, time) -> keyframes.Channel:
@@ -66,21 +84,32 @@ def _mask_shapes(edit, effect, strip, region, frames, time) -> keyframes.Channel
     mask = region.mask
     if mask is None:
         raise EffectError(rpt_("{place}: it has no mask").format(place=validation.place(region)))
-    source = strips.source_of(edit, effect, strip)
-    medium, timing = _Medium.of(source, inbetween_settings.factor(effect)), strip_timing.timing_of(source)
+    if not mask_reading.moves(mask):
+        return keyframes.Constant(_tried(mask_reading.mask_at, mask, mask.frame_start))
+    filmed = shown_frame(edit, effect, strip, time)
 
     def shape(frame):
-        if time is None:
-            index = retiming.source_frame(timing, frame, medium)
-        else:
-            index = retiming.nearest(time.at(frame)[0] - 1, medium.step, medium.count)
-        return mask_reading.mask_at(mask, mask.frame_start + index / medium.step)
+        return mask_reading.mask_at(mask, mask.frame_start + filmed(frame))
 
     return keyframes.Samples({frame: _tried(shape, frame) for frame in frames})
 
 
+def shown_frame(edit, effect, strip, time: keyframes.Channel | None) -> Callable[[float], float]:
+    """What gives the source's frame that an effect strip shows at a timeline frame: filmed ones counted from 0, those
+    between them in parts. time: as of `content`. EffectError, MediaError: it cannot be known."""
+    source = strips.source_of(edit, effect, strip)
+    medium, timing = _Medium.of(source, inbetween_settings.factor(effect)), strip_timing.timing_of(source)
+
+    def shown(frame):
+        if time is None:
+            return retiming.source_frame(timing, frame, medium) / medium.step
+        return retiming.nearest(time.at(frame)[0] - 1, medium.step, medium.count) / medium.step
+
+    return shown
+
+
 class _Medium(NamedTuple):
-    """A source's length and rate as its strip has them, for core.retiming; nothing is opened."""
+    """A source's length and rate, for core.retiming."""
 
     filmed: int
     step: int
@@ -88,13 +117,22 @@ class _Medium(NamedTuple):
 
     @classmethod
     def of(cls, source, step: int) -> "_Medium":
-        clip = source.clip if source.type == "MOVIECLIP" else None
-        fps = clip.fps if clip and clip.source == "MOVIE" else getattr(source, "fps", 0.0) if not clip else 0.0
-        return cls(source.content_duration, step, fps * step)
+        """MediaError: it cannot be read."""
+        spec = source_media.spec(source)
+        filmed, fps = (len(spec.files), 0.0) if spec.files else _movie(spec)
+        return cls(filmed, step, fps * step)
 
     @property
     def count(self) -> int:
         return (self.filmed - 1) * self.step + 1
+
+
+@lru_cache(64)
+def _movie(spec: source_media.SourceSpec) -> tuple[int, float]:
+    """Length and rate of a movie. A strip tells how long it is itself, which is another length once it is retimed.
+    MediaError: it cannot be read."""
+    with closing(spec.open()) as movie:
+        return movie.count, float(movie.fps)
 
 
 def _tried(function, *arguments):
@@ -105,8 +143,8 @@ def _tried(function, *arguments):
         return error
 
 
-def _strip_frames(region, frames) -> keyframes.Channel:
-    parts, word = matte_strips.strips_of(region), channel(region)
+def _strip_frames(strip, region, frames) -> keyframes.Channel:
+    parts, word = matte_strips.parts_for(region, strip), channel(region)
     shown = {part.name: mattes.FileFrames(_of_strip(part, word), timing=strip_timing.timing_of(part)) for part in parts}
     if len(parts) == 1:
         return shown[parts[0].name]
@@ -116,7 +154,7 @@ def _strip_frames(region, frames) -> keyframes.Channel:
 def _of_strip(strip, word: str) -> MatteFile:
     """A channel of what a movie, image or clip strip reads. MediaError: it has no files."""
     spec = source_media.spec(strip)
-    return MatteFile(spec.path, word, spec.files, spec.key)
+    return MatteFile(spec.path, word, spec.files, spec.options["stream"], spec.key)
 
 
 def _stamp(path: Path):

@@ -10,7 +10,7 @@ from .validation import EffectError
 
 def strip_name(region) -> str:
     """The name of the first strip that is a region's matte; "": there is none."""
-    return next((strip.name for strip in _parts(region)), "")
+    return next((strip.name for strip in _with_identity(region)), "")
 
 
 def choose_strip(region, name: str) -> None:
@@ -33,14 +33,13 @@ def choose_strip(region, name: str) -> None:
 
 def _is_part(other, strip) -> bool:
     """Whether a strip and another one that has its identity were cut from one."""
-    overlap = min(other.right_handle, strip.right_handle) - max(other.left_handle, strip.left_handle)
-    return strips.origin(other) == strips.origin(strip) and overlap <= 0
+    return strips.origin(other) == strips.origin(strip) and not _overlap(_content(other), _content(strip))
 
 
 def strips_of(region) -> list:
-    """The movie, image and clip strips that are a region's matte: several, where one was cut. EffectError: there is
-    none."""
-    found = _parts(region)
+    """The movie, image and clip strips that have the identity of a region's matte: several, where it was cut or copied.
+    EffectError: there is none."""
+    found = _with_identity(region)
     if not found:
         words = rpt_("{place}: its matte strip was deleted") if region.strip else rpt_("{place}: it has no matte strip")
         raise EffectError(words.format(place=validation.place(region)))
@@ -51,12 +50,43 @@ def strips_of(region) -> list:
     return shown
 
 
+def parts_for(region, effect_strip) -> list:
+    """The parts of the strip that is a region's matte, where an effect strip shows it: of copies, the nearest in time.
+    EffectError: there is none."""
+    copies: list[list] = []
+    for strip in sorted(strips_of(region), key=lambda strip: (strips.origin(strip), strip.left_handle)):
+        fitting = [parts for parts in copies if not any(_overlap(_content(strip), _content(part)) for part in parts)]
+        # Parts that were moved apart have other origins.
+        same = [parts for parts in fitting if strips.origin(parts[-1]) == strips.origin(strip)]
+        if fitting:
+            (same or fitting)[-1].append(strip)
+        else:
+            copies.append([strip])
+    shown = effect_strip.left_handle, effect_strip.right_handle
+    nearest = min(copies, key=lambda parts: min(_apart(shown, (part.left_handle, part.right_handle)) for part in parts))
+    return sorted(nearest, key=lambda part: part.left_handle)
+
+
+def _content(strip) -> tuple[float, float]:
+    """What a strip shows of its content, from frame to frame."""
+    return strip.left_handle - strips.origin(strip), strip.right_handle - strips.origin(strip)
+
+
+def _overlap(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    return min(one[1], other[1]) > max(one[0], other[0])
+
+
+def _apart(one: tuple[float, float], other: tuple[float, float]) -> tuple[float, float]:
+    """How far apart two spans lie, and where they meet, how far their starts."""
+    return max(other[0] - one[1], one[0] - other[1], 0), abs(other[0] - one[0])
+
+
 def part_at(parts: list, frame: float):
     """Of the parts of a strip that was cut the one that shows a timeline frame, or the nearest."""
     return min(parts, key=lambda part: max(part.left_handle - frame, frame - part.right_handle + 1, 0))
 
 
-def _parts(region) -> list:
+def _with_identity(region) -> list:
     editor = region.id_data.sequence_editor
     strips_all = editor.strips_all if editor and region.strip else ()
     return [strip for strip in strips_all if strip.virtual_shutter_matte == region.strip]

@@ -1,5 +1,6 @@
 """A recipe into Blender's data: shutters, regions, strokes, keys and options."""
 
+import os
 from contextlib import suppress
 from pathlib import Path
 
@@ -69,19 +70,30 @@ def matte_image(path: str | Path, channel: str = "luminance"):
     with MatteFile(Path(path), channel).open() as matte:
         path, count = matte.path, matte.count
     name = _kept(check_name(path))
-    if path.suffix.lower() in IMAGE_SUFFIXES and count > 1:
-        image = bpy.data.images.load(name)  # not one that is there, which may be no sequence
-        image.source = "SEQUENCE"
-        return image
+    is_sequence = path.suffix.lower() in IMAGE_SUFFIXES and count > 1
+    if is_sequence and (known := _sequence_at(name)) is not None:
+        return known
     try:
-        return bpy.data.images.load(name, check_existing=True)
-    except RuntimeError as error:
+        image = bpy.data.images.load(name, check_existing=not is_sequence)  # one that is there may be no sequence
+    except RuntimeError as error:  # its path is longer than Blender's may be
         sentence = rpt_("{file}: Blender cannot read it ({error})")
         raise MediaError(sentence.format(file=path.name, error=error)) from None
+    if is_sequence:
+        image.source = "SEQUENCE"
+    return image
+
+
+def _sequence_at(name: str):
+    """The image that is the sequence at a path already, or None."""
+    own = [image for image in bpy.data.images if image.source == "SEQUENCE" and image.library is None]
+    return next((image for image in own if bpy.path.abspath(image.filepath) == bpy.path.abspath(name)), None)
 
 
 def _kept(name: str) -> str:
-    """A path as Blender keeps those that are chosen: relative to the saved file, if the preferences say so."""
+    """A path as Blender keeps those that are chosen: relative to the saved file, if the preferences say so. With two
+    slashes before it, it would be relative in any case."""
+    if os.name == "posix" and name.startswith("//"):
+        name = name[1:]
     if bpy.data.filepath and bpy.context.preferences.filepaths.use_relative_paths:
         with suppress(ValueError):  # another drive
             return bpy.path.relpath(name)

@@ -202,6 +202,17 @@ def region_at(edit, effect, strip, index: int, frames) -> model.Region | model.M
     return _any_region(curves, path, effect, strip, effect.regions[index], 0, placement, frames, time)
 
 
+def last_shown(edit, effect, strip) -> float:
+    """The last of the source's frames that an effect strip shows, as of matte_content.shown_frame; where keys say which
+    these are, of a hundred frames of the strip. EffectError, MediaError: it cannot be known."""
+    first, last = strip.left_handle, strip.right_handle - 1
+    frames, time = (first, last), None
+    if effect.use_source_time:
+        frames = *range(first, last, max(1, (last - first) // 100)), last
+        time = _source_time(Curves(edit), effect.path_from_id(), effect, frames)
+    return max(map(matte_content.shown_frame(edit, effect, strip, time), frames))
+
+
 def camera_at(edit, effect, frames) -> model.Camera:
     """The camera as plain data, its channels sampled at timeline frames; as region_at."""
     return _camera(Curves(edit), effect, frames)

@@ -296,10 +296,14 @@ def _draw_tracking(layout, effect, index: int | None) -> None:
         place.operator(f"{track}_look", text=str(frame), translate=False).frame = frame
 
 
+def _active_region(context):
+    return selection.active_region(selection.active(context)[1])
+
+
 class _WithRegion(_WithEffect):
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and selection.active_region(selection.active(context)[1]) is not None
+        return super().poll(context) and _active_region(context) is not None
 
 
 class _Track(_WithRegion):
@@ -307,10 +311,14 @@ class _Track(_WithRegion):
     bl_translation_context = CONTEXT
     bl_options = {"DEFAULT_CLOSED"}
 
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and _active_region(context).kind not in strips.MATTES
+
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
-        _draw_track_options(layout, selection.active_region(selection.active(context)[1]))
+        _draw_track_options(layout, _active_region(context))
 
 
 def _draw_track_options(layout, moving) -> None:
@@ -325,7 +333,7 @@ class _Follow(_WithRegion):
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
-        region = selection.active_region(selection.active(context)[1])
+        region = _active_region(context)
         layout.prop(region, "follow_clip")
         layout.prop(region, "follow_kind")
         if region.follow_clip is not None:

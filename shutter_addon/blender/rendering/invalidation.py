@@ -26,6 +26,7 @@ from . import render_job, session
 _signatures: dict[int, int] = {}  # by effect scene
 _files: dict[int, tuple[int, dict[str, SourceFiles]]] = {}  # by effect scene: the revision of the look, files by source
 _current = revision.UntilChange()
+_masks = revision.UntilChange()  # by mask: what it shows at its start
 _spoilt: set[int] = set()  # session_uids of scenes of whose frames the sequencer may keep one that failed
 
 # Keyframe.interpolation as a number: constant, linear, bezier, then the others.
@@ -54,6 +55,7 @@ def forget() -> None:
     _signatures.clear()
     _files.clear()
     _current.clear()
+    _masks.clear()
     revision.changed()
 
 
@@ -171,7 +173,8 @@ def _matte(region):
 
 
 def _mask(mask):
-    yield mask.frame_start, mask_reading.mask_at(mask, mask.frame_start)
+    # Blender tells of these; many points take long to read.
+    yield _masks.get(mask.session_uid, lambda: hash((mask.frame_start, mask_reading.mask_at(mask, mask.frame_start))))
     yield from mask_reading.motion(mask)
     for curve in fcurves.curves_under(mask, ""):
         yield curve.data_path

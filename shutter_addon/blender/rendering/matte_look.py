@@ -8,7 +8,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from ...core.mattes import FileFrames
 from ...core.messages import UserError
 from ...media.matte_files import MatteFile
-from ..data import matte_strips, revision, snapshot, strips
+from ..data import matte_strips, revision, snapshot
 
 _looks = revision.UntilChange()
 
@@ -46,19 +46,24 @@ def _look(edit, effect, strip, index: int) -> Look:
     text = iface_("{width} × {height}, {count} frames").format(width=width, height=height, count=count)
     if count == 1:
         text = iface_("{width} × {height}, one picture").format(width=width, height=height)
-    return Look(text, note=_note(strip, region, content, count))
+    return Look(text, note=_note(edit, effect, strip, region, content, count))
 
 
-def _note(strip, region, content, count: int) -> str:
+def _note(edit, effect, strip, region, content, count: int) -> str:
     """That a matte is shorter than what it is for."""
     if region.matte == "STRIP":
-        ends = max(part.right_handle for part in matte_strips.strips_of(region))
-        return (
-            iface_("The strip ends before the Shutter strip: its last frame holds") if ends < strip.right_handle else ""
-        )
+        ends = max(part.right_handle for part in matte_strips.parts_for(region, strip))
+        return iface_("Ends before the film: its last frame holds") if ends < strip.right_handle else ""
     if not isinstance(content, FileFrames) or count == 1:
         return ""
-    if content.offset + strip.right_handle - strips.origin(strip) <= count:
+    if content.first is not None:
+        last = strip.right_handle - 1 - content.first
+    else:
+        try:
+            last = snapshot.last_shown(edit, effect, strip)
+        except UserError:  # which the live preview tells
+            return ""
+    if content.offset + last < count:
         return ""
     return iface_("Shorter than the film: its last frame holds")
 

@@ -478,10 +478,7 @@ MESSAGES = {
     ("*", "{width} × {height}, {count} frames"): "{width} × {height}, {count} Bilder",
     ("*", "{width} × {height}, one picture"): "{width} × {height}, ein Bild",
     ("*", "Shorter than the film: its last frame holds"): "Kürzer als der Film: Ihr letztes Bild bleibt stehen",
-    (
-        "*",
-        "The strip ends before the Shutter strip: its last frame holds",
-    ): "Der Streifen endet vor dem Verschlussstreifen: Sein letztes Bild bleibt stehen",
+    ("*", "Ends before the film: its last frame holds"): "Endet vor dem Film: Sein letztes Bild bleibt stehen",
     ("*", "{place}: it has no matte file"): "{place}: sie hat keine Mattendatei",
     (
         "*",
@@ -495,6 +492,10 @@ MESSAGES = {
         '{place}: its matte strip "{strip}" is not a movie, image or clip strip',
     ): "{place}: ihr Mattenstreifen „{strip}“ ist kein Film-, Bild- oder Clipstreifen",
     ("*", "{file}: Blender cannot read it ({error})"): "{file}: Blender kann es nicht lesen ({error})",
+    (
+        "*",
+        "{folder}: its pictures are read by the effect; choose another name for the recipe",
+    ): "{folder}: der Effekt liest Bilder darin; wählen Sie einen anderen Namen für das Rezept",
     ("*", "{place}: it has no mask"): "{place}: sie hat keine Maske",
     # Options
     ("Virtual Shutter", "Window"): "Zeitfenster",
