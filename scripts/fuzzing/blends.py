@@ -3,6 +3,7 @@ Then its panels are drawn, it is exported, and a frame is rendered, twice."""
 
 import json
 import math
+import threading
 from types import SimpleNamespace
 
 import numpy as np
@@ -66,7 +67,7 @@ def run(folder):
         bpy.ops.wm.open_mainfile(filepath=path)
     bpy.context.view_layer.update()
     for task in (_draw, _export):  # which use threads
-        trial.forked(lambda task=task: task(bpy, folder / "out"))
+        trial.forked(lambda task=task: _to_its_end(task, bpy, folder / "out"))
     code = {trial.forked(lambda name=name: _render(bpy, folder / "out" / name, plan["frame"]))[0] for name in "ab"}
     if len(code) > 1:
         raise trial.Fault("a frame is rendered once and refused once")
@@ -226,6 +227,17 @@ class _Layout:
         if isinstance(name, str) and hasattr(owner, "bl_rna"):
             getattr(owner, name)
         return _Layout()
+
+
+def _to_its_end(task, *arguments) -> None:
+    """Does a task, and waits for the threads that it has begun."""
+    from shutter_addon.blender.rendering import session
+
+    task(*arguments)
+    session.forget()
+    for thread in threading.enumerate():
+        if thread is not threading.main_thread():
+            thread.join(trial.PATIENCE)
 
 
 def _draw(bpy, _folder):
