@@ -12,4 +12,6 @@ NAMES = (
     "one_stroke",
     "handheld",
     "panning",
+    "time_map",
+    "object_matte",
 )

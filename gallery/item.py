@@ -13,6 +13,8 @@ from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.core import light, recipe, scribbles
 from shutter_addon.core.frame_state import FrameState
 from shutter_addon.media import open_source
+from shutter_addon.media.matte_files import MatteFile
+from shutter_addon.media.matte_values import MatteValues
 
 ROOT = Path(__file__).resolve().parents[1]
 HERE = ROOT / "gallery"
@@ -103,7 +105,8 @@ class Shot:
 
     @cached_property
     def _renderer(self) -> Renderer:
-        return Renderer(open_compositor()[0], self._source)
+        mattes = MatteValues(self._source.width, self._source.height)
+        return Renderer(open_compositor()[0], self._source, mattes)
 
     @property
     def _colors(self) -> np.ndarray:
@@ -113,4 +116,10 @@ class Shot:
         return [each.name for each in self.effect.shutters].index(shutter)
 
     def _at(self, frame: int) -> FrameState:
-        return self.effect.at(frame, self._source.width / self._source.height)
+        return self.effect.at(frame, self._source.width / self._source.height, self._matte)
+
+    def _matte(self, region: recipe.MatteRegion | recipe.RampRegion) -> MatteFile:
+        """What a matte is read from: its file, or for a ramp of luminance the footage."""
+        if isinstance(region, recipe.RampRegion):
+            return MatteFile(self.footage)
+        return MatteFile(self.recipe.parent / region.path, region.channel)

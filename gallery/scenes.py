@@ -67,6 +67,26 @@ def render_frames(folder: Path, count: int, file_format: str = "PNG", first: int
     return paths[0]
 
 
+def write_matte(folder: Path, root: str, name: str) -> None:
+    """Lets every render write a matte beside its picture: an EXR with a channel for what hangs on an object.
+
+    What an editor does in the compositor, with Passes ▸ Cryptomatte ▸ Asset: a Cryptomatte node, whose Matte goes into
+    a File Output node.
+    root: the object, that hangs on nothing; name: of the channel, to which Blender adds `.V`"""
+    scene = bpy.context.scene
+    scene.view_layers[0].use_pass_cryptomatte_asset = True
+    tree = bpy.data.node_groups.new("Matte", "CompositorNodeTree")
+    scene.compositing_node_group = tree
+    picked, output = (tree.nodes.new(f"CompositorNode{kind}") for kind in ("CryptomatteV2", "OutputFile"))
+    picked.source, picked.scene = "RENDER", scene
+    picked.layer_name, picked.matte_id = f"{scene.view_layers[0].name}.CryptoAsset", root
+    output.directory, output.file_name = str(folder), "####"
+    output.format.media_type = "MULTI_LAYER_IMAGE"
+    output.format.color_depth = "16"
+    output.file_output_items.new("FLOAT", name)
+    tree.links.new(picked.outputs["Matte"], output.inputs[name])
+
+
 def complete(folder: Path, count: int, ending: str = ".png") -> Path | None:
     """The first of `count` frames that are all there already, or None."""
     paths = [folder / f"{frame:04}{ending}" for frame in range(1, count + 1)]

@@ -2,26 +2,33 @@
 
     python scripts/benchmark.py --json FILE [--sizes 1920x1080,3840x2160] [--shutters 2,3,4] … [--table]
 
-Needs Python 3.11, NumPy and moderngl alone; --device cpu measures what NumPy composes, beside the average. Passes:
+Needs Python 3.11, NumPy and moderngl alone, mattes PyAV and OpenImageIO as well, or they are left out; --device cpu
+measures what NumPy composes, beside the average. Passes:
 compose: a picture from a window on the device; accumulate: the next frame into the window (average: its upload alone);
 diffuse: coefficients from new labels; diffuse_moved: the same, from the solution for scribbles a few pixels away;
 readback: the picture to the host; frame: accumulate, compose and readback;
+matte: the next frame of a matte, an H.264 movie, from the file to the coefficients that the solver's become with it;
+matte_images: the same of an image sequence, PNG; matte_read, matte_images_read: what of these makes the values,
+matte_blend: and what lays them once they are on the device, so that the rest is their upload;
 copy: a gigabyte moved from one buffer of the device to another, read and written counting as half of it each.
 Methods: ours; paper: its Appendix A with search bounds (scripts/benchmark/appendix_a.glsl); average: the plain mean of
 the window's frames in the same light; edges: coefficients that follow a guide's edges; follow: ours, where the last
 shutter follows a subject that moves, turns and grows. Times are medians in milliseconds.
 Frames are random noise. Errors are the largest over random pixels of the picture (--pixels) in 8-bit levels against
 the float64 reference; those of diffusion over all coefficients, times 255, against twelve cycles with cells
-everywhere on all grids; those along edges against eight more cycles.
+everywhere on all grids; those along edges against eight more cycles; those of coefficients with a matte, times 255,
+against its formula in float64.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import itertools
 import json
 import statistics
 import sys
+import tempfile
 import time
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
@@ -39,13 +46,15 @@ from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.passes import LOCAL_ROW, Image, Pass
 from shutter_addon.compute.tables import table as table_of
 from shutter_addon.compute.window import Frames
-from shutter_addon.core import compositor, light, presets, scribbles, shutters
+from shutter_addon.core import compositor, light, mattes, presets, scribbles, shutters
 from shutter_addon.core.frame_source import FrameSource
 from shutter_addon.core.frame_state import Following, FrameState, Options
 
 HERE = Path(__file__).resolve().with_suffix("")
 METHODS = ("ours", "paper", "average", "edges", "follow")
-PASSES = ("compose", "accumulate", "diffuse", "diffuse_moved", "readback", "frame")
+MATTES = ("matte", "matte_images", "matte_read", "matte_images_read", "matte_blend")
+PASSES = ("compose", "accumulate", "diffuse", "diffuse_moved", "readback", "frame", *MATTES)
+MATTE_FRAMES = 24
 COPIED = 1 << 28  # bytes, beyond any cache
 BARS = {
     # Bars that are constant over spans, and bars that change from frame to frame.
@@ -119,6 +128,59 @@ def following(count: int, window: int, size) -> Following:
     return Following(0, turns, shifts)
 
 
+def has_mattes() -> bool:
+    """Whether there is what mattes are read with."""
+    return all(importlib.util.find_spec(name) for name in ("av", "OpenImageIO"))
+
+
+def matte_frames(width: int, height: int):
+    """Values (h, w) uint8 of an outline's frames: two discs, smooth at their edges, that pass one another."""
+    y, x = np.mgrid[:height, :width].astype(np.float32) + 0.5
+    for k in range(MATTE_FRAMES):
+        along = width * (0.3 + 0.4 * k / MATTE_FRAMES)
+        discs = (along, 0.4 * height, 0.3 * height), (width - along, 0.6 * height, 0.2 * height)
+        inside = [np.clip(r - np.hypot(x - a, y - b) + 0.5, 0, 1) for a, b, r in discs]
+        yield np.rint(255 * np.maximum(*inside)).astype(np.uint8)
+
+
+def write_mattes(folder: Path, width: int, height: int) -> dict[str, mattes.MatteFile]:
+    """The same frames as a movie and as an image sequence, written into a folder."""
+    import av
+    from OpenImageIO import ImageBuf
+
+    from shutter_addon.media.matte_files import MatteFile
+
+    width, height = width - width % 2, height - height % 2  # as H.264 has it
+    with av.open(str(folder / "matte.mp4"), "w") as movie:
+        stream = movie.add_stream("libx264", rate=25, options={"crf": "18"})
+        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+        for k, values in enumerate(matte_frames(width, height)):
+            ImageBuf(values[..., None]).write(str(folder / f"{k:04}.png"))
+            movie.mux(stream.encode(av.VideoFrame.from_ndarray(values, format="gray")))
+        movie.mux(stream.encode())
+    return {"matte": MatteFile(folder / "matte.mp4"), "matte_images": MatteFile(folder / "0000.png")}
+
+
+class MatteCase:
+    """Mattes of both kinds for one case, a frame further with each."""
+
+    def __init__(self, files, size):
+        from shutter_addon.media.matte_values import MatteValues
+
+        self._files, self._readers = files, {kind: MatteValues(*size) for kind in files}
+        self._index = dict.fromkeys(files, -1)
+
+    def read(self, kind: str, block: int):
+        """The mattes, and the layers of the next frame."""
+        self._index[kind] = (self._index[kind] + 1) % MATTE_FRAMES
+        shown = (mattes.Matte(1, mattes.FileFrame(self._files[kind])),)
+        return shown, self._readers[kind].values(shown, self._index[kind], block)
+
+    def close(self) -> None:
+        for reader in self._readers.values():
+            reader.close()
+
+
 @dataclass
 class Case:
     """One configuration on the device. `index`: the source frame that is composed; what slides the window moves it."""
@@ -130,6 +192,7 @@ class Case:
     index: int = 0
     shared: bool = True
     follows: bool = True
+    mattes: MatteCase | None = None
 
     def __post_init__(self):
         size = self.source.width, self.source.height
@@ -142,6 +205,7 @@ class Case:
         self.solver = self.compositor.solver()
         self.handle = self.solver.solve(self.labels, count)
         self.edge_solver = self.compositor.solver()
+        self.matting, self.layers = self.compositor.matting(), None
 
     def _open(self, window: int) -> None:
         self.compositor = GPUCompositor(self.device)
@@ -212,6 +276,27 @@ class Case:
         self.compose(method)
         self.readback(method)
 
+    def matte(self, method: str) -> None:
+        self._lay("matte")
+
+    def matte_images(self, method: str) -> None:
+        self._lay("matte_images")
+
+    def _lay(self, kind: str) -> None:
+        self.layers = self.mattes.read(kind, self.state.options.aggregate)
+        self.matte_blend()
+
+    def matte_read(self, method: str) -> None:
+        self.mattes.read("matte", self.state.options.aggregate)
+
+    def matte_images_read(self, method: str) -> None:
+        self.mattes.read("matte_images", self.state.options.aggregate)
+
+    def matte_blend(self, method: str = "ours") -> None:
+        """Lays what was read last, whose values are on the device then."""
+        self.layers = self.layers or self.mattes.read("matte", self.state.options.aggregate)
+        self.laid = self.matting.lay(self.handle, *self.layers)
+
     def must_move(self, name: str, method: str) -> int | None:
         """Bytes that a pass must move: all it has to read or write, once each. None: what counts is computing."""
         options, pixels = self.state.options, self.source.width * self.source.height
@@ -235,6 +320,8 @@ class Case:
             return self._edges_error()
         if name in ("diffuse", "diffuse_moved"):
             return self._diffusion_error()
+        if name in MATTES:
+            return None if name.endswith("read") else self._matte_error()
         if name == "readback":
             return None
         if name == "accumulate":
@@ -289,6 +376,13 @@ class Case:
             exact.release()
         return float(np.abs(self.compositor.coefficients(self.handle, count) - expected).max() * 255)
 
+    def _matte_error(self) -> float:
+        """Of what was laid last."""
+        count, (shown, layers) = len(self.state.bars), self.layers
+        beneath = self.compositor.coefficients(self.handle, count).astype(np.float64)
+        expected = mattes.blended(beneath, shown, [values for _, values in layers])
+        return float(np.abs(self.compositor.coefficients(self.laid, count) - expected).max() * 255)
+
     def _edges_error(self) -> float:
         """Of what was solved last, along edges."""
         count = len(self.state.bars)
@@ -303,6 +397,7 @@ class Case:
             window.release()
         self.solver.release()
         self.edge_solver.release()
+        self.matting.release()
         self.sums.release()
         for texture in self.compositor._textures.values():
             texture.release()
@@ -421,6 +516,8 @@ def jobs(case: Case, passes, methods):
         }
         if isinstance(case, HostCase):
             has |= {"ours": [p for p in PASSES if p not in ("diffuse_moved", "readback")], "paper": ()}
+        if case.mattes is None and name in MATTES:
+            continue
         if name in has[method] and (method != "average" or case.state.options.aggregate == 1):
             yield name, method
 
@@ -464,20 +561,26 @@ def timed(case: Case, name: str, method: str) -> float:
 
 def run(args) -> list[dict]:
     device, made_for = (Host(), HostCase) if args.device == "cpu" else (Device(), Case)
-    with device.current():
+    has_matte = has_mattes() and "ours" in args.methods and not set(MATTES).isdisjoint(args.passes)
+    with device.current(), tempfile.TemporaryDirectory() as folder:
         rows = [copied(device)]
         print(f"copy: {1e3 / rows[0]['ms']:.1f} GB/s", flush=True)
         for width, height in args.sizes:
             source = Noise(width, height)
+            files = write_mattes(Path(folder), width, height) if has_matte else None
             for window, count, kind, block in itertools.product(
                 args.windows, args.shutters, args.bars, args.aggregates
             ):
                 options = Options(window, light=args.light, aggregate=block)
                 state = FrameState(options, bars(kind, count, window), shapes(count))
                 follows = "follow" in args.methods and "compose" in args.passes
-                case = made_for(device, source, state, kind, shared=args.sums == "shared", follows=follows)
+                matte = files and MatteCase(files, (width, height))
+                shared = args.sums == "shared"
+                case = made_for(device, source, state, kind, shared=shared, follows=follows, mattes=matte)
                 made = measure(case, args)
                 case.release()
+                if matte:
+                    matte.close()
                 for row, moved in made:
                     print(_line(row, moved and moved / 1e9 * rows[0]["ms"]), flush=True)
                 rows += [row for row, _ in made]

@@ -132,7 +132,7 @@ def _composed(edit, source, indices) -> dict[int, np.ndarray]:
 
 def measure(args) -> list[dict]:
     with open_source(args.footage) as medium:
-        edit = new_edit.make_edit(args.footage, medium, effect_recipe(args.window))
+        edit = new_edit.make_edit(args.footage, medium, effect_recipe(args.window), args.footage.parent)
         count, size = medium.count, (medium.width, medium.height)
     ffmpeg = shutil.which("ffmpeg")
     if ffmpeg is None:

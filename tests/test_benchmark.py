@@ -74,3 +74,18 @@ def test_numpy(tmp_path):
         ("compose", "follow"),
     }
     assert all(row["error"] <= ALLOWED[row["method"]] for row in rows)
+
+
+def test_mattes(tmp_path):
+    """Where they can be read; those above are left out."""
+    file = tmp_path / "rows.json"
+    passes = "matte", "matte_images", "matte_read", "matte_images_read", "matte_blend"
+    options = f"--sizes 46x28 --shutters 3 --windows 8 --bars preset --repeats 2 --passes {','.join(passes)}"
+    command = [sys.executable, "scripts/benchmark.py", "--json", str(file), *options.split()]
+    subprocess.run(command, cwd=ROOT, capture_output=True, check=True)
+    rows = [row for row in json.loads(file.read_text()) if row["pass"] != "copy"]
+    assert [(row["pass"], row["method"], row["aggregate"]) for row in rows] == [
+        (name, "ours", block) for block in (1, 2) for name in passes
+    ]
+    assert all(set(row) == KEYS and row["ms"] > 0 for row in rows)
+    assert all(row["error"] <= 0.01 for row in rows if not row["pass"].endswith("read"))

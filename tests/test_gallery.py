@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 from OpenImageIO import ImageBuf
 
-from gallery import NAMES, bunny
+from gallery import NAMES, bunny, time_map
 from gallery.item import HERE, ROOT, Shot
-from shutter_addon.core import recipe
+from shutter_addon.compute.renderer import Renderer, open_compositor
+from shutter_addon.core import light, recipe
+from shutter_addon.media import open_source
+from shutter_addon.media.matte_values import MatteValues
 
 SCRIPT = str(ROOT / "scripts" / "gallery.py")
 WITHOUT_BPY = """
@@ -77,3 +80,32 @@ def test_an_item_from_end_to_end(tmp_path, monkeypatch):
     still = ImageBuf(str(tmp_path / "bunny.png")).get_pixels()
     assert still.shape[1:] == (1632, 3)
     assert still.std() > 0.1
+
+
+def rows_of_time(height, width):
+    """When a pixel is seen, in frames since the shown one, as time runs down."""
+    return np.broadcast_to((np.arange(height)[:, None] + 0.5) / height * 32, (height, width))
+
+
+def angles_of_time(height, width):
+    """The same, as time runs around a point, clockwise from its top."""
+    y, x = np.mgrid[:height, :width] + 0.5
+    return np.degrees(np.arctan2(x - 0.35 * width, 0.45 * height - y)) % 360 / 360 * 32
+
+
+@pytest.mark.parametrize(("name", "times"), [("time_map", rows_of_time), ("time_map-angle", angles_of_time)])
+def test_time_maps_are_frames_put_together(name, times):
+    """A pixel whose time is a whole frame's is that frame's to the bit, and others mix the two frames around."""
+    source, effect = open_source(time_map.footage(None)), recipe.load(HERE / f"{name}.json")
+    height, width, shown = source.height, source.width, time_map.FRAME - 1
+    renderer = Renderer(open_compositor()[0], source, MatteValues(width, height))
+    made = light.to_encoded(renderer.picture(shown, effect.at(time_map.FRAME, width / height))[..., :3]) * 255
+    frames = np.stack([source.read(shown + k)[..., :3] for k in range(33)])
+    time, (y, x) = times(height, width), np.mgrid[:height, :width]
+    before = np.floor(time).astype(int)
+    share = (time - before)[..., None]
+    first, second = (light.to_linear(frames[before + k, y, x] / 255) for k in (0, 1))
+    assert np.abs(light.to_encoded((1 - share) * first + share * second) * 255 - made).max() < 0.1
+    whole = time == before
+    assert whole.any()
+    assert np.array_equal(np.rint(made[whole]), frames[before, y, x][whole])

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 from OpenImageIO import ImageBuf
 
+from gallery import object_matte
 from gallery.item import ROOT
+from shutter_addon.core import recipe
+from shutter_addon.media.matte_files import MatteFile
 
 # Each in a process of its own: an empty scene would take the other tests' edits away.
 RENDER = """
@@ -59,3 +62,16 @@ def test_a_scene_is_built_and_rendered(name, tmp_path):
     picture = ImageBuf(path).get_pixels()[..., :3]
     assert picture.shape[1] == 64
     assert picture.std() > 0.02, "there is something to be seen"
+
+
+def test_an_objects_matte_is_rendered_beside_it(tmp_path):
+    """The recipe names its file and its channel. It covers what is red there, in part at its edges."""
+    picture = ImageBuf(run(FIRST_FRAME, tmp_path / "footage", "object_matte").splitlines()[-1]).get_pixels()
+    (region,) = recipe.load(ROOT / "gallery" / "object_matte.json").regions
+    assert region.channel == f"{object_matte.NAME}.V"
+    values = MatteFile(tmp_path / region.path, region.channel).open().read(0)
+    assert values.shape == picture.shape[:2]
+    assert 0.02 < values.mean() < 0.2
+    assert ((values > 0) & (values < 1)).any()
+    redness = picture[..., 0] - picture[..., 1:3].mean(axis=2)
+    assert redness[values == 1].mean() > redness[values == 0].mean() + 0.2

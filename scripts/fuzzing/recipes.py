@@ -49,7 +49,7 @@ def run(folder):
         if recipe.parse(recipe.dump(found)) != found:
             raise trial.Fault("a recipe does not come back as it was")
         render(folder, 0)
-        compose(found, json.loads((folder / "plan.json").read_text()))
+        compose(found, json.loads((folder / "plan.json").read_text()), folder)
         return
     render(folder, 2)
 
@@ -93,30 +93,41 @@ def same_pictures(first, second):
             raise trial.Fault(f"another picture from the same input: {name}")
 
 
-def _composed(device, source, moment, index, direction):
+def _composed(device, source, moment, index, direction, mattes):
     from shutter_addon.compute.renderer import Renderer
 
-    return [Renderer(device, source).picture(index, moment, direction)]
+    return [Renderer(device, source, mattes).picture(index, moment, direction)]
 
 
-def compose(found, plan: dict):
-    """The effect at some frames on both devices: against the reference, and their coefficients against each other."""
+def compose(found, plan: dict, folder):
+    """The effect at some frames on both devices: against the reference, and their coefficients against each other.
+    folder: of the recipe."""
     from test_composition import check, footage
 
     from shutter_addon.compute.renderer import Renderer, open_compositor
+    from shutter_addon.media.matte_files import MatteFile
+    from shutter_addon.media.matte_values import MatteValues
+
+    def file(region):
+        if region.kind == "ramp":
+            return MatteFile(folder / "in" / "f0001.png")
+        return MatteFile(folder / region.path, region.channel)
+
+    values = MatteValues(*SIZE)
 
     source = footage(np.random.default_rng(1), 8, SIZE, **plan["footage"])
     devices = {device: open_compositor(device)[0] for device in ("cpu", "gpu")}
     keys = [key.frame for owner in (*found.shutters, *found.regions) for key in owner.keys]
     for frame in (1, 2.5, *keys[:2]):
-        moment = found.at(frame, SIZE[0] / SIZE[1])
-        first, second = (Renderer(device, source).coefficients(3, moment).astype(float) for device in devices.values())
+        moment = found.at(frame, SIZE[0] / SIZE[1], file)
+        renderers = [Renderer(device, source, values) for device in devices.values()]
+        first, second = (renderer.coefficients(3, moment).astype(float) for renderer in renderers)
         if not (apart := np.abs(first - second).max()) <= 1 / 255:
             raise trial.Fault(f"coefficients are {255 * apart:.3g}/255 apart at frame {frame:g}")
         for name, device in devices.items():
             try:
                 made = check if moment.bars.size <= REFERABLE else _composed
-                once, again = (made(device, source, moment, 3, plan["direction"])[0] for _ in range(2))
+                once, again = (made(device, source, moment, 3, plan["direction"], mattes=values)[0] for _ in range(2))
             except AssertionError:
                 raise trial.Fault(f"{name} differs from the reference: {plan['footage']}, frame {frame:g}") from None
             if not np.array_equal(once, again):

@@ -22,11 +22,13 @@ import bpy
 from ..compute.device import NoDeviceError
 from ..compute.renderer import DEVICES
 from ..core import atomic_write, recipe, region_keys, retiming
+from ..core.effect import Region
 from ..core.messages import sentence, signed
 from ..media import MediaError, PrefetchSource, camera_tracking, filmed_frames, open_source, registration, tracking
 from ..media.completeness import is_whole_blend, why_short
 from ..media.cuts import ShotSource
 from ..media.files import check_name
+from ..media.matte_files import MatteFile
 from ..media.sequence import by_number
 from .data import inbetween_settings, snapshot, source_media, strips, validation
 from .editing import new_edit
@@ -144,8 +146,9 @@ def _render(arguments) -> None:
             if arguments.save and film_output.is_movie(output) and "#" in output.name:
                 raise film_output.OutputError(f"{output}: in a saved edit, Blender takes # for the frames' numbers")
         frames = _frames(arguments.frames, new_edit.length(medium, source_recipe))
-        film_output.spare(_written(arguments, file_format, frames), [path, *_files(medium), arguments.recipe])
-        edit = new_edit.make_edit(path, medium, source_recipe)
+        read = path, *_files(medium), arguments.recipe, *_mattes(source_recipe, arguments.recipe.parent)
+        film_output.spare(_written(arguments, file_format, frames), read)
+        edit = new_edit.make_edit(path, medium, source_recipe, arguments.recipe.parent)
     edit.frame_start, edit.frame_end = frames
     if output:
         film_output.set_output(edit, output, file_format, alpha=medium.alpha != "opaque")
@@ -179,6 +182,16 @@ def _files(medium) -> list[Path]:
     files = medium.files
     beside = by_number(files[0]) if len(files) > 1 else None
     return [*files, *(map(beside, range(len(files))) if beside else ())]
+
+
+def _mattes(source_recipe, folder: Path) -> list[Path]:
+    """The files of a recipe's mattes; folder: where the recipe lies. MediaError: there are none."""
+    found = []
+    for region in source_recipe.regions:
+        if isinstance(region, recipe.MatteRegion):
+            with MatteFile(folder / region.path, region.channel).open() as matte:
+                found += matte.files
+    return found
 
 
 def _opened(path: Path):
@@ -256,7 +269,11 @@ def _region_index(arguments, source_recipe) -> int:
     names = [region.name for region in source_recipe.regions]
     if arguments.region not in names:
         raise film_output.OutputError(f'{arguments.recipe}: there is no region "{arguments.region}"')
-    return names.index(arguments.region)
+    index = names.index(arguments.region)
+    if not isinstance(source_recipe.regions[index], recipe.Region):
+        sentence = f'region "{arguments.region}" is a matte or a ramp, and has no strokes to track'
+        raise film_output.OutputError(f"{arguments.recipe}: {sentence}")
+    return index
 
 
 def _followed(arguments, source_recipe, index: int | None, medium, frames: range) -> tuple[dict, list]:
@@ -270,7 +287,8 @@ def _followed(arguments, source_recipe, index: int | None, medium, frames: range
         footage = tracking.Footage(shots, filmed.index_at)
         what = footage, filmed.start, filmed.frames
         if index is None:
-            regions = [filmed.seen(region) for region in effect.regions]
+            drawn = [region for region in effect.regions if isinstance(region, Region)]
+            regions = [filmed.seen(region) for region in drawn]
             steps = camera_tracking.follow_camera(filmed.seen(subject), regions, *what, motion=arguments.motion)
         else:
             steps = tracking.follow(filmed.seen(subject), *what, motion=arguments.motion)
@@ -314,7 +332,8 @@ def _write_track(arguments, result, tracked: dict, stops: list) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         film_output.clear_up(path.parent)
     with atomic_write.writing(arguments.output) as part:
-        part.write_text(recipe.dump(result), encoding="utf-8")
+        moved = recipe.moved(result, arguments.recipe.parent, arguments.output.parent)
+        part.write_text(recipe.dump(moved), encoding="utf-8")
         if arguments.report:
             with atomic_write.writing(arguments.report) as other:
                 other.write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

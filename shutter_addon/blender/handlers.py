@@ -31,12 +31,16 @@ def _after_load(*_):
 
 
 @persistent
-def _update(scene=None, *_):
+def _update(scene=None, depsgraph=None):
     revision.changed()
     if render_job.runs() and bpy.app.is_job_running("RENDER"):
         job_snapshots.look(render_job.film())
     if not render_job.cancelling():
         lifecycle.update(scene)
+    # Blender itself draws previews again for most of what changes, but not for a mask. And it may crash where one is
+    # drawn while a render ends.
+    if depsgraph is not None and depsgraph.id_type_updated("MASK") and not render_job.runs():
+        preview_areas.redraw(bpy.context)
 
 
 @persistent
@@ -72,6 +76,7 @@ def _before_render(scene, *_):
 
 def _prepare(film: int, in_job: bool) -> bool:
     """On the main thread, whatever thread renders. True: it has been done."""
+    revision.changed()  # a script may have, since Blender last told
     invalidation.drop_spoilt()
     source_media.look_again()
     source_media.rest(render_job.runs())

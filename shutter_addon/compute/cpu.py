@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from ..core import compositor, light, shutters
+from ..core import compositor, light, mattes, shutters
 from ..core.frame_source import FrameSource
 from ..core.frame_state import FrameState, Options
 from .diffusion import diffuse
@@ -183,6 +183,16 @@ class Solver:
         pass
 
 
+class Matting:
+    """core.mattes, with the methods of compute.matting.Matting."""
+
+    def lay(self, beneath: np.ndarray, shown: tuple[mattes.Matte, ...], layers) -> np.ndarray:
+        return mattes.blended(beneath, shown, [values for _, values in layers])
+
+    def release(self) -> None:
+        pass
+
+
 class CPUCompositor:
     """Composes with NumPy; the same methods as GPUCompositor."""
 
@@ -197,6 +207,9 @@ class CPUCompositor:
 
     def solver(self) -> Solver:
         return Solver()
+
+    def matting(self) -> Matting:
+        return Matting()
 
     def constant(self, values: np.ndarray) -> np.ndarray:
         return np.asarray(values, dtype=np.float32)[:, None, None]

@@ -13,6 +13,7 @@ from .device import Device
 from .diffusion_gpu import Diffusion
 from .edge_diffusion import follows_edges
 from .edge_diffusion_gpu import EdgeDiffusion
+from .matting import Matting
 from .passes import LOCAL_ROW, Image, Pass
 from .tables import moved_tables, padded, table
 from .window import BLOCK, TILE, Frames, PackedFrames, Sums, WholeFrames, decoding, open_window
@@ -29,10 +30,10 @@ _OF_SUMS = {"sums": Image("rg32ui", reads=True, writes=False)}
 _UNIT = {"held": "int", "unit": "float"}
 # Constants that only some passes use: Blender's `gpu` has no others.
 _OF_WAY = {"pieces": ("rows",), "value": ("first", "last")} | dict.fromkeys(
-    ("frames", "walk"), ("rows", "first", "last")
+    ("frames", "search"), ("rows", "first", "last")
 )
 # Rows of pixels that one invocation composes, by the pass; BLOCK for all others.
-_LINES = {"sums": PAIR, "walk": 4}
+_LINES = {"sums": PAIR, "search": 4}
 # Loop iterations of an invocation. Mesa's software renderer ends its loops after 65,535 in all, without an error.
 _MOST_ITERATIONS = 60_000
 # The numbers of pieces for which compose_sums is compiled. A table with another number is filled up with empty pieces.
@@ -108,7 +109,7 @@ def composition_of_moved(
     sharp: bool,
     at: tuple[bool, bool],
 ) -> Pass:
-    """The pass of a way, "frames", "walk" or "value", where shutters follow something.
+    """The pass of a way, "frames", "search" or "value", where shutters follow something.
 
     quads: of pixels that an invocation composes; mixed: motions that are mixed for a pixel; packed: as PackedFrames are
     shortened: frames are left out
@@ -165,7 +166,7 @@ def way_of(window, options: Options, values: np.ndarray, span: tuple[int, int], 
         return "sums"
     if not isinstance(window, Sums) and 3 * rows < 2 * frames:
         return "pieces"
-    return "frames" if frames_iterations(values, span) <= _MOST_ITERATIONS else "walk"
+    return "frames" if frames_iterations(values, span) <= _MOST_ITERATIONS else "search"
 
 
 def frames_iterations(values: np.ndarray, span: tuple[int, int]) -> int:
@@ -194,7 +195,7 @@ def _moved_way(
         return "value", quads if frames * (1 + motions) + quads * mixing <= _MOST_ITERATIONS else 1
     loops = frames_iterations(values, span) + frames
     if loops + mixing > _MOST_ITERATIONS:
-        return "walk", 1
+        return "search", 1
     return "frames", quads if loops + quads * mixing <= _MOST_ITERATIONS else 1
 
 
@@ -288,6 +289,10 @@ class GPUCompositor:
     def solver(self) -> Solver:
         """A new solver. Its solution is valid until its next solve."""
         return Solver(self.device)
+
+    def matting(self) -> Matting:
+        """What lays mattes over coefficients. What it gives is valid until its next."""
+        return Matting(self.device)
 
     def constant(self, values: np.ndarray):
         """Coefficients (N,) of the whole picture, as a texture of one texel. Valid until the next call."""

@@ -1,4 +1,5 @@
-"""Renders pictures of a source: rasterise the scribbles, diffuse them, load the window's frames, compose."""
+"""Renders pictures of a source: rasterise the scribbles, diffuse them, lay mattes over, load the window's frames,
+compose."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ import numpy as np
 from ..core import compositor, scribbles, shutters
 from ..core.frame_source import FrameSource
 from ..core.frame_state import FrameState
+from ..core.mattes import MatteReader
 from . import guide
 from .cpu import CPUCompositor
 from .device import NoDeviceError
@@ -37,17 +39,20 @@ def open_compositor(device: str = "auto"):
 class Renderer:
     """Pictures of one source. It keeps the window's frames, the last coefficients and the last picture.
 
+    mattes: what reads the mattes of its pictures; None: they have none
+
     Windows end at cuts if Options.stop_at_cuts is set and the source knows its shots (FrameSource.shots).
     Frames are counted as the source counts them, from 0. direction, in all methods: 1, or −1 where the source plays in
     reverse, so that the window's next frames are those before `index`.
     """
 
-    def __init__(self, compositor, source: FrameSource):
-        self.compositor, self.source = compositor, source
-        self._solver = compositor.solver()
+    def __init__(self, compositor, source: FrameSource, mattes: MatteReader | None = None):
+        self.compositor, self.source, self._mattes = compositor, source, mattes
+        self._solver, self._matting = compositor.solver(), compositor.matting()
         self._guides = guide.Guides(source)
         self._window = self._kind = None
-        self._labelled = self._solved = self._drawn = None
+        self._labelled = self._solved = self._laid = self._drawn = None
+        self._solution = 0  # counts the solver's
 
     def picture(self, index: int, state: FrameState, direction: int = 1) -> np.ndarray:
         """The picture (H, W, 4) float32 at source frame `index`: scene-linear, premultiplied, top row first."""
@@ -75,7 +80,7 @@ class Renderer:
             if (sole := self._sole(state)) is not None:
                 values = np.eye(count, dtype=np.float32)[sole]
                 return np.broadcast_to(values[:, None, None], (count, height, width))
-            return self.compositor.coefficients(self._diffused(index, state, direction), count)
+            return self.compositor.coefficients(self._mixture(index, state, direction), count)
 
     def drawn_coefficients(self, index: int, state: FrameState, direction: int = 1):
         """Coefficients of a quick `draw` on the device, a GPU: (texture array, block, number of shutters).
@@ -87,7 +92,7 @@ class Renderer:
         with self.compositor.current():
             if (sole := self._sole(state)) is not None:
                 return self.compositor.constant(np.eye(count)[sole]), self._everywhere, count
-            return self._diffused(index, state, direction, quick=True), state.options.aggregate, count
+            return self._mixture(index, state, direction, quick=True), state.options.aggregate, count
 
     def drawn_labels(self, state: FrameState):
         """Labels on the device, a GPU: (texture array r16ui, block), top row first, each texel for block × block
@@ -101,6 +106,10 @@ class Renderer:
 
     def _sole(self, state: FrameState) -> int | None:
         """The shutter that holds for the whole picture, if one does."""
+        return None if state.mattes else self._scribbled(state)
+
+    def _scribbled(self, state: FrameState) -> int | None:
+        """The shutter that the scribbles give to the whole picture, if it is one."""
         return self._labelling(state)[1]
 
     def _labelling(self, state: FrameState) -> tuple[np.ndarray, int | None]:
@@ -164,7 +173,7 @@ class Renderer:
 
     def _is_guided(self, state: FrameState) -> bool:
         """Whether coefficients depend on the shown frame."""
-        return state.options.edge_aware > 0 and self._sole(state) is None
+        return state.options.edge_aware > 0 and self._scribbled(state) is None
 
     def _stops(self, state: FrameState) -> bool:
         """Whether windows end at cuts."""
@@ -194,7 +203,7 @@ class Renderer:
         self._keep_guides(index, direction, state)
         if (sole := self._sole(state)) is None:
             self._load(window, index, direction, state)
-            handle, block = self._diffused(index, state, direction, quick), state.options.aggregate
+            handle, block = self._mixture(index, state, direction, quick), state.options.aggregate
         else:
             state = state.alone(sole)
             self._load(window, index, direction, state)
@@ -216,6 +225,22 @@ class Renderer:
         onwards = range(index - beside, high + 1) if direction > 0 else range(low, index + beside + 1)
         self._guides.keep(i for i in onwards if i % step == 0 or i == index)
 
+    def _mixture(self, index: int, state: FrameState, direction: int, quick: bool = False):
+        """Coefficients on the device, with the mattes laid over what the scribbles give. They are laid again only if
+        either has changed since the last call."""
+        if not state.mattes:
+            return self._diffused(index, state, direction, quick)
+        layers = self._mattes.values(state.mattes, index, state.options.aggregate)
+        count, sole = len(state.bars), self._scribbled(state)
+        if sole is None:
+            beneath = self._diffused(index, state, direction, quick)
+        else:
+            beneath = self.compositor.constant(np.eye(count)[sole])
+        key = state.mattes, [key for key, _ in layers], count, sole, self._solution if sole is None else None
+        if self._laid is None or self._laid[0] != key:
+            self._laid = key, self._matting.lay(beneath, state.mattes, layers)
+        return self._laid[1]
+
     def _diffused(self, index: int, state: FrameState, direction: int, quick: bool = False):
         """Coefficients on the device. They are solved for only if labels or what guides them changed since the last
         call, or if the last solution was a quick one and this must not be."""
@@ -226,6 +251,7 @@ class Renderer:
         if not same or not (quick or self._solved[2]):
             self._keep_guides(index, direction, state)
             guided = (self._guides.guide(frames, options.aggregate), options.edge_aware) if frames else ()
+            self._solution += 1
             self._solved = key, labels, not quick, self._solver.solve(labels, count, *guided, warm=quick)
         return self._solved[3]
 
@@ -256,6 +282,9 @@ class Renderer:
         with self.compositor.current():
             self.release_window()
             self._solver.release()
+            self._matting.release()
+        if self._mattes is not None:
+            self._mattes.close()
         self.source.close()
 
 

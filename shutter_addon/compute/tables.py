@@ -19,8 +19,9 @@ def padded(values: np.ndarray) -> np.ndarray:
 def table(state: FrameState) -> np.ndarray:
     """The table (1 + rows, columns, 4) float32 that shaders/include/compose.glsl describes.
 
-    Row 0: the gains. Displacement: a row per piece of the quantiles: starts, ends, then dz and the time by which the
-    shutters differ at most at either. Value: a row per frame of the shutters' open span, its normalised bars.
+    Row 0: the gains. Displacement: a row per piece of the quantiles: starts, ends, then dz, the time by which the
+    shutters differ at most at either, and z at its start. Value: a row per frame of the shutters' open span, its
+    normalised bars.
     """
     rows = _pieces(state.bars) if state.options.interpolation == "displacement" else _bars(state.bars)
     result = np.zeros((1 + len(rows), rows.shape[1], 4), dtype=np.float32)
@@ -36,6 +37,7 @@ def _pieces(bars) -> np.ndarray:
     last = np.zeros((len(start), 1, 4))
     last[:, 0, 0] = np.diff(knots.z)
     last[:, 0, 1] = np.maximum(np.ptp(knots.start, axis=1), np.ptp(knots.end, axis=1))
+    last[:, 0, 2] = knots.z[:-1]
     return np.concatenate([start, end, last], axis=1)
 
 

@@ -17,24 +17,30 @@ from itertools import pairwise
 import numpy as np
 
 from . import keyframes, limits, recipe
-from .effect import Camera, Effect, Region, Shutter
+from .effect import Camera, Effect, MatteRegion, Region, Shutter
 from .keyframes import Channel, Samples
 
 # Of the largest bar, of fractions of the picture, of degrees; of the larger key's value where that is above 1.
 TOLERANCE = 1e-4
 
 
-def baked(effect: Effect, shown: range, inbetween_method: str) -> recipe.Recipe:
+def baked(effect: Effect, shown: range, inbetween_method: str, mattes=()) -> recipe.Recipe:
     """The recipe of an effect that is shown at these frames, of which the first is the recipe's frame 1. Its channels
     are sampled there, at their keys and at its drawings. EffectError: it cannot be rendered as it stands.
+
+    mattes: of each matte region what a recipe says of it besides its name, shutter and numbers, as a region of one
 
     Left out are regions without strokes, drawings before the first that has strokes, and keys of widths and of options,
     which are as at the first frame."""
     options = effect.options.at(shown.start)
     names = _different([shutter.name for shutter in effect.shutters])
     called = _region_names(effect)
+    words = iter(mattes)
     regions = [
-        _region(region, name, names[region.shutter], shown) for region, name in zip(effect.regions, called, strict=True)
+        _matte(region, next(words), name, names[region.shutter], shown)
+        if isinstance(region, MatteRegion)
+        else _region(region, name, names[region.shutter], shown)
+        for region, name in zip(effect.regions, called, strict=True)
     ]
     # A region without strokes says nothing of how anything moves.
     known = {region.name for region in regions if region} | {recipe.CAMERA}
@@ -173,12 +179,20 @@ def _region(region: Region, name: str, shutter: str, shown: range) -> recipe.Reg
     )
 
 
-def _camera(camera: Camera, shown: range) -> list[recipe.CameraKey]:
-    keys = _move_keys(camera, {}, shown)
-    return [recipe.CameraKey(_frame(frame, shown), *_place_words(camera, frame), ease) for frame, ease in keys]
+def _matte(
+    region: MatteRegion, words: recipe.MatteRegion | recipe.RampRegion, name: str, shutter: str, shown: range
+) -> recipe.MatteRegion | recipe.RampRegion:
+    numbers = {"opacity": _number(region.opacity, shown), "width": _number(region.feather, shown)}
+    own = {"invert": region.invert, "blend": region.blend, "keys": _camera(region, shown)}
+    return replace(words, name=name, shutter=shutter, **own, **numbers)
 
 
-def _move_keys(moving: Region | Camera, words: dict, shown: range) -> list[tuple[float, str]]:
+def _camera(moving: Camera | MatteRegion, shown: range) -> list[recipe.CameraKey]:
+    keys = _move_keys(moving, {}, shown)
+    return [recipe.CameraKey(_frame(frame, shown), *_place_words(moving, frame), ease) for frame, ease in keys]
+
+
+def _move_keys(moving: Region | MatteRegion | Camera, words: dict, shown: range) -> list[tuple[float, str]]:
     """Frames and eases of the keys of location, rotation and scale; words: as of _keys."""
     moves = [channel for channel in (moving.location, moving.rotation, moving.scale) if isinstance(channel, Samples)]
     eases: dict[float, str] = {}
@@ -204,12 +218,12 @@ def _move_keys(moving: Region | Camera, words: dict, shown: range) -> list[tuple
     return _keys(fits, still, eases, sorted(frames), words, shown) if frames or moves else []
 
 
-def _place(moving: Region | Camera, frame: float) -> np.ndarray:
+def _place(moving: Region | MatteRegion | Camera, frame: float) -> np.ndarray:
     (x, y), rotation, scale = (channel.at(frame) for channel in (moving.location, moving.rotation, moving.scale))
     return np.array([x, y, rotation, scale])
 
 
-def _place_words(moving: Region | Camera, frame: float) -> tuple:
+def _place_words(moving: Region | MatteRegion | Camera, frame: float) -> tuple:
     """Location, rotation and scale at a frame, as a recipe has them."""
     x, y, rotation, scale = _place(moving, frame)
     return (_short(x), _short(y)), _short_degrees(rotation), _short(scale)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from . import keyframes, limits, motions, scribbles, shutters
+from . import keyframes, limits, mattes, motions, scribbles, shutters
 from .frame_state import FrameState
 from .keyframes import Bars, Channel
 from .messages import EffectError
@@ -119,6 +119,56 @@ class Region:
 
 
 @dataclass(frozen=True)
+class MatteRegion:
+    """A region whose shutter gets coefficients by a matte. Its numbers are as a Region's, about the picture's centre:
+    they place a ramp, and say of any other matte how what it covers moves.
+
+    content: channel of mattes.Content; feather: of mattes.Matte, as blend, invert and opacity"""
+
+    name: str
+    shutter: int
+    content: Channel
+    blend: mattes.Blend
+    invert: bool
+    opacity: Channel
+    feather: Channel
+    location: Channel
+    rotation: Channel
+    scale: Channel
+
+    def at(self, frame: float) -> mattes.Matte:
+        """The matte at a frame."""
+        opacity, feather = (float(channel.at(frame)) for channel in (self.opacity, self.feather))
+        return mattes.Matte(self.shutter, self.content.at(frame), self.blend, opacity, feather, self.invert)
+
+    def placement(self, frame: float) -> Placement:
+        """Its keyed numbers at a frame."""
+        return _placement(self, frame)
+
+    def centre(self, _frame: float) -> np.ndarray:
+        """The picture's (2,), in fractions of it."""
+        return np.array([0.5, 0.5])
+
+    def corners(self, _frame: float) -> np.ndarray:
+        """The picture's (4, 2), in fractions of it."""
+        return motions.PICTURE
+
+
+@dataclass(frozen=True)
+class PlacedRamp:
+    """Channel of a ramp (mattes.Ramp) that is moved by keys."""
+
+    kind: mattes.RampKind
+    location: Channel
+    rotation: Channel
+    scale: Channel
+
+    def at(self, frame: float) -> mattes.Ramp:
+        placed = _placement(self, frame)
+        return mattes.Ramp(self.kind, placed.location, placed.rotation, placed.scale)
+
+
+@dataclass(frozen=True)
 class Camera:
     """How what the camera sees moves in the picture, about the picture's centre; its numbers are as a Region's."""
 
@@ -136,13 +186,13 @@ class Camera:
 
     def corners(self, _frame: float) -> np.ndarray:
         """The picture's (4, 2), in fractions of it."""
-        return np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+        return motions.PICTURE
 
 
 STILL_CAMERA = Camera(*map(keyframes.Constant, ((0.0, 0.0), 0.0, 1.0)))
 
 
-def _placement(moving: Region | Camera, frame: float) -> Placement:
+def _placement(moving: Region | MatteRegion | PlacedRamp | Camera, frame: float) -> Placement:
     x, y = (float(number) for number in moving.location.at(frame))
     return Placement((x, y), float(moving.rotation.at(frame)), float(moving.scale.at(frame)))
 
@@ -156,7 +206,7 @@ class Shutter:
     name: str
     color: tuple[float, float, float]
     bars: Bars
-    follow: Region | Camera | None = None
+    follow: Region | MatteRegion | Camera | None = None
     trail: Channel | None = None
 
 
@@ -165,7 +215,7 @@ class Effect:
     """The whole effect but its source.
 
     shutters: the first is the default
-    regions: later ones lie over earlier ones
+    regions: later ones lie over earlier ones, and all mattes over all scribbles
     options: channel of frame_state.Options, but for
     edge_aware: channel of its own, as its keys are numbers
     camera: which shutters may follow
@@ -173,7 +223,7 @@ class Effect:
     timing tells what is shown"""
 
     shutters: tuple[Shutter, ...]
-    regions: tuple[Region, ...]
+    regions: tuple[Region | MatteRegion, ...]
     options: Channel
     time: Channel | None = None
     edge_aware: Channel = field(default=keyframes.Constant(0.0))
@@ -183,11 +233,15 @@ class Effect:
         """The effect at a frame. EffectError: no picture can be made of it."""
         options = replace(self.options.at(frame), edge_aware=float(self.edge_aware.at(frame)))
         bars = [self.bars_at(index, frame) for index in range(len(self.shutters))]
-        return FrameState(options, np.stack(bars), tuple(self._shapes_at(frame)))
+        laid = [region.at(frame) for region in self.regions if isinstance(region, MatteRegion)]
+        seen = tuple(matte for matte in laid if matte.opacity > 0)
+        return FrameState(options, np.stack(bars), tuple(self._shapes_at(frame)), mattes=seen)
 
     def _shapes_at(self, frame: float):
         room = limits.MAX_POINTS
         for region in self.regions:
+            if isinstance(region, MatteRegion):
+                continue
             shape = region.at(frame)
             room -= sum(map(len, shape.strokes))
             if room < 0:

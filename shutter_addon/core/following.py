@@ -58,15 +58,16 @@ def followed(
         turns[:, followers] = np.array([motion.turn for motion in found])[:, None]
         shifts[:, followers] = np.array([motion.shift for motion in found])[:, None]
     following = Following(frames.start, turns, shifts)
-    bars = _with_trails(effect, state, following, frame, index, direction, source)
-    return replace(state, bars=bars, following=following.of(slice(None)))
+    bars, open_for = _with_trails(effect, state, following, frame, index, direction, source)
+    return replace(state, bars=bars, following=following.of(slice(None)), open_for=open_for)
 
 
 def _with_trails(
     effect: Effect, state: FrameState, following: Following, frame: float, index: int, direction: int, source
-) -> np.ndarray:
-    """The state's bars (N, L), those of shutters whose trail has a length open for it; arguments as of `followed`."""
-    bars, size = state.bars.copy(), (source.width, source.height)
+) -> tuple[np.ndarray, dict[int, float]]:
+    """The state's bars (N, L), those of shutters whose trail has a length open for it, and FrameState.open_for;
+    arguments as of `followed`."""
+    bars, open_for, size = state.bars.copy(), {}, (source.width, source.height)
     positions = compositor.window_positions(state.options, index, direction)
     shown_at = float(np.abs(positions - index).argmin()) + 0.5
     seen = compositor.source_frames(state.options, positions, range(source.count))
@@ -77,8 +78,8 @@ def _with_trails(
             corners = [motions.pixel(corner, size) for corner in shutter.follow.corners(frame)]
             places = np.outer(turns[:, i], corners) + shifts[:, i, None]
             way = trails.travelled(places) / source.height
-            bars[i] = trails.with_length(bars[i], way, float(shutter.trail.at(frame)), shown_at)
-    return bars
+            bars[i], open_for[i] = trails.with_length(bars[i], way, float(shutter.trail.at(frame)), shown_at)
+    return bars, open_for
 
 
 def _seen(options: Options, index: int, direction: int, count: int) -> range:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
 from . import scribbles
+from .mattes import Matte
 
 Interpolation = Literal["displacement", "value"]
 Light = Literal["linear", "encoded"]
@@ -87,6 +88,9 @@ class FrameState:
     shapes: of the scribbles, where they are at this frame, the later over the earlier
     reference: the exposure (sum of bars) of full brightness where exposure is "weighted"; None: the default shutter's
     following: what exposures follow; None: nothing that moves
+    mattes: laid over what the scribbles give, the later over the earlier
+    open_for: by shutter whose trail has a length, the frames from its first open time to its last: for who is told of
+    it, as its bars say what is exposed
     """
 
     options: Options
@@ -94,6 +98,8 @@ class FrameState:
     shapes: tuple[scribbles.Shape, ...] = ()
     reference: float | None = None
     following: Following | None = None
+    mattes: tuple[Matte, ...] = ()
+    open_for: dict[int, float] = field(default_factory=dict)
 
     @property
     def gains(self) -> np.ndarray:
@@ -110,7 +116,8 @@ class FrameState:
         """Hashable, and equal for states that give the same picture of the same frames."""
         shapes = ((s.shutter, s.kind, s.width, *(stroke.tobytes() for stroke in s.strokes)) for s in self.shapes)
         bars = self.bars.shape, self.bars.tobytes()
-        return self.options, *bars, self.reference, self.following and self.following.key, tuple(shapes)
+        following = self.following and self.following.key
+        return self.options, *bars, self.reference, following, self.mattes, tuple(shapes)
 
     def alone(self, chosen: int) -> FrameState:
         """The state of a picture in which one shutter, `chosen`, is everywhere."""

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from . import shutters
-from .messages import EffectError
+from .messages import UserError
 
 EASES = ("linear", "bezier", "constant")
 
@@ -51,12 +51,12 @@ class Channel(Protocol):
     """A value over time."""
 
     def at(self, frame: float) -> Any:
-        """The value at a frame. EffectError: there is none that an effect can have."""
+        """The value at a frame. UserError: there is none that an effect can have."""
 
 
 @dataclass(frozen=True)
 class Constant:
-    """The same value at every frame; an EffectError is raised where the value is asked for."""
+    """The same value at every frame; a UserError is raised where the value is asked for."""
 
     value: Any
 
@@ -79,7 +79,7 @@ class Keys:
 
 @dataclass(frozen=True)
 class Samples:
-    """Values at frames where they were sampled, and nowhere else. An EffectError among them is raised where the value
+    """Values at frames where they were sampled, and nowhere else. A UserError among them is raised where the value
     is asked for.
 
     keys: frames and eases of the keys of the curve that was sampled, ascending; none where it is no curve of keys."""
@@ -157,6 +157,6 @@ def eased_span(frames, eases, frame: float) -> tuple[int, int, float]:
 
 
 def _given(value):
-    if isinstance(value, EffectError):
+    if isinstance(value, UserError):
         raise value.with_traceback(None)  # which would grow with every raise
     return value

@@ -19,6 +19,9 @@ MAX_POINTS = 100_000
 MAX_KEYS = 100_000
 # In characters: as long as Blender's own, and the channels of an EXR file.
 MAX_NAME = 63
+# In characters: the path of a file, as long as Blender's own, and the name of a channel in it.
+MAX_PATH = 1023
+MAX_CHANNEL = 255
 # A bar, and what the bars of a shutter add up to at least: of two shutters, one may be 10¹⁴ times as bright.
 MAX_BAR = 1e6
 MIN_EXPOSURE = 1e-6

@@ -54,6 +54,10 @@ def centre(strokes: Iterable) -> np.ndarray:
     return (points.min(axis=0) + points.max(axis=0)) / 2
 
 
+# The corners of the picture, in fractions of it.
+PICTURE = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+
+
 def corners(strokes: Iterable) -> np.ndarray:
     """The corners (4, 2) of the strokes' common bounding box."""
     points = _points(strokes)

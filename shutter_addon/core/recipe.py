@@ -7,8 +7,11 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 from collections import Counter
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, is_dataclass, replace
 from functools import cache, partial
 from itertools import pairwise
@@ -17,7 +20,7 @@ from typing import Literal, get_args, get_origin
 
 import numpy as np
 
-from . import atomic_write, effect, keyframes, limits, shutters
+from . import atomic_write, effect, keyframes, limits, mattes, shutters
 from .frame_state import Edges, Exposure, FrameState, Interpolation, Light, Options, Position
 from .messages import UserError, sentence
 
@@ -153,13 +156,75 @@ class Region:
 
 
 @dataclass(frozen=True)
+class MatteRegion:
+    """A region by a matte: its values are its shutter's coefficients.
+
+    path: a movie, or the first file of an image sequence; relative to the recipe's folder
+    channel: one of CHANNELS, or the name of a channel of an EXR
+    timing: whose frames show the matte's, frame by frame: those of the source, or of the timeline
+    offset: the matte's frame, from 0, that belongs to the first of these
+    blend, opacity: as of core.mattes.Matte; width: its feather
+    keys: how what it covers moves; the matte itself is not moved"""
+
+    shutter: str
+    kind: Literal["matte"]
+    path: str
+    name: str = ""
+    channel: str = "luminance"
+    invert: bool = False
+    offset: int = 0
+    timing: Literal["source", "timeline"] = "source"
+    blend: mattes.Blend = "over"
+    opacity: Keyable = 1.0
+    width: Keyable = 0.0
+    keys: list[CameraKey] = field(default_factory=list)
+
+    def over_time(self, shutter: int, file: mattes.MatteFile | None) -> effect.MatteRegion:
+        """As plain data; shutter: the index of its shutter, file: what is at its path."""
+        first = None if self.timing == "source" else 1
+        return _matte(self, shutter, mattes.FileFrames(file, self.offset, first))
+
+
+@dataclass(frozen=True)
+class RampRegion:
+    """A region by a ramp (core.mattes.Ramp), or by the luminance of the shown frame; its other fields are as a
+    MatteRegion's, but its keys place the ramp."""
+
+    shutter: str
+    kind: Literal["ramp"]
+    ramp: Literal["linear", "radial", "angle", "luminance"]
+    name: str = ""
+    invert: bool = False
+    blend: mattes.Blend = "over"
+    opacity: Keyable = 1.0
+    width: Keyable = 0.0
+    keys: list[CameraKey] = field(default_factory=list)
+
+    def over_time(self, shutter: int, file: mattes.MatteFile | None) -> effect.MatteRegion:
+        """As plain data; shutter: the index of its shutter, file: the source's luminance."""
+        if self.ramp == "luminance":
+            return _matte(self, shutter, mattes.FileFrames(file))
+        return _matte(self, shutter, effect.PlacedRamp(self.ramp, *_moves(self.keys)))
+
+
+def _matte(region: MatteRegion | RampRegion, shutter: int, content: keyframes.Channel) -> effect.MatteRegion:
+    numbers = _numbers(region.opacity), _numbers(region.width), *_moves(region.keys)
+    return effect.MatteRegion(region.name, shutter, content, region.blend, region.invert, *numbers)
+
+
+CHANNELS = ("luminance", "red", "green", "blue", "alpha")
+AnyRegion = Region | MatteRegion | RampRegion
+_KINDS = {"line": Region, "lasso": Region, "matte": MatteRegion, "ramp": RampRegion}
+
+
+@dataclass(frozen=True)
 class Recipe:
     """time: keys of the source frame that is shown, 1 is the source's first; none: the strip's own timing says it."""
 
     version: Literal[1]
     window: int
     shutters: list[Shutter]
-    regions: list[Region] = field(default_factory=list)
+    regions: list[AnyRegion] = field(default_factory=list)
     position: Position = "start"
     interpolation: Interpolation = "displacement"
     light: Light = "linear"
@@ -180,10 +245,19 @@ class Recipe:
         names = Options.__dataclass_fields__.keys() - {"step", "edge_aware"}
         return Options(**{name: getattr(self, name) for name in names}, step=self.inbetween)
 
-    def effect(self, aspect: float) -> effect.Effect:
-        """As plain data, for a picture of width / height = aspect. Frame 1 is the strip's first."""
+    def effect(
+        self, aspect: float, files: Callable[[MatteRegion | RampRegion], mattes.MatteFile] | None = None
+    ) -> effect.Effect:
+        """As plain data, for a picture of width / height = aspect. Frame 1 is the strip's first.
+
+        files: what gives the file of a matte, or for a ramp the source's luminance; without it, mattes are empty"""
         order = {shutter.name: i for i, shutter in enumerate(self.shutters)}
-        regions = tuple(region.over_time(order[region.shutter], aspect) for region in self.regions)
+        regions = tuple(
+            region.over_time(order[region.shutter], aspect)
+            if isinstance(region, Region)
+            else region.over_time(order[region.shutter], files and files(region))
+            for region in self.regions
+        )
         camera = effect.Camera(*_moves(self.camera))
         followed = {region.name: region for region in regions} | {CAMERA: camera, None: None}
         return effect.Effect(
@@ -201,9 +275,9 @@ class Recipe:
         keys = tuple((key.frame, key.ease) for key in self.time)
         return keyframes.SourceTime(_numbers(self.time), keys)
 
-    def at(self, frame: float, aspect: float) -> FrameState:
-        """The effect at a timeline frame (1 = the strip's first), for a picture of width / height = aspect."""
-        return self.effect(aspect).at(frame)
+    def at(self, frame: float, aspect: float, files=None) -> FrameState:
+        """The effect at a timeline frame (1 = the strip's first); aspect, files: as of `effect`."""
+        return self.effect(aspect, files).at(frame)
 
     def time_at(self, frame: float) -> float | None:
         """The source frame that is shown at a timeline frame, 1 is the first; None: the strip's timing says that."""
@@ -242,6 +316,27 @@ def with_inbetween(source: Recipe, factor: int) -> Recipe:
         ) from None
     window = -(-source.window * factor // source.inbetween)
     return replace(source, window=window, shutters=found, inbetween=factor)
+
+
+def moved(source: Recipe, old: Path, new: Path) -> Recipe:
+    """The same effect for a recipe in another folder: relative paths of mattes lead to the same files."""
+
+    def rebased(region):
+        if not isinstance(region, MatteRegion) or Path(region.path).is_absolute():
+            return region
+        return replace(region, path=relative(old / region.path, new))
+
+    return replace(source, regions=[rebased(region) for region in source.regions])
+
+
+def relative(path: Path, folder: Path) -> str:
+    """The path of a matte, as a recipe in a folder has it: relative, if there is such a one."""
+    with suppress(ValueError):  # on another drive
+        found = os.path.relpath(path, folder)
+        # ".." leads out of where a linked folder really lies
+        if os.path.realpath(os.path.join(folder, found)) == os.path.realpath(path):
+            return Path(found).as_posix()
+    return Path(os.path.abspath(path)).as_posix()
 
 
 def load(path: str | Path) -> Recipe:
@@ -419,6 +514,18 @@ def _dataclass(kind, converter):
     return structure
 
 
+def _region(converter, value, _kind):
+    """Which of the kinds of regions it is, its field `kind` says."""
+    word = value.get("kind", "line") if isinstance(value, dict) else "line"
+    if isinstance(word, str) and word in _KINDS:
+        return converter.structure(value, _KINDS[word])
+    from cattrs.errors import AttributeValidationNote, ClassValidationError
+
+    error = ValueError(f"{_shown(word)} is none of {', '.join(_KINDS)}")
+    error.add_note(AttributeValidationNote("in a region", "kind", str))
+    raise ClassValidationError("in a region", [error], Region)
+
+
 @cache
 def _converter():
     """RecipeError: cattrs is missing. Blender brings it; a Linux distribution's Blender may not, and effects render
@@ -436,6 +543,7 @@ def _converter():
     converter.register_structure_hook(bool, _exactly(bool, "true or false"))
     converter.register_structure_hook_func(lambda kind: get_origin(kind) is Literal, _choice)
     converter.register_structure_hook_func(lambda kind: kind in (Keyable, Keyable | None), partial(_keyable, converter))
+    converter.register_structure_hook_func(lambda kind: kind == AnyRegion, partial(_region, converter))
     converter.register_structure_hook_factory(lambda kind: get_origin(kind) is tuple, _tuple)
     converter.register_structure_hook_factory(lambda kind: get_origin(kind) is list, _list)
     converter.register_structure_hook_factory(is_dataclass, _dataclass)
@@ -513,8 +621,9 @@ def _check(recipe: Recipe) -> None:
     for i, region in enumerate(recipe.regions):
         there_is_none = f"there is no shutter {_shown(region.shutter)}"
         _require(region.shutter in places, f"regions[{i}].shutter", there_is_none)
-        _check_region(region, f"regions[{i}]")
-    points = sum(_most_points(region) for region in recipe.regions)
+        check = _check_region if isinstance(region, Region) else _check_matte
+        check(region, f"regions[{i}]")
+    points = sum(_most_points(region) for region in recipe.regions if isinstance(region, Region))
     _require(points <= limits.MAX_POINTS, "regions", f"{points} points at once, the most are {limits.MAX_POINTS}")
 
 
@@ -534,7 +643,7 @@ def _check_shutter(shutter: Shutter, window: int, place: str) -> None:
             raise RecipeError(f"{where}: {error}") from None
 
 
-def _check_follow(follow: str | None, regions: list[Region], place: str) -> None:
+def _check_follow(follow: str | None, regions: list[AnyRegion], place: str) -> None:
     """A name that two of them have says nothing."""
     if follow is None:
         return
@@ -571,6 +680,20 @@ def _check_region(region: Region, place: str) -> None:
     _check_strokes(region.strokes, f"{place}.strokes")
 
 
+def _check_matte(region: MatteRegion | RampRegion, place: str) -> None:
+    _check_name(region.name, f"{place}.name")
+    _check_number(region.opacity, f"{place}.opacity", 1)
+    _check_number(region.width, f"{place}.width", limits.MAX_DISTANCE)
+    _check_frames(region.keys, f"{place}.keys")
+    for k, key in enumerate(region.keys):
+        _check_placement(key, f"{place}.keys[{k}]")
+    if isinstance(region, MatteRegion):
+        for name, most in (("path", limits.MAX_PATH), ("channel", limits.MAX_CHANNEL)):
+            _require(getattr(region, name), f"{place}.{name}", "empty")
+            _check_name(getattr(region, name), f"{place}.{name}", most)
+        _require_within(region.offset, limits.MAX_FRAME, f"{place}.offset")
+
+
 def _check_strokes(strokes: list[Stroke], place: str) -> None:
     for j, stroke in enumerate(strokes):
         _require(stroke, f"{place}[{j}]", "empty: a stroke has at least one point")
@@ -589,8 +712,8 @@ def _check_count(items: list, most: int, place: str) -> None:
     _require(len(items) <= most, place, f"{len(items)}, the most are {most}")
 
 
-def _check_name(name: str, place: str) -> None:
-    _require(len(name) <= limits.MAX_NAME, place, f"{len(name)} characters, the most are {limits.MAX_NAME}")
+def _check_name(name: str, place: str, most: int = limits.MAX_NAME) -> None:
+    _require(len(name) <= most, place, f"{len(name)} characters, the most are {most}")
     wrong = next((c for c in name if c == "\0" or "\ud800" <= c <= "\udfff"), "")
     _require(not wrong, place, f"U+{ord(wrong or ' '):04X} is no character of a name")
 

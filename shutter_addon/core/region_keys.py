@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from . import motions
+from . import effect, motions
 from .motions import Placement
 from .recipe import CameraKey, Recipe, Region, RegionKey
 
@@ -16,7 +16,7 @@ _DIGITS = 6  # of what was measured: far below a pixel
 # Pixels by which a thinned camera may be off: unlike a region, it carries the picture itself.
 STEADY = 0.25
 # Of the picture, from its centre on.
-CORNERS = np.array([(x, y) for x in (-0.5, 0.5) for y in (-0.5, 0.5)])
+CORNERS = motions.offsets([motions.PICTURE])
 
 
 def with_placements(
@@ -29,22 +29,15 @@ def with_placements(
     size: width and height of the picture; thin: no more keys than the motion needs within a pixel"""
     drawn = {key.frame if key else None: strokes for key, strokes in region.drawings()}
     eases = {key.frame: key.ease for key in region.keys if key.frame in drawn and len(drawn) > 1}
-    first, last = min(placements), max(placements)
     chosen = sorted(placements)
     if thin:
         # behind a drawing with an ease of its own the motion is to go straight
         kept = {*exact, *drawn, *(frame + 1 for frame, ease in eases.items() if ease != "linear")}
         shape = np.concatenate([motions.offsets(strokes) for strokes in drawn.values()])
         chosen = motions.thinned(placements, shape, size, kept)
-    keys = [key for key in region.keys if not first <= key.frame <= last]
-    moved = region.over_time(0, size[0] / size[1])
-    for frame in _cut(region.keys, first - 1, -1) + _cut(region.keys, last + 1, 1):
-        keys.append(RegionKey(frame, tuple(moved.location.at(frame)), moved.rotation.at(frame), moved.scale.at(frame)))
-    for frame in chosen:
-        placement = placements[frame] if frame in exact else _rounded(placements[frame])
-        ease = eases.get(frame, "linear")
-        keys.append(RegionKey(frame, placement.location, placement.rotation, placement.scale, ease=ease))
-    return _redrawn(replace(region, keys=sorted(keys, key=lambda key: key.frame)), drawn)
+    keys = _keys(RegionKey, region.keys, region.over_time(0, size[0] / size[1]), placements, exact, chosen)
+    keys = [replace(key, ease=eases.get(key.frame, key.ease)) for key in keys]
+    return _redrawn(replace(region, keys=keys), drawn)
 
 
 def with_camera(
@@ -52,17 +45,27 @@ def with_camera(
 ) -> Recipe:
     """The recipe whose camera has these placements as its keys; arguments as of with_placements. Thinned keys are
     within a quarter of a pixel of the placements, everywhere in the picture."""
-    first, last = min(placements), max(placements)
     chosen = motions.thinned(placements, CORNERS, size, exact, STEADY) if thin else sorted(placements)
     camera = source.effect(size[0] / size[1]).camera
-    kept = {key.frame: key for key in source.camera if not first <= key.frame <= last}
-    for frame in _cut(source.camera, first - 1, -1) + _cut(source.camera, last + 1, 1):
-        there = camera.placement(frame)
-        kept[frame] = CameraKey(frame, there.location, there.rotation, there.scale)
-    for frame in chosen:
-        there = placements[frame] if frame in exact else _rounded(placements[frame])
-        kept[frame] = CameraKey(frame, there.location, there.rotation, there.scale)
-    return replace(source, camera=[kept[frame] for frame in sorted(kept)])
+    return replace(source, camera=_keys(CameraKey, source.camera, camera, placements, exact, chosen))
+
+
+def _keys(
+    kind: type[RegionKey | CameraKey],
+    keys: list,
+    moving: effect.Region | effect.Camera,
+    placements: Mapping[int, Placement],
+    exact: Collection[int],
+    chosen: list[int],
+) -> list:
+    """Keys with the chosen placements, in place of those from the first placement to the last; moving: what moves by
+    `keys`, and still does so at whole frames beyond."""
+    first, last = min(placements), max(placements)
+    found = {frame: moving.placement(frame) for frame in _cut(keys, first - 1, -1) + _cut(keys, last + 1, 1)}
+    found |= {frame: placements[frame] if frame in exact else _rounded(placements[frame]) for frame in chosen}
+    made = [kind(frame, there.location, there.rotation, there.scale) for frame, there in found.items()]
+    kept = [key for key in keys if not first <= key.frame <= last]
+    return sorted(kept + made, key=lambda key: key.frame)
 
 
 def _cut(keys: list, edge: int, step: int) -> list[int]:

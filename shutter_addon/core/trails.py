@@ -28,9 +28,9 @@ def travelled(places: np.ndarray) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(own)])
 
 
-def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) -> np.ndarray:
+def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) -> tuple[np.ndarray, float]:
     """Bars (L,) of the same shape and sum, open while a subject moves by `length`, no longer than that takes; for the
-    whole window, where it moves less.
+    whole window, where it moves less. And for how many frames that is.
 
     way: of `travelled`, in the unit of the length
     shown: the time in 0 … L that keeps its place; of bars that are closed there, the nearest that is open. Where an end
@@ -54,4 +54,4 @@ def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) 
     width = np.interp(-length, -moved[::-1], widths[::-1]) if length <= moved[-1] else len(bars)
     width = max(float(width), _SHORTEST)
     start = float(starts(width))
-    return shutters.spanning(bars, start, start + width)
+    return shutters.spanning(bars, start, start + width), width

@@ -16,7 +16,7 @@ def interpolate_fields(frame):
     result = av.VideoFrame(frame.width, frame.height, frame.format.name)
     result.colorspace, result.color_range = frame.colorspace, frame.color_range
     for source, target in zip(frame.planes, result.planes, strict=True):
-        rows, out = _rows(source), _rows(target)
+        rows, out = samples_of(source), samples_of(target)
         r = np.concatenate([rows[:1], rows, rows[-1:], rows[-1:]]).astype(np.int16)  # r[i]: row i - 1
         odd = (-r[0:-4:2] + 4 * r[1:-3:2] + 2 * r[2:-2:2] + 4 * r[3:-1:2] - r[4::2] + 4) >> 3
         out[0::2], out[1::2] = rows[0::2], np.clip(odd, 0, 255)
@@ -38,6 +38,7 @@ def blur_rows(picture, opaque):
     return result
 
 
-def _rows(plane):
-    """The plane's samples as a view (height, width) of its memory."""
-    return np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)[: plane.height, : plane.width]
+def samples_of(plane, dtype=np.uint8):
+    """A plane's samples as a view (height, width) of its memory."""
+    samples = np.frombuffer(plane, dtype)
+    return samples.reshape(-1, plane.line_size // samples.itemsize)[: plane.height, : plane.width]

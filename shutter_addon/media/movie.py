@@ -2,19 +2,22 @@
 
 import gc
 import math
+import re
 from fractions import Fraction
 
 import av
 import numpy as np
 
 from ..core.frame_source import FrameSource
+from .channels import CHANNELS, no_channel
 from .decode import FrameReader, fraction, reason
-from .deinterlace import blur_rows, has_fields, interpolate_fields
+from .deinterlace import blur_rows, has_fields, interpolate_fields, samples_of
 from .errors import MediaError
 from .files import check_file, check_index
 
 # Blender's choice for YUV to RGB; libswscale's defaults are a level too dark and smear colours.
 SCALER = "neighbor+accurate_rnd+full_chroma_int"
+_PLANAR_YUV = re.compile(r"yuv[aj]?4\d\dp(\d+le)?")
 
 
 class MovieSource(FrameSource):
@@ -72,15 +75,21 @@ class MovieSource(FrameSource):
     def _pixels(self, frame):
         by_fields = self._deinterlace and has_fields(frame)
         frame = interpolate_fields(frame) if by_fields else frame
-        graph = self._graph_for(frame)
-        graph.vpush(frame)
-        picture = graph.vpull().to_ndarray()
+        picture = self._converted(frame, self._format)
         if self._deinterlace and not by_fields:
             picture = blur_rows(picture, opaque=self.alpha == "opaque")
+        return self._upright(picture)
+
+    def _converted(self, frame, pix_fmt):
+        graph = self._graph_for(frame, pix_fmt)
+        graph.vpush(frame)
+        return graph.vpull().to_ndarray()
+
+    def _upright(self, picture):
         return np.require(np.rot90(picture, -self._turns), requirements=["C", "W"])
 
-    def _graph_for(self, frame):
-        key = (frame.format.name, frame.width, frame.height, frame.colorspace, frame.color_range)
+    def _graph_for(self, frame, pix_fmt):
+        key = (frame.format.name, frame.width, frame.height, frame.colorspace, frame.color_range, pix_fmt)
         if key != self._graph_key:
             self._drop_graph()
             graph = av.filter.Graph()
@@ -88,7 +97,7 @@ class MovieSource(FrameSource):
             nodes = [
                 graph.add_buffer(width=key[1], height=key[2], format=frame.format, time_base=Fraction(1)),
                 graph.add("scale", f"{size}:flags={SCALER}"),
-                graph.add("format", self._format),
+                graph.add("format", pix_fmt),
                 graph.add("buffersink"),
             ]
             graph.link_nodes(*nodes).configure()
@@ -107,6 +116,41 @@ class MovieSource(FrameSource):
             if isinstance(held, dict):
                 held.clear()
         self._graph = self._graph_key = None
+
+
+class MovieChannel(MovieSource):
+    """One channel of a movie's frames: those of MovieSource, whose attributes it has."""
+
+    def __init__(self, path, channel, *, stream=0):
+        """channel: one of CHANNELS. MediaError: it is another one, or the movie cannot be read."""
+        if channel not in CHANNELS:
+            raise no_channel(check_file(path), channel, CHANNELS)
+        super().__init__(path, stream=stream)
+        self._channel = channel
+
+    def read(self, index):
+        """The samples (height, width, n) that the channel is made of: n is 3, RGB, for the luminance of colours, 0 for
+        the alpha of an opaque movie, 1 otherwise. Raises what MovieSource raises."""
+        if self._channel == "alpha" and self.alpha == "opaque":
+            return np.empty((self.height, self.width, 0), self.dtype)
+        return super().read(index)
+
+    def _pixels(self, frame):
+        if self._channel == "luminance" and _is_grey(frame):
+            grey = self._converted(frame, "gray16le" if self.dtype == np.uint16 else "gray")
+            return self._upright(grey)[..., None]
+        return super()._pixels(frame)[..., CHANNELS[self._channel]]
+
+
+def _is_grey(frame):
+    """Whether a frame's luma is the luminance of its RGB: it has no chroma, or a neutral one, as grey pictures get."""
+    name, bits = frame.format.name, frame.format.components[0].bits
+    if name.startswith("gray"):
+        return True
+    if not _PLANAR_YUV.fullmatch(name):
+        return False
+    neutral, dtype = 1 << (bits - 1), np.uint8 if bits == 8 else np.uint16
+    return all((samples_of(plane, dtype) == neutral).all() for plane in list(frame.planes)[1:3])
 
 
 def _round(x):

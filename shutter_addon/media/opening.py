@@ -1,12 +1,18 @@
 """Opens a movie or an image sequence; both give their frames by index, as Blender's strips count them."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..core.frame_source import FrameSource
 from .color import in_colorspace
 from .errors import MediaError
 from .files import check_file
-from .sequence import IMAGE_SUFFIXES, SequenceSource
+from .sequence import IMAGE_SUFFIXES, SequenceChannel, SequenceSource
+
+if TYPE_CHECKING:
+    from .movie import MovieChannel
 
 
 def open_source(
@@ -23,8 +29,8 @@ def open_source(
     deinterlace: a movie strip's option of that name
     """
     path = Path(path)
-    if files is None and path.suffix.lower() not in IMAGE_SUFFIXES:
-        source = _open_movie(path, stream=stream, deinterlace=deinterlace)
+    if _is_movie(path, files):
+        source = _movies(path).MovieSource(path, stream=stream, deinterlace=deinterlace)
     else:
         source = SequenceSource(path, files=files, fps=fps, alpha=alpha)
     try:
@@ -34,13 +40,28 @@ def open_source(
         raise
 
 
-def _open_movie(path, **options):
+def open_channel(path, channel, *, files=None, stream=0) -> SequenceChannel | MovieChannel:
+    """Opens what `open_source` opens, for one channel alone. MediaError: it cannot be read, or has no such channel.
+
+    channel: one of channels.CHANNELS, or the name of a channel of the images' own; files, stream: as of open_source"""
+    path = Path(path)
+    if _is_movie(path, files):
+        return _movies(path).MovieChannel(path, channel, stream=stream)
+    return SequenceChannel(path, channel, files=files)
+
+
+def _is_movie(path, files):
+    return files is None and path.suffix.lower() not in IMAGE_SUFFIXES
+
+
+def _movies(path):
+    """The module that reads movies. MediaError: this one cannot be read, for want of PyAV."""
     try:
-        from .movie import MovieSource
+        from . import movie
     except ImportError as error:  # a package without wheels, or one for another system
         check_file(path)
         raise MediaError(
             f"{path.name}: movies need the Python package PyAV ({error}); "
             "install the zip of Virtual Shutter that is made for your system, or use an image sequence"
         ) from None
-    return MovieSource(path, **options)
+    return movie

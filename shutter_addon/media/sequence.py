@@ -3,7 +3,7 @@
 import bisect
 import re
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import pairwise
 from pathlib import Path
 from stat import S_ISREG
@@ -12,6 +12,7 @@ import numpy as np
 from OpenImageIO import ImageInput, ImageSpec, geterror
 
 from ..core.frame_source import FrameSource
+from .channels import CHANNELS, no_channel
 from .errors import MediaError
 from .files import FOREIGN, check_file, check_index, check_name, check_size
 
@@ -29,65 +30,78 @@ MISSING = 100  # numbers in a row; what lies beyond a wider gap is another seque
 LONGEST = 1_048_574  # Blender's last frame
 
 
-class SequenceSource(FrameSource):
-    """Images as frames.
+class ImageFiles:
+    """The files of an image sequence, by frame.
 
     Found beside its first file, frame i is the file whose number is i above the first's; where a number is missing,
     the file before it holds. Where more than MISSING in a row are, the sequence ends, and `left_out` says so. With
     `files` (an image strip's list) frame i is files[i].
+
+    path: the first file; files: those there are, in order; count: of frames
+    """
+
+    def __init__(self, path, files=None):
+        """MediaError: there is no first file, or its folder cannot be listed."""
+        path = Path(path)
+        self.left_out = ""
+        if files is None:
+            self.path = check_file(path)
+            self._starts, self.files, beyond = _numbered(path)
+            if beyond:
+                last = self.files[-1].name
+                self.left_out = f"{path.name}: the sequence ends with {last}; too many numbers lie before {beyond.name}"
+        else:
+            folder = path if path.is_dir() else path.parent
+            self.files = [folder / file for file in files]
+            if not self.files:
+                raise MediaError(f"{path.name}: an image sequence without files")
+            self._starts = range(len(self.files))
+            self.path = check_file(self.files[0])
+        self.count = self._starts[-1] + 1
+
+    def __getitem__(self, index):
+        return self.files[bisect.bisect_right(self._starts, index) - 1]
+
+
+class SequenceSource(FrameSource):
+    """Images as frames: see ImageFiles for which file is which frame.
+
     Samples are as stored: straight alpha stays straight, EXIF orientation is left alone, and of an EXR the data window
     is the picture, wherever its display window lies; all as in Blender. All frames must have the first one's size and
     sample type; one with alpha among them, and the source has alpha.
     """
 
     def __init__(self, path, *, files=None, fps=None, alpha=None):
-        path = Path(path)
+        self._files = ImageFiles(path, files)
+        self.path, self.count, self.left_out = self._files.path, self._files.count, self._files.left_out
         self.fps = fps
-        self.left_out = ""
-        if files is None:
-            self.path = check_file(path)
-            self._starts, self._files, beyond = _numbered(path)
-            if beyond:
-                last = self._files[-1].name
-                self.left_out = f"{path.name}: the sequence ends with {last}; too many numbers lie before {beyond.name}"
-        else:
-            folder = path if path.is_dir() else path.parent
-            self._files = [folder / file for file in files]
-            if not self._files:
-                raise MediaError(f"{path.name}: an image sequence without files")
-            self._starts = range(len(self._files))
-            self.path = check_file(self._files[0])
-        self.count = self._starts[-1] + 1
         with _opened(self.path) as (_image, spec, layer):
             self.width, self.height = spec.width, spec.height
             self.dtype = _dtype(spec)
         self.transfer = "linear" if self.path.suffix.lower() in LINEAR_SUFFIXES else "srgb"
-        has_alpha = len(layer) in ALPHA or any(map(_has_alpha, dict.fromkeys(self._files)))
+        has_alpha = len(layer) in ALPHA or any(map(_has_alpha, dict.fromkeys(self._files.files)))
         self.alpha = (alpha or self._usual_alpha()) if has_alpha else "opaque"
         self.options = {}
 
     @property
     def files(self):
         """The file of each frame."""
-        return [self._files[bisect.bisect_right(self._starts, index) - 1] for index in range(self.count)]
+        return [self._files[index] for index in range(self.count)]
 
     def read(self, index):
         """The frame as a new array (height, width, 4), RGBA, top row first.
 
         Raises MediaError for a file that is missing, damaged or unlike the first, IndexError outside 0 … count-1."""
         check_index(self, index)
-        path = check_file(self._files[bisect.bisect_right(self._starts, index) - 1])
+        path = check_file(self._files[index])
         with _opened(path) as (image, spec, layer):
             self._check_like_first(path, spec)
             return self._expand(_samples(image, spec, layer, path))
 
     def _check_like_first(self, path, spec):
         size, dtype = (spec.width, spec.height), _dtype(spec)
-        if size != (self.width, self.height):
-            window = "" if size == (spec.full_width, spec.full_height) else " (its data window)"
-            raise MediaError(
-                f"{path.name}: is {size[0]}×{size[1]}{window}, but {self.path.name} is {self.width}×{self.height}"
-            )
+        whole = size == (spec.full_width, spec.full_height)
+        _check_size_like_first(self, path, size, "" if whole else " (its data window)")
         if dtype != self.dtype:
             raise MediaError(f"{path.name}: has {dtype} samples, but {self.path.name} has {self.dtype}")
 
@@ -107,6 +121,75 @@ class SequenceSource(FrameSource):
 
     def close(self):
         """Nothing stays open between frames."""
+
+
+class SequenceChannel:
+    """One channel of the images of a sequence: see ImageFiles for which file is which frame.
+
+    Samples are as stored, of any type. All frames must have the first one's size. An EXR's picture is its display
+    window, since mattes are often cropped to what they cover: what its data window leaves out is 0. Where that is
+    larger all around, it is the picture, as in Blender.
+
+    path: the first file; width, height: pixels; count: of frames; fps: none
+    """
+
+    fps = None
+
+    def __init__(self, path, channel, *, files=None):
+        """channel: one of CHANNELS, or the name of one of the files' own. MediaError: they have none of that name."""
+        self._files = ImageFiles(path, files)
+        self.path, self.count = self._files.path, self._files.count
+        self._found = partial(_channel_named, channel)
+        with _opened(self.path, self._found) as (image, spec, _positions):
+            _, _, self.width, self.height = _picture_window(image, spec, self.path)
+
+    @property
+    def files(self):
+        """The file of each frame."""
+        return [self._files[index] for index in range(self.count)]
+
+    def read(self, index):
+        """The samples (height, width, n) that the channel is made of, top row first: n is 3, RGB, for the luminance of
+        colours, 0 for the alpha of an opaque image, 1 otherwise.
+
+        Raises MediaError for a file that is missing, damaged or unlike the first, IndexError outside 0 … count-1."""
+        check_index(self, index)
+        path = check_file(self._files[index])
+        with _opened(path, self._found) as (image, spec, positions):
+            window = _picture_window(image, spec, path)
+            _check_size_like_first(self, path, window[2:])
+            if not positions:
+                return np.empty((self.height, self.width, 0), np.uint8)
+            return _in_window(_samples(image, spec, positions, path), spec, window)
+
+    def close(self):
+        """Nothing stays open between frames."""
+
+
+def _check_size_like_first(sequence, path, size, window=""):
+    if size != (sequence.width, sequence.height):
+        first = f"{sequence.path.name} is {sequence.width}×{sequence.height}"
+        raise MediaError(f"{path.name}: is {size[0]}×{size[1]}{window}, but {first}")
+
+
+def _picture_window(image, spec, path):
+    """(x, y, width, height) of what a SequenceChannel shows of an image."""
+    if image.format_name() != "openexr" or spec.roi.contains(spec.roi_full):
+        return spec.x, spec.y, spec.width, spec.height
+    check_size(path.name, spec.full_width, spec.full_height)
+    return spec.full_x, spec.full_y, spec.full_width, spec.full_height
+
+
+def _in_window(samples, spec, window):
+    """An image's samples in a window (x, y, width, height), 0 beside them."""
+    x, y, width, height = window
+    if window == (spec.x, spec.y, spec.width, spec.height):
+        return samples
+    rows, columns = np.arange(height) + y - spec.y, np.arange(width) + x - spec.x
+    down, across = (rows >= 0) & (rows < spec.height), (columns >= 0) & (columns < spec.width)
+    picture = np.zeros((height, width, samples.shape[2]), samples.dtype)
+    picture[np.ix_(down, across)] = samples[np.ix_(rows[down], columns[across])]
+    return picture
 
 
 def _numbered(path):
@@ -169,26 +252,6 @@ def _had_alpha(path, _size, _mtime):
         return len(layer) in ALPHA
 
 
-@contextmanager
-def _opened(path):
-    """(open image, spec, its colour channels' positions: Y, YA, RGB or RGBA). MediaError: there is no such image."""
-    wishes = ImageSpec()
-    wishes.attribute("oiio:UnassociatedAlpha", 1)  # no premultiplication on reading
-    image = ImageInput.open(check_name(path), wishes)
-    if image is None:
-        raise MediaError(f"{path.name}: cannot be read as an image ({_told(geterror, path, 'unknown format')})")
-    try:
-        if image.format_name() not in BLENDERS_FORMATS.split():
-            raise MediaError(f"{path.name}: {FOREIGN}")
-        spec, layer = _first_colours(image, path)
-        check_size(path.name, spec.width, spec.height)
-        yield image, spec, layer
-    except UnicodeDecodeError as error:  # names within a damaged file
-        raise MediaError(f"{path.name}: cannot be read as an image ({_as_text(error)})") from None
-    finally:
-        image.close()
-
-
 def _first_colours(image, path):
     """(spec, positions) of the channels that Blender shows."""
     spec = whole = image.spec()
@@ -205,6 +268,26 @@ def _first_colours(image, path):
         names += [f"deep {name}" for name in spec.channelnames] if spec.deep else spec.channelnames
         part += 1
     raise MediaError(f"{path.name}: no colour channels, only {', '.join(names)}")
+
+
+def _channel_named(channel, image, path):
+    """(spec, positions) of a channel: three for the luminance of colours, none for the alpha of an opaque image.
+    What an EXR calls "red" itself is that: coefficients have the names of shutters."""
+    names, part, is_exr = [], 0, image.format_name() == "openexr"
+    while (is_exr or channel not in CHANNELS) and image.seek_subimage(part, 0):
+        spec = image.spec()
+        if not spec.deep:
+            if channel in spec.channelnames:
+                return spec, [spec.channelnames.index(channel)]
+            names += spec.channelnames
+        part += 1
+    if channel not in CHANNELS:
+        raise no_channel(path, channel, names if is_exr else CHANNELS)
+    spec, layer = _first_colours(image, path)
+    colours, alpha = (layer[:-1], layer[-1:]) if len(layer) in ALPHA else (layer, [])
+    if channel == "alpha":
+        return spec, alpha
+    return spec, colours if channel == "luminance" else (3 * colours)[CHANNELS[channel]]
 
 
 def _colour_channels(names):
@@ -228,6 +311,28 @@ def _rank(place):
     return layer, name not in ("", "Combined"), name
 
 
+@contextmanager
+def _opened(path, found=_first_colours):
+    """(open image, spec, positions of channels). MediaError: there is no such image.
+
+    found: gives spec and positions; those of the colours are Y, YA, RGB or RGBA"""
+    wishes = ImageSpec()
+    wishes.attribute("oiio:UnassociatedAlpha", 1)  # no premultiplication on reading
+    image = ImageInput.open(check_name(path), wishes)
+    if image is None:
+        raise MediaError(f"{path.name}: cannot be read as an image ({_told(geterror, path, 'unknown format')})")
+    try:
+        if image.format_name() not in BLENDERS_FORMATS.split():
+            raise MediaError(f"{path.name}: {FOREIGN}")
+        spec, layer = found(image, path)
+        check_size(path.name, spec.width, spec.height)
+        yield image, spec, layer
+    except UnicodeDecodeError as error:  # names within a damaged file
+        raise MediaError(f"{path.name}: cannot be read as an image ({_as_text(error)})") from None
+    finally:
+        image.close()
+
+
 def _dtype(spec):
     return np.dtype(SAMPLES.get(str(spec.format), np.float32))
 
@@ -236,7 +341,9 @@ def _samples(image, spec, layer, path):
     """The layer's samples (height, width, channels)."""
     kinds = {np.uint8: "uint8", np.uint16: "uint16", np.float16: "half", np.float32: "float"}
     kind, first, stop = kinds[_dtype(spec).type], min(layer), max(layer) + 1
-    if image.format_name() == "openexr" and str(spec.channelformat(layer[0])) == "uint":
+    if image.format_name() != "openexr":  # they hold a pixel's channels together: some take longer than all
+        first, stop = 0, max(stop, min(spec.nchannels, 4))
+    elif str(spec.channelformat(layer[0])) == "uint":
         kind = "uint"  # whole numbers of an EXR stand for themselves
     samples = image.read_image(image.current_subimage(), 0, first, stop, kind)
     if samples is None or image.has_error or samples.size != spec.height * spec.width * (stop - first):

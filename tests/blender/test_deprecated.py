@@ -7,8 +7,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("shutter_addon", "scripts", "gallery", "tests", "docs", ".")
 SUFFIXES = {".py", ".md", ""}
-# Scenes and clips have properties of the same names, which stay.
-OTHERS = {"scene", "edit", "edit()", "film", "clip"}
+# Scenes, clips and masks have properties of the same names, which stay.
+OTHERS = {"scene", "edit", "edit()", "film", "clip", "mask"}
 
 
 def deprecated(bpy):

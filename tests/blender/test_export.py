@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -95,10 +96,26 @@ def camera_keys(draw):
 
 
 @st.composite
+def mattes(draw, names):
+    """A matte, of the footage's own file, or a ramp."""
+    fields = {"shutter": draw(st.sampled_from(names)), "name": draw(text), "invert": draw(st.booleans())}
+    fields |= {"blend": draw(st.sampled_from(["over", "add"])), "keys": draw(st.just([]) | camera_keys())}
+    fields |= {"opacity": draw(numbers(0, 1) | value_keys(0, 1)), "width": draw(numbers(0, 1) | value_keys(0, 1))}
+    if draw(st.booleans()):
+        ramp = draw(st.sampled_from(["linear", "radial", "angle", "luminance"]))
+        return recipes.RampRegion(kind="ramp", ramp=ramp, **fields)
+    fields |= {"offset": draw(st.integers(-9, 9)), "timing": draw(st.sampled_from(["source", "timeline"]))}
+    channel = draw(st.sampled_from(["luminance", "red", "green", "blue", "alpha"]))
+    return recipes.MatteRegion(kind="matte", path="in/f0001.png", channel=channel, **fields)
+
+
+@st.composite
 def following_recipes(draw, longest=6):
-    """Recipes whose shutters follow the camera, or regions, which have names of their own."""
+    """Recipes with mattes, whose shutters follow the camera, or regions, which have names of their own."""
     found = draw(valid_recipes(longest))
-    named = [dataclasses.replace(region, name=f"{region.name[:9]}{i}") for i, region in enumerate(found.regions)]
+    laid = draw(st.lists(mattes([shutter.name for shutter in found.shutters]), max_size=2))
+    regions_ = draw(st.permutations([*found.regions, *laid]))
+    named = [dataclasses.replace(region, name=f"{region.name[:9]}{i}") for i, region in enumerate(regions_)]
     followed = st.sampled_from([None, recipes.CAMERA, *(region.name for region in named)])
     shutters = [dataclasses.replace(shutter, follow=draw(followed)) for shutter in found.shutters]
     trails = st.none() | numbers(0, 10) | value_keys(0, 10)
@@ -121,13 +138,19 @@ def effect_on(bpy, edit, tmp_path):
 def apply(effect_on, data):
     from shutter_addon.blender.data import recipe_import
 
-    recipe_import.apply(*effect_on, recipes.parse(json.dumps(data)) if isinstance(data, dict) else data)
+    source = recipes.parse(json.dumps(data)) if isinstance(data, dict) else data
+    recipe_import.apply(*effect_on, source, folder_of(effect_on))
 
 
 def export(effect_on):
-    from shutter_addon.blender.data.recipe_export import recipe_of
+    from shutter_addon.blender.rendering.matte_export import recipe_for
 
-    return recipe_of(*effect_on)
+    return recipe_for(*effect_on, folder_of(effect_on) / "recipe.json")
+
+
+def folder_of(effect_on):
+    """Beside that of the footage."""
+    return Path(effect_on[0].sequence_editor.strips["images"].directory).parent
 
 
 @settings(max_examples=60, suppress_health_check=list(HealthCheck))

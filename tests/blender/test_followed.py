@@ -52,8 +52,8 @@ def shown(bpy, edit, tmp_path):
     from shutter_addon.blender.editing import add_effect
     from shutter_addon.blender.rendering import session
 
-    def show(data, velocity, frame, change=lambda source: None):
-        first = write_frames(tmp_path / "in", [codes(index, velocity) for index in range(COUNT)])
+    def show(data, velocity, frame, change=lambda source: None, film=codes):
+        first = write_frames(tmp_path / "in", [film(index, velocity) for index in range(COUNT)])
         source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
         for i in range(2, COUNT + 1):
             source.elements.append(f"f{i:04d}.png")
@@ -66,10 +66,10 @@ def shown(bpy, edit, tmp_path):
     session.forget()
 
 
-def levels_off(request, velocity):
+def levels_off(request, velocity, film=codes):
     """How far a picture is at most from the shown frame as it is, in 8-bit levels."""
     picture = light.to_encoded(request.picture()[..., :3].astype(float))
-    return np.abs(255 * picture - codes(request.index, velocity))[INSIDE].max()
+    return np.abs(255 * picture - film(request.index, velocity))[INSIDE].max()
 
 
 # Whole pixels are exact, and between pixels the cubic is nearly so.
@@ -103,6 +103,27 @@ def test_keyed_time(shown, speed):
     keys = {frame: place(np.floor(value - 0.5), velocity) for frame, value in values.items()}
     *_, found = shown(following(keys, time=time), velocity, 5)
     assert levels_off(found, velocity) <= 0.6
+
+
+CUT = 12
+
+
+def two_shots(index, velocity):
+    """The second of them upside down, and half as bright."""
+    return codes(index, velocity) if index < CUT else codes(index, velocity)[::-1] // 2
+
+
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+def test_the_exposure_ends_at_a_cut(shown, position):
+    """Frames that are held in place of those beyond lie where they are themselves, whatever the keys say there."""
+    velocity, upward = (2, -1), (2, 1)
+    keys = {1: place(0, velocity), CUT: place(CUT - 1, velocity), CUT + 1: place(CUT, upward)}
+    data = following(keys | {COUNT: place(COUNT - 1, upward)}, position=position)
+    for frame in (CUT - 1, CUT, CUT + 1, CUT + 2):
+        *_, found = shown(data, velocity, frame, film=two_shots)
+        assert levels_off(found, velocity, two_shots) <= 0.6
+    options = replace(found.state.options, stop_at_cuts=False, position="center")
+    assert levels_off(replace(found, state=replace(found.state, options=options)), velocity, two_shots) > 30
 
 
 def test_the_camera_and_nothing_left_behind(shown):
@@ -147,6 +168,8 @@ def test_a_region_that_is_renamed_or_removed(shown):
 
 def test_the_trails_length_is_keyed(shown):
     """Bars in Blender are those of the recipe; of what is not keyed, too, and of what has no length."""
+    from shutter_addon.blender.editing import bar_edits
+
     velocity, keys = (3, 0), {frame: place((frame - 1) ** 2 / COUNT, (3, 0)) for frame in range(1, COUNT + 1)}
     data = following(keys, position="center")
     shutter = data["shutters"][0]
@@ -157,6 +180,13 @@ def test_the_trails_length_is_keyed(shown):
     assert 1 < bars.sum() / bars.max() < WINDOW - 0.5
     shutter["trail"] = 0.175
     assert core_bars(data, 10) == pytest.approx(bars)
+    for frame, shutter["trail"] in ((10, 0.175), (12, 0.225)):
+        edit.frame_set(frame)
+        bars = core_bars(data, frame)
+        open_for = f"{bars.sum() / bars.max():.3g}"
+        assert bar_edits.open_for(edit, effect, strip, 0) == f"Open for {open_for} of {WINDOW} frames here"
+    edit.frame_set(COUNT + 1)
+    assert bar_edits.open_for(edit, effect, strip, 0) is None, "nothing is shown there"
     effect.shutters[0].length = "FRAMES"
     assert np.array_equal(request(edit, effect, strip, 10).state.bars, np.ones((1, WINDOW)))
     effect.shutters[0].length, effect.shutters[0].follow = "MOTION", "NOTHING"

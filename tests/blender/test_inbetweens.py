@@ -9,6 +9,7 @@ import pytest
 from standin import between
 from support import picture_of, request, write_frames
 
+from shutter_addon.blender.data import fcurves
 from shutter_addon.core import light, shutters
 from shutter_addon.media import inbetween, open_source
 
@@ -94,6 +95,25 @@ def test_a_window_stops_in_the_middle_of_a_cut_pair(film, add, edit, render, sam
     same_pixels(render(edit, (7,))[7][..., :3], shown(frames, window), 1)
     effect.stop_at_cuts, effect.position = False, "START"
     same_pixels(render(edit, (6,))[6][..., :3], shown(frames, range(20, 30)), 1)
+
+
+def test_an_exposure_that_follows_takes_the_motion_between(film, add, edit, render, same_pixels):
+    """By four pixels a filmed frame, so that in-between ones are seen at whole pixels; those beyond the cut are not."""
+    first, frames = film
+    _source, _strip, effect = add(first, COUNT, np.ones(6))
+    effect.shutters[0].follow = "CAMERA"
+    for frame in (1, COUNT):
+        effect.camera.location = (FACTOR * frame / 40, 0)
+        edit.keyframe_insert(effect.camera.path_from_id("location"), frame=frame)
+    for curve in fcurves.curves_under(edit, effect.camera.path_from_id("location")):
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+    end = (CUT - 1) * FACTOR + FACTOR // 2  # the last of the first shot
+    for frame, picture in render(edit, (2, 6)).items():
+        start = (frame - 1) * FACTOR
+        window = np.minimum(np.arange(start, start + 6), end)
+        moved = np.stack([np.roll(frames[k], start - k, axis=1) for k in window])
+        same_pixels(picture[:, :-6, :3], shown(moved, range(6))[:, :-6], 1)
 
 
 def test_reversed_frames(film, add, edit, render, same_pixels):

@@ -174,7 +174,10 @@ def test_pasted_strips_have_their_effect(bpy, edit, add, images, render, cut):
     """Blender's clipboard does not hold the scenes that strips show."""
     add()
     clip = bpy.data.movieclips.load(str(images))
-    edit.virtual_shutter.effects[0].regions[0].follow_clip = edit.virtual_shutter.effects[0].camera.follow_clip = clip
+    effect = edit.virtual_shutter.effects[0]
+    effect.regions[0].follow_clip = effect.camera.follow_clip = clip
+    effect.regions[0].image, effect.regions[0].mask = bpy.data.images.new("matte", 4, 4), bpy.data.masks.new("mask")
+    effect.regions[0].strip = "deleted with it"
     before = render(edit, [1, 5, 9, 20])
     assert not np.array_equal(before[1], before[20])
     for s in edit.sequence_editor.strips:
@@ -193,6 +196,8 @@ def test_pasted_strips_have_their_effect(bpy, edit, add, images, render, cut):
     assert [effect.start for effect in edit.virtual_shutter.effects] == ([101, 201] if cut else [1, 101, 201])
     assert all(effect.regions[0].follow_clip == clip for effect in edit.virtual_shutter.effects)
     assert all(effect.camera.follow_clip == clip for effect in edit.virtual_shutter.effects)
+    for region, *_ in (effect.regions for effect in edit.virtual_shutter.effects):
+        assert (region.image.name, region.mask.name, region.strip) == ("matte", "mask", "deleted with it")
     for frame, picture in before.items():
         assert np.array_equal(shown[frame + 100], picture)
         assert np.array_equal(shown[frame + 200], picture)

@@ -196,6 +196,18 @@ def test_draw_makes_a_region_and_takes_up_the_pen(bpy, effect, preview):
     assert tool(bpy) == "builtin.annotate_eraser"
 
 
+def test_a_stroke_over_a_regions_handle_is_the_pens(bpy, effect, preview):
+    from shutter_addon.blender.interface.region_gizmo import SHUTTER_GGT_region
+
+    handles = []
+    for operator in ("draw", "erase"):
+        getattr(bpy.ops.shutter, operator)()
+        handles.append(SHUTTER_GGT_region.poll(bpy.context))
+        bpy.ops.wm.tool_set_by_id(name="builtin.select_box", space_type="SEQUENCE_EDITOR")
+        handles.append(SHUTTER_GGT_region.poll(bpy.context))
+    assert handles == [False, True, False, True]
+
+
 def test_the_pen_draws_on_the_layer_of_the_active_region(bpy, effect, preview):
     for _ in range(2):
         region_edits.add_region(effect, effect.shutters[1])

@@ -26,7 +26,15 @@ RECIPES = [
     recipe(2, [1, 0]),
     recipe(4, {1: [1, 0, 0, 0], 9: [0, 0, 0, 1]}, [1, 1, 1, 1], regions=[MOVED]),
     recipe(3, [1, 1, 1], {5: [0, 1, 0]}, regions=[REGION, MOVED | {"name": "Hand"}]),
+    recipe(
+        3,
+        [1, 1, 1],
+        [0, 1, 0],
+        regions=[MOVED | {"shutter": "S0"}],
+        camera=[{"frame": 2}, {"frame": 8, "location": [0.1, 0]}],
+    ),
 ]
+RECIPES[-1]["shutters"][0] |= {"follow": "Face", "trail": 0.1}
 MOST_EFFECTS = 6
 EXAMPLES = 25  # about 250 steps of work
 
@@ -57,7 +65,13 @@ def snapshot(bpy):
             (
                 (e.name, e.source, e.start, e.window),
                 [
-                    (s.name, [b.weight for b in s.bars if (b.path_from_id("weight"), 0) not in curves])
+                    (
+                        s.name,
+                        s.follow,
+                        s.follow_region,
+                        s.length,
+                        [b.weight for b in s.bars if (b.path_from_id("weight"), 0) not in curves],
+                    )
                     for s in e.shutters
                 ],
                 [(r.name, r.shutter, r.layer) for r in e.regions],
@@ -93,6 +107,7 @@ class Work(RuleBasedStateMachine):
         edit.sequence_editor_create()
         for channel, start in ((1, 1), (2, 21)):
             self.add_source(edit, channel, start)
+        self.add_recipe(edit, edit.sequence_editor.strips[0], RECIPES[-1])
         self.clear_history()
 
     def teardown(self):
@@ -104,6 +119,13 @@ class Work(RuleBasedStateMachine):
         source = edit.sequence_editor.strips.new_image("images", str(files[0]), channel, start)
         for file in files[1:]:
             source.elements.append(file.name)
+
+    def add_recipe(self, edit, source, chosen):
+        from shutter_addon.blender.data import recipe_import
+        from shutter_addon.blender.editing import add_effect
+
+        strip, effect = add_effect.add_effect(edit, source)
+        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(chosen)))
 
     # Undo
 
@@ -156,16 +178,11 @@ class Work(RuleBasedStateMachine):
 
     @rule(data=st.data(), late=st.booleans())
     def add_effect(self, data, late):
-        from shutter_addon.blender.data import recipe_import
-        from shutter_addon.blender.editing import add_effect
-
         edit = data.draw(st.sampled_from(edits(self.bpy)))
         if not (sources := plain_strips(edit, "IMAGE")) or len(edit.virtual_shutter.effects) >= MOST_EFFECTS:
             return
         with self.step(late):
-            strip, effect = add_effect.add_effect(edit, data.draw(st.sampled_from(sources)))
-            chosen = data.draw(st.sampled_from(RECIPES))
-            recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(chosen)))
+            self.add_recipe(edit, data.draw(st.sampled_from(sources)), data.draw(st.sampled_from(RECIPES)))
 
     @rule(data=st.data(), late=st.booleans(), kind=st.sampled_from(["SCENE", "SCENE", "IMAGE"]))
     def remove_strip(self, data, late, kind):
@@ -222,6 +239,25 @@ class Work(RuleBasedStateMachine):
                 layer.info = "Renamed"
             elif what == "delete":
                 layer.id_data.layers.remove(layer)
+
+    @rule(
+        data=st.data(),
+        late=st.booleans(),
+        name=st.sampled_from(["track", "track_camera", "panning_shot", "tripod"]),
+    )
+    def track(self, data, late, name):
+        from shutter_addon.blender.data import selection, strips
+
+        edit = data.draw(st.sampled_from(edits(self.bpy)))
+        if not (found := strips.effect_strips(edit)):
+            return
+        strip = data.draw(st.sampled_from(found))
+        self.bpy.context.window.scene = edit
+        selection.choose(edit, strip)
+        edit.frame_set(data.draw(st.integers(strip.left_handle, strip.right_handle - 1)))
+        # There may be no region, or nothing to track.
+        with self.step(late), contextlib.suppress(RuntimeError), sequencer(self.bpy):
+            getattr(self.bpy.ops.shutter, name)()
 
     @rule(data=st.data(), late=st.booleans())
     def change_window(self, data, late):
@@ -334,7 +370,8 @@ class Work(RuleBasedStateMachine):
 
 def test_random_work(bpy, tmp_path):
     Work.folder = tmp_path
-    write_frames(tmp_path / "in", np.zeros((30, 8, 8, 3), dtype=np.uint8))
+    noise = np.random.default_rng(0).integers(0, 256, (12, 16, 3), dtype=np.uint8).repeat(6, 0).repeat(6, 1)
+    write_frames(tmp_path / "in", np.stack([np.roll(noise, index, axis=1) for index in range(30)]))
     limits = settings(
         max_examples=EXAMPLES, stateful_step_count=20, derandomize=True, suppress_health_check=list(HealthCheck)
     )

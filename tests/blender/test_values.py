@@ -6,6 +6,7 @@ import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -99,10 +100,30 @@ def identify_another(effect, kind):
     new().virtual_shutter_source = effect.source
 
 
+def follow_camera(effect):
+    """By a length of motion."""
+    effect.shutters[0].follow, effect.shutters[0].length = "CAMERA", "MOTION"
+
+
 def use_time(effect, value):
     effect.use_source_time = True
     unkey(effect, "source_time")
     effect.source_time = value
+
+
+def ramp(effect, kind="RAMP", **values):
+    """A new ramp or matte of the second shutter."""
+    from shutter_addon.blender.editing import region_edits
+
+    return region_edits.add_matte(effect, effect.shutters[1], kind, "Ramp", **values)
+
+
+def image(effect):
+    """A new matte, the footage's own first frame."""
+    import bpy
+
+    source = source_of(effect)
+    return ramp(effect, "MATTE", image=bpy.data.images.load(source.directory + source.elements[0].filename))
 
 
 IMPOSSIBLE = {
@@ -136,6 +157,42 @@ IMPOSSIBLE = {
     "rotation": (lambda e: raw(e.regions[0], "rotation", INF), 'region "Face": Rotation is inf, not -360000 to 360000'),
     "location": (lambda e: raw(e.regions[0], "location", [0.0, NAN]), 'region "Face": Location is nan'),
     "width": (lambda e: raw(e.regions[0], "width", -1.0), 'region "Face": Width is -1'),
+    "opacity": (lambda e: raw(ramp(e), "opacity", 1.5), 'region "Ramp": Opacity is 1.5, not 0 to 1'),
+    "keyed nan feather": (lambda e: key(ramp(e), "feather", (1, NAN), (9, NAN)), 'region "Ramp": Feather is nan'),
+    "a ramp": (lambda e: raw(ramp(e), "ramp", 9), 'region "Ramp": Ramp is none of its choices'),
+    "a ramp's place": (lambda e: raw(ramp(e), "location", [0.0, INF]), 'region "Ramp": Location is inf'),
+    "blend": (lambda e: raw(ramp(e), "blend", -1), 'region "Ramp": Blend is none of its choices'),
+    "matte": (lambda e: raw(ramp(e, "MATTE"), "matte", 7), 'region "Ramp": From is none of its choices'),
+    "no matte": (lambda e: ramp(e, "MATTE"), 'region "Ramp": it has no matte file'),
+    "no matte strip": (lambda e: raw(ramp(e, "MATTE", matte="STRIP"), "strip", "x"), "its matte strip was deleted"),
+    "channel": (lambda e: raw(ramp(e, "MATTE", matte="STRIP", strip_name="images"), "channel", 9), "Channel is none"),
+    "offset": (lambda e: raw(image(e), "offset", 2**31 - 1), 'region "Ramp": Offset is 2.147484e+09, not'),
+    "timing": (lambda e: raw(image(e), "timing", 5), 'region "Ramp": Frames Of is none of its choices'),
+    "follow": (lambda e: raw(e.shutters[0], "follow", 9), 'shutter "Long": Follow is none of its choices'),
+    "length": (
+        lambda e: follow_camera(e) or raw(e.shutters[0], "length", 7),
+        'shutter "Long": Length is none of its choices',
+    ),
+    "trail": (
+        lambda e: follow_camera(e) or raw(e.shutters[0], "trail", -1.0),
+        'shutter "Long": Trail Length is -1, not 0 to 1000',
+    ),
+    "keyed nan trail": (
+        lambda e: follow_camera(e) or key(e.shutters[0], "trail", (1, NAN), (9, NAN)),
+        'shutter "Long": Trail Length is nan',
+    ),
+    "camera": (
+        lambda e: follow_camera(e) or raw(e.camera, "location", [0.0, NAN]),
+        'camera of effect "Shutter": Location is nan',
+    ),
+    "keyed nan camera": (
+        lambda e: follow_camera(e) or key(e.camera, "rotation", (1, NAN), (9, NAN)),
+        'camera of effect "Shutter": Rotation is nan',
+    ),
+    "a far key of the camera": (
+        lambda e: follow_camera(e) or key(e.camera, "scale", (1, 1), (3e9, 1)),
+        'camera of effect "Shutter": Scale has a keyframe at frame 3e+09',
+    ),
     "follow edges": (lambda e: raw(e, "edge_aware", 1.5), 'effect "Shutter": Follow Edges is 1.5, not 0 to 1'),
     "keyed nan edges": (lambda e: key(e, "edge_aware", (1, NAN), (9, NAN)), 'effect "Shutter": Follow Edges is nan'),
     "source time": (lambda e: use_time(e, NAN), 'effect "Shutter": Source Time is nan'),
@@ -352,7 +409,14 @@ def test_random_values(bpy, edit, effect, seed):
 
 def corrupt(rng, effect):
     """Gives a random property of the effect, or of what belongs to it, a random value, or a random F-curve."""
-    groups = [effect, *effect.shutters, *effect.regions, *effect.shutters[0].bars, *effect.shutters[1].bars]
+    groups = [
+        effect,
+        effect.camera,
+        *effect.shutters,
+        *effect.regions,
+        *effect.shutters[0].bars,
+        *effect.shutters[1].bars,
+    ]
     natives = [strip_of(effect).transform, strip_of(effect).crop, source_of(effect), strip_of(effect)]
     group = rng.choice(groups[:1] * 6 + groups + natives * 2)
     names = [
@@ -383,12 +447,11 @@ def rendered(scene):
 
 
 def exported(edit, effect):
-    from shutter_addon.blender.data import recipe_export
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import matte_export, session
     from shutter_addon.core.recipe import RecipeError
 
-    with suppress(*session.FAULTS, RecipeError):
-        recipe_export.recipe_of(edit, effect, strip_of(effect))
+    with suppress(*session.FAULTS, RecipeError), TemporaryDirectory() as folder:
+        matte_export.recipe_for(edit, effect, strip_of(effect), Path(folder, "r.json"))
 
 
 class Layout:

@@ -73,9 +73,9 @@ def device(request):
     return open_compositor(request.param)[0]
 
 
-def composed(device, source, moment, index, direction=1, shot=None):
+def composed(device, source, moment, index, direction=1, shot=None, mattes=None):
     """A device's picture, and the reference's with the same coefficients."""
-    renderer = Renderer(device, source)
+    renderer = Renderer(device, source, mattes)
     picture = renderer.picture(index, moment, direction)
     c = renderer.coefficients(index, moment, direction)
     block = moment.options.aggregate
@@ -89,8 +89,8 @@ def composed(device, source, moment, index, direction=1, shot=None):
     return picture, expected
 
 
-def check(device, source, moment, index, direction=1, shot=None):
-    picture, expected = composed(device, source, moment, index, direction, shot)
+def check(device, source, moment, index, direction=1, shot=None, mattes=None):
+    picture, expected = composed(device, source, moment, index, direction, shot, mattes)
     # Light above white differs in proportion: compare it relatively.
     difference = np.abs(light.to_encoded(picture.astype(np.float64)) - light.to_encoded(expected))
     assert (difference / np.maximum(1, np.abs(expected))).max() <= LEVEL
@@ -285,7 +285,7 @@ def test_long_windows_of_shutters_far_apart(device, count):
 
 @pytest.mark.parametrize("edges", ["hold", "shorten"])
 @pytest.mark.parametrize("stored", ["uint8", "float32"])
-def test_walks_through_pieces(gpu_device, monkeypatch, edges, stored):
+def test_each_pixel_looks_up_its_pieces(gpu_device, monkeypatch, edges, stored):
     monkeypatch.setattr(gpu, "_MOST_ITERATIONS", 0)
     rng = np.random.default_rng(19)
     source = footage(rng, dtype=np.dtype(stored), transfer="linear" if stored == "float32" else "srgb")

@@ -4,11 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_composition import SHAPES, check, device, footage, state  # noqa: F401
+from test_composition import SHAPES, check, device, few_pieces, footage, state  # noqa: F401
+from test_shots import SHOTS, shots_of
 
 from shutter_addon.compute import window
+from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.core.frame_state import Following
+from shutter_addon.core.scribbles import Shape
 
 
 def motions(rng, count, shutters, followers, size=(37, 23)):
@@ -49,6 +52,16 @@ def test_ends_of_the_clip(device, interpolation, edges, index, direction):  # no
     check(device, source, following(rng, source, moment, (0, 1)), index, direction)
 
 
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize(("index", "direction"), [(5, 1), (12, -1), (13, 1)])
+def test_windows_end_at_cuts(device, edges, index, direction):  # noqa: F811
+    """What is seen of a frame of the shot in place of one beyond, lies where that frame has it."""
+    rng = np.random.default_rng(41)
+    source, options = shots_of(np.uint8), {"edges": edges, "position": "center"}
+    for moment in (state(rng, **options), few_pieces(rng, 12, **options)):
+        check(device, source, following(rng, source, moment, (0, 1)), index, direction, SHOTS[index])
+
+
 @pytest.mark.parametrize("alpha", ["straight", "premultiplied"])
 @pytest.mark.parametrize(
     ("dtype", "transfer"), [(np.uint8, "srgb"), (np.uint16, "linear"), (np.float16, "srgb"), (np.float32, "linear")]
@@ -67,6 +80,15 @@ def test_many_shutters(device):  # noqa: F811
     rng = np.random.default_rng(34)
     source, moment = footage(rng), state(rng, count=6)
     check(device, source, following(rng, source, moment, (0, 4, 5)), 3)
+
+
+def test_most_shutters_and_frames(gpu_device):
+    """More turns of loops than a software renderer goes through, were each pixel to pass all pieces."""
+    rng = np.random.default_rng(40)
+    source = footage(rng, count=256, size=(16, 4))
+    shapes = tuple(Shape(i, "line", 0, (np.array([[x, 0.1], [x, 0.9]]),)) for i, x in enumerate(rng.random(32)))
+    moment = replace(state(rng, 256, shapes, 32), bars=rng.random((32, 256)))
+    check(GPUCompositor(gpu_device), source, following(rng, source, moment, range(32)), 0)
 
 
 @pytest.mark.parametrize("resident", [True, False])

@@ -4,25 +4,25 @@ import re
 
 import pytest
 
-from shutter_addon.compute import diffusion_gpu, edge_diffusion_gpu, gpu, window
+from shutter_addon.compute import diffusion_gpu, edge_diffusion_gpu, gpu, matting, window
 from shutter_addon.compute.passes import SHADERS, Pass, body
 
 PASSES = [
     value for made in (diffusion_gpu, edge_diffusion_gpu) for value in vars(made).values() if isinstance(value, Pass)
 ]
-PASSES += [gpu.composition(way, 3, "frames", 1, 2, True, False) for way in ("pieces", "frames", "walk", "value")]
+PASSES += [gpu.composition(way, 3, "frames", 1, 2, True, False) for way in ("pieces", "frames", "search", "value")]
 PASSES += [
     gpu.composition(way, 3, stored, 1, 2, True, False)
-    for way in ("frames", "walk", "value")
+    for way in ("frames", "search", "value")
     for stored in ("sums", "tiles")
 ]
 for tiled in (True, False):
     PASSES += [gpu.composition_of_sums(4, 2, True, tiled, False)]
     PASSES += [window.accumulation(1, again, False, tiled) for again in (True, False)]
-PASSES += [window.packing(1, True)]
+PASSES += [window.packing(1, True), *(matting.blend_pass(2, adds) for adds in (False, True))]
 PASSES += [
     gpu.composition_of_moved(way, 2, 3, 3, packed, 1, shortened, False, False, True, (True, False))
-    for way in ("frames", "walk", "value")
+    for way in ("frames", "search", "value")
     for packed, shortened in ((True, True), (False, False))
 ]
 # Of what is declared inside the sources, whatever it is: variables, parameters, functions.

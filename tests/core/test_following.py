@@ -17,11 +17,15 @@ def made(keys=(), position="start", edges="hold", follow="car", camera=(), strok
     return recipe.Recipe(1, 6, [shutter], [region], position=position, edges=edges, camera=list(camera))
 
 
-def followed(source, frame, index, direction=1, shown=None):
+def state_of(source, frame, index, direction=1, shown=None):
     effect = source.effect(SOURCE.width / SOURCE.height)
     state = effect.at(frame)
     shown = shown or (lambda other: index + round(other - frame))
-    return following.followed(effect, state, frame, index, direction, SOURCE, shown).following
+    return following.followed(effect, state, frame, index, direction, SOURCE, shown)
+
+
+def followed(*arguments, **given):
+    return state_of(*arguments, **given).following
 
 
 STRAIGHT = [recipe.RegionKey(0, (0, 0)), recipe.RegionKey(100, (1, 0.5))]
@@ -99,9 +103,8 @@ def test_the_camera_turns_about_the_pictures_centre():
 
 @pytest.mark.parametrize("keys", [[], STRAIGHT[:1], [recipe.RegionKey(0, scale=0), recipe.RegionKey(9, (1, 1))]])
 def test_what_does_not_move_is_nothing_to_follow(keys):
-    source = made(keys)
-    assert followed(source, 0, 0) is None
-    assert source.at(5, 4 / 3).key == made(keys, follow=None).at(5, 4 / 3).key
+    """The state is that of an effect which follows nothing."""
+    assert state_of(made(keys), 0, 0).key == made(keys, follow=None).at(0, 4 / 3).key
 
 
 def test_a_subject_of_no_size_later_is_a_point():

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shutter_addon.core import limits, recipe, scribbles
+from shutter_addon.core import limits, mattes, recipe, scribbles
 from shutter_addon.core.compositor import window_positions
 from shutter_addon.core.motions import Placement
 
@@ -48,6 +48,28 @@ EXAMPLE = {
         }
     ],
 }
+
+
+MATTE = {"shutter": "Sharp", "kind": "matte", "path": "mattes/0001.png"}
+RAMP = {"shutter": "Sharp", "kind": "ramp", "ramp": "linear"}
+
+
+def test_mattes_and_ramps():
+    keyed = {"opacity": [{"frame": 1, "value": 0}, {"frame": 3, "value": 1}], "blend": "add", "invert": True}
+    regions = [MATTE | keyed, MATTE | {"timing": "timeline", "offset": 4, "width": 0.1}, *EXAMPLE["regions"]]
+    regions += [RAMP | {"keys": [{"frame": 1}, {"frame": 5, "location": [0.2, 0], "rotation": 90, "scale": 2}]}]
+    regions += [RAMP | {"ramp": "luminance"}]
+    parsed = recipe.parse(json.dumps(EXAMPLE | {"regions": regions}))
+    assert recipe.parse(recipe.dump(parsed)) == parsed
+    moment = parsed.at(3, 1, files=lambda region: region.kind)
+    assert len(moment.shapes) == 1
+    of_source, of_timeline, ramp, luminance = moment.mattes
+    assert of_source == mattes.Matte(1, mattes.FileFrame("matte"), "add", invert=True)
+    assert of_timeline == mattes.Matte(1, mattes.FileFrame("matte", 4, 2), feather=0.1)
+    assert ramp.content == mattes.Ramp("linear", (0.1, 0), 45, 1.5)
+    assert luminance.content == mattes.FileFrame("ramp")
+    first = parsed.at(1, 1)
+    assert len(first.mattes) == 3  # one of no opacity is none
 
 
 def test_the_contracts_example():
@@ -118,7 +140,27 @@ def broken(change):
         (lambda d: d["shutters"][1]["keys"][0].update(ease="in"), 'shutters[1].keys[0].ease: "in" is none of'),
         (lambda d: d["regions"][0].update(shutter="X"), 'regions[0].shutter: there is no shutter "X"'),
         (lambda d: d["regions"][0].update(width=-1), "regions[0].width: -1.0 is negative"),
-        (lambda d: d["regions"][0].update(kind="blob"), 'regions[0].kind: "blob" is none of line, lasso'),
+        (lambda d: d["regions"][0].update(kind="blob"), 'regions[0].kind: "blob" is none of line, lasso, matte, ramp'),
+        (lambda d: d["regions"].append(MATTE | {"path": ""}), "regions[1].path: empty"),
+        (lambda d: d["regions"].append(MATTE | {"path": "a\0b"}), "regions[1].path: U+0000 is no character of a name"),
+        (lambda d: d["regions"].append(MATTE | {"strokes": []}), "regions[1]: unknown field strokes"),
+        (lambda d: d["regions"].append(MATTE | {"opacity": 2}), "regions[1].opacity: 2 is not 0 to 1"),
+        (lambda d: d["regions"].append(MATTE | {"opacity": []}), "regions[1].opacity: empty: there is no key"),
+        (lambda d: d["regions"].append(MATTE | {"offset": 0.5}), "regions[1].offset: 0.5 is not a whole number"),
+        (lambda d: d["regions"].append(MATTE | {"offset": 10**9}), "regions[1].offset: 1000000000 is not -1048574 to"),
+        (lambda d: d["regions"].append(MATTE | {"channel": "x" * 256}), "regions[1].channel: 256 characters, the most"),
+        (
+            lambda d: d["regions"].append(MATTE | {"timing": "edit"}),
+            'regions[1].timing: "edit" is none of source, time',
+        ),
+        (
+            lambda d: d["regions"].append(RAMP | {"ramp": "spiral"}),
+            'regions[1].ramp: "spiral" is none of linear, radial',
+        ),
+        (lambda d: d["regions"].append(RAMP | {"path": "a"}), "regions[1]: unknown field path"),
+        (lambda d: d["regions"].append(RAMP | {"blend": "screen"}), 'regions[1].blend: "screen" is none of over, add'),
+        (lambda d: d["regions"].append(RAMP | {"width": -1}), "regions[1].width: -1 is not 0 to"),
+        (lambda d: d["regions"].append(RAMP | {"shutter": "Z"}), 'regions[1].shutter: there is no shutter "Z"'),
         (lambda d: d["regions"][0].update(strokes=[]), "regions[0].strokes: empty"),
         (lambda d: d["regions"][0].update(strokes=[[]]), "regions[0].strokes[0]: empty"),
         (lambda d: d["regions"][0].update(strokes=[[[1, 2, 3]]]), "regions[0].strokes[0][0]: 3 values, not 2"),

@@ -16,6 +16,10 @@ WINDOW = 24
 SOURCE = SimpleNamespace(count=60, width=160, height=100)
 
 
+def with_length(*arguments):
+    return trails.with_length(*arguments)[0]
+
+
 def brute(bars, way, length, shown):
     """The bars by growing the span bit by bit, and by sampling the accumulation."""
     first, last = shutters.open_span(bars)
@@ -39,7 +43,7 @@ def test_any_bars(bars, length, seed):
     rng = np.random.default_rng(seed)
     way = np.cumsum([0, *rng.uniform(0.01, 0.2, len(bars))])
     shown = rng.integers(len(bars)) + 0.5
-    found = trails.with_length(bars, way, length, shown)
+    found = with_length(bars, way, length, shown)
     assert (found >= 0).all()
     assert found.sum() == pytest.approx(bars.sum())
     assert found == pytest.approx(brute(bars, way, length, shown), abs=2e-3 * bars.sum())
@@ -52,14 +56,14 @@ def open_frames(bars):
 
 def test_half_the_length_is_half_the_span():
     box, way = np.ones(WINDOW), np.linspace(0, 1, WINDOW + 1)
-    spans = [open_frames(trails.with_length(box, way, length, 11.5)) for length in (0.1, 0.2, 0.4, 0.8)]
+    spans = [open_frames(with_length(box, way, length, 11.5)) for length in (0.1, 0.2, 0.4, 0.8)]
     assert spans == pytest.approx([0.1 * WINDOW, 0.2 * WINDOW, 0.4 * WINDOW, 0.8 * WINDOW])
 
 
 def test_the_shape_stays():
     """A shutter that is twice as long in half the frames."""
     bars = np.repeat([1.0, 0, 2, 3], 4)
-    found = trails.with_length(bars, np.linspace(0, 1, 17), 0.5, 0)
+    found = with_length(bars, np.linspace(0, 1, 17), 0.5, 0)
     assert found == pytest.approx(np.repeat([2.0, 0, 4, 6, 0, 0, 0, 0], 2))
 
 
@@ -67,29 +71,29 @@ def test_limits():
     box, way = np.ones(WINDOW), np.linspace(0, 1, WINDOW + 1)
     still = np.zeros(WINDOW + 1)
     quarter = np.r_[np.ones(6), np.zeros(18)]
-    assert trails.with_length(box, way, 2, 11.5) == pytest.approx(box)  # there are no more frames
-    assert trails.with_length(box, still, 0.1, 11.5) == pytest.approx(box)
-    assert trails.with_length(quarter, still, 0.1, 0.5) == pytest.approx(np.full(WINDOW, 0.25))
-    assert trails.with_length(box, way, 0, 11.5) == pytest.approx(WINDOW * np.eye(WINDOW)[11])  # the shown frame
-    assert trails.with_length(box, still, 0, 11.5) == pytest.approx(WINDOW * np.eye(WINDOW)[11])
+    assert with_length(box, way, 2, 11.5) == pytest.approx(box)  # there are no more frames
+    assert with_length(box, still, 0.1, 11.5) == pytest.approx(box)
+    assert with_length(quarter, still, 0.1, 0.5) == pytest.approx(np.full(WINDOW, 0.25))
+    assert with_length(box, way, 0, 11.5) == pytest.approx(WINDOW * np.eye(WINDOW)[11])  # the shown frame
+    assert with_length(box, still, 0, 11.5) == pytest.approx(WINDOW * np.eye(WINDOW)[11])
     late_mover = np.r_[np.zeros(20), np.arange(5) / 4]
-    assert trails.with_length(box, late_mover, 0, 0.5) == pytest.approx(WINDOW * np.eye(WINDOW)[0])
-    assert trails.with_length(box, way, 1e-9, 11.5) == pytest.approx(WINDOW * np.eye(WINDOW)[11])
+    assert with_length(box, late_mover, 0, 0.5) == pytest.approx(WINDOW * np.eye(WINDOW)[0])
+    assert with_length(box, way, 1e-9, 11.5) == pytest.approx(WINDOW * np.eye(WINDOW)[11])
     late = np.r_[np.zeros(20), np.ones(4)]
-    assert trails.with_length(late, way, 0, 0.5) == pytest.approx(4 * np.eye(WINDOW)[20])  # the nearest open one
-    assert trails.with_length(np.ones(1), np.zeros(2), 0.3, 0.5).tolist() == [1]
+    assert with_length(late, way, 0, 0.5) == pytest.approx(4 * np.eye(WINDOW)[20])  # the nearest open one
+    assert with_length(np.ones(1), np.zeros(2), 0.3, 0.5).tolist() == [1]
 
 
 def test_what_rounding_leaves_does_not_open_a_bar():
     bars, way = np.r_[np.ones(4), np.zeros(4)], np.linspace(0, 1, 9)
     noisy = bars + np.r_[np.zeros(4), 1e-15, np.zeros(3)]
-    assert trails.with_length(noisy, way, 0.25, 0.5) == pytest.approx(trails.with_length(bars, way, 0.25, 0.5))
+    assert with_length(noisy, way, 0.25, 0.5) == pytest.approx(with_length(bars, way, 0.25, 0.5))
 
 
 def test_no_jumps():
     """A span grows past frames little by little."""
     box, way = np.ones(WINDOW), np.cumsum([0, *np.linspace(0.01, 0.1, WINDOW)])
-    found = np.array([trails.with_length(box, way, length, 0.5) / WINDOW for length in np.linspace(0.05, 1.3, 2000)])
+    found = np.array([with_length(box, way, length, 0.5) / WINDOW for length in np.linspace(0.05, 1.3, 2000)])
     assert np.abs(np.diff(found, axis=0)).max() < 0.02
 
 
@@ -151,6 +155,17 @@ def test_beyond_the_clips_ends_all_stands_still(follow, edges):
     before = np.arange(WINDOW) - state.options.before <= 0
     span = state.bars[0] / state.bars[0].max()
     assert (span[before].sum() - 0.5) * SPEEDS[-3] == pytest.approx(10, rel=0.05)
+
+
+def test_for_how_long_a_shutter_is_open_is_told():
+    """Whatever its shape; of one without a length, its bars say it."""
+    state, _ = followed(accelerating(0.2), 30)
+    assert state.open_for == {0: pytest.approx(open_frames(state.bars[0]))}
+    ramp, _ = followed(accelerating(0.2, bars=np.linspace(1, 2, WINDOW)), 30)
+    assert ramp.open_for == state.open_for
+    still, _ = followed(replace(accelerating(0.2), regions=[replace(accelerating(0.2).regions[0], keys=[])]), 30)
+    assert still.open_for == {0: WINDOW}
+    assert followed(accelerating(None), 30)[0].open_for == {}
 
 
 def test_keys_of_the_length():

@@ -51,6 +51,7 @@ KINDS = (
 class Case:
     """A recipe (JSON), the timeline frame to be shown, and footage: arrays (count, H, W, 4) as they are stored.
 
+    mattes: those that the recipe reads, by path, as the footage
     index, direction: the source frame where the recipe has no time keys, and whether the source runs backward."""
 
     seed: int
@@ -60,12 +61,18 @@ class Case:
     stored: np.ndarray
     index: int
     direction: int
+    mattes: dict[str, np.ndarray]
 
     def footage(self, stored=None) -> Footage:
         """As the reference has it."""
         stored = self.stored if stored is None else stored
         scale = np.iinfo(stored.dtype).max if stored.dtype.kind == "u" else 1
         return Footage(stored.astype(float) / scale, self.kind.transfer, self.kind.alpha)
+
+    def matte_samples(self) -> dict[str, np.ndarray]:
+        """As the reference has them: 0 … 1."""
+        scales = {path: np.iinfo(m.dtype).max if m.dtype.kind == "u" else 1 for path, m in self.mattes.items()}
+        return {path: matte.astype(float) / scales[path] for path, matte in self.mattes.items()}
 
 
 def make(seed: int) -> Case:
@@ -80,6 +87,7 @@ def make(seed: int) -> Case:
         recipe["light"] = "linear"
     frame = int(rng.integers(1, count + 1))
     add_motion(np.random.default_rng([seed, 1]), recipe, count)
+    mattes = add_mattes(np.random.default_rng([seed, 2]), recipe, (count, height, width))
     if "time" in recipe:
         # Halfway between two source frames nobody can tell which is shown.
         last = max(count, int(recipe["time"][-1]["frame"]))
@@ -92,7 +100,7 @@ def make(seed: int) -> Case:
     uncovered = recipe["light"] == "linear"
     stored = random_footage(rng, kind, (count, height, width), uncovered)
     direction = -1 if rng.random() < 0.25 else 1
-    return Case(seed, json.dumps(recipe, indent=1), frame, kind, stored, int(rng.integers(count)), direction)
+    return Case(seed, json.dumps(recipe, indent=1), frame, kind, stored, int(rng.integers(count)), direction, mattes)
 
 
 # Recipes
@@ -119,6 +127,40 @@ def add_motion(rng, recipe: dict, count: int) -> None:
             shutter["follow"] = choose(rng, *moving)
             if rng.random() < 0.4:
                 shutter["trail"] = choose(rng, 0.0, round(rng.uniform(0, 0.5), 4), random_numbers(rng, count, 0.8))
+
+
+def add_mattes(rng, recipe: dict, shape) -> dict[str, np.ndarray]:
+    """Mattes and ramps among the regions, in some recipes; what they read, by path."""
+    if rng.random() < 0.6:
+        return {}
+    (count, height, width), found = shape, {}
+    for number in range(int(rng.integers(1, 4))):
+        region = {"name": f"M{number}", "shutter": choose(rng, *recipe["shutters"])["name"]}
+        if rng.random() < 0.5:
+            path, found_frames = random_matte(rng, number, (int(choose(rng, 1, 3, count)), height, width))
+            region |= {"kind": "matte", "path": path, "channel": choose(rng, "luminance", "red", "blue", "alpha")}
+            region |= {"timing": choose(rng, "source", "timeline"), "offset": int(rng.integers(-2, 3))}
+            found[path] = found_frames
+        else:
+            region |= {"kind": "ramp", "ramp": choose(rng, "linear", "radial", "angle", "luminance")}
+        if rng.random() < 0.5:
+            region["keys"] = [random_camera_key(rng, frame) for frame in frames(rng, count, 3)]
+        region |= {"blend": choose(rng, "over", "over", "add"), "invert": choose(rng, False, True)}
+        region["opacity"] = choose(rng, 1, round(rng.random(), 3), random_numbers(rng, count, 1))
+        region["width"] = choose(rng, 0, 0, round(rng.uniform(0, 0.3), 3), random_numbers(rng, count, 0.2))
+        recipe["regions"].insert(int(rng.integers(len(recipe["regions"]) + 1)), region)
+        if rng.random() < 0.2:
+            choose(rng, *recipe["shutters"]).update(follow=region["name"])
+    return found
+
+
+def random_matte(rng, number: int, shape) -> tuple[str, np.ndarray]:
+    """A matte's path, and its frames (count, H, W, 4) as they are stored."""
+    ending, kind = choose(rng, ("png", np.uint8), ("png", np.uint16), ("exr", np.float16))
+    values = rng.random((*shape, 4)) * 1.2 - 0.1
+    if kind != np.float16:
+        values = np.rint(values.clip(0, 1) * np.iinfo(kind).max)
+    return f"mattes/{number}/0001.{ending}", values.astype(kind)
 
 
 def random_numbers(rng, count: int, most: float) -> list[dict]:
@@ -274,7 +316,12 @@ def random_footage(rng, kind: Kind, shape, uncovered: bool) -> np.ndarray:
 
 
 def write(case: Case, folder):
-    """Writes the case's footage into a folder; the movie, or the first file of the images."""
+    """Writes the case's footage and mattes into a folder; the movie, or the first file of the images."""
+    for path, matte in case.mattes.items():
+        first = folder / path
+        first.parent.mkdir(parents=True)
+        for i, frame in enumerate(matte, start=1):
+            write_image(first.with_stem(f"{i:04d}"), frame)
     if case.kind.codec:
         return write_movie(case, folder / case.kind.name)
     for i, frame in enumerate(case.stored, start=1):

@@ -13,12 +13,13 @@ import json
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from cases import Case, make, write, write_image
 from OpenImageIO import ImageBuf
-from reference import coefficients, labels_at, number_at, picture, showing, shown, time_at, to_encoded
+from reference import coefficients, labels_at, laid, number_at, picture, showing, shown, time_at, to_encoded
 
 ROOT = Path(__file__).resolve().parents[2]
 PICTURE, COEFFICIENTS = 0.5 / 255, 1 / 255
@@ -52,6 +53,7 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
     from shutter_addon.core import following
     from shutter_addon.core import recipe as recipes
     from shutter_addon.media import open_source
+    from shutter_addon.media.matte_values import MatteValues
 
     recipe, parsed, found = json.loads(case.recipe), recipes.parse(case.recipe), {}
     with tempfile.TemporaryDirectory() as files, open_source(write(case, Path(files))) as source:
@@ -62,11 +64,11 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
             if abs(parsed.time_at(case.frame) - time_at(recipe, case.frame)) > 1e-9:
                 raise DifferenceError(f"{told(case)}: another source time")
         shows = showing(recipe, case.frame, index, direction, source.count)
-        effect = parsed.effect(source.width / source.height)
+        effect = parsed.effect(source.width / source.height, partial(matte_file, Path(files), source))
         state = following.followed(effect, effect.at(case.frame), case.frame, index, direction, source, shows)
-        exact = exact_coefficients(case, source, index)
+        exact = exact_coefficients(case, source, footage, index)
         for name, device in devices.items():
-            renderer = Renderer(device, source)
+            renderer = Renderer(device, source, MatteValues(source.width, source.height))
             made, mix = renderer.picture(index, state, direction), renderer.coefficients(index, state, direction)
             with device.current():
                 renderer.release_window()
@@ -75,7 +77,16 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
     return found
 
 
-def exact_coefficients(case: Case, source, index: int) -> np.ndarray:
+def matte_file(folder: Path, source, region):
+    """What the product reads for a matte region of a recipe in that folder, or for the luminance of its source."""
+    from shutter_addon.media.matte_files import MatteFile
+
+    if region.kind == "ramp":
+        return MatteFile(source.path)
+    return MatteFile(folder / region.path, region.channel)
+
+
+def exact_coefficients(case: Case, source, footage, index: int) -> np.ndarray:
     """The reference's; along edges the core's own, of the guide that the product has, as that is no matter of
     precision."""
     from shutter_addon.compute.guide import Guides, guiding
@@ -83,11 +94,13 @@ def exact_coefficients(case: Case, source, index: int) -> np.ndarray:
 
     recipe, size = json.loads(case.recipe), (source.width, source.height)
     strength = number_at(recipe.get("edge_aware", 0), case.frame)
-    if not strength:
-        return coefficients(recipe, case.frame, *size)
-    labels = labels_at(recipe, case.frame, *size) + 1
-    guide = Guides(source).guide(guiding(index, 1, range(source.count)), recipe["aggregate"])
-    return exact_diffusion.solve(labels, len(recipe["shutters"]), guide, strength)
+    if strength:
+        labels = labels_at(recipe, case.frame, *size) + 1
+        guide = Guides(source).guide(guiding(index, 1, range(source.count)), recipe["aggregate"])
+        mix = exact_diffusion.solve(labels, len(recipe["shutters"]), guide, strength)
+    else:
+        mix = coefficients(recipe, case.frame, *size)
+    return laid(recipe, case.frame, index, mix, footage, case.matte_samples())
 
 
 def check_films(cases: list[Case], folder: Path) -> tuple[dict, list[DifferenceError]]:
@@ -109,7 +122,7 @@ def check_films(cases: list[Case], folder: Path) -> tuple[dict, list[DifferenceE
             right = picture(recipe, case.frame, footage, index, direction, mix)
             try:
                 with open_source(Path(footage_path)) as source:
-                    exact = exact_coefficients(case, source, index)
+                    exact = exact_coefficients(case, source, footage, index)
                 found[case.seed] = judge(case, "film", folder, made, right, mix, exact)
             except DifferenceError as error:
                 errors.append(error)

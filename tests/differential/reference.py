@@ -17,6 +17,8 @@ What neither the paper nor the manual says is taken from the product; these are 
 - a frame that is never shown within four windows lies as the nearest of those that the window may show, the earlier of
   two; of two times that are as near, the later counts;
 - a trail's length is that of the fastest corner of what is followed; a bar has half of the ways to the frames beside;
+- mattes lie over what scribbles give, whichever comes first in the list; a ramp at rest runs from one corner of the
+  picture to the opposite one; a feather is a Gaussian of a quarter of its width, of which a pixel has what it covers;
 - a premultiplied colour without cover (alpha 0) is light that is added to what lies below (as in Blender). What it is
   among encoded values, nothing says; there this is no reference.
 
@@ -30,6 +32,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse import diags_array, eye_array, kron
 from scipy.sparse.linalg import spsolve
+from scipy.special import erf
 
 # samples: (count, H, W, 4) float64, 0 … 1 for whole numbers, the top row first; transfer: "srgb" | "linear"; alpha:
 # "opaque" | "straight" | "premultiplied".
@@ -195,7 +198,7 @@ def labels_at(recipe, frame, width, height):
         inner[1:-1, 1:-1] = True
         labels[~inner] = 0
     names = [shutter["name"] for shutter in recipe["shutters"]]
-    for region in recipe.get("regions", []):
+    for region in filter(has_strokes, recipe.get("regions", [])):
         lines, own = region.get("kind", "line") == "line", names.index(region["shutter"])
         for stroke in strokes_at(region, frame, width / height):
             points = stroke.real * (height / width) * w + 1j * stroke.imag * h
@@ -206,6 +209,85 @@ def labels_at(recipe, frame, width, height):
                 covered = distance(centres, points) <= max(radius, LEAST_RADIUS)
             labels[covered] = own
     return labels
+
+
+def has_strokes(region):
+    return region.get("kind", "line") in ("line", "lasso")
+
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+CHANNELS = {"red": 0, "green": 1, "blue": 2, "alpha": 3}
+
+
+def laid(recipe, frame, index, mix, footage, mattes):
+    """Coefficients (N, h, w) with the mattes of a recipe laid over them, at a timeline frame that shows the source
+    frame `index`. mattes: {path: samples (count, H, W, 4), 0 … 1}"""
+    result, names = mix.astype(float), [shutter["name"] for shutter in recipe["shutters"]]
+    _, height, width, _ = footage.samples.shape
+    for region in recipe["regions"]:
+        if has_strokes(region):
+            continue
+        if region["kind"] == "ramp" and region["ramp"] != "luminance":
+            value = ramp(region, frame, width, height)
+        elif region["kind"] == "ramp":
+            value = channel_of(footage.samples[index], "luminance")
+        else:
+            shown_frames, first = mattes[region["path"]], region.get("offset", 0)
+            place = first + (frame - 1 if region.get("timing") == "timeline" else index)
+            value = channel_of(
+                shown_frames[min(max(place, 0), len(shown_frames) - 1)], region.get("channel", "luminance")
+            )
+        value = softened(value, number_at(region.get("width", 0), frame) * height / 4)
+        value = block_means(1 - value if region.get("invert") else value, option(recipe, "aggregate"))
+        value = value * number_at(region.get("opacity", 1), frame)
+        own = np.zeros((len(names), 1, 1))
+        own[names.index(region["shutter"])] = 1
+        default = np.arange(len(names))[:, None, None] == 0
+        if region.get("blend") == "add":
+            value = np.minimum(value, result[0])
+            result = result + value * (own - default)
+        else:
+            result = (1 - value) * result + value * own
+    return result
+
+
+def channel_of(samples, channel):
+    """A channel (H, W) of samples (H, W, 4), 0 to 1."""
+    return np.clip(samples[..., :3] @ LUMINANCE if channel == "luminance" else samples[..., CHANNELS[channel]], 0, 1)
+
+
+def ramp(region, frame, width, height):
+    """The values (H, W) of a ramp at a frame; places are complex, in pixels from its centre on, y up."""
+    x, y, rotation, scale = placement(region["keys"], frame) if region.get("keys") else STILL
+    column, row = np.meshgrid(np.arange(width) + 0.5, height - 0.5 - np.arange(height))
+    centre = width * (0.5 + x) + 1j * height * (0.5 + y)
+    along = (column + 1j * row - centre) * np.exp(-1j * np.radians(rotation))
+    corners = np.array([width + 1j * height, width - 1j * height]) / 2
+    if region["ramp"] == "angle":
+        return (-np.angle(along / 1j) / (2 * np.pi)) % 1
+    if region["ramp"] == "radial":
+        return np.clip(np.abs(along) / (scale * np.abs(corners[0])), 0, 1)
+    reach = max(np.abs((corners * np.exp(-1j * np.radians(rotation))).real))
+    return np.clip((along.real / (scale * reach) + 1) / 2, 0, 1)
+
+
+def softened(values, sigma):
+    """Values (H, W) behind a Gaussian; beyond the picture its edge goes on."""
+    if sigma == 0:
+        return values
+    reach = int(np.ceil(6 * sigma)) + 1
+    ends = erf((np.arange(-reach, reach + 2) - 0.5) / (sigma * np.sqrt(2)))
+    weights = np.diff(ends) / 2
+    for axis in (0, 1):
+        wide = np.pad(values, [(reach, reach) if a == axis else (0, 0) for a in (0, 1)], mode="edge")
+        values = np.apply_along_axis(np.convolve, axis, wide, weights, "valid")
+    return values
+
+
+def block_means(values, block):
+    height, width = values.shape
+    rows, columns = range(0, height, block), range(0, width, block)
+    return np.array([[values[y : y + block, x : x + block].mean() for x in columns] for y in rows])
 
 
 def distance(places, points):
@@ -309,6 +391,8 @@ def subject(recipe, name):
         return lambda frame, aspect: (aspect / 2 + 0.5j, placement(keys, frame) if keys else STILL)
     region = next(region for region in recipe["regions"] if region["name"] == name)
     keys = region.get("keys")
+    if not has_strokes(region):
+        return lambda frame, aspect: (aspect / 2 + 0.5j, placement(keys, frame) if keys else STILL)
     return lambda frame, aspect: (
         middle(drawn_at(region, frame, aspect)),
         placement(keys, frame) if keys else STILL,
@@ -355,10 +439,10 @@ def trailed(recipe, shutter, bars, frame, turns, shifts, shown_time, aspect):
     if "trail" not in shutter:
         return bars
     name, length = shutter["follow"], number_at(shutter["trail"], frame)
-    if name == "camera":
+    region = next((region for region in recipe["regions"] if region["name"] == name), None)
+    if region is None or not has_strokes(region):
         corners = np.array([0, aspect, 1j, aspect + 1j])
     else:
-        region = next(region for region in recipe["regions"] if region["name"] == name)
         points = np.concatenate(strokes_at(region, frame, aspect))
         corners = np.array(
             [x + 1j * y for x in (points.real.min(), points.real.max()) for y in (points.imag.min(), points.imag.max())]
@@ -481,11 +565,13 @@ def summed(footage, index, light):
     return np.concatenate([colour * cover, alpha], axis=-1)
 
 
-def picture(recipe, frame, footage, index, direction, given=None):
+def picture(recipe, frame, footage, index, direction, given=None, mattes=None):
     """The picture at a timeline frame that shows the source frame `index`, as a Result. given: coefficients to compose
-    with, in place of the exact ones."""
+    with, in place of the exact ones; mattes: as for `laid`."""
     count, height, width, _ = footage.samples.shape
-    mix = coefficients(recipe, frame, width, height) if given is None else np.asarray(given, float)
+    if given is None:
+        given = laid(recipe, frame, index, coefficients(recipe, frame, width, height), footage, mattes)
+    mix = np.asarray(given, float)
     mix = mix / mix.sum(axis=0)
     blocks, aspect = mix.shape[1:], width / height
     mix = mix.reshape(len(mix), -1)

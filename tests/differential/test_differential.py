@@ -3,6 +3,7 @@
 import ast
 import json
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ from compare import PICTURE, DifferenceError, can_be_a_film, check, check_films,
 from reference import DEFAULTS, picture, shown
 
 from shutter_addon.compute import cpu, resampling
-from shutter_addon.core import compositor, following, keyframes, light, scribbles, shutters, trails
+from shutter_addon.core import compositor, following, keyframes, light, mattes, scribbles, shutters, trails
+from shutter_addon.media import matte_values
 
 SEEDS = range(200)
 BATCH = 20
@@ -80,17 +82,19 @@ def test_recipes_have_all_that_a_recipe_may_have():
         keys = [key for owner in recipe["shutters"] + recipe["regions"] for key in owner.get("keys", [])]
         seen.update((name, recipe[name]) for name in DEFAULTS)
         seen.update({("ease", key.get("ease")) for key in keys} | {("redrawn", "strokes" in key) for key in keys})
-        seen.update({("kind", region["kind"]) for region in recipe["regions"]})
+        for name in ("kind", "ramp", "blend", "timing", "channel"):
+            seen.update({(name, region[name]) for region in recipe["regions"] if name in region})
         way = shown(recipe, case.frame, len(case.stored))[1]
         seen.update([("shutters", len(recipe["shutters"])), ("time", way), ("direction", case.direction)])
         seen.update([("footage", case.kind)])
         seen.update(("follow", shutter["follow"] == "camera") for shutter in recipe["shutters"] if "follow" in shutter)
         seen.update(("trail", type(shutter["trail"])) for shutter in recipe["shutters"] if "trail" in shutter)
         seen.update([("edge_aware", type(recipe.get("edge_aware")))])
-        found = picture(recipe, case.frame, case.footage(), case.index, case.direction)
+        found = picture(recipe, case.frame, case.footage(), case.index, case.direction, mattes=case.matte_samples())
         doubtful.append(found.doubtful.mean())
     values = {"position": 3, "interpolation": 2, "light": 2, "exposure": 2, "edges": 3, "aggregate": 3, "border": 2}
-    values |= {"ease": 4, "redrawn": 2, "kind": 2, "shutters": 6, "time": 2, "direction": 2, "footage": len(KINDS)}
+    values |= {"ease": 4, "redrawn": 2, "kind": 4, "shutters": 6, "time": 2, "direction": 2, "footage": len(KINDS)}
+    values |= {"ramp": 4, "blend": 2, "timing": 2, "channel": 4}
     values |= {"follow": 2, "trail": 2, "edge_aware": 3}
     assert Counter(name for name, _ in seen) == values
     assert min(seen.values()) >= 10
@@ -107,11 +111,23 @@ FAULTS = {
     "an edge twice": (compositor, "source_frames", lambda *given: twice(*given)),
     "nothing followed": (following, "followed", lambda effect, state, *_: state),
     "a dull filter": (resampling, "_weights", lambda t, sharp: {-1: 0 * t, 0: 1 - t, 1: t, 2: 0 * t}),
-    "trails of no length": (trails, "with_length", lambda bars, *_: bars),
+    "trails of no length": (trails, "with_length", lambda bars, *_: (bars, len(bars))),
     "edges passed over": (cpu.Solver, "solve", lambda solver, labels, count, *_, warm: solve(solver, labels, count)),
+    "mattes in another order": (mattes, "blended", lambda c, shown, values: blended(c, shown[::-1], values[::-1])),
+    "hard mattes": (matte_values, "feathered", lambda values, width: values),
+    "a ramp that is not turned": (
+        mattes.Ramp,
+        "values",
+        lambda ramp, *size: ramp_values(replace(ramp, rotation=0), *size),
+    ),
     "not normalised": (compositor, "source_frames", lambda options, places, shot: places.clip(0, shot.stop - 1)),
 }
 eased, source_frames, solve = keyframes.eased, compositor.source_frames, cpu.Solver.solve
+blended, ramp_values = mattes.blended, mattes.Ramp.values
+
+
+def unturned(ramp, *size):
+    return ramp_values(replace(ramp, rotation=0), *size)
 
 
 def twice(options, positions, shot):

@@ -14,7 +14,7 @@ import pytest
 from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, save_image
 
 from shutter_addon.media import MediaError, open_source
-from shutter_addon.media.exr import write_exr
+from shutter_addon.media.image_writing import write_exr
 from shutter_addon.media.inbetween_cache import write_picture
 from shutter_addon.media.sequence import IMAGE_SUFFIXES
 

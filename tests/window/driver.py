@@ -113,6 +113,18 @@ def move(region, x, y):
     xdotool("mousemove", *screen(region, x, y))
 
 
+def edge_moved(area, right: int, up: int):
+    """Moves an area's right or upper edge by pixels."""
+    window = bpy.context.window_manager.windows[0]
+    x = area.x + (area.width if right else area.width // 2)
+    y = area.y + (area.height if up else area.height // 2)
+    xdotool("mousemove", x, window.height - 1 - y)  # where no region is active
+    yield 0.5
+    with bpy.context.temp_override(window=window):
+        bpy.ops.screen.area_move(x=x, y=y, delta=right + up)
+    yield 0.5
+
+
 def click(region, x, y, repeat=1):
     move(region, x, y)
     xdotool("click", "--repeat", repeat, "--delay", 60, 1)

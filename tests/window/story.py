@@ -124,6 +124,7 @@ def scribbled():
     assert [len(frame.strokes) for frame in layer.frames] == [1]
     with driver.override("PREVIEW"):
         bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+    region.tag_redraw()  # its handles are back, which else come with the pointer
     yield
 
 
@@ -140,6 +141,22 @@ def preset_chosen():
     yield 0.3
     driver.key("Return")
     yield 0.5
+
+
+def sidebar():
+    return driver.region_of(driver.area_of("SEQUENCE_EDITOR", "PREVIEW"), "UI")
+
+
+def chosen_beside_draw(entry):
+    """The first of an entry's own menu, in the menu of regions; the sidebar is as high as it needs."""
+    driver.click(sidebar(), sidebar().width * 0.855, sidebar().height - 423)
+    yield 0.8
+    driver.key(*["Down"] * entry)
+    yield 0.3
+    driver.key("Right")
+    yield 0.5
+    driver.shot("menu")
+    driver.key("Return")
 
 
 def bars():
@@ -222,9 +239,9 @@ def saved_and_loaded():
     yield from seen("9_loaded")
 
 
-def in_agreement():
+def in_agreement(frame=70):
     """Live preview, sequencer's picture and final render of one frame, pixel by pixel at full size."""
-    edit().frame_set(70)
+    edit().frame_set(frame)
     area = driver.area_of("SEQUENCE_EDITOR", "PREVIEW")
     space = area.spaces.active
     space.show_overlays = space.show_gizmo = space.show_region_ui = False
@@ -256,6 +273,11 @@ def in_agreement():
     with driver.override("PREVIEW"):
         bpy.ops.screen.back_to_previous()
     yield 1.0
+    yield from rendered()  # after the preview has filled the sequencer's cache
+
+
+def rendered():
+    """The current frame, as with F12: a job on another thread."""
     render = edit().render
     render.image_settings.media_type = "IMAGE"
     render.image_settings.file_format = "PNG"
@@ -263,7 +285,6 @@ def in_agreement():
     render.filepath = str(driver.OUT / "final.png")
     done = []
     bpy.app.handlers.render_complete.append(lambda *_: done.append(True))
-    # As with F12: a job on another thread, after the preview has filled the sequencer's cache.
     with driver.override("PREVIEW"):
         bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
     yield from driver.until(lambda: done, "the render ends", 30)

@@ -119,6 +119,62 @@ def test_a_panning_shot(tmp_path):
     assert apart[:60].max() > 120
 
 
+def test_a_mask_as_a_matte(tmp_path):
+    """Drawn in Blender's mask editor, with two shape keys: shown at once, moved by a new shape key, and the same in the
+    preview, in a render and by a Blender without a window. Sharp within it, long exposed without."""
+    seen, console = tell("mask_story.py", "vulkan", linked(tmp_path))
+    assert "Traceback" not in console
+    assert "Error" not in next(entry["background"] for entry in seen if "background" in entry)
+    steps = {entry["step"]: crop(tmp_path, entry) for entry in seen if "step" in entry}
+    effect, matte, redo, earlier, dragged = (steps[name] for name in sorted(steps))
+    assert_alike(redo, matte, tmp_path / "redo_difference.png")
+    for before, after in ((effect, matte), (matte, earlier), (matte, dragged)):
+        assert (np.abs(before - after).max(axis=2) > 30).mean() > 0.01
+    final = pixels(tmp_path / "final.png")
+    boxes = {entry["picture"]: entry.get("box") for entry in seen if "picture" in entry}
+    for name, box in (("live", boxes["live"]), ("background_0055", None)):
+        assert_alike(pixels(tmp_path / f"{name}.png", box), final, tmp_path / f"{name}_difference.png")
+    light = film_light(54)
+    height, width = final.shape[:2]
+    inside = np.s_[int(0.35 * height) : int(0.65 * height), int(0.3 * width) : int(0.5 * width)]
+    outside = np.s_[:, int(0.75 * width) :]
+    for place, expected in ((inside, light[0]), (outside, light.mean(axis=0))):
+        assert_alike(final[place], levels(expected[place]), tmp_path / "expected_difference.png")
+
+
+def test_a_time_map(tmp_path):
+    """By the menu, turned, made radial: as frames that are taken for each pixel and mixed in light."""
+    seen, console = tell("time_map_story.py", "opengl", linked(tmp_path))
+    assert "Traceback" not in console
+    steps = {entry["step"]: crop(tmp_path, entry) for entry in seen if "step" in entry}
+    effect, linear, redo, turned, radial, result, played = (steps[name] for name in sorted(steps))
+    for before, after in ((effect, linear), (linear, turned), (turned, radial)):
+        assert (np.abs(before - after).max(axis=2) > 10).mean() > 0.1
+    assert_alike(redo, linear, tmp_path / "redo_difference.png")
+    assert_alike(played, result, tmp_path / "played_difference.png")
+    final, light = pixels(tmp_path / "final.png"), film_light(49)
+    height, width = final.shape[:2]
+    y, x = np.indices((height, width)) + 0.5
+    time = np.hypot(x - width / 2, y - height / 2) / (np.hypot(width, height) / 2) * 7
+    expected = np.zeros_like(light[0])
+    for k, frame in enumerate(light):
+        expected += np.maximum(1 - np.abs(time - k), 0)[..., None] * frame
+    assert_alike(final, levels(expected), tmp_path / "expected_difference.png")
+
+
+def film_light(first):
+    """Eight frames of the film from one on, in linear light (8, H, W, 3)."""
+    with open_source(ROOT / "assets" / "bigbuckbunny.mp4") as source:
+        frames = np.stack([source.read(first + k)[..., :3] for k in range(8)]) / 255
+    return np.where(frames <= 0.04045, frames / 12.92, ((frames + 0.055) / 1.055) ** 2.4)
+
+
+def levels(light):
+    """Linear light in 8-bit sRGB."""
+    encoded = np.where(light <= 0.0031308, light * 12.92, 1.055 * light ** (1 / 2.4) - 0.055)
+    return np.round(encoded * 255).astype(int)
+
+
 def packages(folder):
     """A folder of what tracking needs besides what the Blender of a distribution has."""
     import cv2

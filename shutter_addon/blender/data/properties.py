@@ -20,9 +20,9 @@ from bpy.props import (
 )
 from bpy.types import PropertyGroup
 
-from ...core.limits import MAX_BAR, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE
+from ...core.limits import MAX_BAR, MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE
 from ...core.shutters import MAX_WINDOW
-from . import consistency, revision, selection, strips, validation
+from . import consistency, matte_strips, revision, selection, strips, validation
 
 # Of labels that Blender translates in another sense ("Window" is one on the screen). Operators have a context anyway.
 CONTEXT = "Virtual Shutter"
@@ -74,9 +74,41 @@ PLACES = (
     ("FILE", "Beside the File", "A folder beside the .blend file"),
     ("USER", "Extension", "The extension's own folder"),
 )
-KINDS = (
+STROKES = (
     ("LINE", "Line", "The strokes themselves, as wide as the region's width"),
     ("LASSO", "Lasso", "All that the strokes enclose"),
+)
+KINDS = (
+    *STROKES,
+    ("MATTE", "Matte", "What a file, a strip or a mask says for every pixel"),
+    ("RAMP", "Ramp", "From none of the shutter to all of it, across the picture"),
+)
+MATTE_SOURCES = (
+    ("IMAGE", "File", "A movie, an image sequence or a picture"),
+    ("STRIP", "Strip", "A movie, image or clip strip of the edit, as it is trimmed and retimed, muted or not"),
+    ("MASK", "Mask", "A mask, as a Mask strip on the footage shows it"),
+)
+CHANNELS = (
+    ("LUMINANCE", "Luminance", "How bright the matte is"),
+    ("RED", "Red", "The matte's red"),
+    ("GREEN", "Green", "The matte's green"),
+    ("BLUE", "Blue", "The matte's blue"),
+    ("ALPHA", "Alpha", "How opaque the matte is"),
+    ("NAMED", "Named", "A channel of an EXR file, by its name"),
+)
+TIMINGS = (
+    ("SOURCE", "Footage", "The matte's frames belong to those of the footage, however that is trimmed and retimed"),
+    ("TIMELINE", "Timeline", "The matte plays along the timeline, from where the Shutter strip starts untrimmed"),
+)
+BLENDS = (
+    ("OVER", "Over", "What is beneath shares what the matte leaves"),
+    ("ADD", "Add", "What the matte takes comes from the default shutter alone, so that mattes stand side by side"),
+)
+RAMPS = (
+    ("LINEAR", "Linear", "From the left to the right; its rotation turns it"),
+    ("RADIAL", "Radial", "From the center to the farthest corner"),
+    ("ANGLE", "Angle", "Once around the center, clockwise from the top"),
+    ("LUMINANCE", "Luminance", "How bright the shown frame is"),
 )
 
 MOTIONS = (
@@ -297,11 +329,87 @@ class ShutterRegion(_Tracked, PropertyGroup):
     layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=_changed)
     kind: EnumProperty(
         name="Type",
-        description="How the strokes cover the picture",
+        description="What says where the shutter holds",
         items=KINDS,
         update=_changed,
         options=_UNKEYED,
+        translation_context=CONTEXT,
     )
+    matte: EnumProperty(
+        name="From", description="What the matte is", items=MATTE_SOURCES, update=_changed, options=_UNKEYED
+    )
+    image: PointerProperty(
+        name="File",
+        description="Movie, image sequence or picture that is the matte",
+        type=bpy.types.Image,
+        update=_changed,
+    )
+    strip: StringProperty(name="Strip", description="Identity of the strip that is the matte", update=_changed)
+    strip_name: StringProperty(
+        name="Strip",
+        description="Strip that is the matte",
+        get=matte_strips.strip_name,
+        set=matte_strips.choose_strip,
+        options={"SKIP_SAVE"},
+    )
+    mask: PointerProperty(name="Mask", description="Mask that is the matte", type=bpy.types.Mask, update=_changed)
+    channel: EnumProperty(
+        name="Channel",
+        description="What of the matte says how much of the shutter a pixel gets",
+        items=CHANNELS,
+        update=_changed,
+        options=_UNKEYED,
+    )
+    channel_name: StringProperty(
+        name="Channel Name", description="Name of the channel in the EXR file", maxlen=MAX_CHANNEL, update=_changed
+    )
+    invert: BoolProperty(
+        name="Invert", description="The shutter gets what the matte leaves", update=_changed, options=_UNKEYED
+    )
+    timing: EnumProperty(
+        name="Frames Of",
+        description="What the matte's frames belong to",
+        items=TIMINGS,
+        update=_changed,
+        options=_UNKEYED,
+    )
+    offset: IntProperty(
+        name="Offset",
+        description="Frames by which the matte is ahead",
+        min=-MAX_FRAME,
+        max=MAX_FRAME,
+        update=_changed,
+        options=_UNKEYED,
+    )
+    blend: EnumProperty(
+        name="Blend",
+        description="How the matte lies over other regions",
+        items=BLENDS,
+        update=_changed,
+        options=_UNKEYED,
+        translation_context=CONTEXT,
+    )
+    opacity: FloatProperty(
+        name="Opacity",
+        description="How much of the matte counts",
+        subtype="FACTOR",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        update=_changed,
+    )
+    feather: FloatProperty(
+        name="Feather",
+        description="How wide a hard edge of the matte becomes, as a fraction of the picture's height",
+        min=0.0,
+        max=MAX_DISTANCE,
+        soft_max=0.2,
+        precision=3,
+        step=1,
+        update=_changed,
+        translation_context=CONTEXT,
+    )
+    ramp: EnumProperty(name="Ramp", description="How the ramp runs", items=RAMPS, update=_changed, options=_UNKEYED)
     width: FloatProperty(
         name="Width",
         description="Width of the lines as a fraction of the picture's height",
@@ -456,6 +564,8 @@ def register():
     bpy.types.Scene.virtual_shutter = PointerProperty(type=ShutterScene)
     # A strip cannot be pointed to and may be renamed: the source strip carries the identity that effects look for.
     bpy.types.Strip.virtual_shutter_source = StringProperty(options={"HIDDEN"})
+    # And that which mattes look for: apart, as a source that is duplicated and given other files may be one.
+    bpy.types.Strip.virtual_shutter_matte = StringProperty(options={"HIDDEN"})
     # The effect strip carries its scene's: Blender's clipboard drops the scene itself.
     bpy.types.Strip.virtual_shutter_effect = StringProperty(options={"HIDDEN"})
     # That the source was muted when the effect was made, and shall show again when it goes.
@@ -463,7 +573,7 @@ def register():
 
 
 def unregister():
-    for name in ("source", "effect", "muted"):
+    for name in ("source", "matte", "effect", "muted"):
         delattr(bpy.types.Strip, f"virtual_shutter_{name}")
     del bpy.types.Scene.virtual_shutter
     for cls in reversed(classes):

@@ -13,7 +13,7 @@ def copy_properties(old, new) -> None:
                 copy_properties(item, getattr(new, name).add())
         elif is_group(old, name):
             copy_properties(getattr(old, name), getattr(new, name))
-        elif not prop.is_readonly:
+        elif not (prop.is_readonly or prop.is_skip_save):  # what is not saved only shows another one
             store(new, name, stored(old, name))
 
 

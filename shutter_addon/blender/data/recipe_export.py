@@ -7,16 +7,16 @@ from . import annotations, fcurves, inbetween_settings, snapshot, strips, valida
 from .validation import EffectError
 
 
-def recipe_of(edit, effect, strip) -> recipe.Recipe:
+def recipe_of(edit, effect, strip, mattes=()) -> recipe.Recipe:
     """The effect as a recipe, whose frame 1 is the strip's first; left out is what baking.baked leaves out, and regions
-    without a shutter. EffectError: it cannot be rendered as it stands."""
+    without a shutter. mattes: as of baking.baked. EffectError: it cannot be rendered as it stands."""
     snapshot.check_counts(effect)
     shown = range(strip.left_handle, strip.right_handle)
     if not -limits.MAX_FRAME <= shown.start <= shown.stop <= limits.MAX_FRAME:
         sentence = rpt_('strip "{strip}" lies at frames {first} to {last}, where no timeline is')
         raise EffectError(sentence.format(strip=strip.name, first=shown.start, last=shown.stop - 1))
     drawn = [region for region in strips.drawn_regions(effect) if annotations.layer_of(effect, region)]
-    for item in (*effect.shutters, *drawn):
+    for item in (*effect.shutters, *drawn, *strips.matte_regions(effect)):
         _check_name(item)
     for shutter in effect.shutters:
         for component in shutter.color:
@@ -26,7 +26,7 @@ def recipe_of(edit, effect, strip) -> recipe.Recipe:
         raise EffectError(sentence.format(strip=strip.name))
     with snapshot.translated():
         found = snapshot.read(edit, effect, strip, sorted({*shown, *_keyed(edit, effect)}), thorough=True)
-        return baking.baked(found, shown, inbetween_settings.method(effect))
+        return baking.baked(found, shown, inbetween_settings.method(effect), mattes)
 
 
 def _keyed(edit, effect) -> set[float]:

@@ -1,21 +1,33 @@
 """A recipe into Blender's data: shutters, regions, strokes, keys and options."""
 
+import os
+from contextlib import suppress
+from pathlib import Path
+
+import bpy
 import numpy as np
 from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core import limits, recipe
-from . import fcurves, geometry
+from ...media import MediaError
+from ...media.files import check_name
+from ...media.matte_files import MatteFile
+from ...media.sequence import IMAGE_SUFFIXES
+from . import fcurves, geometry, strips
 from .annotations import annotation, picture_size
 from .snapshot import OPTIONS
 from .validation import EffectError
 
 
-def apply(edit, effect, strip, source: recipe.Recipe) -> None:
-    """Replaces the effect's data and keys by a recipe, whose frame 1 is the strip's first. EffectError: its keys cannot
-    lie there; nothing has changed."""
+def apply(edit, effect, strip, source: recipe.Recipe, folder: Path = Path()) -> None:
+    """Replaces the effect's data and keys by a recipe, whose frame 1 is the strip's first; folder: where it lies, which
+    its mattes' paths begin at. EffectError: its keys cannot lie there; MediaError: it has no such mattes; nothing has
+    changed."""
     first = strip.left_handle - 1
     _check_keys(source, first)
+    mattes = [region for region in source.regions if isinstance(region, recipe.MatteRegion)]
+    images = {region.path: matte_image(folder / region.path, region.channel) for region in mattes}
     clear(edit, effect)
     # Bars per frame before the factor, which else would change the window.
     effect.bars_per_frame, effect.inbetween = source.inbetween, str(source.inbetween)
@@ -35,7 +47,11 @@ def apply(edit, effect, strip, source: recipe.Recipe) -> None:
         _add_shutter(edit, effect, f"{path}.shutters[{i}]", shutter, first)
     colors = {shutter.name: shutter.color for shutter in source.shutters}
     for i, region in enumerate(source.regions):
-        _add_region(edit, effect, strip, f"{path}.regions[{i}]", region, colors[region.shutter], first)
+        where = f"{path}.regions[{i}]"
+        if isinstance(region, recipe.Region):
+            _add_region(edit, effect, strip, where, region, colors[region.shutter], first)
+        else:
+            _add_matte(edit, effect, strip, where, region, images, first)
 
 
 def _set_number(edit, owner, path: str, name: str, value: recipe.Keyable, first: float, **curve) -> None:
@@ -48,9 +64,47 @@ def _set_number(edit, owner, path: str, name: str, value: recipe.Keyable, first:
     fcurves.set_keys(edit, f"{path}.{name}", 0, keys, **curve)
 
 
+def matte_image(path: str | Path, channel: str = "luminance"):
+    """The movie, image sequence or picture at a path, to which a region can point. MediaError: there is none, or none
+    with such a channel."""
+    with MatteFile(Path(path), channel).open() as matte:
+        path, count = matte.path, matte.count
+    name = _kept(check_name(path))
+    is_sequence = path.suffix.lower() in IMAGE_SUFFIXES and count > 1
+    if is_sequence and (known := _sequence_at(name)) is not None:
+        return known
+    try:
+        image = bpy.data.images.load(name, check_existing=not is_sequence)  # one that is there may be no sequence
+    except RuntimeError as error:  # its path is longer than Blender's may be
+        sentence = rpt_("{file}: Blender cannot read it ({error})")
+        raise MediaError(sentence.format(file=path.name, error=error)) from None
+    if is_sequence:
+        image.source = "SEQUENCE"
+    return image
+
+
+def _sequence_at(name: str):
+    """The image that is the sequence at a path already, or None."""
+    own = [image for image in bpy.data.images if image.source == "SEQUENCE" and image.library is None]
+    return next((image for image in own if bpy.path.abspath(image.filepath) == bpy.path.abspath(name)), None)
+
+
+def _kept(name: str) -> str:
+    """A path as Blender keeps those that are chosen: relative to the saved file, if the preferences say so. With two
+    slashes before it, it would be relative in any case."""
+    if os.name == "posix" and name.startswith("//"):
+        name = name[1:]
+    if bpy.data.filepath and bpy.context.preferences.filepaths.use_relative_paths:
+        with suppress(ValueError):  # another drive
+            return bpy.path.relpath(name)
+    return name
+
+
 def _check_keys(source: recipe.Recipe, first: float) -> None:
     """EffectError: keys would lie beyond Blender's timeline, or on the same frame, as it counts in float32."""
+    mattes = [region for region in source.regions if not isinstance(region, recipe.Region)]
     numbers = [source.edge_aware, *(shutter.trail for shutter in source.shutters)]
+    numbers += [number for region in mattes for number in (region.opacity, region.width)]
     keyed = [source.time, source.camera, *(number for number in numbers if isinstance(number, list))]
     for keys in (*keyed, *(part.keys for part in (*source.shutters, *source.regions))):
         frames = np.array([key.frame + first for key in keys], dtype=np.float32)
@@ -96,6 +150,27 @@ def _add_region(edit, effect, strip, path: str, source: recipe.Region, color, fi
     region.name, region.shutter, region.width = source.name, source.shutter, source.width
     region.kind = source.kind.upper()
     region.layer = _draw(effect, strip, source, color, first)
+    _set_moves(edit, region, path, source.keys, first)
+
+
+def _add_matte(
+    edit, effect, strip, path: str, source: recipe.MatteRegion | recipe.RampRegion, images: dict, first: float
+) -> None:
+    region = effect.regions.add()
+    region.name, region.shutter, region.kind = source.name, source.shutter, source.kind.upper()
+    region.invert, region.blend = source.invert, source.blend.upper()
+    if isinstance(source, recipe.RampRegion):
+        region.ramp = source.ramp.upper()
+    else:
+        region.matte, region.image = "IMAGE", images[source.path]
+        # Blender's offset counts from the strip's untrimmed start, a recipe's from the strip's first frame.
+        region.offset = source.offset - (strips.skipped(strip) if source.timing == "timeline" else 0)
+        region.timing = source.timing.upper()
+        is_named = source.channel not in recipe.CHANNELS
+        region.channel = "NAMED" if is_named else source.channel.upper()
+        region.channel_name = source.channel if is_named else ""
+    _set_number(edit, region, path, "opacity", source.opacity, first)
+    _set_number(edit, region, path, "feather", source.width, first)
     _set_moves(edit, region, path, source.keys, first)
 
 

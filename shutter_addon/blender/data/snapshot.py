@@ -17,9 +17,9 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...core import effect as model
 from ...core import following, keyframes, limits
 from ...core.frame_state import FrameState, Options
-from ...core.messages import EffectError
+from ...core.messages import EffectError, UserError
 from ...core.retiming import StripTiming
-from . import annotations, geometry, inbetween_settings, source_media, strips, validation
+from . import annotations, geometry, inbetween_settings, matte_content, source_media, strips, validation
 from .fcurves import Curves, leading, progress
 from .strip_timing import timing_of
 
@@ -115,15 +115,18 @@ def read(edit, effect, strip, frames, *, thorough: bool = False) -> model.Effect
     followed = {shutter.follow_region for shutter in effect.shutters if shutter.follow == "REGION"}
     around = _around(effect, frames)
     placement = _placement(curves, effect, strip, around)
+    time = _source_time(curves, path, effect, around) if effect.use_source_time else None
     regions = tuple(
-        _region(
+        _any_region(
             curves,
             f"{path}.regions[{i}]",
             effect,
+            strip,
             region,
             names.index(region.shutter),
             placement,
             around if region.name in followed else frames,
+            time,
         )
         for i, region in enumerate(effect.regions)
         if region.shutter in names
@@ -144,7 +147,7 @@ def read(edit, effect, strip, frames, *, thorough: bool = False) -> model.Effect
         ),
         regions,
         options,
-        _source_time(curves, path, effect, around) if effect.use_source_time else None,
+        time,
         _channel(curves, effect, path, "edge_aware", frames),
         camera,
     )
@@ -182,17 +185,32 @@ def bars_at(edit, effect, index: int, frame: float) -> np.ndarray:
 
 
 def strokes_at(edit, effect, strip, index: int, frame: float) -> list[np.ndarray]:
-    """A region's strokes (n, 2) on the picture at a timeline frame, not moved yet. EffectError: they lie nowhere."""
+    """A region's strokes (n, 2) on the picture at a timeline frame, not moved yet; a matte has none. EffectError: they
+    lie nowhere."""
+    if effect.regions[index].kind in strips.MATTES:
+        return []
     with translated():
         return region_at(edit, effect, strip, index, (frame,)).unmoved(frame)
 
 
-def region_at(edit, effect, strip, index: int, frames) -> model.Region:
+def region_at(edit, effect, strip, index: int, frames) -> model.Region | model.MatteRegion:
     """A region as plain data, its channels sampled at timeline frames. What is wrong at one frame is told at that
     frame."""
     curves, path = Curves(edit), f"{effect.path_from_id()}.regions[{index}]"
     placement = _placement(curves, effect, strip, frames)
-    return _region(curves, path, effect, effect.regions[index], 0, placement, frames)
+    time = _source_time(curves, effect.path_from_id(), effect, frames) if effect.use_source_time else None
+    return _any_region(curves, path, effect, strip, effect.regions[index], 0, placement, frames, time)
+
+
+def last_shown(edit, effect, strip) -> float:
+    """The last of the source's frames that an effect strip shows, as of matte_content.shown_frame; where keys say which
+    these are, of a hundred frames of the strip. EffectError, MediaError: it cannot be known."""
+    first, last = strip.left_handle, strip.right_handle - 1
+    frames, time = (first, last), None
+    if effect.use_source_time:
+        frames = *range(first, last, max(1, (last - first) // 100)), last
+        time = _source_time(Curves(edit), effect.path_from_id(), effect, frames)
+    return max(map(matte_content.shown_frame(edit, effect, strip, time), frames))
 
 
 def camera_at(edit, effect, frames) -> model.Camera:
@@ -227,10 +245,10 @@ def check_counts(effect) -> None:
 
 
 def _tried(function, *arguments):
-    """The result, or the EffectError in its place, which is raised where the value is asked for."""
+    """The result, or the UserError in its place, which is raised where the value is asked for."""
     try:
         return function(*arguments)
-    except EffectError as error:
+    except UserError as error:
         return error
 
 
@@ -348,6 +366,21 @@ def check_bar_count(shutter, window: int) -> None:
     if len(shutter.bars) != window:
         sentence = rpt_("{place}: {count} bars, the window is {window}")
         raise EffectError(sentence.format(place=validation.place(shutter), count=len(shutter.bars), window=window))
+
+
+def _any_region(
+    curves: Curves, path: str, effect, strip, region, shutter: int, placement, frames, time
+) -> model.Region | model.MatteRegion:
+    if region.kind not in strips.MATTES:
+        return _region(curves, path, effect, region, shutter, placement, frames)
+    moves = _moves(curves, region, path, frames)
+    content = _tried(matte_content.content, effect.id_data, effect, strip, region, moves, frames, time)
+    blend = _tried(validation.word, region, "blend")
+    if faults := [found for found in (content, blend) if isinstance(found, UserError)]:
+        content, blend = keyframes.Constant(faults[0]), "OVER"
+    opacity, feather = (_channel(curves, region, path, name, frames) for name in ("opacity", "feather"))
+    numbers = content, blend.lower(), region.invert, opacity, feather
+    return model.MatteRegion(region.name, shutter, *numbers, *moves)
 
 
 def _region(curves: Curves, path: str, effect, region, shutter: int, placement, frames) -> model.Region:

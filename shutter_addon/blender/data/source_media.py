@@ -30,7 +30,7 @@ class _Look:
 
 
 _specs: dict[tuple, "SourceSpec"] = {}  # by media_key
-_looks: dict[tuple, _Look] = {}  # by edit and strip
+_looks: dict[tuple, _Look] = {}  # by edit and strip, or by image
 _resting = False  # while a film is rendered, all its files have been asked before it
 
 
@@ -44,7 +44,8 @@ def files_key(strip) -> tuple:
     at: a hundred of them a second, in turn, and none while a film is rendered. MediaError: it has none."""
     count, path = _files(strip)
     ends = dict.fromkeys((path(0), path(count - 1)))
-    return count, *((str(end), _stamp(end)) for end in ends), _between(strip, count, path)
+    place = strip.id_data.session_uid, strip.name
+    return count, *((str(end), _stamp(end)) for end in ends), between(place, count, path)
 
 
 def look_again() -> None:
@@ -66,12 +67,13 @@ def forget() -> None:
     _specs.clear()
 
 
-def _between(strip, count, path) -> int:
-    """A number that changes when a file of the strip is found replaced. One that is gone is not: what was made of it
-    still holds, and whoever needs the file itself is told."""
+def between(place: tuple, count: int, path) -> int:
+    """A number that changes when a file of a sequence is found replaced. One that is gone is not: what was made of it
+    still holds, and whoever needs the file itself is told.
+
+    place: what knows it, a strip or an image, as a key; count: of its files; path: gives that of each by its index"""
     if count < 3:
         return 0
-    place = strip.id_data.session_uid, strip.name
     look = _looks.pop(place, None)
     if look is None or len(look.known) != count:
         look = _Look([None] * count, 0, count)

@@ -1,5 +1,7 @@
 """Effect strips: a Scene strip above its source, and the scene, data and source that belong to it."""
 
+import math
+
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
@@ -8,6 +10,7 @@ from .validation import EffectError
 
 ENGINE = "VIRTUAL_SHUTTER"
 SOURCES = ("MOVIE", "IMAGE", "MOVIECLIP")
+MATTES = ("MATTE", "RAMP")  # kinds of regions that have no strokes
 
 
 def effect_strips(edit) -> list:
@@ -53,6 +56,11 @@ def find_edit(scene):
 def origin(strip) -> float:
     """Timeline frame at which the strip's untrimmed content would start: the same for all parts of a cut strip."""
     return strip.content_start - strip.content_trim_start
+
+
+def skipped(strip) -> int:
+    """How many frames of its content a strip leaves out before the first that it shows."""
+    return math.floor(strip.left_handle - origin(strip))
 
 
 def timeline_frame(strip, scene_frame: float) -> float:
@@ -103,6 +111,12 @@ def invalidate(edit, scene=None) -> None:
 
 
 def drawn_regions(effect) -> list:
-    """The regions that have a shutter, in order: those that an effect's state has shapes of."""
+    """The regions of strokes that have a shutter, in order: those that an effect's state has shapes of."""
     names = {shutter.name for shutter in effect.shutters}
-    return [region for region in effect.regions if region.shutter in names]
+    return [region for region in effect.regions if region.shutter in names and region.kind not in MATTES]
+
+
+def matte_regions(effect) -> list:
+    """The regions of mattes and ramps that have a shutter, in order: those that lie over the others."""
+    names = {shutter.name for shutter in effect.shutters}
+    return [region for region in effect.regions if region.shutter in names and region.kind in MATTES]

@@ -66,7 +66,8 @@ def check(items, name: str, found: np.ndarray) -> None:
 def check_region(region) -> None:
     """EffectError: a property of a region, as it stands, is outside of its range."""
     word(region, "kind")
-    number(region, "width")
+    for name in ("width", "opacity", "feather"):
+        number(region, name)
     check_placement(region)
 
 

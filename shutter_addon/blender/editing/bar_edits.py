@@ -2,12 +2,14 @@
 
 from typing import NamedTuple
 
+import bpy
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 
 from ...core import shutters
 from ..data import fcurves, revision, snapshot
 from ..data.consistency import bars
+from ..rendering import invalidation, session
 
 
 def summary(weights) -> str:
@@ -19,6 +21,23 @@ def summary(weights) -> str:
     if frames == "1":
         return iface_("{angle}°, 1 frame of light").format(angle=angle)
     return iface_("{angle}°, {frames} frames of light").format(angle=angle, frames=frames)
+
+
+def open_for(edit, effect, strip, index: int) -> str | None:
+    """For how many frames a shutter is open at the current frame whose trail has a length, in words; None: its bars say
+    that, or there is no picture. For what is drawn: worked out once, with all that the live preview shows, until
+    something changes."""
+    shutter, frame = effect.shutters[index], edit.frame_current
+    has_length = shutter.follow != "NOTHING" and shutter.length == "MOTION"
+    is_shown = strip.left_handle <= frame < strip.right_handle and not bpy.app.is_job_running("RENDER")
+    if not (has_length and is_shown):
+        return None
+    try:
+        state = session.here().request(invalidation.current(edit, effect, strip, frame), frame).state
+    except session.FAULTS:  # which the live preview tells
+        return None
+    words = iface_("Open for {frames} of {window} frames here")
+    return words.format(frames=f"{state.open_for[index]:.3g}", window=state.options.window)
 
 
 def set_bars(shutter, weights) -> None:

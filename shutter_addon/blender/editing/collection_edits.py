@@ -6,13 +6,13 @@ from ...core import limits
 from ..data import fcurves
 
 
-def why_full(effect, collection: str) -> str | None:
-    """Why an effect cannot have another one of its "shutters" or "regions", in a sentence; None if it can."""
+def why_full(effect, collection: str, more: int = 1) -> str | None:
+    """Why an effect cannot have so many more of its "shutters" or "regions", in a sentence; None if it can."""
     most, sentence = {
         "shutters": (limits.MAX_SHUTTERS, rpt_("An effect has {most} shutters at most")),
         "regions": (limits.MAX_REGIONS, rpt_("An effect has {most} regions at most")),
     }[collection]
-    return sentence.format(most=most) if len(getattr(effect, collection)) >= most else None
+    return sentence.format(most=most) if len(getattr(effect, collection)) + more > most else None
 
 
 def remove(effect, collection: str, index: int) -> None:

@@ -13,12 +13,13 @@ from . import add_effect
 _PATHS = {"MOVIE": "filepath", "IMAGE": "directory", "SOUND": "filepath"}  # the property of a strip of that type
 
 
-def make_edit(path: Path, medium, source_recipe):
-    """An edit of one source strip (an opened medium's) under one effect strip; its scene."""
+def make_edit(path: Path, medium, source_recipe, folder: Path):
+    """An edit of one source strip (an opened medium's) under one effect strip; its scene. folder: of the recipe.
+    MediaError: the recipe has mattes that cannot be read."""
     source = make_source(path, medium)
     edit = source.id_data
     strip, effect = add_effect.add_effect(edit, source)
-    recipe_import.apply(edit, effect, strip, source_recipe)
+    recipe_import.apply(edit, effect, strip, source_recipe, folder)
     strip.right_handle = length(medium, source_recipe) + 1
     edit.frame_start, edit.frame_end = strip.left_handle, strip.right_handle - 1
     edit.frame_current = edit.frame_start
@@ -66,6 +67,7 @@ def paths_relative(edit, folder: Path):
     for strip in edit.sequence_editor.strips_all:
         if strip.type in _PATHS:
             owners.append((strip.sound if strip.type == "SOUND" else strip, _PATHS[strip.type]))
+    owners += [(image, "filepath") for image in bpy.data.images]  # mattes
     before = [(owner, name, getattr(owner, name)) for owner, name in owners]
     for owner, name, path in before:
         if path:

@@ -2,10 +2,9 @@
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import presets
-from ..data import consistency, snapshot, validation
+from ..data import consistency, snapshot
 from ..data.validation import EffectError
-from . import bar_edits, shutter_edits
+from . import shutter_edits
 from .motion_keys import MotionKeys
 
 
@@ -24,11 +23,9 @@ def set_up(effect, index: int, key: bool = False) -> None:
     default, so that it holds wherever no other one has a region.
 
     key: keys the bars at the current frame. EffectError: the window has no length, and nothing has changed."""
-    region, bars = effect.regions[index], presets.bars("ANGLE_360", validation.number(effect, "window"))
-    region.name = consistency.unique(region.name, {other.name for other in effect.regions if other != region})
+    region = effect.regions[index]
     place = effect.shutters.find(region.shutter)
-    shutter = effect.shutters[place]
-    shutter.follow, shutter.follow_region, shutter.length = "REGION", region.name, "FRAMES"
-    effect.position = "CENTER"
-    bar_edits.paint(effect, place, bars, key)
+    shutter_edits.follow(effect, place, "REGION", key)
+    region.name = consistency.unique(region.name, {other.name for other in effect.regions if other != region})
+    effect.shutters[place].follow_region = region.name
     shutter_edits.move_shutter(effect, place, 0)

@@ -17,6 +17,17 @@ def add_region(effect, shutter, kind: str = "LINE", name: str = ""):
     return region
 
 
+def add_matte(effect, shutter, kind: str = "MATTE", name: str = "", **values):
+    """Appends a matte or a ramp of a shutter, with these values of its properties, and makes it the active region."""
+    region = effect.regions.add()
+    region.name = unique(name or shutter.name, {r.name for r in effect.regions})
+    region.shutter, region.kind = shutter.name, kind
+    for prop, value in values.items():
+        setattr(region, prop, value)
+    effect.active_region = len(effect.regions) - 1
+    return region
+
+
 def new_layer(effect, region):
     """Gives a region an empty annotation layer, named after it and in its shutter's colour."""
     layer = annotation(effect).layers.new(region.name, set_active=True)

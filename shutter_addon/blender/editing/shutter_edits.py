@@ -5,7 +5,7 @@ from bpy.app.translations import pgettext_data as data_
 
 from ...core import presets
 from ..data import fcurves, property_copy, validation
-from . import collection_edits
+from . import bar_edits, collection_edits
 from .region_edits import remove_region
 
 # Told apart on footage and by colour-blind eyes (Okabe and Ito).
@@ -57,6 +57,14 @@ def duplicate_shutter(effect, index: int):
     move_shutter(effect, last, index + 1)
     effect.active_shutter = index + 1
     return effect.shutters[index + 1]
+
+
+def follow(effect, index: int, subject: str, key: bool) -> None:
+    """Has a shutter follow its region ("REGION") or the camera ("CAMERA"), open for a whole window that lies around the
+    frame; key: keys the bars at the current frame. EffectError: the window has no length, and nothing has changed."""
+    shutter, bars = effect.shutters[index], presets.bars("ANGLE_360", validation.number(effect, "window"))
+    shutter.follow, shutter.length, effect.position = subject, "FRAMES", "CENTER"
+    bar_edits.paint(effect, index, bars, key)
 
 
 def remove_shutter(effect, index: int) -> None:

@@ -20,7 +20,7 @@ from ...core.effect import Camera, Region
 from ...core.keyframes import Samples
 from ...media import camera_tracking, tracking
 from ...media.tracking import Tracked
-from ..data import annotations, selection, snapshot, validation
+from ..data import annotations, selection, snapshot, strips, validation
 from ..data.validation import EffectError
 from ..rendering import session
 from . import motion_keys
@@ -195,7 +195,8 @@ def _region(edit, effect, strip, index: int, frames, here: Tracked) -> _Subject:
 def _camera(edit, effect, strip, _index, frames, here: Tracked) -> _Subject:
     """The camera, and all regions, which are left out."""
     camera = _standing(snapshot.camera_at(edit, effect, frames), here)
-    regions = [snapshot.region_at(edit, effect, strip, i, frames) for i in range(len(effect.regions))]
+    drawn = [i for i, region in enumerate(effect.regions) if region.kind not in strips.MATTES]
+    regions = [snapshot.region_at(edit, effect, strip, i, frames) for i in drawn]
     follow = partial(camera_tracking.follow_camera, camera, regions)
     return _Subject(follow, lambda: region_keys.CORNERS, region_keys.STEADY)
 

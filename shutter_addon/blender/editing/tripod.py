@@ -1,8 +1,6 @@
 """A tripod, for footage that was held in the hand: an exposure for which the camera stands still."""
 
-from ...core import presets
-from ..data import validation
-from . import bar_edits
+from . import shutter_edits
 from .motion_keys import MotionKeys
 
 
@@ -17,10 +15,8 @@ def set_up(effect, key: bool = False) -> None:
     region, and so holds nowhere, the default one takes its place.
 
     key: keys the bars at the current frame. EffectError: the window has no length, and nothing has changed."""
-    bars = presets.bars("ANGLE_360", validation.number(effect, "window"))
-    name = effect.shutters[effect.active_shutter].name
+    index, name = effect.active_shutter, effect.shutters[effect.active_shutter].name
     if not any(region.shutter == name for region in effect.regions):
-        effect.active_shutter = 0
-    shutter = effect.shutters[effect.active_shutter]
-    shutter.follow, shutter.length, effect.position = "CAMERA", "FRAMES", "CENTER"
-    bar_edits.paint(effect, effect.active_shutter, bars, key)
+        index = 0
+    shutter_edits.follow(effect, index, "CAMERA", key)
+    effect.active_shutter = index

@@ -9,6 +9,8 @@ from ..data import fcurves, property_copy
 from . import add_effect
 
 _MOST = 64
+# What effects point to, and where bpy.data has it.
+_POINTED = {"MovieClip": "movieclips", "Image": "images", "Mask": "masks"}
 _effects: dict = {}
 
 
@@ -56,7 +58,7 @@ def restore(edit, identity: str):
 
 
 def _plain(struct) -> dict:
-    """A struct of Blender's with all that is in it as plain data; of what it points to, the session_uid of clips."""
+    """A struct of Blender's with all that is in it as plain data; of what it points to, the session_uid."""
     plain = {}
     for prop in struct.bl_rna.properties:
         name = prop.identifier
@@ -65,9 +67,9 @@ def _plain(struct) -> dict:
         elif property_copy.is_group(struct, name):
             plain[name] = _plain(getattr(struct, name))
         elif prop.type == "POINTER":
-            if isinstance(clip := getattr(struct, name), bpy.types.MovieClip):
-                plain[name] = clip.session_uid
-        elif name != "co_ui":  # setting that one moves a key's handles
+            if getattr(struct, name) is not None and prop.fixed_type.identifier in _POINTED:
+                plain[name] = getattr(struct, name).session_uid
+        elif name != "co_ui" and not prop.is_skip_save:  # setting co_ui moves a key's handles
             value = property_copy.stored(struct, name)
             plain[name] = tuple(value) if getattr(prop, "is_array", False) else value
     return plain
@@ -80,8 +82,9 @@ def _fill(struct, plain: dict) -> None:
                 _fill(_add(getattr(struct, name), name, item), item)
         elif isinstance(value, dict):
             _fill(getattr(struct, name), value)
-        elif struct.bl_rna.properties[name].type == "POINTER":
-            setattr(struct, name, next((clip for clip in bpy.data.movieclips if clip.session_uid == value), None))
+        elif (prop := struct.bl_rna.properties[name]).type == "POINTER":
+            found = getattr(bpy.data, _POINTED[prop.fixed_type.identifier])
+            setattr(struct, name, next((each for each in found if each.session_uid == value), None))
         elif not struct.is_property_readonly(name):
             property_copy.store(struct, name, value)
 

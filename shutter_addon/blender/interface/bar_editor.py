@@ -108,9 +108,13 @@ class SHUTTER_GT_bars(Gizmo):
         self.use_grab_cursor = False
 
     def draw(self, context):
-        effect = selection.active(context)[1]
-        if (shown := _shown(effect)) is not None:
-            _draw(_layout(context, shown.bars), selection.active_shutter(effect), *shown)
+        found = selection.active(context)
+        effect = found[1]
+        if (shown := _shown(effect)) is None:
+            return
+        shutter = selection.active_shutter(effect)
+        words = bar_edits.open_for(*found, effect.active_shutter) or bar_edits.summary(shown.bars)
+        _draw(_layout(context, shown.bars), shutter.color, f"{shutter.name}   {words}", *shown)
 
     def test_select(self, context, location):
         return 0 if bar_under(context, *location) is not None else -1
@@ -158,7 +162,7 @@ class SHUTTER_GT_bars(Gizmo):
         bpy.ops.ed.undo_push(message=iface_("Paint Bars", contexts.operator_default))
 
 
-def _draw(place: Layout, shutter, values, states) -> None:
+def _draw(place: Layout, color, words: str, values, states) -> None:
     left, bottom, right, top = place.box
     edges = np.linspace(left, right, place.count + 1)
     heights = bottom + np.minimum(values / place.top, 1.0) * (top - bottom)
@@ -167,7 +171,7 @@ def _draw(place: Layout, shutter, values, states) -> None:
     drawing.rectangles([place.frame], [_BACK])
     drawing.rectangles(
         [(a, bottom, b - gap, max(h, bottom + 1)) for a, b, h in zip(edges, edges[1:], heights, strict=False)],
-        np.tile((*shutter.color, 0.95), (place.count, 1)),
+        np.tile((*color, 0.95), (place.count, 1)),
     )
     foot = drawing.ui_scale() * 3
     keyed = [i for i, state in enumerate(states) if state]
@@ -180,7 +184,6 @@ def _draw(place: Layout, shutter, values, states) -> None:
         [(edges[k] - 0.5, bottom - foot - 4, edges[k] + 0.5, bottom - 1) for k in ticks],
         np.tile((1, 1, 1, 0.5), (len(ticks), 1)),
     )
-    words = f"{shutter.name}   {bar_edits.summary(values)}"
     drawing.text(left, top + drawing.ui_scale() * 4, words)
 
 

@@ -1,5 +1,7 @@
 """Operators: what the user can do, as thin calls of plain functions."""
 
+from pathlib import Path
+
 import bpy
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
@@ -9,9 +11,10 @@ from bpy.types import Operator
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ...core import presets, recipe
-from ..data import annotations, consistency, recipe_export, recipe_import, selection, strips, validation
-from ..data.properties import CONTEXT, KINDS
+from ..data import annotations, consistency, recipe_import, selection, strips, validation
+from ..data.properties import CONTEXT, STROKES
 from ..editing import add_effect, bar_edits, collection_edits, match_source, region_edits, shutter_edits
+from ..rendering import matte_export
 from ..rendering.session import FAULTS
 from . import icons, preview_areas
 
@@ -76,9 +79,20 @@ class _OfRegion(_OfEffect):
         return selection.active_region(effect) is not None or refused(cls, rpt_("The shutter has no region: draw one"))
 
 
-def has_room(cls, effect, collection: str) -> bool:
-    """For poll(): whether the effect can have another one of its "shutters" or "regions"."""
-    sentence = collection_edits.why_full(effect, collection)
+class _OfStrokes(_OfRegion):
+    """Works on the active region, which is one of strokes."""
+
+    @classmethod
+    def possible(cls, effect):
+        if not super().possible(effect):
+            return False
+        has_strokes = selection.active_region(effect).kind not in strips.MATTES
+        return has_strokes or refused(cls, rpt_("The region is a matte or a ramp, and has no strokes"))
+
+
+def has_room(cls, effect, collection: str, more: int = 1) -> bool:
+    """For poll(): whether the effect can have so many more of its "shutters" or "regions"."""
+    sentence = collection_edits.why_full(effect, collection, more)
     return sentence is None or refused(cls, sentence)
 
 
@@ -344,7 +358,13 @@ class SHUTTER_OT_draw(_OfShutter, Operator):
         description="Start a new region instead of adding strokes to the active one",
         options={"SKIP_SAVE"},
     )
-    kind: EnumProperty(name="Type", description="How the strokes cover the picture", items=KINDS, options={"SKIP_SAVE"})
+    kind: EnumProperty(
+        name="Type",
+        description="How the strokes cover the picture",
+        items=STROKES,
+        translation_context=CONTEXT,
+        options={"SKIP_SAVE"},
+    )
 
     @classmethod
     def possible(cls, effect):
@@ -354,7 +374,7 @@ class SHUTTER_OT_draw(_OfShutter, Operator):
 
     def change(self, context, effect):
         region = selection.active_region(effect)
-        if self.new or region is None:
+        if self.new or region is None or region.kind in strips.MATTES:
             if sentence := collection_edits.why_full(effect, "regions"):  # poll() does not know what `new` is
                 raise validation.EffectError(sentence)
             region = region_edits.add_region(effect, selection.active_shutter(effect), self.kind)
@@ -362,7 +382,7 @@ class SHUTTER_OT_draw(_OfShutter, Operator):
             self.report({"INFO"}, "Open a sequencer with a preview to draw")
 
 
-class SHUTTER_OT_erase(_OfRegion, Operator):
+class SHUTTER_OT_erase(_OfStrokes, Operator):
     """Erase strokes of the active region in the preview"""
 
     bl_idname = "shutter.erase"
@@ -506,8 +526,9 @@ class SHUTTER_OT_recipe_import(_OfEffect, ImportHelper, Operator):
     def change(self, context, effect):
         edit, _effect, strip = selection.active(context)
         try:
-            recipe_import.apply(edit, effect, strip, recipe.load(chosen_file(self)))
-        except (recipe.RecipeError, validation.EffectError) as error:
+            path = Path(chosen_file(self))
+            recipe_import.apply(edit, effect, strip, recipe.load(path), path.parent)
+        except (recipe.RecipeError, *FAULTS) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return None
@@ -526,8 +547,8 @@ class SHUTTER_OT_recipe_export(_OfEffect, ExportHelper, Operator):
         edit, _effect, strip = selection.active(context)
         try:
             path = chosen_file(self)
-            recipe.save(recipe_export.recipe_of(edit, effect, strip), path)
-        except recipe.RecipeError as error:
+            recipe.save(matte_export.recipe_for(edit, effect, strip, Path(path)), path)
+        except (recipe.RecipeError, *FAULTS) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         except OSError as error:

@@ -10,7 +10,7 @@ from ...media.tracking import SURE
 from ..data import annotations, selection, strips, validation
 from ..data.properties import CONTEXT
 from ..editing import bar_edits, follow_track, match_source, track_region
-from ..rendering import inbetween_build
+from ..rendering import inbetween_build, matte_look
 from ..rendering.session import FAULTS
 from . import inbetween_operators, track_operators
 
@@ -31,11 +31,16 @@ class SHUTTER_UL_shutters(UIList):
             hint.label(text="default")
 
 
+_ICONS = {"LINE": "IPO_LINEAR", "LASSO": "MESH_CIRCLE", "MATTE": "MOD_MASK", "RAMP": "IPO_EASE_IN_OUT"}
+
+
 class SHUTTER_UL_regions(UIList):
     def draw_item(self, _context, layout, effect, region, _icon, _active, _property, _index):
         row = layout.row(align=True)
-        row.label(text="", icon="IPO_LINEAR" if region.kind == "LINE" else "MESH_CIRCLE")
+        row.label(text="", icon=_ICONS.get(region.kind, "ERROR"))
         row.prop(region, "name", text="", emboss=False)
+        if region.kind in strips.MATTES:
+            return
         layer = annotations.layer_of(effect, region)
         if layer is None or not any(drawing.strokes for drawing in layer.frames):
             row.label(text="", icon="ERROR")
@@ -56,6 +61,24 @@ class SHUTTER_MT_presets(Menu):
         self.layout.operator_enum("shutter.preset", "preset")
         self.layout.separator()
         self.layout.operator("shutter.tripod", icon="CON_CAMERASOLVER")
+
+
+class SHUTTER_MT_regions(Menu):
+    bl_label = "Region Specials"
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.operator("shutter.matte_add", icon="FILE_MOVIE")
+        layout.operator_menu_enum("shutter.matte_strip", "strip", icon="SEQUENCE")
+        if bpy.data.masks:
+            layout.operator_menu_enum("shutter.matte_mask", "mask", icon="MOD_MASK")
+        else:
+            layout.operator("shutter.matte_mask", icon="MOD_MASK")  # greyed out; its tooltip says why
+        layout.operator_menu_enum("shutter.ramp_add", "ramp", icon="IPO_EASE_IN_OUT")
+        layout.separator()
+        layout.operator_menu_enum("shutter.time_map", "ramp", icon="TIME")
+        layout.separator()
+        layout.operator_menu_enum("shutter.region_take", "layer", icon="GREASEPENCIL")
 
 
 class SHUTTER_MT_shutters(Menu):
@@ -117,6 +140,10 @@ class _Shutters:
         row = layout.row()
         row.active = not bars.any()
         row.label(text=bar_edits.summary(bars), icon="NONE" if bars.any() else "ERROR", translate=False)
+        if words := bar_edits.open_for(*found, effect.active_shutter):
+            row = layout.row()
+            row.active = False
+            row.label(text=words, translate=False)
 
 
 def _draw_follow(layout, effect, shutter) -> None:
@@ -175,20 +202,22 @@ class _Regions(_WithEffect):
 
     def draw(self, context):
         layout = self.layout
-        effect = selection.active(context)[1]
+        edit, effect, strip = selection.active(context)
         row = layout.row()
         row.template_list("SHUTTER_UL_regions", "", effect, "regions", effect, "active_region", rows=3)
         _list_buttons(row, "region")
         row = layout.row(align=True)
         row.operator("shutter.draw", icon="GREASEPENCIL")
         row.operator("shutter.erase")
-        row.operator_menu_enum("shutter.region_take", "layer", text="", icon="DOWNARROW_HLT")
+        row.menu("SHUTTER_MT_regions", text="", icon="DOWNARROW_HLT")
         layout.use_property_split = True
         layout.prop(effect, "edge_aware")
         region = selection.active_region(effect)
         if region is None:
             return
-        _draw_tracking(layout, effect, effect.active_region)
+        has_strokes = region.kind not in strips.MATTES
+        if has_strokes:
+            _draw_tracking(layout, effect, effect.active_region)
         row = layout.split(factor=0.4)
         row.alignment = "RIGHT"
         row.label(text="Shutter")
@@ -200,11 +229,45 @@ class _Regions(_WithEffect):
         layout.prop(region, "kind")
         if region.kind == "LINE":
             layout.prop(region, "width")
+        elif region.kind == "RAMP":
+            layout.prop(region, "ramp")
+        elif region.kind == "MATTE":
+            _draw_matte(layout, matte_look.look(edit, effect, strip, region), region)
+        if not has_strokes:
+            _draw_blend(layout, region)
         column = layout.column(align=True)
         column.prop(region, "location")
         column.prop(region, "rotation")
         column.prop(region, "scale")
         layout.operator("shutter.region_key", text="Insert Keyframes", icon="KEY_HLT")
+
+
+def _draw_matte(layout, look, region) -> None:
+    """What the matte is, and what is wrong with it."""
+    layout.prop(region, "matte")
+    if region.matte == "IMAGE":
+        layout.template_ID(region, "image", open="image.open")
+        if region.image is not None:
+            layout.prop(region.image, "source")
+        layout.prop(region, "timing")
+        layout.prop(region, "offset")
+    elif region.matte == "STRIP":
+        layout.prop_search(region, "strip_name", region.id_data.sequence_editor, "strips_all", text="Strip")
+    else:
+        layout.prop(region, "mask")
+    if region.matte != "MASK":
+        layout.prop(region, "channel")
+        if region.channel == "NAMED":
+            layout.prop(region, "channel_name", text="Name")
+    for text, icon in ((look.fault, "ERROR"), (look.text, "NONE"), (look.note, "INFO")):
+        if text:
+            layout.label(text=text, icon=icon, translate=False)
+
+
+def _draw_blend(layout, region) -> None:
+    """How a matte or a ramp lies over what is beneath."""
+    for name in ("invert", "blend", "opacity", "feather"):
+        layout.prop(region, name)
 
 
 def _draw_tracking(layout, effect, index: int | None) -> None:
@@ -233,10 +296,14 @@ def _draw_tracking(layout, effect, index: int | None) -> None:
         place.operator(f"{track}_look", text=str(frame), translate=False).frame = frame
 
 
+def _active_region(context):
+    return selection.active_region(selection.active(context)[1])
+
+
 class _WithRegion(_WithEffect):
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and selection.active_region(selection.active(context)[1]) is not None
+        return super().poll(context) and _active_region(context) is not None
 
 
 class _Track(_WithRegion):
@@ -244,10 +311,14 @@ class _Track(_WithRegion):
     bl_translation_context = CONTEXT
     bl_options = {"DEFAULT_CLOSED"}
 
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and _active_region(context).kind not in strips.MATTES
+
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
-        _draw_track_options(layout, selection.active_region(selection.active(context)[1]))
+        _draw_track_options(layout, _active_region(context))
 
 
 def _draw_track_options(layout, moving) -> None:
@@ -262,7 +333,7 @@ class _Follow(_WithRegion):
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
-        region = selection.active_region(selection.active(context)[1])
+        region = _active_region(context)
         layout.prop(region, "follow_clip")
         layout.prop(region, "follow_kind")
         if region.follow_clip is not None:
@@ -521,6 +592,7 @@ classes = (
     SHUTTER_UL_shutters,
     SHUTTER_UL_regions,
     SHUTTER_MT_presets,
+    SHUTTER_MT_regions,
     SHUTTER_MT_shutters,
     STRIP_PT_shutter,
     STRIP_PT_shutter_regions,

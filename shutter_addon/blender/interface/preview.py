@@ -28,9 +28,8 @@ VIEWS = (
 
 
 def redraw(_settings, _context) -> None:
-    """Draws all previews again."""
-    for _window, area in preview_areas.previews(bpy.context):
-        area.tag_redraw()  # of the area alone, Blender's picture and ours
+    """Draws all previews again: for what is called at changes of properties."""
+    preview_areas.redraw(bpy.context)
 
 
 def _redraw_once() -> None:

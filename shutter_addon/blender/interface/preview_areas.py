@@ -9,6 +9,12 @@ def previews(context):
                 yield window, area
 
 
+def redraw(context) -> None:
+    """Draws all previews again."""
+    for _window, area in previews(context):
+        area.tag_redraw()  # of the area alone, Blender's picture and ours
+
+
 def preview_region(area):
     """The region of a sequencer's area that shows the picture."""
     return next(region for region in area.regions if region.type == "PREVIEW")

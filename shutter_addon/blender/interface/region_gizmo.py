@@ -17,6 +17,7 @@ from . import drawing, gizmo_keymaps
 _RADIUS = 7  # of a handle, in units of the interface
 _NEAREST = 0.03  # of the corner's handle to the centre's, in parts of the picture
 _MARK = (1.0, 1.0, 1.0, 0.9)
+_RAMP = np.array([(0.25, 0.5), (0.75, 0.5)])  # what handles of a ramp are about, in fractions of the picture
 
 
 @dataclass(frozen=True)
@@ -40,8 +41,11 @@ _strokes = revision.UntilChange()
 
 
 def _strokes_now(edit, effect, strip) -> list[np.ndarray]:
-    """The active region's strokes, not moved yet: read once until something changes."""
+    """The active region's strokes, or the line of a ramp, not moved yet: read once until something changes."""
     index, frame = effect.active_region, edit.frame_current_final
+    region = effect.regions[index]
+    if region.kind == "RAMP":
+        return [_RAMP] if region.ramp != "LUMINANCE" else []
     key = effect.scene.session_uid, strip.name, index, frame
     return _strokes.get(key, lambda: snapshot.strokes_at(edit, effect, strip, index, frame))
 
@@ -64,7 +68,7 @@ def place(context) -> Place | None:
     points = np.concatenate(strokes)
     low, high = points.min(axis=0), points.max(axis=0)
     middle = (low + high) / 2
-    corner = np.maximum(high, middle + _NEAREST)
+    corner = high if region.kind == "RAMP" else np.maximum(high, middle + _NEAREST)
     # Mirrored at the middle as well, so that it is what the corner turns about.
     ((_, moved, _),) = scribbles.transform(
         [[2 * middle - corner, corner, middle]],
@@ -172,6 +176,12 @@ def _key(context, effect, index: int) -> None:
         show(lambda menu, _context: menu.layout.label(text=sentence, translate=False), icon="ERROR")
 
 
+def _is_drawing(context) -> bool:
+    """Whether the preview's tool draws strokes, or erases them."""
+    tool = context.workspace.tools.from_space_sequencer(context.space_data.view_type)
+    return tool is not None and tool.idname.startswith("builtin.annotate")
+
+
 class SHUTTER_GGT_region(GizmoGroup):
     bl_idname = "SHUTTER_GGT_region"
     bl_label = "Shutter Region"
@@ -182,7 +192,8 @@ class SHUTTER_GGT_region(GizmoGroup):
     @classmethod
     def poll(cls, context):
         settings, found = context.window_manager.virtual_shutter, selection.active(context)
-        if settings.live and settings.probe:  # a handle under the pointer would take it from the probe
+        # A handle under the pointer would take it from the probe, and a stroke from the pen.
+        if (settings.live and settings.probe) or _is_drawing(context):
             return False
         return found is not None and found[0].is_editable and selection.active_region(found[1]) is not None
 

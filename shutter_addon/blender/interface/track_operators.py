@@ -12,7 +12,7 @@ from ..data import selection, validation
 from ..data.properties import CONTEXT
 from ..editing import bar_edits, follow_stabilization, follow_track, panning_shot, track_region, tripod
 from ..rendering.session import FAULTS
-from .operators import _OfEffect, _OfRegion, _OfShutter, redraw, refused
+from .operators import _OfEffect, _OfRegion, _OfShutter, _OfStrokes, redraw, refused
 
 # Seconds of work, at least, from one look at the window to the next.
 _TICK = 0.05
@@ -171,7 +171,7 @@ class _OfCamera:
         return None
 
 
-class SHUTTER_OT_track(_Tracks, _OfRegion, Operator):
+class SHUTTER_OT_track(_Tracks, _OfStrokes, Operator):
     """Key the active region by what it covers here, up to your own keys (Esc stops and keeps the tracked frames)"""
 
     bl_idname = "shutter.track"
@@ -189,7 +189,7 @@ class SHUTTER_OT_track_camera(_OfCamera, _Tracks, _OfEffect, Operator):
     direction: _DIRECTION
 
 
-class SHUTTER_OT_panning_shot(_Tracks, _OfRegion, Operator):
+class SHUTTER_OT_panning_shot(_Tracks, _OfStrokes, Operator):
     """Keep what the active region moves with sharp while all else streaks (tracks the region unless it has keys)"""
 
     bl_idname = "shutter.panning_shot"
@@ -272,7 +272,7 @@ class _Follows:
         return None
 
 
-class SHUTTER_OT_follow(_Follows, _OfRegion, Operator):
+class SHUTTER_OT_follow(_Follows, _OfStrokes, Operator):
     """Key the active region by a track of a movie clip, from where the region is at this frame"""
 
     bl_idname = "shutter.follow"
@@ -288,7 +288,7 @@ class SHUTTER_OT_follow(_Follows, _OfRegion, Operator):
         return selection.active_region(effect).follow_clip is not None or refused(cls, rpt_("Choose a clip first"))
 
 
-class SHUTTER_OT_follow_update(_Follows, _OfRegion, Operator):
+class SHUTTER_OT_follow_update(_Follows, _OfStrokes, Operator):
     """Key the active region anew by what it follows, after the track has changed"""
 
     bl_idname = "shutter.follow_update"

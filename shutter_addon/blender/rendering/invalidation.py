@@ -8,7 +8,17 @@ import bpy
 import numpy as np
 
 from ...media import MediaError
-from ..data import fcurves, geometry, revision, snapshot, source_media, strips
+from ..data import (
+    fcurves,
+    geometry,
+    mask_reading,
+    matte_content,
+    matte_strips,
+    revision,
+    snapshot,
+    source_media,
+    strips,
+)
 from ..data.snapshot import Snapshot, SourceFiles
 from ..data.validation import EffectError
 from . import render_job, session
@@ -16,6 +26,7 @@ from . import render_job, session
 _signatures: dict[int, int] = {}  # by effect scene
 _files: dict[int, tuple[int, dict[str, SourceFiles]]] = {}  # by effect scene: the revision of the look, files by source
 _current = revision.UntilChange()
+_masks = revision.UntilChange()  # by mask: what it shows at its start
 _spoilt: set[int] = set()  # session_uids of scenes of whose frames the sequencer may keep one that failed
 
 # Keyframe.interpolation as a number: constant, linear, bezier, then the others.
@@ -44,6 +55,7 @@ def forget() -> None:
     _signatures.clear()
     _files.clear()
     _current.clear()
+    _masks.clear()
     revision.changed()
 
 
@@ -107,20 +119,25 @@ def _signature(edit, effect, strip, looked: dict):
     for region in effect.regions:
         yield region.shutter
         yield from _strokes(effect.scene.annotation, region.layer)
+        if region.kind == "MATTE":
+            yield from _matte(region)
     path = effect.path_from_id()
     for curve in fcurves.curves_under(edit, path + "."):
-        yield curve.data_path.removeprefix(path), curve.array_index, curve.mute, curve.extrapolation
-        yield from _keys(curve.keyframe_points)
-        for modifier in curve.modifiers:
-            yield from (
-                repr(getattr(modifier, p.identifier)) for p in modifier.bl_rna.properties if p.type != "POINTER"
-            )
+        yield curve.data_path.removeprefix(path)
+        yield from _curve(curve)
     transform = strip.transform
     # As words: "not a number" is never the same again.
     yield repr([getattr(transform, name) for name in geometry.TRANSFORM]), repr(tuple(transform.origin))
     yield strip.use_flip_x, strip.use_flip_y  # scribbles lie mirrored with it
     if (source := strips.nearest_source(edit, effect, strip)) is not None:
         yield from _source(effect, source, looked)
+
+
+def _curve(curve):
+    yield curve.array_index, curve.mute, curve.extrapolation
+    yield from _keys(curve.keyframe_points)
+    for modifier in curve.modifiers:
+        yield from (repr(getattr(modifier, p.identifier)) for p in modifier.bl_rna.properties if p.type != "POINTER")
 
 
 def _keys(points):
@@ -141,10 +158,37 @@ def _strokes(annotation, layer: str):
             yield _bytes(stroke.points, "co", 3, np.float32)
 
 
-def _source(effect, source, looked: dict):
+def _matte(region):
+    """What a matte shows, but for properties of the region."""
+    try:
+        if region.matte == "IMAGE":
+            yield matte_content.image_file(region)
+        for part in matte_strips.strips_of(region) if region.matte == "STRIP" else ():
+            yield from _timing(part)
+            yield source_media.media_key(part)
+        if region.matte == "MASK" and region.mask is not None:
+            yield from _mask(region.mask)
+    except (MediaError, EffectError) as error:
+        yield str(error)
+
+
+def _mask(mask):
+    # Blender tells of these; many points take long to read.
+    yield _masks.get(mask.session_uid, lambda: hash((mask.frame_start, mask_reading.mask_at(mask, mask.frame_start))))
+    yield from mask_reading.motion(mask)
+    for curve in fcurves.curves_under(mask, ""):
+        yield curve.data_path
+        yield from _curve(curve)
+
+
+def _timing(source):
     yield tuple(getattr(source, name) for name in _TIMING)
-    yield source_media.reading(source)
     yield tuple(key.timeline_frame for key in getattr(source, "retiming_keys", ()))
+
+
+def _source(effect, source, looked: dict):
+    yield from _timing(source)
+    yield source_media.reading(source)
     try:
         files = snapshot.source_files(effect, source, session.settings().inbetween)
     except (MediaError, EffectError) as error:

@@ -22,8 +22,9 @@ from ...core.frame_state import FrameState
 from ...core.messages import EffectError
 from ...media import MediaError, cuts
 from ...media.cuts import ShotSource
-from ...media.exr import write_exr
+from ...media.image_writing import write_exr
 from ...media.inbetween import InbetweenSource
+from ...media.matte_values import MatteValues
 from ...media.prefetch import PrefetchSource
 from ..data.snapshot import Snapshot, translated
 from .blender_gpu import BlenderDevice, opens_in_background
@@ -215,7 +216,8 @@ class RenderSession:
         if old_key != key:
             if renderer is not None:
                 self.run(renderer.close)
-            renderer = Renderer(self._compositor, open_source(snapshot))
+            source = open_source(snapshot)
+            renderer = Renderer(self._compositor, source, MatteValues.of(source))
         self._renderers[snapshot.scene] = key, renderer
         while len(self._renderers) > _KEPT:
             self.run(self._renderers.pop(next(iter(self._renderers)))[1].close)

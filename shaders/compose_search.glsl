@@ -1,4 +1,4 @@
-// As compose_frames.glsl, every pixel for itself: it walks through pieces and frames together, each once.
+// As compose_frames.glsl, every pixel for itself: for each frame it looks up its own piece, by bisection.
 // For many pieces between shutters that lie far apart in time, which neighbours do not share: there, looking at pieces
 // for a whole block takes pieces times frames, and more loops than software renderers go through.
 #define QUADS 1
@@ -8,7 +8,6 @@ int frame;
 float boundary;  // the frame's end
 vec4 before = vec4(0.0);  // Q at the frame's start
 ivec4 row = ivec4(1);  // of each pixel: the first piece that does not end before the boundary
-vec4 passed = vec4(0.0);  // and the exposure before it
 
 // A pixel's quantile in the table's row, at the piece's start (column 0) or end (column GROUPS).
 float time_at(int pixel, int column, int row)
@@ -20,20 +19,23 @@ float time_at(int pixel, int column, int row)
   return time;
 }
 
-// Q of a pixel at the boundary.
-float walked(int pixel, inout int row, inout float passed)
+// Q of a pixel at the boundary. row: from which on its piece is looked for, then that piece.
+float searched(int pixel, inout int row)
 {
-  for (; row <= rows; row++) {
-    float start = time_at(pixel, 0, row);
-    float end = time_at(pixel, GROUPS, row);
-    float dz = imageLoad(table, ivec3(2 * GROUPS, row, 0)).r;
-    float share = clamp((boundary - start) / max(end - start, 1e-7), 0.0, 1.0);
-    if (share < 1.0) {
-      return passed + dz * share;
-    }
-    passed += dz;
+  int end = rows + 1;
+  while (row < end) {
+    int middle = (row + end) / 2;
+    bool passed = time_at(pixel, GROUPS, middle) <= boundary;
+    row = passed ? middle + 1 : row;
+    end = passed ? end : middle;
   }
-  return passed;
+  if (row > rows) {
+    return 1.0;
+  }
+  vec4 piece = imageLoad(table, ivec3(2 * GROUPS, row, 0));
+  float from = time_at(pixel, 0, row);
+  float until = time_at(pixel, GROUPS, row);
+  return piece.z + piece.x * clamp((boundary - from) / max(until - from, 1e-7), 0.0, 1.0);
 }
 
 void main()
@@ -43,8 +45,7 @@ void main()
   }
   for (frame = first; frame < last; frame++) {
     boundary = float(frame + 1);
-    vec4 after = vec4(walked(0, row.x, passed.x), walked(1, row.y, passed.y),
-                      walked(2, row.z, passed.z), walked(3, row.w, passed.w));
+    vec4 after = vec4(searched(0, row.x), searched(1, row.y), searched(2, row.z), searched(3, row.w));
     expose(0, frame, after - before);
     before = after;
   }

@@ -1,4 +1,4 @@
-"""Float EXR files with channels of any name."""
+"""Pictures of numbers: float EXR files with channels of any name, and grey PNG files."""
 
 from pathlib import Path
 
@@ -14,16 +14,31 @@ def write_exr(path: Path, values: np.ndarray, names: list[str]) -> None:
     """Writes values (height, width, channels) float32 with these channel names, whole or not at all.
 
     MediaError: it cannot be written."""
-    height, width, channels = values.shape
-    spec = OpenImageIO.ImageSpec(width, height, channels, OpenImageIO.FLOAT)
+    spec = OpenImageIO.ImageSpec(*_size(values), OpenImageIO.FLOAT)
     spec.channelnames = tuple(names)
     spec["compression"] = "zip"
     spec["DateTime"] = "1970:01:01 00:00:00"  # else the time of writing: equal samples are equal files
+    _write(path, spec, np.asarray(values, np.float32))
+
+
+def write_grey(path: Path, values: np.ndarray) -> None:
+    """Writes values (height, width) float32, 0 to 1, as a PNG of 16 bits, whole or not at all. MediaError: it cannot be
+    written."""
+    samples = np.rint(values[..., None] * np.float32(65535)).astype(np.uint16)
+    _write(path, OpenImageIO.ImageSpec(*_size(samples), OpenImageIO.UINT16), samples)
+
+
+def _size(values: np.ndarray) -> tuple[int, int, int]:
+    height, width, channels = values.shape
+    return width, height, channels
+
+
+def _write(path: Path, spec: OpenImageIO.ImageSpec, samples: np.ndarray) -> None:
     try:
         with atomic_write.writing(path) as part:
             name = check_name(part)
             output = OpenImageIO.ImageOutput.create(name)
-            written = output.open(name, spec) and output.write_image(np.ascontiguousarray(values, np.float32))
+            written = output.open(name, spec) and output.write_image(np.ascontiguousarray(samples))
             if not (output.close() and written):
                 raise MediaError(f"{path}: {output.geterror() or 'cannot be written'}")
     except OSError as error:

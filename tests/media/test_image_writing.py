@@ -7,7 +7,7 @@ import OpenImageIO
 import pytest
 
 from shutter_addon.media import MediaError
-from shutter_addon.media.exr import write_exr
+from shutter_addon.media.image_writing import write_exr
 
 VALUES = np.random.default_rng(1).random((40, 60, 2), np.float32)
 

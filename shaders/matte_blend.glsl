@@ -1,0 +1,35 @@
+// Lays COUNT mattes over coefficients, four shutters of a pixel: core/mattes.py's `blended`.
+#include "inside.glsl"
+
+void main()
+{
+  ivec3 p = ivec3(gl_GlobalInvocationID);
+  if (!inside(p.xy, size)) {
+    return;
+  }
+  // Coefficients of the whole picture have one texel.
+  ivec2 own = min(p.xy, beneath - 1);
+  vec4 c = imageLoad(under, ivec3(own, p.z));
+  ivec4 shutters = 4 * p.z + ivec4(0, 1, 2, 3);
+#if ADDS
+  float rest = imageLoad(under, ivec3(own, 0)).x;  // what the default shutter has
+#endif
+  for (int k = 0; k < COUNT; k++) {
+    int shutter = int(table[k].x);
+    float share = imageLoad(values, ivec3(p.xy, k)).x * table[k].z;
+#if ADDS
+    float added = table[k].y * min(share, rest);
+    float laid = (1.0 - table[k].y) * share;
+    share = added + laid;
+    rest = (rest - added) * (1.0 - laid) + (shutter == 0 ? share : 0.0);
+    c = (c - added * vec4(equal(shutters, ivec4(0)))) * (1.0 - laid);
+#else
+    c *= 1.0 - share;
+#endif
+    c += share * vec4(equal(shutters, ivec4(shutter)));
+  }
+  // A matte's frame is mostly like the one before, and on a software renderer storing is what takes time.
+  if (any(notEqual(c, imageLoad(before, p)))) {
+    imageStore(over, p, c);
+  }
+}

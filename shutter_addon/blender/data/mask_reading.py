@@ -1,0 +1,278 @@
+"""Blender's masks as plain data at any of their frames, whatever frame Blender itself is at.
+
+Python's API has neither the shape keys of a mask nor where its parents were when they got their children: both are read
+from Blender's memory, and checked against what the API has.
+"""
+
+import ctypes
+from bisect import bisect_right
+from collections.abc import Iterator
+from itertools import chain, pairwise
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...core import mask_handles, mask_outlines
+from ...core.masks import MaskLayer, MaskShape, MaskSpline
+from . import fcurves
+from .validation import EffectError
+
+# Coordinates that are farther off are no mask of any picture.
+_FARTHEST = 1e4
+# Numbers of a point in a shape key: two handles with the point between them, weight and radius.
+_SHAPE_NUMBERS = 8
+
+
+class _Layer(ctypes.Structure):
+    """How MaskLayer begins."""
+
+    _fields_ = (
+        *(("next", ctypes.c_void_p), ("prev", ctypes.c_void_p), ("name", ctypes.c_char * 64)),
+        *(("first_spline", ctypes.c_void_p), ("last_spline", ctypes.c_void_p)),
+        *(("first_shape", ctypes.c_void_p), ("last_shape", ctypes.c_void_p)),
+    )
+
+
+class _Shape(ctypes.Structure):
+    """How MaskLayerShape begins."""
+
+    _fields_ = (
+        *(("next", ctypes.c_void_p), ("prev", ctypes.c_void_p), ("data", ctypes.POINTER(ctypes.c_float))),
+        *(("points", ctypes.c_int), ("frame", ctypes.c_int)),
+    )
+
+
+class _Parent(ctypes.Structure):
+    """MaskParent: where the track was (in mask space), or the plane's corners (in the clip)."""
+
+    _fields_ = (
+        *(("id_type", ctypes.c_int), ("type", ctypes.c_int), ("id", ctypes.c_void_p)),
+        *(("object", ctypes.c_char * 64), ("track", ctypes.c_char * 64)),
+        *(("origin", ctypes.c_float * 2), ("corners", ctypes.c_float * 8)),
+    )
+
+
+def mask_at(mask: bpy.types.Mask, frame: float) -> MaskShape:
+    """A mask at one of its frames: shape keys, handles, parents and the layers' animated opacity are evaluated.
+
+    EffectError: its points or opacities are no usable numbers, or it cannot be read in this version of Blender.
+    """
+    layers = [layer for layer in mask.layers if not layer.hide_render]
+    return MaskShape(tuple(_layer_at(mask, layer, frame) for layer in layers))
+
+
+def motion(mask: bpy.types.Mask) -> Iterator[tuple]:
+    """What lets a mask differ from frame to frame, F-curves apart: its shape keys, and the markers of its parents.
+    EffectError: as `mask_at`."""
+    for layer in mask.layers:
+        for shape in _shapes(mask, layer):
+            yield shape.frame, np.ctypeslib.as_array(shape.data, (shape.points, _SHAPE_NUMBERS)).tobytes()
+    points = [point for layer in mask.layers for spline in layer.splines for point in spline.points]
+    for clip, name, track in {(p.parent.id, p.parent.parent, p.parent.sub_parent) for p in points}:
+        tracked = clip.tracking.objects.get(name) if isinstance(clip, bpy.types.MovieClip) else None
+        for tracks, place, size in ((tracked.tracks, "co", 2), (tracked.plane_tracks, "corners", 8)) if tracked else ():
+            if track in tracks:
+                yield tuple(numbers.tobytes() for numbers in _markers(tracks[track], place, size))
+
+
+def moves(mask: bpy.types.Mask) -> bool:
+    """Whether a mask may differ from frame to frame. EffectError: as `mask_at`."""
+    return bool(fcurves.curves_under(mask, "")) or next(motion(mask), None) is not None
+
+
+def _layer_at(mask, layer, frame: float) -> MaskLayer:
+    keyed = _keyed_points(mask, layer, frame)
+    splines, at = [], 0
+    for spline in layer.splines:
+        count = len(spline.points)
+        splines.append(_spline_at(mask, spline, frame, None if keyed is None else keyed[at : at + count]))
+        at += count
+    return MaskLayer(
+        splines=tuple(splines),
+        alpha=float(_checked(mask, _alpha_at(mask, layer, frame))),
+        holes=layer.use_fill_holes,
+        overlap=layer.use_fill_overlap,
+        **{name: getattr(layer, name) for name in ("blend", "invert", "falloff", "fill_solver")},
+    )
+
+
+def _alpha_at(mask, layer, frame: float) -> float:
+    path = f'layers["{bpy.utils.escape_identifier(layer.name)}"].alpha'
+    curve = fcurves.find_curve(mask, path)
+    return layer.alpha if curve is None or curve.mute or curve.is_empty else curve.evaluate(frame)
+
+
+def _spline_at(mask, spline, frame: float, keyed: np.ndarray | None) -> MaskSpline:
+    """keyed: its points by shape keys, as `_keyed_points` has them; None: as they stand."""
+    points, weights = _standing_points(spline) if keyed is None else (keyed[:, :6].reshape(-1, 3, 2), keyed[:, 6])
+    types = np.stack([_numbers(spline, f"handle_{side}_type", np.int32) for side in ("left", "right")], axis=1)
+    selected = _numbers(spline, "select_left_handle", bool)
+    points = mask_handles.with_handles(points, types, selected, spline.use_cyclic)
+    longest = 0.0
+    if families := _families(mask, spline):
+        longest = mask_outlines.longest_segment(points, spline.use_cyclic)
+        for parent, raw, here in families:
+            points[here] = mask_handles.moved(points[here], _parent_matrix(parent, raw, frame))
+        anew = np.isin(types[:, 0], (mask_handles.AUTO, mask_handles.VECTOR))
+        again = mask_handles.with_handles(points, types, selected, spline.use_cyclic)
+        points = np.where(anew[:, None, None], again, points)
+    feathers = tuple(tuple((f.u, f.weight) for f in point.feather_points) for point in spline.points)
+    _checked(mask, [*points.flat, *weights, *chain(*chain(*feathers))])
+    return MaskSpline(
+        points=tuple(tuple(map(tuple, point)) for point in points.tolist()),
+        weights=tuple(weights.tolist()),
+        feathers=feathers,
+        cyclic=spline.use_cyclic,
+        fill=spline.use_fill,
+        offset_mode=spline.offset_mode,
+        weight_interpolation=spline.weight_interpolation,
+        collapse=spline.use_self_intersection_check,
+        longest=longest,
+    )
+
+
+def _standing_points(spline) -> tuple[np.ndarray, np.ndarray]:
+    places = [_numbers(spline, name, np.float32, 2) for name in ("handle_left", "co", "handle_right")]
+    return np.stack(places, axis=1).astype(np.float64), _numbers(spline, "weight", np.float32).astype(np.float64)
+
+
+def _numbers(spline, name: str, kind, size: int = 1) -> np.ndarray:
+    """A property of all points of a spline: (n,), or (n, size)."""
+    found = np.empty(len(spline.points) * size, kind)
+    spline.points.foreach_get(name, found)
+    return found if size == 1 else found.reshape(-1, size)
+
+
+def _checked(mask, numbers) -> np.ndarray:
+    """Numbers of a mask. EffectError: one is none, or too far off."""
+    numbers = np.asarray(numbers, np.float64)
+    if not (np.abs(numbers) <= _FARTHEST).all():
+        sentence = rpt_('mask "{mask}": a point, a feather or an opacity is not a usable number')
+        raise EffectError(sentence.format(mask=mask.name))
+    return numbers
+
+
+def _keyed_points(mask, layer, frame: float) -> np.ndarray | None:
+    """The points of all splines of a layer (n, 8) by its shape keys; None where it has none that fit.
+
+    Shape keys are held before the first and behind the last. EffectError: not in this Blender.
+    """
+    shapes = _shapes(mask, layer)
+    if not shapes:
+        return None
+    place = np.searchsorted([shape.frame for shape in shapes], frame, side="right")
+    before, after = shapes[max(place - 1, 0)], shapes[min(place, len(shapes) - 1)]
+    count = sum(len(spline.points) for spline in layer.splines)
+    if before.points != count or after.points != count:
+        return None
+    first, last = (np.ctypeslib.as_array(s.data, (count, _SHAPE_NUMBERS)).astype(np.float64) for s in (before, after))
+    share = (frame - before.frame) / max(after.frame - before.frame, 1) if frame > before.frame else 0.0
+    return first + (last - first) * share
+
+
+def _shapes(mask, layer) -> list[_Shape]:
+    """The shape keys of a layer, in order, from Blender's memory. EffectError: not in this Blender."""
+    if not layer.splines:
+        return []
+    raw = _Layer.from_address(layer.as_pointer())
+    ends = layer.splines[0].as_pointer(), layer.splines[-1].as_pointer()
+    known = raw.name == layer.name.encode() and (raw.first_spline, raw.last_spline) == ends
+    shapes, before, here = [], None, raw.first_shape if known else None
+    while here and known:
+        shapes.append(_Shape.from_address(here))
+        known = shapes[-1].prev == before and shapes[-1].points >= 0 and bool(shapes[-1].data)
+        before, here = here, shapes[-1].next
+    ascending = all(a.frame < b.frame for a, b in pairwise(shapes))
+    if not (known and ascending and raw.last_shape == before):
+        raise _unreadable(mask)
+    return shapes
+
+
+def _unreadable(mask) -> EffectError:
+    return EffectError(rpt_('mask "{mask}": it cannot be read in this version of Blender').format(mask=mask.name))
+
+
+def _families(mask, spline) -> list[tuple[bpy.types.MaskParent, _Parent, list[int]]]:
+    """The tracks of clips that are parents of a spline's points: each as Python has it, as it lies in memory, and the
+    indices of its children. EffectError: not in this Blender."""
+    children: dict = {}
+    for index, point in enumerate(spline.points):
+        memory = ctypes.string_at(point.parent.as_pointer(), ctypes.sizeof(_Parent))
+        children.setdefault(memory, []).append(index)
+    families = []
+    for memory, here in children.items():
+        parent, raw = spline.points[here[0]].parent, _Parent.from_buffer_copy(memory)
+        names = parent.parent.encode(), parent.sub_parent.encode()
+        if raw.id != (parent.id and parent.id.as_pointer()) or (raw.object, raw.track) != names:
+            raise _unreadable(mask)
+        if parent.id is not None and parent.id_type == "MOVIECLIP":
+            families.append((parent, raw, here))
+    return families
+
+
+def _parent_matrix(parent, raw: _Parent, frame: float) -> np.ndarray:
+    """How a track (3, 3) has moved its children since they got it, in mask space; no motion where there is none."""
+    clip, matrix = parent.id, np.eye(3)
+    tracked = clip.tracking.objects.get(parent.parent)
+    if tracked is None:
+        return matrix
+    to_mask = _mask_from_clip(clip)
+    if parent.type == "POINT_TRACK":
+        track = tracked.tracks.get(parent.sub_parent)
+        if track is not None and len(track.markers):
+            at = _between_markers(track, "co", 2, frame - clip.frame_start + 1, _halved) + track.offset
+            matrix[:2, 2] = mask_handles.moved(at, to_mask) - raw.origin
+        return matrix
+    track = tracked.plane_tracks.get(parent.sub_parent)
+    if track is None or not len(track.markers):
+        return matrix
+    # Here Blender does not ask on which frame the clip starts.
+    now = _between_markers(track, "corners", 8, frame, _last_until).reshape(4, 2)
+    if clip.size[0] and to_mask[0, 0] < 1:
+        # Blender takes the inverse for pictures higher than wide, where planes move their children less than they do.
+        to_mask = np.linalg.inv(to_mask)
+    return to_mask @ mask_handles.homography(np.reshape(raw.corners, (4, 2)), now) @ np.linalg.inv(to_mask)
+
+
+def _between_markers(track, name: str, size: int, frame: float, find) -> np.ndarray:
+    """A property (size,) of a track's marker at a frame of the clip: what lies between those of two consecutive frames,
+    elsewhere that of the one which `find` finds."""
+    frames, values = _markers(track, name, size)
+    values = values.astype(np.float64)
+    whole = int(frame)
+    here = min(max(find(frames.tolist(), whole), 0), len(frames) - 1)
+    if here + 1 < len(frames) and frames[here + 1] == frames[here] + 1:
+        return values[here] + (values[here + 1] - values[here]) * (frame - whole)
+    return values[here]
+
+
+def _markers(track, name: str, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Of a track's markers the frames (n,), and a property (n, size)."""
+    frames, values = np.empty(len(track.markers), np.int32), np.empty((len(track.markers), size), np.float32)
+    track.markers.foreach_get("frame", frames)
+    track.markers.foreach_get(name, values.reshape(-1))
+    return frames, values
+
+
+def _last_until(frames: list[int], frame: int) -> int:
+    return bisect_right(frames, frame) - 1
+
+
+def _halved(frames: list[int], frame: int) -> int:
+    """The search of Blender for a track's marker: in gaps it ends on either side of them, by the number of markers."""
+    left, right = 0, len(frames)
+    while left < right:
+        middle = (left + right) // 2
+        if frames[middle] == frame:
+            return middle
+        left, right = (middle + 1, right) if frames[middle] < frame else (left, middle - 1)
+    return right
+
+
+def _mask_from_clip(clip) -> np.ndarray:
+    """The matrix (3, 3) from fractions of a clip's picture to mask space."""
+    width, height = clip.size
+    height *= clip.display_aspect[1] / clip.display_aspect[0] / clip.tracking.camera.pixel_aspect
+    x, y = np.array((width, height)) / (max(width, height) or 1) if width and height else (1.0, 1.0)
+    return np.array([[x, 0, (1 - x) / 2], [0, y, (1 - y) / 2], [0, 0, 1]])

@@ -1,0 +1,166 @@
+"""What the mattes and ramps of an effect show, as plain data (core.mattes.Content)."""
+
+import os
+from collections.abc import Callable
+from contextlib import closing
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...core import keyframes, mattes, retiming
+from ...core.effect import PlacedRamp
+from ...media import MediaError
+from ...media.matte_files import MatteFile
+from ...media.sequence import ImageFiles
+from . import inbetween_settings, mask_reading, matte_strips, source_media, strip_timing, strips, validation
+from .validation import EffectError
+
+
+def content(edit, effect, strip, region, moves, frames, time: keyframes.Channel | None) -> keyframes.Channel:
+    """The channel of a matte or a ramp, sampled at timeline frames; strip: the effect strip that shows it, moves:
+    channels of the region's location, rotation and scale, time: as of core.effect.Effect. EffectError, MediaError:
+    there is none."""
+    if region.kind == "RAMP":
+        ramp = validation.word(region, "ramp")
+        if ramp != "LUMINANCE":
+            return PlacedRamp(ramp.lower(), *moves)
+        return mattes.FileFrames(_of_strip(strips.source_of(edit, effect, strip), "luminance"))
+    matte = validation.word(region, "matte")
+    if matte == "STRIP":
+        return _strip_frames(strip, region, frames)
+    if matte == "MASK":
+        return _mask_shapes(edit, effect, strip, region, frames, time)
+    first = strips.origin(strip) if validation.word(region, "timing") == "TIMELINE" else None
+    return mattes.FileFrames(image_file(region), validation.number(region, "offset"), first)
+
+
+def channel(region) -> str:
+    """The channel that is read of a matte, as a recipe has it. EffectError: it has no name."""
+    word = validation.word(region, "channel")
+    if word != "NAMED":
+        return word.lower()
+    if not region.channel_name:
+        raise EffectError(rpt_("{place}: its channel has no name").format(place=validation.place(region)))
+    return region.channel_name
+
+
+def image_path(region) -> Path:
+    """The file of a matte that is an image. EffectError: it has none."""
+    place, image = validation.place(region), region.image
+    if image is None:
+        raise EffectError(rpt_("{place}: it has no matte file").format(place=place))
+    if image.source not in ("FILE", "SEQUENCE", "MOVIE") or image.packed_file or not image.filepath:
+        sentence = rpt_('{place}: image "{image}" is not a movie, image sequence or picture on disk')
+        raise EffectError(sentence.format(place=place, image=image.name))
+    return Path(bpy.path.abspath(image.filepath, library=image.library))
+
+
+def image_file(region) -> MatteFile:
+    """A matte that is an image, to be read. EffectError: it has no file."""
+    path = image_path(region)
+    files = (path,) if region.image.source == "FILE" else None
+    folder = path.parent if region.image.source == "SEQUENCE" else path
+    stamp = _stamp(path), _stamp(folder)
+    if region.image.source == "SEQUENCE":
+        listed = _listed(path, stamp)
+        stamp = *stamp, source_media.between((region.image.session_uid,), len(listed), listed.__getitem__)
+    return MatteFile(path, channel(region), files, stamp=stamp)
+
+
+@lru_cache(64)
+def _listed(path: Path, _stamp) -> list[Path]:
+    """The files of an image sequence, listed anew where its folder has changed."""
+    try:
+        return ImageFiles(path).files
+    except MediaError:  # which whoever reads it is told
+        return []
+
+
+def _mask_shapes(edit, effect, strip, region, frames, time) -> keyframes.Channel:
+    """A mask's shapes at the source's frames, of which the first is the mask's start, as a Mask strip on it has it."""
+    mask = region.mask
+    if mask is None:
+        raise EffectError(rpt_("{place}: it has no mask").format(place=validation.place(region)))
+    if not mask_reading.moves(mask):
+        return keyframes.Constant(_tried(mask_reading.mask_at, mask, mask.frame_start))
+    filmed = shown_frame(edit, effect, strip, time)
+
+    def shape(frame):
+        return mask_reading.mask_at(mask, mask.frame_start + filmed(frame))
+
+    return keyframes.Samples({frame: _tried(shape, frame) for frame in frames})
+
+
+def shown_frame(edit, effect, strip, time: keyframes.Channel | None) -> Callable[[float], float]:
+    """What gives the source's frame that an effect strip shows at a timeline frame: filmed ones counted from 0, those
+    between them in parts. time: as of `content`. EffectError, MediaError: it cannot be known."""
+    source = strips.source_of(edit, effect, strip)
+    medium, timing = _Medium.of(source, inbetween_settings.factor(effect)), strip_timing.timing_of(source)
+
+    def shown(frame):
+        if time is None:
+            return retiming.source_frame(timing, frame, medium) / medium.step
+        return retiming.nearest(time.at(frame)[0] - 1, medium.step, medium.count) / medium.step
+
+    return shown
+
+
+class _Medium(NamedTuple):
+    """A source's length and rate, for core.retiming."""
+
+    filmed: int
+    step: int
+    fps: float
+
+    @classmethod
+    def of(cls, source, step: int) -> "_Medium":
+        """MediaError: it cannot be read."""
+        spec = source_media.spec(source)
+        filmed, fps = (len(spec.files), 0.0) if spec.files else _movie(spec)
+        return cls(filmed, step, fps * step)
+
+    @property
+    def count(self) -> int:
+        return (self.filmed - 1) * self.step + 1
+
+
+@lru_cache(64)
+def _movie(spec: source_media.SourceSpec) -> tuple[int, float]:
+    """Length and rate of a movie. A strip tells how long it is itself, which is another length once it is retimed.
+    MediaError: it cannot be read."""
+    with closing(spec.open()) as movie:
+        return movie.count, float(movie.fps)
+
+
+def _tried(function, *arguments):
+    """The result, or the EffectError in its place, which is raised where the value is asked for."""
+    try:
+        return function(*arguments)
+    except EffectError as error:
+        return error
+
+
+def _strip_frames(strip, region, frames) -> keyframes.Channel:
+    parts, word = matte_strips.parts_for(region, strip), channel(region)
+    shown = {part.name: mattes.FileFrames(_of_strip(part, word), timing=strip_timing.timing_of(part)) for part in parts}
+    if len(parts) == 1:
+        return shown[parts[0].name]
+    return keyframes.Samples({f: shown[matte_strips.part_at(parts, f).name].at(f) for f in frames})
+
+
+def _of_strip(strip, word: str) -> MatteFile:
+    """A channel of what a movie, image or clip strip reads. MediaError: it has no files."""
+    spec = source_media.spec(strip)
+    return MatteFile(spec.path, word, spec.files, spec.options["stream"], spec.key)
+
+
+def _stamp(path: Path):
+    """Tells a file or a folder that has changed from what it was; None: there is none."""
+    try:
+        status = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return status.st_mtime_ns, status.st_size

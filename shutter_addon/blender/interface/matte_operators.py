@@ -1,0 +1,149 @@
+"""Operators that make regions of mattes, ramps and time maps."""
+
+import bpy
+from bpy.app.translations import contexts
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.types import Operator
+from bpy_extras.io_utils import ImportHelper
+
+from ...core.limits import MAX_CHANNEL
+from ...core.recipe import RecipeError
+from ...media import MediaError
+from ..data import matte_strips, recipe_import, selection, strips, validation
+from ..data.properties import RAMPS
+from ..editing import region_edits, time_map
+from .operators import _OfShutter, chosen_file, has_room, refused
+
+
+class _AddsRegion(_OfShutter):
+    """Adds a region to the active shutter."""
+
+    @classmethod
+    def possible(cls, effect):
+        return super().possible(effect) and has_room(cls, effect, "regions")
+
+
+class SHUTTER_OT_matte_add(_AddsRegion, ImportHelper, Operator):
+    """Make a movie, an image sequence or a picture the matte of the active shutter"""
+
+    bl_idname = "shutter.matte_add"
+    bl_label = "Matte from File"
+
+    channel_name: StringProperty(
+        name="Channel Name",
+        description="Name of a channel of an EXR file; empty for the luminance",
+        maxlen=MAX_CHANNEL,
+        options={"SKIP_SAVE"},
+    )
+    # What the file browser shows.
+    filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+
+    def change(self, _context, effect):
+        name = self.channel_name
+        try:
+            image = recipe_import.matte_image(bpy.path.abspath(chosen_file(self)), name or "luminance")
+        except (MediaError, RecipeError) as error:
+            raise validation.EffectError(str(error)) from None
+        channel = {"channel": "NAMED", "channel_name": name} if name else {}
+        region_edits.add_matte(effect, selection.active_shutter(effect), name=image.name, image=image, **channel)
+
+
+_strip_items = []
+
+
+def _strips(_self, context):
+    edit = selection.edit_of(context)
+    found = edit.sequence_editor.strips_all if edit and edit.sequence_editor else ()
+    _strip_items[:] = [(strip.name, strip.name, "") for strip in found if strip.type in strips.SOURCES]
+    return _strip_items
+
+
+class SHUTTER_OT_matte_strip(_AddsRegion, Operator):
+    """Make a movie, image or clip strip of the edit the matte of the active shutter, muted or not"""
+
+    bl_idname = "shutter.matte_strip"
+    bl_label = "Matte from Strip"
+
+    strip: EnumProperty(name="Strip", items=_strips, translation_context=contexts.no_translation)
+
+    def change(self, _context, effect):
+        region = region_edits.add_matte(effect, selection.active_shutter(effect), name=self.strip, matte="STRIP")
+        matte_strips.choose_strip(region, self.strip)
+
+
+_mask_items = []
+
+
+def _masks(_self, _context):
+    _mask_items[:] = [(mask.name_full, mask.name_full, "") for mask in bpy.data.masks]
+    return _mask_items
+
+
+class SHUTTER_OT_matte_mask(_AddsRegion, Operator):
+    """Make a mask the matte of the active shutter"""
+
+    bl_idname = "shutter.matte_mask"
+    bl_label = "Matte from Mask"
+
+    mask: EnumProperty(name="Mask", items=_masks, translation_context=contexts.no_translation)
+
+    @classmethod
+    def possible(cls, effect):
+        return super().possible(effect) and (
+            bool(bpy.data.masks)
+            or refused(cls, rpt_("There is no mask: draw one in the Mask mode of an image or clip"))
+        )
+
+    def change(self, _context, effect):
+        mask = next(mask for mask in bpy.data.masks if mask.name_full == self.mask)
+        region_edits.add_matte(effect, selection.active_shutter(effect), name=mask.name, matte="MASK", mask=mask)
+
+
+class SHUTTER_OT_ramp_add(_AddsRegion, Operator):
+    """Make a ramp across the picture the matte of the active shutter"""
+
+    bl_idname = "shutter.ramp_add"
+    bl_label = "Ramp"
+
+    ramp: EnumProperty(name="Ramp", description="How the ramp runs", items=RAMPS)
+
+    def change(self, _context, effect):
+        region_edits.add_matte(effect, selection.active_shutter(effect), "RAMP", ramp=self.ramp)
+
+
+class SHUTTER_OT_time_map(_AddsRegion, Operator):
+    """Show every pixel at its own moment of the window: a ramp from its first frame to its last (slit-scan)"""
+
+    bl_idname = "shutter.time_map"
+    bl_label = "Time Map"
+
+    ramp: EnumProperty(name="Ramp", description="How the ramp runs", items=RAMPS)
+
+    @classmethod
+    def possible(cls, effect):
+        return super().possible(effect) and has_room(cls, effect, "shutters", 2)
+
+    def change(self, _context, effect):
+        time_map.add(effect, self.ramp)
+
+
+classes = (
+    SHUTTER_OT_matte_add,
+    SHUTTER_OT_matte_strip,
+    SHUTTER_OT_matte_mask,
+    SHUTTER_OT_ramp_add,
+    SHUTTER_OT_time_map,
+)
+
+
+def register():
+    for cls in classes:
+        bpy.utils.register_class(cls)
+
+
+def unregister():
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

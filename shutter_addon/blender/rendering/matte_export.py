@@ -1,0 +1,116 @@
+"""Mattes of an effect for its recipe: files by their path, strips and masks as pictures written beside the recipe."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...core import atomic_write, mattes, recipe
+from ...media.image_writing import write_grey
+from ...media.matte_values import MatteValues
+from ...media.sequence import ImageFiles
+from ..data import matte_content, matte_strips, recipe_export, snapshot, source_media, strips, validation
+from . import session
+
+
+def recipe_for(edit, effect, strip, path: Path) -> recipe.Recipe:
+    """An effect as a recipe that is to lie at a path. What it cannot point to is written into a folder beside it, "NAME
+    mattes". One of session.FAULTS: the effect cannot be rendered as it stands, or a matte cannot be read or written.
+    OSError: there can be no such folder."""
+    regions = strips.matte_regions(effect)
+    # Once before anything is written.
+    recipe_export.recipe_of(edit, effect, strip, [_ramp(region) for region in regions])
+    folders = [_folder(region, path, number) for number, region in enumerate(regions, 1)]
+    _spare(folders, _read(edit, effect, strip, regions))
+    words = [_words(edit, effect, strip, *both, path) for both in zip(regions, folders, strict=True)]
+    return recipe_export.recipe_of(edit, effect, strip, words)
+
+
+def _ramp(region) -> recipe.RampRegion:
+    kind = validation.word(region, "ramp") if region.kind == "RAMP" else "LINEAR"
+    return recipe.RampRegion(region.shutter, "ramp", kind.lower())
+
+
+def _folder(region, path: Path, number: int) -> Path | None:
+    """Where the pictures of a matte are written; None: a recipe can say what it is."""
+    if region.kind == "RAMP" or (region.matte == "IMAGE" and not _is_one_of_many(region)):
+        return None
+    name = re.sub(r"[^\w. -]", "_", region.name).strip(". ") or "Matte"
+    return path.with_name(f"{path.stem} mattes") / f"{number} {name}"
+
+
+def _is_one_of_many(region) -> bool:
+    """Whether a matte is a single picture that a recipe would take for the first of a sequence."""
+    path = matte_content.image_path(region)
+    return region.image.source == "FILE" and path.exists() and ImageFiles(path).count > 1
+
+
+def _read(edit, effect, strip, regions) -> Iterator[Path]:
+    """A file of each medium that is read while mattes are written, or by those that are not."""
+    yield source_media.spec(strips.source_of(edit, effect, strip)).path
+    for region in regions:
+        if region.kind == "MATTE" and region.matte == "IMAGE":
+            yield matte_content.image_path(region)
+        elif region.kind == "MATTE" and region.matte == "STRIP":
+            yield from (source_media.spec(part).path for part in matte_strips.parts_for(region, strip))
+
+
+def _spare(folders: list[Path | None], read: Iterator[Path]) -> None:
+    """EffectError: pictures would be written where others are read."""
+    taken = {file.parent.resolve() for file in read}
+    for folder in folders:
+        if folder is not None and folder.resolve() in taken:
+            sentence = rpt_("{folder}: its pictures are read by the effect; choose another name for the recipe")
+            raise validation.EffectError(sentence.format(folder=folder))
+
+
+def _words(edit, effect, strip, region, folder: Path | None, path: Path) -> recipe.MatteRegion | recipe.RampRegion:
+    if region.kind == "RAMP":
+        return _ramp(region)
+    if folder is not None:
+        first = _write(edit, effect, strip, region, folder)
+        return recipe.MatteRegion(region.shutter, "matte", recipe.relative(first, path.parent), timing="timeline")
+    file, channel = matte_content.image_path(region), matte_content.channel(region)
+    # A recipe's timeline begins with the strip, trimmed as it is.
+    offset = region.offset + (strips.skipped(strip) if region.timing == "TIMELINE" else 0)
+    words = {"channel": channel, "offset": offset, "timing": region.timing.lower()}
+    return recipe.MatteRegion(region.shutter, "matte", recipe.relative(file, path.parent), **words)
+
+
+def _write(edit, effect, strip, region, folder: Path) -> Path:
+    """Writes what a matte shows at each timeline frame of the effect strip, or one picture, if it shows that at all of
+    them; the first one's path."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with atomic_write.part_folder(folder) as part:
+        keys = _write_frames(edit, effect, strip, region, part)
+        kept = 1 if len(set(keys)) == 1 else len(keys)
+        for number in range(1, kept + 1):
+            os.replace(part / _name(number), folder / _name(number))
+    for file in folder.glob("[0-9]*.png"):  # of a longer film, exported before
+        if file.stem.isdecimal() and int(file.stem) > kept:
+            file.unlink()
+    return folder / _name(1)
+
+
+def _name(number: int) -> str:
+    return f"{number:04d}.png"
+
+
+def _write_frames(edit, effect, strip, region, folder: Path) -> list:
+    """Writes what a matte shows at each timeline frame of the effect strip; a key for each, equal for equal ones."""
+    frames, keys = range(strip.left_handle, strip.right_handle), []
+    shown = snapshot.take(edit, effect, strip, frames)
+    content = snapshot.region_at(edit, effect, strip, list(effect.regions).index(region), frames).content
+    with closing(session.open_source(shown)) as source, closing(MatteValues.of(source)) as values:
+        for number, frame in enumerate(frames, 1):
+            with snapshot.translated():
+                matte = mattes.Matte(0, content.at(frame))
+            ((key, array),) = values.values((matte,), session.source_index(shown, frame, source)[0], 1)
+            keys.append(key)
+            write_grey(folder / _name(number), array)
+    return keys

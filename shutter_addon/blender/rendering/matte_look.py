@@ -1,0 +1,81 @@
+"""What a panel says of a matte: how large and how long it is, and what is wrong with it."""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+from bpy.app.translations import pgettext_iface as iface_
+
+from ...core.mattes import FileFrames
+from ...core.messages import UserError
+from ...media.matte_files import MatteFile
+from ..data import matte_strips, revision, snapshot
+
+_looks = revision.UntilChange()
+
+
+class Look(NamedTuple):
+    """text: of the medium, "" where there is none to tell of; fault: why it cannot be shown; note: that its last frame
+    holds; each a sentence or \"\""""
+
+    text: str = ""
+    fault: str = ""
+    note: str = ""
+
+
+def look(edit, effect, strip, region) -> Look:
+    """The look at a region that is a matte, taken once until something changes."""
+    index = list(effect.regions).index(region)
+    return _looks.get((effect.scene.session_uid, index, strip.name), lambda: _look(edit, effect, strip, index))
+
+
+def _look(edit, effect, strip, index: int) -> Look:
+    frame, region = strip.left_handle, effect.regions[index]
+    try:
+        with snapshot.translated():
+            content = snapshot.region_at(edit, effect, strip, index, (frame,)).content
+            shown = content.at(frame)
+    except UserError as error:
+        return Look(fault=str(error))
+    file = getattr(shown, "file", None)
+    if file is None:
+        return Look()
+    size = _size(file)
+    if isinstance(size, str):
+        return Look(fault=size)
+    width, height, count = size
+    text = iface_("{width} × {height}, {count} frames").format(width=width, height=height, count=count)
+    if count == 1:
+        text = iface_("{width} × {height}, one picture").format(width=width, height=height)
+    return Look(text, note=_note(edit, effect, strip, region, content, count))
+
+
+def _note(edit, effect, strip, region, content, count: int) -> str:
+    """That a matte is shorter than what it is for."""
+    if region.matte == "STRIP":
+        ends = max(part.right_handle for part in matte_strips.parts_for(region, strip))
+        return iface_("Ends before the film: its last frame holds") if ends < strip.right_handle else ""
+    if not isinstance(content, FileFrames) or count == 1:
+        return ""
+    if content.first is not None:
+        last = strip.right_handle - 1 - content.first
+    else:
+        try:
+            last = snapshot.last_shown(edit, effect, strip)
+        except UserError:  # which the live preview tells
+            return ""
+    if content.offset + last < count:
+        return ""
+    return iface_("Shorter than the film: its last frame holds")
+
+
+@lru_cache(64)
+def _size(file: MatteFile) -> tuple[int, int, int] | str:
+    """Width, height and number of frames, or why it cannot be read."""
+    try:
+        source = file.open()
+    except UserError as error:
+        return str(error)
+    try:
+        return source.width, source.height, source.count
+    finally:
+        source.close()

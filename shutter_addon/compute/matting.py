@@ -1,0 +1,88 @@
+"""Mattes laid over coefficients on a device (core.mattes.blended)."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from ..core.mattes import Matte
+from .device import Device
+from .passes import LOCAL_ROW, Image, Pass
+
+# Mattes that one pass lays, whose values are on the device at once.
+MOST = 8
+
+_READ = {"reads": True, "writes": False}
+
+
+@cache
+def blend_pass(count: int, adds: bool) -> Pass:
+    """Lays so many mattes; adds: any by the blend "add"."""
+    return Pass(
+        "matte_blend",
+        images={
+            "under": Image("rgba32f", **_READ),
+            "values": Image("r32f", **_READ),
+            "before": Image("rgba32f", **_READ),  # what `over` holds
+            "over": Image("rgba32f"),
+        },
+        constants={"size": "ivec2", "beneath": "ivec2"},
+        defines={"COUNT": count, "ADDS": int(adds)},
+        blocks={"table": MOST},
+        local_size=LOCAL_ROW,
+    )
+
+
+class Matting:
+    """Lays mattes over coefficients. Values that it was given last stay on the device."""
+
+    def __init__(self, device: Device):
+        self._device = device
+        self._textures: dict[str, object] = {}
+        self._held: dict[int, object] = {}  # by layer: the key of the values in it
+
+    def lay(self, beneath, mattes: tuple[Matte, ...], layers):
+        """Coefficients, a texture array rgba32f as of a solver, valid until the next call.
+
+        beneath: coefficients, a texture of a solver or of GPUCompositor.constant
+        layers: of each matte a key, and its values (h, w) float32 (core.mattes.MatteReader.values)"""
+        height, width = layers[0][1].shape
+        values = self._texture("values", (width, height, min(len(mattes), MOST)), "r32f")
+        ends = ["even", "odd"]
+        laid = list(zip(mattes, layers, strict=True))
+        for start in range(0, len(laid), MOST):
+            some = laid[start : start + MOST]
+            table = np.zeros((MOST, 4), np.float32)
+            for layer, (matte, (key, array)) in enumerate(some):
+                table[layer, :3] = matte.shutter, matte.blend == "add", matte.opacity
+                if self._held.get(layer) != key:
+                    self._device.write(values, np.ascontiguousarray(array[..., None]), layer)
+                    self._held[layer] = key
+            over = self._texture(ends[0], (width, height, beneath.size[2]), "rgba32f")
+            self._device.run(
+                blend_pass(len(some), any(matte.blend == "add" for matte, _ in some)),
+                over.size,
+                images={"under": beneath, "values": values, "before": over, "over": over},
+                blocks={"table": table},
+                size=(width, height),
+                beneath=beneath.size[:2],
+            )
+            beneath, ends = over, ends[::-1]
+        return beneath
+
+    def _texture(self, name: str, size: tuple[int, int, int], kind: str):
+        texture = self._textures.get(name)
+        if texture is None or texture.size != size:
+            if texture is not None:
+                texture.release()
+            self._textures[name] = texture = self._device.texture(*size, kind)
+            if name == "values":
+                self._held.clear()
+        return texture
+
+    def release(self) -> None:
+        for texture in self._textures.values():
+            texture.release()
+        self._textures.clear()
+        self._held.clear()

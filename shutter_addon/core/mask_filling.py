@@ -1,0 +1,213 @@
+"""Pictures of polygons and of the feathers around them, a value at each pixel's centre.
+
+Polygons are in units of the picture: x to the right and y up from the lower left corner, both from 0 to 1. Pictures
+have the lowest row first.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from .mask_outlines import crossings, ranges
+
+# Pixels that are computed at once: what their numbers take stays in a processor's cache.
+_BLOCK = 1 << 14
+# By so many pixels quads overlap, so that rounding opens no seam between them.
+_SEAM = 1e-6
+
+
+def fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: bool, overlap: bool) -> None:
+    """Sets the pixels of `value` (h, w) that polygons (n, 2) fill to 1, by the rules of Blender's solvers.
+
+    CDT fills all that the polygons enclose together; with `holes` only what they go around, by their winding number.
+    SWEEP_LINE fills each polygon by itself; with `holes` what lies inside an odd number of them; with `overlap` each is
+    first cut down to its outer loops.
+    """
+    if solver == "SWEEP_LINE":
+        loops = [loop for polygon in polygons for loop in (_outer_loops(polygon) if overlap else [polygon])]
+        for group in [loops] if holes else [[loop] for loop in loops]:
+            _fill_together(value, group, lambda winding: winding % 2 != 0)
+        return
+    for group in [polygons] if holes else [[loop] for loop in polygons + _outer_borders(polygons)]:
+        _fill_together(value, group, lambda winding: winding != 0)
+
+
+def _fill_together(value: np.ndarray, polygons: list[np.ndarray], rule) -> None:
+    """Sets the pixels to 1 whose winding number is one by the rule."""
+    height, width = value.shape
+    row, left, right, winding = _spans(polygons, height)
+    inside = rule(winding)
+    start = np.ceil(np.clip(left[inside] * width - 0.5, 0, width)).astype(int)
+    stop = np.floor(np.clip(right[inside] * width + 0.5, 0, width)).astype(int)
+    for y, a, b in zip(row[inside].tolist(), start.tolist(), stop.tolist(), strict=True):
+        value[y, a:b] = 1
+
+
+def _spans(polygons: list[np.ndarray], height: int):
+    """Along the middle of each row of pixels, what lies between two edges that follow each other: row, left, right and
+    winding number (n,) each, in order."""
+    none = np.zeros((0, 2))
+    start = np.concatenate([none, *polygons])
+    end = np.concatenate([none, *(np.roll(p, -1, axis=0) for p in polygons)])
+    edge, row, x = _at_rows(start, end, height)
+    order = np.lexsort((x, row))
+    row, x = row[order], x[order]
+    winding = np.cumsum(np.where(end[:, 1] > start[:, 1], 1, -1)[edge[order]])
+    same = row[1:] == row[:-1]
+    return row[:-1][same], x[:-1][same], x[1:][same], winding[:-1][same]
+
+
+def _at_rows(start: np.ndarray, end: np.ndarray, height: int):
+    """Where edges (n, 2) cross the middles of rows of pixels: index of edge, row, x (m,) each."""
+    lowest, highest = np.minimum(start[:, 1], end[:, 1]), np.maximum(start[:, 1], end[:, 1])
+    first, last = (np.clip(np.ceil(y * height - 0.5), 0, height).astype(int) for y in (lowest, highest))
+    edge, row = ranges(first, last)
+    share = ((row + 0.5) / height - start[edge, 1]) / (end[edge, 1] - start[edge, 1])
+    return edge, row, start[edge, 0] + (end[edge, 0] - start[edge, 0]) * share
+
+
+def _outer_borders(polygons: list[np.ndarray]) -> list[np.ndarray]:
+    """The outer borders of all groups of polygons that cross one another or themselves."""
+    start = np.concatenate([np.zeros((0, 2)), *polygons])
+    end = np.concatenate([np.zeros((0, 2)), *(np.roll(p, -1, axis=0) for p in polygons)])
+    first, second, at, other = crossings(start, end)
+    if not len(first):
+        return []
+    count, meetings = len(start), np.arange(len(first))
+    points = np.concatenate([start, start[first] + (end - start)[first] * at[:, None]])
+    behind = np.concatenate(
+        [np.roll(part, -1) for part in np.split(np.arange(count), np.cumsum([*map(len, polygons)]))]
+    )
+    # The parts that crossings leave of each edge, as pairs of indices into the points.
+    edge = np.concatenate([np.arange(count), first, second])
+    corner = np.concatenate([np.arange(count), count + meetings, count + meetings])
+    order = np.lexsort((np.concatenate([np.full(count, -1.0), at, other]), edge))
+    edge, corner = edge[order], corner[order]
+    following = np.where(np.append(edge[1:] == edge[:-1], False), np.roll(corner, -1), behind[edge])
+    angle = np.arctan2(*(end - start)[edge].T[::-1])
+    ways: dict = {}  # by point: the parts that begin or end there, as (the other point, direction)
+    for a, b, turn in zip(corner.tolist(), following.tolist(), angle.tolist(), strict=True):
+        ways.setdefault(a, []).append((b, turn))
+        ways.setdefault(b, []).append((a, turn + np.pi))
+    return [points[walk] for walk in _walks_around(points, ways)]
+
+
+def _walks_around(points: np.ndarray, ways: dict) -> list[list[int]]:
+    """Walks around the groups of points that ways connect, with the outside to the right."""
+    walks, seen = [], set()
+    for start in np.argsort(points[:, 0], kind="stable").tolist():
+        if start in seen:
+            continue
+        group = [start]
+        seen.add(start)
+        for point in group:
+            beside = {there for there, _ in ways[point]} - seen
+            group += beside
+            seen |= beside
+        walk, here, back, steps = [], start, np.pi, set()
+        while True:
+            # The way farthest to the right is the next one counterclockwise from that back.
+            there, turn = min(ways[here], key=lambda way: (way[1] - back - 1e-9) % (2 * np.pi))
+            if (here, there) in steps:
+                break
+            steps.add((here, there))
+            walk.append(here)
+            here, back = there, turn + np.pi
+        walks.append(walk)
+    return walks
+
+
+def _outer_loops(polygon: np.ndarray) -> list[np.ndarray]:
+    """The loops of a polygon that crosses itself: its way, from the leftmost point on, without every second part
+    between two crossings."""
+    first, second, at, other = crossings(polygon, np.roll(polygon, -1, axis=0))
+    if not len(first):
+        return [polygon]
+    count, meetings = len(polygon), np.arange(len(first))
+    place = np.concatenate([np.arange(count), first + at, second + other])
+    corner = np.concatenate([np.arange(count), count + meetings, count + meetings])
+    behind = (place - np.argmin(polygon[:, 0])) % count
+    way = corner[np.lexsort((corner, behind))].tolist()
+    following, inside = {}, False
+    for here, there in pairwise([*way, way[0]]):
+        inside ^= here >= count
+        if not inside:
+            following[here] = there
+    points = np.concatenate([polygon, polygon[first] + (np.roll(polygon, -1, axis=0) - polygon)[first] * at[:, None]])
+    loops = []
+    while following:
+        loop = [next(iter(following))]
+        while (there := following.pop(loop[-1], None)) is not None:
+            loop.append(there)
+        loops.append(points[loop])
+    return loops
+
+
+def feather(value: np.ndarray, quads: np.ndarray, falloff) -> None:
+    """Raises the pixels of `value` (h, w) that quads (n, 4, 2) cover to theirs: 1 at the first two corners, 0 at the
+    last two, between them by mean value coordinates, and `falloff` of all."""
+    height, width = value.shape
+    flat = value.reshape(-1)
+    quad, row, start, stop = _quad_rows(quads, width, height)
+    x_of, y_of = np.ascontiguousarray(quads.transpose(2, 1, 0), np.float32)
+    last = np.cumsum(stop - start)
+    blocks = np.searchsorted(last, np.arange(0, last[-1] if len(last) else 0, _BLOCK))
+    for a, b in pairwise(np.unique([*blocks, len(quad)]).tolist()):
+        span, x = ranges(start[a:b], stop[a:b])
+        pixel = row[a:b][span] * width + x
+        bare = np.flatnonzero(flat[pixel] < 1)
+        span, x, pixel = span[bare] + a, x[bare], pixel[bare]
+        of = quad[span]
+        ways_x = np.take(x_of, of, axis=1) - (x.astype(np.float32) + np.float32(0.5)) / np.float32(width)
+        ways_y = np.take(y_of, of, axis=1) - (row[span].astype(np.float32) + np.float32(0.5)) / np.float32(height)
+        np.maximum.at(flat, pixel, falloff(_nearness(ways_x, ways_y)))
+
+
+def _quad_rows(quads: np.ndarray, width: int, height: int):
+    """The pixels that quads (n, 4, 2) cover, row by row: quad, row, first pixel and that behind the last, (m,) each.
+
+    A quad is its two triangles on the sides of the way between its first and its third corner, as in Blender, which
+    matters where they are not side by side.
+    """
+    sides = np.roll(quads, -1, axis=1) - quads
+    following = np.roll(sides, -1, axis=1)
+    turns = sides[..., 0] * following[..., 1] - sides[..., 1] * following[..., 0]
+    convex = (turns >= 0).all(axis=1) | (turns <= 0).all(axis=1)
+    others = np.flatnonzero(~convex)
+    parts = np.concatenate([quads[convex], quads[others][:, [0, 1, 2, 2]], quads[others][:, [0, 2, 3, 3]]])
+    index = np.concatenate([np.flatnonzero(convex), others, others])
+    y = parts[..., 1]
+    first, last = (np.ceil(np.clip(edge * height - 0.5, 0, height)).astype(int) for edge in (y.min(1), y.max(1)))
+    part, row = ranges(first, last)
+    middle = (row + 0.5) / height
+    left, right = np.full(len(row), np.inf), np.full(len(row), -np.inf)
+    for corner in range(4):
+        (ax, ay), (bx, by) = parts[:, corner].T, parts[:, (corner + 1) % 4].T
+        slope = np.divide(bx - ax, by - ay, out=np.zeros_like(ax), where=by != ay)
+        low, high = np.minimum(ay, by)[part], np.maximum(ay, by)[part]
+        x = ax[part] + (middle - ay[part]) * slope[part]
+        met = (low <= middle) & (middle < high)
+        np.minimum(left, x, out=left, where=met)
+        np.maximum(right, x, out=right, where=met)
+    start = np.ceil(np.clip(left * width - 0.5 - _SEAM, 0, width)).astype(int)
+    stop = np.floor(np.clip(right * width + 0.5 + _SEAM, 0, width)).astype(int)
+    some = stop > start
+    return index[part[some]], row[some], start[some], stop[some]
+
+
+def _nearness(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """How near points are to the first two corners of quads: 0 to 1 (n,), by mean value coordinates; x, y (4, n): the
+    ways from the points to the corners."""
+    lengths = np.sqrt(x * x + y * y)
+    tangents = []
+    for a, b in ((0, 1), (1, 2), (2, 3), (3, 0)):
+        area = x[a] * y[b] - y[a] * x[b]
+        far = lengths[a] * lengths[b] - (x[a] * x[b] + y[a] * y[b])
+        tangents.append(np.abs(np.divide(far, area, out=np.zeros_like(far), where=area != 0)))
+    np.maximum(lengths, np.float32(1e-7), out=lengths)
+    near = (tangents[3] + tangents[0]) / lengths[0] + (tangents[0] + tangents[1]) / lengths[1]
+    away = (tangents[1] + tangents[2]) / lengths[2] + (tangents[2] + tangents[3]) / lengths[3]
+    total = near + away
+    return np.divide(near, total, out=np.full_like(near, 0.5), where=total > 0)

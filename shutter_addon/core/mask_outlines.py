@@ -1,0 +1,234 @@
+"""The splines of a mask as polygons: their outlines, and how far their feathers reach.
+
+Polygons are in units of the picture: x to the right and y up from the lower left corner, both from 0 to 1.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+# Points a segment has at least and at most.
+_FEWEST, _MOST = 4, 32
+# The direction of a spline at a point is that of the way through points so far before and behind it on its segment.
+_REACH = 0.05
+# The round ends of an open spline that is not filled have a point every two pixels, in these limits.
+_CAP_POINTS = 8, 64
+# Segments that are compared at once with all others that may cross them.
+_SEGMENTS = 1 << 11
+
+
+def outlines(spline, width: int, height: int) -> tuple[np.ndarray, np.ndarray] | None:
+    """The outline of a spline and that of its feather, (n, 2) float64 each, point by point; None: it covers nothing.
+
+    A feather is a pixel wide at least: that is all there is of anti-aliasing.
+    """
+    points, weights = np.array(spline.points, np.float64), np.array(spline.weights, np.float64)
+    if len(points) < 2:
+        return None
+    steps = _steps(spline, points, weights, max(width, height))
+    segment, u = _positions(spline, len(points), steps)
+    edge = _at(spline, points, segment, u)
+    if len(edge) < 4:
+        return None
+    offset = _even_offset if spline.offset_mode == "EVEN" else _smooth_offset
+    feather = offset(spline, points, weights, segment, u, edge)
+    larger = max(width, height)
+    edge, feather = ((p - 0.5) * (larger / width, larger / height) + 0.5 for p in (edge, feather))
+    feather = _pixel_wide(edge, feather, 1 / min(width, height))
+    if spline.collapse and spline.fill:
+        feather = _without_loops(feather, spline.cyclic)
+    return edge, feather
+
+
+def longest_segment(points: np.ndarray, cyclic: bool) -> float:
+    """Of the segments of a spline (n, 3, 2), the length of the longest, along its handles."""
+    following = np.roll(points, -1, axis=0)
+    hull = np.stack([points[:, 1], points[:, 2], following[:, 0], following[:, 1]], axis=1)
+    lengths = np.linalg.norm(np.diff(hull, axis=1), axis=2).sum(axis=1)
+    return float(lengths[: None if cyclic else -1].max(initial=0))
+
+
+def _steps(spline, points: np.ndarray, weights: np.ndarray, larger: int) -> int:
+    """Points that a segment is cut into: one in four pixels of the longest segment, more where its feather changes."""
+    longest = (spline.longest or longest_segment(points, spline.cyclic)) * larger
+    steepest = 0.0
+    for weight, feather in zip(weights, spline.feathers, strict=True):
+        u, factor = np.array([(0.0, weight), *feather]).T
+        apart = np.diff(u) > 1e-7
+        steepest = max(steepest, np.abs(np.diff(factor)[apart] / np.diff(u)[apart]).max(initial=0))
+    return int(np.clip(min(max(longest, 1), 128) // 1 + steepest / 0.005, 4 * _FEWEST, 4 * _MOST)) // 4
+
+
+def _positions(spline, count: int, steps: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where on a spline of `count` points its outline's points lie: segment (n,) and u (n,) 0 to 1."""
+    segments = count if spline.cyclic else count - 1
+    segment, u = np.repeat(np.arange(segments), steps), np.tile(np.arange(steps) / steps, segments)
+    return (segment, u) if spline.cyclic else (np.append(segment, segments - 1), np.append(u, 1.0))
+
+
+def _bezier(a, b, c, d, u: np.ndarray) -> np.ndarray:
+    u = u[:, None]
+    v = 1 - u
+    return v * v * v * a + 3 * u * v * v * b + 3 * u * u * v * c + u * u * u * d
+
+
+def _at(spline, points: np.ndarray, segment: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Points (n, 2) of a spline; behind the end of an open one its last point."""
+    this, following = points[segment % len(points)], points[(segment + 1) % len(points)]
+    found = _bezier(this[:, 1], this[:, 2], following[:, 0], following[:, 1], u)
+    return found if spline.cyclic else np.where((segment == len(points) - 1)[:, None], points[-1, 1], found)
+
+
+def _even_offset(spline, points, weights, segment, u, edge) -> np.ndarray:
+    """The feather's outline (n, 2), at right angles to the spline."""
+    before, after = u - _REACH < 0, u + _REACH > 1
+    last = _at(spline, points, segment - before, u - _REACH + before)
+    following = _at(spline, points, segment + after, u + _REACH - after)
+    along = _normalized(edge - last) + _normalized(following - edge)
+    if not spline.cyclic:
+        start = before & (segment == 0)
+        along[start] = (following - points[0, 1])[start]
+    return edge + _left_of(along) * _widths(spline, weights, segment, u)[:, None]
+
+
+def _smooth_offset(spline, points, weights, segment, u, edge) -> np.ndarray:
+    """The feather's outline (n, 2): a spline through the moved points, whose handles grow with the distances."""
+    moves = _left_of(points[:, 1] - points[:, 0]) * weights[:, None]
+    handles, moved = points - points[:, 1:2], points[:, 1] + moves
+    after = (np.arange(len(points)) + 1) % len(points)
+    base = np.linalg.norm(points[:, 1] - points[after, 1], axis=1)
+    grown = np.linalg.norm(moved - moved[after], axis=1) / np.where(base > 0, base, 1)
+    hull = (
+        moved,
+        moved + handles[:, 2] * grown[:, None],
+        moved[after] + handles[after, 0] * grown[:, None],
+        moved[after],
+    )
+    feather = _bezier(*(corner[segment] for corner in hull), u)
+    # Feather points scale what there is; where there is none, they make none.
+    plain = weights[segment] * (1 - u) + weights[after][segment] * u
+    scaled = np.array([len(feather) > 0 for feather in spline.feathers])[segment] & (plain != 0)
+    scale = np.divide(_widths(spline, weights, segment, u), plain, out=np.ones_like(plain), where=scaled)
+    return edge + (feather - edge) * scale[:, None]
+
+
+def _widths(spline, weights, segment, u) -> np.ndarray:
+    """The feather's width (n,) in mask space, eased or linear between points and feather points."""
+    result = np.empty(len(u))
+    for index, feather in enumerate(spline.feathers):
+        here = segment == index
+        at, factor = np.array([(0.0, 1.0), *feather, (1.0, 1.0)]).T
+        ends = weights[index], weights[(index + 1) % len(weights)]
+        width = factor * (ends[0] * (1 - at) + ends[1] * at)
+        first = np.clip(np.searchsorted(at, u[here]) - 1, 0, len(at) - 2)
+        gap = at[first + 1] - at[first]
+        share = (u[here] - at[first]) / np.where(gap > 0, gap, 1)
+        if spline.weight_interpolation == "EASE":
+            share = share * share * (3 - 2 * share)
+        result[here] = width[first] + (width[first + 1] - width[first]) * share
+    return result
+
+
+def _pixel_wide(edge: np.ndarray, feather: np.ndarray, pixel: float) -> np.ndarray:
+    """The feather's outline, a pixel from the edge where it was nearer. The normal is that of the point before, as
+    Blender has it."""
+    steps = _normalized(np.roll(edge, 1, axis=0) - edge)
+    along = _normalized(np.roll(steps, 1, axis=0) + steps)
+    narrow = np.sum((feather - edge) ** 2, axis=1) < pixel * pixel
+    return np.where(narrow[:, None], edge + np.stack([along[:, 1], -along[:, 0]], axis=1) * pixel, feather)
+
+
+def feather_quads(spline, edge: np.ndarray, feather: np.ndarray, width: int, height: int) -> np.ndarray:
+    """The feather of a spline as quads (n, 4, 2): two corners on the spline, whose value is 1, and two beyond, of 0."""
+    if spline.fill:
+        return _between(edge, feather, closed=True)
+    other = 2 * edge - feather
+    if spline.collapse:
+        feather, other = _without_loops(feather, spline.cyclic), _without_loops(other, spline.cyclic)
+    sides = [_between(edge, feather, spline.cyclic), _between(edge, other, spline.cyclic)]
+    if spline.cyclic:
+        return np.concatenate(sides)
+    size = np.array([width, height]) / min(width, height)
+    caps = [_cap(edge[0], feather[0], 1.0, size, width, height), _cap(edge[-1], feather[-1], -1.0, size, width, height)]
+    return np.concatenate(sides + caps)
+
+
+def _between(edge: np.ndarray, feather: np.ndarray, closed: bool) -> np.ndarray:
+    quads = np.stack([edge, np.roll(edge, -1, axis=0), np.roll(feather, -1, axis=0), feather], axis=1)
+    return quads if closed else quads[:-1]
+
+
+def _cap(centre, start, turn: float, size, width: int, height: int) -> np.ndarray:
+    """The half disc (n, 4, 2) at an end of an open spline, from a point of its feather on."""
+    pixels = np.linalg.norm(start - centre) * min(width, height)
+    count = int(np.clip(pixels // 2, *_CAP_POINTS))
+    angle = turn * np.pi * np.arange(count + 1) / count
+    x, y = (start - centre) * size
+    around = np.stack([x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)], axis=1)
+    rim = centre + around / size
+    middle = np.broadcast_to(centre, rim[1:].shape)
+    return np.stack([middle, middle, rim[:-1], rim[1:]], axis=1)
+
+
+def _without_loops(outline: np.ndarray, cyclic: bool) -> np.ndarray:
+    """The outline with the smaller part between any two segments that cross drawn together in their crossing."""
+    outline, count = outline.copy(), len(outline)
+    ends = np.roll(outline, -1, axis=0)
+    first, second, _, _ = crossings(outline, ends)
+    for i, j in sorted(zip(second.tolist(), first.tolist(), strict=True)):
+        if j >= i - 1 or (i + 1) % count == j or not (cyclic or i < count - 1):
+            continue
+        found, _, at, _ = crossings(outline[[i, j]], outline[[(i + 1) % count, j + 1]])
+        if not len(found):
+            continue
+        meeting = outline[i] + (outline[(i + 1) % count] - outline[i]) * at[0]
+        inner = np.arange(count)
+        inner = (inner >= j + 1) & (inner <= i)
+        if (np.ptp(outline[inner], axis=0) < np.ptp(outline[~inner], axis=0)).any():
+            outline[inner] = meeting
+        else:
+            outline[~inner] = meeting
+    return outline
+
+
+def crossings(starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Pairs of segments that cross: indices first < second, and where on each, 0 to 1. Neighbours that share a point
+    do not cross."""
+    ways = ends - starts
+    lowest, highest = np.minimum(starts, ends), np.maximum(starts, ends)
+    # In the order of their left ends, a segment can meet those that follow until one begins behind its right end.
+    order = np.argsort(lowest[:, 0], kind="stable")
+    reach = np.searchsorted(lowest[order, 0], highest[order, 0], side="right")
+    found = [np.zeros((2, 0), int)]
+    for a in range(0, len(order), _SEGMENTS):
+        part = np.arange(a, min(a + _SEGMENTS, len(order)))
+        here, there = ranges(part + 1, reach[part])
+        here, there = order[here + a], order[there]
+        near = (lowest[here, 1] <= highest[there, 1]) & (lowest[there, 1] <= highest[here, 1])
+        found.append(np.stack([here[near], there[near]]))
+    first, second = np.sort(np.concatenate(found, axis=1), axis=0)
+    a, b, gap = ways[first], ways[second], starts[second] - starts[first]
+    area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = (gap[:, 0] * b[:, 1] - gap[:, 1] * b[:, 0]) / area
+        other = (gap[:, 0] * a[:, 1] - gap[:, 1] * a[:, 0]) / area
+    shared = (ends[first] == starts[second]).all(1) | (ends[second] == starts[first]).all(1)
+    cross = (at >= 0) & (at <= 1) & (other >= 0) & (other <= 1) & ~shared
+    return first[cross], second[cross], at[cross], other[cross]
+
+
+def ranges(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All whole numbers from first to before last (n,): the index of the range each is of, and the number."""
+    counts = np.maximum(last - first, 0)
+    index = np.repeat(np.arange(len(counts)), counts)
+    return index, np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts - first, counts)
+
+
+def _normalized(vectors: np.ndarray) -> np.ndarray:
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / np.where(lengths > 0, lengths, 1)
+
+
+def _left_of(vectors: np.ndarray) -> np.ndarray:
+    """Directions (n, 2) of length 1 at a right angle to vectors, to their left."""
+    return _normalized(np.stack([-vectors[:, 1], vectors[:, 0]], axis=1))

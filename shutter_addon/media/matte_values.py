@@ -1,0 +1,60 @@
+"""Values of mattes: files, masks and ramps on the pixels of a picture, feathered and inverted."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+
+import numpy as np
+
+from ..core.matte_grid import block_means, feathered, fitted
+from ..core.mattes import FileFrame, Matte, MatteFile, MatteSource
+
+
+class MatteValues:
+    """A core.mattes.MatteReader for pictures of one size.
+
+    step: frames of the source for each filmed one (Options.step)"""
+
+    def __init__(self, width: int, height: int, step: int = 1):
+        self._size, self._step = (width, height), step
+        self._sources: dict[MatteFile, MatteSource] = {}
+        self._made: list[tuple[Hashable, np.ndarray]] = []
+
+    @classmethod
+    def of(cls, source) -> MatteValues:
+        """For the pictures of a source, as core.mattes has them: a ShotSource."""
+        return cls(source.width, source.height, source.step)
+
+    def values(self, mattes: tuple[Matte, ...], index: int, block: int) -> list[tuple[Hashable, np.ndarray]]:
+        """As MatteReader.values. EffectError, MediaError: those of a file cannot be had."""
+        files = {matte.content.file for matte in mattes if isinstance(matte.content, FileFrame)}
+        for file in self._sources.keys() - files:
+            self._sources.pop(file).close()
+        known, self._made = dict(self._made), []
+        for matte in mattes:
+            key = self._content_key(matte.content, index), matte.feather, matte.invert, block
+            self._made.append((key, known[key] if key in known else self._values(matte, key[0], block)))
+        return list(self._made)
+
+    def _content_key(self, content, index: int) -> Hashable:
+        if not isinstance(content, FileFrame):
+            return content
+        if content.file not in self._sources:
+            self._sources[content.file] = content.file.open()
+        source = self._sources[content.file]
+        return content.file, min(max(content.index(source, index // self._step), 0), source.count - 1)
+
+    def _values(self, matte: Matte, key, block: int) -> np.ndarray:
+        if isinstance(matte.content, FileFrame):
+            file, frame = key
+            values = fitted(self._sources[file].read(frame), *self._size)
+        else:
+            values = matte.content.values(*self._size)
+        values = feathered(values, matte.feather * self._size[1])
+        return block_means(1 - values if matte.invert else values, block)
+
+    def close(self) -> None:
+        """Closes the files; they are opened again when they are needed."""
+        for source in self._sources.values():
+            source.close()
+        self._sources.clear()

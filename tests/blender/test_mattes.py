@@ -1,0 +1,730 @@
+"""Mattes and ramps in Blender: files, strips of the edit, as they are trimmed and retimed, and what becomes of them."""
+
+import json
+import os
+import shutil
+
+import av
+import numpy as np
+import pytest
+from support import read_picture, recipe, request, sequencer, write_frames
+
+from shutter_addon.core import light
+from shutter_addon.core import recipe as recipes
+from shutter_addon.media.image_writing import write_exr
+
+WIDTH, HEIGHT, COUNT = 48, 32, 12
+OPTIONS = {"light": "encoded", "interpolation": "value"}
+
+
+@pytest.fixture(scope="module")
+def footage(tmp_path_factory):
+    """Frames of one grey each, 10 levels apart; the first one's path."""
+    frames = [np.full((HEIGHT, WIDTH, 3), 20 + 10 * i, np.uint8) for i in range(COUNT)]
+    return write_frames(tmp_path_factory.mktemp("footage"), frames)
+
+
+def values(index):
+    """What frame `index` of a matte says (H, W), 0 to 255: not the same anywhere, nor at any two frames."""
+    y, x = np.indices((HEIGHT, WIDTH))
+    return ((x * 5 + y * 3 + index * 17) % 256).astype(np.uint8)
+
+
+@pytest.fixture
+def matte(tmp_path):
+    """Its first file."""
+    return write_frames(tmp_path / "matte", [np.stack([values(i)] * 3, axis=-1) for i in range(COUNT)], "m")
+
+
+def region(path=None, **fields):
+    kind = {"kind": "matte", "path": str(path)} if path else {"kind": "ramp"}
+    return {"name": "m", "shutter": "S1", **kind, **fields}
+
+
+def data(*regions, **options):
+    """Where a matte is 1, the frame after the shown one is seen, else the shown one."""
+    return recipe(2, [1, 0], [0, 1], regions=regions, **OPTIONS | options)
+
+
+@pytest.fixture
+def shown(bpy, edit, footage):
+    """Makes an effect of a recipe; its strip, the effect, and a function that gives the coefficients of its second
+    shutter (H, W), as the pictures at a timeline frame show them."""
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import add_effect
+    from shutter_addon.blender.rendering import session
+
+    def show(content, change=lambda source: None):
+        source = edit.sequence_editor.strips.new_image("images", str(footage), 1, 1)
+        for i in range(2, COUNT + 1):
+            source.elements.append(f"f{i:04d}.png")
+        change(source)
+        strip, effect = add_effect.add_effect(edit, source)
+        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(content)))
+
+        def coefficients(frame):
+            asked = request(edit, effect, strip, frame)
+            levels = 255 * light.to_encoded(asked.picture()[..., 0].astype(float))
+            return (levels - (20 + 10 * asked.index)) / 10
+
+        return strip, effect, coefficients
+
+    yield show
+    session.forget()
+
+
+def doubled(bpy, edit, source):
+    """A strip at twice its speed."""
+    source.select, edit.sequence_editor.active_strip = True, source
+    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+        bpy.ops.sequencer.retiming_segment_speed_set(speed=200)
+
+
+def strip_of(edit, path, frame=1, count=COUNT, name="matte"):
+    found = edit.sequence_editor.strips.new_image(name, str(path), 4, frame)
+    for i in range(2, count + 1):
+        found.elements.append(f"m{i:04d}.png")
+    return found
+
+
+def close(found, expected):
+    """To a hundredth: a picture's levels lie ten apart."""
+    return np.abs(found - expected).max() < 0.01
+
+
+def test_a_file_follows_the_footage(shown, matte):
+    """Trimmed and in reverse, the matte's frames stay with those they belong to."""
+
+    def change(source):
+        source.left_handle = 4
+        source.use_reverse_frames = True
+
+    _strip, _effect, coefficients = shown(data(region(matte)), change)
+    for frame in (4, 7, 11):
+        # the last frame has none after it
+        assert close(-coefficients(frame), values(COUNT - frame) / 255)
+
+
+def test_the_timeline_and_an_offset(shown, matte):
+    def change(source):
+        source.left_handle = 4
+
+    content = data(region(matte, timing="timeline", offset=2))
+    _strip, _effect, coefficients = shown(content, change)
+    assert close(coefficients(6), values(6 - 4 + 2) / 255)
+    assert close(coefficients(11), values(9) / 255)
+
+
+def test_a_cut_of_the_effect_changes_nothing(shown, matte, tmp_path):
+    """Neither with the timeline's frames nor with the footage's."""
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import lifecycle
+    from shutter_addon.blender.rendering import matte_export
+
+    regions = region(matte, timing="timeline", offset=1, opacity=0.5), region(matte, opacity=0.5, name="n")
+    strip, effect, _coefficients = shown(data(*regions))
+    before = request(strip.id_data, effect, strip, 9).coefficients()
+    right = strip.split(frame=7, split_method="SOFT")
+    lifecycle.update()
+    assert right.scene == strip.scene
+    assert close(request(strip.id_data, effect, right, 9).coefficients(), before)
+    saved = matte_export.recipe_for(strip.id_data, effect, right, tmp_path / "r.json")
+    assert saved.regions[0].offset == 1 + 6  # frame 1 of this recipe is the seventh of the strip as it was
+    recipe_import.apply(strip.id_data, effect, right, saved, tmp_path)
+    assert close(request(strip.id_data, effect, right, 9).coefficients(), before)
+
+
+def test_a_file_without_colours_has_a_channel_by_name(bpy, edit, shown, tmp_path):
+    """As the files of `--weights`."""
+    write_exr(tmp_path / "0001.exr", np.full((HEIGHT, WIDTH, 1), 0.25, np.float32), ["S1"])
+    strip, effect, coefficients = shown(data())
+    edit.sequence_editor.active_strip, effect.active_shutter = strip, 1
+    with sequencer(bpy):
+        with pytest.raises(RuntimeError, match="no colour channels, only S1"):
+            bpy.ops.shutter.matte_add(filepath=str(tmp_path / "0001.exr"))
+        bpy.ops.shutter.matte_add(filepath=str(tmp_path / "0001.exr"), channel_name="S1")
+    assert close(coefficients(2), 0.25)
+
+
+def test_before_and_behind_its_frames_a_matte_holds(shown, matte):
+    _strip, _effect, coefficients = shown(data(region(matte, offset=8)))
+    assert close(coefficients(9), values(COUNT - 1) / 255)
+    _strip.id_data.virtual_shutter.effects[0].regions[0].offset = -3
+    assert close(coefficients(2), values(0) / 255)
+
+
+def test_one_picture_holds_for_the_film(shown, matte):
+    (matte.parent / "m0002.png").unlink()
+    still = matte.rename(matte.with_name("still.png"))
+    _strip, effect, coefficients = shown(data(region(still)))
+    assert effect.regions[0].image.source == "FILE"
+    for frame in (1, 8):
+        assert close(coefficients(frame), values(0) / 255)
+
+
+@pytest.mark.parametrize("channel", ["red", "green", "blue", "alpha", "luminance"])
+def test_channels(shown, tmp_path, channel):
+    rng = np.random.default_rng(1)
+    picture = rng.integers(0, 256, (HEIGHT, WIDTH, 4)).astype(np.uint8)
+    path = write_frames(tmp_path / "c", [picture], "c")
+    _strip, _effect, coefficients = shown(data(region(path, channel=channel)))
+    samples = dict(zip(("red", "green", "blue", "alpha"), np.moveaxis(picture / 255, -1, 0), strict=True))
+    samples["luminance"] = picture[..., :3] @ [0.2126, 0.7152, 0.0722] / 255
+    assert close(coefficients(3), samples[channel])
+
+
+def test_keyed_opacity_invert_and_order(shown, matte):
+    keys = [{"frame": 2, "value": 0}, {"frame": 10, "value": 1}]
+    regions = region(matte, opacity=keys), region(matte, invert=True, opacity=0.5, offset=3, name="n")
+    _strip, effect, coefficients = shown(data(*regions))
+    first, second = values(5) / 255 * 0.5, (1 - values(8) / 255) * 0.5
+    assert close(coefficients(6), first * (1 - second) + second)
+    effect.regions[1].blend = "ADD"
+    assert close(coefficients(6), np.minimum(first + second, 1))
+
+
+def test_a_strip_is_read_as_it_is_trimmed_muted_and_retimed(edit, shown, matte):
+    _strip, effect, coefficients = shown(data(region(matte)))
+    own = strip_of(edit, matte, 5)
+    own.mute, own.use_reverse_frames = True, True
+    effect.regions[0].matte = "STRIP"
+    effect.regions[0].strip_name = own.name
+    assert close(coefficients(7), values(COUNT - 3) / 255)
+    assert close(coefficients(2), values(COUNT - 1) / 255)  # before it begins
+    own.use_reverse_frames = False
+    assert close(coefficients(7), values(2) / 255)
+    own.name = "another name"
+    assert effect.regions[0].strip_name == "another name"
+    assert close(coefficients(7), values(2) / 255)
+    right = own.split(frame=8, split_method="SOFT")
+    right.content_start -= 2
+    assert close(coefficients(7), values(2) / 255)
+    assert close(coefficients(9), values(6) / 255)
+    for part in (own, right):
+        edit.sequence_editor.strips.remove(part)
+    with pytest.raises(Exception, match='region "m": its matte strip was deleted'):
+        coefficients(7)
+
+
+def test_a_file_is_moved_with_its_mattes(bpy, edit, shown, matte, footage, tmp_path):
+    """Chosen after the file was saved, and before that; then appended to another file, and linked."""
+    from shutter_addon.blender.data import recipe_import, strips
+
+    first = tmp_path / "here"
+    first.mkdir()
+    for folder in (matte.parent, footage.parent):
+        shutil.copytree(folder, first / folder.name)
+    edit.name = "Edit"
+    content = data(region(first / "matte" / "m0001.png"))
+    shown(content, lambda source: setattr(source, "directory", str(first / footage.parent.name)))
+    bpy.ops.wm.save_as_mainfile(filepath=str(first / "edit.blend"))
+    (effect,) = edit.virtual_shutter.effects
+    recipe_import.apply(edit, effect, strips.effect_strips(edit)[0], recipes.parse(json.dumps(content)))
+    assert effect.regions[0].image.filepath == "//matte/m0001.png"
+    bpy.ops.wm.save_mainfile()
+    first.rename(tmp_path / "there")
+    moved = str(tmp_path / "there" / "edit.blend")
+
+    def assert_shown():
+        edit = bpy.data.scenes["Edit"]
+        (effect,) = edit.virtual_shutter.effects
+        asked = request(edit, effect, strips.effect_strips(edit)[0], 3)
+        levels = 255 * light.to_encoded(asked.picture()[..., 0].astype(float))
+        assert close((levels - (20 + 10 * asked.index)) / 10, values(2) / 255)
+
+    bpy.ops.wm.open_mainfile(filepath=moved)
+    assert_shown()
+    for link in (False, True):
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        with bpy.data.libraries.load(moved, link=link) as (_there, here):
+            here.scenes = ["Edit"]
+        assert_shown()
+
+
+def test_a_copy_of_a_strip_is_another_matte(bpy, edit, shown, matte):
+    """Of the source, given other files, and of a matte; the parts of one that was cut are one."""
+    _strip, effect, _coefficients = shown(data(region(matte), region(matte, name="n")))
+    strips = edit.sequence_editor.strips
+    own = strip_of(edit, matte, 3)
+    own.virtual_shutter_source = effect.source
+    one, other = effect.regions
+    for each in (one, other):
+        each.matte, each.strip_name = "STRIP", own.name
+        assert each.strip_name == own.name
+    copy = strip_of(edit, matte, 1, name="copy")
+    copy.virtual_shutter_source, copy.virtual_shutter_matte = own.virtual_shutter_source, own.virtual_shutter_matte
+    other.strip_name = copy.name
+    assert (one.strip_name, other.strip_name) == (own.name, copy.name)
+    right = copy.split(frame=6, split_method="SOFT")
+    one.strip_name = right.name
+    assert one.strip == other.strip
+    strips.remove(copy)
+    assert other.strip_name == right.name
+
+
+def test_sentences_for_what_is_not_there(bpy, edit, shown, matte):
+    _strip, effect, coefficients = shown(data(region(matte)))
+    one = effect.regions[0]
+    matte.with_name("m0006.png").write_bytes(b"no picture")
+    with pytest.raises(Exception, match=r"m0006\.png"):
+        coefficients(6)
+    assert close(coefficients(7), values(6) / 255)
+    one.channel = "NAMED"
+    with pytest.raises(Exception, match='region "m": its channel has no name'):
+        coefficients(7)
+    one.channel_name = "Depth.Z"
+    with pytest.raises(Exception, match=r"m0001\.png: has no channel Depth\.Z"):
+        coefficients(7)
+    one.channel, one.image = "RED", None
+    with pytest.raises(Exception, match='region "m": it has no matte file'):
+        coefficients(7)
+    one.image = bpy.data.images.new("generated", 4, 4)
+    with pytest.raises(Exception, match='image "generated" is not a movie, image sequence or picture on disk'):
+        coefficients(7)
+    one.matte = "STRIP"
+    with pytest.raises(Exception, match='region "m": it has no matte strip'):
+        coefficients(7)
+    own = edit.sequence_editor.strips.new_effect("color", "COLOR", 6, 1, length=5)
+    one.strip_name = own.name
+    with pytest.raises(Exception, match='its matte strip "color" is not a movie, image or clip strip'):
+        coefficients(7)
+    one.matte = "MASK"
+    with pytest.raises(Exception, match='region "m": it has no mask'):
+        coefficients(7)
+    one.opacity = 0
+    one.kind = "RAMP"
+    assert close(coefficients(7), 0)
+
+
+def test_a_frame_that_is_written_again_is_read_again(shown, matte):
+    """In its file, which leaves the first file and the folder as they are."""
+    from shutter_addon.blender.data import source_media
+
+    _strip, _effect, coefficients = shown(data(region(matte)))
+    assert close(coefficients(6), values(5) / 255)
+    matte.with_name("m0006.png").write_bytes(matte.read_bytes())
+    source_media.look_again()
+    assert close(coefficients(6), values(0) / 255)
+
+
+def test_the_stream_of_a_movie_strip(edit, shown, tmp_path):
+    path = tmp_path / "two.mkv"
+    with av.open(str(path), "w") as out:
+        streams = [out.add_stream("ffv1", rate=25) for _ in range(2)]
+        for stream in streams:
+            stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "gray"
+        for stream, grey in zip(streams, (51, 102), strict=True):
+            frame = av.VideoFrame.from_ndarray(np.full((HEIGHT, WIDTH), grey, np.uint8), "gray")
+            out.mux([*stream.encode(frame), *stream.encode()])
+    _strip, effect, coefficients = shown(data(region(ramp="linear")))
+    own = edit.sequence_editor.strips.new_movie("movie", str(path), 4, 1)
+    one = effect.regions[0]
+    one.kind, one.matte, one.strip_name = "MATTE", "STRIP", own.name
+    assert close(coefficients(1), 0.2)
+    own.stream_index = 1
+    assert close(coefficients(1), 0.4)
+
+
+def test_a_recipe_whose_matte_is_missing_changes_nothing(shown, matte):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.media import MediaError
+
+    strip, effect, coefficients = shown(data(region(matte)))
+    gone = recipes.parse(json.dumps(data(region(matte.with_name("gone.png")))))
+    with pytest.raises(MediaError, match=r"gone\.png: no such file"):
+        recipe_import.apply(strip.id_data, effect, strip, gone)
+    assert close(coefficients(3), values(2) / 255)
+
+
+def test_drawn_regions_stay_beside_mattes(shown, matte):
+    stroke = {"shutter": "S1", "strokes": [[[0.5, 0], [0.5, 1]]], "width": 0.2, "name": "s"}
+    content = data(region(matte, opacity=0.5), stroke, border=True)
+    _strip, _effect, coefficients = shown(content)
+    found, m = coefficients(3), values(2) / 255 * 0.5
+    assert close(found[:, WIDTH // 2], (m + (1 - m))[:, WIDTH // 2])
+    assert close(found[:, 0], m[:, 0])
+
+
+def test_copies_have_mattes_of_their_own(bpy, edit, shown, matte):
+    from shutter_addon.blender.editing import lifecycle
+
+    _strip, effect, coefficients = shown(data(region(matte)))
+    own = strip_of(edit, matte, 3)
+    effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
+    copy = edit.copy()
+    lifecycle.update()
+    (other,) = copy.virtual_shutter.effects
+    assert other.regions[0].strip_name == own.name
+    own.name = "renamed"
+    assert other.regions[0].strip_name == "matte"
+    assert close(coefficients(5), values(2) / 255)
+
+
+def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.rendering import matte_export
+
+    content = data(
+        region(matte, offset=1, channel="green", opacity=0.25),
+        region(matte, name="strip/1", width=0.0),
+        region(ramp="radial", keys=[{"frame": 1, "location": [0.25, 0]}], blend="add", name="r"),
+        region(ramp="luminance", opacity=0.5, name="l"),
+    )
+    strip, effect, coefficients = shown(content)
+    own = strip_of(edit, matte, 3, 6)
+    effect.regions[1].matte, effect.regions[1].strip_name = "STRIP", own.name
+    (tmp_path / "out").mkdir()
+    recipes.save(matte_export.recipe_for(edit, effect, strip, tmp_path / "out" / "r.json"), tmp_path / "out" / "r.json")
+    saved = recipes.load(tmp_path / "out" / "r.json")
+    assert saved.regions[0].path == "../matte/m0001.png"
+    assert saved.regions[0] == recipes.parse(json.dumps(content)).regions[0].__class__(
+        **{**vars(recipes.parse(json.dumps(content)).regions[0]), "path": "../matte/m0001.png"}
+    )
+    assert saved.regions[1].path == "r mattes/2 strip_1/0001.png"
+    before = [coefficients(frame) for frame in (1, 4, 10)]
+    edit.sequence_editor.strips.remove(own)
+    recipe_import.apply(edit, effect, strip, saved, tmp_path / "out")
+    for frame, expected in zip((1, 4, 10), before, strict=True):
+        assert close(coefficients(frame), expected)
+    again = tmp_path / "out" / "again.json"
+    recipes.save(matte_export.recipe_for(edit, effect, strip, again), again)
+    assert recipes.load(again) == saved
+
+
+def test_a_still_strip_is_exported_as_one_picture(edit, shown, matte, tmp_path):
+    from shutter_addon.blender.rendering import matte_export
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    own = edit.sequence_editor.strips.new_image("still", str(matte), 4, 1)
+    effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
+    recipes.save(matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json"), tmp_path / "r.json")
+    assert [path.name for path in (tmp_path / "r mattes" / "1 m").iterdir()] == ["0001.png"]
+    assert np.abs(read_picture(tmp_path / "r mattes" / "1 m" / "0001.png")[..., 0] - values(0)).max() < 0.01
+
+
+def test_a_single_picture_among_numbered_ones_is_exported_as_one(shown, matte, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.rendering import matte_export
+
+    strip, effect, coefficients = shown(data(region(matte)))
+    effect.regions[0].image.source = "FILE"
+    saved = matte_export.recipe_for(strip.id_data, effect, strip, tmp_path / "r.json")
+    recipe_import.apply(strip.id_data, effect, strip, saved, tmp_path)
+    assert close(coefficients(5), values(0) / 255)
+
+
+def test_an_export_spares_what_it_reads(edit, shown, matte, tmp_path):
+    """A strip of the pictures that an export has written."""
+    from shutter_addon.blender.rendering import matte_export
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    one = effect.regions[0]
+    one.matte, one.strip_name = "STRIP", strip_of(edit, matte).name
+    matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json")
+    written = tmp_path / "r mattes" / "1 m" / "0001.png"
+    one.strip_name = edit.sequence_editor.strips.new_image("again", str(written), 5, 1).name
+    with pytest.raises(Exception, match="1 m: its pictures are read by the effect"):
+        matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json")
+    assert matte_export.recipe_for(edit, effect, strip, tmp_path / "other.json").regions
+
+
+def test_an_export_through_a_linked_folder(shown, matte, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.rendering import matte_export
+
+    (tmp_path / "there" / "deep").mkdir(parents=True)
+    (tmp_path / "link").symlink_to(tmp_path / "there" / "deep")
+    strip, effect, coefficients = shown(data(region(matte)))
+    saved = matte_export.recipe_for(strip.id_data, effect, strip, tmp_path / "link" / "r.json")
+    recipe_import.apply(strip.id_data, effect, strip, saved, tmp_path / "link")
+    assert close(coefficients(3), values(2) / 255)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere it is the name of a server")
+def test_two_slashes_before_a_path(shown, matte):
+    """Which Blender takes for the folder of its file."""
+    _strip, _effect, coefficients = shown(data(region(f"/{matte}")))
+    assert close(coefficients(3), values(2) / 255)
+
+
+def test_a_path_longer_than_blenders(shown, matte, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.media import MediaError
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    folder = tmp_path / "/".join(["d" * 200] * 6)
+    shutil.copytree(matte.parent, folder)
+    with pytest.raises(MediaError, match=r"m0001\.png: Blender cannot read it"):
+        recipe_import.apply(strip.id_data, effect, strip, recipes.parse(json.dumps(data(region(matte.name)))), folder)
+
+
+@pytest.fixture
+def mask(bpy, edit):
+    """All of the picture and more, whose opacity goes from 0 at its start, frame 5, to 1 eleven frames later."""
+    mask = bpy.data.masks.new("mask")
+    mask.frame_start = 5
+    layer = mask.layers.new(name="layer")
+    spline = layer.splines.new()
+    spline.points.add(3)
+    for point, corner in zip(spline.points, ((-1, -1), (2, -1), (2, 2), (-1, 2)), strict=True):
+        point.co = point.handle_left = point.handle_right = corner
+        point.handle_left_type = point.handle_right_type = "VECTOR"
+    spline.use_cyclic = True
+    for frame, alpha in ((5, 0.0), (16, 1.0)):
+        layer.alpha = alpha
+        mask.keyframe_insert('layers["layer"].alpha', frame=frame)
+    (curve,) = mask.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
+    for key in curve.keyframe_points:
+        key.interpolation = "LINEAR"
+    return mask
+
+
+@pytest.mark.parametrize("time", [None, [{"frame": 1, "value": 11}, {"frame": 11, "value": 1}]])
+def test_a_mask_is_evaluated_at_the_shown_frame(shown, mask, time):
+    """Of a source that runs backward, by its strip or by keys."""
+    content = data(region(ramp="linear"), **({"time": time} if time else {}))
+    _strip, effect, coefficients = shown(content, lambda source: setattr(source, "use_reverse_frames", not time))
+    one = effect.regions[0]
+    one.kind, one.matte, one.mask = "MATTE", "MASK", mask
+    for frame in (3, 6):
+        index = 11 - frame if time else COUNT - frame
+        assert close(-coefficients(frame), np.full((HEIGHT, WIDTH), index / 11))
+
+
+def test_a_mask_over_footage_that_is_retimed(bpy, edit, shown, mask):
+    """Whose strip is not as long as it is."""
+    _strip, effect, coefficients = shown(data(region(ramp="linear")), lambda source: doubled(bpy, edit, source))
+    one = effect.regions[0]
+    one.kind, one.matte, one.mask = "MATTE", "MASK", mask
+    for frame in (2, 4):
+        assert close(coefficients(frame), np.full((HEIGHT, WIDTH), 2 * (frame - 1) / 11))
+
+
+def test_a_mask_is_exported_as_pictures(shown, mask, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.rendering import matte_export
+
+    strip, effect, coefficients = shown(data(region(ramp="linear", opacity=0.5)))
+    one = effect.regions[0]
+    one.kind, one.matte, one.mask = "MATTE", "MASK", mask
+    expected = coefficients(7)
+    saved = matte_export.recipe_for(strip.id_data, effect, strip, tmp_path / "r.json")
+    recipe_import.apply(strip.id_data, effect, strip, saved, tmp_path)
+    assert effect.regions[0].matte == "IMAGE"
+    assert close(coefficients(7), expected)
+    assert close(coefficients(7), np.full((HEIGHT, WIDTH), 0.5 * 6 / 11))
+
+
+def test_a_time_map_shows_each_column_at_its_moment(bpy, edit, shown):
+    from shutter_addon.blender.editing import time_map
+
+    content = data(light="encoded", interpolation="value")
+    _strip, effect, coefficients = shown(content | {"window": 9, "shutters": [{"name": "A", "bars": [1] * 9}]})
+    region_ = time_map.add(effect, "LINEAR")
+    assert next(shutter.name for shutter in effect.shutters) == "First"
+    assert region_.shutter == "Last"
+    found = coefficients(2)
+    # a column at x shows 8x frames later, between two frames both in proportion
+    assert close(found, np.broadcast_to(8 * (np.arange(WIDTH) + 0.5) / WIDTH, found.shape))
+
+
+def test_handles_of_a_ramp(bpy, edit, shown, monkeypatch):
+    """About the middle of the line that it runs along."""
+    from shutter_addon.blender.data import geometry, selection
+    from shutter_addon.blender.interface import region_gizmo
+
+    strip, effect, _coefficients = shown(data(region(ramp="linear")))
+    selection.choose(edit, strip)
+    effect.active_shutter, ramp = 1, effect.regions[0]
+    ramp.location, ramp.rotation, ramp.scale = (0.1, 0), np.pi / 2, 0.5
+    # Without a window, a region has no pixels.
+    monkeypatch.setattr(geometry, "picture_to_region", lambda *_: np.eye(3))
+    with sequencer(bpy):
+        where = region_gizmo.place(bpy.context)
+        assert np.allclose(where.centre, (0.6, 0.5))
+        assert np.allclose(where.corner, (0.6, 0.5 + 0.125 * WIDTH / HEIGHT))
+        ramp.ramp = "LUMINANCE"
+        assert region_gizmo.place(bpy.context) is None
+
+
+def test_what_panels_tell(edit, shown, matte):
+    from shutter_addon.blender.rendering import matte_look
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    one = effect.regions[0]
+
+    def look():
+        return tuple(matte_look.look(edit, effect, strip, one))
+
+    assert look() == (f"{WIDTH} × {HEIGHT}, {COUNT} frames", "", "")
+    one.offset = 1
+    assert look()[2] == "Shorter than the film: its last frame holds"
+    one.matte, one.strip_name = "STRIP", strip_of(edit, matte, 1, 4).name
+    assert look() == (
+        f"{WIDTH} × {HEIGHT}, 4 frames",
+        "",
+        "Ends before the film: its last frame holds",
+    )
+    one.channel = "NAMED"
+    assert look() == ("", 'region "m": its channel has no name', "")
+
+
+def test_weights_are_read_back(tmp_path, footage):
+    """What `--weights` writes gives the same picture as mattes, for each shutter but the default one."""
+    from shutter_addon.blender import command
+
+    stroke = {"name": "s", "shutter": "S1", "strokes": [[[0.3, 0.2], [0.4, 0.9]]]}
+    content = recipe(4, [1, 0, 0, 0], [0, 0, 0, 1], [1, 1, 1, 1], border=True, regions=[stroke])
+    lasso = {"name": "l", "shutter": "S2", "kind": "lasso", "strokes": [[[0.6, 0.2], [0.9, 0.3], [0.7, 0.8]]]}
+    content["regions"].append(lasso)
+
+    def render(name, content, *more):
+        (tmp_path / f"{name}.json").write_text(json.dumps(content))
+        where = "--recipe", str(tmp_path / f"{name}.json"), "--output", str(tmp_path / name)
+        assert command.main(["render", str(footage), "--frames", "2:4", *where, *more]) == 0
+
+    render("a", content, "--weights", str(tmp_path / "weights"))
+    mattes = [
+        {"shutter": name, "kind": "matte", "path": "weights/0002.exr", "offset": -1, "channel": name, "blend": "add"}
+        for name in ("S1", "S2")
+    ]
+    render("b", content | {"regions": mattes, "border": False})
+    for frame in range(2, 5):
+        first, second = (read_picture(tmp_path / folder / f"{frame:04d}.png") for folder in "ab")
+        assert np.abs(first - second).max() <= 1
+        assert np.ptp(first) > 15
+
+
+@pytest.mark.parametrize(("kind", "short"), [("fast", True), ("trimmed", False), ("keyed", True), ("timeline", False)])
+def test_a_panel_tells_of_a_matte_shorter_than_what_is_shown(bpy, edit, shown, matte, kind, short):
+    """A matte of 7 frames, and 6 of the film: at twice its speed, as it is, or backward by keys, from the eleventh."""
+    from shutter_addon.blender.rendering import matte_look
+
+    def change(source):
+        if kind == "fast":
+            doubled(bpy, edit, source)
+
+    for path in list(matte.parent.iterdir()):
+        if int(path.stem[1:]) > 7:
+            path.unlink()
+    keys = {"time": [{"frame": 1, "value": 11}, {"frame": 11, "value": 1}]} if kind == "keyed" else {}
+    timing = "timeline" if kind == "timeline" else "source"
+    strip, effect, _coefficients = shown(data(region(matte, timing=timing), **keys), change)
+    strip.right_handle = 7
+    note = matte_look.look(edit, effect, strip, effect.regions[0]).note
+    assert note == ("Shorter than the film: its last frame holds" if short else "")
+
+
+@pytest.fixture
+def triangle(bpy, shown, matte):
+    """A mask that is the first region's matte: a triangle."""
+    _strip, effect, _coefficients = shown(data(region(matte)))
+    mask = bpy.data.masks.new("Mask")
+    spline = mask.layers.new().splines.new()
+    spline.points.add(2)
+    for point, co in zip(spline.points, ((0.2, 0.2), (0.8, 0.2), (0.5, 0.7)), strict=True):
+        point.co = co
+        point.handle_left = point.handle_right = co
+    spline.use_cyclic = True
+    effect.regions[0].matte, effect.regions[0].mask = "MASK", mask
+    return mask
+
+
+def test_cut_and_pasted_effects_have_their_mattes(bpy, edit, shown, matte, mask):
+    """The strip that is a matte is cut and pasted as well, and has another name by then."""
+    from shutter_addon.blender.data import strips
+
+    _strip, effect, coefficients = shown(data(region(matte), region(matte, name="n"), region(matte, name="o")))
+    own, image = strip_of(edit, matte, 3), effect.regions[0].image
+    effect.regions[1].matte, effect.regions[1].strip_name = "STRIP", own.name
+    effect.regions[2].matte, effect.regions[2].mask, effect.regions[2].opacity = "MASK", mask, 0.5
+    before = coefficients(7)
+    for strip in edit.sequence_editor.strips:
+        strip.select = True
+    edit.frame_set(1)
+    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+        bpy.ops.sequencer.copy()
+        bpy.ops.sequencer.delete()
+        bpy.context.view_layer.update()
+        assert not edit.virtual_shutter.effects
+        edit.sequence_editor.strips.new_effect("matte", "COLOR", 8, 1, length=5)
+        bpy.ops.sequencer.paste()
+        bpy.context.view_layer.update()
+    (effect,) = edit.virtual_shutter.effects
+    assert (effect.regions[0].image, effect.regions[2].mask) == (image, mask)
+    assert effect.regions[1].strip_name == "matte.001"
+    asked = request(edit, effect, strips.effect_strips(edit)[0], 7)
+    levels = 255 * light.to_encoded(asked.picture()[..., 0].astype(float))
+    assert close((levels - (20 + 10 * asked.index)) / 10, before)
+
+
+def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, triangle):
+    from shutter_addon.blender.data import revision
+    from shutter_addon.blender.rendering import invalidation
+
+    layer = triangle.layers[0]
+    point = layer.splines[0].points[0]
+    clip = bpy.data.movieclips.load(str(matte))
+    track = clip.tracking.tracks.new(name="T", frame=1)
+
+    def parented():
+        parent = point.parent
+        parent.id_type, parent.id, parent.parent, parent.sub_parent = "MOVIECLIP", clip, "Camera", "T"
+
+    def keyed():
+        layer.keyframe_insert("alpha", frame=1)
+
+    def tracked():
+        track.markers.insert_frame(9).co = 0.5, 0.6
+
+    changes = {
+        "point": lambda: setattr(point, "co", (0.1, 0.3)),
+        "feather": lambda: setattr(point, "weight", 0.1),
+        "start": lambda: setattr(triangle, "frame_start", 5),
+        "layer": lambda: setattr(layer, "invert", True),
+        "opacity": keyed,
+        "parent": parented,
+        "marker": tracked,
+        "removed": lambda: bpy.data.masks.remove(triangle),
+    }
+    invalidation.invalidate_changed(edit)
+    for name, change in changes.items():
+        number = revision.number()
+        change()
+        bpy.context.view_layer.update()  # whose handler looks for what has changed
+        assert revision.number() > number + 1, name
+        assert not invalidation.invalidate_changed(edit), name
+
+
+def test_a_copy_of_a_matte_strip_is_no_part_of_it(edit, shown, matte):
+    _strip, effect, coefficients = shown(data(region(matte)))
+    own = strip_of(edit, matte, 3, 4)
+    effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
+    copy = strip_of(edit, matte, 7, 6, "copy")
+    copy.virtual_shutter_matte = own.virtual_shutter_matte  # as Blender's Duplicate has it
+    assert close(coefficients(5), values(2) / 255)
+    assert close(coefficients(11), values(3) / 255)  # its last one holds
+    edit.sequence_editor.strips.remove(own)
+    assert close(coefficients(11), values(4) / 255)
+
+
+def test_a_pasted_effect_has_the_matte_strip_beside_it(bpy, edit, shown, matte):
+    from shutter_addon.blender.data import snapshot
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    own = strip_of(edit, matte, 3)
+    effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
+    copy = strip_of(edit, matte, 19, name="copy")
+    copy.virtual_shutter_matte = own.virtual_shutter_matte
+    strip.content_start += 16  # nearer to the copy than to its own
+    content = snapshot.region_at(edit, effect, strip, 0, (18.0,)).content
+    assert content.timing.content_start == copy.content_start
+
+
+def test_a_sequence_is_one_image_however_often_it_is_imported(bpy, shown, matte):
+    from shutter_addon.blender.data import recipe_import
+
+    strip, effect, _coefficients = shown(data(region(matte)))
+    images = len(bpy.data.images)
+    recipe_import.apply(strip.id_data, effect, strip, recipes.parse(json.dumps(data(region(matte), region(matte)))))
+    assert len(bpy.data.images) == images

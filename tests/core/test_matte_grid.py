@@ -1,0 +1,146 @@
+"""A matte on the picture's grid, against the same in float64, written out."""
+
+import math
+
+import numpy as np
+import pytest
+
+from shutter_addon.core.matte_grid import EDGE_SIGMAS, block_means, feathered, fitted
+
+LEVEL = 1 / 255
+SIZES = [  # of the matte, and of the picture
+    ((32, 18), (48, 27)),
+    ((96, 54), (48, 27)),
+    ((40, 30), (64, 36)),
+    ((90, 90), (64, 36)),
+    ((61, 25), (64, 36)),
+    ((64, 27), (64, 36)),
+    ((37, 64), (41, 23)),
+    ((7, 3), (64, 36)),
+    ((64, 36), (64, 36)),
+]
+
+
+def noise(width, height, seed=0):
+    return np.random.default_rng(seed).random((height, width)).astype(np.float32)
+
+
+def along(length, size, scale):
+    """The matrix (size, length) that fits a row: exact areas, or lines between the middles of pixels."""
+    matrix = np.zeros((size, length))
+    for pixel in range(size):
+        start, stop = ((pixel + i - size / 2) / scale + length / 2 for i in (0, 1))
+        cover = max(0.0, min(stop, length) - max(start, 0.0)) * scale
+        if scale < 1:
+            for i in range(length):
+                matrix[pixel, i] = max(0.0, min(stop, i + 1) - max(start, i)) * scale
+        elif cover > 0:
+            middle = (start + stop) / 2 - 0.5
+            for i in (math.floor(middle), math.floor(middle) + 1):
+                matrix[pixel, min(max(i, 0), length - 1)] += cover * (1 - abs(middle - i))
+    return matrix
+
+
+def reference(values, width, height):
+    scale = min(width / values.shape[1], height / values.shape[0])
+    down, across = along(values.shape[0], height, scale), along(values.shape[1], width, scale)
+    return down @ values.astype(np.float64) @ across.T
+
+
+@pytest.mark.parametrize(("size", "picture"), SIZES)
+def test_fitted(size, picture):
+    values = noise(*size)
+    result = fitted(values, *picture)
+    assert result.dtype == np.float32
+    assert result.flags.c_contiguous
+    assert result.shape == picture[::-1]
+    assert np.abs(result - reference(values, *picture)).max() < 1e-5
+
+
+@pytest.mark.parametrize("block", [2, 4])
+@pytest.mark.parametrize("size", [(64, 36), (63, 37), (5, 3), (1, 1)])
+def test_block_means(size, block):
+    values = noise(*size)
+    result = block_means(values, block)
+    assert result.dtype == np.float32
+    rows, columns = range(0, size[1], block), range(0, size[0], block)
+    assert result.shape == (len(rows), len(columns))
+    expected = [[values[y : y + block, x : x + block].mean(dtype=float) for x in columns] for y in rows]
+    assert np.abs(result - expected).max() < 1e-6
+
+
+def test_blocks_of_one():
+    values = noise(8, 8)
+    assert block_means(values, 1) is values
+
+
+def test_the_same_size_is_the_same_array():
+    values = noise(64, 36)
+    assert fitted(values, 64, 36) is values
+
+
+@pytest.mark.parametrize("size", [(32, 18), (160, 90), (128, 72), (61, 36), (64, 31)])
+def test_a_ramp_is_not_shifted(size):
+    """Over the picture, whatever the matte's own pixels are; but for its outermost ones."""
+    width, height = size
+    ramp = np.broadcast_to(((np.arange(width) + 0.5) / width).astype(np.float32), (height, width))
+    scale = min(64 / width, 36 / height)
+    expected = ((np.arange(64) + 0.5 - 32) / scale + width / 2) / width
+    inside = (expected > 0.5 / width + 0.5 / (width * scale)) & (expected < 1 - 0.5 / width - 0.5 / (width * scale))
+    assert inside.sum() > 50
+    assert np.abs(fitted(ramp, 64, 36)[18] - expected)[inside].max() < 0.1 * LEVEL
+
+
+@pytest.mark.parametrize(("size", "picture"), SIZES)
+def test_what_is_white_is_white_and_what_is_outside_black(size, picture):
+    result = fitted(np.ones(size[::-1], np.float32), *picture)
+    scale = min(picture[0] / size[0], picture[1] / size[1])
+    assert result.max() <= 1
+    assert result[picture[1] // 2, picture[0] // 2] > 1 - 1e-6
+    assert abs(result.sum() - size[0] * size[1] * scale**2) < 1e-3
+    if size[0] * scale < picture[0] - 2:
+        assert (result[:, [0, -1]] == 0).all()
+
+
+def profile(distance, width):
+    return 0.5 + 0.5 * math.erf(distance * EDGE_SIGMAS / width / math.sqrt(2))
+
+
+@pytest.mark.parametrize("width", [0.5, 1, 2, 5, 10.7, 21.6, 24, 40, 43.3, 86])
+@pytest.mark.parametrize("at", [100, 101, 102, 103])
+def test_a_hard_edge_becomes_the_error_function(width, at):
+    values = np.zeros((203, 4), np.float32)
+    values[at:] = 1
+    expected = [profile(row + 0.5 - at, width) for row in range(203)]
+    for result in (feathered(values, width)[:, 1], feathered(np.ascontiguousarray(values.T), width)[1]):
+        assert np.abs(result - expected).max() < LEVEL
+
+
+@pytest.mark.parametrize("width", [6, 30, 60])
+def test_a_corner_and_its_place(width):
+    values = np.zeros((120, 150), np.float32)
+    values[47:, 81:] = 1
+    down, across = ([profile(i + 0.5 - at, width) for i in range(n)] for at, n in ((47, 120), (81, 150)))
+    assert np.abs(feathered(values, width) - np.outer(down, across)).max() < 1.5 * LEVEL
+
+
+@pytest.mark.parametrize("width", [4, 8.5, 18.7, 25, 60])
+def test_the_pictures_edges_go_on(width):
+    """As if the picture were larger all around."""
+    values = noise(40, 30, 3)
+    values[:, :12] = 1
+    large = feathered(np.pad(values, 100, "edge"), width)[100:-100, 100:-100]
+    assert np.abs(feathered(values, width) - large).max() < 1.5 * LEVEL
+    white = feathered(np.ones((30, 40), np.float32), width)
+    assert 1 - 1e-5 < white.min() <= white.max() <= 1
+
+
+def test_a_feather_of_no_width():
+    values = noise(8, 8)
+    assert feathered(values, 0) is values
+
+
+def test_a_feather_wider_than_the_picture():
+    values = np.zeros((4, 6), np.float32)
+    values[:, 3:] = 1
+    assert np.abs(feathered(values, 600) - 0.5).max() < 0.01

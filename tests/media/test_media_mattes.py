@@ -1,0 +1,449 @@
+"""Mattes in files: the values of every kind of channel, against what was written; one sentence where there are none."""
+
+import os
+import re
+import struct
+
+import av
+import numpy as np
+import pytest
+from footage import cut_file, damage_frame, make_movie, rotate_movie, save_image
+from OpenImageIO import ImageOutput, ImageSpec
+
+from shutter_addon.media import MediaError, open_source
+from shutter_addon.media.image_writing import write_exr
+from shutter_addon.media.matte_files import MatteFile, MatteSource
+
+LEVEL = 1 / 255
+SIZE = WIDTH, HEIGHT = 36, 20
+REC709 = 0.2126, 0.7152, 0.0722
+STRAIGHT = {"oiio__UnassociatedAlpha": 1}
+TOPS = {"uint8": 255, "uint16": 65535}
+
+
+def noise(channels=1, seed=0, size=SIZE):
+    """(height, width, channels) float64 of 0 … 1, with both ends."""
+    values = np.random.default_rng(seed).random((size[1], size[0], channels))
+    values.flat[:2] = 0, 1
+    return values
+
+
+def stored(values, kind):
+    """The values as such samples, and what these stand for, in float64."""
+    if kind in TOPS:
+        samples = np.rint(values * TOPS[kind]).astype(kind)
+        return samples, samples / TOPS[kind]
+    samples = values.astype({"half": np.float16, "float": np.float32}[kind])
+    return samples, samples.astype(np.float64)
+
+
+def values_of(path, channel="luminance", index=0, **options):
+    with MatteFile(path, channel, **options).open() as matte:
+        values = matte.read(index)
+        assert values.shape == (matte.height, matte.width)
+    assert values.dtype == np.float32
+    assert values.flags.c_contiguous
+    assert values.flags.writeable
+    return values
+
+
+def sentence(path, channel="luminance", **options):
+    with pytest.raises(MediaError) as caught:
+        MatteFile(path, channel, **options).open()
+    text = str(caught.value)
+    assert "\n" not in text
+    assert path.name in text
+    return text
+
+
+KINDS = [
+    *[("png", "uint8"), ("png", "uint16"), ("tif", "uint8"), ("tif", "uint16"), ("tif", "float")],
+    *[("exr", "half"), ("exr", "float"), ("bmp", "uint8")],
+]
+
+
+@pytest.mark.parametrize(("suffix", "kind"), KINDS)
+def test_a_grey_file_is_its_grey(tmp_path, suffix, kind):
+    samples, expected = stored(noise(), kind)
+    names = {"names": ["Y"]} if suffix == "exr" else {}
+    path = save_image(tmp_path / f"a.{suffix}", samples, kind, **names)
+    for channel in ("luminance", "red", "green", "blue"):
+        assert np.abs(values_of(path, channel) - expected[..., 0]).max() < 1e-7
+    assert (values_of(path, "alpha") == 1).all()
+
+
+@pytest.mark.parametrize("alpha", [False, True])
+@pytest.mark.parametrize(("suffix", "kind"), KINDS[:-1])
+def test_the_channels_of_colours(tmp_path, suffix, kind, alpha):
+    """As they are stored: neither multiplied by an alpha nor divided by it."""
+    samples, expected = stored(noise(3 + alpha), kind)
+    path = save_image(tmp_path / f"a.{suffix}", samples, kind, **STRAIGHT)
+    for i, channel in enumerate(("red", "green", "blue")):
+        assert np.abs(values_of(path, channel) - expected[..., i]).max() < 1e-7
+    assert np.abs(values_of(path) - expected[..., :3] @ REC709).max() < 1e-6
+    assert np.abs(values_of(path, "alpha") - (expected[..., 3] if alpha else 1)).max() < 1e-7
+
+
+def test_grey_with_alpha(tmp_path):
+    samples, expected = stored(noise(2), "uint8")
+    path = save_image(tmp_path / "a.png", samples, **STRAIGHT)
+    assert np.abs(values_of(path) - expected[..., 0]).max() < 1e-7
+    assert np.abs(values_of(path, "alpha") - expected[..., 1]).max() < 1e-7
+
+
+@pytest.mark.parametrize("kind", ["half", "float"])
+def test_values_are_clamped_and_numbers(tmp_path, kind):
+    odd = np.array([-3, -np.inf, np.nan, np.inf, 7, 0.25, 1, -0.0])
+    expected = [0, 0, 0, 1, 1, 0.25, 1, 0]
+    grey = save_image(tmp_path / "a.exr", odd.astype(np.float32).reshape(1, -1, 1), kind, names=["Y"])
+    assert values_of(grey)[0].tolist() == expected
+    colours = save_image(tmp_path / "b.exr", np.tile(odd.astype(np.float32)[:, None], 3)[None], kind)
+    assert np.abs(values_of(colours)[0] - expected).max() < 1e-6
+    assert np.isfinite(values_of(colours)).all()
+
+
+NAMES = ["A", "B", "G", "R", "Sharp", "ViewLayer.IndexOB.X", "alpha.R"]
+
+
+@pytest.mark.parametrize("name", NAMES[4:])
+def test_a_channel_by_its_name(tmp_path, name):
+    values = noise(len(NAMES))
+    path = save_image(tmp_path / "a.exr", values.astype(np.float32), "float", names=NAMES)
+    assert np.abs(values_of(path, name) - values[..., NAMES.index(name)]).max() < 1e-7
+    assert np.abs(values_of(path, "red") - values[..., 3]).max() < 1e-7
+
+
+def test_coefficients_that_were_written(tmp_path):
+    values = noise(3).astype(np.float32)
+    write_exr(tmp_path / "0001.exr", values, ["Long", "Sharp", "Röhre"])
+    for i, name in enumerate(["Long", "Sharp", "Röhre"]):
+        assert np.array_equal(values_of(tmp_path / "0001.exr", name), values[..., i])
+
+
+@pytest.mark.parametrize("names", [["red", "alpha"], ["R", "G", "B", "red", "alpha"]])
+def test_coefficients_of_shutters_that_are_called_as_colours_are(tmp_path, names):
+    values = noise(len(names)).astype(np.float32)
+    write_exr(tmp_path / "0001.exr", values, names)
+    for name in ("red", "alpha"):
+        assert np.array_equal(values_of(tmp_path / "0001.exr", name), values[..., names.index(name)])
+
+
+def test_a_channel_of_another_part(tmp_path):
+    """The first part that has it; whole numbers stand for themselves."""
+    path, values = tmp_path / "a.exr", noise(1).astype(np.float32)
+    specs = []
+    for part, (names, kind) in enumerate([(["R", "G", "B"], "half"), (["id", "m"], "float"), (["m"], "half")]):
+        spec = ImageSpec(*SIZE, len(names), kind)
+        spec.channelnames = names
+        spec.attribute("oiio:subimagename", f"part{part}")
+        if "id" in names:
+            spec.channelformats = ("uint", "float")
+        specs.append(spec)
+    out = ImageOutput.create(str(path))
+    assert out.open(str(path), tuple(specs))
+    objects = (values > 0.5).astype(np.float32)
+    out.write_image(np.zeros((HEIGHT, WIDTH, 3), np.float32))
+    out.open(str(path), specs[1], "AppendSubimage")
+    out.write_image(np.dstack([objects, values]))
+    out.open(str(path), specs[2], "AppendSubimage")
+    out.write_image(np.zeros_like(values))
+    out.close()
+    assert np.array_equal(values_of(path, "m"), values[..., 0])
+    assert np.array_equal(values_of(path, "id"), objects[..., 0])
+
+
+@pytest.mark.parametrize(
+    ("at", "display"),
+    [
+        ((0, 0), (0, 0, 100, 60)),
+        ((5, 7), (0, 0, 100, 60)),
+        ((5, 7), (2, 3, 39, 24)),
+        ((-9, -4), (0, 0, 100, 60)),
+        ((90, 50), (0, 0, 100, 60)),
+        ((300, 0), (0, 0, 20, 20)),
+    ],
+)
+def test_a_cropped_exr_lies_in_its_display_window(tmp_path, at, display):
+    values = noise(1).astype(np.float32)
+    path = save_image(tmp_path / "a.exr", values, "float", at=at, display=display, names=["m"])
+    expected = np.zeros((display[3], display[2]))
+    for y, x in np.ndindex(expected.shape):
+        row, column = y + display[1] - at[1], x + display[0] - at[0]
+        if 0 <= row < HEIGHT and 0 <= column < WIDTH:
+            expected[y, x] = values[row, column, 0]
+    assert np.array_equal(values_of(path, "m"), expected)
+
+
+def test_a_larger_data_window_is_the_picture(tmp_path):
+    """As of footage, in Blender as well."""
+    values = noise(1).astype(np.float32)
+    path = save_image(tmp_path / "a.exr", values, "float", at=(-2, -2), display=(0, 0, 20, 10), names=["m"])
+    assert np.array_equal(values_of(path, "m"), values[..., 0])
+
+
+def test_data_windows_may_differ(tmp_path):
+    for n, size in enumerate([(20, 10), (8, 5)]):
+        at = n + 1, n
+        save_image(tmp_path / f"m_{n}.exr", noise(size=size), "float", at=at, display=(0, 0, 30, 16), names=["m"])
+    values = values_of(tmp_path / "m_0.exr", "m", 1)
+    assert np.abs(values[1:6, 2:10] - noise(size=(8, 5))[..., 0]).max() < 1e-6
+    assert np.count_nonzero(values) <= 40
+
+
+def numbered(folder, numbers):
+    """Pictures whose values are their places among those."""
+    for place, number in enumerate(numbers):
+        save_image(folder / f"m_{number:03}.png", np.full((8, 8, 1), place, np.uint8))
+    return folder / f"m_{numbers[0]:03}.png"
+
+
+def places(matte, indices):
+    return [round(matte.read(index)[0, 0] * 255) for index in indices]
+
+
+def test_frames_of_a_sequence(tmp_path):
+    """A gap holds the file before; so do the first and the last one, before and behind."""
+    with MatteFile(numbered(tmp_path, [3, 4, 7, 8])).open() as matte:
+        assert (matte.width, matte.height, matte.count) == (8, 8, 6)
+        assert places(matte, [-100, -1, 0, 1, 2, 3, 4, 5, 6, 100]) == [0, 0, 0, 1, 1, 1, 2, 3, 3, 3]
+
+
+def test_listed_files(tmp_path):
+    numbered(tmp_path, [3, 4, 7])
+    with MatteFile(tmp_path, files=("m_007.png", "m_003.png")).open() as matte:
+        assert places(matte, range(3)) == [2, 0, 0]
+
+
+def test_a_still_picture(tmp_path):
+    save_image(tmp_path / "matte.png", np.full((8, 8, 1), 9, np.uint8))
+    with MatteFile(tmp_path / "matte.png").open() as matte:
+        assert matte.count == 1
+        assert places(matte, [-1, 0, 50]) == [9, 9, 9]
+
+
+def test_a_matte_is_its_file_its_channel_and_its_stamp(tmp_path):
+    matte = MatteFile(tmp_path / "a.png", "red", ("a.png",), stamp=(1, 2))
+    assert len({matte, MatteFile(tmp_path / "a.png", "red", ("a.png",), stamp=(1, 2))}) == 1
+    assert matte != MatteFile(tmp_path / "a.png", "red", ("a.png",), stamp=(1, 3))
+
+
+def luma(bits, full):
+    """Every code value of so many bits once, and what it stands for. The number of values is a multiple of WIDTH."""
+    codes = np.linspace(0, (1 << bits) - 1, WIDTH * HEIGHT).astype(np.uint16).reshape(HEIGHT, WIDTH)
+    scale = 1 << (bits - 8)
+    values = codes / (256 * scale - 1) if full else ((codes / scale - 16) / 219).clip(0, 1)
+    return codes, values
+
+
+def planar(codes, pix_fmt, chroma):
+    """The frame's bytes as PyAV takes them: luma, then what belongs to two chroma planes of a quarter each."""
+    kind = np.uint8 if pix_fmt.endswith("p") or pix_fmt == "gray" else np.uint16
+    if pix_fmt.startswith("gray"):
+        return codes.astype(kind)
+    return np.concatenate([codes, np.full((HEIGHT // 2, WIDTH), chroma)]).astype(kind)
+
+
+MOVIES = [  # codec, suffix, format, bits, full range, the tag (1: limited, 2: full)
+    ("ffv1", "mkv", "gray", 8, True, None),
+    ("ffv1", "mkv", "gray10le", 10, True, None),
+    ("ffv1", "mkv", "yuv420p", 8, False, None),
+    ("ffv1", "mkv", "yuv420p", 8, False, 1),
+    ("ffv1", "mkv", "yuv420p", 8, True, 2),
+    ("ffv1", "mkv", "yuv420p10le", 10, False, None),
+    ("ffv1", "mkv", "yuv420p10le", 10, True, 2),
+    ("libx264", "mp4", "yuv420p", 8, False, 1),
+    ("libx264", "mp4", "yuv420p", 8, True, 2),
+]
+
+
+@pytest.mark.parametrize("off", [0, 1])
+@pytest.mark.parametrize(("codec", "suffix", "pix_fmt", "bits", "full", "tag"), MOVIES)
+def test_the_range_of_a_movie_is_expanded(tmp_path, codec, suffix, pix_fmt, bits, full, tag, off):
+    """off: by how much its chroma is, as some coders leave it."""
+    codes, expected = luma(bits, full)
+    frame = planar(codes, pix_fmt, (128 + off) << (bits - 8))
+    tags = {"color_range": tag} if tag else {}
+    options = {"qp": "0"} if codec == "libx264" else {}
+    path = make_movie(
+        tmp_path / f"a.{suffix}",
+        codec,
+        pictures=[frame] * 2,
+        pix_fmt=pix_fmt,
+        array_format=pix_fmt,
+        size=SIZE,
+        options=options,
+        tags=tags,
+    )
+    with MatteFile(path).open() as matte, open_source(path) as source:
+        values, rgba = matte.read(1), source.read(1)
+        assert matte.count == 2
+    rgb = rgba[..., :3] / np.iinfo(rgba.dtype).max
+    assert np.abs(values - expected).max() < (1.6 if off else 0.51 if bits == 8 else 0.1) * LEVEL
+    assert np.abs(values - rgb @ REC709).max() < (0.01 if bits == 8 else 1) * LEVEL
+
+
+@pytest.mark.parametrize("colorspace", [1, 5])
+@pytest.mark.parametrize("pix_fmt", ["yuv420p", "yuv444p10le", "bgr0", "gbrp10le"])
+def test_the_channels_of_a_coloured_movie(tmp_path, pix_fmt, colorspace):
+    """Those of the RGB that footage has; with another matrix than Rec.709's, luma is not the luminance."""
+    frames = [np.rint(noise(3, seed) * 255).astype(np.uint8) for seed in range(2)]
+    tags = {"colorspace": colorspace} if pix_fmt.startswith("yuv") else {}
+    path = make_movie(tmp_path / "a.mkv", "ffv1", pictures=frames, pix_fmt=pix_fmt, size=SIZE, tags=tags)
+    with open_source(path) as source:
+        rgb = source.read(1)[..., :3] / np.iinfo(source.dtype).max
+    for i, channel in enumerate(("red", "green", "blue")):
+        assert np.abs(values_of(path, channel, 1) - rgb[..., i]).max() < 1e-6
+    assert np.abs(values_of(path, "luminance", 1) - rgb @ REC709).max() < 1e-6
+    assert (values_of(path, "alpha") == 1).all()
+    if pix_fmt == "bgr0":
+        assert np.array_equal(rgb * 255, frames[1])
+
+
+@pytest.mark.parametrize(("codec", "pix_fmt"), [("png", "rgba"), ("png", "rgba64be"), ("qtrle", "argb")])
+def test_the_alpha_of_a_movie(tmp_path, codec, pix_fmt):
+    frames = [np.rint(noise(4, seed) * 255).astype(np.uint8) for seed in range(2)]
+    array_format, top = "rgba", 255
+    if pix_fmt == "rgba64be":
+        frames = [frame.astype(np.uint16) * 257 for frame in frames]
+        array_format, top = pix_fmt, 65535
+    path = make_movie(tmp_path / "a.mov", codec, pictures=frames, pix_fmt=pix_fmt, array_format=array_format, size=SIZE)
+    assert np.abs(values_of(path, "alpha", 1) - frames[1][..., 3] / top).max() < 1e-4
+    assert np.abs(values_of(path, "red", 1) - frames[1][..., 0] / top).max() < 1e-4
+
+
+def test_frames_of_a_movie(movies):
+    path, _ = movies["b_frames.mp4"]
+    with MatteFile(path).open() as matte:
+        first, last = matte.read(0), matte.read(matte.count - 1)
+        assert np.array_equal(matte.read(-7), first)
+        assert np.array_equal(matte.read(10_000), last)
+        assert not np.array_equal(first, last)
+
+
+def test_onwards_every_frame_is_decoded_once(tmp_path):
+    frames = [luma(8, True)[0].astype(np.uint8)] * 30
+    path = make_movie(tmp_path / "a.mp4", "libx264", pictures=frames, array_format="gray", size=SIZE)
+    with MatteFile(path).open() as matte:
+        run = matte._frames._reader._run
+        decoded, following = [], run._frames
+        run._frames = (decoded.append(1) or item for item in following)
+        for index in [*range(30), 30, 31]:
+            matte.read(index)
+            matte.read(index)
+        assert matte._frames._reader._run is run
+        assert len(decoded) <= 30
+
+
+def test_a_turned_movie(tmp_path):
+    frames = [luma(8, True)[0].astype(np.uint8)] * 3
+    path = make_movie(
+        tmp_path / "a.mp4",
+        "libx264",
+        pictures=frames,
+        array_format="gray",
+        size=SIZE,
+        options={"qp": "0"},
+    )
+    upright = values_of(path)
+    with MatteFile(rotate_movie(path, tmp_path / "b.mp4", 90)).open() as matte:
+        assert (matte.width, matte.height) == SIZE[::-1]
+        assert np.array_equal(matte.read(0), np.rot90(upright, -1))
+
+
+@pytest.mark.parametrize("name", ["m.mp4", "m_01.png"])
+def test_no_file(tmp_path, name):
+    assert sentence(tmp_path / name) == f"{name}: no such file in {tmp_path}"
+    (tmp_path / name).touch()
+    assert sentence(tmp_path / name) == f"{name}: file is empty"
+    (tmp_path / name).unlink()
+    (tmp_path / name).mkdir()
+    assert sentence(tmp_path / name) == f"{name}: is a folder, not a file"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes by name")
+def test_a_pipe(tmp_path):
+    """In the place of the first file, of another one, and of a movie."""
+    first = numbered(tmp_path, [1, 2])
+    for name in ("m_002.png", "m.mp4"):
+        (tmp_path / name).unlink(missing_ok=True)
+        os.mkfifo(tmp_path / name)
+    other = "is no file, but a pipe, a socket or a device"
+    with MatteFile(first).open() as matte, pytest.raises(MediaError, match=rf"^m_002\.png: {other}$"):
+        matte.read(1)
+    assert sentence(tmp_path / "m.mp4") == f"m.mp4: {other}"
+
+
+def test_frames_that_cannot_be_read(tmp_path):
+    first = numbered(tmp_path, [0, 1, 2, 3, 4])
+    save_image(tmp_path / "m_001.png", np.zeros((8, 9, 1), np.uint8))
+    cut_file(tmp_path / "m_002.png", tmp_path / "m_002.png", 0.5)
+    with MatteFile(first).open() as matte:
+        (tmp_path / "m_003.png").unlink()
+        told = []
+        for index in (1, 2, 3):
+            with pytest.raises(MediaError) as caught:
+                matte.read(index)
+            told.append(str(caught.value))
+        assert places(matte, [0, 4]) == [0, 4]
+    assert told[0] == "m_001.png: is 9×8, but m_000.png is 8×8"
+    assert re.match(r"m_002\.png: cannot be (decoded|read as an image) \(.+\)$", told[1])
+    assert told[2] == f"m_003.png: no such file in {tmp_path}"
+
+
+def test_a_damaged_movie(tmp_path):
+    codes, _ = luma(8, True)
+    frames = [np.roll(codes, n).astype(np.uint8) for n in range(6)]
+    options = {"g": "1", "slicecrc": "1"}
+    whole = make_movie(
+        tmp_path / "w.mkv", "ffv1", pictures=frames, pix_fmt="gray", array_format="gray", size=SIZE, options=options
+    )
+    with MatteFile(damage_frame(whole, tmp_path / "m.mkv", 3)).open() as matte:
+        with pytest.raises(MediaError, match=r"^frame 3 of m\.mkv cannot be decoded: its data are damaged"):
+            matte.read(3)
+        assert np.abs(matte.read(4) * 255 - frames[4]).max() < 1e-4
+
+
+def test_a_channel_of_another_name(tmp_path, movies):
+    layers = [f"layer{n:02}.{channel}" for n in range(4) for channel in "BGR"]
+    exr = save_image(tmp_path / "a.exr", noise(12), "half", names=layers)
+    told = "layer00.R, layer00.G, layer00.B, layer01.R, layer01.G, layer01.B and 6 others"
+    assert sentence(exr, "Sharp") == f"a.exr: has no channel Sharp, but {told}"
+    png = save_image(tmp_path / "a.png", noise(3), "uint8")
+    usual = "luminance, red, green, blue, alpha"
+    assert sentence(png, "Sharp") == f"a.png: has no channel Sharp, but {usual}"
+    assert sentence(movies["b_frames.mp4"][0], "R") == f"b_frames.mp4: has no channel R, but {usual}"
+    bare = save_image(tmp_path / "b.exr", noise(2), "half", names=["Long", "Sharp"])
+    assert sentence(bare) == "b.exr: no colour channels, only Long, Sharp"
+
+
+def test_a_channel_that_a_later_frame_lacks(tmp_path):
+    for n, name in enumerate(["Sharp", "Soft"]):
+        save_image(tmp_path / f"m_{n}.exr", noise(), "half", names=[name])
+    with (
+        MatteSource(tmp_path / "m_0.exr", "Sharp") as matte,
+        pytest.raises(MediaError, match=r"^m_1\.exr: has no channel Sharp, but Soft$"),
+    ):
+        matte.read(1)
+
+
+def test_a_movie_of_unknown_length(tmp_path):
+    path = make_movie(tmp_path / "raw.h264", "libx264", 5, format="h264")
+    assert sentence(path) == "raw.h264: its length is unknown; put it into an MP4 or MKV file first"
+
+
+def test_a_display_window_of_absurd_size(tmp_path):
+    path = save_image(tmp_path / "a.exr", noise(), "half", names=["m"], display=(0, 0, 47, 43))
+    data = path.read_bytes()
+    window = struct.pack("<4i", 0, 0, 46, 42)
+    assert data.count(window) == 1
+    path.write_bytes(data.replace(window, struct.pack("<4i", 0, 0, 59_999, 59_999)))
+    assert "60000×60000 are too many pixels" in sentence(path, "m") or "cannot be read" in sentence(path, "m")
+
+
+def test_sound_alone(tmp_path):
+    with av.open(str(tmp_path / "song.wav"), "w") as out:
+        stream = out.add_stream("pcm_s16le", rate=8000, layout="mono")
+        frame = av.AudioFrame.from_ndarray(np.zeros((1, 8000), np.int16), format="s16", layout="mono")
+        frame.sample_rate = 8000
+        out.mux(stream.encode(frame))
+    assert sentence(tmp_path / "song.wav") == "song.wav: no video stream"
