@@ -3,8 +3,7 @@ Then its panels are drawn, it is exported, and a frame is rendered, twice."""
 
 import json
 import math
-from pathlib import Path
-from tempfile import TemporaryDirectory
+import threading
 from types import SimpleNamespace
 
 import numpy as np
@@ -68,7 +67,7 @@ def run(folder):
         bpy.ops.wm.open_mainfile(filepath=path)
     bpy.context.view_layer.update()
     for task in (_draw, _export):  # which use threads
-        trial.forked(lambda task=task: task(bpy))
+        trial.forked(lambda task=task: _to_its_end(task, bpy, folder / "out"))
     code = {trial.forked(lambda name=name: _render(bpy, folder / "out" / name, plan["frame"]))[0] for name in "ab"}
     if len(code) > 1:
         raise trial.Fault("a frame is rendered once and refused once")
@@ -230,7 +229,18 @@ class _Layout:
         return _Layout()
 
 
-def _draw(bpy):
+def _to_its_end(task, *arguments) -> None:
+    """Does a task, and waits for the threads that it has begun."""
+    from shutter_addon.blender.rendering import session
+
+    task(*arguments)
+    session.forget()
+    for thread in threading.enumerate():
+        if thread is not threading.main_thread():
+            thread.join(trial.PATIENCE)
+
+
+def _draw(bpy, _folder):
     """What panels and lists do when they are drawn."""
     from shutter_addon.blender.data import selection, validation
     from shutter_addon.blender.editing import bar_edits
@@ -250,15 +260,16 @@ def _draw(bpy):
         panels.SHUTTER_UL_regions.filter_items(SimpleNamespace(bitflag_filter_item=1), None, effect, "regions")
 
 
-def _export(bpy):
+def _export(bpy, folder):
     from shutter_addon.blender.data import selection, validation
     from shutter_addon.blender.rendering import matte_export
     from shutter_addon.core.recipe import RecipeError
     from shutter_addon.media import MediaError
 
     if found := selection.active(bpy.context):
-        with trial.only(validation.EffectError, RecipeError, MediaError), TemporaryDirectory() as folder:
-            matte_export.recipe_for(*found, Path(folder, "r.json"))
+        folder.mkdir(exist_ok=True)
+        with trial.only(validation.EffectError, RecipeError, MediaError):
+            matte_export.recipe_for(*found, folder / "r.json")
 
 
 def _render(bpy, folder, frame: int) -> int:

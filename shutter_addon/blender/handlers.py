@@ -31,12 +31,15 @@ def _after_load(*_):
 
 
 @persistent
-def _update(scene=None, *_):
+def _update(scene=None, depsgraph=None):
     revision.changed()
     if render_job.runs() and bpy.app.is_job_running("RENDER"):
         job_snapshots.look(render_job.film())
-    # Blender draws a preview again for most of what has changed, but not for a shape key of a mask.
-    if not render_job.cancelling() and lifecycle.update(scene):
+    if not render_job.cancelling():
+        lifecycle.update(scene)
+    # Blender itself draws previews again for most of what changes, but not for a mask. And it may crash where one is
+    # drawn while a render ends.
+    if depsgraph is not None and depsgraph.id_type_updated("MASK") and not render_job.runs():
         preview_areas.redraw(bpy.context)
 
 

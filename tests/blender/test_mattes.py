@@ -569,7 +569,7 @@ def test_what_panels_tell(edit, shown, matte):
     assert look() == ("", 'region "m": its channel has no name', "")
 
 
-def test_weights_are_read_back(tmp_path, footage):
+def test_weights_are_read_back(bpy, tmp_path, footage):
     """What `--weights` writes gives the same picture as mattes, for each shutter but the default one."""
     from shutter_addon.blender import command
 
@@ -728,3 +728,19 @@ def test_a_sequence_is_one_image_however_often_it_is_imported(bpy, shown, matte)
     images = len(bpy.data.images)
     recipe_import.apply(strip.id_data, effect, strip, recipes.parse(json.dumps(data(region(matte), region(matte)))))
     assert len(bpy.data.images) == images
+
+
+def test_between_filmed_frames_a_matte_is_that_of_the_one_before(bpy, tmp_path, footage, matte):
+    """At half the speed, with an in-between frame for each filmed one; an exposure is a filmed frame later."""
+    from shutter_addon.blender import command
+
+    content = recipe(4, [1, 0, 0, 0], [0, 0, 1, 0], regions=[region(matte)], inbetween=2, **OPTIONS)
+    content["time"] = [{"frame": 1, "value": 1}, {"frame": 21, "value": 11}]
+    (tmp_path / "r.json").write_text(json.dumps(content))
+    where = "--recipe", str(tmp_path / "r.json"), "--output", str(tmp_path / "out")
+    assert command.main(["render", str(footage), "--frames", "5:8", *where]) == 0
+    for frame in range(5, 9):
+        shown = (frame - 1) / 2
+        expected = 20 + 10 * (shown + values(int(shown)) / 255)
+        found = read_picture(tmp_path / "out" / f"{frame:04d}.png")[..., 0]
+        assert np.abs(found - expected).max() < 0.5

@@ -124,6 +124,7 @@ def scribbled():
     assert [len(frame.strokes) for frame in layer.frames] == [1]
     with driver.override("PREVIEW"):
         bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+    region.tag_redraw()  # its handles are back, which else come with the pointer
     yield
 
 

@@ -14,13 +14,12 @@ EFFECTS = "virtual_shutter.effects"
 _layer_names: dict[int, list[str]] = {}  # by session_uid of an annotation, as they were at the last update
 
 
-def update(updated=None) -> bool:
-    """Brings the effects of all edits in line with their strips, and gives whether any of their pictures has changed. A
-    second call changes nothing.
+def update(updated=None) -> None:
+    """Brings the effects of all edits in line with their strips. A second call changes nothing.
 
     updated: the scene whose depsgraph is being updated, which must not go now."""
     if bpy.app.is_job_running("RENDER"):
-        return False
+        return
     edits = _edits()
     for edit in edits:
         _reconnect(edit)
@@ -35,8 +34,8 @@ def update(updated=None) -> bool:
     _identify()
     if not render_job.runs():  # a film keeps its size
         follow_sources()
-    changed = [invalidation.invalidate_changed(edit) for edit in _edits()]
-    return any(changed)
+    for edit in _edits():
+        invalidation.invalidate_changed(edit)
 
 
 def mend() -> None:
