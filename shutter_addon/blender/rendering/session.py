@@ -65,16 +65,18 @@ class RenderSettings:
 
     device: one of compute.renderer.DEVICES, for renders without a window
     weights: folder for the coefficients of every picture, as EXR files
-    inbetween: folder of in-between frames, in place of the effects' own"""
+    inbetween: folder of in-between frames, in place of the effects' own
+    levels: pictures are those of Renderer.levels"""
 
     device: str = "auto"
     weights: Path | None = None
     inbetween: Path | None = None
+    levels: bool = False
 
 
 @dataclass(frozen=True)
 class FrameRequest:
-    """All that a picture depends on; index, direction: as Renderer.picture has them.
+    """All that a picture depends on; index, direction: as Renderer.picture has them; levels: of RenderSettings.
 
     Where there are in-between frames the index counts them as well."""
 
@@ -82,16 +84,18 @@ class FrameRequest:
     index: int
     state: FrameState
     direction: int
+    levels: bool = False
 
     @property
     def key(self) -> tuple:
         """Equal for requests of the same picture."""
-        return self.renderer, self.index, self.direction, self.state.key
+        return self.renderer, self.index, self.direction, self.state.key, self.levels
 
     def picture(self) -> np.ndarray:
         """The picture, made on the renderer's device; and the frames of the next ones are decoded."""
         self.prefetch()
-        result = self.renderer.picture(self.index, self.state, self.direction)
+        compose = self.renderer.levels if self.levels else self.renderer.picture
+        result = compose(self.index, self.state, self.direction)
         self.prefetch()  # and lets go of what is on the device by now
         return result
 
@@ -175,7 +179,7 @@ class RenderSession:
                 renderer.source,
                 lambda other: source_index(snapshot, other, renderer.source)[0],
             )
-        found = FrameRequest(renderer, index, state, direction)
+        found = FrameRequest(renderer, index, state, direction, _settings.levels)
         self._requests[snapshot.scene] = snapshot, frame, found
         return found
 
@@ -306,9 +310,10 @@ def here() -> RenderSession:
 
 
 def picture(snapshot: Snapshot, frame: float, say: Callable[[str], None] = print, stopped=_never) -> np.ndarray:
-    """The picture (H, W, 4) float32 of an effect strip at a timeline frame: scene-linear, premultiplied, top row first.
-    One of FAULTS: there is none, in one sentence. say: called with a sentence when the device is a lesser one, or cuts
-    cannot be found. stopped: asked whether the picture is not wanted any longer; StoppedError: it is not.
+    """The picture (H, W, 4) of an effect strip at a timeline frame, top row first: scene-linear float32, premultiplied,
+    or levels, if the settings ask for them. One of FAULTS: there is none, in one sentence. say: called with a sentence
+    when the device is a lesser one, or cuts cannot be found. stopped: asked whether the picture is not wanted any
+    longer; StoppedError: it is not.
     """
     if stopped():
         raise StoppedError
