@@ -93,10 +93,11 @@ class FrameRequest:
 
     def picture(self) -> np.ndarray:
         """The picture, made on the renderer's device; and the frames of the next ones are decoded."""
-        self.prefetch()
+        lacking = self._lacking()
+        self._want(lacking)
         compose = self.renderer.levels if self.levels else self.renderer.picture
         result = compose(self.index, self.state, self.direction)
-        self.prefetch()  # and lets go of what is on the device by now
+        self._want([missing - lacking[0] for missing in lacking[1:]])  # the rest is on the device by now
         return result
 
     def coefficients(self) -> np.ndarray:
@@ -123,12 +124,20 @@ class FrameRequest:
 
     def prefetch(self) -> None:
         """Has the frames decoded that the picture lacks, then those of the next pictures."""
+        self._want(self._lacking())
+
+    def _lacking(self) -> list[set[int]]:
+        """The frames that this picture and each of the next ones lack."""
+        source = self.renderer.source
+        indices = (self.index + step * self.direction * source.step for step in range(_AHEAD + 1))
+        shown = (min(max(index, 0), source.count - 1) for index in indices)
+        return [self.renderer.missing(index, self.direction, self.state) for index in shown]
+
+    def _want(self, lacking: list[set[int]]) -> None:
         wanted, source = {}, self.renderer.source
-        for step in range(_AHEAD + 1):
-            index = min(max(self.index + step * self.direction * source.step, 0), source.count - 1)
-            missing = sorted(self.renderer.missing(index, self.direction, self.state))
+        for missing in lacking:
             # One that is not built yet would be remembered as a fault, and may come before it is needed.
-            wanted |= dict.fromkeys(i for i in missing if source.step == 1 or source.has(i))
+            wanted |= dict.fromkeys(i for i in sorted(missing) if source.step == 1 or source.has(i))
         room = _DECODED_BYTES // (source.width * source.height * 4 * np.dtype(source.dtype).itemsize)
         source.want(list(wanted)[: max(_DECODED, room)])
 
