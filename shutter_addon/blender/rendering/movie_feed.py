@@ -5,8 +5,6 @@ which take more of the processor than all else that it does for a frame. So the 
 uncompressed file of the levels that the movie will have, above the effect strip, which it then does not render.
 """
 
-import errno
-import os
 import struct
 import tempfile
 from contextlib import contextmanager
@@ -71,17 +69,16 @@ class LevelsFile:
     """An uncompressed TIFF of RGBA levels, whose pixels are replaced in place."""
 
     def __init__(self, path: Path, width: int, height: int):
+        """OSError: it cannot be written. After this there is room for all that is written to it."""
         self.path = path
         self._head = _tiff_head(width, height)
-        self._file = path.open("wb", buffering=0)
-        self._file.write(self._head)
-        self._file.truncate(len(self._head) + 4 * width * height)
+        path.write_bytes(self._head + bytes(4 * width * height))
+        self._file = path.open("r+b", buffering=0)
 
     def write(self, levels: np.ndarray) -> None:
-        """levels: uint8 (H, W, 4), top row first. OSError: there is no room."""
+        """levels: uint8 (H, W, 4), top row first."""
         self._file.seek(len(self._head))
-        if self._file.write(levels) < levels.nbytes:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.path))
+        self._file.write(levels)
 
     def close(self) -> None:
         self._file.close()
