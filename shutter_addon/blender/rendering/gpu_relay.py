@@ -19,14 +19,16 @@ from ...compute.passes import Pass
 from .blender_gpu import BlenderDevice, Texture
 
 # Seconds of the main thread that calls take at once, if none takes longer: as many as all else took, within these.
-_LEAST, _MOST = 0.02, 0.1
+_LEAST, _MOST = 0.02, 0.05
 _GAP = 0.005  # seconds that the main thread waits there for the next call
+_MOMENT = 0.01  # seconds that the passes take for which it waits at once
 _REST = 1.0  # seconds without a call, after which the main thread looks for none
 
 _calls: queue.SimpleQueue[tuple] = queue.SimpleQueue()
 _lock = threading.Lock()
 _looks_until: float | None = None  # when the main thread stops to look for calls; None: it does not
 _looked = 0.0  # when it looked last
+_unfinished, _batch = 0, 8  # passes that may be under way, and after how many they are waited for
 
 
 class RelayedTexture(Texture):
@@ -89,6 +91,20 @@ def serve(seconds: float = _LEAST) -> None:
             done.set_result(function(*arguments, **options))
         except Exception as error:
             done.set_exception(error)
+        _finish_some()
+
+
+def _finish_some() -> None:
+    """Waits for passes, after so many that it takes a moment: whatever is drawn or read waits for all before it."""
+    global _unfinished, _batch
+    _unfinished += 1
+    if _unfinished >= _batch:
+        start = time.monotonic()
+        gpu.types.GPUTexture((1, 1)).read()
+        _unfinished, _batch = (
+            0,
+            min(max(int(_batch * _MOMENT / (time.monotonic() - start)), _batch // 2, 1), _batch * 2),
+        )
 
 
 def _called(function, *arguments, **options) -> Future:
