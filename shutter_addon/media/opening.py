@@ -9,7 +9,7 @@ from ..core.frame_source import FrameSource
 from .color import in_colorspace
 from .errors import MediaError
 from .files import check_file
-from .reduced import ReducedSource
+from .reduced import smaller
 from .sequence import IMAGE_SUFFIXES, SequenceChannel, SequenceSource
 
 if TYPE_CHECKING:
@@ -34,8 +34,7 @@ def open_source(
     if _is_movie(path, files):
         source = _movies(path).MovieSource(path, stream=stream, deinterlace=deinterlace, divisor=divisor)
     else:
-        source = SequenceSource(path, files=files, fps=fps, alpha=alpha)
-        source = source if divisor == 1 else ReducedSource(source, divisor)
+        source = smaller(SequenceSource(path, files=files, fps=fps, alpha=alpha), divisor)
     try:
         return source if colorspace is None else in_colorspace(source, colorspace, config)
     except MediaError:

@@ -21,6 +21,11 @@ class ReducedSource(SourceWrapper):
         return reduced(self._source.read(index), self._divisor, self.alpha)
 
 
+def smaller(source: FrameSource, divisor: int) -> FrameSource:
+    """The source, that many times smaller each way."""
+    return source if divisor == 1 else ReducedSource(source, divisor)
+
+
 def reduced_size(length: int, divisor: int) -> int:
     """How many pixels stand for so many."""
     return -(-length // divisor)
