@@ -79,6 +79,7 @@ def _prepare(film: int, in_job: bool) -> bool:
     revision.changed()  # a script may have, since Blender last told
     session.settle()
     invalidation.drop_spoilt()
+    invalidation.drop_lesser()
     source_media.look_again()
     source_media.rest(render_job.runs())
     if bpy.app.background:  # in a window the last update has seen to it

@@ -123,36 +123,9 @@ def rss():
 
 def story():
     yield from opened()
-    if os.environ.get("SHUTTER_TRACE"):
-        relay = part("rendering.gpu_relay")
-        inner = relay._called
-        def called(function, *arguments, **options):
-            def timed(*a, **o):
-                t = time.perf_counter()
-                try:
-                    return function(*a, **o)
-                finally:
-                    calls.append((round(time.perf_counter() - t, 3), getattr(function, "__name__", "?"), str(getattr(a[0], "name", "")) if a else ""))
-            return inner(timed, *arguments, **options)
-        calls = []
-        relay._called = called
-        inner_serve = relay.serve
-        serves = []
-        def serve(*a):
-            t = time.perf_counter()
-            inner_serve(*a)
-            serves.append((round(time.perf_counter() - t, 3), round(t - bt, 2)))
-        bt = time.perf_counter()
-        relay.serve = serve
     yield 1.0
     for number, device in enumerate(ROUNDS):
         yield from rendered(number, device)
-        if os.environ.get("SHUTTER_TRACE"):
-            saw(calls=len(calls), longest=sorted(calls, key=lambda c: -c[0])[:25], total=sum(c[0] for c in calls), serves=sorted(serves)[-12:])
-            from collections import Counter
-            by = Counter()
-            for t, n, p in calls: by[n, p] += t
-            saw(by=[(k, round(v, 2)) for k, v in by.most_common(12)])
 
 
 play(story)
