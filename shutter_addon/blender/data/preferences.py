@@ -36,9 +36,14 @@ def device() -> str:
     return addon.preferences.device.lower() if addon and addon.preferences else "auto"
 
 
+classes = (ShutterPreferences,)
+
+
 def register():
-    bpy.utils.register_class(ShutterPreferences)
+    for cls in classes:
+        bpy.utils.register_class(cls)
 
 
 def unregister():
-    bpy.utils.unregister_class(ShutterPreferences)
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)
