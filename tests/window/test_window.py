@@ -303,12 +303,13 @@ def test_renders_that_end_early(tmp_path):
     assert [entry["shown"][0] for entry in seen if "shown" in entry] == [[360, 640, 4]]
 
 
-@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
-def test_a_film_shows_what_was_when_it_began(backend, tmp_path):
+@pytest.mark.parametrize(("backend", "hidden"), [("opengl", ""), ("vulkan", "moderngl")])
+def test_a_film_shows_what_was_when_it_began(backend, hidden, tmp_path):
     """200 changes while a film renders, at the end the strip deleted: no frame is another one before, and then the
     frames are those without it. So with the source deleted, and a single picture. A film ends where the effect's scene
-    is deleted, and by undo, even while it waits for Blender's main thread."""
-    seen, console = tell("stress.py", backend, linked(tmp_path))
+    is deleted, and by undo, even while it waits for Blender's main thread. On OpenGL, and on Blender's own GPU."""
+    seen, console = tell("stress.py", backend, linked(tmp_path), hidden=hidden)
+    assert ("composing on Blender's own GPU" in console) == bool(hidden)
     assert "Traceback" not in console
     films = {entry["film"]: entry for entry in seen}
     ended = {name: film["ended"] for name, film in films.items()}
