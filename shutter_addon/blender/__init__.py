@@ -1,7 +1,7 @@
 """Everything that touches bpy: properties, engine, strips, commands."""
 
 from . import handlers
-from .data import properties
+from .data import preferences, properties
 from .interface import (
     bar_editor,
     icons,
@@ -10,6 +10,7 @@ from .interface import (
     operators,
     panels,
     preview,
+    previewing,
     probe_gizmo,
     region_gizmo,
     split_gizmo,
@@ -20,9 +21,11 @@ from .rendering import engine
 
 _modules = (
     translations,
+    preferences,
     properties,
     engine,
     icons,
+    previewing,
     preview,
     operators,
     inbetween_operators,

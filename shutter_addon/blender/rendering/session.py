@@ -7,7 +7,6 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 
 import bpy
@@ -15,8 +14,7 @@ import numpy as np
 import OpenImageIO
 
 from ...compute.device import NoDeviceError
-from ...compute.gpu import GPUCompositor
-from ...compute.renderer import Renderer, open_compositor
+from ...compute.renderer import Renderer
 from ...core import following, retiming
 from ...core.frame_state import FrameState
 from ...core.messages import EffectError
@@ -26,8 +24,10 @@ from ...media.image_writing import write_exr
 from ...media.inbetween import InbetweenSource
 from ...media.matte_values import MatteValues
 from ...media.prefetch import PrefetchSource
+from ...media.reduced import smaller
+from ..data import preferences
 from ..data.snapshot import Snapshot, translated
-from .blender_gpu import BlenderDevice, opens_in_background
+from . import devices, gpu_relay
 
 FAULTS = (EffectError, MediaError, NoDeviceError, MemoryError)
 
@@ -53,7 +53,9 @@ def _never() -> bool:
 
 def _result(future: Future, stopped):
     """The future's result. StoppedError: it is not waited for any longer."""
-    while not wait([future], _PATIENCE).done:
+    while not wait([future], 0 if in_window() else _PATIENCE).done:
+        if in_window():
+            gpu_relay.serve()
         if stopped():
             raise StoppedError
     return future.result()
@@ -63,12 +65,12 @@ def _result(future: Future, stopped):
 class RenderSettings:
     """What a command sets for its render.
 
-    device: one of compute.renderer.DEVICES, for renders without a window
+    device: one of devices.CHOICES, in place of the user's preference
     weights: folder for the coefficients of every picture, as EXR files
     inbetween: folder of in-between frames, in place of the effects' own
     levels: pictures are those of Renderer.levels"""
 
-    device: str = "auto"
+    device: str | None = None
     weights: Path | None = None
     inbetween: Path | None = None
     levels: bool = False
@@ -145,16 +147,28 @@ class FrameRequest:
 class RenderSession:
     """A compositor, opened when it is first used, and the renderers of the effects that were shown last."""
 
-    def __init__(self, open_device, threaded: bool = False):
-        """threaded: the device belongs to a thread of its own; otherwise to whichever calls."""
-        self._open = open_device
-        self.threaded = threaded
+    def __init__(self, choose: Callable[[], tuple[str, str | None]]):
+        """choose: gives the device, as devices.choose."""
+        self._choose = choose
+        self._chosen: tuple[str, str | None] | None = None
         self._executor: ThreadPoolExecutor | None = None
         self._compositor = None
         self._renderers: dict = {}
         self._requests: dict[int, tuple[Snapshot, float, FrameRequest]] = {}  # by scene: the last one
         self._shown: dict[int, float] = {}  # by scene: the timeline frame that was shown last
         self._begun: dict[int, tuple[tuple, Future]] = {}  # by scene: the key of a request, its picture
+
+    @property
+    def device(self) -> str:
+        """Its device, a key of devices.OPEN; it stays until all is forgotten. NoDeviceError: there is none."""
+        if self._chosen is None:
+            self._chosen = self._choose()
+        return self._chosen[0]
+
+    @property
+    def threaded(self) -> bool:
+        """Whether the device belongs to a thread of its own; otherwise to whichever calls."""
+        return self.device != "blender"
 
     def run(self, function, *arguments, stopped=_never):
         """The result of a function that uses the device. StoppedError: it is not waited for any longer."""
@@ -168,14 +182,17 @@ class RenderSession:
             return function(*arguments)
         return _result(future, stopped)
 
-    def request(self, snapshot: Snapshot, frame: float, say=print) -> FrameRequest:
+    def request(self, snapshot: Snapshot, frame: float, say=print, divisor: int | None = None) -> FrameRequest:
         """What an effect strip shows at a timeline frame; say: called with a sentence when the device is a lesser one.
-        One of FAULTS: it cannot be shown."""
-        renderer = self._renderer(snapshot, say)
+        One of FAULTS: it cannot be shown.
+
+        divisor: how many times smaller than the source's the picture is each way (media.open_source); None: as it was
+        the last time, for who asks for no picture"""
+        renderer = self._renderer(snapshot, say, divisor)
         known = self._requests.get(snapshot.scene)
         if known is not None and known[0] is snapshot and known[1] == frame and known[2].renderer is renderer:
             return known[2]
-        state = snapshot.state(frame)
+        state = _in_blocks(snapshot.state(frame), self._renderers[snapshot.scene][0][1])
         index, backward = source_index(snapshot, frame, renderer.source)
         direction = -1 if backward else 1
         with translated():
@@ -212,24 +229,25 @@ class RenderSession:
         step, last = snapshot.film
         if frame - before == step and frame + step <= last and frame + step in snapshot.frames:
             with suppress(*FAULTS):  # it is met again when the picture is asked for
-                request = self.request(snapshot, frame + step)
+                request = self.request(snapshot, frame + step, divisor=1)
                 self._begun[snapshot.scene] = request.key, self._executor.submit(request.picture)
 
     def coefficients(self, request: FrameRequest, stopped=_never) -> np.ndarray:
         """As Renderer.coefficients."""
         return self.run(request.coefficients, stopped=stopped)
 
-    def _renderer(self, snapshot: Snapshot, say) -> Renderer:
+    def _renderer(self, snapshot: Snapshot, say, divisor: int | None) -> Renderer:
+        """The renderer of the effect's source at that size: the only one that the effect has."""
         if self._compositor is None:
-            self._compositor, message = self.run(self._open)
-            if message:
+            self._compositor = self.run(devices.OPEN[self.device])
+            if message := self._chosen[1]:
                 say(message)
-        key = snapshot.source, snapshot.inbetween, snapshot.built
-        old_key, renderer = self._renderers.pop(snapshot.scene, (None, None))
+        old_key, renderer = self._renderers.pop(snapshot.scene, ((None, 1), None))
+        key = (snapshot.source, snapshot.inbetween, snapshot.built), divisor or old_key[1]
         if old_key != key:
             if renderer is not None:
                 self.run(renderer.close)
-            source = open_source(snapshot)
+            source = open_source(snapshot, key[1])
             renderer = Renderer(self._compositor, source, MatteValues.of(source))
         self._renderers[snapshot.scene] = key, renderer
         while len(self._renderers) > _KEPT:
@@ -262,8 +280,19 @@ class RenderSession:
             self.run(self._compositor.release)
             self._compositor = None
         if self._executor is not None:
+            self.run(_never)  # what is left of a render that was stopped may need this thread
             self._executor.shutdown()
             self._executor = None
+        self._chosen = None
+
+    def settle(self) -> None:
+        """Forgets all if the device is not the one that would be chosen now."""
+        try:
+            if self._chosen is None or self._chosen[0] == self._choose()[0]:
+                return
+        except NoDeviceError:
+            pass  # met again when a picture is asked for
+        self.forget()
 
 
 _settings = RenderSettings()
@@ -285,48 +314,58 @@ def settings() -> RenderSettings:
     return _settings
 
 
-# Blender's own GPU belongs to its main thread. Renders on another one, and without a window, have a context apart, and
-# a thread for it: beside Blender's own another one cannot always be current (see GLDevice). Without moderngl there is
-# no such context, and in the background Blender's own does.
-_offscreen = RenderSession(lambda: open_compositor(_settings.device), threaded=True)
-_window = RenderSession(lambda: (GPUCompositor(BlenderDevice()), None))
+def wanted() -> str:
+    """The device that the command asks for, else the user's preference: one of devices.CHOICES."""
+    return _settings.device or preferences.device()
+
+
+# What the window itself shows is made on its main thread, on its GPU. Renders have a device apart and a thread for it:
+# beside Blender's own GL context another one cannot always be current (see GLDevice). In the background Blender's GPU
+# belongs to the main thread, and has none.
+_offscreen = RenderSession(lambda: devices.choose(wanted()))
+_window = RenderSession(lambda: ("blender", None))
+
+
+def device_names() -> tuple[str, str]:
+    """What the preview of a window is composed on, and its renders, as these call themselves. NoDeviceError: there is
+    none for renders as the user wants it."""
+    return devices.name("blender"), devices.name(devices.choose(wanted())[0])
 
 
 def in_window() -> bool:
-    """Whether Blender's own GPU may be used: on the main thread of a Blender with a window."""
+    """Whether this is the main thread of a Blender with a window."""
     return not bpy.app.background and threading.current_thread() is threading.main_thread()
-
-
-def _borrows() -> bool:
-    """Whether a background render is on Blender's own GPU, as it can have none apart."""
-    on_main = threading.current_thread() is threading.main_thread()
-    return bpy.app.background and on_main and _settings.device != "cpu" and _lacks_moderngl() and opens_in_background()
-
-
-@lru_cache
-def _lacks_moderngl() -> bool:
-    """Whether moderngl is missing, as in a package without wheels, or made for another Python."""
-    try:
-        from ...compute import gl  # noqa: F401
-    except ImportError:
-        return True
-    return False
 
 
 def here() -> RenderSession:
     """The session of whoever calls: the window's own on its main thread, else the offscreen one."""
-    return _window if in_window() or _borrows() else _offscreen
+    return _window if in_window() else _offscreen
 
 
-def picture(snapshot: Snapshot, frame: float, say: Callable[[str], None] = print, stopped=_never) -> np.ndarray:
+def settle() -> None:
+    """Before a render, on the main thread: its device is what the user wants now."""
+    _offscreen.settle()
+
+
+def _in_blocks(state: FrameState, divisor: int) -> FrameState:
+    """The state with its blocks of pixels as large in a smaller picture."""
+    options = state.options
+    if divisor == 1 or options.aggregate == 1:
+        return state
+    return replace(state, options=replace(options, aggregate=max(options.aggregate // divisor, 1)))
+
+
+def picture(
+    snapshot: Snapshot, frame: float, say: Callable[[str], None] = print, stopped=_never, divisor: int = 1
+) -> np.ndarray:
     """The picture (H, W, 4) of an effect strip at a timeline frame, top row first: scene-linear float32, premultiplied,
     or levels, if the settings ask for them. One of FAULTS: there is none, in one sentence. say: called with a sentence
     when the device is a lesser one, or cuts cannot be found. stopped: asked whether the picture is not wanted any
-    longer; StoppedError: it is not.
+    longer; StoppedError: it is not. divisor: as of RenderSession.request.
     """
     if stopped():
         raise StoppedError
-    request = here().request(snapshot, frame, say)
+    request = here().request(snapshot, frame, say, divisor)
     if request.state.options.stop_at_cuts:
         _say_of_cuts(say)
     if _settings.weights is not None:
@@ -366,13 +405,15 @@ def source_index(snapshot: Snapshot, frame: float, source: ShotSource) -> tuple[
         return retiming.source_frame(snapshot.timing, frame, source), snapshot.timing.use_reverse_frames
 
 
-def open_source(snapshot: Snapshot) -> ShotSource:
-    """An effect's source, in-between frames included. EffectError, MediaError: there is none."""
+def open_source(snapshot: Snapshot, divisor: int = 1) -> ShotSource:
+    """An effect's source, in-between frames included; divisor: of media.open_source. EffectError, MediaError: there is
+    none."""
+    if snapshot.inbetween is None:
+        return ShotSource(PrefetchSource(snapshot.source.open(divisor)))
     medium = snapshot.source.open()
     try:
-        if snapshot.inbetween is None:
-            return ShotSource(PrefetchSource(medium))
-        return ShotSource(PrefetchSource(InbetweenSource(medium, *snapshot.inbetween)), snapshot.inbetween.factor)
+        source = InbetweenSource(medium, *snapshot.inbetween)
+        return ShotSource(PrefetchSource(smaller(source, divisor)), snapshot.inbetween.factor)
     except FAULTS:
         medium.close()
         raise
@@ -396,8 +437,11 @@ def forget(*_) -> None:
     _window.forget()
 
 
-def resized(picture: np.ndarray, width: int, height: int) -> np.ndarray:
-    """The picture at the size the sequencer asks for (it renders previews smaller)."""
+def resized(picture: np.ndarray, width: int, height: int, divisor: int = 1) -> np.ndarray:
+    """The picture at the size that Blender asks for: the scene's own, or what a resolution below 100 % makes of it; of
+    one that was composed `divisor` times smaller the pixels are repeated."""
+    if divisor > 1:
+        picture = picture.repeat(divisor, axis=0).repeat(divisor, axis=1)[:height, :width]
     if picture.shape[:2] == (height, width):
         return picture
     small = OpenImageIO.ImageBufAlgo.resize(
