@@ -1,4 +1,4 @@
-// Fills the first rows of a layer from the floats that were sent; see shutter_addon/blender/rendering/blender_gpu.py.
+// Fills rows of a layer, from `top` on, from the floats that were sent; see shutter_addon/blender/rendering/blender_gpu.py.
 // PACKING: 0 as they are, 1 as whole numbers, 2 opaque bytes (R + 256 G + 65536 B), 3 pairs of bytes (R + 256 G,
 // B + 256 A), 4 16-bit samples.
 void main()
@@ -9,7 +9,7 @@ void main()
   }
   vec4 values = texelFetch(sent, ivec3(p, 0), 0);
 #if PACKING == 1
-  imageStore(stored, ivec3(p, layer), uvec4(values));
+  imageStore(stored, ivec3(p.x, p.y + top, layer), uvec4(values));
 #else
 #  if PACKING == 2
   uint bytes = uint(values.r);
@@ -20,6 +20,6 @@ void main()
 #  elif PACKING == 4
   values /= 65535.0;
 #  endif
-  imageStore(stored, ivec3(p, layer), values);
+  imageStore(stored, ivec3(p.x, p.y + top, layer), values);
 #endif
 }

@@ -63,8 +63,9 @@ def _tiles(source) -> list[Tile]:
 
 
 class Frames:
-    """A window of the frames as they are, on the host."""
+    """A window of the frames as they are, on the host. is_open, sends: see window.Window."""
 
+    is_open, sends = True, False
     unit = 1.0
 
     def __init__(self, source: FrameSource, capacity: int):
@@ -110,6 +111,7 @@ class Frames:
 class Sums(RunningSums):
     """A window of running sums of opaque 8-bit frames, on the host: three uint32 for each pixel and layer."""
 
+    is_open, sends = True, False
     unit = 1 / WHITE
 
     def __init__(self, source: FrameSource, capacity: int):
@@ -174,6 +176,8 @@ def _difference(late: np.ndarray, early: np.ndarray) -> np.ndarray:
 class Solver:
     """compute.diffusion and compute.edge_diffusion, with the methods of compute.gpu.Solver. It ignores `warm`."""
 
+    gave_up = False
+
     def solve(self, labels: np.ndarray, count: int, guide=None, strength: float = 0.0, *, warm=False) -> np.ndarray:
         if follows_edges(labels, guide, strength):
             return diffuse_along_edges(labels, count, guide, strength)
@@ -201,7 +205,7 @@ class CPUCompositor:
     def current(self):
         return nullcontext(self)
 
-    def window(self, source: FrameSource, capacity: int, moved: bool = False) -> Frames | Sums:
+    def window(self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4) -> Frames | Sums:
         """A window of `capacity` frames; moved: pictures of it have FrameState.following."""
         return (Sums if Sums.fit(source, capacity) and not moved else Frames)(source, capacity)
 

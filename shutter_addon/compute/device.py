@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from .budget import Budget
 from .passes import Pass
 
 
@@ -15,9 +16,10 @@ class NoDeviceError(RuntimeError):
 
 
 class Texture(Protocol):
-    """A texture array on a device. size: (width, height, layers), in texels."""
+    """A texture array on a device. size: (width, height, layers), in texels; kind: as for Device.texture."""
 
     size: tuple[int, int, int]
+    kind: str
 
     def release(self) -> None:
         """Frees its memory."""
@@ -30,11 +32,13 @@ class Device(Protocol):
     name: the renderer, as it calls itself
     max_size: texels along a texture's side, at most
     max_layers: layers of a texture array, at most
+    budget: what all textures on this GPU may take
     """
 
     name: str
     max_size: int
     max_layers: int
+    budget: Budget
 
     def current(self) -> AbstractContextManager:
         """Makes the device usable on this thread until the `with` block ends."""
@@ -64,6 +68,12 @@ class Device(Protocol):
         blocks: {name: C-contiguous float32 array (length, 4)} for its blocks
         constants: {name: number or tuple of numbers} for its constants, by keyword
         """
+
+    def use(self, window) -> None:
+        """Notes that a window is in use. Where there is no room, others are freed by `window.release`."""
+
+    def forget(self, window) -> None:
+        """Notes that a window was freed."""
 
     def release(self) -> None:
         """Frees the device, but not its textures: each has its own `release`."""

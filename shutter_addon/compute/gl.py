@@ -10,7 +10,9 @@ from functools import cache
 import moderngl
 import numpy as np
 
+from .budget import Budget, is_software, machine_memory
 from .device import NoDeviceError
+from .paging import PagedDevice
 from .passes import Pass, source
 
 _EGL = sys.platform == "linux"
@@ -25,6 +27,10 @@ FORMATS = {
     "r32ui": (1, "u4", np.uint32),
     "rgba16ui": (4, "u2", np.uint16),
 }
+# Of GL_NVX_gpu_memory_info, which Mesa's drivers have as well: all memory of the GPU, in kB.
+_TOTAL_MEMORY = 0x9048
+# Of GL_ATI_meminfo: what is free for textures, in kB, the first of four numbers.
+_FREE_MEMORY = 0x87FC
 
 
 @contextmanager
@@ -55,25 +61,45 @@ def _egl():
 @cache
 def _gl(name: str):
     """An OpenGL function without a result. ctypes releases Python's lock while it runs: other threads go on."""
+    if not _EGL:
+        return getattr(ctypes.windll.opengl32, name)  # of OpenGL 1.1; others are not there
     find = _egl().eglGetProcAddress
     find.restype, find.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
     return ctypes.CFUNCTYPE(None)(find(name.encode()))
 
 
-class GLDevice:
+def _memory(context, renderer: str) -> int | None:
+    """Bytes of the memory of a current context's GPU; None: it does not say. Of what is free, the largest power of two:
+    it is to be the same at the next start."""
+    if is_software(renderer):
+        return machine_memory()
+    for extension, name in (("GL_NVX_gpu_memory_info", _TOTAL_MEMORY), ("GL_ATI_meminfo", _FREE_MEMORY)):
+        if extension in context.extensions:
+            kilobytes = (ctypes.c_int * 4)()
+            _gl("glGetIntegerv")(ctypes.c_uint(name), kilobytes)
+            if (found := kilobytes[0] << 10) > 0:
+                return found if name == _TOTAL_MEMORY else 1 << found.bit_length() - 1
+    return None
+
+
+class GLDevice(PagedDevice):
     """A Device on an OpenGL 4.3 context of its own; see Device. NoDeviceError: there is no OpenGL 4.3.
+
+    It tells the budget what memory there is.
 
     Do not use it on a thread where a GLX context is current, as Blender's is in a window on X11: EGL does not replace
     that context, so the calls would go to it.
     """
 
-    def __init__(self):
+    def __init__(self, budget: Budget | None = None):
+        super().__init__(budget or Budget())
         backend = {"backend": "egl"} if _EGL else {}
         try:
             with _kept_context():
                 self._context = moderngl.create_context(standalone=True, require=430, **backend)
                 with self._context:  # not current afterwards, so that another thread can use it
                     info = self._context.info
+                    self.budget.tell(_memory(self._context, info["GL_RENDERER"]))
         except Exception as error:  # moderngl raises whatever its platform raises
             raise NoDeviceError(f"no OpenGL 4.3: {error}") from None
         self._programs = {}
@@ -88,30 +114,31 @@ class GLDevice:
         with _kept_context(), self._context:
             yield self
 
-    def texture(self, width: int, height: int, layers: int, kind: str) -> moderngl.TextureArray:
-        """See Device."""
+    def _make(self, width: int, height: int, layers: int, kind: str) -> moderngl.TextureArray:
         components, dtype, _ = FORMATS[kind]
         texture = self._context.texture_array((width, height, layers), components, dtype=dtype)
         # moderngl does not check this: a texture that got no memory would read as black.
         if (fault := self._context.error) != "GL_NO_ERROR":
             texture.release()
-            raise NoDeviceError(f"{self.name} has no room for {layers} layers of {width}×{height}: {fault}")
+            raise NoDeviceError(fault)
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        texture.extra = kind
         return texture
+
+    def _free(self, own: moderngl.TextureArray) -> None:
+        own.release()
 
     def write(self, texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
         """See Device. `opaque` changes nothing here."""
         height, width = array.shape[:2]
-        texture.write(array, viewport=(0, 0, layer, width, height, 1), alignment=1)
+        texture.gpu.write(array, viewport=(0, 0, layer, width, height, 1), alignment=1)
 
     def read(self, texture) -> np.ndarray:
         """See Device."""
-        components, _, dtype = FORMATS[texture.extra]
+        components, _, dtype = FORMATS[texture.kind]
         width, height, layers = texture.size
         array = np.empty((layers, height, width, components), dtype=dtype)
         self.finish()
-        texture.read_into(array, alignment=1)
+        texture.gpu.read_into(array, alignment=1)
         return array
 
     def run(
@@ -122,10 +149,11 @@ class GLDevice:
             shader = self._context.compute_shader(source(program))
             self._programs[program] = shader, {name: shader[name] for name in shader}
         shader, used = self._programs[program]
+        self.bring([*(textures[name] for name in program.samplers), *(images[name] for name in program.images)])
         for unit, name in enumerate(program.samplers):
-            textures[name].use(unit)
+            textures[name].own.use(unit)
         for unit, (name, image) in enumerate(program.images.items()):
-            images[name].bind_to_image(unit, read=image.reads, write=image.writes)
+            images[name].own.bind_to_image(unit, read=image.reads, write=image.writes)
         for unit, name in enumerate(program.blocks):
             self._block(unit, blocks[name])
         for name, value in constants.items():

@@ -9,7 +9,8 @@ import numpy as np
 from ..core import compositor, shutters
 from ..core.frame_source import FrameSource
 from ..core.frame_state import FrameState, Options
-from .device import Device
+from . import cpu
+from .device import Device, NoDeviceError
 from .diffusion_gpu import Diffusion
 from .edge_diffusion import follows_edges
 from .edge_diffusion_gpu import EdgeDiffusion
@@ -253,22 +254,59 @@ def _from_frames(way: str, window, state: FrameState, rows: int, origin: int, di
 
 
 class Solver:
-    """Diffusion on a Device, plain or along edges. What the other kind has on the device is freed."""
+    """Diffusion on a Device, plain or along edges. What the other kind has on the device is freed.
+
+    gave_up: whether the device had no room for the last one, which NumPy did
+    """
 
     def __init__(self, device: Device):
+        self.gave_up = False
+        self._device, self._sent = device, None
         self._plain, self._edged = Diffusion(device), EdgeDiffusion(device)
+        self._refused: set = set()  # what the device had no room for
 
     def solve(self, labels: np.ndarray, count: int, guide=None, strength: float = 0.0, *, warm: bool = False):
         """As Diffusion.solve; along the edges of a guide (EdgeDiffusion.solve) where there are some to follow."""
-        if follows_edges(labels, guide, strength):
+        edges = follows_edges(labels, guide, strength)
+        kind = labels.shape, count, edges
+        if kind not in self._refused:
+            try:
+                return self._solved(labels, count, guide, strength, edges, warm)
+            except NoDeviceError:
+                self._refused.add(kind)
+        self.release()
+        self.gave_up = True
+        return self._send(cpu.Solver().solve(labels, count, guide, strength))
+
+    def _solved(self, labels: np.ndarray, count: int, guide, strength: float, edges: bool, warm: bool):
+        self.gave_up = False
+        self._free_sent()
+        if edges:
             self._plain.release()
             return self._edged.solve(labels, count, guide, strength)
         self._edged.release()
         return self._plain.solve(labels, count, warm=warm)
 
+    def _send(self, coefficients: np.ndarray):
+        """Coefficients (N, h, w) as a texture."""
+        count, height, width = coefficients.shape
+        self._sent = self._device.texture(width, height, -(-count // 4), "rgba32f")
+        for layer in range(self._sent.size[2]):
+            four = coefficients[4 * layer : 4 * layer + 4]
+            values = np.zeros((height, width, 4), np.float32)
+            values[..., : len(four)] = np.moveaxis(four, 0, -1)
+            self._device.write(self._sent, values, layer)
+        return self._sent
+
+    def _free_sent(self) -> None:
+        if self._sent is not None:
+            self._sent.release()
+            self._sent = None
+
     def release(self) -> None:
         self._plain.release()
         self._edged.release()
+        self._free_sent()
 
 
 class GPUCompositor:
@@ -283,9 +321,10 @@ class GPUCompositor:
         """A context manager: all other methods are called inside it, on any one thread (Device.current)."""
         return self.device.current()
 
-    def window(self, source: FrameSource, capacity: int, moved: bool = False) -> Frames | Sums:
-        """A window of `capacity` frames on the device; moved: pictures of it have FrameState.following."""
-        return open_window(self.device, source, capacity, moved)
+    def window(self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4) -> Frames | Sums:
+        """A window of `capacity` frames on the device; moved: pictures of it have FrameState.following; shutters: of
+        these pictures."""
+        return open_window(self.device, source, capacity, moved, shutters)
 
     def solver(self) -> Solver:
         """A new solver. Its solution is valid until its next solve."""
@@ -415,4 +454,5 @@ class GPUCompositor:
         with self.device.current():
             for texture in self._textures.values():
                 texture.release()
+            self._textures.clear()
         self.device.release()

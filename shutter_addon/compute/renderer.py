@@ -66,7 +66,8 @@ class Renderer:
         quick: the diffusion may start from the last coefficients, so the picture depends slightly on them.
         """
         key = index, direction, state.key
-        if self._drawn is None or self._drawn[0] != key or not (quick or self._drawn[1]):
+        lost = self._drawn is None or not self._window.is_open
+        if lost or self._drawn[0] != key or not (quick or self._drawn[1]):
             with self.compositor.current():
                 picture = self.compositor.draw(*self._parts(index, state, direction, quick))
             self._drawn = key, not quick, picture
@@ -255,14 +256,16 @@ class Renderer:
             self._solved = key, labels, not quick, self._solver.solve(labels, count, *guided, warm=quick)
         return self._solved[3]
 
-    def _kind_for(self, state: FrameState) -> tuple[int, bool]:
-        """The length of the window, and whether its frames are seen elsewhere than where they are."""
+    def _kind_for(self, state: FrameState) -> tuple[int, bool, int]:
+        """The length of the window, whether its frames are seen elsewhere than where they are, and the number of all
+        shutters."""
         sole = self._sole(state)
-        return state.options.window, (state if sole is None else state.alone(sole)).following is not None
+        moved = (state if sole is None else state.alone(sole)).following is not None
+        return state.options.window, moved, len(state.bars)
 
     def _window_for(self, state: FrameState):
         kind = self._kind_for(state)
-        if self._window is None or self._kind != kind:
+        if self._window is None or self._kind != kind or not self._window.is_open:
             self.release_window()
             self._kind = kind
             self._window = self.compositor.window(guide.NotedSource(self.source, self._guides), *kind)
@@ -277,12 +280,23 @@ class Renderer:
         if self.source.shots is not None:
             self.source.shots.release()
 
-    def close(self) -> None:
-        """Frees what the renderer has on the device, and closes the source."""
+    def shortages(self) -> set[str]:
+        """What was slow in the last picture, as the device has no room: "window", every picture sends the frames;
+        "diffusion", NumPy diffuses."""
+        found = {"window"} if self._window is not None and self._window.sends else set()
+        return found | ({"diffusion"} if self._solver.gave_up else set())
+
+    def release(self) -> None:
+        """Frees what the renderer has on the device. The next picture makes it again."""
         with self.compositor.current():
             self.release_window()
             self._solver.release()
             self._matting.release()
+        self._solved = self._laid = None
+
+    def close(self) -> None:
+        """Frees what the renderer has on the device, and closes the source."""
+        self.release()
         if self._mattes is not None:
             self._mattes.close()
         self.source.close()

@@ -9,14 +9,15 @@ import numpy as np
 from ..core import compositor, light
 from ..core.frame_source import FrameSource
 from ..core.frame_state import Options
+from .budget import is_software
 from .device import Device, NoDeviceError
 from .passes import Image, Pass
 from .running_sums import RunningSums, summable
 
 # Bytes of a texture array, at most. Mesa's software renderer reads wrong values, without an error, from one over 2 GiB.
 BAND_BYTES = 1 << 30
-# Bytes of a window on the device, at most. Frames of a larger one stay on the host, and are sent band by band.
-RESIDENT_BYTES = 6 << 30
+# A band of frames that stay on the host, at most: bytes, and a share of what the device allows.
+SENT_BYTES, SENT_SHARE = 64 << 20, 1 / 8
 
 # Rows of pixels that one invocation of the passes through frames composes. Bands are a multiple of it high.
 BLOCK = 16
@@ -28,43 +29,61 @@ TILE = 8, 4
 _STORED = {np.uint8: "rgba8", np.uint16: "rgba16", np.float16: "rgba16f", np.float32: "rgba32f"}
 
 
-def open_window(device: Device, source: FrameSource, capacity: int, moved: bool) -> Window:
+def open_window(device: Device, source: FrameSource, capacity: int, moved: bool, shutters: int) -> Window:
     """The fastest window of `capacity` frames: running sums if the source is `summable` and the device has room for
-    them, else the frames. moved: what is seen of a frame lies elsewhere in it, so it has to be whole."""
+    them, else the frames. moved: what is seen of a frame lies elsewhere in it, so it has to be whole. shutters: those
+    whose coefficients have to have room beside it."""
     if moved:
-        return (PackedFrames if summable(source) else WholeFrames)(device, source, capacity)
+        return (PackedFrames if summable(source) else WholeFrames)(device, source, capacity, shutters)
     if summable(source):
         try:
-            return Sums(device, source, capacity)
+            return Sums(device, source, capacity, shutters)
         except NoDeviceError:
             pass
-    return Frames(device, source, capacity)
+    return Frames(device, source, capacity, shutters)
+
+
+def beside(source: FrameSource, shutters: int) -> int:
+    """Bytes that have to be left beside a window: what any pass binds besides, and a frame that is sent. Diffusion
+    along edges binds most: four times the coefficients."""
+    return source.width * source.height * (16 * (4 * -(-shutters // 4) + 2) + 4)
 
 
 class Window:
     """What both windows share: texture arrays of `layers` layers, one for each band of rows, so that none is over
     BAND_BYTES; and `picture`, the texture that the compositor draws into.
 
+    Whether it fits depends on sizes and on the device's budget, and not on what is in use just now: so a picture has
+    the same bits whatever was rendered before. Where another window needs its room, it is released.
+
     capacity: the most frames in a window
+    shutters: as for open_window
+    is_open: whether it has its textures; once released, it can show nothing any more
+    sends: whether every picture sends the frames anew, for which the device has no room
     shot: the source frames that the loaded window may show
     rows, tops: rows of pixels in a band (the last band may have fewer), and the top row of each band
     """
 
-    def __init__(self, device: Device, source: FrameSource, capacity: int):
-        self.device, self.source, self.capacity = device, source, capacity
+    sends = False
+
+    def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int):
+        self.device, self.source, self.capacity, self.shutters = device, source, capacity, shutters
         self.shot = range(source.count)
         self.textures: list = []
         self.picture = None
+        device.use(self)
+
+    @property
+    def is_open(self) -> bool:
+        return self.picture is not None
 
     def _allocate(self, kind: str, pixel_bytes: int) -> None:
         """Makes the texture arrays, of the format `kind`, and the picture. NoDeviceError: there is no room for all of
         them; none is kept."""
         source, row_bytes = self.source, self.source.width * pixel_bytes * self.layers
-        self.rows = min(source.height, max(1, BAND_BYTES // row_bytes // BLOCK) * BLOCK)
-        self.tops = range(0, source.height, self.rows)
+        self._cut(row_bytes, BAND_BYTES)
         try:
-            if row_bytes * source.height > RESIDENT_BYTES:
-                raise NoDeviceError("over the budget")
+            self._check(row_bytes * source.height)
             for top in self.tops:
                 size = self._texels(source.width, self._height(top))
                 self.textures.append(self.device.texture(*size, self.layers, kind))
@@ -72,6 +91,16 @@ class Window:
         except NoDeviceError:
             self.release()
             raise
+
+    def _cut(self, row_bytes: int, most: int) -> None:
+        """Cuts the picture into bands of so many bytes at most, but for those of a few rows."""
+        self.rows = min(self.source.height, max(1, most // row_bytes // BLOCK) * BLOCK)
+        self.tops = range(0, self.source.height, self.rows)
+
+    def _check(self, size: int) -> None:
+        """NoDeviceError: a window of so many bytes leaves too little of the device's memory."""
+        if size + beside(self.source, self.shutters) > self.device.budget.limit:
+            raise NoDeviceError("over the budget")
 
     def _texels(self, width: int, height: int) -> tuple[int, int]:
         """The size (across, down) of the texture for a band of so many pixels."""
@@ -89,18 +118,20 @@ class Window:
         for texture in (*self.textures, *filter(None, [self.picture])):
             texture.release()
         self.textures, self.picture = [], None
+        self.device.forget(self)
 
 
 class Frames(Window):
     """A window of the frames as they are: source frame i in layer i mod `layers`.
 
     Where the device has no room for all bands, the frames stay on the host, and every picture sends them band by band.
+    Its bits are the same.
     """
 
     _kind: str | None = None  # of its textures, if it is not that of the frames
 
-    def __init__(self, device: Device, source: FrameSource, capacity: int):
-        super().__init__(device, source, capacity)
+    def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1):
+        super().__init__(device, source, capacity, shutters)
         self.layers = capacity
         self._held: dict[int, int] = {}  # layer: source frame
         self._host: dict[int, np.ndarray] | None = None
@@ -109,13 +140,22 @@ class Frames(Window):
         self.transfer = "linear" if self._linearises else source.transfer
         # The linear value of an encoded half can exceed the range of a half.
         stored = np.dtype(np.float32 if self._linearises else source.dtype)
-        kind, pixel_bytes = self._kind or _STORED[stored.type], 8 if self._kind else 4 * stored.itemsize
+        self.kind, self.pixel_bytes = self._kind or _STORED[stored.type], 8 if self._kind else 4 * stored.itemsize
         try:
-            self._allocate(kind, pixel_bytes)
+            self._allocate(self.kind, self.pixel_bytes)
         except NoDeviceError:
-            self._host = {}
-            self.textures = [device.texture(*self._texels(source.width, self.rows), self.layers, kind)]
-            self.picture = device.texture(source.width, source.height, 1, "rgba32f")
+            device.use(self)
+            self._host, self.sends = {}, True
+            self._divide(min(SENT_BYTES, int(device.budget.limit * SENT_SHARE)))
+            try:
+                self.picture = device.texture(source.width, source.height, 1, "rgba32f")
+            except NoDeviceError:
+                self.release()
+                raise
+
+    def _divide(self, most: int) -> None:
+        """Divides what is sent at a time, in parts of so many bytes at most if they can be."""
+        self._cut(self.source.width * self.pixel_bytes * self.layers, min(most, BAND_BYTES))
 
     @property
     def held(self):
@@ -125,6 +165,7 @@ class Frames(Window):
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
         """See RunningSums.load."""
         self.shot = shot
+        self.device.use(self)
         for index in sorted(set(compositor.source_frames(options, positions, shot).tolist())):
             layer = index % self.capacity
             if self._held.get(layer) == index:
@@ -145,11 +186,15 @@ class Frames(Window):
         if self._host is None:
             yield from super().bands()
             return
-        for top in self.tops:
-            height = self._height(top)
-            for layer, frame in self._host.items():
-                self._send(self.textures[0], frame[top : top + height], layer)
-            yield top, height, self.textures[0]
+        texture = self.device.texture(*self._texels(self.source.width, self.rows), self.layers, self.kind)
+        try:
+            for top in self.tops:
+                height = self._height(top)
+                for layer, frame in self._host.items():
+                    self._send(texture, frame[top : top + height], layer)
+                yield top, height, texture
+        finally:
+            texture.release()
 
     def _read(self, index: int) -> np.ndarray:
         """The source's frame (height, width, 4) in the samples that are stored."""
@@ -179,34 +224,42 @@ class WholeFrames(Frames):
 
     def _allocate(self, kind: str, pixel_bytes: int) -> None:
         source = self.source
-        across, down = self._texels(source.width, source.height)
-        frame_bytes = across * down * pixel_bytes
+        size = self._texels(source.width, source.height)
         self.rows, self.tops = source.height, range(0, source.height, source.height)
-        self.layers = min(self.capacity, max(1, BAND_BYTES // frame_bytes), self.device.max_layers)
+        self._divide(BAND_BYTES)
         try:
-            if frame_bytes * self.capacity > RESIDENT_BYTES:
-                raise NoDeviceError("over the budget")
+            self._check(size[0] * size[1] * pixel_bytes * self.capacity)
             for _ in range(0, self.capacity, self.layers):
-                self.textures.append(self.device.texture(across, down, self.layers, kind))
+                self.textures.append(self.device.texture(*size, self.layers, kind))
             self.picture = self.device.texture(source.width, source.height, 1, "rgba32f")
         except NoDeviceError:
             Window.release(self)
             raise
+
+    def _divide(self, most: int) -> None:
+        across, down = self._texels(self.source.width, self.source.height)
+        slots = min(most, BAND_BYTES) // (across * down * self.pixel_bytes)
+        self.layers = min(self.capacity, max(1, slots), self.device.max_layers)
 
     def _place(self, frame: np.ndarray, layer: int) -> None:
         self._send(self.textures[layer // self.layers], frame, layer % self.layers)
 
     def stacks(self):
         """Yields (slots, texture array) of each array; the texture is valid until the next one."""
-        for first in range(0, self.capacity, self.layers):
-            slots = range(first, min(first + self.layers, self.capacity))
-            if self._host is None:
-                yield slots, self.textures[first // self.layers]
-                continue
-            for slot in slots:
-                if slot in self._host:
-                    self._send(self.textures[0], self._host[slot], slot - first)
-            yield slots, self.textures[0]
+        stacks = [range(k, min(k + self.layers, self.capacity)) for k in range(0, self.capacity, self.layers)]
+        if self._host is None:
+            yield from zip(stacks, self.textures, strict=True)
+            return
+        size = self._texels(self.source.width, self.source.height)
+        texture = self.device.texture(*size, self.layers, self.kind)
+        try:
+            for slots in stacks:
+                for slot in slots:
+                    if slot in self._host:
+                        self._send(texture, self._host[slot], slot - slots.start)
+                yield slots, texture
+        finally:
+            texture.release()
 
 
 class PackedFrames(WholeFrames):
@@ -214,9 +267,14 @@ class PackedFrames(WholeFrames):
 
     _kind = "rgba16ui"
 
-    def __init__(self, device: Device, source: FrameSource, capacity: int):
-        super().__init__(device, source, capacity)
-        self._light, self._sent = "linear", device.texture(source.width, source.height, 1, "rgba8")
+    def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1):
+        self._light, self._sent = "linear", None
+        super().__init__(device, source, capacity, shutters)
+        try:
+            self._sent = device.texture(source.width, source.height, 1, "rgba8")
+        except NoDeviceError:
+            self.release()
+            raise
 
     def _texels(self, width: int, height: int) -> tuple[int, int]:
         return width + RIM, height + RIM
@@ -237,7 +295,8 @@ class PackedFrames(WholeFrames):
 
     def release(self) -> None:
         super().release()
-        self._sent.release()
+        if self._sent is not None:
+            self._sent.release()
 
 
 @cache
@@ -262,7 +321,7 @@ def decoding(stored: str, light: str) -> int:
 
 def stores_rows(device: Device) -> bool:
     """Whether the device keeps textures in memory row by row, as Mesa's software renderer does; a GPU keeps tiles."""
-    return "llvmpipe" in device.name
+    return is_software(device.name)
 
 
 def _in_tiles(width: int, height: int) -> tuple[int, int]:
@@ -301,8 +360,8 @@ class Sums(RunningSums, Window):
     tiled: whether pixels are stored tile by tile, in TILE
     """
 
-    def __init__(self, device: Device, source: FrameSource, capacity: int):
-        Window.__init__(self, device, source, capacity)
+    def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1):
+        Window.__init__(self, device, source, capacity, shutters)
         RunningSums.__init__(self, source, capacity)
         # White is the largest 2ⁿ − 1 for which the sum of a whole window fits into 21 bits, and n is 16 at most.
         self.whole = (1 << min(16, 21 - (capacity - 1).bit_length())) - 1
@@ -315,6 +374,10 @@ class Sums(RunningSums, Window):
         except NoDeviceError:
             self.release()
             raise
+
+    def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
+        self.device.use(self)
+        super().load(positions, options, shot)
 
     def _texels(self, width: int, height: int) -> tuple[int, int]:
         return _in_tiles(width, height) if self.tiled else (width, height)

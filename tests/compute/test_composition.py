@@ -408,7 +408,7 @@ def test_bands_and_streaming_change_nothing(monkeypatch, resident):
     whole = Renderer(device, source).picture(0, moment)
     monkeypatch.setattr(window, "BAND_BYTES", source.width * 4 * 16)
     if not resident:
-        monkeypatch.setattr(window, "RESIDENT_BYTES", 0)
+        monkeypatch.setattr(window, "beside", lambda *_: 1 << 50)
     renderer = Renderer(device, source)
     for index in (3, 0):
         picture = renderer.picture(index, moment)
@@ -471,14 +471,14 @@ def test_a_device_too_small_for_the_window_streams_it(monkeypatch):
     source, moment = footage(rng), state(rng)
     device = open_compositor("gpu")[0]
     whole = Renderer(device, source).picture(0, moment)
-    texture = GLDevice.texture
+    make = GLDevice._make
 
     def small(self, width, height, layers, kind):
         if kind == "rgba16ui" or (layers >= 16 and height > 16):
             raise NoDeviceError("no room")
-        return texture(self, width, height, layers, kind)
+        return make(self, width, height, layers, kind)
 
-    monkeypatch.setattr(GLDevice, "texture", small)
+    monkeypatch.setattr(GLDevice, "_make", small)
     monkeypatch.setattr(window, "BAND_BYTES", source.width * 4 * 16 * 16)
     assert np.abs(Renderer(device, source).picture(0, moment) - whole).max() <= 2**-15
 

@@ -8,7 +8,7 @@ exactly; a pass unpacks them into the layer. (Bit patterns would be simpler, but
 from __future__ import annotations
 
 import subprocess
-from contextlib import nullcontext, suppress
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cache
 
@@ -16,7 +16,9 @@ import bpy
 import gpu
 import numpy as np
 
+from ...compute.budget import Budget, is_software, machine_memory
 from ...compute.device import NoDeviceError
+from ...compute.paging import TEXEL_BYTES, PagedDevice
 from ...compute.passes import LOCAL_ROW, Image, Pass, body
 
 _TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
@@ -31,54 +33,62 @@ FORMATS = {
     "r32ui": (np.uint32, "R32F", _WHOLE),
     "rgba16ui": None,  # of passes alone: floats do not hold it, and Blender reads whole numbers of one component only
 }
+# Bytes of the float texture by which something is sent, at most: larger arrays are sent by strips of rows.
+_SENT_BYTES = 16 << 20
 
 
 @dataclass
 class Texture:
-    """A texture array: its gpu.types.GPUTexture, (width, height, layers), and format (as in GLSL)."""
+    """A small texture array beside the device's own: its gpu.types.GPUTexture, (width, height, layers), and format (as
+    in GLSL)."""
 
-    gpu: gpu.types.GPUTexture | None
+    gpu: gpu.types.GPUTexture
     size: tuple[int, int, int]
     kind: str
 
-    def release(self) -> None:
-        self.gpu = None
 
-
-class BlenderDevice:
+class BlenderDevice(PagedDevice):
     """A compute.device.Device, wherever Blender's GPU context is current: in draw handlers, or after gpu.init()."""
 
-    def __init__(self):
+    def __init__(self, budget: Budget | None = None):
+        super().__init__(budget or Budget())
         self._shaders: dict[Pass, gpu.types.GPUShader] = {}
         self.name = gpu.platform.renderer_get()
         self.max_layers = gpu.capabilities.max_texture_layers_get()
         self.max_size = gpu.capabilities.max_texture_size_get()
+        self.budget.tell(machine_memory() if is_software(self.name) else None)
 
     def current(self):
         return nullcontext(self)
 
-    def texture(self, width: int, height: int, layers: int, kind: str) -> Texture:
-        if max(width, height) <= self.max_size and layers <= self.max_layers:  # on Vulkan Blender does not look
-            with suppress(RuntimeError):
-                texture = gpu.types.GPUTexture((width, height), layers=layers, format=kind.upper())
-                return Texture(texture, (width, height, layers), kind)
-        raise NoDeviceError(f"{self.name} has no room for {layers} layers of {width}×{height}")
+    def _make(self, width: int, height: int, layers: int, kind: str) -> gpu.types.GPUTexture:
+        try:
+            return gpu.types.GPUTexture((width, height), layers=layers, format=kind.upper())
+        except RuntimeError as error:
+            raise NoDeviceError(str(error)) from None
+
+    def _free(self, own: gpu.types.GPUTexture) -> None:
+        """Nothing else refers to it: it goes with this call."""
 
     def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
         height, width = array.shape[:2]
         _, sent_format, packing = _exchanged(texture)
         if texture.kind == "rgba8" and opaque:
             sent_format, packing = "R32F", _OPAQUE_BYTES
-        size, data = (width, height), _buffer("FLOAT", _packed(array, packing))
-        sent = gpu.types.GPUTexture(size, layers=1, format=sent_format, data=data)
-        self.run(
-            unpacking(texture.kind, packing),
-            size,
-            textures={"sent": Texture(sent, (*size, 1), sent_format.lower())},
-            images={"stored": texture},
-            size=size,
-            layer=layer,
-        )
+        rows = max(1, _SENT_BYTES // (width * TEXEL_BYTES[sent_format.lower()]))
+        for top in range(0, height, rows):
+            strip = array[top : top + rows]
+            size, data = (width, len(strip)), _buffer("FLOAT", _packed(strip, packing))
+            sent = gpu.types.GPUTexture(size, layers=1, format=sent_format, data=data)
+            self.run(
+                unpacking(texture.kind, packing),
+                size,
+                textures={"sent": Texture(sent, (*size, 1), sent_format.lower())},
+                images={"stored": texture},
+                size=size,
+                top=top,
+                layer=layer,
+            )
 
     def read(self, texture: Texture) -> np.ndarray:
         """See Device. By framebuffers, for GPUTexture.read() gives a first layer alone."""
@@ -101,6 +111,7 @@ class BlenderDevice:
         shader = self._shaders.get(program)
         if shader is None:
             shader = self._shaders[program] = _compiled(program)
+        self.bring([*(textures[name] for name in program.samplers), *(images[name] for name in program.images)])
         shader.bind()
         for name in program.samplers:
             shader.uniform_sampler(name, textures[name].gpu)
@@ -149,7 +160,7 @@ def unpacking(kind: str, packing: int) -> Pass:
         "unpack",
         {"sent": "sampler2DArray"},
         {"stored": Image(kind)},
-        {"size": "ivec2", "layer": "int"},
+        {"size": "ivec2", "top": "int", "layer": "int"},
         {"PACKING": packing},
         local_size=LOCAL_ROW,
     )

@@ -1,0 +1,71 @@
+"""How much of a GPU's memory textures may take."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from threading import Lock
+
+MEGABYTE = 1 << 20
+# The share of the memory that a GPU says it has: the rest is for Blender, for what else is on the screen, and for what
+# a driver takes beside textures.
+GPU_SHARE = 0.75
+# The share of the machine's memory, at most: software renderers and many GPUs have no other.
+MACHINE_SHARE = 0.5
+# Bytes of a GPU that does not say what it has.
+UNKNOWN = 6 << 30
+
+
+class Budget:
+    """Bytes that textures may take on a GPU, for all devices that reach it, on any thread.
+
+    limit: the most; None until a device tells (`tell`)
+    used: those that are taken
+    """
+
+    def __init__(self, limit: int | None = None):
+        self.limit, self.used = limit, 0
+        self._lock = Lock()
+
+    def tell(self, memory: int | None) -> None:
+        """Sets the limit, if there is none, by the bytes of the GPU's memory; None: it does not say."""
+        if self.limit is None:
+            self.limit = allowed(memory)
+
+    def take(self, size: int) -> bool:
+        """Takes so many bytes, if they are left. Whether they were."""
+        with self._lock:
+            fits = self.used + size <= self.limit
+            self.used += size if fits else 0
+            return fits
+
+    def give_back(self, size: int) -> None:
+        with self._lock:
+            self.used -= size
+
+
+def allowed(memory: int | None) -> int:
+    """The bytes that textures may take on a GPU of so many bytes; None: it does not say. It does not depend on what is
+    free just now: a film's parts have the same bits whenever they are rendered."""
+    limits = [UNKNOWN if memory is None else int(memory * GPU_SHARE)]
+    if (machine := machine_memory()) is not None:
+        limits.append(int(machine * MACHINE_SHARE))
+    return min(limits)
+
+
+def machine_memory() -> int | None:
+    """Bytes of the machine's memory; None: it cannot be asked."""
+    if sys.platform == "win32":
+        kilobytes = ctypes.c_ulonglong()
+        known = ctypes.windll.kernel32.GetPhysicallyInstalledSystemMemory(ctypes.byref(kilobytes))
+        return kilobytes.value << 10 if known else None
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError):
+        return None
+
+
+def is_software(renderer: str) -> bool:
+    """Whether a renderer, as it calls itself, is Mesa's software renderer, whose memory is the machine's."""
+    return "llvmpipe" in renderer

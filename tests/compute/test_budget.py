@@ -1,0 +1,281 @@
+"""Memory of a GPU within a budget: every smaller way gives the same picture, and what was taken is given back."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_composition import SHAPES, footage, state
+from test_moved import following
+
+from shutter_addon.compute import budget, window
+from shutter_addon.compute.budget import Budget
+from shutter_addon.compute.device import NoDeviceError
+from shutter_addon.compute.gpu import GPUCompositor
+from shutter_addon.compute.renderer import Renderer
+from shutter_addon.core.frame_source import FrameSource
+from shutter_addon.core.mattes import Matte
+
+SIZE = 128, 72
+PIXELS = SIZE[0] * SIZE[1]
+ROOMY = 1 << 30
+# Bytes per pixel of windows of 16 frames: their sums, the frames; and what fits neither, nor all grids of diffusion.
+SUMS, FRAMES, HOST = 17 * 8, 16 * 4, 64
+BESIDE = 16 * 6 + 4
+
+
+@pytest.fixture(params=["moderngl", "blender"], scope="module")
+def kind(request):
+    """A class of devices."""
+    if request.param == "moderngl":
+        from shutter_addon.compute.gl import GLDevice
+
+        return GLDevice
+    request.getfixturevalue("blender_device")
+    from shutter_addon.blender.rendering.blender_gpu import BlenderDevice
+
+    return BlenderDevice
+
+
+@pytest.fixture(scope="module")
+def two_devices(kind):
+    """Kept for all tests: each compiles its passes anew."""
+    devices = kind(Budget(ROOMY)), kind(Budget(ROOMY))
+    yield devices
+    for device in devices:
+        device.release()
+
+
+@pytest.fixture
+def limited(two_devices):
+    """Gives a device the budget that it has from then on; everything has to be given back."""
+    budgets = []
+
+    def limit(given: Budget | int, which: int = 0):
+        device = two_devices[which]
+        device.budget = given if isinstance(given, Budget) else Budget(given)
+        budgets.append(device.budget)
+        return device
+
+    yield limit
+    assert [each.used for each in budgets] == [0] * len(budgets)
+    for device in two_devices:
+        device.ask_others = None
+        assert not device._held
+        assert not device._windows
+
+
+def film(seed=3, **kind):
+    return footage(np.random.default_rng(seed), size=SIZE, **kind)
+
+
+def free(compositor):
+    """What it has itself; its device stays."""
+    with compositor.current():
+        for texture in compositor._textures.values():
+            texture.release()
+
+
+def moment(**given):
+    return state(np.random.default_rng(4), **given)
+
+
+def rendered(device, source: FrameSource, states, mattes=None):
+    """The pictures of these moments at frames 2, 3, …, and the renderer, closed."""
+    compositor = GPUCompositor(device)
+    renderer = Renderer(compositor, source, mattes)
+    pictures = [renderer.picture(2 + i, shown) for i, shown in enumerate(states)]
+    shortages, kind = renderer.shortages(), type(renderer._window).__name__
+    renderer.close()
+    free(compositor)
+    return np.array(pictures), kind, shortages
+
+
+def test_textures_wait_on_the_host_and_come_back(limited):
+    rng, device = np.random.default_rng(1), limited(2 * PIXELS * 16)
+    layers = rng.normal(size=(5, SIZE[1], SIZE[0], 4)).astype(np.float32)
+    with device.current():
+        textures = [device.texture(*SIZE, 1, "rgba32f") for _ in layers]
+        for texture, values in zip(textures, layers, strict=True):
+            device.write(texture, values)
+            assert device.budget.used <= device.budget.limit
+        for texture, values in zip(textures, layers, strict=True):
+            assert np.array_equal(device.read(texture)[0], values)
+        for texture in textures:
+            texture.release()
+        with pytest.raises(ValueError, match="was released"):
+            device.read(textures[0])
+
+
+def test_what_can_never_fit_is_refused_at_once(limited):
+    device = limited((3 << 20) - 1)
+    with device.current():
+        kept = device.texture(64, 64, 1, "rgba32f")
+        with pytest.raises(NoDeviceError, match="has no room for 4 layers of 512×512 in the 2 MB that it may take"):
+            device.texture(512, 512, 4, "rgba8")
+        assert kept.own is not None
+        frames = [device.texture(512, 512, 1, "rgba8") for _ in range(2)]
+        with pytest.raises(NoDeviceError, match="has no room"):  # frames do not move
+            device.texture(512, 512, 1, "rgba8")
+        assert kept.waiting is not None
+        for texture in (kept, *frames):
+            texture.release()
+
+
+WAYS = {"sums": ROOMY, "frames": PIXELS * (FRAMES + BESIDE), "host": PIXELS * HOST}
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("options", [{}, {"edge_aware": 1.0}, {"count": 8}, {"light": "encoded", "edges": "mirror"}])
+def test_smaller_ways_show_the_same(limited, way, options):
+    source, shown = film(), [moment(**options), moment(shapes=SHAPES[:2], **options)]
+    shown.append(shown[0])
+    roomy, *_ = rendered(limited(ROOMY), source, shown)
+    device = limited(WAYS[way] if "count" not in options or way != "frames" else WAYS[way] + 64 * PIXELS)
+    pictures, kind, shortages = rendered(device, source, shown)
+    assert kind == ("Sums" if way == "sums" else "Frames")
+    assert ("window" in shortages) == (way == "host")
+    numpys = "diffusion" in shortages
+    assert numpys == (way == "host" and "count" in options)  # a pass of diffusion binds more than that
+    tolerance = 1 / 255 if numpys else 0 if way == "sums" else 2**-14
+    assert np.abs(pictures - roomy).max() <= tolerance
+
+
+def test_frames_on_the_host_and_grids_that_wait_change_no_bit(limited):
+    source, shown = film(), [moment(), moment(shapes=SHAPES[:2])]
+    resident, kind, shortages = rendered(limited(WAYS["frames"]), source, shown)
+    assert (kind, shortages) == ("Frames", set())
+    sent, _, shortages = rendered(limited(WAYS["host"]), source, shown)
+    assert shortages == {"window"}
+    assert np.array_equal(sent, resident)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float16])
+def test_what_follows_fits_too(limited, dtype):
+    source = film(dtype=dtype, transfer="linear" if dtype != np.uint8 else "srgb")
+    rng = np.random.default_rng(5)
+    shown = [following(rng, source, moment(), (0, 1)) for _ in range(2)]
+    roomy, _, _ = rendered(limited(ROOMY), source, shown)
+    small, _, shortages = rendered(limited(PIXELS * 96), source, shown)
+    assert shortages == {"window"}
+    assert np.abs(small - roomy).max() <= 2**-14  # sums of other parts
+
+
+class Values:
+    """Mattes in memory."""
+
+    def __init__(self, values):
+        self._values = values
+
+    def values(self, mattes, index, block):
+        return [((i, index), self._values[i, ::block, ::block]) for i, _ in enumerate(mattes)]
+
+    def close(self):
+        pass
+
+
+def test_mattes_fit_too(limited):
+    values = np.random.default_rng(6).random((3, *SIZE[::-1])).astype(np.float32)
+    mattes = tuple(Matte(str(i), i, 0.5) for i in range(3))
+    shown = [replace(moment(), mattes=mattes)] * 2
+    roomy, _, _ = rendered(limited(ROOMY), film(), shown, Values(values))
+    small, _, shortages = rendered(limited(PIXELS * HOST), film(), shown, Values(values))
+    assert shortages == {"window"}
+    assert np.abs(small - roomy).max() <= 2**-14
+
+
+def test_several_effects_take_turns_and_show_the_same(limited):
+    """The window that was used longest ago is freed, and read again; none takes a smaller way."""
+    sources, limit = [film(seed) for seed in range(3)], PIXELS * (SUMS + BESIDE + 40)
+    alone = [rendered(limited(limit), source, [moment()] * 2)[0] for source in sources]
+    compositor = GPUCompositor(limited(limit))
+    renderers = [Renderer(compositor, source) for source in sources]
+    for index in range(2):
+        for renderer, wanted in zip(renderers, alone, strict=True):
+            assert np.array_equal(renderer.picture(2 + index, moment()), wanted[index])
+            assert type(renderer._window) is window.Sums
+    assert sum(renderer._window.is_open for renderer in renderers) == 1
+    for renderer in renderers:
+        renderer.close()
+    free(compositor)
+
+
+def test_pictures_do_not_depend_on_those_before(limited):
+    """Kinds of windows and of diffusion, in turn, with little room."""
+    source, rng = film(), np.random.default_rng(7)
+    shown = [moment(), following(rng, source, moment(), (0, 1)), moment(shapes=()), moment(edge_aware=0.5)]
+    limit = PIXELS * (FRAMES + BESIDE)
+    alone = [rendered(limited(limit), source, [one])[0][0] for one in shown]
+    device = limited(limit)
+    compositor = GPUCompositor(device)
+    renderer = Renderer(compositor, source)
+    for i in (0, 1, 2, 3, 1, 0, 3, 2, 0):
+        assert np.array_equal(renderer.picture(2, shown[i]), alone[i])
+    renderer.release()
+    assert np.array_equal(renderer.picture(2, shown[0]), alone[0])
+    renderer.close()
+    free(compositor)
+
+
+def test_devices_share_a_budget(limited):
+    """What one has taken the other lacks, until it is asked to free it."""
+    wanted, _, _ = rendered(limited(ROOMY), film(), [moment()] * 2)
+    shared = Budget(PIXELS * (SUMS + BESIDE))
+    source, compositors = film(), [GPUCompositor(limited(shared, which)) for which in range(2)]
+    first, second = (Renderer(compositor, source) for compositor in compositors)
+    assert np.array_equal(first.picture(2, moment()), wanted[0])
+    assert shared.used > PIXELS * SUMS
+    with pytest.raises(NoDeviceError, match="has no room"), compositors[1].current():
+        compositors[1].device.texture(*SIZE, SUMS // 8, "rgba16ui")
+    compositors[1].device.ask_others = first.release
+    assert np.array_equal(second.picture(2, moment()), wanted[0])
+    assert first._window is None
+    compositors[0].device.ask_others = second.release
+    assert np.array_equal(first.picture(3, moment()), wanted[1])
+    for renderer, compositor in zip((first, second), compositors, strict=True):
+        renderer.close()
+        free(compositor)
+
+
+def test_a_driver_that_has_less_than_it_says_gets_less(limited, monkeypatch):
+    most, held = PIXELS * 64, []
+    device = limited(ROOMY)
+    make = type(device)._make
+
+    def small(self, width, height, layers, kind):
+        if self.budget.used > most:
+            raise NoDeviceError("out of memory")
+        held.append(self.budget.used)
+        return make(self, width, height, layers, kind)
+
+    shown = [moment(), moment(shapes=SHAPES[:2])]
+    roomy, *_ = rendered(device, film(), shown)
+    monkeypatch.setattr(type(device), "_make", small)
+    monkeypatch.setattr(window, "SENT_BYTES", most // 8)
+    pictures, _, shortages = rendered(device, film(), shown)
+    assert shortages == {"window"}
+    assert np.abs(pictures - roomy).max() <= 2**-14
+    assert max(held) <= most
+
+
+def test_what_is_allowed(monkeypatch):
+    monkeypatch.setattr(budget, "machine_memory", lambda: 16 << 30)
+    assert budget.allowed(8 << 30) == 6 << 30
+    assert budget.allowed(48 << 30) == 8 << 30
+    assert budget.allowed(None) == 6 << 30
+    monkeypatch.setattr(budget, "machine_memory", lambda: None)
+    assert budget.allowed(48 << 30) == 36 << 30
+
+
+def test_the_machines_memory():
+    lines = Path("/proc/meminfo").read_text().splitlines()
+    kilobytes = next(int(line.split()[1]) for line in lines if line.startswith("MemTotal"))
+    assert budget.machine_memory() == kilobytes << 10
+
+
+def test_a_device_tells_what_there_is(kind):
+    """On the software renderer, the machine's memory; a limit that was set stays."""
+    for given, wanted in ((None, budget.allowed(budget.machine_memory())), (5, 5)):
+        device = kind(Budget(given))
+        assert device.budget.limit == wanted
+        device.release()
