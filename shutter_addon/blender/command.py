@@ -21,7 +21,6 @@ import bpy
 
 from ..compute import benchmark
 from ..compute.device import NoDeviceError
-from ..compute.renderer import DEVICES
 from ..core import atomic_write, recipe, region_keys, retiming
 from ..core.effect import Region
 from ..core.messages import sentence, signed
@@ -33,7 +32,7 @@ from ..media.matte_files import MatteFile
 from ..media.sequence import by_number
 from .data import inbetween_settings, snapshot, source_media, strips, validation
 from .editing import new_edit
-from .rendering import film_output, machine, session
+from .rendering import devices, film_output, machine, session
 
 BAD_INPUT = 2
 # Pixels along a picture's side, and frames of a window, that can be measured.
@@ -118,7 +117,12 @@ def _parser() -> argparse.ArgumentParser:
         "--format", choices=tuple(film_output.FORMATS), help="of the pictures in a folder: 16-bit png, float exr"
     )
     render.add_argument("--frames", metavar="A:B", help="timeline frames A to B; 1 is the strip's first")
-    render.add_argument("--device", choices=DEVICES, default="auto", help="gpu: OpenGL 4.3; cpu: NumPy")
+    render.add_argument(
+        "--device",
+        choices=devices.CHOICES,
+        help="opengl: OpenGL 4.3; blender: Blender's own GPU; gpu: either; cpu: NumPy; auto: the first of these that"
+        " works (default: as in Blender's preferences, else auto)",
+    )
     render.add_argument("--weights", type=_place, metavar="DIR", help="also write the coefficients, as float EXR")
     render.add_argument("--save", type=_place, metavar="FILE.blend", help="keep the edit")
     render.add_argument(
@@ -156,7 +160,7 @@ def _parser() -> argparse.ArgumentParser:
     track.add_argument("--output", type=_place, required=True, metavar="R2.json", help="the recipe with the keys")
     track.add_argument("--report", type=_place, metavar="FILE.json", help="how sure each frame is, and where it ended")
     measured = commands.add_parser("benchmark", help="measure how fast this machine composes, for a bug report")
-    measured.add_argument("--device", choices=DEVICES, default="auto", help="gpu: OpenGL 4.3; cpu: NumPy")
+    measured.add_argument("--device", choices=devices.CHOICES, help="as for render")
     measured.add_argument("--json", type=_place, metavar="FILE.json", help="also write what was measured")
     measured.add_argument("--sizes", type=_sizes, default=benchmark.SIZES, metavar="WxH,…", help="of pictures")
     measured.add_argument("--windows", type=_windows, default=benchmark.WINDOWS, metavar="L,…", help="their lengths")

@@ -11,15 +11,19 @@ import numpy as np
 
 from ...compute.benchmark import processor
 from ...compute.budget import machine_memory
-from ...compute.renderer import open_compositor
+from ..data import preferences
+from . import devices
 from .blender_gpu import BlenderDevice
 
 MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
 
 
-def open_device(wanted: str):
-    """A compositor, and why it is a lesser one, or None. NoDeviceError: there is none as it is wanted."""
-    return open_compositor(wanted)
+def open_device(wanted: str | None):
+    """A compositor, and why it is a lesser one, or None. NoDeviceError: there is none as it is wanted.
+
+    wanted: one of devices.CHOICES; None: as the user prefers"""
+    kind, lesser = devices.choose(wanted or preferences.device())
+    return devices.OPEN[kind](), lesser
 
 
 def described(compositor, lesser: str | None) -> dict[str, str]:

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 
 import bpy
@@ -15,8 +14,7 @@ import numpy as np
 import OpenImageIO
 
 from ...compute.device import NoDeviceError
-from ...compute.gpu import GPUCompositor
-from ...compute.renderer import Renderer, open_compositor
+from ...compute.renderer import Renderer
 from ...core import following, retiming
 from ...core.frame_state import FrameState
 from ...core.messages import EffectError
@@ -27,8 +25,9 @@ from ...media.inbetween import InbetweenSource
 from ...media.matte_values import MatteValues
 from ...media.prefetch import PrefetchSource
 from ...media.reduced import smaller
+from ..data import preferences
 from ..data.snapshot import Snapshot, translated
-from .blender_gpu import BlenderDevice, opens_in_background
+from . import devices, gpu_relay
 
 FAULTS = (EffectError, MediaError, NoDeviceError, MemoryError)
 
@@ -54,7 +53,9 @@ def _never() -> bool:
 
 def _result(future: Future, stopped):
     """The future's result. StoppedError: it is not waited for any longer."""
-    while not wait([future], _PATIENCE).done:
+    while not wait([future], 0 if in_window() else _PATIENCE).done:
+        if in_window():
+            gpu_relay.serve()
         if stopped():
             raise StoppedError
     return future.result()
@@ -64,11 +65,11 @@ def _result(future: Future, stopped):
 class RenderSettings:
     """What a command sets for its render.
 
-    device: one of compute.renderer.DEVICES, for renders without a window
+    device: one of devices.CHOICES, in place of the user's preference
     weights: folder for the coefficients of every picture, as EXR files
     inbetween: folder of in-between frames, in place of the effects' own"""
 
-    device: str = "auto"
+    device: str | None = None
     weights: Path | None = None
     inbetween: Path | None = None
 
@@ -133,16 +134,28 @@ class FrameRequest:
 class RenderSession:
     """A compositor, opened when it is first used, and the renderers of the effects that were shown last."""
 
-    def __init__(self, open_device, threaded: bool = False):
-        """threaded: the device belongs to a thread of its own; otherwise to whichever calls."""
-        self._open = open_device
-        self.threaded = threaded
+    def __init__(self, choose: Callable[[], tuple[str, str | None]]):
+        """choose: gives the device, as devices.choose."""
+        self._choose = choose
+        self._chosen: tuple[str, str | None] | None = None
         self._executor: ThreadPoolExecutor | None = None
         self._compositor = None
         self._renderers: dict = {}
         self._requests: dict[int, tuple[Snapshot, float, FrameRequest]] = {}  # by scene: the last one
         self._shown: dict[int, float] = {}  # by scene: the timeline frame that was shown last
         self._begun: dict[int, tuple[tuple, Future]] = {}  # by scene: the key of a request, its picture
+
+    @property
+    def device(self) -> str:
+        """Its device, a key of devices.OPEN; it stays until all is forgotten. NoDeviceError: there is none."""
+        if self._chosen is None:
+            self._chosen = self._choose()
+        return self._chosen[0]
+
+    @property
+    def threaded(self) -> bool:
+        """Whether the device belongs to a thread of its own; otherwise to whichever calls."""
+        return self.device != "blender"
 
     def run(self, function, *arguments, stopped=_never):
         """The result of a function that uses the device. StoppedError: it is not waited for any longer."""
@@ -213,8 +226,8 @@ class RenderSession:
     def _renderer(self, snapshot: Snapshot, say, divisor: int | None) -> Renderer:
         """The renderer of the effect's source at that size: the only one that the effect has."""
         if self._compositor is None:
-            self._compositor, message = self.run(self._open)
-            if message:
+            self._compositor = self.run(devices.OPEN[self.device])
+            if message := self._chosen[1]:
                 say(message)
         old_key, renderer = self._renderers.pop(snapshot.scene, ((None, 1), None))
         key = (snapshot.source, snapshot.inbetween, snapshot.built), divisor or old_key[1]
@@ -254,8 +267,19 @@ class RenderSession:
             self.run(self._compositor.release)
             self._compositor = None
         if self._executor is not None:
+            self.run(_never)  # what is left of a render that was stopped may need this thread
             self._executor.shutdown()
             self._executor = None
+        self._chosen = None
+
+    def settle(self) -> None:
+        """Forgets all if the device is not the one that would be chosen now."""
+        try:
+            if self._chosen is None or self._chosen[0] == self._choose()[0]:
+                return
+        except NoDeviceError:
+            pass  # met again when a picture is asked for
+        self.forget()
 
 
 _settings = RenderSettings()
@@ -277,37 +301,37 @@ def settings() -> RenderSettings:
     return _settings
 
 
-# Blender's own GPU belongs to its main thread. Renders on another one, and without a window, have a context apart, and
-# a thread for it: beside Blender's own another one cannot always be current (see GLDevice). Without moderngl there is
-# no such context, and in the background Blender's own does.
-_offscreen = RenderSession(lambda: open_compositor(_settings.device), threaded=True)
-_window = RenderSession(lambda: (GPUCompositor(BlenderDevice()), None))
+def wanted() -> str:
+    """The device that the command asks for, else the user's preference: one of devices.CHOICES."""
+    return _settings.device or preferences.device()
+
+
+# What the window itself shows is made on its main thread, on its GPU. Renders have a device apart and a thread for it:
+# beside Blender's own GL context another one cannot always be current (see GLDevice). In the background Blender's GPU
+# belongs to the main thread, and has none.
+_offscreen = RenderSession(lambda: devices.choose(wanted()))
+_window = RenderSession(lambda: ("blender", None))
+
+
+def device_names() -> tuple[str, str]:
+    """What the preview of a window is composed on, and its renders, as these call themselves. NoDeviceError: there is
+    none for renders as the user wants it."""
+    return devices.name("blender"), devices.name(devices.choose(wanted())[0])
 
 
 def in_window() -> bool:
-    """Whether Blender's own GPU may be used: on the main thread of a Blender with a window."""
+    """Whether this is the main thread of a Blender with a window."""
     return not bpy.app.background and threading.current_thread() is threading.main_thread()
-
-
-def _borrows() -> bool:
-    """Whether a background render is on Blender's own GPU, as it can have none apart."""
-    on_main = threading.current_thread() is threading.main_thread()
-    return bpy.app.background and on_main and _settings.device != "cpu" and _lacks_moderngl() and opens_in_background()
-
-
-@lru_cache
-def _lacks_moderngl() -> bool:
-    """Whether moderngl is missing, as in a package without wheels, or made for another Python."""
-    try:
-        from ...compute import gl  # noqa: F401
-    except ImportError:
-        return True
-    return False
 
 
 def here() -> RenderSession:
     """The session of whoever calls: the window's own on its main thread, else the offscreen one."""
-    return _window if in_window() or _borrows() else _offscreen
+    return _window if in_window() else _offscreen
+
+
+def settle() -> None:
+    """Before a render, on the main thread: its device is what the user wants now."""
+    _offscreen.settle()
 
 
 def _in_blocks(state: FrameState, divisor: int) -> FrameState:

@@ -1,0 +1,140 @@
+"""Blender's GPU for a thread beside its main one, which is the only one that has it: a device whose calls the main
+thread makes, a few at a time between redraws of the window.
+
+An engine's own way to it (bl_use_gpu_context) holds a lock of Blender's for as long as a picture takes, and no window
+is drawn meanwhile.
+"""
+
+import queue
+import threading
+import time
+from concurrent.futures import Future
+
+import bpy
+import gpu
+
+from ...compute.passes import Pass
+from .blender_gpu import BlenderDevice
+
+# Seconds of the main thread that calls take at once, if none takes longer: as many as all else took, within these.
+_LEAST, _MOST = 0.02, 0.05
+_GAP = 0.005  # seconds that the main thread waits there for the next call
+_MOMENT = 0.01  # seconds that the passes take for which it waits at once
+_REST = 1.0  # seconds without a call, after which the main thread looks for none
+
+_calls: queue.SimpleQueue[tuple] = queue.SimpleQueue()
+_lock = threading.Lock()
+_looks_until: float | None = None  # when the main thread stops to look for calls; None: it does not
+_looked = 0.0  # when it looked last
+_unfinished, _batch = 0, 8  # passes that may be under way, and after how many they are waited for
+
+
+class RelayedDevice(BlenderDevice):
+    """A compute.device.Device, on any one thread but Blender's main one. What a pass raises is met when something is
+    made, sent or read next.
+
+    Its own textures are lists of one, which the main thread empties: on Vulkan Blender crashes where another frees one.
+    """
+
+    def __init__(self):
+        super().__init__()
+        self._passes: list[Future] = []
+
+    def _make(self, *arguments) -> list:
+        return self._wait_for(lambda: [BlenderDevice._make(self, *arguments)])
+
+    def _free(self, own: list) -> None:
+        _called(own.clear)
+
+    def _send(self, stored: list, *arguments) -> None:
+        self._wait_for(lambda: BlenderDevice._send(self, *stored, *arguments))
+
+    def _read(self, texture: list, *arguments) -> None:
+        self._wait_for(lambda: BlenderDevice._read(self, *texture, *arguments))
+
+    def _dispatch(self, program: Pass, groups, textures: dict, images: dict, *arguments) -> None:
+        def dispatch():
+            bound = ({name: own[0] for name, own in kind.items()} for kind in (textures, images))
+            BlenderDevice._dispatch(self, program, groups, *bound, *arguments)
+
+        self._passes.append(_called(dispatch))
+
+    def release(self) -> None:
+        self._wait_for(lambda: BlenderDevice.release(self))
+
+    def _wait_for(self, function):
+        """What the function gives on the main thread, after all passes."""
+        result = _called(function).result()
+        passes, self._passes = self._passes, []
+        for done in passes:
+            done.result()
+        return result
+
+
+def serve(seconds: float = _LEAST) -> None:
+    """Makes calls, on the main thread while it waits for another that may call, for these seconds or a call more."""
+    end = time.monotonic() + seconds
+    while (left := end - time.monotonic()) > 0:
+        try:
+            done, function = _calls.get(timeout=min(left, _GAP))
+        except queue.Empty:
+            return
+        _keep_looking()
+        try:
+            done.set_result(function())
+        except Exception as error:
+            done.set_exception(error.with_traceback(None))  # whose frames refer to textures
+        _finish_some()
+
+
+def _finish_some() -> None:
+    """Waits for passes, after so many that it takes a moment: whatever is drawn or read waits for all before it."""
+    global _unfinished, _batch
+    _unfinished += 1
+    if _unfinished >= _batch:
+        start = time.monotonic()
+        gpu.types.GPUTexture((1, 1)).read()
+        _unfinished, _batch = (
+            0,
+            min(max(int(_batch * _MOMENT / (time.monotonic() - start)), _batch // 2, 1), _batch * 2),
+        )
+
+
+def _called(function) -> Future:
+    """The function, called on the main thread after all calls before."""
+    done = Future()
+    _calls.put((done, function))
+    with _lock:
+        if _looks_until is None:
+            _keep_looking()
+            bpy.app.timers.register(_look, persistent=True)
+    return done
+
+
+def _keep_looking() -> None:
+    global _looks_until
+    _looks_until = time.monotonic() + _REST
+
+
+def _look() -> float | None:
+    """A timer."""
+    global _looks_until, _looked
+    if _has_context():
+        serve(min(max(time.monotonic() - _looked, _LEAST), _MOST))
+    _looked = time.monotonic()
+    with _lock:
+        if _calls.empty() and time.monotonic() > _looks_until:
+            _looks_until = None
+    return None if _looks_until is None else 0.0
+
+
+def _has_context() -> bool:
+    """Whether Blender's GPU is current here. It is not after a window was closed, until another one is drawn."""
+    try:
+        gpu.types.GPUTexture((1, 1))
+    except RuntimeError:
+        for window in bpy.context.window_manager.windows:
+            for area in window.screen.areas:
+                area.tag_redraw()
+        return False
+    return True
