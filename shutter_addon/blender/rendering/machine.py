@@ -15,6 +15,7 @@ from ..data import preferences
 from . import devices
 from .blender_gpu import BlenderDevice
 
+BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal", "NONE": "nothing", "UNKNOWN": "unknown"}
 MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
 
 
@@ -42,5 +43,5 @@ def described(compositor, lesser: str | None) -> dict[str, str]:
 
 def _backend(device) -> str:
     if isinstance(device, BlenderDevice):
-        return f"Blender's {gpu.platform.backend_type_get()}"
+        return f"Blender's own {BACKENDS[gpu.platform.backend_type_get()]}"
     return "OpenGL"
