@@ -1,30 +1,47 @@
-"""How quick a whole render is, from movie to movie, beside two references, measured in one run, interleaved.
+"""How quick a whole render is, from movie to movie, and what its processor time goes into, beside three references.
 
-    python scripts/render_speed.py [FOOTAGE] [--window 64] [--rounds 3] [--json FILE]
+    python scripts/render_speed.py [FOOTAGE …] [--window 64] [--rounds 3] [--json FILE]
     blender -b --factory-startup --python scripts/render_speed.py -- …
 
-Needs Blender as a library (bpy), or a Blender that has the extension's packages. Ways:
+Needs Blender as a library (bpy), or a Blender that has the extension's packages. Ways, interleaved in one run:
 ours: FOOTAGE under an effect of three shutters, scribbled, through the sequencer;
-constant: the same edit, but its engine returns a constant;
-average: `ffmpeg -vf tmix` of as many frames, with the codec settings of Blender's output. It takes ffmpeg from PATH.
-Each begins with nothing decoded and nothing compiled. Frames per second are medians. The films are checked: their
-length, what they show, and ours against the NumPy compositor.
+plain: the movie strip alone, through the sequencer, to the same output;
+echo: the edit of ours, but its engine gives the source's own frames, decoded and made scene-linear ahead by a thread;
+tmix: `ffmpeg -vf tmix` of as many frames, with the codec settings of Blender's output. It takes ffmpeg from PATH. Its
+film is blurred all over, which costs the encoder less: it is told, not judged.
+Films are silent: sound is encoded on Blender's own thread, where it could not be told from the rest. Each begins with
+nothing decoded and nothing compiled. All figures are medians. The films are checked: their length, what they show, and
+ours against the NumPy compositor.
+
+Processor time is that of the whole process, or of ffmpeg's, divided by the film's frames. On Linux it is split by what
+/proc says of each thread, looked at every 20 ms:
+encoder: the threads that are begun when the movie is opened for writing, x264's;
+composition: those that OpenGL began with the device, a software renderer's, and its passes on the thread that calls;
+decoding: FFmpeg's, and the thread of ours that decodes ahead;
+device: the rest of the thread that calls the device: what is read back, and what a picture needs in Python;
+engine: the engine's own part of Blender's main thread;
+blender: all else, which is Blender's.
+outside: all but encoder and composition, to be compared with that of plain.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import shutil
 import statistics
 import subprocess
 import sys
 import tempfile
+import threading
 import time
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
 import av
+import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -35,31 +52,28 @@ from shutter_addon.blender.editing import new_edit
 from shutter_addon.blender.rendering import film_output, session
 from shutter_addon.blender.rendering.engine import VirtualShutterEngine
 from shutter_addon.compute.cpu import CPUCompositor
+from shutter_addon.compute.device import NoDeviceError
+from shutter_addon.compute.gl import GLDevice
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.core import light, presets, recipe
 from shutter_addon.media import MediaError, open_source
 from shutter_addon.media.cuts import ShotSource
+from shutter_addon.media.prefetch import PrefetchSource
+from shutter_addon.media.source import SourceWrapper
 
 ROOT = Path(__file__).resolve().parents[1]
-WAYS = ("ours", "constant", "average")
-GREY = 0.25  # of the constant, in linear light
+FOOTAGE = [ROOT / "assets" / name for name in ("bigbuckbunny.mp4", "pedestrians.avi")]
+WAYS = ("ours", "plain", "echo", "tmix")
+PARTS = ("encoder", "composition", "decoding", "device", "engine", "blender")
 # Levels of 255, on average, that the codec may take means of 8 × 8 pixels away from what was given to it.
 LOSSY = 1.5
 # What Blender's settings are to x264.
 _RATES, _PRESETS = {"HIGH": 20}, {"GOOD": "medium"}
-
-
-def constant(engine, depsgraph) -> None:
-    """The least that an engine can do."""
-    width, height = engine.resolution_x, engine.resolution_y
-    result = engine.begin_result(0, 0, width, height)
-    result.layers[0].passes["Combined"].rect.foreach_set(_grey(width * height))
-    engine.end_result(result)
-
-
-@cache
-def _grey(pixels: int) -> np.ndarray:
-    return np.tile(np.array([GREY, GREY, GREY, 1], np.float32), pixels)
+_AHEAD = 4  # frames that echo decodes ahead
+OURS = "Virtual Shutter"  # how Python names the thread that decodes ahead; that of the device begins so
+_TICK = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 1
+_THREADS = Path("/proc/self/task")  # only on Linux
+_LOOK = 0.02  # seconds between two looks at the threads
 
 
 def effect_recipe(window: int) -> recipe.Recipe:
@@ -76,41 +90,194 @@ def effect_recipe(window: int) -> recipe.Recipe:
     return recipe.parse(json.dumps(data))
 
 
-def through_blender(edit, film: Path, render=VirtualShutterEngine.render) -> None:
-    """Renders the edit; render: what the engine of its effect's scene does."""
+class ProcessorTime:
+    """Processor time of this process while it renders, in seconds: `total`, and `parts` by name of PARTS; none where
+    the system does not tell it by thread."""
+
+    def __init__(self):
+        self.total, self.parts = 0.0, {}
+        self._device = _device_threads()
+        self._before = self._seen = _threads()
+        self._pythons: dict[int, str] = {}  # Python's threads, and how it names them
+        self._encoders: set[int] = set()
+        self._passes = self._engine = 0.0
+
+    @contextmanager
+    def of_render(self):
+        """Measures the film that is rendered inside."""
+        done, started = threading.Event(), time.process_time()
+        watch = threading.Thread(target=self._watch, args=(done,))
+        watch.start()
+        try:
+            with self._timing(), self._noting_encoders():
+                yield
+        finally:
+            done.set()
+            watch.join()
+        own = self._seen.pop(watch.native_id, ("", 0.0))[1]
+        self.total = time.process_time() - started - own
+        if self._before:
+            self.parts = self._split()
+
+    def _watch(self, done: threading.Event) -> None:
+        while not done.wait(_LOOK):
+            self._seen = self._seen | _threads()
+            self._pythons |= {thread.native_id: thread.name for thread in threading.enumerate()}
+
+    @contextmanager
+    def _timing(self):
+        """Inside, passes and engine are timed on the threads that call them."""
+        run, render = GLDevice.run, VirtualShutterEngine.render
+
+        def timed_run(*given, **named):
+            start = time.thread_time()
+            run(*given, **named)
+            self._passes += time.thread_time() - start
+
+        def timed_render(engine, depsgraph):  # Blender counts its arguments
+            start = time.thread_time()
+            render(engine, depsgraph)
+            self._engine += time.thread_time() - start
+
+        GLDevice.run, VirtualShutterEngine.render = timed_run, timed_render
+        try:
+            yield
+        finally:
+            GLDevice.run, VirtualShutterEngine.render = run, render
+
+    @contextmanager
+    def _noting_encoders(self):
+        """Blender opens the movie after render_init, and before the first frame's render_pre."""
+        handlers, before = bpy.app.handlers, []
+
+        def begun(*_):
+            before.append(_threads().keys())
+
+        def opened(*_):
+            self._encoders = self._encoders or _threads().keys() - before[0]
+
+        handlers.render_init.append(begun)
+        handlers.render_pre.append(opened)
+        try:
+            yield
+        finally:
+            handlers.render_init.remove(begun)
+            handlers.render_pre.remove(opened)
+
+    def _split(self) -> dict[str, float]:
+        def of(wanted) -> float:
+            return sum(
+                spent - self._before.get(number, ("", 0.0))[1]
+                for number, (name, spent) in self._seen.items()
+                if wanted(number, name)
+            )
+
+        def is_ours(number: int, name: str = "") -> bool:
+            return self._pythons.get(number, "").startswith(OURS)
+
+        found = {
+            "encoder": of(lambda number, _: number in self._encoders),
+            "composition": of(lambda number, _: number in self._device) + self._passes,
+            "decoding": of(lambda number, name: name.startswith("av:") or self._pythons.get(number) == OURS),
+            "device": of(lambda number, _: is_ours(number) and self._pythons[number] != OURS) - self._passes,
+            "engine": self._engine,
+        }
+        return found | {"blender": self.total - sum(found.values())}
+
+
+def _threads() -> dict[int, tuple[str, float]]:
+    """This process's threads: by number the system's name and seconds of processor time; none without /proc."""
+    found = {}
+    for place in _THREADS.iterdir() if _THREADS.is_dir() else ():
+        with suppress(OSError):  # it has ended
+            name, _, numbers = (place / "stat").read_text().partition(" (")[2].rpartition(") ")
+            found[int(place.name)] = name, sum(map(int, numbers.split()[11:13])) / _TICK
+    return found
+
+
+@cache
+def _device_threads() -> set[int]:
+    """The threads that OpenGL begins with a device, and keeps."""
+    before = _threads().keys()
+    with suppress(NoDeviceError):
+        GLDevice().release()
+    return _threads().keys() - before
+
+
+def echo(engine, source, depsgraph) -> None:
+    """The least that an engine of source frames can do."""
+    index = depsgraph.scene.frame_current - 1
+    source.want(range(index, min(index + _AHEAD, source.count)))
+    result = engine.begin_result(0, 0, engine.resolution_x, engine.resolution_y)
+    result.layers[0].passes["Combined"].rect.foreach_set(source.read(index).ravel())
+    engine.end_result(result)
+
+
+class LinearSource(SourceWrapper):
+    """An 8-bit source's frames in scene-linear float32, the bottom row first."""
+
+    _LINEAR = light.to_linear(np.arange(256, dtype=np.float32) / 255)
+
+    def read(self, index):
+        return np.take(self._LINEAR, self._source.read(index)[::-1], mode="clip")  # twice as quick as with a check
+
+
+def make_edit(way: str, footage: Path, window: int, film: Path):
+    """The silent edit that a way renders, alone in Blender, to a movie; its scene."""
+    with open_source(footage) as medium:
+        if way == "plain":
+            edit = new_edit.make_source(footage, medium).id_data
+            edit.frame_start, edit.frame_end = 1, medium.count
+        else:
+            edit = new_edit.make_edit(footage, medium, effect_recipe(window), footage.parent)
+    editor = edit.sequence_editor
+    for strip in [strip for strip in editor.strips_all if strip.type == "SOUND"]:
+        editor.strips.remove(strip)
+    film_output.set_output(edit, film, "png", alpha=False)
+    return edit
+
+
+@contextmanager
+def engine_of(way: str, footage: Path):
+    """Inside, effects are rendered as a way does."""
+    if way != "echo":
+        yield
+        return
     # Another engine would make it another strip, and the effect would go with it.
-    kept, VirtualShutterEngine.render = VirtualShutterEngine.render, render
-    try:
-        session.forget()
-        film_output.film(edit, film)
-    finally:
-        VirtualShutterEngine.render = kept
+    kept = VirtualShutterEngine.render
+    with open_source(footage) as medium, PrefetchSource(LinearSource(medium)) as source:
+        VirtualShutterEngine.render = lambda engine, _depsgraph: echo(engine, source, _depsgraph)
+        try:
+            yield
+        finally:
+            VirtualShutterEngine.render = kept
 
 
-def average_command(ffmpeg: str, edit, footage: Path, window: int, film: Path) -> list[str]:
+def tmix_command(edit, footage: Path, window: int, film: Path) -> list[str]:
     to = edit.render.ffmpeg
     video = f"-c:v libx264 -preset {_PRESETS[to.ffmpeg_preset]} -crf {_RATES[to.constant_rate_factor]}"
     video += f" -g {to.gopsize} -bf {to.max_b_frames if to.use_max_b_frames else 0} -pix_fmt yuv420p"
-    sound = "-an" if to.audio_codec == "NONE" else f"-c:a aac -b:a {to.audio_bitrate}k"
-    given = [ffmpeg, "-v", "error", "-y", "-i", str(footage), "-vf", f"tmix=frames={window}"]
-    return [*given, *video.split(), *sound.split(), str(film)]
+    given = ["ffmpeg", "-v", "error", "-y", "-i", str(footage), "-vf", f"tmix=frames={window}"]
+    return [*given, *video.split(), "-an", str(film)]
 
 
 def check(way: str, film: Path, edit, footage: Path) -> float | None:
-    """How far the film's pictures are from what they should be, in levels; for the average no more is asked than
-    that it has pictures. AssertionError: the film is not what was timed."""
+    """How far the film's pictures are from what they should be, in levels; of tmix no more is asked than that it has
+    pictures. AssertionError: the film is not what was timed."""
     with open_source(footage) as source, open_source(film) as made:
         with av.open(str(film)) as container:
             count = sum(packet.size > 0 for packet in container.demux(video=0))
         assert count == source.count, f"{way}: {count} frames instead of {source.count}"
         chosen = sorted({0, source.count // 2, source.count - 1})
         shown = {index: made.read(index)[..., :3] for index in chosen}
-        if way == "average":
+        if way == "tmix":
             assert all(picture.std() > 5 for picture in shown.values()), f"{way}: pictures without content"
             return None
-        expected = _composed(edit, source, chosen) if way == "ours" else {}
-    grey = np.full((8, 8, 3), 255 * light.to_encoded(np.float32(GREY)))
-    error = max(float(np.abs(_means(shown[i]) - _means(expected.get(i, grey))).mean()) for i in chosen)
+        if way == "ours":
+            expected = _composed(edit, source, chosen)
+        else:
+            expected = {index: source.read(index)[..., :3] for index in chosen}
+    error = max(float(np.abs(_means(shown[index]) - _means(expected[index])).mean()) for index in chosen)
     assert error < LOSSY, f"{way}: {error:.2f} levels off"
     return error
 
@@ -130,51 +297,72 @@ def _composed(edit, source, indices) -> dict[int, np.ndarray]:
     return {index: 255 * light.to_encoded(renderer.picture(index, shown.at(index + 1)))[..., :3] for index in indices}
 
 
-def measure(args) -> list[dict]:
-    with open_source(args.footage) as medium:
-        edit = new_edit.make_edit(args.footage, medium, effect_recipe(args.window), args.footage.parent)
-        count, size = medium.count, (medium.width, medium.height)
-    ffmpeg = shutil.which("ffmpeg")
-    if ffmpeg is None:
-        print("There is no ffmpeg on the PATH: the way “average” is left out.", file=sys.stderr, flush=True)
-    rates = {way: [] for way in WAYS if ffmpeg or way != "average"}
-    errors = {}
+def run(way: str, footage: Path, window: int, film: Path, *, checked: bool) -> dict:
+    """Renders a film once: seconds of the clock and of the processor, whole and by part, and its error, if checked."""
+    edit = make_edit(way, footage, window, film)
+    session.forget()
+    start, before = time.perf_counter(), os.times()
+    if way == "tmix":
+        subprocess.run(tmix_command(edit, footage, window, film), check=True)
+        after = os.times()
+        spent = after.children_user + after.children_system - before.children_user - before.children_system
+        found = {"cpu": spent}
+    else:
+        measured = ProcessorTime()
+        with engine_of(way, footage), measured.of_render():
+            film_output.film(edit, film)
+        found = {"cpu": measured.total} | measured.parts
+    found["clock"] = time.perf_counter() - start
+    return found | {"error": check(way, film, edit, footage) if checked else None}
+
+
+def measure(footage: Path, window: int, rounds: int) -> list[dict]:
+    """A row for each way."""
+    with open_source(footage) as medium:
+        common = {"film": footage.name, "width": medium.width, "height": medium.height}
+        common |= {"window": window, "frames": medium.count}
+    found = {way: [] for way in WAYS if way != "tmix" or shutil.which("ffmpeg")}
     with tempfile.TemporaryDirectory() as folder:
-        films = {way: Path(folder, f"{way}.mp4") for way in rates}
-        film_output.set_output(edit, films["ours"], "png", alpha=False)
-        for _ in range(args.rounds):
-            for way, film in films.items():
-                start = time.perf_counter()
-                if way == "average":
-                    subprocess.run(average_command(ffmpeg, edit, args.footage, args.window, film), check=True)
-                elif way == "constant":
-                    through_blender(edit, film, constant)
-                else:
-                    through_blender(edit, film)
-                rates[way].append(count / (time.perf_counter() - start))
-                if way not in errors:
-                    errors[way] = check(way, film, edit, args.footage)
-    common = {"width": size[0], "height": size[1], "window": args.window, "frames": count}
-    return [
-        {"way": way, **common, "fps": statistics.median(found), "all": found, "error": errors[way]}
-        for way, found in rates.items()
-    ]
+        for number in range(rounds):
+            for way, runs in found.items():
+                film = Path(folder, f"{way}.mp4")
+                runs.append(run(way, footage, window, film, checked=number == 0))
+    return [{"way": way} | common | _row(runs, common["frames"]) for way, runs in found.items()]
+
+
+def _row(runs: list[dict], frames: int) -> dict:
+    """The medians of a way's runs: frames per second, and milliseconds of processor time a frame."""
+
+    def median(name: str) -> float:
+        return statistics.median(run[name] for run in runs) / frames * 1000
+
+    row = {"fps": statistics.median(frames / run["clock"] for run in runs), "error": runs[0]["error"]}
+    row |= {f"{part}_ms": median(part) for part in ("cpu", *PARTS) if part in runs[0]}
+    if "encoder" in runs[0]:
+        outside = [{"outside": run["cpu"] - run["encoder"] - run["composition"]} for run in runs]
+        row["outside_ms"] = statistics.median(found["outside"] for found in outside) / frames * 1000
+    return row
 
 
 def report(rows: list[dict]) -> str:
-    found = {row["way"]: row["fps"] for row in rows}
-    lines = [f"{rows[0]['width']}×{rows[0]['height']}, window {rows[0]['window']}, {rows[0]['frames']} frames"]
+    """The rows of a film as a table, and what ours takes beside plain."""
+    first, found = rows[0], {row["way"]: row for row in rows}
+    names = [name for name in ("fps", "cpu_ms", *(f"{part}_ms" for part in PARTS), "outside_ms") if name in first]
+    lines = [f"{first['film']}, {first['width']}×{first['height']}, window {first['window']}, {first['frames']} frames"]
+    lines.append(" " * 6 + "".join(f"{name:>16s}" for name in names))
     for row in rows:
-        error = "" if row["error"] is None else f"  {row['error']:.2f} levels from what it should show"
-        share = "" if row["way"] == "ours" else f"  ours is {found['ours'] / row['fps']:.2f} of it"
-        lines.append(f"{row['way']:9s} {row['fps']:7.2f} fps{share}{error}")
+        lines.append(f"{row['way']:6s}" + "".join(f"{row[name]:16.2f}" if name in row else " " * 16 for name in names))
+    for name, what in (("cpu_ms", "processor time"), ("outside_ms", "of it outside of composition and encoder")):
+        if name in first:
+            ratios = ", ".join(f"{first[name] / row[name]:.2f} of {way}" for way, row in found.items() if name in row)
+            lines.append(f"{what}: ours is {ratios}")
     return "\n".join(lines)
 
 
 def parse(arguments=None):
     parser = argparse.ArgumentParser("render_speed.py", description=__doc__.partition("\n")[0])
     add = parser.add_argument
-    add("footage", type=Path, nargs="?", default=ROOT / "assets" / "bigbuckbunny.mp4", metavar="FOOTAGE")
+    add("footage", type=Path, nargs="*", default=FOOTAGE, metavar="FOOTAGE")
     add("--window", type=int, default=64)
     add("--rounds", type=int, default=3)
     add("--json", type=Path, help="where the rows are written")
@@ -183,14 +371,17 @@ def parse(arguments=None):
 
 def main(arguments=None) -> int:
     args = parse(arguments)
-    args.footage = args.footage.resolve()
     blender.register()
+    if shutil.which("ffmpeg") is None:
+        print("There is no ffmpeg on the PATH: the way “tmix” is left out.", file=sys.stderr, flush=True)
+    rows = []
     try:
-        rows = measure(args)
+        for footage in args.footage:
+            rows += (found := measure(footage.resolve(), args.window, args.rounds))
+            print(report(found), flush=True)
     except MediaError as error:
         print(f"render_speed: {error}", file=sys.stderr)
         return 2
-    print(report(rows), flush=True)
     if args.json:
         args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     return 0

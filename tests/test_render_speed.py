@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[1]
+PARTS = ("encoder", "composition", "decoding", "device", "engine", "blender")
 
 
 @pytest.fixture(scope="module")
@@ -30,34 +31,56 @@ def clip(tmp_path_factory):
     return path
 
 
-def run(clip, file, **variables):
-    command = [sys.executable, "scripts/render_speed.py", str(clip), "--window", "4", "--rounds", "2"]
+def run(clip, file, rounds=2, **variables):
+    command = [sys.executable, "scripts/render_speed.py", str(clip), "--window", "4", "--rounds", str(rounds)]
     environment = os.environ | variables
     return subprocess.run(
         [*command, "--json", str(file)], cwd=ROOT, env=environment, capture_output=True, text=True, check=True
     )
 
 
-def test_rows(clip, tmp_path):
-    done = run(clip, tmp_path / "rows.json")
-    rows = {row["way"]: row for row in json.loads((tmp_path / "rows.json").read_text())}
-    assert set(rows) == {"ours", "constant"} | ({"average"} if shutil.which("ffmpeg") else set())
+@pytest.fixture(scope="module")
+def done(clip, tmp_path_factory):
+    """(the script's output, its rows by way)."""
+    file = tmp_path_factory.mktemp("rows") / "rows.json"
+    output = run(clip, file).stdout
+    return output, {row["way"]: row for row in json.loads(file.read_text())}
+
+
+def test_rows(done):
+    output, rows = done
+    assert set(rows) == {"ours", "plain", "echo"} | ({"tmix"} if shutil.which("ffmpeg") else set())
     for row in rows.values():
-        assert (row["width"], row["height"], row["window"], row["frames"]) == (96, 64, 4, 12)
-        assert len(row["all"]) == 2
+        assert (row["film"], row["width"], row["height"], row["window"], row["frames"]) == ("clip.mp4", 96, 64, 4, 12)
         assert row["fps"] > 0
-    assert rows["ours"]["error"] < 1.5
-    assert done.stdout.count("ours is") == len(rows) - 1
+        assert row["cpu_ms"] > 0
+    for way in {"ours", "plain", "echo"}:
+        assert rows[way]["error"] < 1.5
+    assert "ours is 1.00 of ours" in output
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="the system does not tell time by thread")
+def test_parts_make_the_whole(done):
+    _, rows = done
+    for way in ("ours", "plain", "echo"):
+        row = rows[way]
+        parts = {name: row[f"{name}_ms"] for name in PARTS}
+        assert min(parts.values()) > -5, parts  # two clocks, one of hundredths of a second
+        outside = row["cpu_ms"] - row["encoder_ms"] - row["composition_ms"]
+        assert row["outside_ms"] == pytest.approx(outside, abs=0.1 * row["cpu_ms"])
+    assert rows["ours"]["composition_ms"] > 0
+    assert rows["ours"]["engine_ms"] > 0
+    assert rows["plain"]["composition_ms"] == rows["plain"]["engine_ms"] == 0
 
 
 def test_without_ffmpeg(clip, tmp_path):
-    done = run(clip, tmp_path / "rows.json", PATH=str(tmp_path))
+    done = run(clip, tmp_path / "rows.json", rounds=1, PATH=str(tmp_path))
     assert "no ffmpeg on the PATH" in done.stderr
-    assert {row["way"] for row in json.loads((tmp_path / "rows.json").read_text())} == {"ours", "constant"}
+    assert {row["way"] for row in json.loads((tmp_path / "rows.json").read_text())} == {"ours", "plain", "echo"}
 
 
 def test_a_film_that_is_not_there_is_one_sentence():
     command = [sys.executable, "scripts/render_speed.py", "none.mp4"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert done.stderr.startswith("render_speed: none.mp4: no such file")
+    assert done.stderr.splitlines()[-1].startswith("render_speed: none.mp4: no such file")

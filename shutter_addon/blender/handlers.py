@@ -78,6 +78,7 @@ def _prepare(film: int, in_job: bool) -> bool:
     """On the main thread, whatever thread renders. True: it has been done."""
     revision.changed()  # a script may have, since Blender last told
     invalidation.drop_spoilt()
+    invalidation.drop_lesser()
     source_media.look_again()
     source_media.rest(render_job.runs())
     if bpy.app.background:  # in a window the last update has seen to it

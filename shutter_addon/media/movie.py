@@ -14,9 +14,11 @@ from .decode import FrameReader, fraction, reason
 from .deinterlace import blur_rows, has_fields, interpolate_fields, samples_of
 from .errors import MediaError
 from .files import check_file, check_index
+from .reduced import reduced, reduced_size
 
 # Blender's choice for YUV to RGB; libswscale's defaults are a level too dark and smear colours.
 SCALER = "neighbor+accurate_rnd+full_chroma_int"
+REDUCER = "area+accurate_rnd+full_chroma_int"  # the same, where frames become smaller
 _PLANAR_YUV = re.compile(r"yuv[aj]?4\d\dp(\d+le)?")
 
 
@@ -30,9 +32,10 @@ class MovieSource(FrameSource):
 
     transfer = "srgb"
 
-    def __init__(self, path, *, stream=0, deinterlace=False):
+    def __init__(self, path, *, stream=0, deinterlace=False, divisor=1):
+        """divisor: how many times smaller than the file's the frames are each way (ReducedSource)"""
         self.path = check_file(path)
-        self._deinterlace = deinterlace
+        self._deinterlace, self._divisor = deinterlace, divisor
         self.options = {"stream": stream, "deinterlace": bool(deinterlace)}
         self._graph = self._graph_key = None
         self._reader = FrameReader(self.path, stream)
@@ -50,14 +53,17 @@ class MovieSource(FrameSource):
             raise MediaError(f"{self.path.name}: its length is unknown; put it into an MP4 or MKV file first")
         self.has_audio = bool(reader.container.streams.audio)
         self._step = float(1 / (self.fps * reader.time_base))
-        self._size = first.width, first.height
         self._turns = -round(first.rotation / 90) % 4
-        self.width, self.height = self._size[::-1] if self._turns % 2 else self._size
+        size = tuple(reduced_size(length, self._divisor) for length in (first.width, first.height))
+        self.width, self.height = size[::-1] if self._turns % 2 else size
         deep = max(component.bits for component in first.format.components) > 8
         self._format, self.dtype = ("rgba64le", np.dtype(np.uint16)) if deep else ("rgba", np.dtype(np.uint8))
         # Blender takes 8-bit colours for straight, but those of deeper movies, its floats, for premultiplied.
         has_alpha = any(component.is_alpha for component in first.format.components)
         self.alpha = "opaque" if not has_alpha else "premultiplied" if deep else "straight"
+        # libswscale takes the mean of straight colours whatever their cover.
+        in_conversion = self._divisor > 1 and self.alpha != "straight"
+        self._size, self._scaler = (size, REDUCER) if in_conversion else ((first.width, first.height), SCALER)
 
     def read(self, index):
         """The frame as a new array (height, width, 4), RGBA, top row first.
@@ -76,8 +82,10 @@ class MovieSource(FrameSource):
         by_fields = self._deinterlace and has_fields(frame)
         frame = interpolate_fields(frame) if by_fields else frame
         picture = self._converted(frame, self._format)
-        if self._deinterlace and not by_fields:
+        if self._deinterlace and not by_fields and self._divisor == 1:  # smaller frames have both fields' means
             picture = blur_rows(picture, opaque=self.alpha == "opaque")
+        if self.alpha == "straight":
+            picture = reduced(picture, self._divisor, self.alpha)
         return self._upright(picture)
 
     def _converted(self, frame, pix_fmt):
@@ -96,7 +104,7 @@ class MovieSource(FrameSource):
             size = "{}:{}".format(*self._size)
             nodes = [
                 graph.add_buffer(width=key[1], height=key[2], format=frame.format, time_base=Fraction(1)),
-                graph.add("scale", f"{size}:flags={SCALER}"),
+                graph.add("scale", f"{size}:flags={self._scaler}"),
                 graph.add("format", pix_fmt),
                 graph.add("buffersink"),
             ]

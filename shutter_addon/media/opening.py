@@ -9,6 +9,7 @@ from ..core.frame_source import FrameSource
 from .color import in_colorspace
 from .errors import MediaError
 from .files import check_file
+from .reduced import smaller
 from .sequence import IMAGE_SUFFIXES, SequenceChannel, SequenceSource
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def open_source(
-    path, *, stream=0, fps=None, files=None, colorspace=None, config=None, alpha=None, deinterlace=False
+    path, *, stream=0, fps=None, files=None, colorspace=None, config=None, alpha=None, deinterlace=False, divisor=1
 ) -> FrameSource:
     """Opens a movie, or the image sequence that starts with the file `path`. MediaError: it cannot be read.
 
@@ -27,12 +28,13 @@ def open_source(
     config: path of the OpenColorIO configuration; colour spaces other than sRGB and Linear Rec.709 need it
     alpha: an image strip's alpha mode, "straight" or "premultiplied" (default: what Blender assumes); not a movie's
     deinterlace: a movie strip's option of that name
+    divisor: how many times smaller than the files' the frames are each way, one of reduced.DIVISORS
     """
     path = Path(path)
     if _is_movie(path, files):
-        source = _movies(path).MovieSource(path, stream=stream, deinterlace=deinterlace)
+        source = _movies(path).MovieSource(path, stream=stream, deinterlace=deinterlace, divisor=divisor)
     else:
-        source = SequenceSource(path, files=files, fps=fps, alpha=alpha)
+        source = smaller(SequenceSource(path, files=files, fps=fps, alpha=alpha), divisor)
     try:
         return source if colorspace is None else in_colorspace(source, colorspace, config)
     except MediaError:

@@ -124,9 +124,9 @@ class SourceSpec:
     files: tuple[Path, ...] | None = field(compare=False)
     options: dict = field(compare=False)
 
-    def open(self) -> FrameSource:
-        """The medium, as Blender would show it. MediaError: it cannot be read."""
-        return open_source(self.path, files=self.files, **self.options)
+    def open(self, divisor: int = 1) -> FrameSource:
+        """The medium, as Blender would show it; divisor: of media.open_source. MediaError: it cannot be read."""
+        return open_source(self.path, files=self.files, divisor=divisor, **self.options)
 
 
 def spec(strip, key: tuple | None = None) -> SourceSpec:

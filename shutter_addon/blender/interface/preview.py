@@ -1,6 +1,6 @@
 """The live preview: what is drawn over the sequencer's picture, composed on Blender's GPU: views, and scribbles."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import bpy
 import gpu
@@ -17,7 +17,8 @@ from ..data import annotations, geometry, selection, strips
 from ..data.properties import CONTEXT
 from ..rendering import invalidation, session
 from ..rendering.blender_gpu import Texture
-from . import drawing, preview_areas
+from . import drawing, preview_areas, previewing
+from .previewing import Shown, shown
 
 VIEWS = (
     ("RESULT", "Result", "The finished picture"),
@@ -25,6 +26,7 @@ VIEWS = (
     ("SCRIBBLES", "Scribbles", "The source, and where each shutter is scribbled"),
     ("COEFFICIENTS", "Coefficients", "How much of each shutter a pixel gets, in the shutters' colors"),
 )
+RESULTS = "RESULT", "SPLIT"  # views that have it
 
 
 def redraw(_settings, _context) -> None:
@@ -89,53 +91,13 @@ class ShutterPreview(PropertyGroup):
     )
 
 
-@dataclass(frozen=True)
-class Shown:
-    """The effect strip that a preview shows."""
-
-    edit: object
-    effect: object
-    strip: object
-    strips_above: bool
-
-
-def shown(context) -> Shown | None:
-    """The effect strip under the playhead that the preview shows: the active one, or the highest."""
-    edit, space = selection.edit_of(context), context.space_data
-    if edit is None or edit.sequence_editor is None or space.display_mode != "IMAGE" or space.display_channel:
-        return None
-    visible = _visible(edit)
-    found = [
-        strip for strip in visible if strip.type == "SCENE" and strip.scene and strips.effect_of(edit, strip.scene)
-    ]
-    if not found:
-        return None
-    active = selection.active(context)
-    strip = next((s for s in found if active and s == active[2]), max(found, key=lambda s: s.channel))
-    above = any(other.channel > strip.channel for other in visible)
-    return Shown(edit, strips.effect_of(edit, strip.scene), strip, above)
-
-
-def _visible(edit) -> list:
-    """Strips with a picture under the playhead, not muted, of the edit or of the meta strip that is open."""
-    editor, frame = edit.sequence_editor, edit.frame_current
-    level = editor.meta_stack[-1] if editor.meta_stack else editor
-    return [
-        strip
-        for strip in level.strips
-        if strip.left_handle <= frame < strip.right_handle
-        and strip.type != "SOUND"
-        and not strip.mute
-        and not level.channels[strip.channel].mute
-    ]
-
-
 def _draw() -> None:
     """The draw handler of the previews."""
     context = bpy.context
     settings = context.window_manager.virtual_shutter
     if bpy.app.is_job_running("RENDER"):
         return
+    invalidation.drop_lesser()
     # Blender tells nobody of strokes that are drawn or erased, but it draws the preview again.
     edit = selection.edit_of(context)
     if edit is not None and edit.library is None and invalidation.invalidate_changed(edit):
@@ -158,21 +120,28 @@ def _draw() -> None:
         say.draw()
 
 
-def request_of(found: Shown) -> session.FrameRequest:
-    """What the effect strip shows at the current frame, as a draft. One of session.FAULTS: it cannot be shown."""
+def request_of(context, found: Shown) -> session.FrameRequest:
+    """What the effect strip shows at the current frame, in the previews' size, as a draft where a still result is not
+    exact anyway. One of session.FAULTS: it cannot be shown."""
     frame = found.edit.frame_current
     snapshot = invalidation.current(found.edit, found.effect, found.strip, frame)
-    return session.here().request(snapshot, frame).draft()
+    request = session.here().request(snapshot, frame, divisor=previewing.divisor(context, found))
+    is_result = context.window_manager.virtual_shutter.view in RESULTS and _is_rendered(found)
+    return request if is_result and not context.screen.is_animation_playing else request.draft()
+
+
+def _is_rendered(found: Shown) -> bool:
+    """Whether the sequencer renders its previews."""
+    return found.edit.render.sequencer_gl_preview == "RENDERED"
 
 
 def _show(context, found: Shown, settings, say) -> None:
-    request = request_of(found)
+    request = request_of(context, found)
     quad = Quad(context.region, found.strip, annotations.picture_size(found.effect))
-    has_result = settings.view in ("RESULT", "SPLIT")
+    has_result = settings.view in RESULTS
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
-    # Where the sequencer renders its preview, the engine has composed the result on this GPU by now, and it lies there
-    # in its place among the other strips, exact; what is drawn here passes through 8 bits on its way to the screen.
-    draws_result = has_result and found.edit.render.sequencer_gl_preview != "RENDERED"
+    # Else the engine has composed it, and it lies there in its place among the other strips.
+    draws_result = has_result and (not _is_rendered(found) or previewing.is_drawn(context, found, request))
     if left > 0 or draws_result:
         _warn(found, say)
     if left > 0:

@@ -64,7 +64,7 @@ class SHUTTER_GT_probe(Gizmo):
         if _is_cropped(found.strip, annotations.picture_size(found.effect), at):
             return
         try:
-            probed = probe.at(preview.request_of(found), at)
+            probed = probe.at(preview.request_of(context, found), at)
         except session.FAULTS:  # which the live preview tells
             return
         if probed is not None:

@@ -2,13 +2,24 @@
 
 import sys
 import traceback
+from collections.abc import Callable
 
 import bpy
 import numpy as np
 
 from ...core.messages import signed
+from ..data.snapshot import Snapshot
 from ..data.strips import ENGINE
 from . import invalidation, job_snapshots, render_job, session
+
+
+def in_full(_shown: Snapshot, _frame: float) -> tuple[int, bool]:
+    return 1, False
+
+
+# What a preview needs that Blender is drawing (interface/previewing.py): how many times smaller than the source's the
+# picture may be each way, and whether it is drawn over what the engine gives. One of session.FAULTS: there is none.
+needed_by_preview: Callable[[Snapshot, float], tuple[int, bool]] = in_full
 
 
 class VirtualShutterEngine(bpy.types.RenderEngine):
@@ -21,7 +32,8 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             self.report({"ERROR"}, self.bl_label)  # whatever it says, it ends the other render
             return
         try:
-            self._render(depsgraph)
+            # A script's frame lies below where it renders, even by an operator that does not say so, as render.opengl.
+            self._render(depsgraph, called_by_script=sys._getframe().f_back is not None)
         except BaseException as error:  # Blender would print it, and render the frame without the effect
             invalidation.spoil(depsgraph.scene.session_uid)
             if not isinstance(error, session.StoppedError):
@@ -29,10 +41,18 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             elif not self.test_break():
                 render_job.cancel(self.test_break)
 
-    def _render(self, depsgraph):
+    def _render(self, depsgraph, called_by_script: bool):
         scene, width, height = depsgraph.scene, self.resolution_x, self.resolution_y
         shown, frame = job_snapshots.of(scene, scene.frame_current, self._stopped)
-        picture = session.resized(session.picture(shown, frame, self._say, self._stopped), width, height)
+        divisor, is_drawn = 1, False
+        if session.in_window() and not (called_by_script or render_job.runs()):
+            divisor, is_drawn = needed_by_preview(shown, frame)
+        if divisor > 1 or is_drawn:
+            invalidation.keep_until_drawn(scene.session_uid)
+        if is_drawn:
+            return  # nothing, which costs Blender the least
+        picture = session.picture(shown, frame, self._say, self._stopped, divisor)
+        picture = session.resized(picture, width, height, divisor)
         result = self.begin_result(0, 0, width, height)
         # Blender's rows go up; composed pictures lie so in memory, and this copies nothing.
         result.layers[0].passes["Combined"].rect.foreach_set(np.ascontiguousarray(picture[::-1]).ravel())

@@ -28,6 +28,7 @@ _files: dict[int, tuple[int, dict[str, SourceFiles]]] = {}  # by effect scene: t
 _current = revision.UntilChange()
 _masks = revision.UntilChange()  # by mask: what it shows at its start
 _spoilt: set[int] = set()  # session_uids of scenes of whose frames the sequencer may keep one that failed
+_lesser: set[int] = set()  # likewise, one that is less than the full picture, for a preview
 
 # Keyframe.interpolation as a number: constant, linear, bezier, then the others.
 _BEZIER = 2
@@ -78,6 +79,24 @@ def drop_spoilt() -> None:
     for edit in bpy.data.scenes if failed else ():
         for strip in strips.effect_strips(edit):
             if strip.scene.session_uid in failed:
+                strip.invalidate_cache("RAW")
+
+
+def keep_until_drawn(scene: int) -> None:
+    """The sequencer was given less than the picture of an effect scene, by its session_uid, for a preview that it
+    draws. Nobody else may get that: Blender shares what it keeps with renders, scopes and the colour picker. So the
+    draw handler drops it."""
+    _lesser.add(scene)
+    if not bpy.app.timers.is_registered(drop_lesser):
+        bpy.app.timers.register(drop_lesser)  # should the handler not be called
+
+
+def drop_lesser() -> None:
+    """Drops what the sequencer keeps of pictures for previews."""
+    given = {_lesser.pop() for _ in range(len(_lesser))}
+    for edit in bpy.data.scenes if given else ():
+        for strip in strips.effect_strips(edit):
+            if strip.scene.session_uid in given:
                 strip.invalidate_cache("RAW")
 
 

@@ -26,6 +26,7 @@ from ...media.image_writing import write_exr
 from ...media.inbetween import InbetweenSource
 from ...media.matte_values import MatteValues
 from ...media.prefetch import PrefetchSource
+from ...media.reduced import smaller
 from ..data.snapshot import Snapshot, translated
 from .blender_gpu import BlenderDevice, opens_in_background
 
@@ -155,14 +156,17 @@ class RenderSession:
             return function(*arguments)
         return _result(future, stopped)
 
-    def request(self, snapshot: Snapshot, frame: float, say=print) -> FrameRequest:
+    def request(self, snapshot: Snapshot, frame: float, say=print, divisor: int | None = None) -> FrameRequest:
         """What an effect strip shows at a timeline frame; say: called with a sentence when the device is a lesser one.
-        One of FAULTS: it cannot be shown."""
-        renderer = self._renderer(snapshot, say)
+        One of FAULTS: it cannot be shown.
+
+        divisor: how many times smaller than the source's the picture is each way (media.open_source); None: as it was
+        the last time, for who asks for no picture"""
+        renderer = self._renderer(snapshot, say, divisor)
         known = self._requests.get(snapshot.scene)
         if known is not None and known[0] is snapshot and known[1] == frame and known[2].renderer is renderer:
             return known[2]
-        state = snapshot.state(frame)
+        state = _in_blocks(snapshot.state(frame), self._renderers[snapshot.scene][0][1])
         index, backward = source_index(snapshot, frame, renderer.source)
         direction = -1 if backward else 1
         with translated():
@@ -199,24 +203,25 @@ class RenderSession:
         step, last = snapshot.film
         if frame - before == step and frame + step <= last and frame + step in snapshot.frames:
             with suppress(*FAULTS):  # it is met again when the picture is asked for
-                request = self.request(snapshot, frame + step)
+                request = self.request(snapshot, frame + step, divisor=1)
                 self._begun[snapshot.scene] = request.key, self._executor.submit(request.picture)
 
     def coefficients(self, request: FrameRequest, stopped=_never) -> np.ndarray:
         """As Renderer.coefficients."""
         return self.run(request.coefficients, stopped=stopped)
 
-    def _renderer(self, snapshot: Snapshot, say) -> Renderer:
+    def _renderer(self, snapshot: Snapshot, say, divisor: int | None) -> Renderer:
+        """The renderer of the effect's source at that size: the only one that the effect has."""
         if self._compositor is None:
             self._compositor, message = self.run(self._open)
             if message:
                 say(message)
-        key = snapshot.source, snapshot.inbetween, snapshot.built
-        old_key, renderer = self._renderers.pop(snapshot.scene, (None, None))
+        old_key, renderer = self._renderers.pop(snapshot.scene, ((None, 1), None))
+        key = (snapshot.source, snapshot.inbetween, snapshot.built), divisor or old_key[1]
         if old_key != key:
             if renderer is not None:
                 self.run(renderer.close)
-            source = open_source(snapshot)
+            source = open_source(snapshot, key[1])
             renderer = Renderer(self._compositor, source, MatteValues.of(source))
         self._renderers[snapshot.scene] = key, renderer
         while len(self._renderers) > _KEPT:
@@ -305,14 +310,25 @@ def here() -> RenderSession:
     return _window if in_window() or _borrows() else _offscreen
 
 
-def picture(snapshot: Snapshot, frame: float, say: Callable[[str], None] = print, stopped=_never) -> np.ndarray:
+def _in_blocks(state: FrameState, divisor: int) -> FrameState:
+    """The state with its blocks of pixels as large in a smaller picture."""
+    options = state.options
+    if divisor == 1 or options.aggregate == 1:
+        return state
+    return replace(state, options=replace(options, aggregate=max(options.aggregate // divisor, 1)))
+
+
+def picture(
+    snapshot: Snapshot, frame: float, say: Callable[[str], None] = print, stopped=_never, divisor: int = 1
+) -> np.ndarray:
     """The picture (H, W, 4) float32 of an effect strip at a timeline frame: scene-linear, premultiplied, top row first.
     One of FAULTS: there is none, in one sentence. say: called with a sentence when the device is a lesser one, or cuts
-    cannot be found. stopped: asked whether the picture is not wanted any longer; StoppedError: it is not.
+    cannot be found. stopped: asked whether the picture is not wanted any longer; StoppedError: it is not. divisor: as
+    of RenderSession.request.
     """
     if stopped():
         raise StoppedError
-    request = here().request(snapshot, frame, say)
+    request = here().request(snapshot, frame, say, divisor)
     if request.state.options.stop_at_cuts:
         _say_of_cuts(say)
     if _settings.weights is not None:
@@ -352,13 +368,15 @@ def source_index(snapshot: Snapshot, frame: float, source: ShotSource) -> tuple[
         return retiming.source_frame(snapshot.timing, frame, source), snapshot.timing.use_reverse_frames
 
 
-def open_source(snapshot: Snapshot) -> ShotSource:
-    """An effect's source, in-between frames included. EffectError, MediaError: there is none."""
+def open_source(snapshot: Snapshot, divisor: int = 1) -> ShotSource:
+    """An effect's source, in-between frames included; divisor: of media.open_source. EffectError, MediaError: there is
+    none."""
+    if snapshot.inbetween is None:
+        return ShotSource(PrefetchSource(snapshot.source.open(divisor)))
     medium = snapshot.source.open()
     try:
-        if snapshot.inbetween is None:
-            return ShotSource(PrefetchSource(medium))
-        return ShotSource(PrefetchSource(InbetweenSource(medium, *snapshot.inbetween)), snapshot.inbetween.factor)
+        source = InbetweenSource(medium, *snapshot.inbetween)
+        return ShotSource(PrefetchSource(smaller(source, divisor)), snapshot.inbetween.factor)
     except FAULTS:
         medium.close()
         raise
@@ -382,8 +400,11 @@ def forget(*_) -> None:
     _window.forget()
 
 
-def resized(picture: np.ndarray, width: int, height: int) -> np.ndarray:
-    """The picture at the size the sequencer asks for (it renders previews smaller)."""
+def resized(picture: np.ndarray, width: int, height: int, divisor: int = 1) -> np.ndarray:
+    """The picture at the size that Blender asks for: the scene's own, or what a resolution below 100 % makes of it; of
+    one that was composed `divisor` times smaller the pixels are repeated."""
+    if divisor > 1:
+        picture = picture.repeat(divisor, axis=0).repeat(divisor, axis=1)[:height, :width]
     if picture.shape[:2] == (height, width):
         return picture
     small = OpenImageIO.ImageBufAlgo.resize(

@@ -1,0 +1,158 @@
+"""What previews need of an effect's picture: its size, and whether our draw handler shows it or Blender.
+
+Blender asks the engine for a Scene strip's full size whatever a preview's, takes its floats, converts, blends and sends
+them. Drawn by our handler, the picture stays on the GPU, and is as small as it is shown.
+"""
+
+import math
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...media.reduced import DIVISORS
+from ..data import annotations, geometry, selection, strips
+from ..data.snapshot import Snapshot
+from ..rendering import engine, session
+from . import preview_areas
+
+# Operators that read the sequencer's pictures, from the window; while an annotation is drawn, Blender shows it alone.
+_READERS, _PEN = {"RENDER_OT_opengl", "SEQUENCER_OT_sample"}, "GPENCIL_OT_annotate"
+_READING_TOOL = "builtin.sample"  # reads once before it is one of those that run
+_PERCENT = {"PROXY_25": 25, "PROXY_50": 50, "PROXY_75": 75, "PROXY_100": 100}
+_STANDARD = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
+_STANDARD |= {"use_curve_mapping": False, "use_white_balance": False}
+_PLAIN_STRIP = {"blend_alpha": 1.0, "color_multiply": 1.0, "color_saturation": 1.0, "scene_input": "CAMERA"}
+_PLAIN_SPACE = {"display_mode": "IMAGE", "display_channel": 0, "show_overexposed": 0}
+
+
+@dataclass(frozen=True)
+class Shown:
+    """The effect strip that a preview shows."""
+
+    edit: object
+    effect: object
+    strip: object
+    strips_above: bool
+
+
+def shown(context) -> Shown | None:
+    """The effect strip under the playhead that the preview shows: the active one, or the highest."""
+    edit, space = selection.edit_of(context), context.space_data
+    if edit is None or edit.sequence_editor is None or space.display_mode != "IMAGE" or space.display_channel:
+        return None
+    visible = _visible(edit)
+    found = [
+        strip for strip in visible if strip.type == "SCENE" and strip.scene and strips.effect_of(edit, strip.scene)
+    ]
+    if not found:
+        return None
+    active = selection.active(context)
+    strip = next((s for s in found if active and s == active[2]), max(found, key=lambda s: s.channel))
+    above = any(other.channel > strip.channel for other in visible)
+    return Shown(edit, strips.effect_of(edit, strip.scene), strip, above)
+
+
+def _visible(edit) -> list:
+    """Strips with a picture under the playhead, not muted, of the edit or of the meta strip that is open."""
+    editor, frame = edit.sequence_editor, edit.frame_current
+    level = editor.meta_stack[-1] if editor.meta_stack else editor
+    return [
+        strip
+        for strip in level.strips
+        if strip.left_handle <= frame < strip.right_handle
+        and strip.type != "SOUND"
+        and not strip.mute
+        and not level.channels[strip.channel].mute
+    ]
+
+
+def divisor(context, found: Shown) -> int:
+    """How many times smaller than its source's an effect's picture is composed each way for the previews of its edit:
+    the power of two, of reduced.DIVISORS, that is nearest to the largest of them."""
+    size = annotations.picture_size(found.effect)
+    scales = [_scale(context, found, size, area) for area in _areas_of(context, found.edit)]
+    scale = max((scale for scale in scales if math.isfinite(scale)), default=1.0)
+    return min(DIVISORS, key=lambda number: abs(math.log2(max(scale, 1e-3) * number)))
+
+
+def _scale(context, found: Shown, size, area) -> float:
+    """How wide or high a pixel of the source is in a preview: in its picture, which is as small as Blender's menu has
+    it; and on the screen, where our handler draws."""
+    space = area.spaces.active
+    percent = _PERCENT.get(space.proxy_render_size, found.edit.render.resolution_percentage)
+    scale = percent / 100 * _pixel(geometry.picture_to_image(found.strip, size), size)
+    if not context.window_manager.virtual_shutter.live:
+        return percent / 100
+    region = preview_areas.preview_region(area)
+    if space.display_mode != "IMAGE" or min(region.width, region.height) < 2:
+        return scale
+    return min(scale, _pixel(geometry.picture_to_region(found.strip, size, region), size))
+
+
+def _pixel(matrix, size) -> float:
+    """The larger side of a picture's pixel after a matrix (3, 3) from fractions of the picture."""
+    return float(np.max(np.hypot(*matrix[:2, :2]) / size))
+
+
+def _areas_of(context, edit):
+    """The areas in which an edit's preview is drawn."""
+    for window, area in preview_areas.previews(context):
+        shows = getattr(window.workspace, "sequencer_scene", None) or window.scene
+        if shows == edit and area.spaces.active.proxy_render_size != "NONE":
+            yield area
+
+
+def is_drawn(context, found: Shown, request: session.FrameRequest) -> bool:
+    """Whether our draw handler shows the result, or in another view what covers it, in place of what Blender makes of
+    the engine's picture: wherever both are the same, in all previews of the edit."""
+    edit, strip = found.edit, found.strip
+    return (
+        context.window_manager.virtual_shutter.live
+        and not found.strips_above
+        and request.renderer.source.alpha == "opaque"
+        and strip.blend_type in ("REPLACE", "ALPHA_OVER")
+        and _has(strip, _PLAIN_STRIP)
+        and all(modifier.mute for modifier in strip.modifiers)
+        and edit.display_settings.display_device == "sRGB"
+        and _has(edit.view_settings, _STANDARD)
+        and not edit.render.use_multiview
+        and not edit.sequence_editor.show_overlay_frame
+        and all(_has(area.spaces.active, _PLAIN_SPACE) for area in _areas_of(context, edit))
+        and _PEN not in _running(context)
+    )
+
+
+def _has(item, values: dict) -> bool:
+    return all(getattr(item, name) == value for name, value in values.items())
+
+
+def _running(context) -> set[str]:
+    return {operator.bl_idname for window in context.window_manager.windows for operator in window.modal_operators}
+
+
+def is_read(context) -> bool:
+    """Whether somebody reads the sequencer's picture from the window, for whom it has to be whole."""
+    tool = context.workspace and context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
+    return bool(_READERS & _running(context)) or (tool is not None and tool.idname == _READING_TOOL)
+
+
+def _needed(snapshot: Snapshot, frame: float) -> tuple[int, bool]:
+    """See engine.needed_by_preview."""
+    context = bpy.context
+    region = context.region
+    if region is None or region.type != "PREVIEW" or is_read(context):
+        return 1, False
+    found = shown(context)
+    if found is None or found.effect.scene.session_uid != snapshot.scene or found.edit.frame_current != frame:
+        return 1, False
+    wanted = divisor(context, found)
+    return wanted, is_drawn(context, found, session.here().request(snapshot, frame, divisor=wanted))
+
+
+def register():
+    engine.needed_by_preview = _needed
+
+
+def unregister():
+    engine.needed_by_preview = engine.in_full

@@ -1,0 +1,99 @@
+"""Smaller frames for previews, beside the means of the full ones."""
+
+import numpy as np
+import OpenImageIO
+import pytest
+
+from shutter_addon.core import light
+from shutter_addon.media import open_source
+from shutter_addon.media.reduced import ReducedSource, reduced
+
+
+def means(frame, divisor):
+    """Of squares of an opaque frame, in float64; the last pixels go on."""
+    height, width, channels = frame.shape
+    down, right = -height % divisor, -width % divisor
+    frame = np.pad(frame.astype(np.float64), ((0, down), (0, right), (0, 0)), mode="edge")
+    return frame.reshape(frame.shape[0] // divisor, divisor, -1, divisor, channels).mean(axis=(1, 3))
+
+
+@pytest.mark.parametrize("divisor", [2, 4])
+def test_a_movie_becomes_smaller_as_it_is_converted(bunny, divisor):
+    with open_source(bunny) as full, open_source(bunny, divisor=divisor) as small:
+        assert (small.width, small.height, small.count) == (1280 // divisor, 720 // divisor, full.count)
+        for index in (3, 80):
+            apart = np.abs(small.read(index) - means(full.read(index), divisor))
+            assert apart.mean() < 0.5
+            assert apart.max() < 12
+
+
+def test_ugly_movies_become_smaller(movies):
+    """Turned, interlaced, with alpha, of odd sizes and with frames of other sizes."""
+    for name, (path, _numbers) in movies.items():
+        with open_source(path, deinterlace=True) as full, open_source(path, deinterlace=True, divisor=2) as small:
+            assert (small.width, small.height) == (-(-full.width // 2), -(-full.height // 2)), name
+            assert (small.count, small.alpha, small.dtype) == (full.count, full.alpha, full.dtype), name
+            frame = small.read(1)
+            assert frame.shape == (small.height, small.width, 4), name
+            assert frame.dtype == small.dtype, name
+            scale = 255 / (np.iinfo(small.dtype).max)
+            apart = np.abs(frame.astype(np.float64) - reduced(full.read(1), 2, full.alpha)) * scale
+            assert apart.mean() < 4, name
+
+
+@pytest.mark.parametrize(("suffix", "kind"), [("png", "uint8"), ("tif", "uint16"), ("exr", "half"), ("exr", "float")])
+def test_images_of_an_odd_size(tmp_path, suffix, kind):
+    path = tmp_path / f"picture_1.{suffix}"
+    values = np.random.default_rng(3).random((31, 45, 3), dtype=np.float32)
+    image = OpenImageIO.ImageBuf(OpenImageIO.ImageSpec(45, 31, 3, kind))
+    image.set_pixels(OpenImageIO.ROI(), values)
+    assert image.write(str(path))
+    with open_source(path) as full, open_source(path, divisor=4) as small:
+        assert (small.width, small.height) == (12, 8)
+        expected, step = means(full.read(0), 4), 0.5 if kind.startswith("u") else 1e-3
+        assert np.abs(small.read(0) - expected).max() <= step
+
+
+def test_straight_colours_count_by_their_cover():
+    frame = np.zeros((2, 2, 4), np.uint8)
+    frame[0, 0] = 200, 100, 50, 255
+    frame[0, 1] = 9, 9, 9, 0
+    assert reduced(frame, 2, "straight").tolist() == [[[200, 100, 50, 64]]]
+    assert reduced(frame, 2, "premultiplied").tolist() == [[[52, 27, 15, 64]]]
+
+
+def test_a_uniform_picture_stays_what_it_is():
+    for dtype in (np.uint8, np.uint16, np.float16, np.float32):
+        frame = np.full((7, 9, 4), 3.0 if np.dtype(dtype).kind == "f" else np.iinfo(dtype).max, dtype)
+        for alpha in ("opaque", "straight", "premultiplied"):
+            small = reduced(frame, 4, alpha)
+            assert small.shape == (2, 3, 4)
+            assert (small == frame[0, 0]).all()
+            assert small.dtype == dtype
+
+
+def test_it_is_made_smaller_before_its_colours_are_converted(tmp_path, blender_config):
+    path = tmp_path / "grey.png"
+    image = OpenImageIO.ImageBuf(OpenImageIO.ImageSpec(8, 8, 3, "uint8"))
+    image.set_pixels(OpenImageIO.ROI(), np.full((8, 8, 3), 0.5, np.float32))
+    assert image.write(str(path))
+    options = {"colorspace": "Filmic sRGB", "config": blender_config, "divisor": 2}
+    with open_source(path, **options) as small, open_source(path, **options | {"divisor": 1}) as full:
+        assert small.read(0).shape == (4, 4, 4)
+        assert np.allclose(small.read(0)[0, 0], full.read(0)[0, 0])
+
+
+def test_it_wraps_any_source(bunny):
+    with ReducedSource(open_source(bunny), 4) as small:
+        assert (small.width, small.height) == (320, 180)
+        assert small.read(5).shape == (180, 320, 4)
+        assert small.options == {"stream": 0, "deinterlace": False}
+
+
+def test_light(bunny):
+    """What is averaged is what is shown, as where Blender makes pictures smaller: in linear light it would differ."""
+    with open_source(bunny, divisor=4) as small, open_source(bunny) as full:
+        encoded = means(full.read(60), 4)
+        linear = light.to_encoded(means(light.to_linear(full.read(60)[..., :3] / np.float32(255)), 4)) * 255
+        shown = small.read(60).astype(np.float64)
+    assert np.abs(shown - encoded).mean() < np.abs(shown[..., :3] - linear).mean() / 2
