@@ -1,7 +1,7 @@
 """Everything that touches bpy: properties, engine, strips, commands."""
 
 from . import handlers
-from .data import properties
+from .data import preferences, properties
 from .interface import (
     bar_editor,
     icons,
@@ -21,6 +21,7 @@ from .rendering import engine
 
 _modules = (
     translations,
+    preferences,
     properties,
     engine,
     icons,

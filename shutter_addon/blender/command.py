@@ -20,7 +20,6 @@ from typing import get_args
 import bpy
 
 from ..compute.device import NoDeviceError
-from ..compute.renderer import DEVICES
 from ..core import atomic_write, recipe, region_keys, retiming
 from ..core.effect import Region
 from ..core.messages import sentence, signed
@@ -32,7 +31,7 @@ from ..media.matte_files import MatteFile
 from ..media.sequence import by_number
 from .data import inbetween_settings, snapshot, source_media, strips, validation
 from .editing import new_edit
-from .rendering import film_output, session
+from .rendering import devices, film_output, session
 
 BAD_INPUT = 2
 FACTORS = get_args(recipe.Factor)  # 1: none
@@ -83,6 +82,12 @@ def _place(text: str) -> Path:
     return Path(re.sub("^//+", "/", os.path.abspath(text)))
 
 
+def _megabytes(text: str) -> int:
+    if not (text.isdecimal() and int(text) > 0):
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of megabytes")
+    return int(text)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("shutter", description="Every pixel its own exposure.")
     commands = parser.add_subparsers(dest="command", required=True)
@@ -94,7 +99,19 @@ def _parser() -> argparse.ArgumentParser:
         "--format", choices=tuple(film_output.FORMATS), help="of the pictures in a folder: 16-bit png, float exr"
     )
     render.add_argument("--frames", metavar="A:B", help="timeline frames A to B; 1 is the strip's first")
-    render.add_argument("--device", choices=DEVICES, default="auto", help="gpu: OpenGL 4.3; cpu: NumPy")
+    render.add_argument(
+        "--device",
+        choices=devices.CHOICES,
+        help="opengl: OpenGL 4.3; blender: Blender's own GPU; gpu: either; cpu: NumPy; auto: the first of these that"
+        " works (default: as in Blender's preferences, else auto)",
+    )
+    render.add_argument(
+        "--gpu-memory",
+        type=_megabytes,
+        metavar="MB",
+        help="of the GPU's memory, what textures may take (default: as in Blender's preferences, else three quarters,"
+        " and half of the machine's memory at most)",
+    )
     render.add_argument("--weights", type=_place, metavar="DIR", help="also write the coefficients, as float EXR")
     render.add_argument("--save", type=_place, metavar="FILE.blend", help="keep the edit")
     render.add_argument(
@@ -155,7 +172,8 @@ def _render(arguments) -> None:
     if arguments.save:
         _save(edit, arguments.save)
     folder = _cache(arguments) if source_recipe.inbetween > 1 else None
-    with session.using(session.RenderSettings(arguments.device, arguments.weights if output else None, folder)):
+    weights = arguments.weights if output else None
+    with session.using(session.RenderSettings(arguments.device, weights, folder, arguments.gpu_memory)):
         if folder:
             _build_lacking(edit, folder)
         if output and arguments.weights:

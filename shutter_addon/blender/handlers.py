@@ -77,6 +77,7 @@ def _before_render(scene, *_):
 def _prepare(film: int, in_job: bool) -> bool:
     """On the main thread, whatever thread renders. True: it has been done."""
     revision.changed()  # a script may have, since Blender last told
+    session.settle()
     invalidation.drop_spoilt()
     invalidation.drop_lesser()
     source_media.look_again()

@@ -22,18 +22,24 @@ def open_compositor(device: str = "auto"):
     device: one of DEVICES. NoDeviceError: it is "gpu", and there is none."""
     if device == "cpu":
         return CPUCompositor(), None
+    from .gpu import GPUCompositor
+
+    try:
+        return GPUCompositor(open_gl()), None
+    except NoDeviceError as error:
+        if device == "gpu":
+            raise
+        return CPUCompositor(), f"{error}; composing with NumPy, which is slow"
+
+
+def open_gl(*memory):
+    """A device on an OpenGL 4.3 context of its own; memory: the arguments of GLDevice. NoDeviceError: there is none, or
+    no moderngl."""
     try:
         from .gl import GLDevice
-        from .gpu import GPUCompositor
-
-        return GPUCompositor(GLDevice()), None
     except ImportError as error:  # a package without wheels, or one for another Python
-        reason = f"the Python package moderngl cannot be loaded ({error})"
-    except NoDeviceError as error:
-        reason = str(error)
-    if device == "gpu":
-        raise NoDeviceError(reason)
-    return CPUCompositor(), f"{reason}; composing with NumPy, which is slow"
+        raise NoDeviceError(f"the Python package moderngl cannot be loaded ({error})") from None
+    return GLDevice(*memory)
 
 
 class Renderer:

@@ -8,9 +8,12 @@ exactly; a pass unpacks them into the layer. (Bit patterns would be simpler, but
 from __future__ import annotations
 
 import subprocess
+import sys
+from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 
 import bpy
 import gpu
@@ -48,10 +51,11 @@ class Texture:
 
 
 class BlenderDevice(PagedDevice):
-    """A compute.device.Device, wherever Blender's GPU context is current: in draw handlers, or after gpu.init()."""
+    """A compute.device.Device, wherever Blender's GPU context is current: in draw handlers, in engines
+    that ask for it, or after gpu.init()."""
 
-    def __init__(self, budget: Budget | None = None):
-        super().__init__(budget or Budget())
+    def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None):
+        super().__init__(budget or Budget(), ask_others)
         self._shaders: dict[Pass, gpu.types.GPUShader] = {}
         self.name = gpu.platform.renderer_get()
         self.max_layers = gpu.capabilities.max_texture_layers_get()
@@ -144,14 +148,22 @@ def texel(texture: Texture, x: int, y: int) -> np.ndarray:
 def opens_in_background() -> bool:
     """Whether Blender's GPU can be used without a window; it is from then on, on the main thread.
 
-    Another Blender tries first: where OpenGL is missing, 5.2's gpu.init() does not raise, it crashes."""
-    trial = ["--background", "--factory-startup", "--python-exit-code", "1", "--python-expr", "import gpu; gpu.init()"]
+    Another Blender tries first: where there is none, 5.2's gpu.init() does not raise, it crashes."""
     try:
-        subprocess.run([bpy.app.binary_path, *trial], check=True, capture_output=True, timeout=60)
+        subprocess.run(_trial(), check=True, capture_output=True, timeout=60)
         gpu.init()
     except (OSError, SystemError, subprocess.SubprocessError):
         return False
     return True
+
+
+def _trial() -> list[str]:
+    """The command that tries gpu.init() with this process's backend."""
+    if bpy.app.module:
+        return [sys.executable, "-c", "import bpy, gpu; gpu.init()"]
+    given = dict(pairwise(sys.argv)).get("--gpu-backend", bpy.context.preferences.system.gpu_backend.lower())
+    options = ["--background", "--factory-startup", "--gpu-backend", given, "--python-exit-code", "1"]
+    return [bpy.app.binary_path, *options, "--python-expr", "import gpu; gpu.init()"]
 
 
 @cache

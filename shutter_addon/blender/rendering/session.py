@@ -7,16 +7,16 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 
 import bpy
 import numpy as np
 import OpenImageIO
+from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...compute.budget import MEGABYTE, Budget
 from ...compute.device import NoDeviceError
-from ...compute.gpu import GPUCompositor
-from ...compute.renderer import Renderer, open_compositor
+from ...compute.renderer import Renderer
 from ...core import following, retiming
 from ...core.frame_state import FrameState
 from ...core.messages import EffectError
@@ -27,8 +27,9 @@ from ...media.inbetween import InbetweenSource
 from ...media.matte_values import MatteValues
 from ...media.prefetch import PrefetchSource
 from ...media.reduced import smaller
+from ..data import preferences
 from ..data.snapshot import Snapshot, translated
-from .blender_gpu import BlenderDevice, opens_in_background
+from . import devices, gpu_relay, render_job
 
 FAULTS = (EffectError, MediaError, NoDeviceError, MemoryError)
 
@@ -40,6 +41,7 @@ _AHEAD, _DECODED, _DECODED_BYTES = 4, 8, 256 << 20
 # Blocks along the shorter side of a draft in which shutters follow edges.
 DRAFT_ROWS = 270
 _PATIENCE = 0.1  # seconds between two looks at whether a picture is still wanted
+_ANSWER = 5.0  # seconds that a job waits for the window to free memory
 
 _said: set[str] = set()  # what is said once
 
@@ -54,7 +56,9 @@ def _never() -> bool:
 
 def _result(future: Future, stopped):
     """The future's result. StoppedError: it is not waited for any longer."""
-    while not wait([future], _PATIENCE).done:
+    while not wait([future], 0 if in_window() else _PATIENCE).done:
+        if in_window():
+            gpu_relay.serve()
         if stopped():
             raise StoppedError
     return future.result()
@@ -64,13 +68,15 @@ def _result(future: Future, stopped):
 class RenderSettings:
     """What a command sets for its render.
 
-    device: one of compute.renderer.DEVICES, for renders without a window
+    device: one of devices.CHOICES, in place of the user's preference
     weights: folder for the coefficients of every picture, as EXR files
-    inbetween: folder of in-between frames, in place of the effects' own"""
+    inbetween: folder of in-between frames, in place of the effects' own
+    gpu_memory: megabytes of the GPU that textures may take, in place of the user's preference; 0: as budget.allowed"""
 
-    device: str = "auto"
+    device: str | None = None
     weights: Path | None = None
     inbetween: Path | None = None
+    gpu_memory: int | None = None
 
 
 @dataclass(frozen=True)
@@ -133,16 +139,29 @@ class FrameRequest:
 class RenderSession:
     """A compositor, opened when it is first used, and the renderers of the effects that were shown last."""
 
-    def __init__(self, open_device, threaded: bool = False):
-        """threaded: the device belongs to a thread of its own; otherwise to whichever calls."""
-        self._open = open_device
-        self.threaded = threaded
+    def __init__(self, choose: Callable[[], tuple[str, str | None]], ask_others: Callable[[], None]):
+        """choose: gives the device, as devices.choose; ask_others: called where the GPU has no room, has others free
+        what they hold of it."""
+        self._choose, self._ask_others = choose, ask_others
+        self._chosen: tuple[str, str | None] | None = None
         self._executor: ThreadPoolExecutor | None = None
         self._compositor = None
         self._renderers: dict = {}
         self._requests: dict[int, tuple[Snapshot, float, FrameRequest]] = {}  # by scene: the last one
         self._shown: dict[int, float] = {}  # by scene: the timeline frame that was shown last
         self._begun: dict[int, tuple[tuple, Future]] = {}  # by scene: the key of a request, its picture
+
+    @property
+    def device(self) -> str:
+        """Its device, a key of devices.OPEN; it stays until all is forgotten. NoDeviceError: there is none."""
+        if self._chosen is None:
+            self._chosen = self._choose()
+        return self._chosen[0]
+
+    @property
+    def threaded(self) -> bool:
+        """Whether the device belongs to a thread of its own; otherwise to whichever calls."""
+        return self.device != "blender"
 
     def run(self, function, *arguments, stopped=_never):
         """The result of a function that uses the device. StoppedError: it is not waited for any longer."""
@@ -213,8 +232,8 @@ class RenderSession:
     def _renderer(self, snapshot: Snapshot, say, divisor: int | None) -> Renderer:
         """The renderer of the effect's source at that size: the only one that the effect has."""
         if self._compositor is None:
-            self._compositor, message = self.run(self._open)
-            if message:
+            self._compositor = self.run(devices.OPEN[self.device], _memory(), self._ask_others)
+            if message := self._chosen[1]:
                 say(message)
         old_key, renderer = self._renderers.pop(snapshot.scene, ((None, 1), None))
         key = (snapshot.source, snapshot.inbetween, snapshot.built), divisor or old_key[1]
@@ -227,6 +246,11 @@ class RenderSession:
         while len(self._renderers) > _KEPT:
             self.run(self._renderers.pop(next(iter(self._renderers)))[1].close)
         return renderer
+
+    def free(self) -> None:
+        """Frees what its renderers have on the device. They make it again."""
+        for _key, renderer in list(self._renderers.values()):
+            self.run(renderer.release)
 
     def forget_requests(self) -> None:
         """Lets go of the last requests, and of their snapshots."""
@@ -256,6 +280,16 @@ class RenderSession:
         if self._executor is not None:
             self._executor.shutdown()
             self._executor = None
+        self._chosen = None
+
+    def settle(self) -> None:
+        """Forgets all if the device is not the one that would be chosen now."""
+        try:
+            if self._chosen is None or self._chosen[0] == self._choose()[0]:
+                return
+        except NoDeviceError:
+            pass  # met again when a picture is asked for
+        self.forget()
 
 
 _settings = RenderSettings()
@@ -277,37 +311,62 @@ def settings() -> RenderSettings:
     return _settings
 
 
-# Blender's own GPU belongs to its main thread. Renders on another one, and without a window, have a context apart, and
-# a thread for it: beside Blender's own another one cannot always be current (see GLDevice). Without moderngl there is
-# no such context, and in the background Blender's own does.
-_offscreen = RenderSession(lambda: open_compositor(_settings.device), threaded=True)
-_window = RenderSession(lambda: (GPUCompositor(BlenderDevice()), None))
+def wanted() -> str:
+    """The device that the command asks for, else the user's preference: one of devices.CHOICES."""
+    return _settings.device or preferences.device()
+
+
+def _wanted_memory() -> int:
+    """The megabytes that the command sets, else the user's preference; 0: as many as are allowed."""
+    return preferences.gpu_memory() if _settings.gpu_memory is None else _settings.gpu_memory
+
+
+def _memory() -> Budget:
+    """What the textures of both sessions may take together: it is one GPU, which OpenGL knows best."""
+    global _budget
+    if _budget is None:
+        megabytes = _wanted_memory()
+        _budget = megabytes, Budget(megabytes * MEGABYTE if megabytes else devices.opengl().memory)
+    return _budget[1]
+
+
+def _ask_window() -> None:
+    """Has the window free what it shows, for a job: it is not drawn meanwhile, and makes it again."""
+    gpu_relay.call(_window.free, _ANSWER) if render_job.in_job() else _window.free()
+
+
+def _ask_offscreen() -> None:
+    """Has renders free what they keep for the next one, unless one runs."""
+    if not render_job.runs():
+        _offscreen.free()
+
+
+_budget: tuple[int, Budget] | None = None  # with the megabytes that it was made for
+
+# What the window itself shows is made on its main thread, by its GPU. Renders have a context apart and a thread for it,
+# for beside Blender's own another one cannot always be current (see GLDevice); or Blender's GPU, with textures of their
+# own, in a job's own context.
+_offscreen = RenderSession(lambda: devices.choose(wanted()), _ask_window)
+_window = RenderSession(lambda: ("blender", None), _ask_offscreen)
 
 
 def in_window() -> bool:
-    """Whether Blender's own GPU may be used: on the main thread of a Blender with a window."""
+    """Whether this is the main thread of a Blender with a window."""
     return not bpy.app.background and threading.current_thread() is threading.main_thread()
-
-
-def _borrows() -> bool:
-    """Whether a background render is on Blender's own GPU, as it can have none apart."""
-    on_main = threading.current_thread() is threading.main_thread()
-    return bpy.app.background and on_main and _settings.device != "cpu" and _lacks_moderngl() and opens_in_background()
-
-
-@lru_cache
-def _lacks_moderngl() -> bool:
-    """Whether moderngl is missing, as in a package without wheels, or made for another Python."""
-    try:
-        from ...compute import gl  # noqa: F401
-    except ImportError:
-        return True
-    return False
 
 
 def here() -> RenderSession:
     """The session of whoever calls: the window's own on its main thread, else the offscreen one."""
-    return _window if in_window() or _borrows() else _offscreen
+    return _window if in_window() else _offscreen
+
+
+def settle() -> None:
+    """Before a render, on the main thread: its device and its memory are what the user wants now."""
+    global _budget
+    if _budget is not None and _budget[0] != _wanted_memory():
+        forget()
+        _budget = None
+    _offscreen.settle()
 
 
 def _in_blocks(state: FrameState, divisor: int) -> FrameState:
@@ -335,15 +394,40 @@ def picture(
         names = [shutter.name for shutter in snapshot.effect.shutters]
         place = _settings.weights / f"{round(frame - snapshot.first + 1):04d}.exr"
         write_exr(place, np.moveaxis(here().coefficients(request, stopped), 0, -1), names)
-    return here().picture(snapshot.scene, request, stopped)
+    result = here().picture(snapshot.scene, request, stopped)
+    for sentence in shortages(request):
+        _say_once(sentence, say)
+    return result
+
+
+def _say_once(sentence: str, say) -> None:
+    if sentence not in _said:
+        _said.add(sentence)
+        say(sentence)
 
 
 def _say_of_cuts(say) -> None:
     if package := cuts.missing_package():
         sentence = f"Stop at Cuts finds none, and windows run across them: the Python package {package} is missing"
-        if sentence not in _said:
-            _said.add(sentence)
-            say(sentence)
+        _say_once(sentence, say)
+
+
+def shortages(request: FrameRequest) -> list[str]:
+    """Sentences about what is slow in pictures as requested, for the GPU has no room."""
+    found, source = request.renderer.shortages(), request.renderer.source
+    words = {"width": source.width, "height": source.height, "frames": request.state.options.window}
+    words["limit"] = _memory().limit // MEGABYTE if found else 0
+    sentences = {
+        "window": rpt_(
+            "the {limit} MB that may be taken of the GPU are too few for {frames} frames of {width}×{height}: all are"
+            " sent for every picture, which is slow"
+        ),
+        "diffusion": rpt_(
+            "the {limit} MB that may be taken of the GPU are too few to diffuse {width}×{height}: NumPy does it, which"
+            " is slow"
+        ),
+    }
+    return [sentences[name].format(**words) for name in sorted(found)]
 
 
 def pairs(snapshot: Snapshot) -> set[int]:

@@ -1,0 +1,64 @@
+"""The extension's preferences."""
+
+import bpy
+from bpy.props import EnumProperty, IntProperty
+
+from .properties import CONTEXT
+
+ADDON = __package__.rpartition(".shutter_addon")[0] or "shutter_addon"
+
+DEVICES = (
+    ("AUTO", "Automatic", "OpenGL 4.3 where there is one, else Blender's own GPU, else NumPy"),
+    ("GPU", "GPU", "As Automatic, but never NumPy"),
+    ("OPENGL", "OpenGL 4.3", "An OpenGL context of its own, beside Blender's"),
+    ("BLENDER", "Blender's GPU", "The GPU that Blender draws with"),
+    ("CPU", "NumPy", "The processor, which is slow"),
+)
+
+
+class ShutterPreferences(bpy.types.AddonPreferences):
+    bl_idname = ADDON
+
+    device: EnumProperty(
+        name="Render Device",
+        description="What composes renders; the preview is always composed on the GPU that Blender draws with",
+        items=DEVICES,
+        translation_context=CONTEXT,
+    )
+    gpu_memory: IntProperty(
+        name="GPU Memory",
+        description="Megabytes of the GPU's memory that frames and pictures may take, from the next render on."
+        " 0: three quarters of what there is, and half of the machine's memory at most",
+        min=0,
+        soft_max=65536,
+        translation_context=CONTEXT,
+    )
+
+    def draw(self, _context):
+        self.layout.prop(self, "device")
+        self.layout.prop(self, "gpu_memory")
+
+
+def device() -> str:
+    """The device that renders are wanted on, one of rendering.devices.CHOICES."""
+    found = _preferences()
+    return found.device.lower() if found else "auto"
+
+
+def gpu_memory() -> int:
+    """Megabytes of the GPU that textures may take; 0: as compute.budget allows."""
+    found = _preferences()
+    return found.gpu_memory if found else 0
+
+
+def _preferences() -> ShutterPreferences | None:
+    addon = bpy.context.preferences.addons.get(ADDON)
+    return addon.preferences if addon else None
+
+
+def register():
+    bpy.utils.register_class(ShutterPreferences)
+
+
+def unregister():
+    bpy.utils.unregister_class(ShutterPreferences)

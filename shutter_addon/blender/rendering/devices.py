@@ -1,0 +1,82 @@
+"""Which device renders: an OpenGL 4.3 context of its own, else Blender's own GPU, else NumPy."""
+
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import NamedTuple
+
+import bpy
+import gpu
+
+from ...compute.cpu import CPUCompositor
+from ...compute.device import NoDeviceError
+from ...compute.gpu import GPUCompositor
+from ...compute.renderer import open_gl
+from .blender_gpu import BlenderDevice, opens_in_background
+from .gpu_relay import RelayedDevice
+
+CHOICES = ("auto", "gpu", "opengl", "blender", "cpu")  # gpu: opengl, or else blender
+# Given a Budget and `ask_others`, as PagedDevice.
+OPEN = {
+    "opengl": lambda *memory: GPUCompositor(open_gl(*memory)),
+    "blender": lambda *memory: GPUCompositor(BlenderDevice(*memory)),
+    "relayed": lambda *memory: GPUCompositor(RelayedDevice(*memory)),  # Blender's from a thread of a window's job
+    "cpu": lambda *_memory: CPUCompositor(),
+}
+
+
+def choose(wanted: str) -> tuple[str, str | None]:
+    """The device that renders, a key of OPEN; and where "auto" found a lesser one, why, a sentence for the user.
+    NoDeviceError: there is none as it is wanted.
+
+    wanted: one of CHOICES"""
+    if wanted == "cpu":
+        return "cpu", None
+    lacking = "Blender's own GPU cannot be used without a window here"
+    if wanted != "blender":
+        lacking = opengl().lacking
+        if lacking is None:
+            return "opengl", None
+    if wanted != "opengl" and (not bpy.app.background or _blender_in_background()):
+        way = "blender" if bpy.app.background else "relayed"
+        return way, f"{lacking}; composing on Blender's own GPU" if wanted == "auto" else None
+    if wanted == "auto":
+        return "cpu", f"{lacking}; composing with NumPy, which is slow"
+    raise NoDeviceError(lacking)
+
+
+def name(kind: str) -> str:
+    """What a device that `choose` gave calls itself."""
+    if kind == "cpu":
+        return "NumPy"
+    return opengl().name if kind == "opengl" else gpu.platform.renderer_get()
+
+
+class OpenGL(NamedTuple):
+    """The name of an OpenGL 4.3 context's renderer and the bytes that its textures may take, or why there is none."""
+
+    name: str | None = None
+    memory: int | None = None
+    lacking: str | None = None
+
+
+@cache
+def opengl() -> OpenGL:
+    """What is known of OpenGL 4.3. It is tried once.
+
+    On a thread of its own: where Blender's context is current, another one cannot always be."""
+    with ThreadPoolExecutor(1) as thread:
+        return thread.submit(_tried).result()
+
+
+def _tried() -> OpenGL:
+    try:
+        device = open_gl()
+    except NoDeviceError as error:
+        return OpenGL(lacking=str(error))
+    device.release()
+    return OpenGL(device.name, device.budget.limit)
+
+
+def _blender_in_background() -> bool:
+    return threading.current_thread() is threading.main_thread() and opens_in_background()
