@@ -51,8 +51,9 @@ class Texture:
 
 
 class BlenderDevice(PagedDevice):
-    """A compute.device.Device, wherever Blender's GPU context is current: in draw handlers, in engines
-    that ask for it, or after gpu.init()."""
+    """A compute.device.Device, wherever Blender's GPU context is current: in draw handlers, or after gpu.init().
+
+    What begins with _ gets and gives the gpu module's own textures; RelayedDevice has it called elsewhere."""
 
     def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None):
         super().__init__(budget or Budget(), ask_others)
@@ -82,52 +83,62 @@ class BlenderDevice(PagedDevice):
         rows = max(1, _SENT_BYTES // (width * TEXEL_BYTES[sent_format.lower()]))
         for top in range(0, height, rows):
             strip = array[top : top + rows]
-            size, data = (width, len(strip)), _buffer("FLOAT", _packed(strip, packing))
-            sent = gpu.types.GPUTexture(size, layers=1, format=sent_format, data=data)
-            self.run(
-                unpacking(texture.kind, packing),
-                size,
-                textures={"sent": Texture(sent, (*size, 1), sent_format.lower())},
-                images={"stored": texture},
-                size=size,
-                top=top,
-                layer=layer,
-            )
+            sent = (width, len(strip)), sent_format, _buffer("FLOAT", _packed(strip, packing))
+            self._send(texture.gpu, unpacking(texture.kind, packing), *sent, top, layer)
+
+    def _send(self, stored: gpu.types.GPUTexture, program: Pass, size: tuple[int, int], kind: str, data, top, layer):
+        textures = {"sent": gpu.types.GPUTexture(size, layers=1, format=kind, data=data)}
+        constants = {"size": size, "top": top, "layer": layer}
+        BlenderDevice._dispatch(self, program, program.groups(size), textures, {"stored": stored}, {}, constants)
 
     def read(self, texture: Texture) -> np.ndarray:
-        """See Device. By framebuffers, for GPUTexture.read() gives a first layer alone."""
+        """See Device."""
         width, height, layers = texture.size
         dtype, _, packing = _exchanged(texture)
         components = 4 if texture.kind.startswith("rgba") else 1
         sample, kind = (np.uint32, "UINT") if packing == _WHOLE else (np.float32, "FLOAT")
         array = np.empty((layers, height, width, components), sample)
         for layer, pixels in enumerate(array):
-            framebuffer = gpu.types.GPUFrameBuffer(color_slots={"texture": texture.gpu, "layer": layer})
-            with framebuffer.bind():
-                framebuffer.read_color(0, 0, width, height, components, 0, kind, data=_buffer(kind, pixels))
+            self._read(texture.gpu, layer, (0, 0, width, height), components, kind, pixels)
         if kind == "FLOAT" and np.dtype(dtype).kind == "u":
             array = np.rint(array * np.float32(np.iinfo(dtype).max))
         return array.astype(dtype, copy=False)
 
+    def _read(self, texture: gpu.types.GPUTexture, layer: int, box, components: int, kind: str, pixels) -> None:
+        """By a framebuffer, for GPUTexture.read() gives a first layer alone."""
+        framebuffer = gpu.types.GPUFrameBuffer(color_slots={"texture": texture, "layer": layer})
+        with framebuffer.bind():
+            framebuffer.read_color(*box, components, 0, kind, data=_buffer(kind, pixels))
+
     def run(
         self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, blocks=None, **constants
     ) -> None:
+        self.bring([*(textures[name] for name in program.samplers), *(images[name] for name in program.images)])
+        self._dispatch(
+            program,
+            program.groups(extent),
+            {name: textures[name].gpu for name in program.samplers},
+            {name: images[name].gpu for name in program.images},
+            blocks,
+            constants,
+        )
+
+    def _dispatch(self, program: Pass, groups: tuple[int, int, int], textures, images, blocks, constants) -> None:
         shader = self._shaders.get(program)
         if shader is None:
             shader = self._shaders[program] = _compiled(program)
-        self.bring([*(textures[name] for name in program.samplers), *(images[name] for name in program.images)])
         shader.bind()
-        for name in program.samplers:
-            shader.uniform_sampler(name, textures[name].gpu)
-        for name in program.images:
-            shader.image(name, images[name].gpu)
+        for name, texture in textures.items():
+            shader.uniform_sampler(name, texture)
+        for name, image in images.items():
+            shader.image(name, image)
         uniforms = {name: gpu.types.GPUUniformBuf(_buffer("FLOAT", blocks[name])) for name in program.blocks}
         for name, uniform in uniforms.items():  # which must outlive the dispatch
             shader.uniform_block(name, uniform)
         for name, kind in program.constants.items():
             set_constant = shader.uniform_float if kind in ("float", "vec2") else shader.uniform_int
             set_constant(name, constants[name])
-        gpu.compute.dispatch(shader, *program.groups(extent))  # which makes the next one wait for what this one stores
+        gpu.compute.dispatch(shader, *groups)  # which makes the next one wait for what this one stores
 
     def release(self) -> None:
         self._shaders = {}

@@ -1,22 +1,22 @@
 """Blender's GPU for a thread beside its main one, which is the only one that has it: a device whose calls the main
 thread makes, a few at a time between redraws of the window.
 
-An engine's own way to it (bl_use_gpu_context) holds a lock of Blender's for as long as a picture takes, and no window is
-drawn meanwhile.
+An engine's own way to it (bl_use_gpu_context) holds a lock of Blender's for as long as a picture takes, and no window
+is drawn meanwhile.
 """
 
 import queue
 import threading
 import time
+from collections.abc import Callable
 from concurrent.futures import Future
-from contextlib import nullcontext
+from contextlib import suppress
 
 import bpy
 import gpu
-import numpy as np
 
 from ...compute.passes import Pass
-from .blender_gpu import BlenderDevice, Texture
+from .blender_gpu import BlenderDevice
 
 # Seconds of the main thread that calls take at once, if none takes longer: as many as all else took, within these.
 _LEAST, _MOST = 0.02, 0.05
@@ -31,51 +31,52 @@ _looked = 0.0  # when it looked last
 _unfinished, _batch = 0, 8  # passes that may be under way, and after how many they are waited for
 
 
-class RelayedTexture(Texture):
-    """A texture of a RelayedDevice."""
+class RelayedDevice(BlenderDevice):
+    """A compute.device.Device, on any one thread but Blender's main one. What a pass raises is met when something is
+    made, sent or read next.
 
-    def release(self) -> None:
-        _called(super().release)
+    Its own textures are lists of one, which the main thread empties: on Vulkan Blender crashes where another frees one.
+    """
 
-
-class RelayedDevice:
-    """A compute.device.Device, on any one thread but Blender's main one. What a pass raises is met at the next call of
-    another method."""
-
-    def __init__(self):
+    def __init__(self, *memory):
+        super().__init__(*memory)
         self._passes: list[Future] = []
-        self._device = self._wait_for(BlenderDevice)
-        self.name, self.max_layers, self.max_size = self._device.name, self._device.max_layers, self._device.max_size
 
-    def current(self):
-        return nullcontext(self)
+    def _make(self, *arguments) -> list:
+        return self._wait_for(lambda: [BlenderDevice._make(self, *arguments)])
 
-    def texture(self, width: int, height: int, layers: int, kind: str) -> RelayedTexture:
-        made = self._wait_for(self._device.texture, width, height, layers, kind)
-        return RelayedTexture(made.gpu, made.size, made.kind)
+    def _free(self, own: list) -> None:
+        _called(own.clear)
 
-    def write(self, texture: RelayedTexture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
-        self._wait_for(self._device.write, texture, array, layer, opaque=opaque)
+    def _send(self, stored: list, *arguments) -> None:
+        self._wait_for(lambda: BlenderDevice._send(self, *stored, *arguments))
 
-    def read(self, texture: RelayedTexture) -> np.ndarray:
-        return self._wait_for(self._device.read, texture)
+    def _read(self, texture: list, *arguments) -> None:
+        self._wait_for(lambda: BlenderDevice._read(self, *texture, *arguments))
 
-    def run(
-        self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, blocks=None, **constants
-    ) -> None:
-        bound = {"textures": textures, "images": images, "blocks": blocks}
-        self._passes.append(_called(self._device.run, program, extent, **bound, **constants))
+    def _dispatch(self, program: Pass, groups, textures: dict, images: dict, *arguments) -> None:
+        def dispatch():
+            bound = ({name: own[0] for name, own in kind.items()} for kind in (textures, images))
+            BlenderDevice._dispatch(self, program, groups, *bound, *arguments)
+
+        self._passes.append(_called(dispatch))
 
     def release(self) -> None:
-        self._wait_for(self._device.release)
+        self._wait_for(lambda: BlenderDevice.release(self))
 
-    def _wait_for(self, function, *arguments, **options):
+    def _wait_for(self, function):
         """What the function gives on the main thread, after all passes."""
-        result = _called(function, *arguments, **options).result()
+        result = _called(function).result()
         passes, self._passes = self._passes, []
         for done in passes:
             done.result()
         return result
+
+
+def ask(function: Callable[[], None], seconds: float) -> None:
+    """Has the main thread call a function, and waits for its end, but no longer than that."""
+    with suppress(TimeoutError):
+        _called(function).result(seconds)
 
 
 def serve(seconds: float = _LEAST) -> None:
@@ -83,14 +84,14 @@ def serve(seconds: float = _LEAST) -> None:
     end = time.monotonic() + seconds
     while (left := end - time.monotonic()) > 0:
         try:
-            done, function, arguments, options = _calls.get(timeout=min(left, _GAP))
+            done, function = _calls.get(timeout=min(left, _GAP))
         except queue.Empty:
             return
         _keep_looking()
         try:
-            done.set_result(function(*arguments, **options))
+            done.set_result(function())
         except Exception as error:
-            done.set_exception(error)
+            done.set_exception(error.with_traceback(None))  # whose frames refer to textures
         _finish_some()
 
 
@@ -107,10 +108,10 @@ def _finish_some() -> None:
         )
 
 
-def _called(function, *arguments, **options) -> Future:
+def _called(function) -> Future:
     """The function, called on the main thread after all calls before."""
     done = Future()
-    _calls.put((done, function, arguments, options))
+    _calls.put((done, function))
     with _lock:
         if _looks_until is None:
             _keep_looking()

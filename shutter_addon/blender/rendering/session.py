@@ -278,6 +278,7 @@ class RenderSession:
             self.run(self._compositor.release)
             self._compositor = None
         if self._executor is not None:
+            self.run(_never)  # what is left of a render that was stopped may need this thread
             self._executor.shutdown()
             self._executor = None
         self._chosen = None
@@ -332,7 +333,7 @@ def _memory() -> Budget:
 
 def _ask_window() -> None:
     """Has the window free what it shows, for a job: it is not drawn meanwhile, and makes it again."""
-    gpu_relay.call(_window.free, _ANSWER) if render_job.in_job() else _window.free()
+    gpu_relay.ask(_window.free, _ANSWER) if render_job.in_job() else _window.free()
 
 
 def _ask_offscreen() -> None:
@@ -343,9 +344,9 @@ def _ask_offscreen() -> None:
 
 _budget: tuple[int, Budget] | None = None  # with the megabytes that it was made for
 
-# What the window itself shows is made on its main thread, by its GPU. Renders have a context apart and a thread for it,
-# for beside Blender's own another one cannot always be current (see GLDevice); or Blender's GPU, with textures of their
-# own, in a job's own context.
+# What the window itself shows is made on its main thread, on its GPU. Renders have a device apart and a thread for it:
+# beside Blender's own GL context another one cannot always be current (see GLDevice). In the background Blender's GPU
+# belongs to the main thread, and has none.
 _offscreen = RenderSession(lambda: devices.choose(wanted()), _ask_window)
 _window = RenderSession(lambda: ("blender", None), _ask_offscreen)
 
