@@ -185,6 +185,7 @@ def test_several_effects_take_turns_and_show_the_same(limited):
             assert np.array_equal(renderer.picture(2 + index, moment()), wanted[index])
             assert type(renderer._window) is window.Sums
     assert sum(renderer._window.is_open for renderer in renderers) == 1
+    assert np.array_equal(renderers[0].picture(3, moment()), alone[0][1])  # its last one, whose texture was freed
     for renderer in renderers:
         renderer.close()
     free(compositor)

@@ -333,7 +333,8 @@ def _memory() -> Budget:
 
 def _ask_window() -> None:
     """Has the window free what it shows, for a job: it is not drawn meanwhile, and makes it again."""
-    gpu_relay.ask(_window.free, _ANSWER) if render_job.in_job() else _window.free()
+    if render_job.in_job():
+        gpu_relay.ask(_window.free, _ANSWER)
 
 
 def _ask_offscreen() -> None:

@@ -58,6 +58,18 @@ MESSAGES = {
     ("*", '"{effect}" has no shutter'): "„{effect}“ hat keinen Verschluss",
     ("*", 'scene "{scene}" belongs to no Shutter strip'): "Szene „{scene}“ gehört zu keinem Verschlussstreifen",
     ("*", 'the source strip of "{strip}" was deleted'): "der Quellstreifen von „{strip}“ wurde gelöscht",
+    (
+        "*",
+        "the {limit} MB that may be taken of the GPU are too few for {frames} frames of {width}×{height}: all are sent"
+        " for every picture, which is slow",
+    ): "die {limit} MB, die von der GPU genommen werden dürfen, reichen nicht für {frames} Einzelbilder von"
+    " {width}×{height}: für jedes Bild werden alle neu gesendet, und das ist langsam",
+    (
+        "*",
+        "the {limit} MB that may be taken of the GPU are too few to diffuse {width}×{height}: NumPy does it, which is"
+        " slow",
+    ): "die {limit} MB, die von der GPU genommen werden dürfen, reichen für die Diffusion auf {width}×{height} nicht:"
+    " NumPy rechnet sie, und das ist langsam",
     ("*", "the effect was deleted while it was rendered"): "der Effekt wurde gelöscht, während er gerendert wurde",
     ("*", 'the scene of "{strip}" was deleted'): "die Szene von „{strip}“ wurde gelöscht",
     ("*", 'the scene of "{strip}" has no camera'): "die Szene von „{strip}“ hat keine Kamera",
