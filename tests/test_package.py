@@ -319,7 +319,8 @@ def test_installed_without_wheels(blender, dist, bunny, recipe, tmp_path):
     edit, first = tmp_path / "edit.blend", frames / "0001.png"
     blender.run("-b", "--python-exit-code", 1, "--python", MAKE_EDIT, "--", first, recipe, edit, NAME)
     cuts = "Virtual Shutter: Stop at Cuts finds none, and windows run across them: the Python package"
-    blender.run("-b", edit, "-o", tmp_path / "real" / "####", "-s", 1, "-e", 2, "-a", says=[cuts])
+    borrowed = "composing on Blender's own GPU"
+    blender.run("-b", edit, "-o", tmp_path / "real" / "####", "-s", 1, "-e", 2, "-a", says=[borrowed, cuts])
     command, options = ("--command", "shutter", "render"), ("--recipe", recipe, "--output", tmp_path / "real")
     blender.run(*command, first, *options, "--frames", 3, "--device", "gpu", says=[cuts])
     numpy = "composing with NumPy, which is slow"

@@ -11,7 +11,17 @@ import bpy  # before its addon_utils
 
 NAME = "bl_ext.user_default.virtual_shutter"
 MENUS = ("SEQUENCER_MT_add_effect", "SEQUENCER_MT_strip", "SEQUENCER_MT_context_menu")
-BASES = ("Gizmo", "GizmoGroup", "Menu", "Operator", "Panel", "PropertyGroup", "RenderEngine", "UIList")
+BASES = (
+    "AddonPreferences",
+    "Gizmo",
+    "GizmoGroup",
+    "Menu",
+    "Operator",
+    "Panel",
+    "PropertyGroup",
+    "RenderEngine",
+    "UIList",
+)
 OWNERS = ("Scene", "Strip", "WindowManager")
 
 

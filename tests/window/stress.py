@@ -1,9 +1,11 @@
 """A film renders as a job of the window while an editor goes on working: run inside Blender, by test_window.py.
 
-Frames of each film go to a folder of its name in SHUTTER_PICTURES; what they have to be is test_window.py's."""
+Frames of each film go to a folder of its name in SHUTTER_PICTURES; what they have to be is test_window.py's.
+SHUTTER_HIDDEN: a package that shall be missing."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folders)
 import json
+import os
 import random
 import sys
 import threading
@@ -12,6 +14,8 @@ from functools import partial
 from pathlib import Path
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
+if os.environ.get("SHUTTER_HIDDEN"):
+    sys.modules[os.environ["SHUTTER_HIDDEN"]] = None  # there is no such module
 
 import bpy
 import numpy as np

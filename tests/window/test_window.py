@@ -54,11 +54,11 @@ def test_blender_quits_after_a_render(tmp_path):
 
 
 def test_without_wheels(tmp_path):
-    """Blender's own GPU in the preview; a render's thread may not use it, takes NumPy and says so."""
+    """The preview and a render's thread are on Blender's own GPU; it says why."""
     ((seen,), console) = tell("without_wheels.py", "opengl", linked(tmp_path))
     (said,) = seen["said"]
     assert "moderngl" in said
-    assert "composing with NumPy, which is slow" in said
+    assert "composing on Blender's own GPU" in said
     assert said in console
     assert "Traceback" not in console
 
@@ -87,6 +87,35 @@ def test_preview_and_film_take_turns_where_the_gpu_is_small(tmp_path):
         assert found["kept"][1] is None
         assert found["most"] <= found["limit"] == megabytes << 20
         for name in ("0001.png", "0002.png", "0003.png", "0004.png"):
+            apart = np.abs(pixels(tmp_path / folder / name) - pixels(tmp_path / "expected" / name))
+            assert apart.max() <= 1, (folder, name)
+
+
+def test_films_on_blenders_own_gpu(tmp_path):
+    """In a job of the window, moderngl hidden: as moderngl renders them without a window; ten in a row, and their
+    textures take what the first one's took."""
+    (tmp_path / "frames").mkdir()
+    for number, frame in enumerate(np.random.default_rng(1).integers(0, 256, (30, 54, 96, 3), dtype=np.uint8)):
+        OpenImageIO.ImageBuf(frame).write(str(tmp_path / "frames" / f"{number + 1:04d}.png"))
+    line = {"name": "Moved", "shutter": "Sharp", "strokes": [[[0.2, 0.2], [0.6, 0.9]]], "width": 0.1}
+    line["keys"] = [{"frame": 1}, {"frame": 30, "location": [0.3, 0.1]}]
+    shutters = [{"name": "Long", "bars": [1] * 6}, {"name": "Sharp", "bars": [0, 0, 1, 0, 0, 0]}]
+    path, first = tmp_path / "recipe.json", tmp_path / "frames" / "0001.png"
+    path.write_text(json.dumps({"version": 1, "window": 6, "border": True, "shutters": shutters, "regions": [line]}))
+    given = {"footage": first, "recipe": path}
+    seen, console = tell("own_gpu_story.py", "vulkan", linked(tmp_path), **given)
+    assert "Traceback" not in console
+    assert console.count("composing on Blender's own GPU") == 2  # of each file's first film
+    held = [found for entry in seen for found in entry.values()]
+    assert {tuple(found[:2]) for found in held} == {("RelayedDevice", held[0][1])}
+    assert len({used for *_, used in held}) == 1
+    options = ("--recipe", path, "--output", tmp_path / "expected", "--device", "opengl")
+    subprocess.run([sys.executable, "-m", "shutter_addon", "render", first, *options], check=True, cwd=ROOT)
+    assert 3 <= len(list((tmp_path / "stopped").iterdir())) < 30
+    for folder, count in (("film", 30), ("short", 12), ("after", 5)):
+        names = sorted(file.name for file in (tmp_path / folder).iterdir())
+        assert names == [f"{number:04d}.png" for number in range(1, count + 1)]
+        for name in names:
             apart = np.abs(pixels(tmp_path / folder / name) - pixels(tmp_path / "expected" / name))
             assert apart.max() <= 1, (folder, name)
 
@@ -302,12 +331,13 @@ def test_renders_that_end_early(tmp_path):
     assert [entry["shown"][0] for entry in seen if "shown" in entry] == [[360, 640, 4]]
 
 
-@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
-def test_a_film_shows_what_was_when_it_began(backend, tmp_path):
+@pytest.mark.parametrize(("backend", "hidden"), [("opengl", ""), ("vulkan", "moderngl")])
+def test_a_film_shows_what_was_when_it_began(backend, hidden, tmp_path):
     """200 changes while a film renders, at the end the strip deleted: no frame is another one before, and then the
     frames are those without it. So with the source deleted, and a single picture. A film ends where the effect's scene
-    is deleted, and by undo, even while it waits for Blender's main thread."""
-    seen, console = tell("stress.py", backend, linked(tmp_path))
+    is deleted, and by undo, even while it waits for Blender's main thread. On OpenGL, and on Blender's own GPU."""
+    seen, console = tell("stress.py", backend, linked(tmp_path), hidden=hidden)
+    assert ("composing on Blender's own GPU" in console) == bool(hidden)
     assert "Traceback" not in console
     films = {entry["film"]: entry for entry in seen}
     ended = {name: film["ended"] for name, film in films.items()}

@@ -1,4 +1,4 @@
-"""The extension without any wheel, on pictures: Blender's GPU shows them, NumPy renders them on a thread, and says so.
+"""The extension without any wheel, on pictures: Blender's GPU shows them, and renders them for another thread.
 
 Run in a Blender with a window, the checkout linked as an extension."""
 

@@ -56,9 +56,14 @@ def _preferences() -> ShutterPreferences | None:
     return addon.preferences if addon else None
 
 
+classes = (ShutterPreferences,)
+
+
 def register():
-    bpy.utils.register_class(ShutterPreferences)
+    for cls in classes:
+        bpy.utils.register_class(cls)
 
 
 def unregister():
-    bpy.utils.unregister_class(ShutterPreferences)
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

@@ -5,12 +5,13 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.types import Menu, Panel, UIList
 
+from ...compute.device import NoDeviceError
 from ...media import cuts
 from ...media.tracking import SURE
 from ..data import annotations, selection, strips, validation
 from ..data.properties import CONTEXT
 from ..editing import bar_edits, follow_track, match_source, track_region
-from ..rendering import inbetween_build, matte_look
+from ..rendering import inbetween_build, matte_look, session
 from ..rendering.session import FAULTS
 from . import inbetween_operators, track_operators
 
@@ -418,6 +419,20 @@ class _Options(_WithEffect):
         column.prop(effect, "source_time")
         if effect.use_source_time and effect.inbetween == "1":
             column.label(text="No in-between frames: the nearest source frame is shown", icon="INFO")
+        _draw_devices(layout)
+
+
+def _draw_devices(layout):
+    """What composes."""
+    column = layout.column(align=True)
+    column.active = False
+    try:
+        preview, render = session.device_names()
+    except NoDeviceError as error:
+        column.label(text=str(error), icon="ERROR", translate=False)
+        return
+    for text, device in ((iface_("Preview: {device}"), preview), (iface_("Renders: {device}"), render)):
+        column.label(text=text.format(device=device), translate=False)
 
 
 class _Inbetween(_WithEffect):

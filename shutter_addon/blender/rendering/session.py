@@ -352,6 +352,12 @@ _offscreen = RenderSession(lambda: devices.choose(wanted()), _ask_window)
 _window = RenderSession(lambda: ("blender", None), _ask_offscreen)
 
 
+def device_names() -> tuple[str, str]:
+    """What the preview of a window is composed on, and its renders, as these call themselves. NoDeviceError: there is
+    none for renders as the user wants it."""
+    return devices.name("blender"), devices.name(devices.choose(wanted())[0])
+
+
 def in_window() -> bool:
     """Whether this is the main thread of a Blender with a window."""
     return not bpy.app.background and threading.current_thread() is threading.main_thread()

@@ -982,4 +982,32 @@ MESSAGES = {
         "*",
         "No in-between frames: the nearest source frame is shown",
     ): "Keine Zwischenbilder: Das nächste Bild der Quelle wird gezeigt",
+    # Devices
+    ("Virtual Shutter", "Render Device"): "Rendergerät",
+    (
+        "*",
+        "What composes renders; the preview is always composed on the GPU that Blender draws with",
+    ): "Was Renderbilder berechnet; die Vorschau berechnet immer die GPU, mit der Blender zeichnet",
+    ("Virtual Shutter", "Automatic"): "Automatisch",
+    (
+        "*",
+        "OpenGL 4.3 where there is one, else Blender's own GPU, else NumPy",
+    ): "OpenGL 4.3, wo es das gibt, sonst Blenders eigene GPU, sonst NumPy",
+    ("Virtual Shutter", "GPU"): "GPU",
+    ("*", "As Automatic, but never NumPy"): "Wie Automatisch, aber nie NumPy",
+    ("Virtual Shutter", "OpenGL 4.3"): "OpenGL 4.3",
+    ("*", "An OpenGL context of its own, beside Blender's"): "Ein eigener OpenGL-Kontext neben dem von Blender",
+    ("Virtual Shutter", "Blender's GPU"): "Blenders GPU",
+    ("*", "The GPU that Blender draws with"): "Die GPU, mit der Blender zeichnet",
+    ("Virtual Shutter", "NumPy"): "NumPy",
+    ("*", "The processor, which is slow"): "Der Prozessor, was langsam ist",
+    ("Virtual Shutter", "GPU Memory"): "GPU-Speicher",
+    (
+        "*",
+        "Megabytes of the GPU's memory that frames and pictures may take, from the next render on. 0: three quarters of"
+        " what there is, and half of the machine's memory at most",
+    ): "Megabyte des GPU-Speichers, die Einzelbilder und Ergebnisse belegen dürfen, ab dem nächsten Rendern. 0: drei"
+    " Viertel des vorhandenen und höchstens die Hälfte des Arbeitsspeichers",
+    ("*", "Preview: {device}"): "Vorschau: {device}",
+    ("*", "Renders: {device}"): "Renderbilder: {device}",
 }
