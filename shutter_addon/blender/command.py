@@ -106,6 +106,12 @@ def _seconds(text: str) -> float:
     return float(text)
 
 
+def _megabytes(text: str) -> int:
+    if not (text.isdecimal() and int(text) > 0):
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of megabytes")
+    return int(text)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("shutter", description="Every pixel its own exposure.")
     commands = parser.add_subparsers(dest="command", required=True)
@@ -122,6 +128,13 @@ def _parser() -> argparse.ArgumentParser:
         choices=devices.CHOICES,
         help="opengl: OpenGL 4.3; blender: Blender's own GPU; gpu: either; cpu: NumPy; auto: the first of these that"
         " works (default: as in Blender's preferences, else auto)",
+    )
+    render.add_argument(
+        "--gpu-memory",
+        type=_megabytes,
+        metavar="MB",
+        help="of the GPU's memory, what textures may take (default: as in Blender's preferences, else three quarters,"
+        " and half of the machine's memory at most)",
     )
     render.add_argument("--weights", type=_place, metavar="DIR", help="also write the coefficients, as float EXR")
     render.add_argument("--save", type=_place, metavar="FILE.blend", help="keep the edit")
@@ -191,7 +204,8 @@ def _render(arguments) -> None:
     if arguments.save:
         _save(edit, arguments.save)
     folder = _cache(arguments) if source_recipe.inbetween > 1 else None
-    with session.using(session.RenderSettings(arguments.device, arguments.weights if output else None, folder)):
+    weights = arguments.weights if output else None
+    with session.using(session.RenderSettings(arguments.device, weights, folder, arguments.gpu_memory)):
         if folder:
             _build_lacking(edit, folder)
         if output and arguments.weights:

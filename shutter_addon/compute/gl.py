@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import sys
+from collections.abc import Callable
 from contextlib import contextmanager
 from functools import cache
 
@@ -91,8 +92,8 @@ class GLDevice(PagedDevice):
     that context, so the calls would go to it.
     """
 
-    def __init__(self, budget: Budget | None = None):
-        super().__init__(budget or Budget())
+    def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None):
+        super().__init__(budget or Budget(), ask_others)
         backend = {"backend": "egl"} if _EGL else {}
         try:
             with _kept_context():

@@ -65,9 +65,8 @@ class PagedDevice(ABC):
     max_size: int
     max_layers: int
 
-    def __init__(self, budget: Budget):
-        self.budget = budget
-        self.ask_others: Callable[[], None] | None = None
+    def __init__(self, budget: Budget, ask_others: Callable[[], None] | None = None):
+        self.budget, self.ask_others = budget, ask_others
         self._held: dict[PagedTexture, None] = {}  # on the device, used longest ago first
         self._windows: dict = {}  # likewise; the last one is in use
 

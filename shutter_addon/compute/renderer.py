@@ -32,13 +32,14 @@ def open_compositor(device: str = "auto"):
         return CPUCompositor(), f"{error}; composing with NumPy, which is slow"
 
 
-def open_gl():
-    """A device on an OpenGL 4.3 context of its own. NoDeviceError: there is none, or no moderngl."""
+def open_gl(*memory):
+    """A device on an OpenGL 4.3 context of its own; memory: the arguments of GLDevice. NoDeviceError: there is none, or
+    no moderngl."""
     try:
         from .gl import GLDevice
     except ImportError as error:  # a package without wheels, or one for another Python
         raise NoDeviceError(f"the Python package moderngl cannot be loaded ({error})") from None
-    return GLDevice()
+    return GLDevice(*memory)
 
 
 class Renderer:

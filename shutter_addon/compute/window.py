@@ -16,8 +16,8 @@ from .running_sums import RunningSums, summable
 
 # Bytes of a texture array, at most. Mesa's software renderer reads wrong values, without an error, from one over 2 GiB.
 BAND_BYTES = 1 << 30
-# A band of frames that stay on the host, at most: bytes, and a share of what the device allows.
-SENT_BYTES, SENT_SHARE = 64 << 20, 1 / 8
+# What is sent at a time of frames that stay on the host: a share of what the device allows; bytes of a band, at most.
+SENT_SHARE, SENT_BYTES = 1 / 8, 64 << 20
 
 # Rows of pixels that one invocation of the passes through frames composes. Bands are a multiple of it high.
 BLOCK = 16
@@ -146,7 +146,7 @@ class Frames(Window):
         except NoDeviceError:
             device.use(self)
             self._host, self.sends = {}, True
-            self._divide(min(SENT_BYTES, int(device.budget.limit * SENT_SHARE)))
+            self._divide(int(device.budget.limit * SENT_SHARE))
             try:
                 self.picture = device.texture(source.width, source.height, 1, "rgba32f")
             except NoDeviceError:
@@ -155,7 +155,7 @@ class Frames(Window):
 
     def _divide(self, most: int) -> None:
         """Divides what is sent at a time, in parts of so many bytes at most if they can be."""
-        self._cut(self.source.width * self.pixel_bytes * self.layers, min(most, BAND_BYTES))
+        self._cut(self.source.width * self.pixel_bytes * self.layers, min(most, SENT_BYTES, BAND_BYTES))
 
     @property
     def held(self):

@@ -63,6 +63,34 @@ def test_without_wheels(tmp_path):
     assert "Traceback" not in console
 
 
+def test_preview_and_film_take_turns_where_the_gpu_is_small(tmp_path):
+    """Each has room for the running sums of its window, and both have not."""
+    size, megabytes = (480, 270), 34
+    (tmp_path / "frames").mkdir()
+    for number, frame in enumerate(np.random.default_rng(1).integers(0, 256, (20, *size[::-1], 3), dtype=np.uint8)):
+        OpenImageIO.ImageBuf(frame).write(str(tmp_path / "frames" / f"{number + 1:04d}.png"))
+    line = {"shutter": "Sharp", "strokes": [[[0.2, 0.2], [0.6, 0.9]]], "width": 0.1}
+    shutters = [{"name": "Long", "bars": [1] * 16}, {"name": "Sharp", "bars": [1] + [0] * 15}]
+    path, first = tmp_path / "recipe.json", tmp_path / "frames" / "0001.png"
+    path.write_text(json.dumps({"version": 1, "window": 16, "border": True, "shutters": shutters, "regions": [line]}))
+    given = {"footage": first, "recipe": path, "megabytes": megabytes}
+    seen, console = tell("memory_story.py", "opengl", linked(tmp_path), **given)
+    assert "Traceback" not in console
+    options = ("--recipe", path, "--output", tmp_path / "expected", "--device", "opengl", "--frames", "1:4")
+    subprocess.run([sys.executable, "-m", "shutter_addon", "render", first, *options], check=True, cwd=ROOT)
+    sums = 17 * 8 * size[0] * size[1]
+    assert [found["device"] for found in seen] == ["GLDevice", "RelayedDevice"]
+    for found, folder in zip(seen, ("OPENGL", "BLENDER"), strict=True):
+        assert found["before"][0] > sums
+        assert found["before"][1] == found["job"][1] == found["after"][1] == "Sums"
+        assert found["freed"][1] is None
+        assert found["kept"][1] is None
+        assert found["most"] <= found["limit"] == megabytes << 20
+        for name in ("0001.png", "0002.png", "0003.png", "0004.png"):
+            apart = np.abs(pixels(tmp_path / folder / name) - pixels(tmp_path / "expected" / name))
+            assert apart.max() <= 1, (folder, name)
+
+
 def test_films_on_blenders_own_gpu(tmp_path):
     """In a job of the window, moderngl hidden: as moderngl renders them without a window; ten in a row, and their
     textures take what the first one's took."""

@@ -1,7 +1,7 @@
 """The extension's preferences."""
 
 import bpy
-from bpy.props import EnumProperty
+from bpy.props import EnumProperty, IntProperty
 
 from .properties import CONTEXT
 
@@ -25,15 +25,35 @@ class ShutterPreferences(bpy.types.AddonPreferences):
         items=DEVICES,
         translation_context=CONTEXT,
     )
+    gpu_memory: IntProperty(
+        name="GPU Memory",
+        description="Megabytes of the GPU's memory that frames and pictures may take, from the next render on."
+        " 0: three quarters of what there is, and half of the machine's memory at most",
+        min=0,
+        soft_max=65536,
+        translation_context=CONTEXT,
+    )
 
     def draw(self, _context):
         self.layout.prop(self, "device")
+        self.layout.prop(self, "gpu_memory")
 
 
 def device() -> str:
     """The device that renders are wanted on, one of rendering.devices.CHOICES."""
+    found = _preferences()
+    return found.device.lower() if found else "auto"
+
+
+def gpu_memory() -> int:
+    """Megabytes of the GPU that textures may take; 0: as compute.budget allows."""
+    found = _preferences()
+    return found.gpu_memory if found else 0
+
+
+def _preferences() -> ShutterPreferences | None:
     addon = bpy.context.preferences.addons.get(ADDON)
-    return addon.preferences.device.lower() if addon and addon.preferences else "auto"
+    return addon.preferences if addon else None
 
 
 classes = (ShutterPreferences,)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cache
@@ -54,8 +55,8 @@ class BlenderDevice(PagedDevice):
 
     What begins with _ gets and gives the gpu module's own textures; RelayedDevice has it called elsewhere."""
 
-    def __init__(self, budget: Budget | None = None):
-        super().__init__(budget or Budget())
+    def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None):
+        super().__init__(budget or Budget(), ask_others)
         self._shaders: dict[Pass, gpu.types.GPUShader] = {}
         self.name = gpu.platform.renderer_get()
         self.max_layers = gpu.capabilities.max_texture_layers_get()

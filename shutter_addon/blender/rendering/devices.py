@@ -3,6 +3,7 @@
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from typing import NamedTuple
 
 import bpy
 import gpu
@@ -15,11 +16,12 @@ from .blender_gpu import BlenderDevice, opens_in_background
 from .gpu_relay import RelayedDevice
 
 CHOICES = ("auto", "gpu", "opengl", "blender", "cpu")  # gpu: opengl, or else blender
+# Given a Budget and `ask_others`, as PagedDevice.
 OPEN = {
-    "opengl": lambda: GPUCompositor(open_gl()),
-    "blender": lambda: GPUCompositor(BlenderDevice()),
-    "relayed": lambda: GPUCompositor(RelayedDevice()),  # Blender's from a thread of a window's job
-    "cpu": CPUCompositor,
+    "opengl": lambda *memory: GPUCompositor(open_gl(*memory)),
+    "blender": lambda *memory: GPUCompositor(BlenderDevice(*memory)),
+    "relayed": lambda *memory: GPUCompositor(RelayedDevice(*memory)),  # Blender's from a thread of a window's job
+    "cpu": lambda *_memory: CPUCompositor(),
 }
 
 
@@ -32,7 +34,7 @@ def choose(wanted: str) -> tuple[str, str | None]:
         return "cpu", None
     lacking = "Blender's own GPU cannot be used without a window here"
     if wanted != "blender":
-        _name, lacking = opengl()
+        lacking = opengl().lacking
         if lacking is None:
             return "opengl", None
     if wanted != "opengl" and (not bpy.app.background or _blender_in_background()):
@@ -47,25 +49,33 @@ def name(kind: str) -> str:
     """What a device that `choose` gave calls itself."""
     if kind == "cpu":
         return "NumPy"
-    return opengl()[0] if kind == "opengl" else gpu.platform.renderer_get()
+    return opengl().name if kind == "opengl" else gpu.platform.renderer_get()
+
+
+class OpenGL(NamedTuple):
+    """The name of an OpenGL 4.3 context's renderer and the bytes that its textures may take, or why there is none."""
+
+    name: str | None = None
+    memory: int | None = None
+    lacking: str | None = None
 
 
 @cache
-def opengl() -> tuple[str | None, str | None]:
-    """The name of an OpenGL 4.3 context's renderer, or why there is no such context. It is tried once.
+def opengl() -> OpenGL:
+    """What is known of OpenGL 4.3. It is tried once.
 
     On a thread of its own: where Blender's context is current, another one cannot always be."""
     with ThreadPoolExecutor(1) as thread:
         return thread.submit(_tried).result()
 
 
-def _tried() -> tuple[str | None, str | None]:
+def _tried() -> OpenGL:
     try:
         device = open_gl()
     except NoDeviceError as error:
-        return None, str(error)
+        return OpenGL(lacking=str(error))
     device.release()
-    return device.name, None
+    return OpenGL(device.name, device.budget.limit)
 
 
 def _blender_in_background() -> bool:

@@ -8,7 +8,9 @@ is drawn meanwhile.
 import queue
 import threading
 import time
+from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import suppress
 
 import bpy
 import gpu
@@ -36,8 +38,8 @@ class RelayedDevice(BlenderDevice):
     Its own textures are lists of one, which the main thread empties: on Vulkan Blender crashes where another frees one.
     """
 
-    def __init__(self):
-        super().__init__()
+    def __init__(self, *memory):
+        super().__init__(*memory)
         self._passes: list[Future] = []
 
     def _make(self, *arguments) -> list:
@@ -69,6 +71,12 @@ class RelayedDevice(BlenderDevice):
         for done in passes:
             done.result()
         return result
+
+
+def ask(function: Callable[[], None], seconds: float) -> None:
+    """Has the main thread call a function, and waits for its end, but no longer than that."""
+    with suppress(TimeoutError):
+        _called(function).result(seconds)
 
 
 def serve(seconds: float = _LEAST) -> None:

@@ -12,7 +12,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 import OpenImageIO
+from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...compute.budget import MEGABYTE, Budget
 from ...compute.device import NoDeviceError
 from ...compute.renderer import Renderer
 from ...core import following, retiming
@@ -27,7 +29,7 @@ from ...media.prefetch import PrefetchSource
 from ...media.reduced import smaller
 from ..data import preferences
 from ..data.snapshot import Snapshot, translated
-from . import devices, gpu_relay
+from . import devices, gpu_relay, render_job
 
 FAULTS = (EffectError, MediaError, NoDeviceError, MemoryError)
 
@@ -39,6 +41,7 @@ _AHEAD, _DECODED, _DECODED_BYTES = 4, 8, 256 << 20
 # Blocks along the shorter side of a draft in which shutters follow edges.
 DRAFT_ROWS = 270
 _PATIENCE = 0.1  # seconds between two looks at whether a picture is still wanted
+_ANSWER = 5.0  # seconds that a job waits for the window to free memory
 
 _said: set[str] = set()  # what is said once
 
@@ -68,11 +71,13 @@ class RenderSettings:
     device: one of devices.CHOICES, in place of the user's preference
     weights: folder for the coefficients of every picture, as EXR files
     inbetween: folder of in-between frames, in place of the effects' own
+    gpu_memory: megabytes of the GPU that textures may take, in place of the user's preference; 0: as budget.allowed
     levels: pictures are those of Renderer.levels"""
 
     device: str | None = None
     weights: Path | None = None
     inbetween: Path | None = None
+    gpu_memory: int | None = None
     levels: bool = False
 
 
@@ -147,9 +152,10 @@ class FrameRequest:
 class RenderSession:
     """A compositor, opened when it is first used, and the renderers of the effects that were shown last."""
 
-    def __init__(self, choose: Callable[[], tuple[str, str | None]]):
-        """choose: gives the device, as devices.choose."""
-        self._choose = choose
+    def __init__(self, choose: Callable[[], tuple[str, str | None]], ask_others: Callable[[], None]):
+        """choose: gives the device, as devices.choose; ask_others: called where the GPU has no room, has others free
+        what they hold of it."""
+        self._choose, self._ask_others = choose, ask_others
         self._chosen: tuple[str, str | None] | None = None
         self._executor: ThreadPoolExecutor | None = None
         self._compositor = None
@@ -239,7 +245,7 @@ class RenderSession:
     def _renderer(self, snapshot: Snapshot, say, divisor: int | None) -> Renderer:
         """The renderer of the effect's source at that size: the only one that the effect has."""
         if self._compositor is None:
-            self._compositor = self.run(devices.OPEN[self.device])
+            self._compositor = self.run(devices.OPEN[self.device], _memory(), self._ask_others)
             if message := self._chosen[1]:
                 say(message)
         old_key, renderer = self._renderers.pop(snapshot.scene, ((None, 1), None))
@@ -253,6 +259,11 @@ class RenderSession:
         while len(self._renderers) > _KEPT:
             self.run(self._renderers.pop(next(iter(self._renderers)))[1].close)
         return renderer
+
+    def free(self) -> None:
+        """Frees what its renderers have on the device. They make it again."""
+        for _key, renderer in list(self._renderers.values()):
+            self.run(renderer.release)
 
     def forget_requests(self) -> None:
         """Lets go of the last requests, and of their snapshots."""
@@ -319,11 +330,39 @@ def wanted() -> str:
     return _settings.device or preferences.device()
 
 
+def _wanted_memory() -> int:
+    """The megabytes that the command sets, else the user's preference; 0: as many as are allowed."""
+    return preferences.gpu_memory() if _settings.gpu_memory is None else _settings.gpu_memory
+
+
+def _memory() -> Budget:
+    """What the textures of both sessions may take together: it is one GPU, which OpenGL knows best."""
+    global _budget
+    if _budget is None:
+        megabytes = _wanted_memory()
+        _budget = megabytes, Budget(megabytes * MEGABYTE if megabytes else devices.opengl().memory)
+    return _budget[1]
+
+
+def _ask_window() -> None:
+    """Has the window free what it shows, for a job: it is not drawn meanwhile, and makes it again."""
+    if render_job.in_job():
+        gpu_relay.ask(_window.free, _ANSWER)
+
+
+def _ask_offscreen() -> None:
+    """Has renders free what they keep for the next one, unless one runs."""
+    if not render_job.runs():
+        _offscreen.free()
+
+
+_budget: tuple[int, Budget] | None = None  # with the megabytes that it was made for
+
 # What the window itself shows is made on its main thread, on its GPU. Renders have a device apart and a thread for it:
 # beside Blender's own GL context another one cannot always be current (see GLDevice). In the background Blender's GPU
 # belongs to the main thread, and has none.
-_offscreen = RenderSession(lambda: devices.choose(wanted()))
-_window = RenderSession(lambda: ("blender", None))
+_offscreen = RenderSession(lambda: devices.choose(wanted()), _ask_window)
+_window = RenderSession(lambda: ("blender", None), _ask_offscreen)
 
 
 def device_names() -> tuple[str, str]:
@@ -343,7 +382,11 @@ def here() -> RenderSession:
 
 
 def settle() -> None:
-    """Before a render, on the main thread: its device is what the user wants now."""
+    """Before a render, on the main thread: its device and its memory are what the user wants now."""
+    global _budget
+    if _budget is not None and _budget[0] != _wanted_memory():
+        forget()
+        _budget = None
     _offscreen.settle()
 
 
@@ -372,15 +415,40 @@ def picture(
         names = [shutter.name for shutter in snapshot.effect.shutters]
         place = _settings.weights / f"{round(frame - snapshot.first + 1):04d}.exr"
         write_exr(place, np.moveaxis(here().coefficients(request, stopped), 0, -1), names)
-    return here().picture(snapshot.scene, request, stopped)
+    result = here().picture(snapshot.scene, request, stopped)
+    for sentence in shortages(request):
+        _say_once(sentence, say)
+    return result
+
+
+def _say_once(sentence: str, say) -> None:
+    if sentence not in _said:
+        _said.add(sentence)
+        say(sentence)
 
 
 def _say_of_cuts(say) -> None:
     if package := cuts.missing_package():
         sentence = f"Stop at Cuts finds none, and windows run across them: the Python package {package} is missing"
-        if sentence not in _said:
-            _said.add(sentence)
-            say(sentence)
+        _say_once(sentence, say)
+
+
+def shortages(request: FrameRequest) -> list[str]:
+    """Sentences about what is slow in pictures as requested, for the GPU has no room."""
+    found, source = request.renderer.shortages(), request.renderer.source
+    words = {"width": source.width, "height": source.height, "frames": request.state.options.window}
+    words["limit"] = _memory().limit // MEGABYTE if found else 0
+    sentences = {
+        "window": rpt_(
+            "the {limit} MB that may be taken of the GPU are too few for {frames} frames of {width}×{height}: all are"
+            " sent for every picture, which is slow"
+        ),
+        "diffusion": rpt_(
+            "the {limit} MB that may be taken of the GPU are too few to diffuse {width}×{height}: NumPy does it, which"
+            " is slow"
+        ),
+    }
+    return [sentences[name].format(**words) for name in sorted(found)]
 
 
 def pairs(snapshot: Snapshot) -> set[int]:

@@ -58,6 +58,18 @@ MESSAGES = {
     ("*", '"{effect}" has no shutter'): "„{effect}“ hat keinen Verschluss",
     ("*", 'scene "{scene}" belongs to no Shutter strip'): "Szene „{scene}“ gehört zu keinem Verschlussstreifen",
     ("*", 'the source strip of "{strip}" was deleted'): "der Quellstreifen von „{strip}“ wurde gelöscht",
+    (
+        "*",
+        "the {limit} MB that may be taken of the GPU are too few for {frames} frames of {width}×{height}: all are sent"
+        " for every picture, which is slow",
+    ): "die {limit} MB, die von der GPU genommen werden dürfen, reichen nicht für {frames} Einzelbilder von"
+    " {width}×{height}: für jedes Bild werden alle neu gesendet, und das ist langsam",
+    (
+        "*",
+        "the {limit} MB that may be taken of the GPU are too few to diffuse {width}×{height}: NumPy does it, which is"
+        " slow",
+    ): "die {limit} MB, die von der GPU genommen werden dürfen, reichen für die Diffusion auf {width}×{height} nicht:"
+    " NumPy rechnet sie, und das ist langsam",
     ("*", "the effect was deleted while it was rendered"): "der Effekt wurde gelöscht, während er gerendert wurde",
     ("*", 'the scene of "{strip}" was deleted'): "die Szene von „{strip}“ wurde gelöscht",
     ("*", 'the scene of "{strip}" has no camera'): "die Szene von „{strip}“ hat keine Kamera",
@@ -989,6 +1001,13 @@ MESSAGES = {
     ("*", "The GPU that Blender draws with"): "Die GPU, mit der Blender zeichnet",
     ("Virtual Shutter", "NumPy"): "NumPy",
     ("*", "The processor, which is slow"): "Der Prozessor, was langsam ist",
+    ("Virtual Shutter", "GPU Memory"): "GPU-Speicher",
+    (
+        "*",
+        "Megabytes of the GPU's memory that frames and pictures may take, from the next render on. 0: three quarters of"
+        " what there is, and half of the machine's memory at most",
+    ): "Megabyte des GPU-Speichers, die Einzelbilder und Ergebnisse belegen dürfen, ab dem nächsten Rendern. 0: drei"
+    " Viertel des vorhandenen und höchstens die Hälfte des Arbeitsspeichers",
     ("*", "Preview: {device}"): "Vorschau: {device}",
     ("*", "Renders: {device}"): "Renderbilder: {device}",
 }

@@ -1,0 +1,76 @@
+"""A limit of the GPU's memory: the command's option, what is told, and what is given back."""
+
+import numpy as np
+import pytest
+from support import picture_of, read_picture, recipe, write_frames
+
+SIZE = 480, 270
+# In megabytes, for windows of 8 frames of that size: room for their running sums, and for no window.
+ROOMY, SMALL = 64, 12
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory):
+    """The first of ten frames, and a recipe whose scribble moves."""
+    frames = np.random.default_rng(0).integers(0, 256, (10, SIZE[1], SIZE[0], 3), dtype=np.uint8)
+    keys = [{"frame": 1}, {"frame": 10, "location": [0.3, 0.1]}]
+    moved = {"shutter": "S1", "strokes": [[[0.2, 0.2], [0.5, 0.8]]], "width": 0.1, "keys": keys}
+    data = recipe(8, np.ones(8), [1] + [0] * 7, regions=[moved], border=True)
+    return write_frames(tmp_path_factory.mktemp("film"), frames), data
+
+
+def pictures(folder):
+    return np.array([read_picture(path) for path in sorted(folder.iterdir())])
+
+
+def test_little_memory_shows_the_same_and_says_so_once(command, film, tmp_path):
+    first, data = film
+    for name, megabytes in (("roomy", ROOMY), ("small", SMALL)):
+        options = "--output", tmp_path / name, "--frames", "1:3", "--gpu-memory", str(megabytes)
+        done = command(first, *options, recipe=data)
+        told = "the 12 MB that may be taken of the GPU are too few for 8 frames of 480×270: all are sent for every"
+        assert done.stderr.count(told) == (name == "small"), done.stderr
+    command(first, "--output", tmp_path / "part", "--frames", "3", "--gpu-memory", str(SMALL), recipe=data)
+    roomy, small, part = (pictures(tmp_path / name) for name in ("roomy", "small", "part"))
+    assert np.abs(small - roomy).max() <= 1 / 16
+    assert np.array_equal(part[0], small[2])
+
+
+def test_what_cannot_be_is_a_sentence(command, film, tmp_path):
+    first, data = film
+    done = command(first, "--output", tmp_path / "none", "--gpu-memory", "1", recipe=data, check=False)
+    assert done.returncode == 2
+    assert "has no room for" in done.stderr
+    assert "in the 1 MB that it may take" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("given", ["0", "-5", "1.5", "much"])
+def test_a_limit_is_a_number_of_megabytes(bpy, capsys, given):
+    from shutter_addon.blender.command import main
+
+    assert main(["render", "film.mp4", "--recipe", "r.json", "--output", "out", "--gpu-memory", given]) == 2
+    assert "--gpu-memory: " in capsys.readouterr().err
+
+
+def test_a_session_gives_back_what_it_took_and_settles_for_another_limit(bpy, edit, effect):
+    from shutter_addon.blender.rendering import session
+
+    session.forget()
+    with session.using(session.RenderSettings(gpu_memory=ROOMY)):
+        session.settle()
+        picture = picture_of(effect.scene, 1)
+        budget = session._memory()
+        assert (budget.limit, budget.used > 0) == (ROOMY << 20, True)
+        session._offscreen.free()
+        assert np.array_equal(picture_of(effect.scene, 1), picture)
+    with session.using(session.RenderSettings(gpu_memory=SMALL)):
+        session.settle()
+        assert budget.used == 0
+        assert np.abs(picture_of(effect.scene, 1) - picture).max() <= 2**-14
+        budget = session._memory()
+        assert (budget.limit, budget.used > 0) == (SMALL << 20, True)
+    session.forget()
+    assert budget.used == 0
+    session.settle()
+    assert session._memory().limit > ROOMY << 20
