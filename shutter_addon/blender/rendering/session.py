@@ -285,8 +285,16 @@ _window = RenderSession(lambda: (GPUCompositor(BlenderDevice()), None))
 
 
 def in_window() -> bool:
-    """Whether Blender's own GPU may be used: on the main thread of a Blender with a window."""
-    return not bpy.app.background and threading.current_thread() is threading.main_thread()
+    """Whether Blender's own GPU may be used: on the main thread of a Blender with a window, but not where the editor
+    renders a view there, which leaves no context to engines."""
+    on_main = not bpy.app.background and threading.current_thread() is threading.main_thread()
+    return on_main and "RENDER_OT_opengl" not in operators_running()
+
+
+def operators_running() -> set[str]:
+    """The names of the operators of all windows that wait for events; on the main thread."""
+    windows = bpy.context.window_manager.windows
+    return {operator.bl_idname for window in windows for operator in window.modal_operators}
 
 
 def _borrows() -> bool:
