@@ -94,10 +94,10 @@ def by_script(name, scene=None):
     bpy.ops.render.render(write_still=True, scene=edit.name)
 
 
-def by_opengl(name, way):
+def by_opengl(name):
     story.edit().render.filepath = str(driver.OUT / f"{name}.png")
     with driver.override("PREVIEW"):
-        bpy.ops.render.opengl(way, sequencer=True, write_still=True)
+        bpy.ops.render.opengl(sequencer=True, write_still=True)
 
 
 def played(seconds):
@@ -154,24 +154,17 @@ def tricked():
     by_script("script_again")
     story.preview().tag_redraw()
     yield 1.0
-    by_opengl("opengl", "EXEC_DEFAULT")
+    by_opengl("opengl")
     yield 1.0
-    by_opengl("opengl_invoked", "INVOKE_DEFAULT")
-    yield 2.0
     yield from played(1.5)
     story.edit().frame_set(FRAME)
-    yield from in_a_job_while_playing("playing")
+    yield from in_a_job("playing")  # of the frame that it begins with, while the playhead goes on
     yield from stopped()
     yield from in_a_handler("handler")
     by_script("scene_strip", other_edit())
     yield 1.0
     yield from shown("after")
     yield from in_a_job("job_after")
-
-
-def in_a_job_while_playing(name):
-    """A job renders the frame that it began with, while the playhead goes on."""
-    yield from in_a_job(name)
 
 
 def told():
