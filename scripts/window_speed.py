@@ -1,16 +1,23 @@
 """How quick the live preview is, measured in Blender's own window beside two references, interleaved in one run.
 
-    blender --factory-startup --python scripts/window_speed.py -- FOOTAGE.mp4 OUT.json
+    blender --factory-startup --python scripts/window_speed.py -- FOOTAGE.mp4 OUT.json \\
+        [--size 1280x720] [--percent 100] [--zoom fit|full] [--ways plain,live] [--sync NONE|FRAME_DROP]
+
+--percent: the preview's size in Blender's menu; --zoom full: a pixel of the picture to one of the screen, so that all
+of it is composed at 100 %. It tells frames per second, processor time per frame, by how much the timeline
+advanced beside the clock (1 keeps time), and the memory of the process.
 
 Any Blender 5.2 with the extension enabled, started with a window and `--python` this file, will do. Ways:
 plain: the movie strip alone; texture: its picture replaced by a draw handler that draws one texture of its size;
 engine: the effect strip, live preview off; live: the effect strip with its live preview.
 """
 
+import argparse
 import json
 import statistics
 import sys
 import time
+from pathlib import Path
 
 import bpy
 import gpu
@@ -18,7 +25,23 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 WINDOW, ROUNDS, SECONDS = 16, 3, 4.0
-FOOTAGE, OUT = sys.argv[sys.argv.index("--") + 1 :][:2]
+WAYS = "plain", "texture", "engine", "live"
+
+
+def arguments():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("footage")
+    parser.add_argument("out")
+    parser.add_argument("--size", default="1280x720")
+    parser.add_argument("--percent", default="100", choices=("25", "50", "75", "100"))
+    parser.add_argument("--zoom", default="fit", choices=("fit", "full"))
+    parser.add_argument("--ways", default=",".join(WAYS))
+    parser.add_argument("--sync", default="NONE", choices=("NONE", "FRAME_DROP"))
+    return parser.parse_args(sys.argv[sys.argv.index("--") + 1 :])
+
+
+OPTIONS = arguments()
+SIZE = tuple(map(int, OPTIONS.size.split("x")))
 
 
 def extension():
@@ -33,13 +56,14 @@ def make_edit():
     bpy.ops.wm.read_homefile(app_template="Video_Editing")
     addon_utils.enable("bl_ext.user_default.virtual_shutter")
     edit = bpy.data.scenes[0]
-    edit.render.resolution_x, edit.render.resolution_y = 1280, 720
-    edit.render.fps, edit.frame_start, edit.frame_end = 240, 1, 116
-    edit.sync_mode = "NONE"
+    edit.render.resolution_x, edit.render.resolution_y = SIZE
+    edit.render.fps, edit.frame_start = 240 if OPTIONS.sync == "NONE" else 24, 1
+    edit.sync_mode = OPTIONS.sync
     editor = edit.sequence_editor_create()
     # Finished frames would be shown again without any work: not what is measured.
     editor.use_cache_raw = editor.use_cache_final = False
-    source = editor.strips.new_movie("Footage", FOOTAGE, 1, 1)
+    source = editor.strips.new_movie("Footage", OPTIONS.footage, 1, 1)
+    edit.frame_end = source.right_handle - WINDOW - 1
     editor.active_strip = source
     return edit, source
 
@@ -70,10 +94,8 @@ def add_effect(edit, source):
 
 def texture_handler():
     """A draw handler that draws one texture of the picture's size over the preview."""
-    pixels = np.random.default_rng(0).random((720, 1280, 4), dtype=np.float32)
-    texture = gpu.types.GPUTexture(
-        (1280, 720), format="RGBA32F", data=gpu.types.Buffer("FLOAT", pixels.size, pixels.ravel())
-    )
+    pixels = np.random.default_rng(0).random((*SIZE[::-1], 4), dtype=np.float32)
+    texture = gpu.types.GPUTexture(SIZE, format="RGBA32F", data=gpu.types.Buffer("FLOAT", pixels.size, pixels.ravel()))
     shader = gpu.shader.from_builtin("IMAGE")
 
     def draw():
@@ -112,14 +134,16 @@ def timeline():
 
 
 def playing(edit, seconds):
-    """Frames per second that the preview shows; generator, whose last value is the number."""
-    count, shown = [], []
+    """What the preview shows while it plays, a dict of numbers; generator, whose last value they are."""
+    drawn_at, shown, advanced = [], [], [0]
 
     def drawn():
         # Blender may go to another frame without drawing it, and draw one twice.
         if shown != [edit.frame_current]:
+            length = edit.frame_end - edit.frame_start + 1
+            advanced[0] += (edit.frame_current - shown[0]) % length if shown else 0
             shown[:] = [edit.frame_current]
-            count.append(time.perf_counter())
+            drawn_at.append((time.perf_counter(), time.process_time()))
 
     with bpy.context.temp_override(**timeline()):
         bpy.ops.screen.animation_play()
@@ -129,7 +153,34 @@ def playing(edit, seconds):
     bpy.types.SpaceSequenceEditor.draw_handler_remove(handler, "PREVIEW")
     with bpy.context.temp_override(**timeline()):
         bpy.ops.screen.animation_cancel(restore_frame=False)
-    yield (len(count) - 1) / (count[-1] - count[0])
+    (first, first_cpu), (last, last_cpu) = drawn_at[0], drawn_at[-1]
+    count = len(drawn_at) - 1
+    yield {
+        "fps": count / (last - first),
+        "cpu ms": (last_cpu - first_cpu) / count * 1000,
+        "time kept": advanced[0] / (last - first) / edit.render.fps,
+        "resident MB": resident(),
+    }
+
+
+def resident() -> float:
+    """Megabytes of memory that the process has now; 0 where the system does not say."""
+    try:
+        lines = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text(encoding="utf-8").splitlines())
+    except OSError:
+        return 0.0
+    return int(lines["VmRSS"].split()[0]) / 1024
+
+
+def previewed():
+    """The preview as large as the options have it."""
+    area = next(a for a in timeline()["window"].screen.areas if getattr(a.spaces.active, "view_type", "") == "PREVIEW")
+    area.spaces.active.proxy_render_size = f"PROXY_{OPTIONS.percent}"
+    region = next(region for region in area.regions if region.type == "PREVIEW")
+    with bpy.context.temp_override(window=timeline()["window"], area=area, region=region):
+        bpy.ops.sequencer.view_all_preview()
+        if OPTIONS.zoom == "full":
+            bpy.ops.sequencer.view_zoom_ratio(ratio=1.0)
 
 
 def drawing(change):
@@ -157,24 +208,28 @@ def story():
     def drag(step):
         bar.weight = 0.2 + 0.05 * step
 
-    results = {f"{way} {what}": [] for way in ("plain", "texture", "engine", "live") for what in ("fps", "ms")}
+    previewed()
+    yield 1.0
+    results = {}
     for _ in range(ROUNDS):
-        for way in ("plain", "texture", "engine", "live"):
+        for way in OPTIONS.ways.split(","):
             ways(way)
             edit.frame_set(1)
             yield 0.5
-            *_, fps = yield from _collect(playing(edit, SECONDS))
-            edit.frame_set(40)
+            *_, numbers = yield from _collect(playing(edit, SECONDS))
+            edit.frame_set(min(40, edit.frame_end))
             yield 0.5
-            results[f"{way} fps"].append(fps)
-            results[f"{way} ms"].append(drawing(drag if way in ("engine", "live") else lambda step: None))
+            if OPTIONS.sync == "NONE":
+                numbers["ms"] = drawing(drag if way in ("engine", "live") else lambda step: None)
+            for name, value in numbers.items():
+                results.setdefault(f"{way} {name}", []).append(value)
             yield 0.2
     summary = {name: {"median": statistics.median(v), "all": v} for name, v in results.items()}
     summary["renderer"] = gpu.platform.renderer_get(), gpu.platform.backend_type_get()
-    with open(OUT, "w", encoding="utf-8") as file:
+    with open(OPTIONS.out, "w", encoding="utf-8") as file:
         json.dump(summary, file, indent=1)
     for name, value in summary.items():
-        print(name, f"{value['median']:.1f}" if isinstance(value, dict) else value, flush=True)
+        print(name, f"{value['median']:.2f}" if isinstance(value, dict) else value, flush=True)
     bpy.ops.wm.quit_blender()
 
 

@@ -310,6 +310,25 @@ def crop(folder, entry):
     return pixels(folder / f"{entry['step']}.png", (left, top, left + width, top + height))
 
 
+def test_previews_of_any_size_and_renders_after_them(tmp_path):
+    """At 100, 50 and 25 %, in all views and by scopes; whatever was shown before, a render is the full picture."""
+    seen, console = tell("preview_sizes_story.py", "opengl", linked(tmp_path))
+    assert "Traceback" not in console
+    steps = {entry["step"]: entry for entry in seen if "step" in entry}
+    composed = {name: entry["composed"] for name, entry in steps.items()}
+    small = [[320, 180]]
+    assert (composed["at_100"], composed["at_50"], composed["engine"]) == ([[640, 360]], [[640, 360]], [[1280, 720]])
+    assert all(composed[name] == small for name in steps if name not in ("at_100", "at_50", "engine"))
+    pictures = {name: crop(tmp_path, entry) for name, entry in steps.items()}
+    for name, most in (("at_100", 2.5), ("at_50", 2.5), ("at_25", 4), ("image", 4), ("after", 4)):
+        assert np.abs(pictures[name] - pictures["engine"]).mean() < most, name
+    assert (pictures["waveform"] > 60).mean() > 0.05
+    background = pixels(tmp_path / "background_0050.png")
+    for name in ("job", "script", "script_again", "playing", "handler", "scene_strip", "job_after"):
+        assert np.array_equal(pixels(tmp_path / f"{name}.png"), background), name
+    assert_alike(pixels(tmp_path / "opengl.png"), background, tmp_path / "opengl_difference.png")
+
+
 def test_renders_that_end_early(tmp_path):
     """A picture that fails ends the job, as Esc does: the movie is finished up to there, and a menu says why."""
     seen, console = tell("failing.py", "opengl", linked(tmp_path))

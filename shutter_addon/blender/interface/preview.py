@@ -18,7 +18,7 @@ from ..data.properties import CONTEXT
 from ..rendering import invalidation, session
 from ..rendering.blender_gpu import Texture
 from . import drawing, preview_areas, previewing
-from .previewing import Shown, shown
+from .previewing import RESULTS, Shown, shown
 
 VIEWS = (
     ("RESULT", "Result", "The finished picture"),
@@ -26,7 +26,6 @@ VIEWS = (
     ("SCRIBBLES", "Scribbles", "The source, and where each shutter is scribbled"),
     ("COEFFICIENTS", "Coefficients", "How much of each shutter a pixel gets, in the shutters' colors"),
 )
-RESULTS = "RESULT", "SPLIT"  # views that have it
 
 
 def redraw(_settings, _context) -> None:
@@ -125,7 +124,7 @@ def request_of(context, found: Shown) -> session.FrameRequest:
     exact anyway. One of session.FAULTS: it cannot be shown."""
     frame = found.edit.frame_current
     snapshot = invalidation.current(found.edit, found.effect, found.strip, frame)
-    request = session.here().request(snapshot, frame, divisor=previewing.divisor(context, found))
+    request = session.here().request(snapshot, frame, divisor=previewing.divisor(context, found.edit, found.strip))
     is_result = context.window_manager.virtual_shutter.view in RESULTS and _is_rendered(found)
     return request if is_result and not context.screen.is_animation_playing else request.draft()
 

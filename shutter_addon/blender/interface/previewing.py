@@ -17,12 +17,13 @@ from ..rendering import engine, session
 from . import preview_areas
 
 # Operators that read the sequencer's pictures, from the window; while an annotation is drawn, Blender shows it alone.
-_READERS, _PEN = {"RENDER_OT_opengl", "SEQUENCER_OT_sample"}, "GPENCIL_OT_annotate"
+_SAMPLE, _PEN = "SEQUENCER_OT_sample", "GPENCIL_OT_annotate"
 _READING_TOOL = "builtin.sample"  # reads once before it is one of those that run
 _PERCENT = {"PROXY_25": 25, "PROXY_50": 50, "PROXY_75": 75, "PROXY_100": 100}
 _STANDARD = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
 _STANDARD |= {"use_curve_mapping": False, "use_white_balance": False}
 _PLAIN_STRIP = {"blend_alpha": 1.0, "color_multiply": 1.0, "color_saturation": 1.0, "scene_input": "CAMERA"}
+RESULTS = "RESULT", "SPLIT"  # views of the live preview that show the result
 _PLAIN_SPACE = {"display_mode": "IMAGE", "display_channel": 0, "show_overexposed": 0}
 
 
@@ -67,27 +68,27 @@ def _visible(edit) -> list:
     ]
 
 
-def divisor(context, found: Shown) -> int:
+def divisor(context, edit, strip) -> int:
     """How many times smaller than its source's an effect's picture is composed each way for the previews of its edit:
     the power of two, of reduced.DIVISORS, that is nearest to the largest of them."""
-    size = annotations.picture_size(found.effect)
-    scales = [_scale(context, found, size, area) for area in _areas_of(context, found.edit)]
+    scales = [_scale(context, edit, strip, area) for area in _areas_of(context, edit)]
     scale = max((scale for scale in scales if math.isfinite(scale)), default=1.0)
     return min(DIVISORS, key=lambda number: abs(math.log2(max(scale, 1e-3) * number)))
 
 
-def _scale(context, found: Shown, size, area) -> float:
+def _scale(context, edit, strip, area) -> float:
     """How wide or high a pixel of the source is in a preview: in its picture, which is as small as Blender's menu has
     it; and on the screen, where our handler draws."""
     space = area.spaces.active
-    percent = _PERCENT.get(space.proxy_render_size, found.edit.render.resolution_percentage)
-    scale = percent / 100 * _pixel(geometry.picture_to_image(found.strip, size), size)
+    percent = _PERCENT.get(space.proxy_render_size, edit.render.resolution_percentage)
+    size = strip.scene.render.resolution_x, strip.scene.render.resolution_y
+    scale = percent / 100 * _pixel(geometry.picture_to_image(strip, size), size)
     if not context.window_manager.virtual_shutter.live:
         return percent / 100
     region = preview_areas.preview_region(area)
     if space.display_mode != "IMAGE" or min(region.width, region.height) < 2:
         return scale
-    return min(scale, _pixel(geometry.picture_to_region(found.strip, size, region), size))
+    return min(scale, _pixel(geometry.picture_to_region(strip, size, region), size))
 
 
 def _pixel(matrix, size) -> float:
@@ -105,10 +106,13 @@ def _areas_of(context, edit):
 
 def is_drawn(context, found: Shown, request: session.FrameRequest) -> bool:
     """Whether our draw handler shows the result, or in another view what covers it, in place of what Blender makes of
-    the engine's picture: wherever both are the same, in all previews of the edit."""
+    the engine's picture: wherever both are the same, in all previews of the edit. Not a still picture of full size:
+    what is drawn passes through 8 bits on its way to the screen, and lacks shades next to black."""
     edit, strip = found.edit, found.strip
+    is_less = request.renderer.source.width < annotations.picture_size(found.effect)[0]
     return (
         context.window_manager.virtual_shutter.live
+        and (is_less or _is_playing(context) or context.window_manager.virtual_shutter.view not in RESULTS)
         and not found.strips_above
         and request.renderer.source.alpha == "opaque"
         and strip.blend_type in ("REPLACE", "ALPHA_OVER")
@@ -119,22 +123,22 @@ def is_drawn(context, found: Shown, request: session.FrameRequest) -> bool:
         and not edit.render.use_multiview
         and not edit.sequence_editor.show_overlay_frame
         and all(_has(area.spaces.active, _PLAIN_SPACE) for area in _areas_of(context, edit))
-        and _PEN not in _running(context)
+        and _PEN not in session.operators_running()
     )
+
+
+def _is_playing(context) -> bool:
+    return any(window.screen.is_animation_playing for window in context.window_manager.windows)
 
 
 def _has(item, values: dict) -> bool:
     return all(getattr(item, name) == value for name, value in values.items())
 
 
-def _running(context) -> set[str]:
-    return {operator.bl_idname for window in context.window_manager.windows for operator in window.modal_operators}
-
-
 def is_read(context) -> bool:
     """Whether somebody reads the sequencer's picture from the window, for whom it has to be whole."""
     tool = context.workspace and context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
-    return bool(_READERS & _running(context)) or (tool is not None and tool.idname == _READING_TOOL)
+    return _SAMPLE in session.operators_running() or (tool is not None and tool.idname == _READING_TOOL)
 
 
 def _needed(snapshot: Snapshot, frame: float) -> tuple[int, bool]:
@@ -143,10 +147,11 @@ def _needed(snapshot: Snapshot, frame: float) -> tuple[int, bool]:
     region = context.region
     if region is None or region.type != "PREVIEW" or is_read(context):
         return 1, False
-    found = shown(context)
-    if found is None or found.effect.scene.session_uid != snapshot.scene or found.edit.frame_current != frame:
-        return 1, False
-    wanted = divisor(context, found)
+    edit, found = selection.edit_of(context), shown(context)
+    if found is None or found.effect.scene.session_uid != snapshot.scene or edit.frame_current != frame:
+        strip = next((s for s in strips.effect_strips(edit) if s.scene.session_uid == snapshot.scene), None)
+        return (divisor(context, edit, strip) if strip else 1), False
+    wanted = divisor(context, edit, found.strip)
     return wanted, is_drawn(context, found, session.here().request(snapshot, frame, divisor=wanted))
 
 

@@ -8,7 +8,7 @@ from bpy.types import Gizmo, GizmoGroup
 
 from ..data import annotations, geometry
 from ..rendering import probe, session
-from . import drawing, preview
+from . import drawing, preview, previewing
 
 _WIDTH, _HEIGHT, _LINE, _PAD, _APART = 180, 64, 17, 8, 14  # in units of the interface
 _BACK = (0.08, 0.08, 0.08, 0.85)
@@ -58,7 +58,7 @@ class SHUTTER_GT_probe(Gizmo):
     bl_idname = "SHUTTER_GT_probe"
 
     def draw(self, context):
-        found, at = preview.shown(context), tuple(context.window_manager.virtual_shutter.probe_at)
+        found, at = previewing.shown(context), tuple(context.window_manager.virtual_shutter.probe_at)
         if found is None or (matrix := _to_region(context, found)) is None:
             return
         if _is_cropped(found.strip, annotations.picture_size(found.effect), at):
@@ -72,7 +72,7 @@ class SHUTTER_GT_probe(Gizmo):
 
     def test_select(self, context, location):
         """Blender asks whenever the pointer moves: nothing else tells of it without taking events from others."""
-        found = preview.shown(context)
+        found = previewing.shown(context)
         if found is not None and (matrix := _to_region(context, found)) is not None:
             centre = np.array([location], dtype=np.float64) + 0.5
             context.window_manager.virtual_shutter.probe_at = geometry.mapped(np.linalg.inv(matrix), centre)[0]
@@ -116,7 +116,7 @@ class SHUTTER_GGT_probe(GizmoGroup):
         settings = context.window_manager.virtual_shutter
         if not (settings.live and settings.probe) or bpy.app.is_job_running("RENDER"):
             return False
-        return preview.shown(context) is not None
+        return previewing.shown(context) is not None
 
     def setup(self, _context):
         self.gizmos.new(SHUTTER_GT_probe.bl_idname)

@@ -40,6 +40,15 @@ FORMATS = {
 _SENT_BYTES = 16 << 20
 
 
+# Samplers and images, as many as any pass has.
+LETTING_GO = Pass(
+    "let_go",
+    samplers={f"sampled_{i}": "sampler2DArray" for i in range(4)},
+    images={f"stored_{i}": Image("rgba32f") for i in range(4)},
+    local_size=(1, 1, 1),
+)
+
+
 @dataclass
 class Texture:
     """A small texture array beside the device's own: its gpu.types.GPUTexture, (width, height, layers), and format (as
@@ -58,13 +67,27 @@ class BlenderDevice(PagedDevice):
     def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None):
         super().__init__(budget or Budget(), ask_others)
         self._shaders: dict[Pass, gpu.types.GPUShader] = {}
+        self._spare: Texture | None = None
         self.name = gpu.platform.renderer_get()
         self.max_layers = gpu.capabilities.max_texture_layers_get()
         self.max_size = gpu.capabilities.max_texture_size_get()
         self.budget.tell(machine_memory() if is_software(self.name) else None)
 
     def current(self):
+        if gpu.platform.backend_type_get() == "OPENGL":
+            self._let_go()
         return nullcontext(self)
+
+    def _let_go(self) -> None:
+        """Has the current OpenGL context bind no texture of ours any more.
+
+        An engine's render and what Blender draws have a context each. A texture that is freed in one of them stays
+        bound in the other; and a new one that gets its number is taken for bound there, by Blender as by Mesa, so that
+        passes would read and write the old one."""
+        if self._spare is None:
+            self._spare = Texture(self._make(1, 1, 1, "rgba32f"), (1, 1, 1), "rgba32f")
+        spares = dict.fromkeys((*LETTING_GO.samplers, *LETTING_GO.images), self._spare)
+        self.run(LETTING_GO, (1, 1), textures=spares, images=spares)
 
     def _make(self, width: int, height: int, layers: int, kind: str) -> gpu.types.GPUTexture:
         try:
@@ -141,7 +164,7 @@ class BlenderDevice(PagedDevice):
         gpu.compute.dispatch(shader, *groups)  # which makes the next one wait for what this one stores
 
     def release(self) -> None:
-        self._shaders = {}
+        self._shaders, self._spare = {}, None
 
 
 def texel(texture: Texture, x: int, y: int) -> np.ndarray:

@@ -45,7 +45,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         scene, width, height = depsgraph.scene, self.resolution_x, self.resolution_y
         shown, frame = job_snapshots.of(scene, scene.frame_current, self._stopped)
         divisor, is_drawn = 1, False
-        if session.in_window() and not (called_by_script or render_job.runs()):
+        if session.has_windows_gpu() and not (called_by_script or render_job.runs()):
             divisor, is_drawn = needed_by_preview(shown, frame)
         if divisor > 1 or is_drawn:
             invalidation.keep_until_drawn(scene.session_uid)

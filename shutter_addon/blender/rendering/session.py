@@ -376,9 +376,21 @@ def in_window() -> bool:
     return not bpy.app.background and threading.current_thread() is threading.main_thread()
 
 
+def has_windows_gpu() -> bool:
+    """Whether Blender's own GPU may be used as it is: in_window, but not where the editor renders a view there, which
+    leaves no context to engines."""
+    return in_window() and "RENDER_OT_opengl" not in operators_running()
+
+
+def operators_running() -> set[str]:
+    """The names of the operators of all windows that wait for events; on the main thread."""
+    windows = bpy.context.window_manager.windows
+    return {operator.bl_idname for window in windows for operator in window.modal_operators}
+
+
 def here() -> RenderSession:
     """The session of whoever calls: the window's own on its main thread, else the offscreen one."""
-    return _window if in_window() else _offscreen
+    return _window if has_windows_gpu() else _offscreen
 
 
 def settle() -> None:

@@ -1,0 +1,181 @@
+"""Previews of several sizes, and what reads the sequencer's pictures after them. Run inside Blender, by test_window.py.
+
+Renders of one frame go to SHUTTER_PICTURES, whatever was shown before; what they have to be is test_window.py's."""
+
+# ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
+import json
+import sys
+from pathlib import Path
+
+sys.path[:0] = [str(Path(__file__).parent)]
+
+import bpy
+import driver
+import mask_story
+import story
+
+FRAME = 50
+_part = "bl_ext.user_default.virtual_shutter.shutter_addon.blender.{}".format
+
+
+def session():
+    return sys.modules[_part("rendering.session")]
+
+
+def space():
+    return driver.area_of("SEQUENCE_EDITOR", "PREVIEW").spaces.active
+
+
+def composed():
+    """The sizes of what the window's session holds."""
+    return [[r.source.width, r.source.height] for _key, r in session()._window._renderers.values()]
+
+
+def effect_added():
+    with driver.override("SEQUENCER"):
+        assert bpy.ops.shutter.add_effect("EXEC_DEFAULT") == {"FINISHED"}
+    line = [[0.45, 0.2], [0.5, 0.8]]
+    recipe = {
+        "version": 1,
+        "window": 8,
+        "border": True,
+        "shutters": [{"name": "Long", "bars": [1] * 8}, {"name": "Sharp", "bars": [1] + [0] * 7}],
+        "regions": [{"shutter": "Sharp", "kind": "line", "width": 0.05, "strokes": [line]}],
+    }
+    (driver.OUT / "recipe.json").write_text(json.dumps(recipe))
+    with driver.override("SEQUENCER"):
+        assert bpy.ops.shutter.recipe_import(filepath=str(driver.OUT / "recipe.json")) == {"FINISHED"}
+    space().show_region_ui = space().show_gizmo = space().show_overlays = False
+    with driver.override("PREVIEW"):
+        bpy.ops.sequencer.view_all_preview()
+    yield 1.0
+
+
+def shown(name, **settings):
+    """The preview with these settings of its space."""
+    for key, value in settings.items():
+        setattr(space(), key, value)
+    region = story.preview()
+    driver.move(region, region.width / 2, region.height + 12)
+    region.tag_redraw()
+    yield 1.0
+    driver.shot(name)
+    driver.saw(step=name, crop=story.crop(), composed=composed())
+
+
+def sizes():
+    for percent in (100, 50, 25):
+        yield from shown(f"at_{percent}", proxy_render_size=f"PROXY_{percent}")
+    settings = bpy.context.window_manager.virtual_shutter
+    for view in ("SPLIT", "COEFFICIENTS", "SCRIBBLES", "RESULT"):
+        settings.view = view
+        yield from shown(f"view_{view}")
+    yield from shown("waveform", display_mode="WAVEFORM")
+    yield from shown("image", display_mode="IMAGE")
+    settings.live = False
+    yield from shown("engine", proxy_render_size="PROXY_100")
+    settings.live = True
+
+
+def in_a_job(name):
+    edit, ended = story.edit(), []
+    edit.render.filepath = str(driver.OUT / f"{name}.png")
+    bpy.app.handlers.render_complete.append(lambda *_: ended.append(True))
+    with driver.override("PREVIEW"):
+        bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
+    yield from driver.until(lambda: ended, "the render ends", 40)
+    del bpy.app.handlers.render_complete[-1]
+    yield 0.5
+
+
+def by_script(name, scene=None):
+    edit = scene or story.edit()
+    edit.render.filepath = str(driver.OUT / f"{name}.png")
+    bpy.ops.render.render(write_still=True, scene=edit.name)
+
+
+def by_opengl(name):
+    story.edit().render.filepath = str(driver.OUT / f"{name}.png")
+    with driver.override("PREVIEW"):
+        bpy.ops.render.opengl(sequencer=True, write_still=True)
+
+
+def played(seconds):
+    with driver.override("SEQUENCER"):
+        bpy.ops.screen.animation_play()
+    yield seconds
+
+
+def stopped():
+    with driver.override("SEQUENCER"):
+        bpy.ops.screen.animation_cancel(restore_frame=False)
+    story.edit().frame_set(FRAME)
+    yield 1.0
+
+
+def in_a_handler(name):
+    def render(*_):
+        by_script(name)
+
+    bpy.app.handlers.undo_post.append(render)
+    bpy.ops.ed.undo_push(message="One")
+    story.effect().shutters[1].name = "Other"
+    bpy.ops.ed.undo_push(message="Two")
+    bpy.ops.ed.undo()
+    bpy.app.handlers.undo_post.remove(render)
+    yield 1.0
+
+
+def other_edit():
+    """A scene that shows the edit as a strip."""
+    other = bpy.data.scenes.new("Other")
+    render, own = other.render, story.edit().render
+    for name in ("resolution_x", "resolution_y", "dither_intensity", "fps"):
+        setattr(render, name, getattr(own, name))
+    other.view_settings.view_transform = "Standard"
+    render.image_settings.media_type, render.image_settings.file_format = "IMAGE", "PNG"
+    strip = other.sequence_editor_create().strips.new_scene("Edit", story.edit(), 1, 1)
+    strip.scene_input = "SEQUENCER"
+    other.frame_set(FRAME)
+    return other
+
+
+def tricked():
+    """Renders of the same frame, after and between previews of a quarter's size."""
+    render = story.edit().render
+    render.image_settings.media_type, render.image_settings.file_format = "IMAGE", "PNG"
+    render.dither_intensity = 0
+    bpy.context.preferences.view.render_display_type = "NONE"
+    space().proxy_render_size = "PROXY_25"
+    yield 1.0
+    yield from in_a_job("job")
+    by_script("script")
+    yield 1.0
+    by_script("script_again")
+    story.preview().tag_redraw()
+    yield 1.0
+    by_opengl("opengl")
+    yield 1.0
+    yield from played(1.5)
+    story.edit().frame_set(FRAME)
+    yield from in_a_job("playing")  # of the frame that it begins with, while the playhead goes on
+    yield from stopped()
+    yield from in_a_handler("handler")
+    by_script("scene_strip", other_edit())
+    yield 1.0
+    yield from shown("after")
+    yield from in_a_job("job_after")
+
+
+def told():
+    yield from story.opened()
+    yield from story.movie_added()
+    story.edit().frame_set(FRAME)
+    yield from effect_added()
+    yield from sizes()
+    yield from tricked()
+    yield from mask_story.in_background(FRAME)
+
+
+if __name__ == "__main__":
+    driver.play(told)
