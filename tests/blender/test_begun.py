@@ -122,7 +122,7 @@ def test_what_a_job_takes_away_meanwhile_is_not_missed(bpy):
             return False
 
     for name in ("_shown", "_begun", "_renderers"):
-        found = session.RenderSession(None)
+        found = session.RenderSession(None, None)
         getattr(found, name)[7] = None
         found.keep({Job()})
         assert getattr(found, name) == {}
