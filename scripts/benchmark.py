@@ -41,13 +41,13 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from shutter_addon.compute import cpu, diffusion, diffusion_gpu, edge_diffusion, edge_diffusion_gpu, gpu, guide
+from shutter_addon.compute.benchmark import BARS, Noise, bars, levels_apart, reference, shapes
 from shutter_addon.compute.gl import GLDevice
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.passes import LOCAL_ROW, Image, Pass
 from shutter_addon.compute.tables import table as table_of
 from shutter_addon.compute.window import Frames
-from shutter_addon.core import compositor, light, mattes, presets, scribbles, shutters
-from shutter_addon.core.frame_source import FrameSource
+from shutter_addon.core import compositor, light, mattes, scribbles, shutters
 from shutter_addon.core.frame_state import Following, FrameState, Options
 
 HERE = Path(__file__).resolve().with_suffix("")
@@ -56,50 +56,6 @@ MATTES = ("matte", "matte_images", "matte_read", "matte_images_read", "matte_ble
 PASSES = ("compose", "accumulate", "diffuse", "diffuse_moved", "readback", "frame", *MATTES)
 MATTE_FRAMES = 24
 COPIED = 1 << 28  # bytes, beyond any cache
-BARS = {
-    # Bars that are constant over spans, and bars that change from frame to frame.
-    "preset": ("ANGLE_360", "STILL", "TWO_CUTS", "ANGLE_180", "LAST", "CUTS", "ANGLE_90", "ANGLE_45"),
-    "smooth": ("RAMP_UP", "GAUSSIAN", "TRAIL", "TRIANGLE", "RAMP_DOWN", "STILL", "ANGLE_360", "ANGLE_180"),
-}
-
-
-class Noise(FrameSource):
-    """A clip of random frames, every one another cut of the same noise."""
-
-    transfer, alpha, dtype, count = "srgb", "opaque", np.uint8, 100_000
-
-    def __init__(self, width: int, height: int):
-        self.width, self.height = width, height
-        self._size = width * height
-        rng = np.random.default_rng(0)
-        pixels = rng.integers(0, 256, (self._size + 1_000_003, 4), dtype=np.uint8)
-        pixels[:, 3] = 255
-        self._pixels = pixels
-
-    def read(self, index: int) -> np.ndarray:
-        start = index * 7919 % 1_000_003
-        return self._pixels[start : start + self._size].reshape(self.height, self.width, 4)
-
-
-def bars(kind: str, count: int, window: int) -> np.ndarray:
-    if kind == "random":
-        return np.random.default_rng(window).random((count, window))
-    return np.stack([presets.bars(name, window) for name in BARS[kind][:count]])
-
-
-def shapes(count: int) -> tuple:
-    """The paper's two lines and two lassos, and more lines where there are more shutters."""
-    drawn = [
-        ("line", [[0.1, 0.1], [0.2, 0.8]]),
-        ("line", [[0.4, 0.9], [0.6, 0.7]]),
-        ("lasso", [[0.4, 0.2], [0.6, 0.2], [0.6, 0.4], [0.4, 0.4]]),
-        ("lasso", [[0.75, 0.5], [0.9, 0.5], [0.8, 0.7]]),
-        *(("line", [[0.1 * k, 0.02], [0.1 * k, 0.08]]) for k in range(1, 10)),
-    ]
-    shutter = itertools.cycle(range(count))
-    return tuple(
-        scribbles.Shape(next(shutter), kind, 0.02, (np.array(points),)) for kind, points in drawn[: max(count, 4)]
-    )
 
 
 @cache
@@ -330,25 +286,18 @@ class Case:
         y, x = rng.integers(0, self.source.height, pixels), rng.integers(0, self.source.width, pixels)
         picture = self.readback(method)[y, x, :3].astype(np.float64)
         expected = self._followed(y, x) if method == "follow" else self._reference(y, x, method)
-        return float(np.abs(light.to_encoded(picture) - light.to_encoded(expected)).max() * 255)
+        return levels_apart(picture, expected)
 
     def _reference(self, y, x, method: str) -> np.ndarray:
-        """float64 colours (P, 3) of pixels; a few at a time, for their weights are large in between."""
+        """float64 colours (P, 3) of pixels."""
         options, block = self.state.options, self.state.options.aggregate
-        codes = np.stack([self.source.read(k)[y, x] for k in self._wanted]) / 255.0
-        frames = light.premultiplied(codes, light.to_linear)[:, None]
+        codes = np.stack([self.source.read(k)[y, x] for k in self._wanted])
         if method == "average":
-            codes = codes if options.light == "encoded" else frames[:, 0]
-            mean = codes[..., :3].mean(axis=0)
-            return light.to_linear(mean) if options.light == "encoded" else mean
-        c = self.compositor.coefficients(self.handle, len(self.state.bars))[:, y // block, x // block][:, None].astype(
-            np.float64
-        )
-        present, step = np.ones(len(frames), dtype=bool), max(1, (1 << 21) // self.state.bars.size // len(frames))
-        parts = (slice(start, start + step) for start in range(0, len(y), step))
-        return np.concatenate(
-            [compositor.compose(self.state, frames[:, :, p], present, c[..., p])[0, :, :3] for p in parts]
-        )
+            encoded = options.light == "encoded"
+            mean = (codes / 255.0 if encoded else light.to_linear(codes / 255.0))[..., :3].mean(axis=0)
+            return light.to_linear(mean) if encoded else mean
+        c = self.compositor.coefficients(self.handle, len(self.state.bars))[:, y // block, x // block]
+        return reference(self.state, codes, c)
 
     def _followed(self, y, x) -> np.ndarray:
         """float64 colours (P, 3) of pixels of what follows."""

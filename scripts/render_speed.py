@@ -16,10 +16,11 @@ ours against the NumPy compositor.
 Processor time is that of the whole process, or of ffmpeg's, divided by the film's frames. On Linux it is split by what
 /proc says of each thread, looked at every 20 ms:
 encoder: the threads that are begun when the movie is opened for writing, x264's;
-composition: those that OpenGL began with the device, a software renderer's, and its passes on the thread that calls;
+composition: those that OpenGL began with the device, a software renderer's, and on the thread that calls its passes
+and the making of its textures, which a software renderer clears;
 decoding: FFmpeg's, and the thread of ours that decodes ahead;
 device: the rest of the thread that calls the device: what is read back, and what a picture needs in Python;
-engine: the engine's own part of Blender's main thread;
+engine: our Python on Blender's main thread, and what it hands over;
 blender: all else, which is Blender's.
 outside: all but encoder and composition, to be compared with that of plain.
 """
@@ -36,7 +37,7 @@ import sys
 import tempfile
 import threading
 import time
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from functools import cache
 from pathlib import Path
 
@@ -49,7 +50,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from shutter_addon import blender
 from shutter_addon.blender.data import snapshot, strips
 from shutter_addon.blender.editing import new_edit
-from shutter_addon.blender.rendering import film_output, session
+from shutter_addon.blender.rendering import film_output, movie_feed, session
 from shutter_addon.blender.rendering.engine import VirtualShutterEngine
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.device import NoDeviceError
@@ -126,24 +127,34 @@ class ProcessorTime:
 
     @contextmanager
     def _timing(self):
-        """Inside, passes and engine are timed on the threads that call them."""
-        run, render = GLDevice.run, VirtualShutterEngine.render
+        """Inside, what is timed on the thread that calls it."""
+        with ExitStack() as kept:
+            kept.enter_context(self._timed(GLDevice, "run", "_passes"))
+            kept.enter_context(self._timed(GLDevice, "texture", "_passes"))
+            kept.enter_context(self._timed(movie_feed, "fill", "_engine"))
+            kept.enter_context(self._timed(VirtualShutterEngine, "render", "_engine"))
+            yield
 
-        def timed_run(*given, **named):
+    @contextmanager
+    def _timed(self, owner, name: str, total: str):
+        """Inside, the calling thread's time in a function of an owner is added to an attribute."""
+        function = getattr(owner, name)
+
+        def timed(*given, **named):
             start = time.thread_time()
-            run(*given, **named)
-            self._passes += time.thread_time() - start
+            try:
+                return function(*given, **named)
+            finally:
+                setattr(self, total, getattr(self, total) + time.thread_time() - start)
 
-        def timed_render(engine, depsgraph):  # Blender counts its arguments
-            start = time.thread_time()
-            render(engine, depsgraph)
-            self._engine += time.thread_time() - start
+        def of_engine(engine, depsgraph):  # Blender counts an engine's arguments
+            timed(engine, depsgraph)
 
-        GLDevice.run, VirtualShutterEngine.render = timed_run, timed_render
+        setattr(owner, name, of_engine if owner is VirtualShutterEngine else timed)
         try:
             yield
         finally:
-            GLDevice.run, VirtualShutterEngine.render = run, render
+            setattr(owner, name, function)
 
     @contextmanager
     def _noting_encoders(self):
@@ -244,13 +255,14 @@ def engine_of(way: str, footage: Path):
         yield
         return
     # Another engine would make it another strip, and the effect would go with it.
-    kept = VirtualShutterEngine.render
+    kept, feeding = VirtualShutterEngine.render, movie_feed.feeding
     with open_source(footage) as medium, PrefetchSource(LinearSource(medium)) as source:
-        VirtualShutterEngine.render = lambda engine, _depsgraph: echo(engine, source, _depsgraph)
+        VirtualShutterEngine.render = lambda engine, depsgraph: echo(engine, source, depsgraph)
+        movie_feed.feeding = nullcontext
         try:
             yield
         finally:
-            VirtualShutterEngine.render = kept
+            VirtualShutterEngine.render, movie_feed.feeding = kept, feeding
 
 
 def tmix_command(edit, footage: Path, window: int, film: Path) -> list[str]:

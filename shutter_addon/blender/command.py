@@ -2,7 +2,7 @@
 
 `python -m shutter_addon render …`, and `blender -c shutter render …` in an installed Blender. `inbetween` in place of
 `render` builds in-between frames alone, `track` has a recipe's region follow what it covers, or its camera what stands
-still.
+still, `benchmark` measures the machine.
 """
 
 import argparse
@@ -11,7 +11,7 @@ import os
 import re
 import sys
 import traceback
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
@@ -19,6 +19,7 @@ from typing import get_args
 
 import bpy
 
+from ..compute import benchmark
 from ..compute.device import NoDeviceError
 from ..core import atomic_write, recipe, region_keys, retiming
 from ..core.effect import Region
@@ -31,9 +32,11 @@ from ..media.matte_files import MatteFile
 from ..media.sequence import by_number
 from .data import inbetween_settings, snapshot, source_media, strips, validation
 from .editing import new_edit
-from .rendering import devices, film_output, session
+from .rendering import devices, film_output, machine, session
 
 BAD_INPUT = 2
+# Pixels along a picture's side, and frames of a window, that can be measured.
+MOST_PIXELS, MOST_FRAMES = 16384, 256
 FACTORS = get_args(recipe.Factor)  # 1: none
 METHODS = tuple(inbetween_settings.METHODS.values())
 FAULTS = (recipe.RecipeError, MediaError, film_output.OutputError, validation.EffectError, NoDeviceError)
@@ -59,7 +62,7 @@ def main(argv: list[str]) -> int:
     except MemoryError as error:
         return _refuse(str(error) or "not enough memory")
     except OSError as error:
-        place = next(filter(None, (getattr(arguments, name, None) for name in ("output", "save", "cache"))))
+        place = next(filter(None, (getattr(arguments, name, None) for name in ("output", "save", "cache", "json"))))
         return _refuse(film_output.in_words(error, place))
     except RuntimeError as error:  # from Blender
         return _refuse(film_output.message(error))
@@ -80,6 +83,27 @@ def _place(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError("a name is missing")
     return Path(re.sub("^//+", "/", os.path.abspath(text)))
+
+
+def _sizes(text: str) -> list[tuple[int, int]]:
+    found = [re.fullmatch(r"(\d{1,5})x(\d{1,5})", part) for part in text.split(",")]
+    sizes = [(int(match[1]), int(match[2])) for match in found if match]
+    if len(sizes) < len(found) or not all(1 <= n <= MOST_PIXELS for size in sizes for n in size):
+        raise argparse.ArgumentTypeError(f'"{sentence(text, 40)}" is not WxH,… with 1 to {MOST_PIXELS} pixels a side')
+    return sizes
+
+
+def _windows(text: str) -> list[int]:
+    found = [int(part) if re.fullmatch(r"\d{1,4}", part) else 0 for part in text.split(",")]
+    if not all(2 <= window <= MOST_FRAMES for window in found):
+        raise argparse.ArgumentTypeError(f'"{sentence(text, 40)}" is not L,… with 2 to {MOST_FRAMES} frames')
+    return found
+
+
+def _seconds(text: str) -> float:
+    if not re.fullmatch(r"\d{1,6}(\.\d{1,6})?", text):
+        raise argparse.ArgumentTypeError(f'"{sentence(text, 40)}" is no number of seconds')
+    return float(text)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -135,6 +159,14 @@ def _parser() -> argparse.ArgumentParser:
     track.add_argument("--all-keys", action="store_true", help="a key at every frame, needed or not")
     track.add_argument("--output", type=_place, required=True, metavar="R2.json", help="the recipe with the keys")
     track.add_argument("--report", type=_place, metavar="FILE.json", help="how sure each frame is, and where it ended")
+    measured = commands.add_parser("benchmark", help="measure how fast this machine composes, for a bug report")
+    measured.add_argument("--device", choices=devices.CHOICES, help="as for render")
+    measured.add_argument("--json", type=_place, metavar="FILE.json", help="also write what was measured")
+    measured.add_argument("--sizes", type=_sizes, default=benchmark.SIZES, metavar="WxH,…", help="of pictures")
+    measured.add_argument("--windows", type=_windows, default=benchmark.WINDOWS, metavar="L,…", help="their lengths")
+    measured.add_argument(
+        "--seconds", type=_seconds, default=60.0, help="about how long it may take; what would take longer is left out"
+    )
     return parser
 
 
@@ -404,4 +436,32 @@ def _is_whole(path: Path, scene: str) -> bool:
         return False
 
 
-_COMMANDS = {"render": _render, "inbetween": _build_alone, "track": _track}
+def _benchmark(arguments) -> None:
+    compositor, lesser = machine.open_device(arguments.device)
+    steps = len(arguments.sizes) * (len(arguments.windows) + 1)
+    try:
+        described = machine.described(compositor, lesser)
+        with _writing(arguments.json) as part, film_output.progress(steps, "row") as moved:
+            rows, plays = benchmark.run(compositor, arguments.sizes, arguments.windows, arguments.seconds, moved)
+            if part:
+                found = {"machine": described, "rows": rows, "plays": plays}
+                part.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    finally:
+        compositor.release()
+    print("\n".join(f"- {heading}: {value}" for heading, value in described.items()))
+    print(f"\n{benchmark.table(rows, plays)}\n\n{benchmark.MEASURED}")
+
+
+@contextmanager
+def _writing(path: Path | None):
+    """What to write in place of a file, so that it is there whole or not at all; None for none."""
+    if path is None:
+        yield None
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    film_output.clear_up(path.parent)
+    with atomic_write.writing(path) as part:
+        yield part
+
+
+_COMMANDS = {"render": _render, "inbetween": _build_alone, "track": _track, "benchmark": _benchmark}

@@ -224,6 +224,12 @@ class CPUCompositor:
     def read(self, drawn: np.ndarray) -> np.ndarray:
         return drawn
 
+    def levels(self, drawn: np.ndarray) -> np.ndarray:
+        """A picture of `draw` as Renderer.levels has it."""
+        found = np.full(drawn.shape, 255, np.uint8)
+        found[..., :3] = 255 * light.to_encoded(np.nan_to_num(drawn[..., :3]).clip(0, 1)) + np.float32(0.5)
+        return found
+
     def draw(self, window, index: int, direction: int, state: FrameState, handle, block: int) -> np.ndarray:
         """The picture (H, W, 4) float32, top row first; arguments as for GPUCompositor.draw."""
         source, options = window.source, state.options

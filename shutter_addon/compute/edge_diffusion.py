@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.conductances import cell_side, conductances
-from .diffusion import COLOURS, finished, galerkin, inner, missing, padded, part, smooth
+from .diffusion import COLOURS, finished
 
 # Cycles where the guide's cells are pixels, at most, and the iterations of conjugate gradients in each: frames of films
 # at 640 × 360 take four, specks of single pixels some forty. And cycles where the cells are larger, so that on pixels
@@ -29,6 +29,7 @@ SWEEPS = 2
 TWICE = 2
 # A cell of which more than this share of the diagonal is no tie to free cells does not follow them fully.
 GROUNDED = 1e-3
+_OFFSETS = tuple((y, x) for y in (-1, 0, 1) for x in (-1, 0, 1))
 
 
 def diffuse_along_edges(labels: np.ndarray, count: int, guide: np.ndarray, strength: float) -> np.ndarray:
@@ -44,15 +45,15 @@ def diffuse_along_edges(labels: np.ndarray, count: int, guide: np.ndarray, stren
     while grids[-1].shape != (1, 1):
         grids.append(_coarser(grids[-1]))
     solved = min(first_solved(side), len(grids) - 1)
-    solution, last = padded(labels == np.arange(1, count + 1)[:, None, None]), 0.0
+    solution, last = _padded(labels == np.arange(1, count + 1)[:, None, None]), 0.0
     for iterations in CYCLES if side == 1 else SMOOTH_CYCLES:
         flow = _unbalanced(solution, across, down) * grids[0].live
         change = _cycle(grids, flow, solved, iterations)
-        inner(solution)[:] += change
+        _inner(solution)[:] += change
         before, last = last, np.abs(change).max()
         if is_enough(last, before):
             break
-    return finished(inner(solution))
+    return finished(_inner(solution))
 
 
 def follows_edges(labels: np.ndarray, guide: np.ndarray | None, strength: float) -> bool:
@@ -93,7 +94,7 @@ def _finest(free, across, down) -> _Grid:
     for (dy, dx), weights in ties.items():
         weights = np.pad(weights, ((int(dy < 0), int(dy > 0)), (int(dx < 0), int(dx > 0))))
         diagonal += weights
-        whole[dy, dx] = weights * free * part(padded(free[None]), (dy, dx))[0]
+        whole[dy, dx] = weights * free * _part(_padded(free[None]), (dy, dx))[0]
     return _Grid(whole, diagonal * free)
 
 
@@ -118,7 +119,7 @@ def _prolongation(ties, diagonal, live):
     odd_row, odd_column = np.arange(height)[:, None] % 2 == 1, np.arange(width) % 2 == 1
 
     def near(values, dy, dx):
-        return part(padded(values[None]), (dy, dx))[0]
+        return _part(_padded(values[None]), (dy, dx))[0]
 
     between = {
         (0, 0): tie(-1, -1) + tie(0, -1) * near(north, 0, -1) + tie(-1, 0) * near(west, -1, 0),
@@ -141,15 +142,15 @@ def _prolongation(ties, diagonal, live):
 
 def _coarser(fine: _Grid) -> _Grid:
     def answer(values):
-        return -_restricted(fine, missing(fine, padded(_prolonged(fine, values)), 0.0))
+        return -_restricted(fine, _missing(fine, _padded(_prolonged(fine, values)), 0.0))
 
-    weights, diagonal = galerkin(fine.shape, answer)
+    weights, diagonal = _galerkin(fine.shape, answer)
     return _Grid(weights, np.maximum(diagonal, 0))
 
 
 def _unbalanced(solution, across, down) -> np.ndarray:
     """What flows into each pixel (N, H, W). By differences: a diagonal that is rounded would leak like a ground."""
-    values = inner(solution)
+    values = _inner(solution)
     flow = np.zeros_like(values)
     for axis, weights in ((2, across), (1, down)):
         passed = weights * np.diff(values, axis=axis)
@@ -167,22 +168,22 @@ def _cycle(grids, right, solved: int, iterations: int, twice: int = 0) -> np.nda
     twice: how many of the grids after the first are visited twice
     """
     grid, *below = grids
-    values = padded(np.zeros_like(right))
+    values = _padded(np.zeros_like(right))
     for colours in (COLOURS,) * SWEEPS:
-        smooth(grid, values, right, colours)
+        _smooth(grid, values, right, colours)
     if not below:
-        return inner(values)
-    coarse = _restricted(grid, missing(grid, values, right))
+        return _inner(values)
+    coarse = _restricted(grid, _missing(grid, values, right))
     if solved == 1:
         correction = _conjugate_gradients(below, coarse, iterations)
     else:
         correction = _cycle(below, coarse, solved - 1, iterations, twice - 1)
         if twice > 0 and len(below) > 1:
-            correction += _cycle(below, missing(below[0], padded(correction), coarse), 0, 0, twice - 1)
-    inner(values)[:] += _prolonged(grid, correction)
+            correction += _cycle(below, _missing(below[0], _padded(correction), coarse), 0, 0, twice - 1)
+    _inner(values)[:] += _prolonged(grid, correction)
     for colours in (COLOURS[::-1],) * SWEEPS:
-        smooth(grid, values, right, colours)
-    return inner(values)
+        _smooth(grid, values, right, colours)
+    return _inner(values)
 
 
 def _conjugate_gradients(grids, right, iterations: int) -> np.ndarray:
@@ -192,7 +193,7 @@ def _conjugate_gradients(grids, right, iterations: int) -> np.ndarray:
         guess = _cycle(grids, residual, 0, 0, TWICE)
         power = _dot(residual, guess)
         direction = guess + _ratio(power, before) * direction
-        answer = -missing(grids[0], padded(direction), 0.0)
+        answer = -_missing(grids[0], _padded(direction), 0.0)
         step = _ratio(power, _dot(direction, answer))
         solution = solution + step * direction
         residual = residual - step * answer
@@ -227,3 +228,63 @@ def _restricted(grid: _Grid, values) -> np.ndarray:
         shares = np.pad(weights * values, ((0, 0), (0, grid.shape[0] % 2), (0, grid.shape[1] % 2)))
         total[:, b : b + height, a : a + width] += shares.reshape(len(values), height, 2, width, 2).sum(axis=(2, 4))
     return total[:, :height, :width]
+
+
+def _galerkin(shape, answer):
+    """The next coarser grid's operator: {offset: what a cell gives its neighbour, (h, w)} and its diagonal (h, w).
+
+    shape: of the finer grid; answer: gives PᵀAP of values (N, h, w). Coarse cells three apart do not meet in a row of
+    it, so nine vectors tell all rows."""
+    height, width = ((n + 1) // 2 for n in shape)
+    rows, columns = np.arange(height) % 3, np.arange(width) % 3
+    probes = np.stack([np.outer(rows == y, columns == x) for y in range(3) for x in range(3)]).astype(np.float32)
+    answers, entries = answer(probes), {}
+    for y, x in _OFFSETS:
+        near = (rows[:, None] + y) % 3 * 3 + (columns + x) % 3
+        entries[y, x] = np.take_along_axis(answers, near[None], axis=0)[0]
+        # Grids of one or two cells: beyond the edge there is nothing.
+        entries[y, x][_beyond(height, y)] = 0
+        entries[y, x][:, _beyond(width, x)] = 0
+    diagonal = entries.pop((0, 0))
+    return {offset: -entry for offset, entry in entries.items()}, diagonal
+
+
+def _beyond(size: int, offset: int) -> np.ndarray:
+    neighbours = np.arange(size) + offset
+    return (neighbours < 0) | (neighbours >= size)
+
+
+def _smooth(level, solution, right, colours) -> None:
+    """A Gauss-Seidel sweep over the padded solution, in four colours."""
+    height, width = level.shape
+    for y, x in colours:
+        cells = np.s_[y::2, x::2]
+        total = right[:, *cells]
+        for (dy, dx), weight in level.weights.items():
+            near = solution[:, y + 1 + dy : height + 1 + dy : 2, x + 1 + dx : width + 1 + dx : 2]
+            total = total + near * weight[cells]
+        own = _inner(solution)[:, *cells]
+        np.copyto(own, total * level.inverse[cells], where=level.live[cells])
+
+
+def _missing(level, solution, right) -> np.ndarray:
+    """What the equations of the live cells of a padded solution still miss, (N, H, W)."""
+    total = right - level.diagonal * _inner(solution)
+    for offset, weight in level.weights.items():
+        total += weight * _part(solution, offset)
+    return total * level.live
+
+
+def _padded(array: np.ndarray) -> np.ndarray:
+    """(N, H, W) with a frame of zeros around, float32."""
+    return np.pad(array.astype(np.float32), ((0, 0), (1, 1), (1, 1)))
+
+
+def _inner(padded: np.ndarray) -> np.ndarray:
+    return padded[:, 1:-1, 1:-1]
+
+
+def _part(padded: np.ndarray, offset) -> np.ndarray:
+    """The neighbours at an offset (dy, dx) of all cells."""
+    dy, dx = offset
+    return padded[:, 1 + dy : padded.shape[1] - 1 + dy, 1 + dx : padded.shape[2] - 1 + dx]

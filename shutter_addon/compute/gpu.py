@@ -29,6 +29,12 @@ _PLACE = {"size": "ivec2"} | dict.fromkeys(("top", "height", "block_bits"), "int
 _LAYERS = dict.fromkeys(("origin", "direction", "layers", "lowest", "lowest_layer"), "int")
 _OF_SUMS = {"sums": Image("rgba16ui", reads=True, writes=False)}
 _UNIT = {"held": "int", "unit": "float"}
+_LEVELS = Pass(
+    "levels",
+    images={"picture": _READ, "levels": Image("rgba8")},
+    constants={"size": "ivec2"},
+    local_size=LOCAL_ROW,
+)
 # Constants that only some passes use: Blender's `gpu` has no others.
 _OF_WAY = {"pieces": ("rows",), "value": ("first", "last")} | dict.fromkeys(
     ("frames", "search"), ("rows", "first", "last")
@@ -350,6 +356,13 @@ class GPUCompositor:
     def read(self, drawn) -> np.ndarray:
         """A picture of `draw` as an array (H, W, 4) float32, top row first."""
         return self.device.read(drawn)[0, ::-1]
+
+    def levels(self, drawn) -> np.ndarray:
+        """A picture of `draw` as Renderer.levels has it."""
+        size = drawn.size[:2]
+        texture = self._texture("levels", *size, 1, "rgba8")
+        self.device.run(_LEVELS, size, images={"picture": drawn, "levels": texture}, size=size)
+        return self.device.read(texture)[0]
 
     def draw(self, window, index: int, direction: int, state: FrameState, handle, block: int):
         """The picture on the device: a texture array rgba32f of one layer, scene-linear, premultiplied, bottom row

@@ -64,6 +64,12 @@ class Renderer:
         with self.compositor.current():
             return self.compositor.read(self.draw(index, state, direction))
 
+    def levels(self, index: int, state: FrameState, direction: int = 1) -> np.ndarray:
+        """The picture over black in 8-bit sRGB (H, W, 4), top row first, its alpha full: as a movie has it where
+        Blender's view transform is Standard."""
+        with self.compositor.current():
+            return self.compositor.levels(self.draw(index, state, direction))
+
     def draw(self, index: int, state: FrameState, direction: int = 1, *, quick: bool = False):
         """The picture on the device: a texture array rgba32f of one layer, bottom row first; with NumPy, an array as of
         `picture`. It is valid until the next picture of this renderer, and composed only if it is not the last one.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from ..core import shutters
@@ -32,7 +34,13 @@ def table(state: FrameState) -> np.ndarray:
 
 
 def _pieces(bars) -> np.ndarray:
-    knots = shutters.knots(bars)
+    return _pieces_of(bars.tobytes(), bars.dtype, bars.shape)
+
+
+@lru_cache(16)
+def _pieces_of(content: bytes, dtype, shape: tuple[int, int]) -> np.ndarray:
+    """Bars seldom change from frame to frame."""
+    knots = shutters.knots(np.frombuffer(content, dtype).reshape(shape))
     start, end = padded(knots.start), padded(knots.end)
     last = np.zeros((len(start), 1, 4))
     last[:, 0, 0] = np.diff(knots.z)

@@ -10,7 +10,7 @@ _WAYS = ("frames", "search", "value")
 
 
 def _declared():
-    for module in (diffusion_gpu, edge_diffusion_gpu):
+    for module in (diffusion_gpu, edge_diffusion_gpu, gpu):
         yield from (value for value in vars(module).values() if isinstance(value, Pass))
 
 

@@ -211,6 +211,23 @@ def test_colours_of_any_range(device, dtype, transfer, light_):
         assert (np.abs(picture - expected) <= 0.002 * np.abs(expected) + 1e-5 * brightest).all()
 
 
+@pytest.mark.parametrize("alpha", ["opaque", "premultiplied"])
+def test_levels(device, alpha):
+    """Those of the picture over black, of lamps and of light below none too: a level apart where rounding decides."""
+    rng = np.random.default_rng(31)
+    source, moment = footage(rng, dtype=np.float32, transfer="linear", alpha=alpha), state(rng, window=1)
+    source.frames[..., :3] -= 0.1
+    renderer = Renderer(device, source)
+    picture, levels = renderer.picture(5, moment), renderer.levels(5, moment)
+    renderer.release_window()
+    expected = 255 * light.to_encoded(picture[..., :3].astype(np.float64).clip(0, 1))
+    assert expected.min() == 0
+    assert expected.max() > 254.9
+    assert levels.dtype == np.uint8
+    assert np.abs(levels[..., :3] - expected).max() < 0.51
+    assert (levels[..., 3] == 255).all()
+
+
 @pytest.mark.parametrize("dtype", [np.uint16, np.float16, np.float32])
 def test_light_without_cover_is_kept(device, dtype):
     """As Blender's own strip keeps it: of glows that are added to what lies below."""

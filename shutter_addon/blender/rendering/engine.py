@@ -37,7 +37,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         except BaseException as error:  # Blender would print it, and render the frame without the effect
             invalidation.spoil(depsgraph.scene.session_uid)
             if not isinstance(error, session.StoppedError):
-                fail(self, _in_words(error))
+                fail(self, in_words(error))
             elif not self.test_break():
                 render_job.cancel(self.test_break)
 
@@ -53,10 +53,10 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             return  # nothing, which costs Blender the least
         picture = session.picture(shown, frame, self._say, self._stopped, divisor)
         picture = session.resized(picture, width, height, divisor)
-        result = self.begin_result(0, 0, width, height)
+        # A result of a single pixel has Blender make room for the whole picture. One of all would be copied there.
+        self.end_result(self.begin_result(0, 0, 1, 1))
         # Blender's rows go up; composed pictures lie so in memory, and this copies nothing.
-        result.layers[0].passes["Combined"].rect.foreach_set(np.ascontiguousarray(picture[::-1]).ravel())
-        self.end_result(result)
+        self.get_result().layers[0].passes["Combined"].rect.foreach_set(np.ascontiguousarray(picture[::-1]).ravel())
         self.update_progress(1.0)
         session.here().begin_next(shown, frame)
 
@@ -65,12 +65,17 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
 
     def _say(self, message: str) -> None:
         if bpy.app.background:
-            print(signed(message), file=sys.stderr, flush=True)
+            say(message)
         else:
             self.report({"WARNING"}, signed(message))
 
 
-def _in_words(error: BaseException) -> str:
+def say(message: str) -> None:
+    """Says something of a render in the background."""
+    print(signed(message), file=sys.stderr, flush=True)
+
+
+def in_words(error: BaseException) -> str:
     if isinstance(error, session.FAULTS):
         return str(error) or "not enough memory"
     if isinstance(error, KeyboardInterrupt):

@@ -5,7 +5,7 @@ import os
 import shutil
 import signal
 import sys
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
 import bpy
@@ -14,7 +14,7 @@ from ...core import atomic_write
 from ...core.messages import UserError
 from ...media.completeness import is_whole_movie, is_whole_picture, whole_pictures, why_short
 from ..data import strips
-from . import render_job
+from . import movie_feed, render_job
 
 INTERRUPTED = 130
 
@@ -146,6 +146,7 @@ def film(edit, output: Path) -> None:
                 _stoppable() as stopped,
                 quiet(),
                 _lean(edit),
+                movie_feed.feeding(edit) if is_movie(output) and strips.effect_strips(edit) else nullcontext(),
                 _moved(part, output, edit) as missing,
             ):
                 bpy.ops.render.render(animation=True, scene=edit.name)

@@ -67,16 +67,18 @@ class RenderSettings:
 
     device: one of devices.CHOICES, in place of the user's preference
     weights: folder for the coefficients of every picture, as EXR files
-    inbetween: folder of in-between frames, in place of the effects' own"""
+    inbetween: folder of in-between frames, in place of the effects' own
+    levels: pictures are those of Renderer.levels"""
 
     device: str | None = None
     weights: Path | None = None
     inbetween: Path | None = None
+    levels: bool = False
 
 
 @dataclass(frozen=True)
 class FrameRequest:
-    """All that a picture depends on; index, direction: as Renderer.picture has them.
+    """All that a picture depends on; index, direction: as Renderer.picture has them; levels: of RenderSettings.
 
     Where there are in-between frames the index counts them as well."""
 
@@ -84,17 +86,20 @@ class FrameRequest:
     index: int
     state: FrameState
     direction: int
+    levels: bool = False
 
     @property
     def key(self) -> tuple:
         """Equal for requests of the same picture."""
-        return self.renderer, self.index, self.direction, self.state.key
+        return self.renderer, self.index, self.direction, self.state.key, self.levels
 
     def picture(self) -> np.ndarray:
         """The picture, made on the renderer's device; and the frames of the next ones are decoded."""
-        self.prefetch()
-        result = self.renderer.picture(self.index, self.state, self.direction)
-        self.prefetch()  # and lets go of what is on the device by now
+        lacking = self._lacking()
+        self._want(lacking)
+        compose = self.renderer.levels if self.levels else self.renderer.picture
+        result = compose(self.index, self.state, self.direction)
+        self._want([missing - lacking[0] for missing in lacking[1:]])  # the rest is on the device by now
         return result
 
     def coefficients(self) -> np.ndarray:
@@ -121,12 +126,20 @@ class FrameRequest:
 
     def prefetch(self) -> None:
         """Has the frames decoded that the picture lacks, then those of the next pictures."""
+        self._want(self._lacking())
+
+    def _lacking(self) -> list[set[int]]:
+        """The frames that this picture and each of the next ones lack."""
+        source = self.renderer.source
+        indices = (self.index + step * self.direction * source.step for step in range(_AHEAD + 1))
+        shown = (min(max(index, 0), source.count - 1) for index in indices)
+        return [self.renderer.missing(index, self.direction, self.state) for index in shown]
+
+    def _want(self, lacking: list[set[int]]) -> None:
         wanted, source = {}, self.renderer.source
-        for step in range(_AHEAD + 1):
-            index = min(max(self.index + step * self.direction * source.step, 0), source.count - 1)
-            missing = sorted(self.renderer.missing(index, self.direction, self.state))
+        for missing in lacking:
             # One that is not built yet would be remembered as a fault, and may come before it is needed.
-            wanted |= dict.fromkeys(i for i in missing if source.step == 1 or source.has(i))
+            wanted |= dict.fromkeys(i for i in sorted(missing) if source.step == 1 or source.has(i))
         room = _DECODED_BYTES // (source.width * source.height * 4 * np.dtype(source.dtype).itemsize)
         source.want(list(wanted)[: max(_DECODED, room)])
 
@@ -192,7 +205,7 @@ class RenderSession:
                 renderer.source,
                 lambda other: source_index(snapshot, other, renderer.source)[0],
             )
-        found = FrameRequest(renderer, index, state, direction)
+        found = FrameRequest(renderer, index, state, direction, _settings.levels)
         self._requests[snapshot.scene] = snapshot, frame, found
         return found
 
@@ -345,10 +358,10 @@ def _in_blocks(state: FrameState, divisor: int) -> FrameState:
 def picture(
     snapshot: Snapshot, frame: float, say: Callable[[str], None] = print, stopped=_never, divisor: int = 1
 ) -> np.ndarray:
-    """The picture (H, W, 4) float32 of an effect strip at a timeline frame: scene-linear, premultiplied, top row first.
-    One of FAULTS: there is none, in one sentence. say: called with a sentence when the device is a lesser one, or cuts
-    cannot be found. stopped: asked whether the picture is not wanted any longer; StoppedError: it is not. divisor: as
-    of RenderSession.request.
+    """The picture (H, W, 4) of an effect strip at a timeline frame, top row first: scene-linear float32, premultiplied,
+    or levels, if the settings ask for them. One of FAULTS: there is none, in one sentence. say: called with a sentence
+    when the device is a lesser one, or cuts cannot be found. stopped: asked whether the picture is not wanted any
+    longer; StoppedError: it is not. divisor: as of RenderSession.request.
     """
     if stopped():
         raise StoppedError

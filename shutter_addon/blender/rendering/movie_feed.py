@@ -1,0 +1,99 @@
+"""What a movie is rendered from: pictures of finished levels.
+
+What an engine gives is scene-linear floats. Blender copies and converts those to a movie's levels in several passes,
+which take more of the processor than all else that it does for a frame. So the sequencer is given each picture as an
+uncompressed file of the levels that the movie will have, above the effect strip, which it then does not render.
+"""
+
+import struct
+import tempfile
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..data import snapshot, strips
+from . import render_job, session
+from .engine import in_words, say
+
+
+@contextmanager
+def feeding(edit):
+    """Inside, the movie of an edit of new_edit.make_edit is rendered from such files. It has the levels that Blender
+    would give the effect's picture, but for one where rounding decides."""
+    effect_strip = strips.effect_strips(edit)[0]
+    with tempfile.TemporaryDirectory() as folder:
+        picture = LevelsFile(Path(folder, "picture.tif"), edit.render.resolution_x, edit.render.resolution_y)
+        strip = _above(effect_strip, picture.path)
+        handler = partial(fill, effect_strip, picture, [])
+        bpy.app.handlers.render_pre.append(handler)
+        try:
+            with session.using(replace(session.settings(), levels=True)):
+                yield
+        finally:
+            bpy.app.handlers.render_pre.remove(handler)
+            edit.sequence_editor.strips.remove(strip)
+            picture.close()
+
+
+def _above(effect_strip, path: Path):
+    """A strip of that file which covers the effect strip."""
+    editor = effect_strip.id_data.sequence_editor
+    channel = max(strip.channel for strip in editor.strips) + 1
+    strip = editor.strips.new_image(path.name, str(path), channel, effect_strip.left_handle)
+    strip.right_handle, strip.blend_type = effect_strip.right_handle, "REPLACE"
+    return strip
+
+
+def fill(effect_strip, picture, film: list, edit, *_) -> None:
+    """Fills the file with the picture of the frame that is rendered next. film: the snapshot of all its frames, once it
+    is read."""
+    if not render_job.is_film(edit) or render_job.stopping():
+        return
+    try:
+        if not film:
+            effect, frames = strips.effect_of(edit, effect_strip.scene), range(edit.frame_start, edit.frame_end + 1)
+            film.append(snapshot.take(edit, effect, effect_strip, frames, folder=session.settings().inbetween))
+        picture.write(session.picture(film[0], edit.frame_current, say, render_job.stopping))
+        session.here().begin_next(film[0], edit.frame_current)
+    except BaseException as error:  # Blender would print it, and write the picture again that was there before
+        if not isinstance(error, session.StoppedError):
+            render_job.fail(in_words(error))
+        render_job.cancel()
+
+
+class LevelsFile:
+    """An uncompressed TIFF of RGBA levels, whose pixels are replaced in place."""
+
+    def __init__(self, path: Path, width: int, height: int):
+        """OSError: it cannot be written. After this there is room for all that is written to it."""
+        self.path = path
+        self._head = _tiff_head(width, height)
+        path.write_bytes(self._head + bytes(4 * width * height))
+        self._file = path.open("r+b", buffering=0)
+
+    def write(self, levels: np.ndarray) -> None:
+        """levels: uint8 (H, W, 4), top row first."""
+        self._file.seek(len(self._head))
+        self._file.write(levels)
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def _tiff_head(width: int, height: int) -> bytes:
+    """All of a little-endian TIFF before its pixels, which are one strip."""
+    short, long, count = 3, 4, 10
+    depths = 8 + 2 + 12 * count + 4  # behind the header of 8 bytes, the number of fields, the fields, and their end
+    fields = [
+        *((256, long, 1, width), (257, long, 1, height)),
+        *((258, short, 4, depths), (259, short, 1, 1), (262, short, 1, 2)),  # bits of samples, not compressed, RGB
+        *((273, long, 1, depths + 8), (277, short, 1, 4)),  # where the pixels are, samples of each
+        *((278, long, 1, height), (279, long, 1, 4 * width * height)),  # rows and bytes of the strip
+        (338, short, 1, 2),  # straight alpha
+    ]
+    packed = b"".join(struct.pack("<HHII", *field) for field in fields)
+    return struct.pack("<2sHIH", b"II", 42, 8, count) + packed + bytes(4) + struct.pack("<4H", 8, 8, 8, 8)
