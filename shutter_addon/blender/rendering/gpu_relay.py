@@ -92,7 +92,8 @@ def serve(seconds: float = _LEAST) -> None:
             done.set_result(function())
         except Exception as error:
             done.set_exception(error.with_traceback(None))  # whose frames refer to textures
-        _finish_some()
+        with suppress(RuntimeError):  # the GPU is full: that is met by who needs it
+            _finish_some()
 
 
 def _finish_some() -> None:
@@ -102,10 +103,8 @@ def _finish_some() -> None:
     if _unfinished >= _batch:
         start = time.monotonic()
         gpu.types.GPUTexture((1, 1)).read()
-        _unfinished, _batch = (
-            0,
-            min(max(int(_batch * _MOMENT / (time.monotonic() - start)), _batch // 2, 1), _batch * 2),
-        )
+        quick = _MOMENT / max(time.monotonic() - start, 1e-4)
+        _unfinished, _batch = 0, max(1, int(_batch * min(max(quick, 0.5), 2.0)))
 
 
 def _called(function) -> Future:
