@@ -33,7 +33,7 @@ FORMATS = {
 }
 
 
-# Samplers and images, as many as any pass has.
+# Samplers and images, as many as any pass has; with OpenGL alone.
 LETTING_GO = Pass(
     "let_go",
     samplers={f"sampled_{i}": "sampler2DArray" for i in range(4)},
