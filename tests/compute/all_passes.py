@@ -44,6 +44,7 @@ def _unpacking():
         for kind, sent in blender_gpu.FORMATS.items():
             if sent is not None:
                 yield blender_gpu.unpacking(kind, sent[2])
+        yield blender_gpu.LETTING_GO
 
 
 PASSES = list(dict.fromkeys((*_declared(), *_composing(), *_filling(), *_unpacking())))

@@ -38,6 +38,7 @@ LETTING_GO = Pass(
     "let_go",
     samplers={f"sampled_{i}": "sampler2DArray" for i in range(4)},
     images={f"stored_{i}": Image("rgba32f") for i in range(4)},
+    constants={"layer": "int"},
     local_size=(1, 1, 1),
 )
 
@@ -78,7 +79,7 @@ class BlenderDevice:
         if self._spare is None:
             self._spare = self.texture(1, 1, 1, "rgba32f")
         spares = dict.fromkeys((*LETTING_GO.samplers, *LETTING_GO.images), self._spare)
-        self.run(LETTING_GO, (1, 1), textures=spares, images=spares)
+        self.run(LETTING_GO, (1, 1), textures=spares, images=spares, layer=0)
 
     def texture(self, width: int, height: int, layers: int, kind: str) -> Texture:
         if max(width, height) <= self.max_size and layers <= self.max_layers:  # on Vulkan Blender does not look
