@@ -2,7 +2,7 @@
 // shutter_addon/blender/rendering/blender_gpu.py.
 void main()
 {
-  ivec3 first = ivec3(0);
+  ivec3 first = ivec3(0, 0, layer);
   vec4 sum = texelFetch(sampled_0, first, 0) + texelFetch(sampled_1, first, 0) + texelFetch(sampled_2, first, 0) +
              texelFetch(sampled_3, first, 0);
   imageStore(stored_0, first, sum);

@@ -85,6 +85,7 @@ def in_a_job(name):
         bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
     yield from driver.until(lambda: ended, "the render ends", 40)
     del bpy.app.handlers.render_complete[-1]
+    yield from driver.until(lambda: not bpy.app.is_job_running("RENDER"), "its job ends")
     yield 0.5
 
 

@@ -40,11 +40,12 @@ FORMATS = {
 _SENT_BYTES = 16 << 20
 
 
-# Samplers and images, as many as any pass has.
+# Samplers and images, as many as any pass has; with OpenGL alone.
 LETTING_GO = Pass(
     "let_go",
     samplers={f"sampled_{i}": "sampler2DArray" for i in range(4)},
     images={f"stored_{i}": Image("rgba32f") for i in range(4)},
+    constants={"layer": "int"},
     local_size=(1, 1, 1),
 )
 
@@ -87,7 +88,7 @@ class BlenderDevice(PagedDevice):
         if self._spare is None:
             self._spare = Texture(self._make(1, 1, 1, "rgba32f"), (1, 1, 1), "rgba32f")
         spares = dict.fromkeys((*LETTING_GO.samplers, *LETTING_GO.images), self._spare)
-        self.run(LETTING_GO, (1, 1), textures=spares, images=spares)
+        self.run(LETTING_GO, (1, 1), textures=spares, images=spares, layer=0)
 
     def _make(self, width: int, height: int, layers: int, kind: str) -> gpu.types.GPUTexture:
         try:
