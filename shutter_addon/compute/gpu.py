@@ -280,7 +280,7 @@ class Solver:
                 return self._solved(labels, count, guide, strength, edges, warm)
             except NoDeviceError:
                 self._refused.add(kind)
-        self.release()
+        self._free()
         self.gave_up = True
         return self._send(cpu.Solver().solve(labels, count, guide, strength))
 
@@ -309,10 +309,14 @@ class Solver:
             self._sent.release()
             self._sent = None
 
-    def release(self) -> None:
+    def _free(self) -> None:
         self._plain.release()
         self._edged.release()
         self._free_sent()
+
+    def release(self) -> None:
+        self._free()
+        self._refused.clear()  # others may have freed what was in the way
 
 
 class GPUCompositor:

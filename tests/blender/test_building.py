@@ -116,10 +116,9 @@ def test_a_build_reopens_its_source_once_and_no_other(bpy, inbetween_build, edit
     begun = selection.active(bpy.context)
     ready = edit, strips.effect_of(edit, first.scene), first
     opened, asked, go = [], threading.Semaphore(0), threading.Semaphore(0)
+    usual = session.open_source
     monkeypatch.setattr(
-        session,
-        "open_source",
-        lambda shown, usual=session.open_source: opened.append(shown.timing.name) or usual(shown),
+        session, "open_source", lambda shown, *size: opened.append(shown.timing.name) or usual(shown, *size)
     )
 
     def draw():

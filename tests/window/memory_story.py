@@ -6,6 +6,7 @@ SHUTTER_FOOTAGE has the first of the source's frames, SHUTTER_RECIPE the effect,
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folders)
 import os
 import sys
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -89,12 +90,14 @@ def story():
         edit().render.filepath = f"{OUT / device}/"
         with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], scene=edit()):
             bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
-        budget, most = part._memory(), 0
+        budget, most, found = part._memory(), 0, {}
         while rendering():
             most = max(most, budget.used)
+            with suppress(ValueError, RuntimeError):  # the film's thread takes its renderer out for a moment
+                if part._offscreen._renderers and held(part._offscreen)[1]:  # what is drawn after it has that freed
+                    found |= {"job": held(part._offscreen), "freed": held(part._window)}
             yield 0.05
-        found = {"device": type(part._offscreen._compositor.device).__name__, "limit": budget.limit}
-        found |= {"before": before, "job": held(part._offscreen), "freed": held(part._window)}
+        found |= {"device": type(part._offscreen._compositor.device).__name__, "limit": budget.limit, "before": before}
         yield from shown()
         most = max(most, budget.used)
         saw(**found, after=held(part._window), kept=held(part._offscreen), most=most)

@@ -90,7 +90,7 @@ def written(folder):
 def held():
     """The job's device, and what its textures take."""
     device = part("rendering.session")._offscreen._compositor.device
-    return type(device).__name__, device.name, device.budget.used
+    return type(device).__name__, device.name, sum(texture.bytes for texture in device._held)
 
 
 def story():

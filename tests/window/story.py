@@ -287,7 +287,8 @@ def rendered():
     bpy.app.handlers.render_complete.append(lambda *_: done.append(True))
     with driver.override("PREVIEW"):
         bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
-    yield from driver.until(lambda: done, "the render ends", 30)
+    # An effect scene's render within it is complete before.
+    yield from driver.until(lambda: done and not bpy.app.is_job_running("RENDER"), "the render ends", 30)
     driver.saw(picture="final")
 
 

@@ -74,9 +74,13 @@ class RelayedDevice(BlenderDevice):
 
 
 def ask(function: Callable[[], None], seconds: float) -> None:
-    """Has the main thread call a function, and waits for its end, but no longer than that."""
-    with suppress(TimeoutError):
-        _called(function).result(seconds)
+    """Has the main thread call a function, and waits for its end, but no longer than that: then it is not called any
+    more, unless it has begun."""
+    asked = _called(function)
+    try:
+        asked.result(seconds)
+    except TimeoutError:
+        asked.cancel()
 
 
 def serve(seconds: float = _LEAST) -> None:
@@ -88,6 +92,8 @@ def serve(seconds: float = _LEAST) -> None:
         except queue.Empty:
             return
         _keep_looking()
+        if not done.set_running_or_notify_cancel():
+            continue
         try:
             done.set_result(function())
         except Exception as error:

@@ -5,9 +5,10 @@ which take more of the processor than all else that it does for a frame. So the 
 uncompressed file of the levels that the movie will have, above the effect strip, which it then does not render.
 """
 
+import os
 import struct
 import tempfile
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -23,20 +24,32 @@ from .engine import in_words, say
 @contextmanager
 def feeding(edit):
     """Inside, the movie of an edit of new_edit.make_edit is rendered from such files. It has the levels that Blender
-    would give the effect's picture, but for one where rounding decides."""
+    would give the effect's picture, but for one where rounding decides.
+
+    Where there is no room for such a file, or another OpenColorIO configuration than Blender's makes other levels, the
+    engine renders as ever."""
+    with ExitStack() as until_the_end:
+        if not os.environ.get("OCIO"):
+            with suppress(OSError):
+                folder = until_the_end.enter_context(tempfile.TemporaryDirectory(prefix="virtual_shutter_"))
+                size = edit.render.resolution_x, edit.render.resolution_y
+                until_the_end.enter_context(_fed(edit, LevelsFile(Path(folder, "picture.tif"), *size)))
+        yield
+
+
+@contextmanager
+def _fed(edit, picture):
     effect_strip = strips.effect_strips(edit)[0]
-    with tempfile.TemporaryDirectory() as folder:
-        picture = LevelsFile(Path(folder, "picture.tif"), edit.render.resolution_x, edit.render.resolution_y)
-        strip = _above(effect_strip, picture.path)
-        handler = partial(fill, effect_strip, picture, [])
-        bpy.app.handlers.render_pre.append(handler)
-        try:
-            with session.using(replace(session.settings(), levels=True)):
-                yield
-        finally:
-            bpy.app.handlers.render_pre.remove(handler)
-            edit.sequence_editor.strips.remove(strip)
-            picture.close()
+    strip = _above(effect_strip, picture.path)
+    handler = partial(fill, effect_strip, picture, [])
+    bpy.app.handlers.render_pre.append(handler)
+    try:
+        with session.using(replace(session.settings(), levels=True)):
+            yield
+    finally:
+        bpy.app.handlers.render_pre.remove(handler)
+        edit.sequence_editor.strips.remove(strip)
+        picture.close()
 
 
 def _above(effect_strip, path: Path):

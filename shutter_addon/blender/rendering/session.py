@@ -336,11 +336,13 @@ def _wanted_memory() -> int:
 
 
 def _memory() -> Budget:
-    """What the textures of both sessions may take together: it is one GPU, which OpenGL knows best."""
+    """What the textures of both sessions may take together: it is one GPU, which OpenGL knows best, where it may be
+    asked; else the first device tells."""
     global _budget
     if _budget is None:
         megabytes = _wanted_memory()
-        _budget = megabytes, Budget(megabytes * MEGABYTE if megabytes else devices.opengl().memory)
+        asks = not megabytes and wanted() in ("auto", "gpu", "opengl")
+        _budget = megabytes, Budget(megabytes * MEGABYTE or (devices.opengl().memory if asks else None))
     return _budget[1]
 
 
