@@ -46,8 +46,8 @@ class Budget:
 
 
 def allowed(memory: int | None) -> int:
-    """The bytes that textures may take on a GPU of so many bytes; None: it does not say. It does not depend on what is
-    free just now: a film's parts have the same bits whenever they are rendered."""
+    """The bytes that textures may take on a GPU of so many bytes; None: it does not say. It is to be the
+    same at each start: then a film's parts have the same bits whenever they are rendered."""
     limits = [UNKNOWN if memory is None else int(memory * GPU_SHARE)]
     if (machine := machine_memory()) is not None:
         limits.append(int(machine * MACHINE_SHARE))
