@@ -423,7 +423,9 @@ class _Options(_WithEffect):
 
 
 def _draw_devices(layout):
-    """What composes."""
+    """What composes; in a window, which alone has a preview."""
+    if bpy.app.background:
+        return
     column = layout.column(align=True)
     column.active = False
     try:
