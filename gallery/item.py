@@ -106,7 +106,7 @@ class Shot:
     @cached_property
     def _renderer(self) -> Renderer:
         mattes = MatteValues(self._source.width, self._source.height)
-        return Renderer(open_compositor()[0], self._source, mattes)
+        return Renderer(open_compositor(), self._source, mattes)
 
     @property
     def _colors(self) -> np.ndarray:

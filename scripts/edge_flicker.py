@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from shutter_addon.compute import guide  # noqa: E402
-from shutter_addon.compute.renderer import DEVICES, Renderer, open_compositor  # noqa: E402
+from shutter_addon.compute.renderer import Renderer, open_compositor  # noqa: E402
 from shutter_addon.core.frame_state import FrameState, Options  # noqa: E402
 from shutter_addon.core.scribbles import Shape  # noqa: E402
 from shutter_addon.media import open_source  # noqa: E402
@@ -83,7 +83,7 @@ def changes(compositor, film: Path, first: int, stroke, args, noise: float) -> d
 
 
 def run(args) -> list[dict]:
-    compositor, rows = open_compositor(args.device)[0], []
+    compositor, rows = open_compositor(args.device), []
     for film, first, stroke in (entry for entry in FILMS if entry[0].name in args.films):
         for noise in args.noise:
             for way, beside in (("steadied", guide.BESIDE), ("alone", 0)):
@@ -102,7 +102,7 @@ def parse(arguments=None):
     parser.add_argument("--frames", type=int, default=24)
     parser.add_argument("--noise", type=lambda text: [float(part) for part in text.split(",")], default="0,8")
     parser.add_argument("--aggregate", type=int, choices=(1, 2, 4), default=2)
-    parser.add_argument("--device", choices=DEVICES, default="auto")
+    parser.add_argument("--device", choices=("gpu", "cpu"), default="gpu")
     parser.add_argument("--json", type=Path, help="where the rows are written")
     return parser.parse_args(arguments)
 

@@ -142,7 +142,7 @@ class Masks:
         self._source = open_source(folder / "footage" / "0001.png")
         self._truth = open_source(folder / "mask" / "0001.png")
         self._keyed, self._known = keyed, {}
-        self._renderer = Renderer(open_compositor()[0], self._source)
+        self._renderer = Renderer(open_compositor(), self._source)
         self.frames = range(1, self._source.count + 1)
 
     def overlap(self, way: str) -> dict[str, float]:

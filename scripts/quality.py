@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmark import BARS, bars, shapes
 
-from shutter_addon.compute.renderer import DEVICES, Renderer, open_compositor
+from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.core import light
 from shutter_addon.core.frame_state import FrameState, Options
 from shutter_addon.media import MediaError, open_source
@@ -58,7 +58,7 @@ def _codes(picture: np.ndarray) -> np.ndarray:
 
 
 def run(args) -> list[dict]:
-    compositor, _ = open_compositor(args.device)
+    compositor = open_compositor(args.device)
     rows = []
     for film, kind, window in itertools.product(args.films, args.bars, args.windows):
         values = similarities(compositor, film, kind, args.shutters, window, args.aggregate, args.frames)
@@ -81,7 +81,7 @@ def parse(arguments=None):
     add("--windows", type=listed(int), default="16")
     add("--shutters", type=int, choices=range(2, 9), default=4)
     add("--frames", type=int, default=12, help="pictures of each film")
-    add("--device", choices=DEVICES, default="auto")
+    add("--device", choices=("gpu", "cpu"), default="gpu")
     return parser.parse_args(arguments)
 
 

@@ -5,7 +5,8 @@
 
 --percent: the preview's size in Blender's menu; --zoom full: a pixel of the picture to one of the screen, so that all
 of it is composed at 100 %. It tells frames per second, processor time per frame, by how much the timeline
-advanced beside the clock (1 keeps time), and the memory of the process.
+advanced beside the clock (1 keeps time), by how much the shown frame strayed from the clock, and the memory of the
+process.
 
 Any Blender 5.2 with the extension enabled, started with a window and `--python` this file, will do. Ways:
 plain: the movie strip alone; texture: its picture replaced by a draw handler that draws one texture of its size;
@@ -57,13 +58,14 @@ def make_edit():
     addon_utils.enable("bl_ext.user_default.virtual_shutter")
     edit = bpy.data.scenes[0]
     edit.render.resolution_x, edit.render.resolution_y = SIZE
-    edit.render.fps, edit.frame_start = 240 if OPTIONS.sync == "NONE" else 24, 1
-    edit.sync_mode = OPTIONS.sync
+    edit.frame_start, edit.sync_mode = 1, OPTIONS.sync
     editor = edit.sequence_editor_create()
     # Finished frames would be shown again without any work: not what is measured.
     editor.use_cache_raw = editor.use_cache_final = False
     source = editor.strips.new_movie("Footage", OPTIONS.footage, 1, 1)
     edit.frame_end = source.right_handle - WINDOW - 1
+    # Where playing keeps time, the film is not to end meanwhile: Blender's clock starts anew there.
+    edit.render.fps = 240 if OPTIONS.sync == "NONE" else min(24, max(1, int(edit.frame_end / (SECONDS + 2))))
     editor.active_strip = source
     return edit, source
 
@@ -134,7 +136,7 @@ def timeline():
 
 
 def playing(edit, seconds):
-    """What the preview shows while it plays, a dict of numbers; generator, whose last value they are."""
+    """What the preview shows while it plays, a dict of numbers; generator, which returns them."""
     drawn_at, shown, advanced = [], [], [0]
 
     def drawn():
@@ -143,22 +145,25 @@ def playing(edit, seconds):
             length = edit.frame_end - edit.frame_start + 1
             advanced[0] += (edit.frame_current - shown[0]) % length if shown else 0
             shown[:] = [edit.frame_current]
-            drawn_at.append((time.perf_counter(), time.process_time()))
+            drawn_at.append((time.perf_counter(), time.process_time(), advanced[0]))
 
     with bpy.context.temp_override(**timeline()):
         bpy.ops.screen.animation_play()
     yield 1.0
     handler = bpy.types.SpaceSequenceEditor.draw_handler_add(drawn, (), "PREVIEW", "POST_PIXEL")
-    yield seconds
+    while len(drawn_at) < 3:
+        yield seconds
     bpy.types.SpaceSequenceEditor.draw_handler_remove(handler, "PREVIEW")
     with bpy.context.temp_override(**timeline()):
         bpy.ops.screen.animation_cancel(restore_frame=False)
-    (first, first_cpu), (last, last_cpu) = drawn_at[0], drawn_at[-1]
+    (first, first_cpu, _), (last, last_cpu, _) = drawn_at[0], drawn_at[-1]
     count = len(drawn_at) - 1
-    yield {
+    off = [frames / edit.render.fps - (when - first) for when, _, frames in drawn_at]
+    return {
         "fps": count / (last - first),
         "cpu ms": (last_cpu - first_cpu) / count * 1000,
         "time kept": advanced[0] / (last - first) / edit.render.fps,
+        "off s": max(off) - min(off),
         "resident MB": resident(),
     }
 
@@ -216,7 +221,7 @@ def story():
             ways(way)
             edit.frame_set(1)
             yield 0.5
-            *_, numbers = yield from _collect(playing(edit, SECONDS))
+            numbers = yield from playing(edit, SECONDS)
             edit.frame_set(min(40, edit.frame_end))
             yield 0.5
             if OPTIONS.sync == "NONE" and OPTIONS.percent == "100":  # what a script draws is asked for in full
@@ -231,15 +236,6 @@ def story():
     for name, value in summary.items():
         print(name, f"{value['median']:.2f}" if isinstance(value, dict) else value, flush=True)
     bpy.ops.wm.quit_blender()
-
-
-def _collect(steps):
-    values = []
-    for value in steps:
-        values.append(value)
-        if len(values) < 3:
-            yield value
-    return values
 
 
 def start():

@@ -1,8 +1,29 @@
 // Adds a frame to the running sums, or takes it away: from the layer `known` to the layer `next`.
-// The frame: the one that was sent, in light that is summed (DECODE: 0 as it is, 1 made linear, 2 encoded), `whole` for white;
+// The frame: the one that was sent, in light that is summed (DECODE: 0 as it is, 1 made linear, 2 encoded), `whole` for white,
+// its colours with NUMBERS in one of 0 to 2²⁴ − 1, R + 256 G + 65536 B;
+// with PLANES by the whole numbers of libswscale (core/planes.py) from samples of luma and chroma;
 // or with AGAIN one that the sums hold already, between the layers `before` and `after`.
 #include "light.glsl"
 #include "sums.glsl"
+
+#if PLANES
+// A texel has four samples, side by side.
+int sample_of(uvec4 texel, int x)
+{
+  return int((texel.r >> ((x & 3) << 3)) & 255u);
+}
+
+// Sums wrap around beyond 32 bits, as libswscale's do.
+vec3 color_at(ivec2 pixel)
+{
+  ivec2 place = (pixel * chroma_step + (chroma_step >> 1)) >> 16;
+  int light = ((sample_of(imageLoad(luma, ivec3(pixel.x >> 2, pixel.y, 0)), pixel.x) << 9) - luma_of.x) * luma_of.y + (1 << 21);
+  int cb = (sample_of(imageLoad(chroma, ivec3(place.x >> 2, place.y, 0)), place.x) - 128) << 9;
+  int cr = (sample_of(imageLoad(chroma, ivec3(place.x >> 2, place.y, 1)), place.x) - 128) << 9;
+  ivec3 rgb = light + ivec3(cr * red_of, cb * green_of.x + cr * green_of.y, cb * blue_of);
+  return vec3(clamp(rgb, 0, (1 << 30) - 1) >> 22) / 255.0;
+}
+#endif
 
 void main()
 {
@@ -10,11 +31,21 @@ void main()
   if (any(greaterThanEqual(pixel, size))) {
     return;
   }
-  ivec2 place = place_of_sums(pixel);
+  ivec3 place = place_of_sums(pixel);
 #if AGAIN
   uvec2 light = minus(sum_at(place, after), sum_at(place, before));
 #else
-  vec3 color = texelFetch(frame, ivec3(pixel + ivec2(0, top), 0), 0).rgb;
+#  if PLANES
+  vec3 color = color_at(pixel + ivec2(0, top));
+#  else
+  vec4 sent = texelFetch(frame, ivec3(pixel + ivec2(0, top), 0), 0);
+#    if NUMBERS
+  uint bytes = uint(sent.r);
+  vec3 color = vec3(uvec3(bytes, bytes >> 8, bytes >> 16) & 255u) / 255.0;
+#    else
+  vec3 color = sent.rgb;
+#    endif
+#  endif
 #  if DECODE == 1
   color = to_linear(color);
 #  elif DECODE == 2
@@ -23,5 +54,5 @@ void main()
   uvec2 light = packed_light(uvec3(ivec3(color * whole + 0.5)));
 #endif
   uvec2 sum = sum_at(place, known);
-  imageStore(sums, ivec3(place, next), halves_of(BACK != 0 ? minus(sum, light) : plus(sum, light)));
+  imageStore(sums, place_in_layer(place, next), halves_of(BACK != 0 ? minus(sum, light) : plus(sum, light)));
 }

@@ -5,6 +5,7 @@
 // loop that a compiler unrolls. The window's time 0 lies `origin` positions from the first of the sums, and time runs
 // backwards with BACK. (Of time nothing but whole frames depends on where the sums begin: pictures must not.)
 #include "light.glsl"
+#include "finish.glsl"
 #include "sums.glsl"
 #define COLUMNS (2 * GROUPS + 1)
 
@@ -16,7 +17,7 @@
   does(1)
 
 vec4 c[PIXELS * GROUPS];
-ivec2 place[PIXELS];  // of a pixel's sums
+ivec3 place[PIXELS];  // of a pixel's sums
 vec3 total[PIXELS];
 vec4 starts[GROUPS];
 vec4 ends[GROUPS];
@@ -83,8 +84,7 @@ void finish_pixel(int k)
   for (int g = 0; g < GROUPS; g++) {
     gain += dot(starts[g], c[k * GROUPS + g]);
   }
-  // Bottom row first: Blender's order, and GL's.
-  imageStore(picture, ivec3(pixel.x, height - 1 - top - pixel.y, 0), vec4(light * gain, 1.0));
+  finish(pixel + ivec2(0, top), vec4(light * gain, 1.0));
 }
 
 void main()

@@ -8,5 +8,5 @@ void main()
     return;
   }
   vec3 linear = imageLoad(picture, ivec3(p.x, size.y - 1 - p.y, 0)).rgb;
-  imageStore(levels, ivec3(p, 0), vec4(to_encoded(clamp(linear, 0.0, 1.0)), 1.0));
+  imageStore(levels, ivec3(p, 0), vec4(to_level(clamp(linear, 0.0, 1.0)), 1.0));
 }

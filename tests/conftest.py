@@ -15,6 +15,12 @@ hypothesis.settings.register_profile("shutter", deadline=None)
 hypothesis.settings.load_profile("shutter")
 
 ROOT = Path(__file__).parents[1]
+LONG = "window", "farm", "differential"
+
+
+def pytest_collection_modifyitems(items):
+    """The folders of the longest files come first, so that no process is left alone with one at the end."""
+    items.sort(key=lambda item: item.path.parent.name not in LONG)
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,7 @@ import planted
 import pytest
 
 SCRIPTS = Path(__file__).parents[1] / "scripts"
-INPUTS = {"recipes": 16, "media": 40, "caches": 40, "blends": 35}
+INPUTS = {"recipes": 8, "media": 20, "caches": 20, "blends": 18}
 
 
 @pytest.fixture

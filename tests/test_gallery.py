@@ -98,7 +98,7 @@ def test_time_maps_are_frames_put_together(name, times):
     """A pixel whose time is a whole frame's is that frame's to the bit, and others mix the two frames around."""
     source, effect = open_source(time_map.footage(None)), recipe.load(HERE / f"{name}.json")
     height, width, shown = source.height, source.width, time_map.FRAME - 1
-    renderer = Renderer(open_compositor()[0], source, MatteValues(width, height))
+    renderer = Renderer(open_compositor(), source, MatteValues(width, height))
     made = light.to_encoded(renderer.picture(shown, effect.at(time_map.FRAME, width / height))[..., :3]) * 255
     frames = np.stack([source.read(shown + k)[..., :3] for k in range(33)])
     time, (y, x) = times(height, width), np.mgrid[:height, :width]

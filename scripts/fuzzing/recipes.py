@@ -116,7 +116,7 @@ def compose(found, plan: dict, folder):
     values = MatteValues(*SIZE)
 
     source = footage(np.random.default_rng(1), 8, SIZE, **plan["footage"])
-    devices = {device: open_compositor(device)[0] for device in ("cpu", "gpu")}
+    devices = {device: open_compositor(device) for device in ("cpu", "gpu")}
     keys = [key.frame for owner in (*found.shutters, *found.regions) for key in owner.keys]
     for frame in (1, 2.5, *keys[:2]):
         moment = found.at(frame, SIZE[0] / SIZE[1], file)

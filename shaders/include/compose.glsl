@@ -29,10 +29,15 @@
 
 ivec2 corner;
 #if TILED
-ivec2 corner_place;  // of the corner's sums
+ivec3 corner_place;  // of the corner's sums
 #endif
 mat4 c[QUADS * GROUPS];
+#if SUMS
+uvec2 sum_before[4 * QUADS];  // of each pixel, the sum at the frame's start
+vec3 total[4 * QUADS];
+#else
 mat4 total[QUADS];
+#endif
 vec4 share[QUADS];  // of the exposure that fell on frames that are there
 vec4 centre[QUADS];  // of the exposure in time, frames left out included
 
@@ -40,16 +45,6 @@ vec4 centre[QUADS];  // of the exposure in time, frames left out included
 ivec2 pixel_at(int quad, int pixel)
 {
   return min(corner + ivec2(0, 4 * quad + pixel), size - 1);
-}
-
-// Where a pixel's light is read. A quad is as high as a tile of sums.
-ivec2 place_of_light(int quad, int pixel)
-{
-#if TILED
-  return corner_place + ivec2(8 * pixel, quad);
-#else
-  return pixel_at(quad, pixel);
-#endif
 }
 
 vec4 coefficients_at(ivec2 pixel, int group)
@@ -63,6 +58,50 @@ vec4 coefficients_at(ivec2 pixel, int group)
   return max(imageLoad(coefficients, place), 0.0);
 #endif
 }
+
+#if SUMS
+// Where a pixel's sums begin. The block is as high as a tile of them.
+ivec3 place_of_light(int quad, int pixel)
+{
+#if TILED
+  return corner_place + ivec3(8 * (4 * quad + pixel), 0, 0);
+#else
+  return place_of_sums(pixel_at(quad, pixel));
+#endif
+}
+
+// The layer of the sum at a position, or at the nearest that is there.
+int layer_at(int position)
+{
+  int layer = clamp(position - lowest, 0, held) + lowest_layer;
+  return layer < layers ? layer : layer - layers;
+}
+
+// The layer of the sum where the window's frame begins.
+int start_of(int frame)
+{
+  return layer_at(origin + direction * frame + (direction < 0 ? 1 : 0));
+}
+
+vec3 light_between(uvec2 start, uvec2 end)
+{
+  return unpacked_light(direction < 0 ? minus(start, end) : minus(end, start));
+}
+
+void start_light(int quad)
+{
+  int layer = start_of(first);
+  for (int pixel = 0; pixel < 4; pixel++) {
+    sum_before[4 * quad + pixel] = sum_at(place_of_light(quad, pixel), layer);
+    total[4 * quad + pixel] = vec3(0.0);
+  }
+}
+#else
+void start_light(int quad)
+{
+  total[quad] = mat4(0.0);
+}
+#endif
 
 void start_quad(int quad)
 {
@@ -79,9 +118,9 @@ void start_quad(int quad)
     mat4 loaded = c[quad * GROUPS + g];
     c[quad * GROUPS + g] = mat4(loaded[0] / sum.x, loaded[1] / sum.y, loaded[2] / sum.z, loaded[3] / sum.w);
   }
-  total[quad] = mat4(0.0);
   share[quad] = vec4(0.0);
   centre[quad] = vec4(0.0);
+  start_light(quad);
 }
 
 // False where the block lies outside the picture.
@@ -105,24 +144,7 @@ vec4 mixed(int quad, int column, int row)
   return sum;
 }
 
-#if SUMS
-vec4 frame_light(ivec2 place, int layer)
-{
-  int next = layer + 1 < layers ? layer + 1 : 0;
-  return vec4(unit * unpacked_light(minus(sum_at(place, next), sum_at(place, layer))), 1.0);
-}
-
-// The layer of the window's frame, or of the nearest that is there.
-int layer_of(int frame)
-{
-  int index = origin + direction * frame;
-#if EDGES == 2  // what is held may reach beyond the shot's ends
-  index = clamp(index, 0, count - 1);
-#endif
-  int layer = clamp(index - lowest, 0, held - 1) + lowest_layer;
-  return layer < layers ? layer : layer - layers;
-}
-#else
+#if !SUMS
 #  if !PACKED
 // The frame's light as it is summed, premultiplied.
 vec4 frame_light(ivec2 place, int slot)
@@ -166,6 +188,9 @@ int layer_of(int frame)
 #if MOVED
 #include "moved.glsl"
 #else
+#include "finish.glsl"
+
+// Frames one after another: at each, the sum at its end is looked up, and that at its start is known.
 void expose(int quad, int frame, vec4 weight)
 {
 #if EDGES == 2  // shorten
@@ -174,12 +199,36 @@ void expose(int quad, int frame, vec4 weight)
   weight = index >= 0 && index < count ? weight : vec4(0.0);
 #endif
   share[quad] += weight;
+#if SUMS
+  int end = start_of(frame + 1);
+  for (int pixel = 0; pixel < 4; pixel++) {
+    uvec2 sum = sum_at(place_of_light(quad, pixel), end);
+    total[4 * quad + pixel] += weight[pixel] * light_between(sum_before[4 * quad + pixel], sum);
+    sum_before[4 * quad + pixel] = sum;
+  }
+#else
   int layer = layer_of(frame);
-  total[quad] += mat4(weight.x * frame_light(place_of_light(quad, 0), layer),
-                      weight.y * frame_light(place_of_light(quad, 1), layer),
-                      weight.z * frame_light(place_of_light(quad, 2), layer),
-                      weight.w * frame_light(place_of_light(quad, 3), layer));
+  total[quad] += mat4(weight.x * frame_light(pixel_at(quad, 0), layer),
+                      weight.y * frame_light(pixel_at(quad, 1), layer),
+                      weight.z * frame_light(pixel_at(quad, 2), layer),
+                      weight.w * frame_light(pixel_at(quad, 3), layer));
+#endif
 }
+
+#if EDGES == 2
+// The light of the frame that is nearest to the window's among those that are there.
+vec4 nearest_light(int quad, int pixel, int frame)
+{
+#if SUMS
+  int position = clamp(origin + direction * frame, 0, count - 1);
+  ivec3 place = place_of_light(quad, pixel);
+  uvec2 sum = minus(sum_at(place, layer_at(position + 1)), sum_at(place, layer_at(position)));
+  return vec4(unit * unpacked_light(sum), 1.0);
+#else
+  return frame_light(pixel_at(quad, pixel), layer_of(frame));
+#endif
+}
+#endif
 
 void store(int quad, int pixel, float gain)
 {
@@ -187,18 +236,20 @@ void store(int quad, int pixel, float gain)
   if (at.y >= size.y) {
     return;
   }
+#if SUMS
+  vec4 color = vec4(unit * total[4 * quad + pixel], share[quad][pixel]) / max(share[quad][pixel], 1e-6);
+#else
   vec4 color = total[quad][pixel] / max(share[quad][pixel], 1e-6);
+#endif
 #if EDGES == 2
   // Where nothing of the shutter is left, the nearest frame that there is (core/compositor.py has the 1e-3).
-  int nearest = layer_of(int(centre[quad][pixel] - 1e-3));
-  color = share[quad][pixel] > 1e-6 ? color : frame_light(place_of_light(quad, pixel), nearest);
+  color = share[quad][pixel] > 1e-6 ? color : nearest_light(quad, pixel, int(centre[quad][pixel] - 1e-3));
 #endif
 #if ENCODED
   color.rgb = to_linear_exact(straight(color)) * color.a;
 #endif
   color.rgb *= gain;
-  // Bottom row first: Blender's order, and GL's.
-  imageStore(picture, ivec3(at.x, height - 1 - top - at.y, 0), color);
+  finish(at + ivec2(0, top), color);
 }
 #endif
 

@@ -28,6 +28,16 @@ vec3 to_encoded(vec3 linear)
   return mix(curve, linear * 12.92, lessThanEqual(linear, vec3(0.0031308)));
 }
 
+// As to_encoded, for light in [0, 1]: of its fourth root a polynomial within 0.0005 of an 8-bit level, cheaper than powers.
+vec3 to_level(vec3 linear)
+{
+  vec3 x = sqrt(sqrt(max(linear, 0.0031308)));
+  vec3 curve =
+      (((((0.06820799 * x - 0.31841607) * x + 0.65718848) * x - 0.85295766) * x + 1.36592116) * x + 0.13960411) * x -
+      0.05954661;
+  return mix(curve, linear * 12.92, lessThanEqual(linear, vec3(0.0031308)));
+}
+
 // What a premultiplied colour is multiplied by: what is fully transparent keeps its light.
 float cover(vec4 color)
 {

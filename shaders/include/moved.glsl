@@ -174,6 +174,10 @@ vec4 nearest_light(int quad, int pixel)
 }
 #endif
 
+#if !UNFINISHED
+#include "finish.glsl"
+#endif
+
 void store(int quad, int pixel, float gain)
 {
   ivec2 at = corner + ivec2(0, 4 * quad + pixel);
@@ -186,15 +190,16 @@ void store(int quad, int pixel, float gain)
     color = nearest_light(quad, pixel);
   }
 #endif
-  ivec3 stored = ivec3(at.x, height - 1 - at.y, 0);
 #if CONTINUED
-  color += texelFetch(summed, stored, 0);
+  color += texelFetch(summed, ivec3(at, 0), 0);
 #endif
-#if !UNFINISHED
+#if UNFINISHED
+  imageStore(picture, ivec3(at, 0), color);
+#else
 #  if ENCODED
   color.rgb = to_linear_exact(straight(color)) * color.a;
 #  endif
   color.rgb *= gain;
+  finish(at, color);
 #endif
-  imageStore(picture, stored, color);
 }

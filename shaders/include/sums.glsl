@@ -27,18 +27,28 @@ vec3 unpacked_light(uvec2 difference)
   return vec3(ivec3(difference.x & FIELD, green & FIELD, difference.y >> 10));
 }
 
-// Where a pixel's sums lie: TILED, a row of texels holds four rows of pixels, in tiles of 8 × 4.
-ivec2 place_of_sums(ivec2 pixel)
+// Where a pixel's sums begin. TILED: those of a tile of 8 × 16 pixels lie behind one another in a row of texels, a layer
+// of texels holds a row of tiles.
+ivec3 place_of_sums(ivec2 pixel)
 {
 #if TILED
-  return ivec2((pixel.x >> 3 << 5) + ((pixel.y & 3) << 3) + (pixel.x & 7), pixel.y >> 2);
+  return ivec3(((pixel.y & 15) << 3) + (pixel.x & 7), pixel.x >> 3, pixel.y >> 4);
 #else
-  return pixel;
+  return ivec3(pixel, 0);
+#endif
+}
+
+ivec3 place_in_layer(ivec3 place, int layer)
+{
+#if TILED
+  return place + ivec3(layer << 7, 0, 0);
+#else
+  return place + ivec3(0, 0, layer);
 #endif
 }
 
 // imageLoad: a software renderer's texelFetch of whole numbers takes three times as long.
-uvec2 sum_at(ivec2 place, int layer)
+uvec2 sum_at(ivec3 place, int layer)
 {
-  return words_of(imageLoad(sums, ivec3(place, layer)));
+  return words_of(imageLoad(sums, place_in_layer(place, layer)));
 }

@@ -7,7 +7,7 @@ from functools import partial
 import bpy
 from bpy.app.handlers import persistent
 
-from .data import inbetween_settings, revision, selection, source_media, strips
+from .data import inbetween_settings, revision, selection, source_media, strips, versions
 from .editing import copies, lifecycle, track_region, undelete
 from .interface import inbetween_operators, preview_areas
 from .rendering import invalidation, job_snapshots, render_job, session
@@ -26,8 +26,16 @@ def _before_load(*_):
 
 @persistent
 def _after_load(*_):
+    session.drop_removed()  # what a render job took up while the file was loaded
     copies.adopt()
     lifecycle.mend()
+
+
+@persistent
+def _before_save(*_):
+    for edit in bpy.data.scenes:
+        if edit.virtual_shutter.effects and edit.library is None:
+            edit.virtual_shutter.version = versions.extension()
 
 
 @persistent
@@ -114,6 +122,7 @@ def _after_render(scene, *_):
 HANDLERS = {
     "load_pre": _before_load,
     "load_post": _after_load,
+    "save_pre": _before_save,
     "depsgraph_update_post": _update,
     "undo_post": _after_undo,
     "redo_post": _after_undo,

@@ -101,28 +101,27 @@ def levels_apart(picture: np.ndarray, expected: np.ndarray) -> float:
     return float(np.abs(light.to_encoded(picture) - light.to_encoded(expected)).max() * 255)
 
 
-def measure(device, size: tuple[int, int], window: int) -> dict:
+def measure(compositor, size: tuple[int, int], window: int) -> dict:
     """A row of the table: pictures of a size (width, height) with a window of so many frames.
 
-    device: a compositor, as compute.renderer.open_compositor gives it
     ms: a picture's time, from the next frame to the composed picture on the device; readback_ms: to have it on the host
     fps: pictures a second without reading them back; memory: bytes of the device's textures, None for NumPy
     error: the largest of random pixels, in 8-bit levels, against the reference. NoDeviceError: there is no room."""
     state = FrameState(Options(window), bars("preset", SHUTTERS, window), shapes(SHUTTERS))
-    renderer = Renderer(device, source := Noise(*size))
+    renderer = Renderer(compositor, source := Noise(*size))
     try:
-        with device.current():
+        with compositor.current():
             times = []
             for index in range(PICTURES + 1):
                 start = time.perf_counter()
-                picture = device.read(drawn := renderer.draw(index, state))
+                picture = compositor.read(drawn := renderer.draw(index, state))
                 middle = time.perf_counter()
-                device.read(drawn)
+                compositor.read(drawn)
                 readback = time.perf_counter() - middle
                 times.append((max(middle - start - readback, 0.0), readback))
                 if index and sum(map(sum, times[1:])) > PATIENCE:
                     break
-            memory = device.device.budget.used if hasattr(device, "device") else None
+            memory = compositor.device.budget.used if hasattr(compositor, "device") else None
             rng = np.random.default_rng(window)
             y, x = rng.integers(0, source.height, COMPARED), rng.integers(0, source.width, COMPARED)
             found, coefficients = picture[y, x, :3].copy(), renderer.coefficients(index, state)[:, y, x]
@@ -144,12 +143,12 @@ def measure(device, size: tuple[int, int], window: int) -> dict:
 
 class Timetable:
     """Rows, measured once each, as long as there is time: a row is taken to need as long for each pixel of its frames
-    as the last one.
+    as the slowest one before.
 
     seconds: there are in all"""
 
-    def __init__(self, device, seconds: float):
-        self.device = device
+    def __init__(self, compositor, seconds: float):
+        self._compositor = compositor
         self._end = time.monotonic() + seconds
         self._pace = 0.0
         self._rows: dict[tuple, dict] = {}
@@ -166,11 +165,11 @@ class Timetable:
         if start + self._pace * work > self._end:
             return {**place, "left_out": "too slow"}
         try:
-            return measure(self.device, size, window)
+            return measure(self._compositor, size, window)
         except (NoDeviceError, MemoryError):
             return {**place, "left_out": "no room"}
         finally:
-            self._pace = (time.monotonic() - start) / work
+            self._pace = max(self._pace, (time.monotonic() - start) / work)
 
 
 def largest_that_plays(rows: Timetable, size: tuple[int, int]) -> dict:
@@ -192,9 +191,9 @@ def largest_that_plays(rows: Timetable, size: tuple[int, int]) -> dict:
     return found | ({"left_out": why} if why == "too slow" else {})
 
 
-def run(device, sizes=SIZES, windows=WINDOWS, seconds: float = 60.0, update=lambda: None) -> tuple[list, list]:
+def run(compositor, sizes=SIZES, windows=WINDOWS, seconds: float = 60.0, update=lambda: None) -> tuple[list, list]:
     """The rows of `measure`, and for each size that of `largest_that_plays`. update: called after each of them."""
-    timetable, rows, plays = Timetable(device, seconds), [], []
+    timetable, rows, plays = Timetable(compositor, seconds), [], []
     for size in sizes:
         plays.append(largest_that_plays(timetable, size))
         update()

@@ -201,6 +201,7 @@ class CPUCompositor:
     """Composes with NumPy; the same methods as GPUCompositor."""
 
     name = "NumPy"
+    takes_planes = False
 
     def current(self):
         return nullcontext(self)
@@ -224,14 +225,16 @@ class CPUCompositor:
     def read(self, drawn: np.ndarray) -> np.ndarray:
         return drawn
 
-    def levels(self, drawn: np.ndarray) -> np.ndarray:
-        """A picture of `draw` as Renderer.levels has it."""
+    def over_black(self, drawn: np.ndarray) -> np.ndarray:
+        """A scene-linear picture of `draw` as Renderer.levels has it."""
         found = np.full(drawn.shape, 255, np.uint8)
         found[..., :3] = 255 * light.to_encoded(np.nan_to_num(drawn[..., :3]).clip(0, 1)) + np.float32(0.5)
         return found
 
-    def draw(self, window, index: int, direction: int, state: FrameState, handle, block: int) -> np.ndarray:
-        """The picture (H, W, 4) float32, top row first; arguments as for GPUCompositor.draw."""
+    def draw(
+        self, window, index: int, direction: int, state: FrameState, handle, block: int, *, levels: bool = False
+    ) -> np.ndarray:
+        """The picture (H, W, 4), top row first: float32, or levels in uint8; arguments as for GPUCompositor.draw."""
         source, options = window.source, state.options
         picture = np.empty((source.height, source.width, 4), dtype=np.float32)
         # Backwards in time is forwards with the shutters reversed.
@@ -254,7 +257,7 @@ class CPUCompositor:
             pixels[..., 3] = 1
             for k, plane in enumerate(planes):
                 pixels[..., k] = plane
-        return picture
+        return self.over_black(picture) if levels else picture
 
     def release(self) -> None:
         pass

@@ -33,12 +33,14 @@ class Device(Protocol):
     max_size: texels along a texture's side, at most
     max_layers: layers of a texture array, at most
     budget: what all textures on this GPU may take
+    takes_planes: whether frames that are planes (core.planes) are quickest to send as such; it has to write r32ui then
     """
 
     name: str
     max_size: int
     max_layers: int
     budget: Budget
+    takes_planes: bool
 
     def current(self) -> AbstractContextManager:
         """Makes the device usable on this thread until the `with` block ends."""
@@ -54,6 +56,10 @@ class Device(Protocol):
 
         opaque: every alpha in the array is full; a device may then send the colours alone.
         TypeError: the device neither writes nor reads this format, only passes do (rgba16ui on Blender's GPU)."""
+
+    def send(self, texture: Texture, frame: np.ndarray) -> Texture:
+        """Sends an opaque 8-bit frame (rows, width, 4) for the pass that is run next. It returns what that binds:
+        `texture`, rgba8 of the frame's size, filled; or one of the format r32f, of numbers R + 256 G + 65536 B."""
 
     def read(self, texture: Texture) -> np.ndarray:
         """A copy of the texture (layers, height, width, components) in the format's type, after all passes that were

@@ -92,6 +92,8 @@ class GLDevice(PagedDevice):
     that context, so the calls would go to it.
     """
 
+    takes_planes = True
+
     def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None):
         super().__init__(budget or Budget(), ask_others)
         backend = {"backend": "egl"} if _EGL else {}

@@ -24,8 +24,10 @@ PAIR = 2
 
 _EDGES = {"hold": 0, "mirror": 1, "shorten": 2}
 _READ = Image("rgba32f", reads=True, writes=False)
-_IMAGES = {"picture": Image("rgba32f"), "coefficients": _READ}
-_PLACE = {"size": "ivec2"} | dict.fromkeys(("top", "height", "block_bits"), "int")
+_COEFFICIENTS = {"coefficients": _READ}
+# What a picture is stored as, by whether it is levels.
+_PICTURE = {False: "rgba32f", True: "rgba8"}
+_PLACE = {"size": "ivec2", "top": "int", "block_bits": "int"}
 _LAYERS = dict.fromkeys(("origin", "direction", "layers", "lowest", "lowest_layer"), "int")
 _OF_SUMS = {"sums": Image("rgba16ui", reads=True, writes=False)}
 _UNIT = {"held": "int", "unit": "float"}
@@ -47,8 +49,16 @@ _MOST_ITERATIONS = 60_000
 _ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 
 
+def _stored_as(levels: bool) -> tuple[dict, dict]:
+    """The images and constants of a pass that stores a finished picture: of levels, or scene-linear
+    (shaders/include/finish.glsl)."""
+    return {"picture": Image(_PICTURE[levels])}, {} if levels else {"height": "int"}
+
+
 @cache
-def composition(way: str, groups: int, stored: str, decode: int, edges: int, premultiplied: bool, encoded: bool):
+def composition(
+    way: str, groups: int, stored: str, decode: int, edges: int, premultiplied: bool, encoded: bool, levels: bool
+) -> Pass:
     """The pass compose_<way> for a way of `way_of` other than "sums".
 
     groups: of four shutters
@@ -57,13 +67,16 @@ def composition(way: str, groups: int, stored: str, decode: int, edges: int, pre
     edges: a number of _EDGES
     premultiplied: whether the frames' colours are
     encoded: whether the sums are of encoded light (Options.light)
+    levels: whether the picture is of levels
     """
     summed = stored != "frames"
+    images, constants = _stored_as(levels)
     return Pass(
         f"compose_{way}",
         samplers={} if summed else {"frames": "sampler2DArray"},
-        images=_IMAGES | {"table": _READ} | (_OF_SUMS if summed else {}),
+        images=images | _COEFFICIENTS | {"table": _READ} | (_OF_SUMS if summed else {}),
         constants=_PLACE
+        | constants
         | _LAYERS
         | dict.fromkeys(_OF_WAY[way], "int")
         | ({"count": "int"} if edges == 2 or not summed else {})
@@ -78,27 +91,30 @@ def composition(way: str, groups: int, stored: str, decode: int, edges: int, pre
             "DECODE": decode,
             "PREMULTIPLIED": int(premultiplied),
             "ENCODED": int(encoded),
+            "LEVELS": int(levels),
         },
         local_size=LOCAL_ROW,
     )
 
 
 @cache
-def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, encoded: bool) -> Pass:
+def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, encoded: bool, levels: bool) -> Pass:
     """The pass compose_sums for `rows` pieces. back: the source plays in reverse; the others as for `composition`."""
+    images, constants = _stored_as(levels)
     return Pass(
         "compose_sums",
-        images=_IMAGES | _OF_SUMS,
-        constants=_PLACE | _UNIT | {"origin": "int", "layers": "int", "first_layer": "int"},
+        images=images | _COEFFICIENTS | _OF_SUMS,
+        constants=_PLACE | constants | _UNIT | {"origin": "int", "layers": "int", "first_layer": "int"},
         defines={
             "ROWS": rows,
             "GROUPS": groups,
             "BACK": int(back),
             "TILED": int(tiled),
             "ENCODED": int(encoded),
+            "LEVELS": int(levels),
         },
         blocks={"table": (1 + rows) * (2 * groups + 1)},
-        local_size=(64, TILE[1] // PAIR, 1),
+        local_size=(16, TILE[1] // PAIR, 1),
     )
 
 
@@ -115,6 +131,7 @@ def composition_of_moved(
     encoded: bool,
     sharp: bool,
     at: tuple[bool, bool],
+    levels: bool,
 ) -> Pass:
     """The pass of a way, "frames", "search" or "value", where shutters follow something.
 
@@ -123,7 +140,9 @@ def composition_of_moved(
     sharp: how frames are resampled (core.compositor.seen)
     at: whether passes over other frames come before and after; the others as for `composition`"""
     continued, unfinished = at
-    images = {"picture": Image("rgba32f"), "table": _READ, "moves": _READ}
+    levels = levels and not unfinished
+    images, constants = ({"picture": Image("rgba32f")}, {}) if unfinished else _stored_as(levels)
+    images |= {"table": _READ, "moves": _READ}
     images |= {"packed_frames": Image("rgba16ui", reads=True, writes=False)} if packed else {}
     sampled = ("coefficients", *(("summed",) if continued else ()), *(() if packed else ("frames",)))
     numbers = ("motions", *_OF_WAY[way], *(("seen_first", "seen_last", "parts") if shortened else ()))
@@ -131,7 +150,7 @@ def composition_of_moved(
         f"compose_{way}",
         samplers=dict.fromkeys(sampled, "sampler2DArray"),
         images=images,
-        constants=_PLACE | dict.fromkeys(numbers, "int"),
+        constants=_PLACE | constants | dict.fromkeys(numbers, "int"),
         defines={
             "MOVED": 1,
             "PACKED": int(packed),
@@ -150,6 +169,7 @@ def composition_of_moved(
             "SHARP": int(sharp),
             "CONTINUED": int(continued),
             "UNFINISHED": int(unfinished),
+            "LEVELS": int(levels),
         },
         local_size=LOCAL_ROW,
     )
@@ -217,15 +237,15 @@ def _extent(window: Sums) -> dict:
     return {"layers": window.layers, "held": window.stop - window.start, "unit": 1 / window.whole}
 
 
-def _from_sums(window: Sums, state: FrameState, values: np.ndarray, origin: int, direction: int):
+def _from_sums(window: Sums, state: FrameState, values: np.ndarray, origin: int, direction: int, levels: bool):
     """compose_sums for a table of pieces, and its arguments for Device.run but for the band's.
 
-    origin: the position of the window's first frame; direction: 1, or −1 in reverse"""
+    origin: the position of the window's first frame; direction: 1, or −1 in reverse; levels: as for `composition`"""
     rows = _filled_rows(len(values) - 1)
     filled = np.zeros((1 + rows, *values.shape[1:]), np.float32)
     filled[: len(values)] = values
     back, encoded = direction < 0, state.options.light == "encoded"
-    return composition_of_sums(rows, -(-len(state.bars) // 4), back, window.tiled, encoded), {
+    return composition_of_sums(rows, -(-len(state.bars) // 4), back, window.tiled, encoded, levels), {
         "images": {},
         "blocks": {"table": filled.reshape(-1, 4)},
         **_extent(window),
@@ -234,7 +254,9 @@ def _from_sums(window: Sums, state: FrameState, values: np.ndarray, origin: int,
     }
 
 
-def _from_frames(way: str, window, state: FrameState, rows: int, origin: int, direction: int, shortened: bool):
+def _from_frames(
+    way: str, window, state: FrameState, rows: int, origin: int, direction: int, shortened: bool, levels: bool
+):
     """The pass of another way, and its arguments: as _from_sums.
 
     rows: pieces in the table; shortened: as for way_of"""
@@ -256,7 +278,8 @@ def _from_frames(way: str, window, state: FrameState, rows: int, origin: int, di
     given |= {"count": len(window.shot), "origin": origin - window.shot.start, "lowest": lowest - window.shot.start}
     groups, premultiplied = -(-len(state.bars) // 4), source.alpha == "premultiplied"
     stored = "frames" if not summed else "tiles" if window.tiled else "sums"
-    return composition(way, groups, stored, decode, edges, premultiplied, options.light == "encoded"), given
+    encoded = options.light == "encoded"
+    return composition(way, groups, stored, decode, edges, premultiplied, encoded, levels), given
 
 
 class Solver:
@@ -327,6 +350,11 @@ class GPUCompositor:
         self.device = device
         self._textures: dict[str, object] = {}
 
+    @property
+    def takes_planes(self) -> bool:
+        """Whether frames that are planes are quickest to send."""
+        return self.device.takes_planes
+
     def current(self):
         """A context manager: all other methods are called inside it, on any one thread (Device.current)."""
         return self.device.current()
@@ -358,26 +386,28 @@ class GPUCompositor:
         return np.moveaxis(values, -1, 1).reshape(-1, *values.shape[1:3])[:count]
 
     def read(self, drawn) -> np.ndarray:
-        """A picture of `draw` as an array (H, W, 4) float32, top row first."""
-        return self.device.read(drawn)[0, ::-1]
+        """A picture of `draw` as an array (H, W, 4), top row first: float32, or levels in uint8."""
+        picture = self.device.read(drawn)[0]
+        return picture if drawn.kind == _PICTURE[True] else picture[::-1]
 
-    def levels(self, drawn) -> np.ndarray:
-        """A picture of `draw` as Renderer.levels has it."""
+    def over_black(self, drawn) -> np.ndarray:
+        """A scene-linear picture of `draw` as Renderer.levels has it."""
         size = drawn.size[:2]
         texture = self._texture("levels", *size, 1, "rgba8")
         self.device.run(_LEVELS, size, images={"picture": drawn, "levels": texture}, size=size)
         return self.device.read(texture)[0]
 
-    def draw(self, window, index: int, direction: int, state: FrameState, handle, block: int):
-        """The picture on the device: a texture array rgba32f of one layer, scene-linear, premultiplied, bottom row
-        first. It is window.picture, valid until the next draw with this window.
+    def draw(self, window, index: int, direction: int, state: FrameState, handle, block: int, *, levels: bool = False):
+        """The picture on the device, premultiplied: a texture array rgba32f of one layer, scene-linear, bottom row
+        first; or with `levels` rgba8, display code values, top row first. It is one of the window's, valid until its
+        next picture of the kind.
 
         window: must have loaded all frames that some shutter exposes
         index, direction: as for core.compositor.window_positions
         handle: coefficients, a texture of a solver or of `constant`; block: the pixels along a side of each texel
         """
         if state.following is not None:
-            return self._draw_moved(window, index, direction, state, handle, block)
+            return self._draw_moved(window, index, direction, state, handle, block, levels)
         options, values = state.options, table(state)
         first, last = shutters.open_span(state.bars)
         origin = int(compositor.window_positions(options, index, direction)[0])
@@ -385,11 +415,13 @@ class GPUCompositor:
         shortened = options.edges == "shorten" and (reach[0] < window.shot.start or reach[1] >= window.shot.stop)
         way = way_of(window, options, values, (first, last), shortened)
         if way == "sums":
-            program, given = _from_sums(window, state, values, origin, direction)
+            program, given = _from_sums(window, state, values, origin, direction, levels)
         else:
-            program, given = _from_frames(way, window, state, len(values) - 1, origin, direction, shortened)
+            rows = len(values) - 1
+            program, given = _from_frames(way, window, state, rows, origin, direction, shortened, levels)
             given["images"]["table"] = self._filled("table", values[None], "rgba32f")
-        given["images"] |= {"picture": window.picture, "coefficients": handle}
+        picture = window.levels() if levels else window.picture
+        given["images"] |= {"picture": picture, "coefficients": handle}
         lines = _LINES.get(way, BLOCK)
         for top, height, stored in window.bands():
             name = "sums" if isinstance(window, Sums) else "frames"
@@ -404,9 +436,11 @@ class GPUCompositor:
                 block_bits=(block - 1).bit_length(),
                 **given,
             )
-        return window.picture
+        return picture
 
-    def _draw_moved(self, window: WholeFrames, index: int, direction: int, state: FrameState, handle, block: int):
+    def _draw_moved(
+        self, window: WholeFrames, index: int, direction: int, state: FrameState, handle, block: int, levels: bool
+    ):
         """As `draw`, where shutters follow something: a pass for each texture array of frames, which adds what is seen
         of these to what those before have."""
         options, (width, height) = state.options, (window.source.width, window.source.height)
@@ -425,6 +459,7 @@ class GPUCompositor:
         # What is left out is read in another's place: what lies in its own may be no number.
         slots = np.where(frames < 0, frames[there[0]], frames) % window.capacity
         sums = "sum", "other sum"
+        picture = window.levels() if levels else window.picture
         for held, stack in window.stacks():
             at = held.start > 0, held.stop < window.capacity
             inside = (slots >= held.start) & (slots < held.stop)
@@ -432,7 +467,7 @@ class GPUCompositor:
             images["moves"] = self._filled("moves", moves[None], "rgba32f")
             images["summed"] = images.get("picture")
             sums = sums[::-1]
-            images["picture"] = self._texture(sums[0], width, height, 1, "rgba32f") if at[1] else window.picture
+            images["picture"] = self._texture(sums[0], width, height, 1, "rgba32f") if at[1] else picture
             # What has more to do for a pixel takes long to compile for many.
             program = composition_of_moved(
                 way,
@@ -446,11 +481,12 @@ class GPUCompositor:
                 options.light == "encoded",
                 window.source.alpha == "opaque",
                 at,
+                levels,
             )
             images["packed_frames"] = stack
             extent = width, -(-height // (4 * program.defines["QUADS"]))
             self.device.run(program, extent, textures={**images, "frames": stack}, images=images, **given)
-        return window.picture
+        return picture
 
     def _texture(self, name: str, width: int, height: int, layers: int, kind: str):
         texture = self._textures.get(name)

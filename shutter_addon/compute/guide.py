@@ -14,6 +14,7 @@ import numpy as np
 from ..core import light
 from ..core.frame_source import FrameSource
 from ..core.messages import UserError
+from ..core.planes import Planes, as_rgba
 
 # Rows of the picture whose pixels are smoothed over about one, by a Gaussian of so many pixels.
 ROWS = 240
@@ -62,9 +63,13 @@ class Guides:
         if not self._kept:
             self._made = None
 
+    def wants(self, index: int) -> bool:
+        """Whether a frame is to be noted."""
+        return index in self._kept and index not in self._reduced
+
     def note(self, index: int, frame: np.ndarray) -> None:
         """A frame that was read for something else."""
-        if index in self._kept and index not in self._reduced:
+        if self.wants(index):
             self._reduced[index] = self._reduce(frame)
 
     def lacking(self, frames: tuple[int, ...]) -> set[int]:
@@ -113,6 +118,13 @@ class NotedSource:
     def read(self, index: int) -> np.ndarray:
         frame = self._source.read(index)
         self._guides.note(index, frame)
+        return frame
+
+    def decoded(self, index: int) -> np.ndarray | Planes:
+        # As it is decoded in any case: colours that are sent as such may differ by rounding.
+        frame = self._source.decoded(index)
+        if self._guides.wants(index):
+            self._guides.note(index, as_rgba(frame))
         return frame
 
 

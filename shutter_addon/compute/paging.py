@@ -64,6 +64,7 @@ class PagedDevice(ABC):
     name: str
     max_size: int
     max_layers: int
+    takes_planes = False
 
     def __init__(self, budget: Budget, ask_others: Callable[[], None] | None = None):
         self.budget, self.ask_others = budget, ask_others
@@ -98,6 +99,11 @@ class PagedDevice(ABC):
             self._held.pop(texture, None)
             self._free(own)
             self.budget.give_back(texture.bytes)
+
+    def send(self, texture, frame: np.ndarray):
+        """See Device."""
+        self.write(texture, frame, opaque=True)
+        return texture
 
     def use(self, window) -> None:
         """Notes that a window is in use: others are freed (`window.release`) before it, where there is no room."""

@@ -13,23 +13,15 @@ from . import guide
 from .cpu import CPUCompositor
 from .device import NoDeviceError
 
-DEVICES = ("auto", "gpu", "cpu")
 
-
-def open_compositor(device: str = "auto"):
-    """(compositor, None), or (CPUCompositor, why) where "auto" found no GL: a sentence for the user.
-
-    device: one of DEVICES. NoDeviceError: it is "gpu", and there is none."""
+def open_compositor(device: str = "gpu", *memory):
+    """The compositor "gpu", on OpenGL 4.3, or "cpu", on NumPy; memory: the arguments of GLDevice. NoDeviceError: there
+    is no OpenGL 4.3."""
     if device == "cpu":
-        return CPUCompositor(), None
+        return CPUCompositor()
     from .gpu import GPUCompositor
 
-    try:
-        return GPUCompositor(open_gl()), None
-    except NoDeviceError as error:
-        if device == "gpu":
-            raise
-        return CPUCompositor(), f"{error}; composing with NumPy, which is slow"
+    return GPUCompositor(open_gl(*memory))
 
 
 def open_gl(*memory):
@@ -69,19 +61,22 @@ class Renderer:
         """The picture over black in 8-bit sRGB (H, W, 4), top row first, its alpha full: as a movie has it where
         Blender's view transform is Standard."""
         with self.compositor.current():
-            return self.compositor.levels(self.draw(index, state, direction))
+            if self.source.alpha == "opaque":
+                return self.compositor.read(self.draw(index, state, direction, levels=True))
+            return self.compositor.over_black(self.draw(index, state, direction))
 
-    def draw(self, index: int, state: FrameState, direction: int = 1, *, quick: bool = False):
-        """The picture on the device: a texture array rgba32f of one layer, bottom row first; with NumPy, an array as of
-        `picture`. It is valid until the next picture of this renderer, and composed only if it is not the last one.
+    def draw(self, index: int, state: FrameState, direction: int = 1, *, quick: bool = False, levels: bool = False):
+        """The picture on the device (GPUCompositor.draw); with NumPy, an array as of `picture` or `levels`. It is valid
+        until the next picture of this renderer, and composed only if it is not the last one.
 
         quick: the diffusion may start from the last coefficients, so the picture depends slightly on them.
+        levels: the picture is of 8-bit display code values, not scene-linear
         """
-        key = index, direction, state.key
+        key = index, direction, state.key, levels
         lost = self._drawn is None or not self._window.is_open
         if lost or self._drawn[0] != key or not (quick or self._drawn[1]):
             with self.compositor.current():
-                picture = self.compositor.draw(*self._parts(index, state, direction, quick))
+                picture = self.compositor.draw(*self._parts(index, state, direction, quick), levels=levels)
             self._drawn = key, not quick, picture
         return self._drawn[2]
 
@@ -260,7 +255,8 @@ class Renderer:
         labels, options, count = self.labels(state), state.options, len(state.bars)
         frames = self._guiding(index, state, self.shot(index, direction, state)) if options.edge_aware else ()
         key = count, frames and (frames, options.edge_aware)
-        same = self._solved and self._solved[0] == key and np.array_equal(self._solved[1], labels)
+        same = self._solved and self._solved[0] == key
+        same = same and (self._solved[1] is labels or np.array_equal(self._solved[1], labels))
         if not same or not (quick or self._solved[2]):
             self._keep_guides(index, direction, state)
             guided = (self._guides.guide(frames, options.aggregate), options.edge_aware) if frames else ()
@@ -285,10 +281,11 @@ class Renderer:
 
     def release_window(self) -> None:
         """Frees the window's frames, and those that the search for cuts has read. The next picture reads them again."""
-        if self._window is not None:
-            self._window.release()
-            self._window = self._drawn = None
-        self._guides.keep(())
+        with self.compositor.current():  # another's textures may have the same numbers
+            if self._window is not None:
+                self._window.release()
+                self._window = self._drawn = None
+            self._guides.keep(())
         if self.source.shots is not None:
             self.source.shots.release()
 

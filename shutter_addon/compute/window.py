@@ -9,6 +9,7 @@ import numpy as np
 from ..core import compositor, light
 from ..core.frame_source import FrameSource
 from ..core.frame_state import Options
+from ..core.planes import Planes, chroma_step
 from .budget import is_software
 from .device import Device, NoDeviceError
 from .passes import Image, Pass
@@ -24,7 +25,7 @@ BLOCK = 16
 # Pixels by which packed frames are larger, as in shaders/include/packed.glsl.
 RIM = 5
 # A tile of running sums in pixels (across, down), as in shaders/include/sums.glsl.
-TILE = 8, 4
+TILE = 8, BLOCK
 
 _STORED = {np.uint8: "rgba8", np.uint16: "rgba16", np.float16: "rgba16f", np.float32: "rgba32f"}
 
@@ -70,7 +71,7 @@ class Window:
         self.device, self.source, self.capacity, self.shutters = device, source, capacity, shutters
         self.shot = range(source.count)
         self.textures: list = []
-        self.picture = None
+        self.picture = self._levels = None
         device.use(self)
 
     @property
@@ -85,8 +86,7 @@ class Window:
         try:
             self._check(row_bytes * source.height)
             for top in self.tops:
-                size = self._texels(source.width, self._height(top))
-                self.textures.append(self.device.texture(*size, self.layers, kind))
+                self.textures.append(self.device.texture(*self._size(self._height(top)), kind))
             self.picture = self.device.texture(source.width, source.height, 1, "rgba32f")
         except NoDeviceError:
             self.release()
@@ -102,9 +102,9 @@ class Window:
         if size + beside(self.source, self.shutters) > self.device.budget.limit:
             raise NoDeviceError("over the budget")
 
-    def _texels(self, width: int, height: int) -> tuple[int, int]:
-        """The size (across, down) of the texture for a band of so many pixels."""
-        return width, height
+    def _size(self, height: int) -> tuple[int, int, int]:
+        """The size (width, height, layers) of the texture for a band of so many rows."""
+        return self.source.width, height, self.layers
 
     def _height(self, top: int) -> int:
         return min(self.rows, self.source.height - top)
@@ -114,10 +114,16 @@ class Window:
         for top, texture in zip(self.tops, self.textures, strict=True):
             yield top, self._height(top), texture
 
+    def levels(self):
+        """The texture that the compositor draws levels into, made when it is first asked for."""
+        if self._levels is None:
+            self._levels = self.device.texture(self.source.width, self.source.height, 1, "rgba8")
+        return self._levels
+
     def release(self) -> None:
-        for texture in (*self.textures, *filter(None, [self.picture])):
+        for texture in (*self.textures, *filter(None, [self.picture, self._levels])):
             texture.release()
-        self.textures, self.picture = [], None
+        self.textures, self.picture, self._levels = [], None, None
         self.device.forget(self)
 
 
@@ -186,7 +192,7 @@ class Frames(Window):
         if self._host is None:
             yield from super().bands()
             return
-        texture = self.device.texture(*self._texels(self.source.width, self.rows), self.layers, self.kind)
+        texture = self.device.texture(*self._size(self.rows), self.kind)
         try:
             for top in self.tops:
                 height = self._height(top)
@@ -235,6 +241,10 @@ class WholeFrames(Frames):
         except NoDeviceError:
             Window.release(self)
             raise
+
+    def _texels(self, width: int, height: int) -> tuple[int, int]:
+        """The size (across, down) of the texture for a frame of so many pixels."""
+        return width, height
 
     def _divide(self, most: int) -> None:
         across, down = self._texels(self.source.width, self.source.height)
@@ -324,33 +334,59 @@ def stores_rows(device: Device) -> bool:
     return is_software(device.name)
 
 
-def _in_tiles(width: int, height: int) -> tuple[int, int]:
-    """The size (across, down) of a texture for pixels stored tile by tile: a row of texels holds a row of tiles.
-
-    Down, it has room for whole BLOCKs. Across, it has TILE[0] texels to spare: else all rows of texels could begin in
-    the same sets of the processor's cache."""
+def _in_tiles(width: int, height: int, layers: int) -> tuple[int, int, int]:
+    """The size of a texture for so many layers of pixels stored tile by tile: a row of texels has all layers of a tile,
+    a layer of texels a row of tiles."""
     across, down = TILE
-    return across * down * -(-width // across) + across, -(-height // BLOCK) * BLOCK // down
+    return across * down * layers, -(-width // across), -(-height // down)
+
+
+# What the pass that adds a frame binds of it, by how it was sent, and its constants; what was sent before is taken from
+# the sums themselves. Images hold samples of planes: a software renderer's texelFetch takes longer.
+_COLOURS = {"frame": "sampler2DArray"}
+_PLANES = {name: Image("r32ui", reads=True, writes=False) for name in ("luma", "chroma")}
+_OF_FRAME = {"top": "int", "whole": "float"}
+_OF_MATRIX = {"luma_of": "ivec2", "red_of": "int", "green_of": "ivec2", "blue_of": "int"}
+_OF_SENT = {
+    "colours": _OF_FRAME,
+    "numbers": _OF_FRAME,
+    "planes": _OF_FRAME | _OF_MATRIX | {"chroma_step": "ivec2"},
+    "before": {"before": "int", "after": "int"},
+}
 
 
 @cache
-def accumulation(decode: int, again: bool, back: bool, tiled: bool) -> Pass:
+def accumulation(decode: int, sent: str, back: bool, tiled: bool) -> Pass:
     """The pass that makes a layer of sums from its neighbour: with the frame between the two added, or subtracted.
 
     decode: of `decoding`
-    again: the frame is taken as the difference of two layers that hold it already, not from a texture
+    sent: as what the frame was sent, "colours", "numbers" (Device.send) or "planes"; "before": it is taken as the
+    difference of two layers that hold it already
     back: it is subtracted
     tiled: the sums are stored in tiles
     """
     return Pass(
         "accumulate",
-        samplers={} if again else {"frame": "sampler2DArray"},
-        images={"sums": Image("rgba16ui", reads=True)},
-        constants={"size": "ivec2", "known": "int", "next": "int"}
-        | ({"before": "int", "after": "int"} if again else {"top": "int", "whole": "float"}),
-        defines={"DECODE": decode, "AGAIN": int(again), "BACK": int(back), "TILED": int(tiled)},
-        local_size=(32, TILE[1], 1),
+        samplers=_COLOURS if sent in ("colours", "numbers") else {},
+        images={"sums": Image("rgba16ui", reads=True)} | (_PLANES if sent == "planes" else {}),
+        constants={"size": "ivec2", "known": "int", "next": "int"} | _OF_SENT[sent],
+        defines={
+            "DECODE": decode,
+            "AGAIN": int(sent == "before"),
+            "BACK": int(back),
+            "TILED": int(tiled),
+            "NUMBERS": int(sent == "numbers"),
+            "PLANES": int(sent == "planes"),
+        },
+        local_size=(TILE[0], TILE[1], 1),
     )
+
+
+def _in_fours(plane: np.ndarray) -> np.ndarray:
+    """Samples uint8 (h, w) as uint32 (h, ⌈w/4⌉), four side by side."""
+    if missing := -plane.shape[1] % 4:
+        plane = np.pad(plane, ((0, 0), (0, missing)))
+    return np.ascontiguousarray(plane).view(np.dtype("<u4"))
 
 
 class Sums(RunningSums, Window):
@@ -365,12 +401,13 @@ class Sums(RunningSums, Window):
         RunningSums.__init__(self, source, capacity)
         # White is the largest 2ⁿ − 1 for which the sum of a whole window fits into 21 bits, and n is 16 at most.
         self.whole = (1 << min(16, 21 - (capacity - 1).bit_length())) - 1
-        # Neighbouring pixels read different layers. In tiles, what a workgroup reads of a layer is one run of memory.
-        self.tiled = stores_rows(device) and _in_tiles(source.width, 1)[0] <= device.max_size
-        self._sent = None
+        # A workgroup reads all layers of its pixels. In tiles, they are one run of memory.
+        texels, _, tiles = _in_tiles(source.width, source.height, self.layers)
+        self.tiled = stores_rows(device) and texels <= device.max_size and tiles <= device.max_layers
+        self._sent = {}
         self._allocate("rgba16ui", 8)
         try:
-            self._sent = device.texture(source.width, source.height, 1, "rgba8")
+            self._hold("frame")
         except NoDeviceError:
             self.release()
             raise
@@ -379,25 +416,65 @@ class Sums(RunningSums, Window):
         self.device.use(self)
         super().load(positions, options, shot)
 
-    def _texels(self, width: int, height: int) -> tuple[int, int]:
-        return _in_tiles(width, height) if self.tiled else (width, height)
+    def _size(self, height: int) -> tuple[int, int, int]:
+        return _in_tiles(self.source.width, height, self.layers) if self.tiled else super()._size(height)
+
+    def _hold(self, *names: str) -> None:
+        """Has the textures that a frame is sent to: "frame", or "luma" and "chroma", which take less. The others go."""
+        if self._sent.keys() == set(names):
+            return
+        self._free_sent()
+        width, height = self.source.width, self.source.height
+        sizes = {"frame": (width, height, 1, "rgba8"), "luma": (-(-width // 4), height, 1, "r32ui")}
+        sizes["chroma"] = -(-width // 8), -(-height // 2), 2, "r32ui"
+        for name in names:
+            self._sent[name] = self.device.texture(*sizes[name])
+
+    def _free_sent(self) -> None:
+        for texture in self._sent.values():
+            texture.release()
+        self._sent = {}
+
+    def _send(self, index: int) -> tuple[str, dict]:
+        """Sends a source frame: as what (`accumulation`), and the arguments of the pass that adds it."""
+        frame = self.source.decoded(index) if self.device.takes_planes else self.source.read(index)
+        if isinstance(frame, Planes):
+            return "planes", self._send_planes(frame)
+        self._hold("frame")
+        sent = self.device.send(self._sent["frame"], frame)
+        return "colours" if sent is self._sent["frame"] else "numbers", {"textures": {"frame": sent}}
+
+    def _send_planes(self, frame: Planes) -> dict:
+        self._hold("luma", "chroma")
+        self.device.write(self._sent["luma"], _in_fours(frame.luma))
+        for layer, plane in enumerate(frame.chroma):
+            self.device.write(self._sent["chroma"], _in_fours(plane), layer)
+        matrix = frame.matrix
+        return {
+            "images": self._sent,
+            "chroma_step": (chroma_step(self.source.width), chroma_step(self.source.height)),
+            "luma_of": (matrix.offset, matrix.luma),
+            "red_of": matrix.red_of_cr,
+            "green_of": (matrix.green_of_cb, matrix.green_of_cr),
+            "blue_of": matrix.blue_of_cb,
+        }
 
     def _add(self, frame: int, same: int | None, known: int, next_: int) -> None:
-        program = accumulation(
-            decoding(self.source.transfer, self._options.light), same is not None, next_ < known, self.tiled
-        )
-        given = {"known": known % self.layers, "next": next_ % self.layers}
+        given = {"images": {}, "known": known % self.layers, "next": next_ % self.layers}
         if same is None:
-            self.device.write(self._sent, self.source.read(frame), opaque=True)
-            given |= {"textures": {"frame": self._sent}, "whole": float(self.whole)}
+            sent, arguments = self._send(frame)
+            given |= arguments | {"whole": float(self.whole)}
         else:
+            sent = "before"
             given |= {"before": same % self.layers, "after": (same + 1) % self.layers}
+        decode = decoding(self.source.transfer, self._options.light)
+        program = accumulation(decode, sent, next_ < known, self.tiled)
         for top, height, sums in self.bands():
             size = self.source.width, height
-            self.device.run(program, size, images={"sums": sums}, size=size, top=top, **given)
+            given["images"] = given["images"] | {"sums": sums}
+            self.device.run(program, size, size=size, top=top, **given)
 
     def release(self) -> None:
         RunningSums.release(self)
         Window.release(self)
-        if self._sent is not None:
-            self._sent.release()
+        self._free_sent()

@@ -5,9 +5,8 @@ import os
 import re
 import secrets
 import shutil
-import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 LEFT_BEHIND = 3600  # seconds without a change after which a part folder counts as abandoned
@@ -43,14 +42,28 @@ def is_part(name: str) -> bool:
 
 
 def left_behind(parent: Path) -> list[Path]:
-    """The part folders in `parent` that processes have left behind that were killed. OSError: it cannot be read."""
-    return [
-        Path(entry)
-        for entry in os.scandir(parent)
-        if is_part(entry.name)
-        and entry.is_dir(follow_symlinks=False)
-        and time.time() - _last_written(entry.path) > LEFT_BEHIND
-    ]
+    """The part folders in `parent` that processes have left behind that were killed. OSError: it cannot be read or
+    written to."""
+    with os.scandir(parent) as entries:
+        parts = [entry.path for entry in entries if is_part(entry.name) and entry.is_dir(follow_symlinks=False)]
+    if not parts:
+        return []
+    now = _clock(parent)
+    return [Path(part) for part in parts if now - _last_written(part) > LEFT_BEHIND]
+
+
+def clear_up(parent: Path) -> None:
+    """Removes them, as far as that is possible."""
+    with suppress(OSError):
+        for left in left_behind(parent):
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _clock(parent: Path) -> float:
+    """The time by the clock that dates the files there, in seconds since 1970: on a network drive the server's, which
+    need not agree with this machine's."""
+    with part_folder(parent) as folder:
+        return folder.lstat().st_mtime
 
 
 def _last_written(folder: str) -> float:

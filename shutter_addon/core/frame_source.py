@@ -10,6 +10,8 @@ from typing import Protocol
 
 import numpy as np
 
+from .planes import Planes
+
 
 class ShotFinder(Protocol):
     """Where the shots of a source end. It may have to read frames for that; those wait for their `read`.
@@ -47,6 +49,7 @@ class FrameSource(Protocol):
     has_audio: whether the file has sound
     left_out: a sentence for the user about files beside the sequence that do not belong to it; "" if there are none
     shots: what knows where its shots end; None: it is one shot
+    from_proxy: whether frames are read from a proxy, as far as it has them
     """
 
     path: Path
@@ -61,6 +64,7 @@ class FrameSource(Protocol):
     has_audio: bool = False
     left_out: str = ""
     shots: ShotFinder | None = None
+    from_proxy: bool = False
 
     @property
     def files(self) -> list[Path]:
@@ -72,6 +76,11 @@ class FrameSource(Protocol):
         """The frame as an array (height, width, 4), RGBA, top row first. Any order; ascending is fastest.
 
         MediaError: the frame cannot be decoded. IndexError: it is outside 0 … count-1."""
+
+    def decoded(self, index: int) -> np.ndarray | Planes:
+        """The frame as it is quickest to get, raising what `read` raises: its planes, where it has some and nothing but
+        their conversion is between the two, else as `read` gives it."""
+        return self.read(index)
 
     def want(self, indices: Iterable[int]) -> None:
         """Says which frames will be read next, in this order; others will not. A source may decode them ahead."""

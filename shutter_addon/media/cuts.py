@@ -7,6 +7,7 @@ from itertools import pairwise, product
 import numpy as np
 
 from ..core import light
+from ..core.planes import Planes, as_rgba
 from .errors import MediaError
 from .source import SourceWrapper
 
@@ -45,24 +46,31 @@ _HANDED_BYTES = 256 << 20
 Signature = np.ndarray
 
 
-def signature(frame: np.ndarray, transfer: str, alpha: str = "opaque") -> Signature:
-    """A small picture (18, 32, 3) float32 of a frame (H, W, 4), in encoded levels from 0 to 255; of a frame that is
-    smaller, as small. transfer, alpha: the source's."""
-    height, width = frame.shape[:2]
+def signature(frame: np.ndarray | Planes, transfer: str, alpha: str = "opaque") -> Signature:
+    """A small picture (18, 32, 3) float32 of a frame (H, W, 4) or of its planes, in encoded levels from 0 to 255; of
+    one that is smaller, as small. transfer, alpha: the source's."""
+    planar = isinstance(frame, Planes)
+    height, width = (frame.luma if planar else frame).shape[:2]
     down, right = max(1, height // (5 * _ROWS)), max(1, width // (10 * _COLUMNS))
-    samples = frame[down // 2 :: down, right // 2 :: right]
-    scale = np.float32(1 / np.iinfo(frame.dtype).max if frame.dtype.kind == "u" else 1)
-    colours = samples[..., :3] * scale
-    if frame.dtype.kind == "f":
+    chosen = slice(down // 2, None, down), slice(right // 2, None, right)
+    samples = frame.samples(*chosen) if planar else np.ascontiguousarray(frame[chosen])
+    scale = np.float32(1 / np.iinfo(samples.dtype).max if samples.dtype.kind == "u" else 1)
+    colours = samples * scale  # an alpha as well: NumPy is quickest with all that lies in a row
+    if samples.dtype.kind == "f":
         colours = np.nan_to_num(colours, copy=False).clip(0, 1)  # one sun would outweigh the rest of the picture
     if alpha == "straight":
-        colours *= samples[..., 3:] * scale
-    for axis, most in enumerate((_ROWS, _COLUMNS)):
-        length = colours.shape[axis]
-        edges = np.linspace(0, length, min(most, length) + 1).astype(int)
-        sizes = np.diff(edges).astype(np.float32).reshape((-1,) + (1,) * (2 - axis))
-        colours = np.add.reduceat(colours, edges[:-1], axis=axis) / sizes
+        colours[..., :3] *= samples[..., 3:] * scale
+    (rows, heights), (columns, widths) = map(_blocks, colours.shape, (_ROWS, _COLUMNS))
+    colours = np.add.reduceat(colours.reshape(len(colours), -1), rows, axis=0).reshape(len(rows), *colours.shape[1:])
+    colours = np.add.reduceat(colours / heights[:, None, None], columns, axis=1) / widths[:, None]
+    colours = np.ascontiguousarray(colours[..., :3])
     return 255 * (light.to_encoded(colours) if transfer == "linear" else colours)
+
+
+def _blocks(length: int, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where blocks of so many samples begin, and how long they are: as many as there are samples, `most` at most."""
+    edges = np.linspace(0, length, min(most, length) + 1).astype(int)
+    return edges[:-1], np.diff(edges).astype(np.float32)
 
 
 @cache
@@ -207,7 +215,7 @@ class ShotSource(SourceWrapper):
         self.filmed = (source.count - 1) // step + 1  # how many frames are
         self._cuts: dict[int, bool] = {}  # by filmed frame: whether there is a cut before it
         self._signatures: dict[int, Signature] = {}  # likewise
-        self._handed: dict[int, np.ndarray] = {}
+        self._handed: dict[int, np.ndarray | Planes] = {}
 
     @property
     def shots(self) -> "ShotSource":  # an attribute would keep its frames until Python looks for cycles
@@ -215,8 +223,12 @@ class ShotSource(SourceWrapper):
 
     def read(self, index: int) -> np.ndarray:
         """The frame as the source gives it."""
+        return as_rgba(self.decoded(index))
+
+    def decoded(self, index: int) -> np.ndarray | Planes:
+        """The frame as the source has it decoded."""
         frame = self._handed.pop(index, None)
-        return self._source.read(index) if frame is None else frame
+        return self._source.decoded(index) if frame is None else frame
 
     def around(self, index: int, low: int, high: int, *, known: bool = False) -> range:
         """The frames of the shot around frame `index`, for a window of the frames from `low` to `high`.
@@ -298,7 +310,7 @@ class ShotSource(SourceWrapper):
         if index in self._signatures:
             return self._signatures[index]
         try:
-            frame = self.read(index * self.step)
+            frame = self.decoded(index * self.step)
         except MediaError:
             return None
         found = self._signatures[index] = signature(frame, self.transfer, self.alpha)
@@ -307,7 +319,7 @@ class ShotSource(SourceWrapper):
             del self._signatures[next(iter(self._signatures))]
         return found
 
-    def _hand_over(self, index: int, frame: np.ndarray) -> None:
+    def _hand_over(self, index: int, frame: np.ndarray | Planes) -> None:
         self._handed[index] = frame
         while len(self._handed) > 1 and len(self._handed) * frame.nbytes > _HANDED_BYTES:
             del self._handed[next(iter(self._handed))]

@@ -26,6 +26,22 @@ def check_file(path):
     return path
 
 
+def check_sound(path):
+    """MediaError unless it is a file that has sound; without PyAV, unless it is a file."""
+    path = check_file(path)
+    try:
+        import av
+    except ImportError:
+        return
+    try:
+        with av.open(check_name(path)) as container:
+            found = container.streams.audio
+    except (av.error.FFmpegError, IndexError):
+        found = ()
+    if not found:
+        raise MediaError(f"{path.name}: has no sound, or cannot be read")
+
+
 def is_other(path):
     """Whether something lies there that is neither a file nor a folder; who opens a pipe may wait for ever."""
     return path.exists() and not (path.is_file() or path.is_dir())

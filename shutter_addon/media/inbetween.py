@@ -6,25 +6,28 @@ are built together."""
 
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, as_completed, wait
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from ..core.claims import Claims
 from ..core.frame_source import FrameSource
 from . import cuts
 from .completeness import why_short
 from .errors import MediaError
 from .files import check_index
-from .inbetween_cache import InbetweenCache, State, pair_line, write_picture
+from .inbetween_cache import InbetweenCache, State, pair_line, unwritable, write_picture
 from .source import SourceWrapper
 
 MEMORY = 4 << 30  # bytes of all pairs that are built at the same time, and of the frames that are read ahead
 AHEAD = 640 << 20  # bytes of them for frames that are read ahead; enough to read none of 16 bits in 4K twice
 # Memory for building a pair, in RGBA frames of float32. Measured: 9 to 17 for "quick", 15 to 24.3 for "good".
 LAYERS = 26
+_PAUSE = 1.0  # seconds between two looks at what other processes have built
 
 
 class InbetweenSource(SourceWrapper):
@@ -86,6 +89,7 @@ def build(
     update: Callable[[int, int], None] = lambda done, total: None,
     cancelled: Callable[[], bool] = lambda: False,
     between=None,
+    pairs: Sequence[int] | None = None,
 ) -> State:
     """Builds in-between frames in `folder`. Pictures that are there are checked, and damaged ones are built again.
 
@@ -95,11 +99,13 @@ def build(
     update: called with the number of finished pairs and that of all
     cancelled: called often, from several threads; True ends the build, and finished pairs are kept
     between: makes a pair's frames, in place of flow.between
+    pairs: those to build, each by its first source frame, ascending; in place of `frames`
 
-    After a build that was killed, the next one goes on where that was. Several processes may build in the same folder.
-    The files are the same for any chunks and any interruptions. The source must not be used elsewhere meanwhile.
-    Returns how far the build came. MediaError: a package is missing, or a frame cannot be read or written; finished
-    pairs are kept."""
+    After a build that was killed, the next one goes on where that was. Several processes may build in the same folder,
+    and share the pairs: one that another is building is waited for, and built here if that one is killed. The files are
+    the same for any chunks and any interruptions. The source must not be used elsewhere meanwhile. Returns how far the
+    build came. MediaError: a package is missing, or a frame cannot be read or written, and finished pairs are kept; or
+    the source was written to meanwhile."""
     if package := cuts.missing_package():
         raise MediaError(
             f"in-between frames need the Python package {package}; "
@@ -107,13 +113,23 @@ def build(
         )
     if between is None:
         from .flow import between
-    cache, pairs = InbetweenCache(source, folder, factor, method), _pairs(source, frames)
+    cache = InbetweenCache(source, folder, factor, method)
+    pairs = _pairs(source, frames) if pairs is None else pairs
     cache.prepare()
-    cache.load()
-    done = 0
-    for finished in _in_parallel(_tasks(cache, pairs, between, cancelled), _workers(source)):
-        done += finished
-        update(done, len(pairs))
+    done, left = 0, list(pairs)
+    with Claims(cache.folder) as claims:
+        while left:
+            cache.load()
+            others: list[int] = []  # pairs that other processes are building
+            tasks = _tasks(cache, left, claims, others, between, cancelled)
+            for finished in _in_parallel(tasks, _workers(source)):
+                done += finished
+                update(done, len(pairs))
+            if len(others) == len(left):
+                time.sleep(_PAUSE)
+            left = others
+        claims.clear(map(_claim, pairs))
+    cache.confirm()
     return State("ready" if done == len(pairs) else "partial", done, len(pairs))
 
 
@@ -139,21 +155,26 @@ def _pairs(source: FrameSource, frames: tuple[int, int] | None) -> range:
     return range(first, min(last + 1, source.count - 1))
 
 
-def _tasks(cache: InbetweenCache, pairs: range, between, cancelled) -> Iterator[Callable[[], bool]]:
-    """Yields a function for each pair that builds it and returns whether it is finished. Frames are read here, in the
-    caller's thread; the functions may run in any."""
+def _tasks(
+    cache: InbetweenCache, pairs: list[int], claims: Claims, others: list[int], between, cancelled
+) -> Iterator[Callable[[], bool]]:
+    """Yields a function for each pair that builds it and returns whether it is finished; adds those to `others` that
+    other processes have claimed. Frames are read here, in the caller's thread; the functions may run in any."""
     near = _Near(cache.source)
     for pair in pairs:
         if cancelled():
             return
         if cache.is_sound(pair):
             yield lambda: True
-            continue
-        first, second, kind = near.pair(pair)
-        if kind:
-            yield partial(_note_kind, cache, pair, kind)
+        elif not _take(cache, claims, pair):
+            others.append(pair)
+        elif _finished_by_another(cache, pair):
+            claims.release(_claim(pair))
+            yield lambda: True
         else:
-            yield partial(_make, cache, pair, first, second, between, cancelled)
+            first, second, kind = near.pair(pair)
+            make = partial(_note_kind, kind) if kind else partial(_make, first, second, between, cancelled)
+            yield partial(_build_claimed, claims, cache, pair, make)
 
 
 class _Near:
@@ -206,7 +227,35 @@ class _Near:
         return self._signatures[index]
 
 
-def _make(cache, pair, first, second, between, cancelled) -> bool:
+def _claim(pair: int) -> str:
+    """The name of a pair's claim."""
+    return f"{pair:08d}"
+
+
+def _take(cache: InbetweenCache, claims: Claims, pair: int) -> bool:
+    try:
+        return claims.take(_claim(pair))
+    except OSError as error:
+        raise unwritable(cache.folder, error) from None
+
+
+def _finished_by_another(cache: InbetweenCache, pair: int) -> bool:
+    """Whether a pair was finished since the cache was read. Only its pictures are looked for: of a pair without any,
+    the note is made again."""
+    if not cache.picture(cache.steps(pair)[0]).exists():
+        return False
+    cache.load()
+    return cache.is_sound(pair)
+
+
+def _build_claimed(claims: Claims, cache: InbetweenCache, pair: int, make) -> bool:
+    try:
+        return make(cache, pair)
+    finally:
+        claims.release(_claim(pair))
+
+
+def _make(first, second, between, cancelled, cache, pair) -> bool:
     source = cache.source
     pictures = between(first, second, cache.factor, cache.method, source.transfer, source.alpha)
     for index, picture in zip(cache.steps(pair), pictures, strict=True):
@@ -216,7 +265,7 @@ def _make(cache, pair, first, second, between, cancelled) -> bool:
     return True
 
 
-def _note_kind(cache, pair, kind) -> bool:
+def _note_kind(kind, cache, pair) -> bool:
     cache.note(pair_line(pair, kind))
     return True
 

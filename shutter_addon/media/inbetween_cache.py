@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from OpenImageIO import ImageInput, ImageOutput, ImageSpec, geterror
 
-from ..core import atomic_write
+from ..core import atomic_write, claims
 from ..core.frame_source import FrameSource
 from .completeness import is_whole_picture, why_short
 from .errors import MediaError
@@ -170,7 +170,7 @@ class InbetweenCache:
                     with suppress(OSError):  # another user's, or cleared by others meanwhile
                         _remove_part(folder, part.name)
         except OSError as error:
-            raise _unwritable(self.folder, error) from None
+            raise unwritable(self.folder, error) from None
 
     def write(self, frame: int, picture: np.ndarray) -> None:
         """Writes a frame's picture (height, width, 4) whole or not at all, and its digest. MediaError: it cannot be
@@ -185,7 +185,7 @@ class InbetweenCache:
                 # process is killed.
                 self.note(f"{_sha256(part)}  {path.name}")
         except OSError as error:
-            raise _unwritable(self.folder, error) from None
+            raise unwritable(self.folder, error) from None
 
     def note(self, line: str) -> None:
         """Appends a line to this build's checks. MediaError: it cannot be written."""
@@ -194,7 +194,16 @@ class InbetweenCache:
                 checks.append(f"{self._token}.sha256", f"{line}\n".encode())
         except OSError as error:
             self._token = secrets.token_hex(4)  # that file may end in half a line: go on in another
-            raise _unwritable(self.folder, error) from None
+            raise unwritable(self.folder, error) from None
+
+    def confirm(self) -> None:
+        """MediaError: the source was written to since this was made. What this build has finished counts no longer: it
+        may be of what the source has become."""
+        if identity(self.source) == self.manifest["source"]:
+            return
+        with suppress(OSError), Folder(self.folder) as folder, folder.folder(CHECKS) as checks:
+            checks.remove(f"{self._token}.sha256")
+        raise MediaError(f"{self.source.path}: was written to while in-between frames were built; build them again")
 
     def _name(self, frame):
         return f"{frame:08d}{self._suffix}"
@@ -237,13 +246,7 @@ def identity(source: FrameSource) -> dict:
     MediaError: a file is gone."""
     content = hashlib.sha256()
     for path in source.files:
-        try:
-            status = path.stat()
-            if not stat.S_ISREG(status.st_mode):  # a pipe would never end
-                raise MediaError(f"{path.name}: is no file")
-            content.update(_content(path, status.st_size, status.st_mtime_ns))
-        except OSError as error:
-            raise MediaError(f"{path.name}: cannot be read ({error.strerror})") from None
+        content.update(content_digest(path))
     return {
         "content": content.hexdigest(),
         "count": source.count,
@@ -253,6 +256,19 @@ def identity(source: FrameSource) -> dict:
         "alpha": source.alpha,
         "options": source.options,
     }
+
+
+def content_digest(path: Path, whole: int = WHOLE) -> bytes:
+    """32 bytes that tell a file's content from others'; `identity` has the same of a source's files.
+
+    whole: files of more bytes are told by their size and by blocks spread over them. MediaError: it is gone."""
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):  # a pipe would never end
+            raise MediaError(f"{path.name}: is no file")
+        return _content(path, status.st_size, status.st_mtime_ns, whole)
+    except OSError as error:
+        raise MediaError(f"{path.name}: cannot be read ({error.strerror})") from None
 
 
 def state(source: FrameSource, folder, factor: int, method: str) -> State:
@@ -477,6 +493,7 @@ def _pictures(cache: Folder, checks: _Checks) -> list[os.DirEntry]:
 def _other_files(cache: Folder, checks: _Checks) -> Iterator[tuple[Folder, str]]:
     """Our other files in a cache's folder, as (folder, name), in the order in which they are removed. The manifest is
     last: without it, what is left would not be recognised as a cache again."""
+    yield from ((cache, entry.name) for entry in cache.files() if claims.is_claim(entry.name))
     for entry in cache.entries():
         if atomic_write.is_part(entry.name):
             with suppress(OSError), cache.folder(entry.name) as part:
@@ -547,10 +564,10 @@ def _remembered(known: dict[Path, tuple], folder: Path, find: Callable[[], int])
 
 
 @lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
-def _content(path: Path, size: int, _mtime: int) -> bytes:
-    """The SHA-256 of a file's content; of a file over WHOLE, that of its size and of blocks spread over it."""
+def _content(path: Path, size: int, _mtime: int, whole: int) -> bytes:
+    """The SHA-256 of a file's content; of a file over `whole`, that of its size and of blocks spread over it."""
     with path.open("rb") as file:
-        if size <= WHOLE:
+        if size <= whole:
             return hashlib.file_digest(file, "sha256").digest()
         digest = hashlib.sha256(str(size).encode())
         for block in range(BLOCKS):
@@ -576,5 +593,6 @@ def _irremovable(folder, error: OSError) -> MediaError:
     return MediaError(f"{folder}: cannot be removed ({error.strerror or error})")
 
 
-def _unwritable(folder: Path, error: OSError) -> MediaError:
+def unwritable(folder: Path, error: OSError) -> MediaError:
+    """The sentence about a folder of in-between frames that cannot be written to."""
     return MediaError(f"{folder}: in-between frames cannot be written there ({error.strerror or error})")

@@ -3,12 +3,17 @@
 import gc
 import math
 import re
+import threading
+from contextlib import contextmanager
 from fractions import Fraction
+from functools import partial
 
 import av
 import numpy as np
+from av.video.reformatter import ColorRange
 
 from ..core.frame_source import FrameSource
+from ..core.planes import Planes, matrix
 from .channels import CHANNELS, no_channel
 from .decode import FrameReader, fraction, reason
 from .deinterlace import blur_rows, has_fields, interpolate_fields, samples_of
@@ -19,6 +24,7 @@ from .reduced import reduced, reduced_size
 # Blender's choice for YUV to RGB; libswscale's defaults are a level too dark and smear colours.
 SCALER = "neighbor+accurate_rnd+full_chroma_int"
 REDUCER = "area+accurate_rnd+full_chroma_int"  # the same, where frames become smaller
+_PLANAR_420 = frozenset({"yuv420p", "yuvj420p"})
 _PLANAR_YUV = re.compile(r"yuv[aj]?4\d\dp(\d+le)?")
 
 
@@ -32,12 +38,14 @@ class MovieSource(FrameSource):
 
     transfer = "srgb"
 
-    def __init__(self, path, *, stream=0, deinterlace=False, divisor=1):
-        """divisor: how many times smaller than the file's the frames are each way (ReducedSource)"""
+    def __init__(self, path, *, stream=0, deinterlace=False, divisor=1, size=None):
+        """divisor: how many times smaller than the file's the frames are each way (ReducedSource)
+        size: what opaque frames are fitted to, width and height, in place of `divisor`"""
         self.path = check_file(path)
-        self._deinterlace, self._divisor = deinterlace, divisor
+        self._deinterlace, self._divisor, self._fitted_to = deinterlace, divisor, size
         self.options = {"stream": stream, "deinterlace": bool(deinterlace)}
         self._graph = self._graph_key = None
+        self._converting = threading.Lock()  # planes are converted on any thread
         self._reader = FrameReader(self.path, stream)
         try:
             self._probe()
@@ -54,7 +62,8 @@ class MovieSource(FrameSource):
         self.has_audio = bool(reader.container.streams.audio)
         self._step = float(1 / (self.fps * reader.time_base))
         self._turns = -round(first.rotation / 90) % 4
-        size = tuple(reduced_size(length, self._divisor) for length in (first.width, first.height))
+        filmed = first.width, first.height
+        size = self._fitted_to or tuple(reduced_size(length, self._divisor) for length in filmed)
         self.width, self.height = size[::-1] if self._turns % 2 else size
         deep = max(component.bits for component in first.format.components) > 8
         self._format, self.dtype = ("rgba64le", np.dtype(np.uint16)) if deep else ("rgba", np.dtype(np.uint8))
@@ -62,21 +71,48 @@ class MovieSource(FrameSource):
         has_alpha = any(component.is_alpha for component in first.format.components)
         self.alpha = "opaque" if not has_alpha else "premultiplied" if deep else "straight"
         # libswscale takes the mean of straight colours whatever their cover.
-        in_conversion = self._divisor > 1 and self.alpha != "straight"
-        self._size, self._scaler = (size, REDUCER) if in_conversion else ((first.width, first.height), SCALER)
+        in_conversion = size != filmed and self.alpha != "straight"
+        self._size, self._scaler = (size, REDUCER) if in_conversion else (filmed, SCALER)
 
     def read(self, index):
         """The frame as a new array (height, width, 4), RGBA, top row first.
 
         Raises MediaError for a frame that is damaged or cut off, IndexError outside 0 … count-1."""
+        with self._named(index):
+            return self._pixels(self._frame(index))
+
+    def decoded(self, index):
+        """As `read`, or the frame's planes, where they are 8-bit 4:2:0 and as large as the frame, and BT.601 or 709.
+
+        They are those of the decoder's own memory. What they become is what libswscale makes of them, by SCALER."""
+        with self._named(index):
+            frame = self._frame(index)
+            if (found := self._matrix(frame)) is None:
+                return self._pixels(frame)
+            luma, *chroma = map(samples_of, frame.planes)
+            return Planes(luma, tuple(chroma), found, partial(self._pixels, frame))
+
+    def _frame(self, index):
         check_index(self, index)
-        time = self._reader.start + _round(index * self._step)
+        return self._reader.frame_at(self._reader.start + _round(index * self._step), self._step)
+
+    @contextmanager
+    def _named(self, index):
+        """Inside, what fails is said of that frame, by MediaError."""
         try:
-            return self._pixels(self._reader.frame_at(time, self._step))
+            yield
         except av.error.FFmpegError as error:
             raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {reason(error)}") from error
         except MediaError as error:
             raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {error}") from error
+
+    def _matrix(self, frame):
+        """What makes RGB of the frame's planes; None where more has to be done with it."""
+        if frame.format.name not in _PLANAR_420 or self._deinterlace or self._turns:
+            return None
+        if (frame.width, frame.height) != self._size or self._scaler != SCALER:
+            return None
+        return matrix(frame.colorspace, frame.format.name == "yuvj420p" or frame.color_range == ColorRange.JPEG)
 
     def _pixels(self, frame):
         by_fields = self._deinterlace and has_fields(frame)
@@ -89,9 +125,10 @@ class MovieSource(FrameSource):
         return self._upright(picture)
 
     def _converted(self, frame, pix_fmt):
-        graph = self._graph_for(frame, pix_fmt)
-        graph.vpush(frame)
-        return graph.vpull().to_ndarray()
+        with self._converting:
+            graph = self._graph_for(frame, pix_fmt)
+            graph.vpush(frame)
+            return graph.vpull().to_ndarray()
 
     def _upright(self, picture):
         return np.require(np.rot90(picture, -self._turns), requirements=["C", "W"])
@@ -101,12 +138,12 @@ class MovieSource(FrameSource):
         if key != self._graph_key:
             self._drop_graph()
             graph = av.filter.Graph()
-            size = "{}:{}".format(*self._size)
+            scale = "scale", "{}:{}:flags={}".format(*self._size, self._scaler)
+            # libswscale takes twice as long for packed colours with alpha as for planes, and then those from these.
+            by_planes = [scale, ("format", "gbrp")] if pix_fmt == "rgba" and _is_opaque_yuv(frame.format) else []
             nodes = [
                 graph.add_buffer(width=key[1], height=key[2], format=frame.format, time_base=Fraction(1)),
-                graph.add("scale", f"{size}:flags={self._scaler}"),
-                graph.add("format", pix_fmt),
-                graph.add("buffersink"),
+                *(graph.add(*filter_) for filter_ in (*by_planes, scale, ("format", pix_fmt), ("buffersink",))),
             ]
             graph.link_nodes(*nodes).configure()
             self._graph, self._graph_key = graph, key
@@ -115,7 +152,8 @@ class MovieSource(FrameSource):
     def close(self):
         """Closes the file and ends all threads; a later read opens it again."""
         self._reader.close()
-        self._drop_graph()
+        with self._converting:
+            self._drop_graph()
 
     def _drop_graph(self):
         """Ends its threads. PyAV's graph and its filters refer to each other, and it has no close: the dicts in which
@@ -143,11 +181,19 @@ class MovieChannel(MovieSource):
             return np.empty((self.height, self.width, 0), self.dtype)
         return super().read(index)
 
+    def decoded(self, index):
+        return self.read(index)
+
     def _pixels(self, frame):
         if self._channel == "luminance" and _is_grey(frame):
             grey = self._converted(frame, "gray16le" if self.dtype == np.uint16 else "gray")
             return self._upright(grey)[..., None]
         return super()._pixels(frame)[..., CHANNELS[self._channel]]
+
+
+def _is_opaque_yuv(pixels):
+    """Whether a frame's format has luma and chroma, and no alpha."""
+    return not pixels.is_rgb and [each.is_chroma for each in pixels.components] == [False, True, True]
 
 
 def _is_grey(frame):

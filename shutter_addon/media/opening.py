@@ -17,7 +17,17 @@ if TYPE_CHECKING:
 
 
 def open_source(
-    path, *, stream=0, fps=None, files=None, colorspace=None, config=None, alpha=None, deinterlace=False, divisor=1
+    path,
+    *,
+    stream=0,
+    fps=None,
+    files=None,
+    colorspace=None,
+    config=None,
+    alpha=None,
+    deinterlace=False,
+    divisor=1,
+    size=None,
 ) -> FrameSource:
     """Opens a movie, or the image sequence that starts with the file `path`. MediaError: it cannot be read.
 
@@ -29,10 +39,11 @@ def open_source(
     alpha: an image strip's alpha mode, "straight" or "premultiplied" (default: what Blender assumes); not a movie's
     deinterlace: a movie strip's option of that name
     divisor: how many times smaller than the files' the frames are each way, one of reduced.DIVISORS
+    size: what the frames of an opaque movie are fitted to, width and height, in place of `divisor`
     """
     path = Path(path)
     if _is_movie(path, files):
-        source = _movies(path).MovieSource(path, stream=stream, deinterlace=deinterlace, divisor=divisor)
+        source = _movies(path).MovieSource(path, stream=stream, deinterlace=deinterlace, divisor=divisor, size=size)
     else:
         source = smaller(SequenceSource(path, files=files, fps=fps, alpha=alpha), divisor)
     try:
@@ -40,6 +51,21 @@ def open_source(
     except MediaError:
         source.close()
         raise
+
+
+def with_proxy(source: FrameSource, path, **options) -> FrameSource:
+    """The source with its frames read from a proxy; the source itself, where there is none that fits.
+
+    path, options: of the proxy, as of open_source"""
+    try:
+        from .proxy import ProxySource, fits
+
+        with open_source(path, **options) as proxy:
+            if not fits(proxy, source):
+                return source
+        return ProxySource(source, open_source(path, size=(source.width, source.height), **options))
+    except (ImportError, MediaError):  # without PyAV nothing is fitted
+        return source
 
 
 def open_channel(path, channel, *, files=None, stream=0) -> SequenceChannel | MovieChannel:

@@ -5,6 +5,7 @@ import threading
 import numpy as np
 
 from ..core.frame_source import FrameSource
+from ..core.planes import Planes, as_rgba
 from .errors import MediaError
 from .source import SourceWrapper
 
@@ -15,11 +16,13 @@ class PrefetchSource(SourceWrapper):
     The frames of the last `want` are kept until the next one: they are what it holds in memory.
     """
 
-    def __init__(self, source: FrameSource):
+    def __init__(self, source: FrameSource, *, planes: bool = False):
+        """planes: frames lie decoded as the source's `decoded` gives them, which `read` then has to convert"""
         super().__init__(source)
+        self._fetch = source.decoded if planes else source.read
         self._wanted: list[int] = []  # in the order of decoding
         self._asked: list[int] = []  # by reads that wait
-        self._done: dict[int, np.ndarray | Exception] = {}
+        self._done: dict[int, np.ndarray | Planes | Exception] = {}
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
 
@@ -40,6 +43,10 @@ class PrefetchSource(SourceWrapper):
 
         An error of the source's `read` is raised here once; the next call decodes the frame again. MediaError as well
         if `close` is called meanwhile."""
+        return as_rgba(self.decoded(index))
+
+    def decoded(self, index: int) -> np.ndarray | Planes:
+        """As `read`, but for the conversion."""
         with self._changed:
             self._asked.append(index)
             self._wake()
@@ -95,10 +102,11 @@ class PrefetchSource(SourceWrapper):
                     self._drop()
                     self._changed.notify_all()
 
-    def _frame(self, index: int) -> np.ndarray | Exception:
+    def _frame(self, index: int) -> np.ndarray | Planes | Exception:
         try:
-            frame = self._source.read(index)
-            frame.flags.writeable = False
+            frame = self._fetch(index)
+            if not isinstance(frame, Planes):
+                frame.flags.writeable = False
             return frame
         except Exception as error:  # raised to whoever reads the frame
             return error

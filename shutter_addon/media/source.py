@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..core.frame_source import FrameSource
+from ..core.planes import Planes
 
 
 class _Forwarded:
@@ -31,12 +32,16 @@ class SourceWrapper(FrameSource):
     has_audio = _Forwarded()
     left_out = _Forwarded()
     shots = _Forwarded()
+    from_proxy = _Forwarded()
 
     def __init__(self, source: FrameSource):
         self._source = source
 
     def read(self, index: int) -> np.ndarray:
         return self._source.read(index)
+
+    def decoded(self, index: int) -> np.ndarray | Planes:
+        return self.read(index)  # which may give other frames than the source
 
     def want(self, indices) -> None:
         self._source.want(indices)

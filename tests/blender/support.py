@@ -1,5 +1,7 @@
 """Pictures and recipes for the tests of the Blender layer."""
 
+import json
+import subprocess
 from contextlib import contextmanager
 
 import numpy as np
@@ -47,6 +49,29 @@ def recipe(window, *shutters, regions=(), **options):
     return {"version": 1, "window": window, "shutters": entries, "regions": list(regions), **options}
 
 
+def noise_film(edit, frames, folder):
+    """Frames (n, H, W, C) as the edit's source, under an effect of two shutters: source, effect and strip."""
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import add_effect
+    from shutter_addon.blender.rendering import session
+    from shutter_addon.core import recipe as recipes
+
+    session.forget()
+    height, width = frames.shape[1:3]
+    source = edit.sequence_editor.strips.new_image("images", str(write_frames(folder / "in", frames[:1])), 1, 1)
+    write_frames(folder / "in", frames)
+    for i in range(2, len(frames) + 1):
+        source.elements.append(f"f{i:04d}.png")
+    edit.render.resolution_x, edit.render.resolution_y = width, height
+    edit.frame_start, edit.frame_end = 1, len(frames)
+    edit.sequence_editor.use_cache_raw = edit.sequence_editor.use_cache_final = False
+    strip, effect = add_effect.add_effect(edit, source)
+    line = {"shutter": "S1", "kind": "line", "width": 0.1, "strokes": [[[0.2, 0.2], [0.3, 0.8]]]}
+    data = recipe(4, [1, 1, 1, 1], [0, 0, 1, 0], regions=[line], border=True)
+    recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
+    return source, effect, strip
+
+
 @contextmanager
 def sequencer(bpy):
     """The context of a sequencer: the operators of its menus ask for one. Gives its area."""
@@ -87,3 +112,14 @@ def request(edit, effect, strip, frame):
 
     folder = session.settings().inbetween
     return session.here().request(snapshot.take(edit, effect, strip, (frame,), folder=folder), frame)
+
+
+@contextmanager
+def small_disk(folder, size):
+    """A folder on a disk of that many bytes."""
+    folder.mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)], check=True)
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", str(folder)], check=True)

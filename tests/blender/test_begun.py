@@ -1,34 +1,17 @@
 """Pictures that are begun before Blender asks for them: used where they are right, and never where they are not."""
 
-import json
+import threading
 
 import numpy as np
 import pytest
-from support import recipe, write_frames
-
-from shutter_addon.core import recipe as recipes
+from support import noise_film, picture_of
 
 
 @pytest.fixture
 def film(bpy, edit, tmp_path):
     """An edit of twelve frames of noise under an effect of two shutters and a line; its source, effect and strip."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-    from shutter_addon.blender.rendering import session
-
-    session.forget()
     noise = np.random.default_rng(0).integers(0, 256, (12, 24, 40, 3), dtype=np.uint8)
-    source = edit.sequence_editor.strips.new_image("images", str(write_frames(tmp_path / "in", noise[:1])), 1, 1)
-    write_frames(tmp_path / "in", noise)
-    for i in range(2, 13):
-        source.elements.append(f"f{i:04d}.png")
-    edit.render.resolution_x, edit.render.resolution_y = 40, 24
-    edit.frame_start, edit.frame_end = 1, 12
-    edit.sequence_editor.use_cache_raw = edit.sequence_editor.use_cache_final = False
-    strip, effect = add_effect.add_effect(edit, source)
-    line = {"shutter": "S1", "kind": "line", "width": 0.1, "strokes": [[[0.2, 0.2], [0.3, 0.8]]]}
-    data = recipe(4, [1, 1, 1, 1], [0, 0, 1, 0], regions=[line], border=True)
-    recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
+    source, effect, strip = noise_film(edit, noise, tmp_path)
     return edit, source, effect, strip
 
 
@@ -126,3 +109,38 @@ def test_what_a_job_takes_away_meanwhile_is_not_missed(bpy):
         getattr(found, name)[7] = None
         found.keep({Job()})
         assert getattr(found, name) == {}
+
+
+def test_who_is_stopped_waits_neither_for_a_device_nor_for_others_to_be_closed(film):
+    """Though the session's thread waits, as for a window that does not answer."""
+    from shutter_addon.blender.rendering import job_snapshots, session
+
+    scene, answer, half = film[2].scene, threading.Event(), session.Detail(2)
+    waits = session._offscreen._submit(answer.wait, 10)
+    stops = iter([False])  # and then it is stopped
+    with pytest.raises(session.StoppedError):
+        picture_of(scene, 1, stopped=lambda: next(stops, True))
+    assert not waits.done()
+    answer.set()
+    first = session._offscreen.request(*job_snapshots.of(scene, 1), detail=session.FULL)
+    answer.clear()
+    waits = session._offscreen._submit(answer.wait, 10)
+    assert session._offscreen.request(*job_snapshots.of(scene, 1), detail=half).renderer is not first.renderer
+    assert not waits.done()
+    answer.set()
+    session.forget()
+
+
+def test_who_asks_for_room_keeps_what_it_uses(film):
+    """The other one may ask it in turn, while it waits for that."""
+    from shutter_addon.blender.rendering import job_snapshots, session
+
+    found = session.RenderSession(lambda: ("cpu", None), lambda: found.free())
+    request = found.request(*job_snapshots.of(film[2].scene, 1), detail=session.FULL)
+    found.picture(film[2].scene.session_uid, request)
+    window = request.renderer._window
+    found._ask()
+    assert request.renderer._window is window
+    found.free()
+    assert request.renderer._window is None
+    found.forget()

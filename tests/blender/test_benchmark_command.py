@@ -99,6 +99,19 @@ def test_what_would_take_too_long_is_left_out(measured):
     assert re.search(r"\| 64×36 \| not measured \|", printed)
 
 
+def test_a_quick_row_does_not_hide_a_slow_one(monkeypatch):
+    now, seconds = [0.0], {4: 50.0, 5: 0.1, 6: 0.1}
+
+    def measure(_compositor, _size, window):
+        now[0] += seconds[window]
+        return {"window": window}
+
+    monkeypatch.setattr(benchmark, "measure", measure)
+    monkeypatch.setattr(benchmark, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    rows = benchmark.Timetable(None, 107)
+    assert [rows.row((8, 8), window).get("left_out") for window in (4, 5, 6)] == [None, None, "too slow"]
+
+
 def test_without_gl_it_measures_numpy_and_says_why(measured, monkeypatch):
     reason = "no OpenGL 4.3: none; composing with NumPy, which is slow"
     monkeypatch.setattr(machine, "open_device", lambda wanted: (cpu.CPUCompositor(), reason))

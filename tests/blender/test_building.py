@@ -118,7 +118,9 @@ def test_a_build_reopens_its_source_once_and_no_other(bpy, inbetween_build, edit
     opened, asked, go = [], threading.Semaphore(0), threading.Semaphore(0)
     usual = session.open_source
     monkeypatch.setattr(
-        session, "open_source", lambda shown, *size: opened.append(shown.timing.name) or usual(shown, *size)
+        session,
+        "open_source",
+        lambda shown, *size, **how: opened.append(shown.timing.name) or usual(shown, *size, **how),
     )
 
     def draw():

@@ -231,13 +231,13 @@ def test_a_gap_in_the_numbering_holds(command, noise, tmp_path, same_pixels):
 @pytest.mark.parametrize("suffix", [".png", ".jp2"])
 def test_files_that_a_gap_would_show_are_the_sources_own(noise, tmp_path, suffix):
     """The number in a suffix is none of theirs."""
-    from shutter_addon.blender import command
+    from shutter_addon.blender.commands import command_line
 
     for path in sorted(write_frames(tmp_path, noise[1][:4]).parent.iterdir()):
         path.rename(path.with_suffix(suffix))
     (tmp_path / f"f0003{suffix}").unlink()
     with open_source(tmp_path / f"f0001{suffix}") as source:
-        assert tmp_path / f"f0003{suffix}" in command._files(source)
+        assert tmp_path / f"f0003{suffix}" in command_line.files(source)
 
 
 def test_a_number_far_off_is_left_out(command, noise, tmp_path):

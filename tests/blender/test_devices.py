@@ -3,7 +3,11 @@ bits."""
 
 import numpy as np
 import pytest
-from support import read_picture, recipe, write_frames
+from support import picture_of, read_picture, recipe, write_frames
+
+from shutter_addon.compute.cpu import CPUCompositor
+from shutter_addon.compute.device import NoDeviceError
+from shutter_addon.compute.gpu import GPUCompositor
 
 BORROWED = "composing on Blender's own GPU"
 
@@ -40,7 +44,7 @@ def test_without_moderngl_blenders_own_gpu_renders(command, given, tmp_path, sam
     refused = command(first, "--output", tmp_path / "no", "--device", "opengl", recipe=data, env=hidden, check=False)
     assert refused.returncode == 2
     assert "moderngl cannot be loaded" in refused.stderr
-    assert list((tmp_path / "no").glob("*")) == []
+    assert not (tmp_path / "no").exists()
 
 
 def test_a_blender_on_vulkan_without_opengl(blender, command, given, tmp_path, same_pixels, monkeypatch):
@@ -60,11 +64,43 @@ def test_a_blender_on_vulkan_without_opengl(blender, command, given, tmp_path, s
     assert np.array_equal(pictures(tmp_path / "chunk"), vulkan[4:])
 
 
-def test_the_preference_chooses(bpy, monkeypatch):
+@pytest.fixture
+def preferred(bpy):
+    """The extension's preferences, as of an enabled one."""
+    from shutter_addon.blender.data import preferences
+
+    addon = bpy.context.preferences.addons.new()
+    addon.module = preferences.ADDON
+    yield addon.preferences
+    bpy.context.preferences.addons.remove(addon)
+
+
+def test_the_preference_chooses(effect, preferred):
+    """From the next render on, if the command asks for nothing else."""
     from shutter_addon.blender.data import preferences
     from shutter_addon.blender.rendering import devices, session
 
-    assert session.wanted() == "auto"
-    monkeypatch.setattr(session, "_settings", session.RenderSettings(device="cpu"))
-    assert session.wanted() == "cpu"
-    assert tuple(item[0].lower() for item in preferences.DEVICES) == devices.CHOICES
+    def composed_by():
+        session.settle()
+        picture_of(effect.scene, 1)
+        return type(session.here()._compositor.result())
+
+    for wanted, found in (("CPU", CPUCompositor), ("AUTO", GPUCompositor), ("OPENGL", GPUCompositor)):
+        preferred.device = wanted
+        assert composed_by() is found, wanted
+        with session.using(session.RenderSettings(device="cpu")):
+            assert composed_by() is CPUCompositor, wanted
+    assert {item[0].lower() for item in preferences.DEVICES} == set(devices.CHOICES)
+    session.forget()
+
+
+def test_what_is_lacking_is_said_of_all(bpy, monkeypatch):
+    from shutter_addon.blender.rendering import devices
+
+    monkeypatch.setattr(devices, "opengl", lambda: devices.OpenGL(lacking="no OpenGL 4.3: none"))
+    monkeypatch.setattr(devices, "_blender_in_background", lambda: False)
+    both = "no OpenGL 4.3: none, and Blender's own GPU cannot be used without a window here"
+    assert devices.choose("auto") == ("cpu", f"{both}; composing with NumPy, which is slow")
+    for wanted, lacking in (("gpu", both), ("opengl", both.split(",")[0]), ("blender", both.split("and ")[1])):
+        with pytest.raises(NoDeviceError, match=f"^{lacking}$"):
+            devices.choose(wanted)

@@ -45,7 +45,7 @@ def test_what_cannot_be_is_a_sentence(command, film, tmp_path):
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("given", ["0", "-5", "1.5", "much"])
+@pytest.mark.parametrize("given", ["-5", "1.5", "much"])
 def test_a_limit_is_a_number_of_megabytes(bpy, capsys, given):
     from shutter_addon.blender.command import main
 
@@ -60,7 +60,7 @@ def test_a_session_gives_back_what_it_took_and_settles_for_another_limit(bpy, ed
     with session.using(session.RenderSettings(gpu_memory=ROOMY)):
         session.settle()
         picture = picture_of(effect.scene, 1)
-        budget = session._memory()
+        budget = session.memory()
         assert (budget.limit, budget.used > 0) == (ROOMY << 20, True)
         session._offscreen.free()
         assert np.array_equal(picture_of(effect.scene, 1), picture)
@@ -68,9 +68,9 @@ def test_a_session_gives_back_what_it_took_and_settles_for_another_limit(bpy, ed
         session.settle()
         assert budget.used == 0
         assert np.abs(picture_of(effect.scene, 1) - picture).max() <= 2**-14
-        budget = session._memory()
+        budget = session.memory()
         assert (budget.limit, budget.used > 0) == (SMALL << 20, True)
     session.forget()
     assert budget.used == 0
     session.settle()
-    assert session._memory().limit > ROOMY << 20
+    assert session.memory().limit > ROOMY << 20

@@ -6,12 +6,11 @@ import shutil
 import signal
 import subprocess
 import sys
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support import read_picture, recipe, write_frames
+from support import read_picture, recipe, small_disk, write_frames
 
 from shutter_addon.media import open_source
 from shutter_addon.media.completeness import whole_pictures
@@ -216,17 +215,6 @@ def test_equal_pixels_are_equal_files(command, frames, tmp_path, ending):
     assert everything(tmp_path / "a") == everything(tmp_path / "b")
     assert everything(tmp_path / "wa") == everything(tmp_path / "wb")
     assert b"Time" not in (tmp_path / "a" / f"0002.{ending}").read_bytes()
-
-
-@contextmanager
-def small_disk(folder, size):
-    """A folder on a disk of that many bytes."""
-    folder.mkdir()
-    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)], check=True)
-    try:
-        yield folder
-    finally:
-        subprocess.run(["umount", str(folder)], check=True)
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts a small disk")

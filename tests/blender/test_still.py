@@ -34,15 +34,15 @@ def still_on(edit):
 
 
 def test_frames_of_big_buck_bunny_in_random_order(edit, render, bunny, still_on):
-    """Every third, from all over the film."""
+    """Every sixth, from all over the film."""
     strip = still_on(bunny)
     source = next(s for s in edit.sequence_editor.strips if s.type == "MOVIE")
-    order = 3 * np.random.default_rng(0).permutation(44)
-    for start in range(0, 132, 33):
+    order = 6 * np.random.default_rng(0).permutation(22)
+    for start in range(0, 132, 66):
         strip.mute, source.mute = True, False
-        plain = render(edit, range(start + 1, start + 34, 3))
+        plain = render(edit, range(start + 1, start + 67, 6))
         strip.mute, source.mute = False, True  # or Blender would decode below the effect, and seek as well
-        for frame in (int(i) + 1 for i in order if start <= i < start + 33):
+        for frame in (int(i) + 1 for i in order if start <= i < start + 66):
             assert np.array_equal(render(edit, [frame])[frame], plain[frame]), f"frame {frame}"
 
 

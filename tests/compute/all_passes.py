@@ -16,21 +16,21 @@ def _declared():
 
 def _composing():
     for way, edges in itertools.product(("pieces", *_WAYS), (1, 2)):
-        yield gpu.composition(way, 3, "frames", 1, edges, True, False)
+        yield gpu.composition(way, 3, "frames", 1, edges, True, False, edges == 2)
     for way, stored in itertools.product(_WAYS, ("sums", "tiles")):
-        yield gpu.composition(way, 3, stored, 1, 2, True, False)
+        yield gpu.composition(way, 3, stored, 1, 2, True, False, stored == "sums")
     for rows, groups, back, tiled in ((1, 1, False, True), (4, 2, True, False), (32, 4, True, True)):
-        yield gpu.composition_of_sums(rows, groups, back, tiled, True)
+        yield gpu.composition_of_sums(rows, groups, back, tiled, True, back)
     for way, packed in itertools.product(_WAYS, (True, False)):
         for at in ((True, False), (False, True)):
-            yield gpu.composition_of_moved(way, 1, 3, 3, packed, 1, packed, False, False, True, at)
+            yield gpu.composition_of_moved(way, 1, 3, 3, packed, 1, packed, False, False, True, at, True)
         quads = 1 if way == "search" else 4
-        yield gpu.composition_of_moved(way, quads, 5, 1, packed, 1, False, True, True, False, (False, False))
+        yield gpu.composition_of_moved(way, quads, 5, 1, packed, 1, False, True, True, False, (False, False), packed)
 
 
 def _filling():
-    for tiled, again in itertools.product((True, False), (True, False)):
-        yield window.accumulation(1, again, tiled, tiled)
+    for tiled, sent in itertools.product((True, False), ("colours", "numbers", "planes", "before")):
+        yield window.accumulation(1, sent, tiled, tiled)
     yield window.packing(1, True)
     yield window.packing(2, False)
     for adds in (False, True):

@@ -402,7 +402,7 @@ def test_the_device_forgets_earlier_frames(device, on_device):
 def test_moved_scribbles_start_from_the_last_solution(on_device):
     labels, count = four_lines_and_a_ring(960, 540)
     on_device(labels, count)
-    for _ in range(4):
+    for _ in range(2):
         labels = np.roll(labels, (1, -2), axis=(0, 1))
         got = on_device(labels, count, warm=True)
         assert_coefficients(got, count, labels.shape)

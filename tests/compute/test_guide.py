@@ -149,7 +149,7 @@ def guided(rng, window=6, strength=1.0, **options):
 def device(request):
     if request.param == "blender":
         return GPUCompositor(request.getfixturevalue("blender_device"))
-    return open_compositor(request.param)[0]
+    return open_compositor(request.param)
 
 
 @pytest.mark.parametrize("aggregate", [1, 2, 4])

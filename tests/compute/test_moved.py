@@ -10,6 +10,7 @@ from test_shots import SHOTS, shots_of
 from shutter_addon.compute import window
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer
+from shutter_addon.core import light
 from shutter_addon.core.frame_state import Following
 from shutter_addon.core.scribbles import Shape
 
@@ -104,6 +105,19 @@ def test_frames_in_several_textures(device, monkeypatch, resident):  # noqa: F81
         moment.bars[2, :6] = 0
         for index in (2, 14):
             check(device, source, moment, index)
+
+
+def test_levels(device, monkeypatch):  # noqa: F811
+    """By one pass, and by several of which the last one alone makes levels."""
+    rng = np.random.default_rng(41)
+    source = footage(rng)
+    moment = following(rng, source, state(rng), (0, 2))
+    for most in (window.BAND_BYTES, 7 * (source.width + window.RIM) * (source.height + window.RIM) * 8):
+        monkeypatch.setattr(window, "BAND_BYTES", most)
+        renderer = Renderer(device, source)
+        picture, levels = renderer.picture(5, moment), renderer.levels(5, moment)
+        renderer.release_window()
+        assert np.abs(levels - 255 * light.to_encoded(picture.astype(np.float64))).max() < 0.51
 
 
 def test_one_shutter_everywhere(device):  # noqa: F811

@@ -23,7 +23,7 @@ def device(request):
         from shutter_addon.compute.gpu import GPUCompositor
 
         return GPUCompositor(request.getfixturevalue("blender_device"))
-    return open_compositor(request.param)[0]
+    return open_compositor(request.param)
 
 
 def film(dtype=np.uint8, size=(37, 23)) -> Footage:

@@ -1,6 +1,7 @@
 """Files are written whole or not at all, and through no link."""
 
 import os
+import time
 from concurrent.futures import ThreadPoolExecutor
 from threading import Barrier
 
@@ -88,3 +89,13 @@ def test_what_was_left_behind_is_known_by_name_kind_and_age(tmp_path):
         os.utime(tmp_path / name, (0, 0))
     os.utime(tmp_path / names[3] / "a.txt", (0, 0))
     assert [path.name for path in atomic_write.left_behind(tmp_path)] == names[:2]
+
+
+def test_a_clock_ahead_of_the_drives_makes_nothing_left_behind(tmp_path, monkeypatch):
+    later = time.time() + 2 * atomic_write.LEFT_BEHIND
+    with atomic_write.part_folder(tmp_path) as live:
+        monkeypatch.setattr(time, "time", lambda: later)
+        assert atomic_write.left_behind(tmp_path) == []
+        os.utime(live, (0, 0))
+        assert atomic_write.left_behind(tmp_path) == [live]
+    assert listed(tmp_path) == []

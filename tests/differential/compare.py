@@ -35,7 +35,7 @@ def open_devices(names) -> dict:
     from shutter_addon.compute.gpu import GPUCompositor
     from shutter_addon.compute.renderer import open_compositor
 
-    devices = {name: open_compositor(name)[0] for name in names if name != "blender"}
+    devices = {name: open_compositor(name) for name in names if name != "blender"}
     if "blender" in names:
         import gpu
 

@@ -16,7 +16,7 @@ from shutter_addon.compute import cpu, resampling
 from shutter_addon.core import compositor, following, keyframes, light, mattes, scribbles, shutters, trails
 from shutter_addon.media import matte_values
 
-SEEDS = range(200)
+SEEDS = range(120)
 BATCH = 20
 IN_BLENDER = SEEDS[::8]  # which goes around the kinds of footage
 
@@ -51,15 +51,15 @@ def test_on_blenders_gpu(tmp_path):
     assert not errors, "\n".join(errors)
 
 
-@pytest.mark.parametrize("first", SEEDS[::50])
+@pytest.mark.parametrize("first", SEEDS[::40])
 def test_films(first, tmp_path):
     """The command, from files to files: F-curves, annotations, source times and Blender's sequencer between them."""
     pytest.importorskip("bpy")
     found, errors = check_films(
-        [case for case in map(make, SEEDS[first : first + 50]) if can_be_a_film(case)], tmp_path
+        [case for case in map(make, SEEDS[first : first + 40]) if can_be_a_film(case)], tmp_path
     )
     assert not errors, "\n".join(map(str, errors))
-    assert len(found) > 35
+    assert len(found) > 25
 
 
 def test_the_reference_shares_nothing_with_the_product():
@@ -97,7 +97,7 @@ def test_recipes_have_all_that_a_recipe_may_have():
     values |= {"ramp": 4, "blend": 2, "timing": 2, "channel": 4}
     values |= {"follow": 2, "trail": 2, "edge_aware": 3}
     assert Counter(name for name, _ in seen) == values
-    assert min(seen.values()) >= 10
+    assert min(seen.values()) >= 5
     assert np.mean(doubtful) < 0.01
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shutter_addon.core.frame_source import FrameSource
 from shutter_addon.media import MediaError, open_source
 from shutter_addon.media.cuts import NEIGHBOURS, ShotSource, is_cut, is_duplicate, signature
 
@@ -143,7 +144,7 @@ def test_small_frames():
     assert signature(np.zeros((2160, 16, 4), np.float16), "linear").shape == (18, 16, 3)
 
 
-class Frames:
+class Frames(FrameSource):
     transfer, alpha = "srgb", "opaque"
 
     def __init__(self, frames):

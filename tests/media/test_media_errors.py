@@ -349,7 +349,7 @@ def test_names_that_are_not_utf8(tmp_path):
                 with open_source(path) as source:
                     assert number(source.read(2)) == 2
                 continue
-            text = sentence(path)
+            text = sentence(path, longest=200)
             assert text.isprintable()
             assert text.endswith("its path is not UTF-8; rename the file, or the folder that is not")
     with pytest.raises(MediaError, match="its path is not UTF-8"):

@@ -14,7 +14,8 @@ sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "ble
 
 import bpy
 import traces
-from driver import OUT, area_of, enable, override, play, saw, until
+from driver import OUT, area_of, play, saw, until
+from given_edit import edit, opened
 
 FRAMES = 4
 MEGABYTES = int(os.environ["SHUTTER_MEGABYTES"])
@@ -25,42 +26,9 @@ def session():
     return sys.modules[f"{traces.NAME}.shutter_addon.blender.rendering.session"]
 
 
-def edit():
-    return bpy.data.scenes["Edit"]
-
-
-def opened():
-    bpy.context.preferences.view.render_display_type = "NONE"  # its window would cover the other
-    enable()
-    bpy.ops.wm.read_homefile(app_template="Video_Editing")
-    yield 1.0
-    enable()
-    bpy.context.window_manager.windows[0].workspace.sequencer_scene.name = "Edit"
-    editor = edit().sequence_editor_create()
-    editor.use_cache_raw = editor.use_cache_final = False
-    source = Path(os.environ["SHUTTER_FOOTAGE"])
-    strip = editor.strips.new_image("Source", str(source), 1, 1)
-    for path in sorted(source.parent.iterdir())[1:]:
-        strip.elements.append(path.name)
-    editor.active_strip = strip
-    with override("SEQUENCER"):
-        assert bpy.ops.shutter.add_effect("EXEC_DEFAULT") == {"FINISHED"}
-    with override("PREVIEW"):
-        assert bpy.ops.shutter.recipe_import("EXEC_DEFAULT", filepath=os.environ["SHUTTER_RECIPE"]) == {"FINISHED"}
-    render = edit().render
-    element = strip.elements[0]
-    render.resolution_x, render.resolution_y = element.orig_width, element.orig_height
-    render.image_settings.media_type = "IMAGE"
-    render.image_settings.file_format = "PNG"
-    render.image_settings.compression = 0
-    render.dither_intensity = 0
-    edit().view_settings.view_transform = "Standard"
-    edit().frame_start, edit().frame_end = 1, FRAMES
-
-
 def held(which):
     """What a session's textures take, and the kind of its window; None: it has none."""
-    device = which._compositor.device
+    device = which._compositor.result().device
     ((_key, renderer),) = which._renderers.values()
     window = renderer._window
     kind = type(window).__name__ if window is not None and window.is_open else None
@@ -77,8 +45,19 @@ def shown():
     yield 1.0
 
 
+def told_in_the_preview():
+    """What a preview says of a GPU that has no room for its frames."""
+    preview = sys.modules[f"{traces.NAME}.shutter_addon.blender.interface.preview"]
+    said, call = [], preview._Notes.__call__
+    preview._Notes.__call__ = lambda notes, sentence: (said.append(sentence), call(notes, sentence))[1]
+    yield from shown()
+    preview._Notes.__call__ = call
+    saw(said=said)
+
+
 def story():
     yield from opened()
+    edit().frame_start, edit().frame_end = 1, FRAMES
     preferences = bpy.context.preferences.addons[traces.NAME].preferences
     preferences.gpu_memory = MEGABYTES
     session().settle()
@@ -90,17 +69,21 @@ def story():
         edit().render.filepath = f"{OUT / device}/"
         with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], scene=edit()):
             bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
-        budget, most, found = part._memory(), 0, {}
+        budget, most, found = part.memory(), 0, {}
         while rendering():
             most = max(most, budget.used)
             with suppress(ValueError, RuntimeError):  # the film's thread takes its renderer out for a moment
                 if part._offscreen._renderers and held(part._offscreen)[1]:  # what is drawn after it has that freed
                     found |= {"job": held(part._offscreen), "freed": held(part._window)}
             yield 0.05
-        found |= {"device": type(part._offscreen._compositor.device).__name__, "limit": budget.limit, "before": before}
+        kind = type(part._offscreen._compositor.result().device).__name__
+        found |= {"device": kind, "limit": budget.limit, "before": before}
         yield from shown()
         most = max(most, budget.used)
         saw(**found, after=held(part._window), kept=held(part._offscreen), most=most)
+    preferences.gpu_memory = MEGABYTES // 4
+    session().settle()
+    yield from told_in_the_preview()
 
 
 play(story)

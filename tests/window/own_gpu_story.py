@@ -1,6 +1,6 @@
 """Films as jobs of the window on Blender's own GPU, moderngl hidden: a whole one, while a second window opens and
-closes; one that Esc ends; ten short ones; one more after the file was loaded again. Run inside Blender, by
-test_window.py.
+closes; one that Esc ends; ten short ones; one that is refused; one during which the file is loaded again, and one more.
+Run inside Blender, by test_window.py.
 
 SHUTTER_BESIDE=1 measures in place of that: films on Blender's GPU and on moderngl's in turn, and the longest wait
 between two redraws of the window. SHUTTER_FOOTAGE has the source, SHUTTER_RECIPE the effect."""
@@ -20,7 +20,8 @@ if not BESIDE:
 
 import bpy
 import traces
-from driver import OUT, area_of, enable, key, move, override, play, region_of, saw, until
+from driver import OUT, area_of, key, move, override, play, region_of, saw, shot, until
+from given_edit import edit, opened
 
 FRAMES = 30
 rendering = partial(bpy.app.is_job_running, "RENDER")
@@ -30,45 +31,8 @@ def part(name):
     return sys.modules[f"{traces.NAME}.shutter_addon.blender.{name}"]
 
 
-def edit():
-    return bpy.data.scenes["Edit"]
-
-
 def windows():
     return bpy.context.window_manager.windows
-
-
-def opened():
-    bpy.context.preferences.view.render_display_type = "NONE"  # its window would cover the other
-    enable()
-    bpy.ops.wm.read_homefile(app_template="Video_Editing")
-    yield 1.0
-    enable()
-    windows()[0].workspace.sequencer_scene.name = "Edit"
-    editor = edit().sequence_editor_create()
-    editor.use_cache_raw = editor.use_cache_final = False
-    strips = editor.strips
-    source = Path(os.environ["SHUTTER_FOOTAGE"])
-    if source.suffix == ".png":
-        strip = strips.new_image("Source", str(source), 1, 1)
-        for path in sorted(source.parent.iterdir())[1:]:
-            strip.elements.append(path.name)
-    else:
-        strip = strips.new_movie("Source", str(source), 1, 1)
-    editor.active_strip = strip
-    with override("SEQUENCER"):
-        assert bpy.ops.shutter.add_effect("EXEC_DEFAULT") == {"FINISHED"}
-    with override("PREVIEW"):
-        assert bpy.ops.shutter.recipe_import("EXEC_DEFAULT", filepath=os.environ["SHUTTER_RECIPE"]) == {"FINISHED"}
-    render = edit().render
-    element = strip.elements[0]
-    render.resolution_x, render.resolution_y = element.orig_width, element.orig_height
-    render.image_settings.media_type = "IMAGE"
-    render.image_settings.file_format = "PNG"
-    render.image_settings.compression = 0
-    render.dither_intensity = 0
-    edit().view_settings.view_transform = "Standard"
-    bpy.ops.wm.save_as_mainfile(filepath=str(OUT / "edit.blend"))
 
 
 def begun(folder, first=1, last=FRAMES):
@@ -89,18 +53,16 @@ def written(folder):
 
 def held():
     """The job's device, and what its textures take."""
-    device = part("rendering.session")._offscreen._compositor.device
+    device = part("rendering.session")._offscreen._compositor.result().device
     return type(device).__name__, device.name, sum(texture.bytes for texture in device._held)
 
 
 def story():
     yield from opened()
+    bpy.ops.wm.save_as_mainfile(filepath=str(OUT / "edit.blend"))
     begun("film")
     yield from until(lambda: written("film") > 3, "frames are rendered", 100)
-    bpy.ops.wm.window_new()
-    yield 0.5
-    with bpy.context.temp_override(window=windows()[-1]):
-        bpy.ops.wm.window_close()
+    yield from second_window_closed()
     yield from ended()
     saw(film=held())
     begun("stopped")
@@ -114,11 +76,35 @@ def story():
         begun("short", 1 + number, 3 + number)
         yield from ended()
         saw(short=held())
+    yield from refused()
+    begun("left")
+    yield from until(lambda: written("left") > 2, "frames are rendered", 100)
+    yield from second_window_closed()  # until another one is drawn, Blender's GPU is not current
     bpy.ops.wm.open_mainfile(filepath=str(OUT / "edit.blend"))
     yield 1.0
     begun("after", 1, 5)
     yield from ended()
     saw(after=held())
+
+
+def refused():
+    """View ▸ Render Sequencer Animation: the window, which has the GPU, waits for its job."""
+    edit().frame_start, edit().frame_end = 1, FRAMES
+    edit().render.filepath = str(OUT / "refused_")
+    with override("PREVIEW"):
+        bpy.ops.render.opengl("INVOKE_DEFAULT", animation=True, sequencer=True)
+    yield from ended()
+    yield 0.5
+    shot("refused")
+    key("Escape")  # the menu that says why
+    yield 0.5
+
+
+def second_window_closed():
+    bpy.ops.wm.window_new()
+    yield 0.5
+    with bpy.context.temp_override(window=windows()[-1]):
+        bpy.ops.wm.window_close()
 
 
 class Redraws:

@@ -27,8 +27,9 @@ def space():
 
 
 def composed():
-    """The sizes of what the window's session holds."""
-    return [[r.source.width, r.source.height] for _key, r in session()._window._renderers.values()]
+    """The sizes of what the window's session holds, and whether that is read from a proxy."""
+    sources = [renderer.source for _key, renderer in session()._window._renderers.values()]
+    return [[source.width, source.height] + ["proxy"] * source.from_proxy for source in sources]
 
 
 def effect_added():
@@ -77,6 +78,29 @@ def sizes():
     settings.live = True
 
 
+def proxies():
+    """Read at their size, where they are to be used; they stay for what follows. Blender has the others built by
+    itself, as the preview's size changes."""
+    source = next(strip for strip in story.edit().sequence_editor.strips if strip.type == "MOVIE")
+    source.select = source.use_proxy = source.proxy.build_25 = True
+    yield from shown("no_proxy_built", proxy_render_size="PROXY_25")
+    with driver.override("SEQUENCER"):
+        assert bpy.ops.sequencer.rebuild_proxy() == {"FINISHED"}
+    space().show_overlays = True
+    yield from shown("proxy_note")
+    space().show_overlays = False
+    yield from shown("proxy")
+    yield from shown("proxy_unused", use_proxies=False)
+    yield from shown("proxy_of_half", use_proxies=True, proxy_render_size="PROXY_50")
+    settings, effect = bpy.context.window_manager.virtual_shutter, story.edit().sequence_editor.active_strip
+    settings.view, settings.split = "SPLIT", 1.0
+    yield from shown("proxy_still", proxy_render_size="PROXY_25")
+    settings.view, settings.split = "RESULT", 0.5
+    effect.mute = True
+    yield from shown("proxy_by_blender")
+    effect.mute = False
+
+
 def in_a_job(name):
     edit, ended = story.edit(), []
     edit.render.filepath = str(driver.OUT / f"{name}.png")
@@ -99,6 +123,19 @@ def by_opengl(name):
     story.edit().render.filepath = str(driver.OUT / f"{name}.png")
     with driver.override("PREVIEW"):
         bpy.ops.render.opengl(sequencer=True, write_still=True)
+
+
+def by_opengl_in_a_job(name):
+    """As by the preview's menu, which renders beside the main thread, and has that wait."""
+    edit, written = story.edit(), driver.OUT / f"{name}{FRAME:04d}.png"
+    edit.render.filepath = str(driver.OUT / name)
+    limits, (edit.frame_start, edit.frame_end) = (edit.frame_start, edit.frame_end), (FRAME, FRAME)
+    with driver.override("PREVIEW"):
+        bpy.ops.render.opengl("INVOKE_DEFAULT", sequencer=True, animation=True)
+    yield from driver.until(lambda: written.exists() and not bpy.app.is_job_running("RENDER"), "it is rendered", 40)
+    edit.frame_start, edit.frame_end = limits
+    edit.frame_set(FRAME)
+    yield 0.5
 
 
 def played(seconds):
@@ -157,6 +194,7 @@ def tricked():
     yield 1.0
     by_opengl("opengl")
     yield 1.0
+    yield from by_opengl_in_a_job("opengl_job_")
     yield from played(1.5)
     story.edit().frame_set(FRAME)
     yield from in_a_job("playing")  # of the frame that it begins with, while the playhead goes on
@@ -174,6 +212,7 @@ def told():
     story.edit().frame_set(FRAME)
     yield from effect_added()
     yield from sizes()
+    yield from proxies()
     yield from tricked()
     yield from mask_story.in_background(FRAME)
 

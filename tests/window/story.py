@@ -274,6 +274,7 @@ def in_agreement(frame=70):
         bpy.ops.screen.back_to_previous()
     yield 1.0
     yield from rendered()  # after the preview has filled the sequencer's cache
+    yield from sequencer_animation(frame)
 
 
 def rendered():
@@ -290,6 +291,20 @@ def rendered():
     # An effect scene's render within it is complete before.
     yield from driver.until(lambda: done and not bpy.app.is_job_running("RENDER"), "the render ends", 30)
     driver.saw(picture="final")
+
+
+def sequencer_animation(frame):
+    """View ▸ Render Sequencer Animation, of two frames, over a preview that needs less than them."""
+    edit().frame_start, edit().frame_end = frame, frame + 1
+    edit().render.filepath = str(driver.OUT / "animation_")
+    for layer in effect().scene.annotation.layers:  # Blender draws them into it
+        layer.annotation_hide = True
+    driver.area_of("SEQUENCE_EDITOR", "PREVIEW").spaces.active.proxy_render_size = "PROXY_25"
+    with driver.override("PREVIEW"):
+        bpy.ops.render.opengl("INVOKE_DEFAULT", animation=True, sequencer=True)
+    yield from driver.until(lambda: not bpy.app.is_job_running("RENDER"), "the animation ends", 30)
+    driver.move(preview(), 20, 20)  # the operator's end is at an event
+    yield 0.5
 
 
 def disabled_and_enabled():

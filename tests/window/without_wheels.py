@@ -5,6 +5,7 @@ Run in a Blender with a window, the checkout linked as an extension."""
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folders)
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
 sys.modules |= dict.fromkeys(("av", "glcontext", "moderngl", "tqdm"))  # None: there is no such module
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
@@ -52,11 +53,25 @@ def rendered():
     yield from until(lambda: ended, "the render ends", 30)
 
 
+def devices_named():
+    """A panel makes no OpenGL context while it is drawn, and names the devices a moment later."""
+    opengl, layout = part("rendering.devices").opengl, Mock()
+    opengl.cache_clear()
+    part("interface.panels")._draw_devices(layout)
+    assert not layout.mock_calls
+    assert not opengl.cache_info().currsize
+    yield from until(lambda: opengl.cache_info().currsize, "OpenGL is tried", 10)
+    part("interface.panels")._draw_devices(layout)
+    labels = [call.kwargs["text"].partition(": ")[0] for call in layout.column().label.mock_calls]
+    assert labels == ["Preview", "Renders"], labels
+
+
 def story():
     enable()
     bpy.ops.wm.read_homefile(app_template="Video_Editing")
     yield 1.0
     enable()
+    yield from devices_named()
     edit = edit_now()
     edit.render.resolution_x, edit.render.resolution_y, edit.render.dither_intensity = 64, 36, 0
     edit.view_settings.view_transform = "Standard"
@@ -68,7 +83,7 @@ def story():
     engine._say = lambda self, message: (said.append(message), say(self, message))
     edit.frame_set(3)
     yield 1.0
-    assert part("rendering.session")._window._compositor.device.name, "the preview is on Blender's GPU"
+    assert part("rendering.session")._window._compositor.result().device.name, "the preview is on Blender's GPU"
     assert not said, said
     effect = edit.virtual_shutter.effects[0]
     shown = part("rendering.session").picture(*part("rendering.job_snapshots").of(effect.scene, 3))

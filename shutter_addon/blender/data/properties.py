@@ -549,9 +549,11 @@ class ShutterEffect(PropertyGroup):
 
 
 class ShutterScene(PropertyGroup):
-    """Of an edit: its effects. Of an effect's scene: an identity, by which a copy is known."""
+    """Of an edit: its effects, and the version of the extension that saved it. Of an effect's scene: an identity, by
+    which a copy is known."""
 
     effects: CollectionProperty(type=ShutterEffect)
+    version: StringProperty()
     identity: StringProperty()
 
 

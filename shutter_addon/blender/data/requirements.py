@@ -2,12 +2,14 @@
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core import frame_ranges
+from ...core.limits import MAX_FRAME
 from .strips import ENGINE, own_strips
 
 
 def left_out(edit) -> list[tuple[range, str]]:
     """The timeline frames that the sequencer leaves an effect out of, and why."""
-    found = ((_shown(edit, strip), why) for strip in own_strips(edit) if (why := _why(strip)) is not None)
+    found = ((shown_frames(edit, strip), why) for strip in own_strips(edit) if (why := _why(strip)) is not None)
     return [(frames, why) for frames, why in found if frames]
 
 
@@ -42,8 +44,28 @@ def camera(strip):
     return strip.scene_camera or strip.scene.camera or next(bound, None)
 
 
-def _shown(edit, strip) -> range:
-    """The frames at which a strip is shown: neither muted, nor in a meta strip that is not."""
+def edits_at(film, frames: range) -> list[tuple]:
+    """What a film shows at some of its frames: (edit, frames) of itself, and of every edit in its Scene strips, which
+    counts as a whole."""
+    found = {film: frames}
+    new = [film]
+    while new:
+        edit = new.pop()
+        for strip in edit.sequence_editor.strips_all if edit.sequence_editor else ():
+            is_new = strip.type == "SCENE" and strip.scene and strip.scene not in found
+            if is_new and is_shown(edit, strip, found[edit]):
+                found[strip.scene] = range(-MAX_FRAME, MAX_FRAME + 1)
+                new.append(strip.scene)
+    return [(edit, at) for edit, at in found.items() if edit.sequence_editor]
+
+
+def is_shown(edit, strip, frames: range) -> bool:
+    """Whether a strip is shown at one of these timeline frames."""
+    return bool(frame_ranges.common(shown_frames(edit, strip), frames))
+
+
+def shown_frames(edit, strip) -> range:
+    """The timeline frames at which a strip is shown: neither muted, nor in a meta strip that is not."""
     first, last = strip.left_handle, strip.right_handle
     while strip is not None:
         outer = strip.parent_meta()

@@ -9,8 +9,10 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...media import MediaError, open_source
+from ...media.opening import with_proxy
 from ...media.sequence import by_number
 from ...media.source import FrameSource
+from . import strip_proxies
 
 _AT_ONCE = 100  # files of a sequence, which may be long, that one look asks, beside the first and the last
 _REST = 1.0  # seconds from one look at them to the next: on a network's drive a look takes a while
@@ -124,9 +126,18 @@ class SourceSpec:
     files: tuple[Path, ...] | None = field(compare=False)
     options: dict = field(compare=False)
 
-    def open(self, divisor: int = 1) -> FrameSource:
-        """The medium, as Blender would show it; divisor: of media.open_source. MediaError: it cannot be read."""
-        return open_source(self.path, files=self.files, divisor=divisor, **self.options)
+    def open(self, divisor: int = 1, proxy: strip_proxies.Proxy | None = None) -> FrameSource:
+        """The medium, as Blender would show it; divisor: of media.open_source; proxy: what frames are read from, where
+        it fits. MediaError: it cannot be read."""
+        medium = open_source(self.path, files=self.files, divisor=divisor, **self.options)
+        if proxy is None:
+            return medium
+        space = self.options["colorspace"]
+        if not proxy.of_images:
+            return with_proxy(medium, proxy.path, colorspace=space, config=self.options["config"])
+        files = [strip_proxies.of_image(proxy.path, file) for file in self.files]
+        # Blender has converted them to the sequencer's colour space, but for data.
+        return with_proxy(medium, proxy.path, files=files, colorspace="Non-Color" if space == "Non-Color" else None)
 
 
 def spec(strip, key: tuple | None = None) -> SourceSpec:
@@ -157,6 +168,13 @@ def open_media(strip) -> FrameSource:
     return spec(strip).open()
 
 
+def files(strip) -> list[Path]:
+    """The files of a movie, image or clip strip, there or not, whether or not an effect can read it so. MediaError: it
+    has none."""
+    count, path = _clip_files(strip) if strip.type == "MOVIECLIP" else _files(strip)
+    return [path(index) for index in range(count)]
+
+
 def first_frame(strip) -> int:
     """Which frame of the medium is the first of the strip's content."""
     return strip.clip.frame_offset if strip.type == "MOVIECLIP" and _is_movie(strip) else 0
@@ -176,6 +194,9 @@ def _alpha(strip) -> str | None:
 def _files(strip):
     """How many files the strip reads, and a function that gives the path of each."""
     if strip.type == "MOVIECLIP":
+        if strip.clip is not None and (strip.undistort or strip.stabilize2d):
+            sentence = rpt_('strip "{strip}": undistorted or stabilized clips are not supported')
+            raise MediaError(sentence.format(strip=strip.name))
         return _clip_files(strip)
     library = strip.id_data.library
     if strip.type == "MOVIE":
@@ -192,9 +213,6 @@ def _clip_files(strip):
     clip = strip.clip
     if clip is None:
         raise MediaError(rpt_('strip "{strip}" has no clip').format(strip=strip.name))
-    if strip.undistort or strip.stabilize2d:
-        sentence = rpt_('strip "{strip}": undistorted or stabilized clips are not supported')
-        raise MediaError(sentence.format(strip=strip.name))
     path = Path(bpy.path.abspath(clip.filepath, library=clip.library))
     beside = by_number(path)
     if clip.source == "MOVIE" or beside is None:

@@ -24,6 +24,17 @@ def effect_strips(edit) -> list:
     ]
 
 
+def shown_edits(edit) -> list:
+    """The edit, and those that its Scene strips show."""
+    found, new = [], [edit]
+    while new:
+        scene = new.pop()
+        if scene is not None and scene not in found and scene.sequence_editor:
+            found.append(scene)
+            new += [strip.scene for strip in scene.sequence_editor.strips_all if strip.type == "SCENE"]
+    return found
+
+
 def own_strips(edit) -> list:
     """The strips that were made for effects, those too whose scene has another engine or is gone."""
     if edit.sequence_editor is None:

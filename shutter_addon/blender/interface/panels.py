@@ -11,7 +11,7 @@ from ...media.tracking import SURE
 from ..data import annotations, selection, strips, validation
 from ..data.properties import CONTEXT
 from ..editing import bar_edits, follow_track, match_source, track_region
-from ..rendering import inbetween_build, matte_look, session
+from ..rendering import devices, inbetween_build, matte_look, session
 from ..rendering.session import FAULTS
 from . import inbetween_operators, track_operators
 
@@ -426,6 +426,10 @@ def _draw_devices(layout):
     """What composes; in a window, which alone has a preview."""
     if bpy.app.background:
         return
+    if not devices.is_known(session.wanted()):  # it is asked for beside drawing
+        if not bpy.app.timers.is_registered(_ask_for_opengl):
+            bpy.app.timers.register(_ask_for_opengl)
+        return
     column = layout.column(align=True)
     column.active = False
     try:
@@ -435,6 +439,11 @@ def _draw_devices(layout):
         return
     for text, device in ((iface_("Preview: {device}"), preview), (iface_("Renders: {device}"), render)):
         column.label(text=text.format(device=device), translate=False)
+
+
+def _ask_for_opengl() -> None:
+    devices.opengl()
+    _redraw()
 
 
 class _Inbetween(_WithEffect):
@@ -640,7 +649,8 @@ def register():
 def unregister():
     for menu, entry in MENUS.items():
         getattr(bpy.types, menu).remove(entry)
-    if bpy.app.timers.is_registered(_redraw):
-        bpy.app.timers.unregister(_redraw)
+    for timer in (_redraw, _ask_for_opengl):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
     for cls in reversed(classes):
         bpy.utils.unregister_class(cls)

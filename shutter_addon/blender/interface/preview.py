@@ -124,7 +124,8 @@ def request_of(context, found: Shown) -> session.FrameRequest:
     exact anyway. One of session.FAULTS: it cannot be shown."""
     frame = found.edit.frame_current
     snapshot = invalidation.current(found.edit, found.effect, found.strip, frame)
-    request = session.here().request(snapshot, frame, divisor=previewing.divisor(context, found.edit, found.strip))
+    detail = previewing.detail(context, found.edit, found.effect, found.strip)
+    request = session.here().request(snapshot, frame, detail=detail)
     is_result = context.window_manager.virtual_shutter.view in RESULTS and _is_rendered(found)
     return request if is_result and not context.screen.is_animation_playing else request.draft()
 
@@ -136,7 +137,10 @@ def _is_rendered(found: Shown) -> bool:
 
 def _show(context, found: Shown, settings, say) -> None:
     request = request_of(context, found)
-    quad = Quad(context.region, found.strip, annotations.picture_size(found.effect))
+    size = annotations.picture_size(found.effect)
+    quad = Quad(context.region, found.strip, size)
+    if context.space_data.show_overlays:
+        _tell_detail(request.renderer.source, size, say)
     has_result = settings.view in RESULTS
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
     # Else the engine has composed it, and it lies there in its place among the other strips.
@@ -149,7 +153,7 @@ def _show(context, found: Shown, settings, say) -> None:
         _tell_missing(request, say)
     if draws_result:
         request.prefetch()
-        texture = request.renderer.draw(request.index, request.state, request.direction, quick=True)
+        texture = request.renderer.draw(request.index, request.state, request.direction, quick=True, levels=True)
         quad.draw("show_picture", {"picture": texture}, left, 1.0, opacity=found.strip.blend_alpha)
     if settings.view == "SCRIBBLES":
         _show_scribbles(quad, found.effect, request)
@@ -157,6 +161,8 @@ def _show(context, found: Shown, settings, say) -> None:
         _show_coefficients(quad, found.effect, request)
     else:
         _show_strokes(context, quad, found.effect, request)
+    for sentence in session.shortages(request):
+        say(sentence)
 
 
 def _warn(found: Shown, say) -> None:
@@ -165,6 +171,17 @@ def _warn(found: Shown, say) -> None:
         say(rpt_("The strips above are hidden in this view"))
     if found.edit.view_settings.view_transform != "Standard":
         say(rpt_("This view has the view transform Standard"))
+
+
+def _tell_detail(source, size: tuple[int, int], say) -> None:
+    """Says in how much detail the picture is composed, where that is less than a render's; size: of a render's."""
+    scale, is_small = f"1/{round(size[0] / source.width)}", source.width < size[0]
+    if is_small and source.from_proxy:
+        say(rpt_("Composed at {scale} size, from a proxy").format(scale=scale))
+    elif is_small:
+        say(rpt_("Composed at {scale} size").format(scale=scale))
+    elif source.from_proxy:
+        say(rpt_("Composed from a proxy"))
 
 
 def _tell_missing(request, say) -> None:
@@ -203,7 +220,7 @@ def _show_source(quad, found: Shown, request, right: float) -> None:
     moving = following and following.of([following.moving()[0]])
     plain = replace(request, state=FrameState(options, still, following=moving))
     plain.prefetch()
-    texture = request.renderer.draw(plain.index, plain.state, plain.direction)
+    texture = request.renderer.draw(plain.index, plain.state, plain.direction, levels=True)
     quad.draw("show_picture", {"picture": texture}, 0.0, right, opacity=found.strip.blend_alpha)
 
 

@@ -1,4 +1,4 @@
-"""What previews need of an effect's picture: its size, and whether our draw handler shows it or Blender.
+"""What previews need of an effect's picture: its detail, and whether our draw handler shows it or Blender.
 
 Blender asks the engine for a Scene strip's full size whatever a preview's, takes its floats, converts, blends and sends
 them. Drawn by our handler, the picture stays on the GPU, and is as small as it is shown.
@@ -11,13 +11,13 @@ import bpy
 import numpy as np
 
 from ...media.reduced import DIVISORS
-from ..data import annotations, geometry, selection, strips
+from ..data import annotations, geometry, selection, strip_proxies, strips
 from ..data.snapshot import Snapshot
-from ..rendering import engine, session
+from ..rendering import engine, render_job, session
 from . import preview_areas
 
 # Operators that read the sequencer's pictures, from the window; while an annotation is drawn, Blender shows it alone.
-_SAMPLE, _PEN = "SEQUENCER_OT_sample", "GPENCIL_OT_annotate"
+_READERS, _PEN = {"RENDER_OT_opengl", "SEQUENCER_OT_sample"}, "GPENCIL_OT_annotate"
 _READING_TOOL = "builtin.sample"  # reads once before it is one of those that run
 _PERCENT = {"PROXY_25": 25, "PROXY_50": 50, "PROXY_75": 75, "PROXY_100": 100}
 _STANDARD = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
@@ -68,12 +68,24 @@ def _visible(edit) -> list:
     ]
 
 
-def divisor(context, edit, strip) -> int:
-    """How many times smaller than its source's an effect's picture is composed each way for the previews of its edit:
-    the power of two, of reduced.DIVISORS, that is nearest to the largest of them."""
-    scales = [_scale(context, edit, strip, area) for area in _areas_of(context, edit)]
-    scale = max((scale for scale in scales if math.isfinite(scale)), default=1.0)
-    return min(DIVISORS, key=lambda number: abs(math.log2(max(scale, 1e-3) * number)))
+def detail(context, edit, effect, strip) -> session.Detail:
+    """What an effect's picture is composed in for the previews of its edit: smaller by the power of two, of
+    reduced.DIVISORS, that is nearest to the largest of them, and from the proxy that Blender reads for that one."""
+    spaces = {area.spaces.active: _scale(context, edit, strip, area) for area in _areas_of(context, edit)}
+    spaces = {space: scale for space, scale in spaces.items() if math.isfinite(scale)}
+    if not spaces:
+        return session.FULL
+    space = max(spaces, key=spaces.get)
+    divisor = min(DIVISORS, key=lambda number: abs(math.log2(max(spaces[space], 1e-3) * number)))
+    return session.Detail(divisor, _proxy(edit, effect, strip, space))
+
+
+def _proxy(edit, effect, strip, space) -> strip_proxies.Proxy | None:
+    """What Blender reads of an effect's source in a preview; None: the footage itself."""
+    source, percent = strips.nearest_source(edit, effect, strip), _PERCENT.get(space.proxy_render_size)
+    if source is None or percent is None or not space.use_proxies:
+        return None
+    return strip_proxies.proxy_of(edit, source, percent)
 
 
 def _scale(context, edit, strip, area) -> float:
@@ -109,12 +121,13 @@ def is_drawn(context, found: Shown, request: session.FrameRequest) -> bool:
     the engine's picture: wherever both are the same, in all previews of the edit. Not a still picture of full size:
     what is drawn passes through 8 bits on its way to the screen, and lacks shades next to black."""
     edit, strip = found.edit, found.strip
-    is_less = request.renderer.source.width < annotations.picture_size(found.effect)[0]
+    source = request.renderer.source
+    is_less = source.from_proxy or source.width < annotations.picture_size(found.effect)[0]
     return (
         context.window_manager.virtual_shutter.live
         and (is_less or _is_playing(context) or context.window_manager.virtual_shutter.view not in RESULTS)
         and not found.strips_above
-        and request.renderer.source.alpha == "opaque"
+        and source.alpha == "opaque"
         and strip.blend_type in ("REPLACE", "ALPHA_OVER")
         and _has(strip, _PLAIN_STRIP)
         and all(modifier.mute for modifier in strip.modifiers)
@@ -123,7 +136,7 @@ def is_drawn(context, found: Shown, request: session.FrameRequest) -> bool:
         and not edit.render.use_multiview
         and not edit.sequence_editor.show_overlay_frame
         and all(_has(area.spaces.active, _PLAIN_SPACE) for area in _areas_of(context, edit))
-        and _PEN not in session.operators_running()
+        and _PEN not in render_job.operators_running()
     )
 
 
@@ -138,21 +151,22 @@ def _has(item, values: dict) -> bool:
 def is_read(context) -> bool:
     """Whether somebody reads the sequencer's picture from the window, for whom it has to be whole."""
     tool = context.workspace and context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
-    return _SAMPLE in session.operators_running() or (tool is not None and tool.idname == _READING_TOOL)
+    return bool(_READERS & render_job.operators_running()) or (tool is not None and tool.idname == _READING_TOOL)
 
 
-def _needed(snapshot: Snapshot, frame: float) -> tuple[int, bool]:
+def _needed(snapshot: Snapshot, frame: float) -> tuple[session.Detail, bool]:
     """See engine.needed_by_preview."""
     context = bpy.context
     region = context.region
     if region is None or region.type != "PREVIEW" or is_read(context):
-        return 1, False
+        return session.FULL, False
     edit, found = selection.edit_of(context), shown(context)
     if found is None or found.effect.scene.session_uid != snapshot.scene or edit.frame_current != frame:
         strip = next((s for s in strips.effect_strips(edit) if s.scene.session_uid == snapshot.scene), None)
-        return (divisor(context, edit, strip) if strip else 1), False
-    wanted = divisor(context, edit, found.strip)
-    return wanted, is_drawn(context, found, session.here().request(snapshot, frame, divisor=wanted))
+        effect = strip and strips.effect_of(edit, strip.scene)
+        return (detail(context, edit, effect, strip) if effect else session.FULL), False
+    wanted = detail(context, edit, found.effect, found.strip)
+    return wanted, is_drawn(context, found, session.here().request(snapshot, frame, detail=wanted))
 
 
 def register():

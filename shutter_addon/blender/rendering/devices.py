@@ -2,26 +2,25 @@
 
 import threading
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import bpy
 import gpu
 
-from ...compute.cpu import CPUCompositor
 from ...compute.device import NoDeviceError
 from ...compute.gpu import GPUCompositor
-from ...compute.renderer import open_gl
+from ...compute.renderer import open_compositor, open_gl
 from .blender_gpu import BlenderDevice, opens_in_background
 from .gpu_relay import RelayedDevice
 
 CHOICES = ("auto", "gpu", "opengl", "blender", "cpu")  # gpu: opengl, or else blender
 # Given a Budget and `ask_others`, as PagedDevice.
 OPEN = {
-    "opengl": lambda *memory: GPUCompositor(open_gl(*memory)),
+    "opengl": partial(open_compositor, "gpu"),
     "blender": lambda *memory: GPUCompositor(BlenderDevice(*memory)),
     "relayed": lambda *memory: GPUCompositor(RelayedDevice(*memory)),  # Blender's from a thread of a window's job
-    "cpu": lambda *_memory: CPUCompositor(),
+    "cpu": partial(open_compositor, "cpu"),
 }
 
 
@@ -32,17 +31,19 @@ def choose(wanted: str) -> tuple[str, str | None]:
     wanted: one of CHOICES"""
     if wanted == "cpu":
         return "cpu", None
-    lacking = "Blender's own GPU cannot be used without a window here"
+    lacking = []
     if wanted != "blender":
-        lacking = opengl().lacking
-        if lacking is None:
+        if opengl().lacking is None:
             return "opengl", None
-    if wanted != "opengl" and (not bpy.app.background or _blender_in_background()):
-        way = "blender" if bpy.app.background else "relayed"
-        return way, f"{lacking}; composing on Blender's own GPU" if wanted == "auto" else None
+        lacking.append(opengl().lacking)
+    if wanted != "opengl":
+        if not bpy.app.background or _blender_in_background():
+            way = "blender" if bpy.app.background else "relayed"
+            return way, f"{lacking[0]}; composing on Blender's own GPU" if wanted == "auto" else None
+        lacking.append("Blender's own GPU cannot be used without a window here")
     if wanted == "auto":
-        return "cpu", f"{lacking}; composing with NumPy, which is slow"
-    raise NoDeviceError(lacking)
+        return "cpu", f"{', and '.join(lacking)}; composing with NumPy, which is slow"
+    raise NoDeviceError(", and ".join(lacking))
 
 
 def name(kind: str) -> str:
@@ -50,6 +51,11 @@ def name(kind: str) -> str:
     if kind == "cpu":
         return "NumPy"
     return opengl().name if kind == "opengl" else gpu.platform.renderer_get()
+
+
+def is_known(wanted: str) -> bool:
+    """Whether `choose` answers at once: it makes no OpenGL context for that."""
+    return wanted in ("blender", "cpu") or opengl.cache_info().currsize > 0
 
 
 class OpenGL(NamedTuple):

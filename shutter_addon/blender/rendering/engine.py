@@ -13,13 +13,13 @@ from ..data.strips import ENGINE
 from . import invalidation, job_snapshots, render_job, session
 
 
-def in_full(_shown: Snapshot, _frame: float) -> tuple[int, bool]:
-    return 1, False
+def in_full(_shown: Snapshot, _frame: float) -> tuple[session.Detail, bool]:
+    return session.FULL, False
 
 
-# What a preview needs that Blender is drawing (interface/previewing.py): how many times smaller than the source's the
-# picture may be each way, and whether it is drawn over what the engine gives. One of session.FAULTS: there is none.
-needed_by_preview: Callable[[Snapshot, float], tuple[int, bool]] = in_full
+# What a preview needs that Blender is drawing (interface/previewing.py): in how much detail, and whether the picture is
+# drawn over what the engine gives. One of session.FAULTS: there is none.
+needed_by_preview: Callable[[Snapshot, float], tuple[session.Detail, bool]] = in_full
 
 
 class VirtualShutterEngine(bpy.types.RenderEngine):
@@ -44,21 +44,21 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
     def _render(self, depsgraph, called_by_script: bool):
         scene, width, height = depsgraph.scene, self.resolution_x, self.resolution_y
         shown, frame = job_snapshots.of(scene, scene.frame_current, self._stopped)
-        divisor, is_drawn = 1, False
-        if session.has_windows_gpu() and not (called_by_script or render_job.runs()):
-            divisor, is_drawn = needed_by_preview(shown, frame)
-        if divisor > 1 or is_drawn:
+        detail, is_drawn = session.FULL, False
+        if session.in_window() and not (called_by_script or render_job.runs()):
+            detail, is_drawn = needed_by_preview(shown, frame)
+        if detail != session.FULL or is_drawn:
             invalidation.keep_until_drawn(scene.session_uid)
         if is_drawn:
             return  # nothing, which costs Blender the least
-        picture = session.picture(shown, frame, self._say, self._stopped, divisor)
-        picture = session.resized(picture, width, height, divisor)
+        picture = session.picture(shown, frame, self._say, self._stopped, detail)
+        picture = session.resized(picture, width, height, detail.divisor)
         # A result of a single pixel has Blender make room for the whole picture. One of all would be copied there.
         self.end_result(self.begin_result(0, 0, 1, 1))
         # Blender's rows go up; composed pictures lie so in memory, and this copies nothing.
         self.get_result().layers[0].passes["Combined"].rect.foreach_set(np.ascontiguousarray(picture[::-1]).ravel())
         self.update_progress(1.0)
-        session.here().begin_next(shown, frame)
+        session.here().begin_next(shown, frame, self._stopped)
 
     def _stopped(self) -> bool:
         return self.test_break() or render_job.stopping()

@@ -2,11 +2,12 @@
 
 import itertools
 import os
-import shutil
 import signal
 import sys
+from collections.abc import Callable
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
+from typing import NamedTuple
 
 import bpy
 
@@ -26,12 +27,21 @@ MOVIES = {
     ".webm": ("WEBM", "WEBM", "OPUS"),
     ".avi": ("AVI", "MPEG4", "MP3"),
 }
-# Name: Blender's name, bits per channel.
-FORMATS = {"png": ("PNG", "16"), "exr": ("OPEN_EXR", "32")}
 
 
-# What Blender would write into a picture about its making.
+class PictureFormat(NamedTuple):
+    """blender: its name in Blender; bits: of a channel's sample; samples: as rendered_pictures calls them"""
+
+    blender: str
+    bits: int
+    samples: str
+
+
+FORMATS = {"png": PictureFormat("PNG", 16, "uint16"), "exr": PictureFormat("OPEN_EXR", 32, "float")}
+
+# What Blender would write into a picture about its making; a frame's number has as many digits as the range's last.
 _STAMPS = (
+    *("use_stamp_frame", "use_stamp_frame_range"),
     *("use_stamp_date", "use_stamp_time", "use_stamp_render_time", "use_stamp_memory", "use_stamp_hostname"),
     *("use_stamp_filename", "use_stamp_sequencer_strip"),
 )
@@ -50,6 +60,12 @@ def is_movie(path: Path) -> bool:
     return path.suffix.lower() in MOVIES
 
 
+def size(edit) -> tuple[int, int]:
+    """Width and height of the pictures that Blender renders of an edit, in pixels."""
+    render = edit.render
+    return tuple(n * render.resolution_percentage // 100 for n in (render.resolution_x, render.resolution_y))
+
+
 def check(path: Path, file_format: str | None, size) -> None:
     """OutputError: Blender cannot write a film of this size there. A new folder is made on the way."""
     width, height = size
@@ -62,7 +78,13 @@ def check(path: Path, file_format: str | None, size) -> None:
             raise OutputError(f"{path}: --format is for a folder of pictures, not for a movie")
         if width % 2 or height % 2:
             raise OutputError(f"{path}: a movie has even sizes, not {width}×{height}; render to a folder of pictures")
-    elif path.suffix.strip(".") and not path.is_dir() and file_format is None:
+    else:
+        check_folder(path, file_format)
+
+
+def check_folder(path: Path, file_format: str | None) -> None:
+    """OutputError: it looks like a file of another kind, and no format says that it is a folder of pictures."""
+    if path.suffix.strip(".") and not path.is_dir() and file_format is None:
         raise OutputError(f"{path}: neither a folder nor one of {', '.join(MOVIES)}")
 
 
@@ -109,49 +131,89 @@ def set_output(edit, path: Path, file_format: str, *, alpha: bool) -> None:
 
     alpha: pictures keep the source's transparency. OutputError: Blender cannot write there."""
     settings, render = edit.render.image_settings, edit.render
-    render.use_file_extension = not is_movie(path)
-    for name in _STAMPS:  # no time or place of the render: equal pixels are equal files
-        setattr(render, name, False)
-    render.filepath = for_blender(str(path) if is_movie(path) else f"{path}{os.sep}")
+    set_place(render, path)
     if is_movie(path):
         container, codec, audio = MOVIES[path.suffix.lower()]
         settings.media_type = "VIDEO"
         settings.color_mode = "RGB"
         render.ffmpeg.format, render.ffmpeg.codec = container, codec
-        has_sound = any(strip.type == "SOUND" for strip in edit.sequence_editor.strips_all)
-        render.ffmpeg.audio_codec = audio if has_sound else "NONE"
+        render.ffmpeg.audio_codec = audio if _has_sound(edit) else "NONE"
         render.ffmpeg.constant_rate_factor = "HIGH"
         return
-    settings.file_format, settings.color_depth = FORMATS[file_format]
+    _set_format(settings, FORMATS[file_format])
     settings.color_mode = "RGBA" if alpha else "RGB"
 
 
+def set_place(render, path: Path) -> None:
+    """Where the edit's render goes, and that it says nothing of its making. OutputError: Blender cannot write there."""
+    render.use_file_extension = not is_movie(path)
+    _stamp_nothing(render)
+    render.filepath = for_blender(str(path) if is_movie(path) else f"{path}{os.sep}")
+
+
+def _has_sound(edit) -> bool:
+    """Whether an edit has sound strips, or one that it shows."""
+    found = [strip for shown in strips.shown_edits(edit) for strip in shown.sequence_editor.strips_all]
+    return any(strip.type == "SOUND" for strip in found)
+
+
+def set_pictures(edit, file_format: str, note: str) -> None:
+    """What pictures a saved edit's render writes: every frame anew, as colours are set in the edit, with a note in
+    their metadata."""
+    settings, render = edit.render.image_settings, edit.render
+    settings.media_type = "IMAGE"
+    _set_format(settings, FORMATS[file_format])
+    render.use_file_extension = render.use_overwrite = True
+    render.use_placeholder = False
+    edit.frame_step = 1
+    if not render.use_stamp:  # what is burnt into pictures stays as it is
+        _stamp_nothing(render)
+        render.use_stamp_note, render.stamp_note_text = True, note
+
+
+def _set_format(settings, kind: PictureFormat) -> None:
+    settings.file_format, settings.color_depth = kind.blender, str(kind.bits)
+
+
+def _stamp_nothing(render) -> None:
+    """No time or place of the render in pictures: equal pixels are equal files."""
+    for name in _STAMPS:
+        setattr(render, name, False)
+
+
 def film(edit, output: Path) -> None:
-    """Renders an edit of new_edit.make_edit to a movie or a folder. Blender writes into a folder beside the output, and
-    what is finished moves out of it.
+    """Renders an edit of new_edit.make_edit to a movie or a folder.
 
     OutputError: it cannot be rendered or written; finished pictures stay, and of a movie what was finished, under a
     name of its own. InterruptedRenderError: the same, by Ctrl-C or a farm's TERM."""
-    folder = output.parent if is_movie(output) else output
-    folder.mkdir(parents=True, exist_ok=True)
-    clear_up(folder)
+    prepare(output.parent if is_movie(output) else output)
+    feed = movie_feed.feeding(edit) if is_movie(output) and strips.effect_strips(edit) else nullcontext()
+    with progress(edit.frame_end - edit.frame_start + 1, "frame") as moved, _without_sources(edit), feed:
+        write(edit, output, moved)
+
+
+def write(edit, output: Path, moved: Callable[[], None], moving: Callable[[Path], None] = lambda picture: None) -> None:
+    """Renders the frames of any edit to a movie, or to the pictures that its settings say in a prepared folder. Blender
+    writes into a folder beside the output, and what is finished moves out of it.
+
+    moved: called after each frame; moving: with each picture's place before it moves there, unless it raises an error
+    OutputError, InterruptedRenderError: as of `film`."""
     kept = edit.render.filepath
     faults: list[str] = []
-    with atomic_write.part_folder(folder) as part:
+    with atomic_write.part_folder(output.parent if is_movie(output) else output) as part:
         part_film = part / f"film{output.suffix}"
         try:
             edit.render.filepath = for_blender(str(part_film) if is_movie(output) else f"{part}{os.sep}")
             with (
                 render_job.telling(faults.append),
-                _stoppable() as stopped,
+                stoppable() as stopped,
                 quiet(),
-                _lean(edit),
-                movie_feed.feeding(edit) if is_movie(output) and strips.effect_strips(edit) else nullcontext(),
-                _moved(part, output, edit) as missing,
+                _uncached(edit),
+                _moved(part, output, edit, moved, moving) as missing,
             ):
                 bpy.ops.render.render(animation=True, scene=edit.name)
             if is_movie(output) and not faults and not stopped:
-                _finish(part_film, output, edit.frame_end - edit.frame_start + 1)
+                _finish(part_film, output, len(range(edit.frame_start, edit.frame_end + 1, edit.frame_step)))
             elif missing and not faults and not stopped:
                 raise OutputError(f"{output}: {len(missing)} frames were not written; {why_short(part)}")
         except RuntimeError as error:
@@ -165,11 +227,22 @@ def film(edit, output: Path) -> None:
             raise InterruptedRenderError(f"{output}: stopped{rescued}")
 
 
-def clear_up(folder: Path) -> None:
-    """Removes what killed renders left half-written in a folder."""
-    with suppress(OSError):
-        for left in atomic_write.left_behind(folder):
-            shutil.rmtree(left, ignore_errors=True)
+def prepare(folder: Path) -> None:
+    """Makes a folder, or clears it up. OSError: it cannot be made."""
+    folder.mkdir(parents=True, exist_ok=True)
+    atomic_write.clear_up(folder)
+
+
+@contextmanager
+def whole(path: Path | None):
+    """What to write in place of a file, so that it is there whole or not at all; None for none."""
+    if path is None:
+        yield None
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    atomic_write.clear_up(path.parent)
+    with atomic_write.writing(path) as part:
+        yield part
 
 
 def _finish(part: Path, output: Path, count: int) -> None:
@@ -199,30 +272,31 @@ def message(error: RuntimeError) -> str:
 
 
 @contextmanager
-def _moved(part: Path, output: Path, edit):
-    """Moves each finished picture from `part` to `output`, and a progress bar on. Gives the pictures that are missing
-    so far, by name; none of a movie's."""
+def _moved(part: Path, output: Path, edit, update: Callable[[], None], moving: Callable[[Path], None]):
+    """Moves each finished picture from `part` to `output`, and calls both. Gives the pictures that are missing so
+    far, by name; none of a movie's."""
     frames = edit.frame_start, edit.frame_end
-    ending = next((name for name, kind in FORMATS.items() if edit.render.image_settings.file_format == kind[0]), "")
+    settings = edit.render.image_settings
+    ending = next((name for name, kind in FORMATS.items() if settings.file_format == kind.blender), "")
     missing = {path.name: path for path in pictures_of(output, ending, frames)} if ending else {}
-    with progress(frames[1] - frames[0] + 1, "frame") as update:
 
-        def moved(*_):
-            update()
-            try:
-                os.utime(part)  # a movie's encoder may not write for long: nobody shall take it for left behind
-                for name in [path.name for path in part.iterdir() if path.name in missing]:
-                    if not is_whole_picture(part / name):
-                        raise OutputError(f"{output / name}: could not be written whole; {why_short(part)}")
-                    (part / name).replace(missing.pop(name))
-            except (OutputError, OSError) as error:
-                render_job.fail(in_words(error, output))
-
-        bpy.app.handlers.render_write.append(moved)
+    def moved(*_):
+        update()
         try:
-            yield missing
-        finally:
-            bpy.app.handlers.render_write.remove(moved)
+            os.utime(part)  # a movie's encoder may not write for long: nobody shall take it for left behind
+            for name in [path.name for path in part.iterdir() if path.name in missing]:
+                if not is_whole_picture(part / name):
+                    raise OutputError(f"{output / name}: could not be written whole; {why_short(part)}")
+                moving(missing[name])
+                (part / name).replace(missing.pop(name))
+        except (UserError, OSError) as error:
+            render_job.fail(in_words(error, output))
+
+    bpy.app.handlers.render_write.append(moved)
+    try:
+        yield missing
+    finally:
+        bpy.app.handlers.render_write.remove(moved)
 
 
 def in_words(error: Exception, place) -> str:
@@ -245,7 +319,7 @@ def progress(count: int, unit: str):
 
 
 @contextmanager
-def _stoppable():
+def stoppable():
     """Ctrl-C and a farm's TERM end the render after its frame, so that an open movie is finished; a second time, at
     once. Gives a list with the signal that came, if any.
 
@@ -267,22 +341,31 @@ def _stoppable():
 
 
 @contextmanager
-def _lean(edit):
-    """Spares Blender what no frame shows.
-
-    Each frame is rendered once: finished ones would fill gigabytes. And the source lies wholly below its effect, but
-    Blender takes any Scene strip for transparent: it would decode the source and blend the two, 2/5 of all its work.
-    """
+def _uncached(edit):
+    """Each frame is rendered once: those that Blender would keep would fill gigabytes."""
     editor = edit.sequence_editor
+    if editor is None:
+        yield
+        return
     kept = editor.use_cache_raw, editor.use_cache_final
-    shown = [strip for name in strips.shown_sources(edit) if not (strip := editor.strips_all[name]).mute]
     editor.use_cache_raw = editor.use_cache_final = False
+    try:
+        yield
+    finally:
+        editor.use_cache_raw, editor.use_cache_final = kept
+
+
+@contextmanager
+def _without_sources(edit):
+    """Spares Blender what no frame shows: the source lies wholly below its effect, but Blender takes any Scene strip
+    for transparent: it would decode the source and blend the two, 2/5 of all its work."""
+    sources = [edit.sequence_editor.strips_all[name] for name in strips.shown_sources(edit)]
+    shown = [strip for strip in sources if not strip.mute]
     for strip in shown:
         strip.mute = True
     try:
         yield
     finally:
-        editor.use_cache_raw, editor.use_cache_final = kept
         for strip in shown:
             strip.mute = False
 

@@ -15,6 +15,7 @@ from contextlib import suppress
 import bpy
 import gpu
 
+from ...compute.paging import PagedDevice
 from ...compute.passes import Pass
 from .blender_gpu import BlenderDevice
 
@@ -47,6 +48,8 @@ class RelayedDevice(BlenderDevice):
 
     def _free(self, own: list) -> None:
         _called(own.clear)
+
+    send = PagedDevice.send  # what others make would have to be freed there, too
 
     def _send(self, stored: list, *arguments) -> None:
         self._wait_for(lambda: BlenderDevice._send(self, *stored, *arguments))
@@ -83,14 +86,18 @@ def ask(function: Callable[[], None], seconds: float) -> None:
         asked.cancel()
 
 
-def serve(seconds: float = _LEAST) -> None:
-    """Makes calls, on the main thread while it waits for another that may call, for these seconds or a call more."""
+def serve(seconds: float = _LEAST) -> bool:
+    """Makes calls, on the main thread while it waits for another that may call, for these seconds or a call more.
+    False: there are some, but Blender's GPU is not current."""
+    if not _has_context():
+        time.sleep(_GAP)
+        return _calls.empty()
     end = time.monotonic() + seconds
     while (left := end - time.monotonic()) > 0:
         try:
             done, function = _calls.get(timeout=min(left, _GAP))
         except queue.Empty:
-            return
+            return True
         _keep_looking()
         if not done.set_running_or_notify_cancel():
             continue
@@ -100,6 +107,7 @@ def serve(seconds: float = _LEAST) -> None:
             done.set_exception(error.with_traceback(None))  # whose frames refer to textures
         with suppress(RuntimeError):  # the GPU is full: that is met by who needs it
             _finish_some()
+    return True
 
 
 def _finish_some() -> None:
@@ -132,8 +140,7 @@ def _keep_looking() -> None:
 def _look() -> float | None:
     """A timer."""
     global _looks_until, _looked
-    if _has_context():
-        serve(min(max(time.monotonic() - _looked, _LEAST), _MOST))
+    serve(min(max(time.monotonic() - _looked, _LEAST), _MOST))
     _looked = time.monotonic()
     with _lock:
         if _calls.empty() and time.monotonic() > _looks_until:

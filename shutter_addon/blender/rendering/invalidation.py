@@ -75,11 +75,7 @@ def spoil(scene: int) -> None:
 
 def drop_spoilt() -> None:
     """Drops what the sequencer keeps of pictures that failed: it would show them again without asking."""
-    failed = {_spoilt.pop() for _ in range(len(_spoilt))}
-    for edit in bpy.data.scenes if failed else ():
-        for strip in strips.effect_strips(edit):
-            if strip.scene.session_uid in failed:
-                strip.invalidate_cache("RAW")
+    _drop(_spoilt)
 
 
 def keep_until_drawn(scene: int) -> None:
@@ -93,10 +89,15 @@ def keep_until_drawn(scene: int) -> None:
 
 def drop_lesser() -> None:
     """Drops what the sequencer keeps of pictures for previews."""
-    given = {_lesser.pop() for _ in range(len(_lesser))}
-    for edit in bpy.data.scenes if given else ():
+    _drop(_lesser)
+
+
+def _drop(noted: set[int]) -> None:
+    """Empties a set of session_uids of effect scenes, and drops what the sequencer keeps of those."""
+    scenes = {noted.pop() for _ in range(len(noted))}
+    for edit in bpy.data.scenes if scenes else ():
         for strip in strips.effect_strips(edit):
-            if strip.scene.session_uid in given:
+            if strip.scene.session_uid in scenes:
                 strip.invalidate_cache("RAW")
 
 

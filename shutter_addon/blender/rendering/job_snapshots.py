@@ -24,15 +24,15 @@ _left_out: list[tuple[range, str]] = []  # of its film, see requirements.left_ou
 def begin(film: int) -> None:
     """Reads all effects for a job, on the main thread; film: session_uid of the scene that it renders."""
     _taken.clear()
-    for edit in _shown(film):
-        for effect, parts in _effects(edit):
-            if effect.scene.session_uid in _taken:  # of a copied edit: the first counts, as for strips.find_edit
-                continue
-            try:
-                frames = _frames(edit, parts, edit.session_uid == film)
-                _taken[effect.scene.session_uid] = snapshot.take(edit, effect, parts[0], frames)
-            except session.FAULTS as error:
-                _taken[effect.scene.session_uid] = error
+    scene = _scene(film)
+    for edit, effect, parts in shown_effects(scene) if scene else ():
+        if effect.scene.session_uid in _taken:  # of a copied edit: the first counts, as for strips.find_edit
+            continue
+        try:
+            frames = asked_frames(edit, parts, edit == scene)
+            _taken[effect.scene.session_uid] = snapshot.take(edit, effect, parts[0], frames)
+        except session.FAULTS as error:
+            _taken[effect.scene.session_uid] = error
     look(film)
 
 
@@ -87,30 +87,21 @@ def _late(uid: int, scene_frame: float) -> Snapshot | Exception:
         return error
 
 
-def _shown(film: int) -> list:
-    """The edits that a film shows: its own, and those of its Scene strips."""
-    found, new = [], [_scene(film)]
-    while new:
-        scene = new.pop()
-        if scene is not None and scene not in found and scene.sequence_editor:
-            found.append(scene)
-            new += [strip.scene for strip in scene.sequence_editor.strips_all if strip.type == "SCENE"]
-    return found
-
-
 def _scene(uid: int):
     return next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
 
 
-def _effects(edit):
-    """The edit's effects, each with the strips that show it."""
-    shown = strips.effect_strips(edit)
-    for effect in edit.virtual_shutter.effects:
-        if parts := [strip for strip in shown if strip.scene == effect.scene]:
-            yield effect, parts
+def shown_effects(film):
+    """The effects that a film's scene shows, and the edits in its Scene strips: each with its edit and with the strips
+    that show it."""
+    for edit in strips.shown_edits(film):
+        shown = strips.effect_strips(edit)
+        for effect in edit.virtual_shutter.effects:
+            if parts := [strip for strip in shown if strip.scene == effect.scene]:
+                yield edit, effect, parts
 
 
-def _frames(edit, parts, is_film: bool) -> set[float]:
+def asked_frames(edit, parts, is_film: bool) -> set[float]:
     """The timeline frames at which the parts of an effect may be asked for: those of the film, or in another edit,
     which strips show, all."""
     first, last = edit.frame_start, edit.frame_end

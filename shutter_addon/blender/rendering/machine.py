@@ -2,8 +2,6 @@
 
 import os
 import platform
-import tomllib
-from pathlib import Path
 
 import bpy
 import gpu
@@ -11,27 +9,26 @@ import numpy as np
 
 from ...compute.benchmark import processor
 from ...compute.budget import machine_memory
-from ..data import preferences
+from ..data import preferences, versions
 from . import devices
 from .blender_gpu import BlenderDevice
 
 BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal", "NONE": "nothing", "UNKNOWN": "unknown"}
-MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
 
 
-def open_device(wanted: str | None):
+def open_device(wanted: str | None, *memory):
     """A compositor, and why it is a lesser one, or None. NoDeviceError: there is none as it is wanted.
 
-    wanted: one of devices.CHOICES; None: as the user prefers"""
+    wanted: one of devices.CHOICES; None: as the user prefers; memory: a Budget, in place of the device's own"""
     kind, lesser = devices.choose(wanted or preferences.device())
-    return devices.OPEN[kind](), lesser
+    return devices.OPEN[kind](*memory), lesser
 
 
 def described(compositor, lesser: str | None) -> dict[str, str]:
     """The machine, by headings."""
     memory, device = machine_memory(), getattr(compositor, "device", None)
     return {
-        "Virtual Shutter": tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"],
+        "Virtual Shutter": versions.extension(),
         "Blender": f"{bpy.app.version_string}, Python {platform.python_version()}, NumPy {np.__version__}",
         "Device": compositor.name if device is None else f"{device.name}, by {_backend(device)}",
         **({"Because": lesser} if lesser else {}),

@@ -5,7 +5,6 @@ which take more of the processor than all else that it does for a frame. So the 
 uncompressed file of the levels that the movie will have, above the effect strip, which it then does not render.
 """
 
-import os
 import struct
 import tempfile
 from contextlib import ExitStack, contextmanager, suppress
@@ -16,9 +15,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..data import snapshot, strips
+from ...core import atomic_write
+from ..data import colour_configuration, snapshot, strips
 from . import render_job, session
 from .engine import in_words, say
+
+_ROWS = 64  # of a strip of the file: of a single one, libtiff makes as many as there are rows, in twice the time
 
 
 @contextmanager
@@ -29,11 +31,12 @@ def feeding(edit):
     Where there is no room for such a file, or another OpenColorIO configuration than Blender's makes other levels, the
     engine renders as ever."""
     with ExitStack() as until_the_end:
-        if not os.environ.get("OCIO"):
+        if not colour_configuration.name():
             with suppress(OSError):
-                folder = until_the_end.enter_context(tempfile.TemporaryDirectory(prefix="virtual_shutter_"))
+                atomic_write.clear_up(place := Path(tempfile.gettempdir()))
+                folder = until_the_end.enter_context(atomic_write.part_folder(place))
                 size = edit.render.resolution_x, edit.render.resolution_y
-                until_the_end.enter_context(_fed(edit, LevelsFile(Path(folder, "picture.tif"), *size)))
+                until_the_end.enter_context(_fed(edit, LevelsFile(folder / "picture.tif", *size)))
         yield
 
 
@@ -71,7 +74,7 @@ def fill(effect_strip, picture, film: list, edit, *_) -> None:
             effect, frames = strips.effect_of(edit, effect_strip.scene), range(edit.frame_start, edit.frame_end + 1)
             film.append(snapshot.take(edit, effect, effect_strip, frames, folder=session.settings().inbetween))
         picture.write(session.picture(film[0], edit.frame_current, say, render_job.stopping))
-        session.here().begin_next(film[0], edit.frame_current)
+        session.here().begin_next(film[0], edit.frame_current, render_job.stopping)
     except BaseException as error:  # Blender would print it, and write the picture again that was there before
         if not isinstance(error, session.StoppedError):
             render_job.fail(in_words(error))
@@ -98,15 +101,22 @@ class LevelsFile:
 
 
 def _tiff_head(width: int, height: int) -> bytes:
-    """All of a little-endian TIFF before its pixels, which are one strip."""
+    """All of a little-endian TIFF before its pixels, which are strips of _ROWS rows."""
     short, long, count = 3, 4, 10
+    strips = -(-height // _ROWS)
     depths = 8 + 2 + 12 * count + 4  # behind the header of 8 bytes, the number of fields, the fields, and their end
+    places = depths + 8
+    pixels = places + 8 * strips if strips > 1 else places
+    sizes = [4 * width * min(_ROWS, height - top) for top in range(0, height, _ROWS)]
+    starts = [pixels + 4 * width * top for top in range(0, height, _ROWS)]
     fields = [
         *((256, long, 1, width), (257, long, 1, height)),
         *((258, short, 4, depths), (259, short, 1, 1), (262, short, 1, 2)),  # bits of samples, not compressed, RGB
-        *((273, long, 1, depths + 8), (277, short, 1, 4)),  # where the pixels are, samples of each
-        *((278, long, 1, height), (279, long, 1, 4 * width * height)),  # rows and bytes of the strip
+        # Where the strips are, samples of each pixel, rows and bytes of each strip.
+        *((273, long, strips, places if strips > 1 else pixels), (277, short, 1, 4)),
+        *((278, long, 1, _ROWS), (279, long, strips, places + 4 * strips if strips > 1 else sizes[0])),
         (338, short, 1, 2),  # straight alpha
     ]
-    packed = b"".join(struct.pack("<HHII", *field) for field in fields)
-    return struct.pack("<2sHIH", b"II", 42, 8, count) + packed + bytes(4) + struct.pack("<4H", 8, 8, 8, 8)
+    packed = b"".join(struct.pack("<HHII", *field) for field in fields) + bytes(4) + struct.pack("<4H", 8, 8, 8, 8)
+    tables = struct.pack(f"<{2 * strips}I", *starts, *sizes) if strips > 1 else b""
+    return struct.pack("<2sHIH", b"II", 42, 8, count) + packed + tables

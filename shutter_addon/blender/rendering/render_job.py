@@ -34,16 +34,19 @@ _spent: list[tuple[str, str]] = []  # names of the scenes and cameras of small r
 _film: int | None = None  # session_uid of the scene whose render runs; neither of those that its Scene strips show, nor
 # of what a preview shows
 _begun = False
+_waited_for = False  # whether the window waits for every picture that the job's thread makes, see in_job
 
 
 def begin(scene) -> bool:
     """A render begins. True: that of a film or a picture; not of a scene in one, nor of a preview."""
-    global _film, _begun, failure, _stopping
+    global _film, _begun, failure, _stopping, _waited_for
     is_effect = scene.render.engine == ENGINE
-    in_film = _film is not None and (_begun or is_effect)
-    in_preview = is_effect and not (bpy.app.background or in_job())
-    if in_film or in_preview:
+    if _film is not None and (_begun or is_effect):
         return False
+    # Render Sequencer Animation says of no film that it begins, only of each effect in it.
+    _waited_for = is_effect and _beside_main_thread() and "RENDER_OT_opengl" in operators_running()
+    if is_effect and not (bpy.app.background or _beside_main_thread()):
+        return False  # a preview
     _film, _begun, failure, _stopping = scene.session_uid, False, None, False
     return True
 
@@ -84,12 +87,32 @@ def end(scene, alone: bool) -> None:
 def ends_films() -> bool:
     """Whether what fails here and now is a film: in the background, in a job of the window, or in a script there. Else
     it is a preview, on the main thread."""
-    return bpy.app.background or in_job() or (_film is not None and not bpy.app.is_job_running("RENDER"))
+    if bpy.app.background or _beside_main_thread():
+        return True
+    return _film is not None and not bpy.app.is_job_running("RENDER")
 
 
 def in_job() -> bool:
-    """Whether this is the thread of a job of the window."""
+    """Whether this is the thread of a job of the window, which goes on meanwhile.
+
+    It does not in View ▸ Render Sequencer Animation: its main thread waits while a picture is made. So the job's thread
+    may read Blender's data by itself, and must not wait for the main thread."""
+    return _beside_main_thread() and not _waited_for
+
+
+def window_waits() -> bool:
+    """Whether this is a thread for which the window waits, see in_job."""
+    return _beside_main_thread() and _waited_for
+
+
+def _beside_main_thread() -> bool:
     return not bpy.app.background and threading.current_thread() is not threading.main_thread()
+
+
+def operators_running() -> set[str]:
+    """The names of the operators of all windows that wait for events; where the main thread is, or waits."""
+    windows = bpy.context.window_manager.windows
+    return {operator.bl_idname for window in windows for operator in window.modal_operators}
 
 
 @contextmanager
@@ -132,7 +155,7 @@ def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None):
 
 def soon(function: Callable[[], None]) -> None:
     """Has a function called on the main thread: at once, if this is it."""
-    if in_job():
+    if _beside_main_thread():
         bpy.app.timers.register(function)
     else:
         function()
@@ -163,9 +186,16 @@ def cancel(ended=None) -> None:
 
     ended: whether the window has ended it meanwhile; without it, the window is not waited for long."""
     if in_job():
-        on_main_thread(lambda: (_cancel(), _show()), ended)
+        on_main_thread(_cancel_and_show, ended)
+    elif window_waits():  # until this picture is done, which is left out; what comes meanwhile fails likewise
+        soon(_cancel_and_show)
     else:
         _cancel()
+
+
+def _cancel_and_show() -> None:
+    _cancel()
+    _show()
 
 
 def _cancel() -> None:

@@ -16,6 +16,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...compute.budget import MEGABYTE, Budget
 from ...compute.device import NoDeviceError
+from ...compute.memory_needs import frame_bytes
 from ...compute.renderer import Renderer
 from ...core import following, retiming
 from ...core.frame_state import FrameState
@@ -29,6 +30,7 @@ from ...media.prefetch import PrefetchSource
 from ...media.reduced import smaller
 from ..data import preferences
 from ..data.snapshot import Snapshot, translated
+from ..data.strip_proxies import Proxy
 from . import devices, gpu_relay, render_job
 
 FAULTS = (EffectError, MediaError, NoDeviceError, MemoryError)
@@ -55,10 +57,11 @@ def _never() -> bool:
 
 
 def _result(future: Future, stopped):
-    """The future's result. StoppedError: it is not waited for any longer."""
+    """The future's result. StoppedError: it is not waited for any longer. NoDeviceError: it cannot be waited for, as
+    Blender's GPU is not current."""
     while not wait([future], 0 if in_window() else _PATIENCE).done:
-        if in_window():
-            gpu_relay.serve()
+        if in_window() and not gpu_relay.serve():
+            raise NoDeviceError(rpt_("Blender's GPU cannot be used until a window is drawn"))
         if stopped():
             raise StoppedError
     return future.result()
@@ -79,6 +82,20 @@ class RenderSettings:
     inbetween: Path | None = None
     gpu_memory: int | None = None
     levels: bool = False
+
+
+@dataclass(frozen=True)
+class Detail:
+    """In how much detail a preview is composed.
+
+    divisor: how many times smaller than the source's the picture is each way (media.open_source)
+    proxy: what frames are read from, where it fits; in-between frames and those beside them have none"""
+
+    divisor: int = 1
+    proxy: Proxy | None = None
+
+
+FULL = Detail()  # what renders are composed in
 
 
 @dataclass(frozen=True)
@@ -145,8 +162,18 @@ class FrameRequest:
         for missing in lacking:
             # One that is not built yet would be remembered as a fault, and may come before it is needed.
             wanted |= dict.fromkeys(i for i in sorted(missing) if source.step == 1 or source.has(i))
-        room = _DECODED_BYTES // (source.width * source.height * 4 * np.dtype(source.dtype).itemsize)
-        source.want(list(wanted)[: max(_DECODED, room)])
+        source.want(list(wanted)[: decoded_ahead(source)])
+
+
+def decoded_ahead(source) -> int:
+    """How many frames of a source may lie decoded on the host, besides a window that is kept there."""
+    return max(_DECODED, _DECODED_BYTES // frame_bytes(source))
+
+
+def decoded_bytes(source, window: int) -> int:
+    """Bytes that decoded frames take on the host at most: those of a window of so many frames, and of the next
+    pictures, as far as there is room."""
+    return min(decoded_ahead(source), window + _AHEAD * source.step) * frame_bytes(source)
 
 
 class RenderSession:
@@ -156,9 +183,10 @@ class RenderSession:
         """choose: gives the device, as devices.choose; ask_others: called where the GPU has no room, has others free
         what they hold of it."""
         self._choose, self._ask_others = choose, ask_others
+        self._asks = False  # others for room, in the middle of a picture
         self._chosen: tuple[str, str | None] | None = None
         self._executor: ThreadPoolExecutor | None = None
-        self._compositor = None
+        self._compositor: Future | None = None
         self._renderers: dict = {}
         self._requests: dict[int, tuple[Snapshot, float, FrameRequest]] = {}  # by scene: the last one
         self._shown: dict[int, float] = {}  # by scene: the timeline frame that was shown last
@@ -178,27 +206,31 @@ class RenderSession:
 
     def run(self, function, *arguments, stopped=_never):
         """The result of a function that uses the device. StoppedError: it is not waited for any longer."""
-        if not self.threaded:
-            return function(*arguments)
-        if self._executor is None:
-            self._executor = ThreadPoolExecutor(1, "Virtual Shutter")
-        try:
-            future = self._executor.submit(function, *arguments)
-        except RuntimeError:  # Python ends, and its threads take no more work
-            return function(*arguments)
-        return _result(future, stopped)
+        return _result(self._submit(function, *arguments), stopped)
 
-    def request(self, snapshot: Snapshot, frame: float, say=print, divisor: int | None = None) -> FrameRequest:
+    def _submit(self, function, *arguments) -> Future:
+        """The result to come of a function that uses the device. Such functions are called one after the other."""
+        if self.threaded:
+            if self._executor is None:
+                self._executor = ThreadPoolExecutor(1, "Virtual Shutter")
+            with suppress(RuntimeError):  # Python ends, and its threads take no more work
+                return self._executor.submit(function, *arguments)
+        done = Future()
+        done.set_result(function(*arguments))
+        return done
+
+    def request(
+        self, snapshot: Snapshot, frame: float, say=print, detail: Detail | None = None, stopped=_never
+    ) -> FrameRequest:
         """What an effect strip shows at a timeline frame; say: called with a sentence when the device is a lesser one.
-        One of FAULTS: it cannot be shown.
+        One of FAULTS: it cannot be shown. StoppedError: the device is not waited for any longer.
 
-        divisor: how many times smaller than the source's the picture is each way (media.open_source); None: as it was
-        the last time, for who asks for no picture"""
-        renderer = self._renderer(snapshot, say, divisor)
+        detail: None: as it was the last time, for who asks for no picture"""
+        renderer = self._renderer(snapshot, say, detail, stopped)
         known = self._requests.get(snapshot.scene)
         if known is not None and known[0] is snapshot and known[1] == frame and known[2].renderer is renderer:
             return known[2]
-        state = _in_blocks(snapshot.state(frame), self._renderers[snapshot.scene][0][1])
+        state = _in_blocks(snapshot.state(frame), self._renderers[snapshot.scene][0][1].divisor)
         index, backward = source_index(snapshot, frame, renderer.source)
         direction = -1 if backward else 1
         with translated():
@@ -224,7 +256,7 @@ class RenderSession:
             begun.cancel()
         return self.run(request.picture, stopped=stopped)
 
-    def begin_next(self, snapshot: Snapshot, frame: float) -> None:
+    def begin_next(self, snapshot: Snapshot, frame: float, stopped=_never) -> None:
         """Begins the picture after the one at that timeline frame, where a film is rendered: if the last two were
         neighbours.
 
@@ -235,33 +267,52 @@ class RenderSession:
         step, last = snapshot.film
         if frame - before == step and frame + step <= last and frame + step in snapshot.frames:
             with suppress(*FAULTS):  # it is met again when the picture is asked for
-                request = self.request(snapshot, frame + step, divisor=1)
-                self._begun[snapshot.scene] = request.key, self._executor.submit(request.picture)
+                request = self.request(snapshot, frame + step, detail=FULL, stopped=stopped)
+                self._begun[snapshot.scene] = request.key, self._submit(request.picture)
 
     def coefficients(self, request: FrameRequest, stopped=_never) -> np.ndarray:
         """As Renderer.coefficients."""
         return self.run(request.coefficients, stopped=stopped)
 
-    def _renderer(self, snapshot: Snapshot, say, divisor: int | None) -> Renderer:
-        """The renderer of the effect's source at that size: the only one that the effect has."""
-        if self._compositor is None:
-            self._compositor = self.run(devices.OPEN[self.device], _memory(), self._ask_others)
-            if message := self._chosen[1]:
-                say(message)
-        old_key, renderer = self._renderers.pop(snapshot.scene, ((None, 1), None))
-        key = (snapshot.source, snapshot.inbetween, snapshot.built), divisor or old_key[1]
+    def _renderer(self, snapshot: Snapshot, say, detail: Detail | None, stopped) -> Renderer:
+        """The renderer of the effect's source in that detail: the only one that the effect has."""
+        compositor = self._opened(say, stopped)
+        old_key, renderer = self._renderers.pop(snapshot.scene, ((None, FULL), None))
+        key = (snapshot.source, snapshot.inbetween, snapshot.built), detail or old_key[1]
         if old_key != key:
             if renderer is not None:
-                self.run(renderer.close)
-            source = open_source(snapshot, key[1])
-            renderer = Renderer(self._compositor, source, MatteValues.of(source))
+                self._submit(renderer.close)
+            source = open_source(snapshot, key[1], planes=compositor.takes_planes)
+            renderer = Renderer(compositor, source, MatteValues.of(source))
         self._renderers[snapshot.scene] = key, renderer
         while len(self._renderers) > _KEPT:
-            self.run(self._renderers.pop(next(iter(self._renderers)))[1].close)
+            self._submit(self._renderers.pop(next(iter(self._renderers)))[1].close)
         return renderer
 
+    def _opened(self, say, stopped):
+        """The compositor, opened if need be."""
+        if self._compositor is None:
+            self._compositor = self._submit(devices.OPEN[self.device], memory(), self._ask)
+            if message := self._chosen[1]:
+                say(message)
+        try:
+            return _result(self._compositor, stopped)
+        except NoDeviceError:
+            self._compositor = None
+            raise
+
+    def _ask(self) -> None:
+        """Has others free what they hold. What this one holds is in use."""
+        self._asks = True
+        try:
+            self._ask_others()
+        finally:
+            self._asks = False
+
     def free(self) -> None:
-        """Frees what its renderers have on the device. They make it again."""
+        """Frees what its renderers have on the device, unless it asks for room itself. They make it again."""
+        if self._asks:
+            return
         for _key, renderer in list(self._renderers.values()):
             self.run(renderer.release)
 
@@ -278,21 +329,22 @@ class RenderSession:
         for place in set(self._renderers) - scenes:
             _key, renderer = self._renderers.pop(place, (None, None))
             if renderer is not None:
-                self.run(renderer.close)
+                self._submit(renderer.close)
 
     def forget(self) -> None:
-        """Closes all sources and frees the device."""
+        """Closes all sources and frees the device; where Blender's GPU is not current, once it is. A render job may
+        take up more meanwhile."""
         for known in (self._shown, self._begun, self._requests):
             known.clear()
-        for _key, renderer in self._renderers.values():
-            self.run(renderer.close)
-        self._renderers.clear()
-        if self._compositor is not None:
-            self.run(self._compositor.release)
-            self._compositor = None
+        while self._renderers:
+            _place, (_key, renderer) = self._renderers.popitem()
+            self._submit(renderer.close)
+        compositor, self._compositor = self._compositor, None
+        if compositor is not None:
+            with suppress(NoDeviceError):
+                self.run(lambda: compositor.result().release())  # behind what is left of a render that was stopped
         if self._executor is not None:
-            self.run(_never)  # what is left of a render that was stopped may need this thread
-            self._executor.shutdown()
+            self._executor.shutdown(wait=False)
             self._executor = None
         self._chosen = None
 
@@ -335,7 +387,7 @@ def _wanted_memory() -> int:
     return preferences.gpu_memory() if _settings.gpu_memory is None else _settings.gpu_memory
 
 
-def _memory() -> Budget:
+def memory() -> Budget:
     """What the textures of both sessions may take together: it is one GPU, which OpenGL knows best, where it may be
     asked; else the first device tells."""
     global _budget
@@ -378,21 +430,9 @@ def in_window() -> bool:
     return not bpy.app.background and threading.current_thread() is threading.main_thread()
 
 
-def has_windows_gpu() -> bool:
-    """Whether Blender's own GPU may be used as it is: in_window, but not where the editor renders a view there, which
-    leaves no context to engines."""
-    return in_window() and "RENDER_OT_opengl" not in operators_running()
-
-
-def operators_running() -> set[str]:
-    """The names of the operators of all windows that wait for events; on the main thread."""
-    windows = bpy.context.window_manager.windows
-    return {operator.bl_idname for window in windows for operator in window.modal_operators}
-
-
 def here() -> RenderSession:
     """The session of whoever calls: the window's own on its main thread, else the offscreen one."""
-    return _window if has_windows_gpu() else _offscreen
+    return _window if in_window() else _offscreen
 
 
 def settle() -> None:
@@ -413,16 +453,20 @@ def _in_blocks(state: FrameState, divisor: int) -> FrameState:
 
 
 def picture(
-    snapshot: Snapshot, frame: float, say: Callable[[str], None] = print, stopped=_never, divisor: int = 1
+    snapshot: Snapshot, frame: float, say: Callable[[str], None] = print, stopped=_never, detail: Detail = FULL
 ) -> np.ndarray:
     """The picture (H, W, 4) of an effect strip at a timeline frame, top row first: scene-linear float32, premultiplied,
     or levels, if the settings ask for them. One of FAULTS: there is none, in one sentence. say: called with a sentence
     when the device is a lesser one, or cuts cannot be found. stopped: asked whether the picture is not wanted any
-    longer; StoppedError: it is not. divisor: as of RenderSession.request.
+    longer; StoppedError: it is not.
     """
     if stopped():
         raise StoppedError
-    request = here().request(snapshot, frame, say, divisor)
+    if render_job.window_waits() and here().device == "relayed":
+        raise NoDeviceError(
+            rpt_("View > Render Sequencer Animation cannot use Blender's own GPU: use Render > Render Animation")
+        )
+    request = here().request(snapshot, frame, say, detail, stopped)
     if request.state.options.stop_at_cuts:
         _say_of_cuts(say)
     if _settings.weights is not None:
@@ -451,7 +495,7 @@ def shortages(request: FrameRequest) -> list[str]:
     """Sentences about what is slow in pictures as requested, for the GPU has no room."""
     found, source = request.renderer.shortages(), request.renderer.source
     words = {"width": source.width, "height": source.height, "frames": request.state.options.window}
-    words["limit"] = _memory().limit // MEGABYTE if found else 0
+    words["limit"] = memory().limit // MEGABYTE if found else 0
     sentences = {
         "window": rpt_(
             "the {limit} MB that may be taken of the GPU are too few for {frames} frames of {width}×{height}: all are"
@@ -487,15 +531,15 @@ def source_index(snapshot: Snapshot, frame: float, source: ShotSource) -> tuple[
         return retiming.source_frame(snapshot.timing, frame, source), snapshot.timing.use_reverse_frames
 
 
-def open_source(snapshot: Snapshot, divisor: int = 1) -> ShotSource:
-    """An effect's source, in-between frames included; divisor: of media.open_source. EffectError, MediaError: there is
+def open_source(snapshot: Snapshot, detail: Detail = FULL, *, planes: bool = False) -> ShotSource:
+    """An effect's source, in-between frames included; planes: as of PrefetchSource. EffectError, MediaError: there is
     none."""
     if snapshot.inbetween is None:
-        return ShotSource(PrefetchSource(snapshot.source.open(divisor)))
+        return ShotSource(PrefetchSource(snapshot.source.open(detail.divisor, detail.proxy), planes=planes))
     medium = snapshot.source.open()
     try:
         source = InbetweenSource(medium, *snapshot.inbetween)
-        return ShotSource(PrefetchSource(smaller(source, divisor)), snapshot.inbetween.factor)
+        return ShotSource(PrefetchSource(smaller(source, detail.divisor)), snapshot.inbetween.factor)
     except FAULTS:
         medium.close()
         raise

@@ -70,6 +70,13 @@ MESSAGES = {
         " slow",
     ): "die {limit} MB, die von der GPU genommen werden dürfen, reichen für die Diffusion auf {width}×{height} nicht:"
     " NumPy rechnet sie, und das ist langsam",
+    (
+        "*",
+        "View > Render Sequencer Animation cannot use Blender's own GPU: use Render > Render Animation",
+    ): "Ansicht > Sequencer-Animation rendern kann Blenders eigene GPU nicht nutzen: Rendern > Animation rendern"
+    " kann es",
+    ("*", "Blender's GPU cannot be used until a window is drawn"): "Blenders GPU lässt sich erst nutzen, wenn ein"
+    " Fenster gezeichnet wurde",
     ("*", "the effect was deleted while it was rendered"): "der Effekt wurde gelöscht, während er gerendert wurde",
     ("*", 'the scene of "{strip}" was deleted'): "die Szene von „{strip}“ wurde gelöscht",
     ("*", 'the scene of "{strip}" has no camera'): "die Szene von „{strip}“ hat keine Kamera",
@@ -729,6 +736,9 @@ MESSAGES = {
         "The pixel that is probed, in fractions of the picture from its lower left corner",
     ): "Das Pixel, das die Sonde zeigt, in Bruchteilen des Bildes von seiner unteren linken Ecke",
     ("*", "Shutter: {fault}"): "Verschluss: {fault}",
+    ("*", "Composed at {scale} size"): "In {scale} der Größe berechnet",
+    ("*", "Composed at {scale} size, from a proxy"): "In {scale} der Größe aus einem Proxy berechnet",
+    ("*", "Composed from a proxy"): "Aus einem Proxy berechnet",
     ("*", "The strips above are hidden in this view"): "Die Streifen darüber sind in dieser Ansicht verborgen",
     ("*", "This view has the view transform Standard"): "Diese Ansicht hat die Anzeigetransformation Standard",
     # Tracking and following

@@ -1,0 +1,11 @@
+// Stores a pixel of the finished picture, of `height` rows. LEVELS: display code values (view transform Standard), top row
+// first; else scene-linear, bottom row first: Blender's order, and GL's. Both are premultiplied.
+void finish(ivec2 pixel, vec4 color)
+{
+#if LEVELS
+  color.rgb = to_level(clamp(straight(color), 0.0, 1.0)) * color.a;
+  imageStore(picture, ivec3(pixel, 0), color);
+#else
+  imageStore(picture, ivec3(pixel.x, height - 1 - pixel.y, 0), color);
+#endif
+}

@@ -1,0 +1,249 @@
+"""The command `check`: whether an edit can be rendered on this machine, and what that will take."""
+
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+import bpy
+
+from ...compute.budget import machine_memory
+from ...compute.device import NoDeviceError
+from ...core import atomic_write, chunks, frame_ranges, job_file
+from ...core.edit_version import EditVersion
+from ...core.messages import signed
+from ..data import missing_media, versions
+from ..editing import saved_edit
+from ..rendering import edit_check, film_output, machine, session
+from ..rendering.edit_check import EffectCheck
+from . import command_line
+
+
+def add(commands) -> None:
+    parser = commands.add_parser("check", help="find out whether an edit can be rendered here, and what that will take")
+    parser.add_argument("edit", metavar="FILE.blend", type=command_line.place, help="a saved edit")
+    parser.add_argument("--frames", metavar="A:B", help="timeline frames A to B (default: all of the edit)")
+    parser.add_argument(
+        "--output", type=command_line.place, metavar="DIR", help="where the frames are to go: it gets the job's file"
+    )
+    parser.add_argument("--format", choices=tuple(film_output.FORMATS), default="png", help="of the frames")
+    parser.add_argument(
+        "--inbetweens-later", action="store_true", help="in-between frames may be missing: they are built after this"
+    )
+    command_line.add_device(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.set_defaults(run=run)
+
+
+def run(arguments) -> None:
+    edit = saved_edit.open_edit(arguments.edit)
+    first, last = command_line.frames(arguments.frames, (edit.frame_start, edit.frame_end), "edit")
+    frames = range(first, last + 1)
+    with session.using(session.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)):
+        report = _report(arguments, edit, frames)
+    if arguments.json:
+        print(json.dumps(report, indent=1, ensure_ascii=False))
+    else:
+        print("\n".join(_lines(report)))
+    with suppress(BrokenPipeError):  # nobody reads on
+        sys.stdout.flush()
+    for fault in report["faults"]:
+        print(signed(fault), file=sys.stderr)
+    if report["faults"]:
+        sys.exit(2)
+
+
+def _report(arguments, edit, frames: range) -> dict:
+    """What is found, as JSON has it (docs/command.md)."""
+    faults, notes = [*_version_faults(edit), *_setting_faults(edit)], []
+    version = versions.of_edit(edit)
+    device, found, limit = _on_device(edit, frames, faults, notes, find_cuts=not arguments.inbetweens_later)
+    build = _builds(arguments.edit, edit, frames, found)
+    for each in found:
+        faults += [f'"{each.name}": {fault}' for fault in each.faults]
+        notes += [f'"{each.name}": {note}' for note in each.notes]
+        if each.missing and not arguments.inbetweens_later:
+            words = f"in-between frames of source {frame_ranges.in_words(each.missing)} are missing"
+            faults.append(f'"{each.name}": {words}; build them: {build}')
+    faults += edit_check.left_out(edit, frames)
+    faults += missing_media.faults(edit, frames, sources=False)  # of these the effects' own say more
+    faults += missing_media.sound_faults(edit, frames)
+    memory = _memory(found, limit)
+    if memory["host"] > (machine_memory() or memory["host"]):
+        words = f"{_bytes(memory['host'])} of memory, the machine has {_bytes(machine_memory())}"
+        faults.append(f"a frame needs {words}")
+    disk = _disk(arguments, edit, frames, faults)
+    if arguments.output:
+        faults += _output_faults(arguments.output, None if faults else version)
+    return {
+        "edit": str(arguments.edit),
+        "key": version.key,
+        "frames": [frames[0], frames[-1]],
+        "size": list(film_output.size(edit)),
+        "extension": {"here": version.extension, "saved": edit.virtual_shutter.version or None},
+        "blender": {"here": version.blender, "saved": _file_version()},
+        "device": device,
+        "effects": [_effect(each) for each in found],
+        "build": build,
+        "memory": memory,
+        "disk": disk,
+        "chunk": min(len(frames), max([each.chunk for each in found], default=chunks.LEAST)),
+        "notes": notes,
+        "faults": faults,
+    }
+
+
+def _version_faults(edit) -> list[str]:
+    """Whether something newer than what is here has saved the file."""
+    found, saved = [], edit.virtual_shutter.version
+    if _numbers(saved) > _numbers(versions.extension()):
+        found.append(f"the edit was saved by version {saved} of the extension, this machine has {versions.extension()}")
+    if bpy.data.version > bpy.app.version_file:
+        found.append(f"the edit was saved by Blender {_file_version()}, this machine has {bpy.app.version_string}")
+    return found
+
+
+def _file_version() -> str:
+    """The version of Blender that saved the edit. (Its third number is another one than a release's.)"""
+    return ".".join(map(str, bpy.data.version[:2]))
+
+
+def _numbers(version: str) -> list[int]:
+    return [int(number) for number in re.findall(r"\d+", version)]
+
+
+def _setting_faults(edit) -> list[str]:
+    """Whether Blender can write pictures of the edit's size, and the movie, if that is its output."""
+    is_movie = edit.render.image_settings.media_type == "VIDEO"
+    try:
+        film_output.check(Path("film.mp4" if is_movie else "frames"), None, film_output.size(edit))
+    except film_output.OutputError as error:
+        return [str(error)]
+    return []
+
+
+def _on_device(
+    edit, frames: range, faults: list[str], notes: list[str], *, find_cuts: bool
+) -> tuple[str | None, list[EffectCheck], int | None]:
+    """The name of the device that will render, what is found of the effects (edit_check.effects), and the bytes that
+    textures may take of a GPU; without a device, which is a fault, nothing of the effects."""
+    try:
+        compositor, lesser = machine.open_device(session.wanted(), session.memory())
+    except NoDeviceError as error:
+        faults.append(str(error))
+        return None, [], None
+    notes += [lesser] if lesser else []
+    try:
+        limit = compositor.device.budget.limit if hasattr(compositor, "device") else None
+        return compositor.name, edit_check.effects(edit, frames, compositor, find_cuts=find_cuts), limit
+    finally:
+        compositor.release()
+
+
+def _memory(found: list[EffectCheck], limit: int | None) -> dict:
+    """Bytes that a frame needs at most, where several effects are shown in it of all of them."""
+    shown = [each for each in found if each.needs]
+    frames = set().union(*(each.frames for each in shown))
+    gpu = max((sum(each.needs.gpu for each in shown if frame in each.frames) for frame in frames), default=0)
+    host = max((sum(each.needs.host for each in shown if frame in each.frames) for frame in frames), default=0)
+    return {"gpu": min(gpu, limit or gpu), "gpu_limit": limit, "host": host}
+
+
+def _disk(arguments, edit, frames: range, faults: list[str]) -> dict:
+    """Bytes that the frames take at most, as noise does, which is not compressed: no frame is rendered for this. Those
+    that are there already are not counted."""
+    width, height = film_output.size(edit)
+    frame, free = width * height * 4 * film_output.FORMATS[arguments.format].bits // 8, None
+    if output := arguments.output:
+        paths = (output / f"{number:04d}.{arguments.format}" for number in frames)
+        left = sum(not path.exists() for path in paths)
+        place = next(path for path in (output, *output.parents) if path.exists())
+        free = shutil.disk_usage(place).free
+        if left * frame > free:
+            words = f"{left} frames may take {_bytes(left * frame)}, {_bytes(free)} are free"
+            faults.append(f"{output}: {words}")
+    return {"format": arguments.format, "frame": frame, "all": len(frames) * frame, "free": free}
+
+
+def _output_faults(folder: Path, job: EditVersion | None) -> list[str]:
+    """Whether the folder can be written to. It gets the job's file, if there is a job."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        atomic_write.clear_up(folder)
+        with atomic_write.part_folder(folder):
+            pass
+        if job:
+            job_file.write(folder, job)
+    except FileExistsError:
+        return [f"{folder}: is a file, and no folder"]
+    except OSError as error:
+        return [film_output.in_words(error, folder)]
+    return []
+
+
+def _effect(found: EffectCheck) -> dict:
+    return {
+        "strip": found.name,
+        "source": found.source,
+        "size": list(found.size),
+        "window": found.window,
+        "shutters": found.shutters,
+        "inbetween": found.factor,
+        "pairs": found.pairs,
+        "missing": [list(run) for run in frame_ranges.runs(found.missing)],
+    }
+
+
+def _builds(file: Path, edit, frames: range, found: list[EffectCheck]) -> str | None:
+    """The command that builds the in-between frames that are missing; None: none is."""
+    if not any(each.missing for each in found):
+        return None
+    # Of an edit in this one all are built, whatever frames are asked for.
+    lacking = set().union(*(each.lacking for each in found if each.edit == edit)) or frames
+    program = "python -m shutter_addon" if bpy.app.module else "blender -c shutter"
+    quoted = subprocess.list2cmdline([file]) if os.name == "nt" else shlex.quote(str(file))
+    return f"{program} inbetween {quoted} --frames {min(lacking)}:{max(lacking)}"
+
+
+def _lines(report: dict) -> list[str]:
+    """The report for people."""
+    memory, disk = report["memory"], report["disk"]
+    lines = [
+        f"Edit: {report['edit']}, version {report['key']}",
+        "Frames: {} to {}, {}×{}".format(*report["frames"], *report["size"]),
+        _saved_by("Virtual Shutter", report["extension"]),
+        _saved_by("Blender", report["blender"]),
+    ]
+    for effect in report["effects"]:
+        words = "{}, {}×{}, windows of {} frames, {} shutters".format(
+            effect["source"] or "no footage", *effect["size"], effect["window"], effect["shutters"]
+        )
+        if effect["inbetween"] > 1:
+            gone = sum(last - first + 1 for first, last in effect["missing"])
+            words += f"; in-between frames ×{effect['inbetween']}: {effect['pairs'] - gone} of {effect['pairs']} pairs"
+        lines.append(f"Effect {effect['strip']}: {words}")
+    lines.append(f"Device: {report['device'] or 'none'}")
+    if is_known := all(effect["source"] for effect in report["effects"]):
+        limit = memory["gpu_limit"]
+        gpu = f"{_bytes(memory['gpu'])} of the {_bytes(limit)} that may be taken of the GPU, " if limit else ""
+        lines.append(f"Memory: {gpu}{_bytes(memory['host'])} for decoded frames")
+    free = f", {_bytes(disk['free'])} are free" if disk["free"] is not None else ""
+    most = f"at most {_bytes(disk['frame'])} a frame as {disk['format']}, {_bytes(disk['all'])} in all{free}"
+    lines.append(f"Disk: {most}")
+    lines += [f"Chunk size: {report['chunk']} frames"] if is_known else []
+    return lines + [f"Note: {note}" for note in report["notes"]]
+
+
+def _saved_by(name: str, version: dict) -> str:
+    return f"{name}: {version['here']}, the edit was saved by {version['saved'] or 'an older one'}"
+
+
+def _bytes(count: int) -> str:
+    sizes = {"GB": 1 << 30, "MB": 1 << 20, "kB": 1 << 10}
+    unit = next((unit for unit, size in sizes.items() if count >= size), "kB")
+    return f"{count / sizes[unit]:.1f} {unit}"

@@ -1,0 +1,78 @@
+"""What several commands take: values of their options, and the source that they read."""
+
+import argparse
+import os
+import re
+import sys
+from pathlib import Path
+from typing import get_args
+
+from ...core import recipe
+from ...core.messages import sentence, signed
+from ...media import open_source
+from ...media.sequence import by_number
+from ..data import inbetween_settings
+from ..rendering import devices, film_output
+
+FACTORS = get_args(recipe.Factor)  # 1: none
+METHODS = tuple(inbetween_settings.METHODS.values())
+
+
+def place(text: str) -> Path:
+    """A path as it is named. Two slashes at its beginning, which Blender takes for the .blend's folder, are one."""
+    if not text:
+        raise argparse.ArgumentTypeError("a name is missing")
+    return Path(re.sub("^//+", "/", os.path.abspath(text)))
+
+
+def megabytes(text: str) -> int | None:
+    """None for 0: as without the option."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of megabytes")
+    return int(text) or None
+
+
+def add_device(parser: argparse.ArgumentParser) -> None:
+    """The options that say what composes pictures."""
+    parser.add_argument(
+        "--device",
+        choices=devices.CHOICES,
+        help="opengl: OpenGL 4.3; blender: Blender's own GPU; gpu: either; cpu: NumPy; auto: the first of these that"
+        " works (default: as in Blender's preferences, else auto)",
+    )
+    parser.add_argument(
+        "--gpu-memory",
+        type=megabytes,
+        metavar="MB",
+        help="of the GPU's memory, what textures may take (default: as in Blender's preferences, else three quarters,"
+        " and half of the machine's memory at most)",
+    )
+
+
+def opened(path: Path):
+    """The source, with a word on stderr of files that were left out."""
+    medium = open_source(path)
+    if left_out := medium.left_out:
+        print(signed(left_out), file=sys.stderr)
+    return medium
+
+
+def files(medium) -> list[Path]:
+    """The source's files, also those that are missing in an image sequence: it would show them, were they there."""
+    files = medium.files
+    beside = by_number(files[0]) if len(files) > 1 else None
+    return [*files, *(map(beside, range(len(files))) if beside else ())]
+
+
+def frames(text: str | None, whole: tuple[int, int], what: str = "clip") -> tuple[int, int]:
+    """First and last timeline frame of `A:B` (or `A-B`, as schedulers name chunks), of `A` alone, or of the whole.
+    OutputError: what is rendered has no such frames."""
+    if text is None:
+        return whole
+    numbers = re.fullmatch(r"(-?\d{1,9})(?:[:-](-?\d{1,9}))?", text)
+    if not numbers:
+        raise film_output.OutputError(f'--frames: "{sentence(text, 40)}" is not A:B')
+    first, last = int(numbers[1]), int(numbers[2] or numbers[1])
+    if not whole[0] <= first <= last <= whole[1]:
+        raise film_output.OutputError(f"--frames: {text} is not within the {what}'s frames {whole[0]}:{whole[1]}")
+    return first, last

@@ -1,0 +1,81 @@
+"""The command `inbetween`: a source's in-between frames alone, or all that a saved edit needs."""
+
+from pathlib import Path
+
+from ...media import inbetween
+from ..data import inbetween_settings, requirements, snapshot, source_media
+from ..editing import new_edit, saved_edit
+from ..rendering import film_output, job_snapshots, session
+from . import command_line
+
+
+def add(commands) -> None:
+    parser = commands.add_parser("inbetween", help="build a source's in-between frames, or those that an edit needs")
+    parser.add_argument(
+        "source", type=command_line.place, help="a movie, the first file of an image sequence, or a saved edit (.blend)"
+    )
+    parser.add_argument("--factor", type=int, choices=command_line.FACTORS[1:], help="how many times the source's rate")
+    parser.add_argument("--method", choices=command_line.METHODS, help="of optical flow (default: quick)")
+    parser.add_argument(
+        "--frames",
+        metavar="A:B",
+        help="source frames A to B, and up to the one behind; 1 is the first; of an edit: its timeline frames",
+    )
+    parser.add_argument("--cache", type=command_line.place, metavar="DIR", help="where in-between frames shall lie")
+    parser.set_defaults(run=run)
+
+
+def run(arguments) -> None:
+    if saved_edit.is_saved(arguments.source):
+        _build_edit(arguments)
+    else:
+        _build_source(arguments)
+
+
+def _build_edit(arguments) -> None:
+    for name in ("factor", "method", "cache"):
+        if getattr(arguments, name) is not None:
+            raise film_output.OutputError(f"--{name}: is for a source; a saved edit says it itself")
+    edit = saved_edit.open_edit(arguments.source)
+    whole = edit.frame_start, edit.frame_end
+    edit.frame_start, edit.frame_end = command_line.frames(arguments.frames, whole, "edit")
+    build_lacking(edit)
+
+
+def _build_source(arguments) -> None:
+    for name in ("factor", "cache"):
+        if getattr(arguments, name) is None:
+            raise film_output.OutputError(f"--{name} is missing: only a saved edit (.blend) says it itself")
+    path = arguments.source
+    with command_line.opened(path) as medium:
+        first, last = command_line.frames(arguments.frames, (1, medium.count))
+        strip = new_edit.make_source(path, medium)
+    # A strip may read the file in another way, with a colour space of Blender's own choice.
+    with source_media.open_media(strip) as medium:
+        pairs = range(first - 1, min(last, medium.count - 1))
+        _build(medium, arguments.cache, arguments.factor, arguments.method or "quick", pairs)
+
+
+def build_lacking(film) -> None:
+    """Builds the in-between frames that a film's frames need, of all effects that it shows, where they are looked
+    for."""
+    film.frame_set(film.frame_start)
+    for edit, effect, parts in job_snapshots.shown_effects(film):
+        shown = [strip for strip in parts if requirements.shown_frames(edit, strip)]
+        if not shown or inbetween_settings.factor(effect) == 1:
+            continue
+        frames = job_snapshots.asked_frames(edit, shown, edit == film)
+        if edit == film:
+            frames = {frame for frame in frames if film.frame_start - 1 < frame <= film.frame_end}
+        needing = snapshot.take(edit, effect, shown[0], frames, folder=session.settings().inbetween)
+        with needing.source.open() as medium:
+            _build(medium, *needing.inbetween, sorted(session.pairs(needing)))
+
+
+def _build(medium, folder: Path, factor: int, method: str, pairs) -> None:
+    """Builds the in-betweens of these pairs of source frames, each given by its first, in ascending order."""
+    with film_output.stoppable() as stopped, film_output.progress(len(pairs), "pair") as moved:
+        told = {"update": lambda *_: moved(), "cancelled": lambda: bool(stopped)}
+        inbetween.build(medium, folder, factor, method, **told, pairs=pairs)
+    if stopped:
+        raise film_output.InterruptedRenderError(f"{folder}: stopped; what is finished stays")

@@ -1,0 +1,202 @@
+"""The command `render`: from a source and a recipe to a finished film, through Blender's sequencer."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+
+from ...core import atomic_write, job_file, recipe
+from ...media.completeness import is_whole_blend, why_short
+from ...media.matte_files import MatteFile
+from ..data import inbetween_settings, missing_media, preferences, versions
+from ..editing import new_edit, saved_edit
+from ..rendering import devices, film_output, session, shared_frames
+from . import command_line, inbetween_command
+
+
+def add(commands) -> None:
+    parser = commands.add_parser("render", help="render a source through a recipe, or a saved edit")
+    parser.add_argument(
+        "source", type=command_line.place, help="a movie, the first file of an image sequence, or a saved edit (.blend)"
+    )
+    parser.add_argument("--recipe", type=command_line.place, help="the effect, a JSON file; of a saved edit none")
+    parser.add_argument(
+        "--output", type=command_line.place, help=f"a folder, or a movie ({', '.join(film_output.MOVIES)})"
+    )
+    parser.add_argument(
+        "--format", choices=tuple(film_output.FORMATS), help="of the pictures in a folder: 16-bit png, float exr"
+    )
+    parser.add_argument("--frames", metavar="A:B", help="timeline frames A to B; 1 is the strip's first")
+    parser.add_argument(
+        "--resume",
+        action="store_true",
+        help="of a saved edit: only what is missing, shared with other machines",
+    )
+    command_line.add_device(parser)
+    parser.add_argument(
+        "--weights", type=command_line.place, metavar="DIR", help="also write the coefficients, as float EXR"
+    )
+    parser.add_argument("--save", type=command_line.place, metavar="FILE.blend", help="keep the edit")
+    parser.add_argument(
+        "--inbetween", type=int, choices=command_line.FACTORS, help="in-between frames, in place of the recipe's factor"
+    )
+    parser.add_argument("--inbetween-method", choices=command_line.METHODS, help="in place of the recipe's")
+    parser.add_argument(
+        "--cache",
+        type=command_line.place,
+        metavar="DIR",
+        help="where in-between frames lie"
+        f' (default: "{inbetween_settings.FOLDER}" beside the output, or beside FILE.blend)',
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments) -> None:
+    if saved_edit.is_saved(arguments.source):
+        _render_edit(arguments)
+    else:
+        _render_source(arguments)
+
+
+def _render_edit(arguments) -> None:
+    """Renders a saved edit as it is."""
+    for name in ("recipe", "weights", "save", "inbetween", "inbetween_method", "cache"):
+        if getattr(arguments, name) is not None:
+            option = f"--{name.replace('_', '-')}"
+            raise film_output.OutputError(f"{option}: is for a source and a recipe; a saved edit is rendered as it is")
+    source, output, file_format = arguments.source, arguments.output, arguments.format or "png"
+    if output is None:
+        raise film_output.OutputError("nothing to do: give --output")
+    if film_output.is_movie(output):
+        raise film_output.OutputError(f"{output}: a saved edit is rendered to a folder of pictures, not to a movie")
+    film_output.check_folder(output, arguments.format)
+    opened = versions.stamp(source)
+    edit = saved_edit.open_edit(source)
+    whole = edit.frame_start, edit.frame_end
+    edit.frame_start, edit.frame_end = frames = command_line.frames(arguments.frames, whole, "edit")
+    for fault in missing_media.faults(edit, range(frames[0], frames[1] + 1), sources=True):
+        raise film_output.OutputError(fault)  # Blender would render on without it
+    settings = session.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)
+    with session.using(settings), shared_frames.of_same_footage(edit) as rendered:
+        version = versions.of_edit(edit)
+        if versions.stamp(source) != opened:  # its key is not that of what was opened
+            raise film_output.OutputError(f"{source}: was saved over while it was opened; render it again")
+        job_file.guard(output, version)
+        film_output.spare(film_output.pictures_of(output, file_format, frames), [source, *versions.read_files(edit)])
+        _check_device(arguments)
+        shared_frames.render(edit, output, file_format, version, rendered, resume=arguments.resume)
+
+
+def _render_source(arguments) -> None:
+    """Makes an edit of a source and a recipe, and renders it."""
+    if arguments.recipe is None:
+        raise film_output.OutputError("--recipe is missing: only a saved edit (.blend) is rendered without one")
+    if arguments.resume:
+        raise film_output.OutputError("--resume: is for a saved edit (.blend)")
+    if arguments.output is None and arguments.save is None:
+        raise film_output.OutputError("nothing to do: give --output, --save or both")
+    source_recipe = _recipe(arguments)
+    path = arguments.source
+    with command_line.opened(path) as medium:
+        output, file_format = arguments.output, arguments.format or "png"
+        if output:
+            film_output.check(output, arguments.format, (medium.width, medium.height))
+            if arguments.save and film_output.is_movie(output) and "#" in output.name:
+                raise film_output.OutputError(f"{output}: in a saved edit, Blender takes # for the frames' numbers")
+        frames = command_line.frames(arguments.frames, (1, new_edit.length(medium, source_recipe)))
+        read = path, *command_line.files(medium), arguments.recipe, *_mattes(source_recipe, arguments.recipe.parent)
+        film_output.spare(_written(arguments, file_format, frames), read)
+        edit = new_edit.make_edit(path, medium, source_recipe, arguments.recipe.parent)
+    edit.frame_start, edit.frame_end = frames
+    if output:
+        _check_device(arguments)
+        film_output.set_output(edit, output, file_format, alpha=medium.alpha != "opaque")
+    if arguments.save:
+        _save(edit, arguments.save)
+    folder = _cache(arguments) if source_recipe.inbetween > 1 else None
+    weights = arguments.weights if output else None
+    with session.using(session.RenderSettings(arguments.device, weights, folder, arguments.gpu_memory)):
+        if folder:
+            inbetween_command.build_lacking(edit)
+        if output and arguments.weights:
+            arguments.weights.mkdir(parents=True, exist_ok=True)
+            atomic_write.clear_up(arguments.weights)
+        if output:
+            film_output.film(edit, output)
+
+
+def _check_device(arguments) -> None:
+    """NoDeviceError: there is none as it is wanted. Called before anything is written."""
+    devices.choose(arguments.device or preferences.device())
+
+
+def _written(arguments, file_format: str, frames: tuple[int, int]) -> list[Path]:
+    """All files that a render writes, but for in-between frames."""
+    found = [arguments.save] if arguments.save else []
+    if arguments.output and film_output.is_movie(arguments.output):
+        found.append(arguments.output)
+    elif arguments.output:
+        found += film_output.pictures_of(arguments.output, file_format, frames)
+        if arguments.weights:
+            found += film_output.pictures_of(arguments.weights, "exr", frames)
+    return found
+
+
+def _mattes(source_recipe, folder: Path) -> list[Path]:
+    """The files of a recipe's mattes; folder: where the recipe lies. MediaError: there are none."""
+    found = []
+    for region in source_recipe.regions:
+        if isinstance(region, recipe.MatteRegion):
+            with MatteFile(folder / region.path, region.channel).open() as matte:
+                found += matte.files
+    return found
+
+
+def _recipe(arguments) -> recipe.Recipe:
+    """The recipe, with the in-between frames that were asked for."""
+    found = recipe.load(arguments.recipe)
+    if arguments.inbetween is not None:
+        found = recipe.with_inbetween(found, arguments.inbetween)
+    return replace(found, inbetween_method=arguments.inbetween_method or found.inbetween_method)
+
+
+def _cache(arguments) -> Path:
+    """The folder of in-between frames: where a saved edit will look for them, if it is to be saved."""
+    return arguments.cache or (arguments.save or arguments.output).parent / inbetween_settings.FOLDER
+
+
+def _save(edit, path: Path) -> None:
+    """Saves the edit, its paths relative to the file: it may be opened on another machine. OutputError: it cannot be
+    saved whole; what stood there stays."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        atomic_write.clear_up(path.parent)
+        _save_whole(edit, path)
+    except OSError as error:
+        raise film_output.OutputError(f"{path}: {error.strerror or error}") from None
+
+
+def _save_whole(edit, path: Path) -> None:
+    with atomic_write.part_folder(path.parent) as folder:
+        part = folder / "edit.blend"
+        try:
+            with film_output.quiet(), new_edit.paths_relative(edit, path.parent):
+                bpy.ops.wm.save_as_mainfile(filepath=str(part), compress=True, copy=True, relative_remap=False)
+        except RuntimeError as error:
+            raise film_output.OutputError(f"{path}: {film_output.message(error)}") from None
+        if not _is_whole(part, edit.name):
+            raise film_output.OutputError(f"{path}: could not be saved whole; {why_short(folder)}")
+        if path.is_file() and bpy.context.preferences.filepaths.save_version:
+            path.replace(f"{path}1")  # as Blender itself keeps what stood there
+        part.replace(path)
+
+
+def _is_whole(path: Path, scene: str) -> bool:
+    """Whether a .blend file was written to its end, and Blender finds the scene in it."""
+    if not is_whole_blend(path):
+        return False
+    try:
+        with bpy.data.libraries.load(str(path)) as (found, _):
+            return scene in found.scenes
+    except OSError:
+        return False

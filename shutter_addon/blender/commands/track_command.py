@@ -1,0 +1,144 @@
+"""The command `track`: a recipe's region follows what it covers, or its camera what stands still."""
+
+import json
+import sys
+from dataclasses import replace
+
+from ...core import atomic_write, recipe, region_keys, retiming
+from ...core.effect import Region
+from ...core.messages import signed
+from ...media import PrefetchSource, camera_tracking, filmed_frames, registration, tracking
+from ...media.cuts import ShotSource
+from ..editing import new_edit
+from ..rendering import film_output
+from . import command_line
+
+
+def add(commands) -> None:
+    parser = commands.add_parser("track", help="follow what a region covers, or the camera")
+    parser.add_argument("source", type=command_line.place, help="a movie, or the first file of an image sequence")
+    parser.add_argument("--recipe", type=command_line.place, required=True, help="the effect, a JSON file")
+    parser.add_argument("--region", metavar="NAME", help="the region that is to follow")
+    parser.add_argument(
+        "--camera", action="store_true", help="in its place: the camera, by all that regions leave free"
+    )
+    parser.add_argument("--frame", type=int, required=True, metavar="F", help="the frame at which it lies right")
+    parser.add_argument(
+        "--frames", metavar="A:B", help="timeline frames A to B, both ways from F; 1 is the strip's first"
+    )
+    parser.add_argument(
+        "--motion", choices=registration.MOTIONS, default="scale", help="location; rotation too; or scale as well"
+    )
+    parser.add_argument("--all-keys", action="store_true", help="a key at every frame, needed or not")
+    parser.add_argument(
+        "--output", type=command_line.place, required=True, metavar="R2.json", help="the recipe with the keys"
+    )
+    parser.add_argument(
+        "--report", type=command_line.place, metavar="FILE.json", help="how sure each frame is, and where it ended"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments) -> None:
+    if arguments.camera == (arguments.region is not None):
+        raise film_output.OutputError("track: either --region NAME or --camera, one of the two")
+    source_recipe = recipe.load(arguments.recipe)
+    index = None if arguments.camera else _region_index(arguments, source_recipe)
+    subject = recipe.CAMERA if arguments.camera else arguments.region
+    with command_line.opened(arguments.source) as medium:
+        film_output.spare(
+            filter(None, (arguments.output, arguments.report)),
+            [arguments.source, *command_line.files(medium), arguments.recipe],
+        )
+        first, last = command_line.frames(arguments.frames, (1, new_edit.length(medium, source_recipe)))
+        if not first <= arguments.frame <= last:
+            raise film_output.OutputError(f"--frame: {arguments.frame} is not within the frames {first}:{last}")
+        try:
+            tracked, stops = _followed(arguments, source_recipe, index, medium, range(first, last + 1))
+        except tracking.TrackingError as error:
+            raise tracking.TrackingError(f"{subject}: {error}") from None
+        size = medium.width, medium.height
+    placements = {frame: found.placement for frame, found in tracked.items()}
+    with_keys = _keyed(source_recipe, index, placements, {arguments.frame}, size, thin=not arguments.all_keys)
+    _write_track(arguments, with_keys, tracked, stops)
+    for stop in stops:
+        if stop.fault == tracking.SHOT_ENDS:
+            near = stop.frame - 1 if stop.frame > arguments.frame else stop.frame + 1
+            said = f"{subject}: tracked to frame {near}, where the shot ends"
+        else:
+            said = f"{subject}: not tracked from frame {stop.frame} on: {stop.fault}"
+        print(signed(said), file=sys.stderr)
+
+
+def _region_index(arguments, source_recipe) -> int:
+    names = [region.name for region in source_recipe.regions]
+    if arguments.region not in names:
+        raise film_output.OutputError(f'{arguments.recipe}: there is no region "{arguments.region}"')
+    index = names.index(arguments.region)
+    if not isinstance(source_recipe.regions[index], recipe.Region):
+        sentence = f'region "{arguments.region}" is a matte or a ramp, and has no strokes to track'
+        raise film_output.OutputError(f"{arguments.recipe}: {sentence}")
+    return index
+
+
+def _followed(arguments, source_recipe, index: int | None, medium, frames: range) -> tuple[dict, list]:
+    """What tracking of a region, or of the camera, found by frame, and where it ended before the last frame.
+    TrackingError: at once."""
+    effect = source_recipe.effect(medium.width / medium.height)
+    subject = effect.camera if index is None else effect.regions[index]
+    times = {frame: _shown(source_recipe, frame, medium.count) for frame in frames}
+    filmed = filmed_frames.FilmedFrames(times, arguments.frame)
+    with ShotSource(PrefetchSource(medium)) as shots, film_output.progress(len(filmed.frames), "frame") as moved:
+        footage = tracking.Footage(shots, filmed.index_at)
+        what = footage, filmed.start, filmed.frames
+        if index is None:
+            drawn = [region for region in effect.regions if isinstance(region, Region)]
+            regions = [filmed.seen(region) for region in drawn]
+            steps = camera_tracking.follow_camera(filmed.seen(subject), regions, *what, motion=arguments.motion)
+        else:
+            steps = tracking.follow(filmed.seen(subject), *what, motion=arguments.motion)
+        tracked = []
+        for step in steps:
+            tracked.append(step)
+            moved()
+    found = list(filmed.on_timeline(subject, tracked, footage.size))
+    stops = [each for each in found if each.fault]
+    if len(found) - len(stops) < 2:
+        raise tracking.TrackingError(stops[0].fault if stops else tracking.ALONE)
+    return {each.frame: each for each in found if not each.fault}, stops
+
+
+def _keyed(source_recipe, index: int | None, *placements, thin: bool) -> recipe.Recipe:
+    """The recipe with placements as keys of a region, or of the camera; arguments as of region_keys."""
+    if index is None:
+        return region_keys.with_camera(source_recipe, *placements, thin=thin)
+    regions = list(source_recipe.regions)
+    regions[index] = region_keys.with_placements(regions[index], *placements, thin=thin)
+    return replace(source_recipe, regions=regions)
+
+
+def _shown(source_recipe, frame: int, count: int) -> float:
+    """Which of a source's frames, from 0 on, a recipe shows at a timeline frame; a fraction: an in-between one."""
+    time, factor = source_recipe.time_at(frame), source_recipe.inbetween
+    filmed = (frame if time is None else time) - 1
+    return retiming.nearest(filmed, factor, (count - 1) * factor + 1) / factor
+
+
+def _write_track(arguments, result, tracked: dict, stops: list) -> None:
+    """Writes the recipe, and the report of it, both whole or neither."""
+    report = {
+        **({"camera": True} if arguments.camera else {"region": arguments.region}),
+        "frame": arguments.frame,
+        "motion": arguments.motion,
+        "frames": [{"frame": n, "confidence": round(tracked[n].confidence, 3)} for n in sorted(tracked)],
+        "stops": [{"frame": stop.frame, "reason": stop.fault} for stop in stops],
+    }
+    for path in filter(None, (arguments.output, arguments.report)):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        atomic_write.clear_up(path.parent)
+    with atomic_write.writing(arguments.output) as part:
+        moved = recipe.moved(result, arguments.recipe.parent, arguments.output.parent)
+        part.write_text(recipe.dump(moved), encoding="utf-8")
+        if arguments.report:
+            with atomic_write.writing(arguments.report) as other:
+                other.write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -1,0 +1,96 @@
+"""Media of an edit that are not there, or cannot be read."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+
+from ...core import frame_ranges
+from ...media import MediaError, open_source
+from ...media.files import check_file, check_sound
+from . import requirements, strips, used_data
+
+
+def faults(edit, frames: range, *, sources: bool) -> list[str]:
+    """A sentence for each file that the pictures of these frames need and that cannot be had: of movie, image and clip
+    strips, of images, volumes, caches and fonts that what is shown uses, and of libraries. Edits that it shows count as
+    a whole; files of mattes are not looked for.
+
+    sources: those of effects, too, as far as the sources are shown themselves"""
+    found = _of_strips(edit, frames, strips.SOURCES, sources=sources)
+    used, data = used_data.used(edit, frames) - _clips(edit), bpy.data
+    for items in (data.images, data.volumes, data.cache_files, data.movieclips, data.fonts):
+        found += [_words(item, fault) for item in used.intersection(items) for fault in _of_item(item)]
+    found += [_words(library, fault) for library in data.libraries for fault in _of_item(library)]
+    return list(dict.fromkeys(found))
+
+
+def sound_faults(edit, frames: range) -> list[str]:
+    """As `faults`, of sound strips."""
+    return _of_strips(edit, frames, ("SOUND",), sources=False)
+
+
+def _clips(edit) -> set:
+    """Those of the strips, which are looked at as such."""
+    shown = (strip for each in strips.shown_edits(edit) for strip in each.sequence_editor.strips_all)
+    return {strip.clip for strip in shown if strip.type == "MOVIECLIP"}
+
+
+def _words(item, fault: str) -> str:
+    return f'{item.bl_rna.name.lower()} "{item.name}": {fault}'
+
+
+def _of_strips(edit, frames: range, kinds: tuple[str, ...], *, sources: bool) -> list[str]:
+    found = []
+    for shown, wanted in requirements.edits_at(edit, frames):
+        others = () if sources else strips.shown_sources(shown)
+        for strip in shown.sequence_editor.strips_all:
+            at = frame_ranges.common(requirements.shown_frames(shown, strip), wanted)
+            if at and strip.type in kinds and strip.name not in others:
+                found += [f'strip "{strip.name}": {fault}' for fault in _of_strip(strip, at)]
+    return found
+
+
+def _of_strip(strip, frames: range) -> Iterator[str]:
+    if strip.type == "MOVIE":
+        yield from _fault(lambda: open_source(_path(strip, strip.filepath)).close())
+    elif strip.type == "IMAGE":
+        elements = {element.filename for frame in frames if (element := strip.strip_elem_from_frame(frame))}
+        folder = _path(strip, strip.directory)
+        gone = [fault for name in sorted(elements) for fault in _fault(check_file, folder / name)]
+        yield from [gone[0] + (f" (and {len(gone) - 1} more files)" if len(gone) > 1 else "")] if gone else ()
+    elif strip.type == "MOVIECLIP":
+        yield from _of_item(strip.clip) if strip.clip else ["it has no clip"]
+    elif strip.type == "SOUND":
+        yield from _of_item(strip.sound, check_sound) if strip.sound else ["it has no sound"]
+
+
+def _of_item(item, check=check_file) -> Iterator[str]:
+    """Of a sound, a library, an image or the like; of a sequence its first file. check: raises MediaError for a
+    file."""
+    source = getattr(item, "source", "FILE")
+    is_made = source in ("GENERATED", "VIEWER") or item.filepath in ("", "<builtin>")
+    if is_made or getattr(item, "packed_file", None):
+        return
+    for name in _tiles(item) if source == "TILED" else (item.filepath,):
+        yield from _fault(check, _path(item, name))
+
+
+def _tiles(image) -> Iterator[str]:
+    """The files of an image in tiles."""
+    for tile in image.tiles:
+        v, u = divmod(tile.number - 1001, 10)
+        yield image.filepath.replace("<UDIM>", str(tile.number)).replace("<UVTILE>", f"u{u + 1}_v{v + 1}")
+
+
+def _path(owner, path: str) -> Path:
+    """An absolute path, where an ID or a strip of one names it."""
+    library = owner.library if isinstance(owner, bpy.types.ID) else owner.id_data.library
+    return Path(bpy.path.abspath(path, library=library))
+
+
+def _fault(function, *arguments) -> Iterator[str]:
+    try:
+        function(*arguments)
+    except MediaError as error:
+        yield str(error)

@@ -1,0 +1,98 @@
+"""The versions of the extension, of Blender, and of the edit that is open."""
+
+import hashlib
+import tomllib
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from itertools import groupby
+from pathlib import Path
+
+import bpy
+
+from ...core.edit_version import EditVersion, Footage
+from ...media import MediaError, inbetween_cache
+from ...media.sequence import ImageFiles
+from . import colour_configuration, source_media, strips
+
+MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
+_FEW = 256  # files of a sequence; of a longer one's, blocks are hashed: to read all of it would take hours
+_BLOCKS = 1 << 16  # bytes of such a file, above which that is so
+_READERS = 16  # threads: what takes long is that a network drive answers
+
+
+def extension() -> str:
+    return tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"]
+
+
+def blender() -> str:
+    """Major, minor and micro version."""
+    return ".".join(map(str, bpy.app.version))
+
+
+def of_edit(edit) -> EditVersion:
+    """The version of an edit, as it is in the .blend file that is open. OSError: the file is gone."""
+    with open(bpy.data.filepath, "rb") as file:
+        blend = hashlib.file_digest(file, "sha256").hexdigest()
+    footage = tuple(map(_footage, _footage_files(edit)))
+    return EditVersion(blend, extension(), blender(), colour_configuration.name(), footage)
+
+
+def read_files(edit) -> list[Path]:
+    """All files that the edit's pictures are made of, beside the .blend file."""
+    return [path for files in _footage_files(edit) for path in files]
+
+
+def stamps(edit) -> dict[Path, tuple[int, int] | None]:
+    """The stamp of each of `read_files`."""
+    return {path: stamp(path) for path in read_files(edit)}
+
+
+def stamp(path: Path) -> tuple[int, int] | None:
+    """What changes when a file is written to; None: it is not there."""
+    try:
+        status = path.stat()
+        return status.st_size, status.st_mtime_ns
+    except OSError:
+        return None
+
+
+def _footage_files(edit):
+    """What the edit's pictures are made of beside the .blend file, as lists of files: of its strips, of those of the
+    edits that it shows, and of all other data; without sound."""
+    for shown in strips.shown_edits(edit):
+        for strip in shown.sequence_editor.strips_all:
+            if strip.type in strips.SOURCES and (files := _files_of(strip)):
+                yield files
+    data = bpy.data
+    for item in (*data.images, *data.movieclips, *data.fonts, *data.cache_files, *data.volumes, *data.libraries):
+        if item.filepath not in ("", "<builtin>") and not getattr(item, "packed_file", None):
+            path = Path(bpy.path.abspath(item.filepath, library=getattr(item, "library", None)))
+            yield _sequence(path) if getattr(item, "source", "") == "SEQUENCE" else [path]
+
+
+def _files_of(strip) -> list[Path]:
+    try:
+        return source_media.files(strip)
+    except MediaError:  # it shows nothing
+        return []
+
+
+def _sequence(path: Path) -> list[Path]:
+    try:
+        return ImageFiles(path).files
+    except MediaError:
+        return [path]
+
+
+def _footage(files: list[Path]) -> Footage:
+    """The digest of files: of an image sequence's, in order."""
+    files = [path for path, _ in groupby(files)]  # a still that is held is one file
+    whole = inbetween_cache.WHOLE if len(files) <= _FEW else _BLOCKS
+    content = hashlib.sha256()
+    try:
+        with ThreadPoolExecutor(_READERS) as pool:
+            for digest in pool.map(partial(inbetween_cache.content_digest, whole=whole), files):
+                content.update(digest)
+    except MediaError:
+        return Footage(files[0].name, len(files), "")
+    return Footage(files[0].name, len(files), content.hexdigest())

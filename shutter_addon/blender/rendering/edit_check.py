@@ -1,0 +1,233 @@
+"""Whether an edit can be rendered on this machine, as far as can be told without rendering it."""
+
+import math
+import os
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+import bpy
+
+from ...compute import memory_needs
+from ...core import frame_ranges
+from ...core.chunks import LEAST, chunk_size
+from ...core.mattes import FileFrame
+from ...core.messages import UserError
+from ...media import MediaError, cuts
+from ...media.files import check_file
+from ..data import requirements, snapshot, source_media, strips
+from . import job_snapshots, session
+from .session import FrameRequest, RenderSession
+
+
+@dataclass
+class EffectCheck:
+    """What was found of an effect, of the frames that its strips show.
+
+    edit: its scene; name: of its strip; source: the footage's first file, "": it cannot be read
+    size: of its pictures, width and height in pixels; window: frames of the longest; shutters: how many
+    factor: of its in-between frames, 1: none; pairs: how many pairs of source frames the frames need in-betweens of
+    missing: those of them that are not built, each by its first source frame, from 1 on
+    lacking: the timeline frames of its edit that need these
+    faults, notes: sentences; notes are of what can be rendered, but otherwise than one may think"""
+
+    edit: bpy.types.Scene
+    name: str
+    frames: set[float]
+    shutters: int
+    source: str = ""
+    size: tuple[int, int] = (0, 0)
+    window: int = 0
+    factor: int = 1
+    pairs: int = 0
+    missing: set[int] = field(default_factory=set)
+    lacking: set[int] = field(default_factory=set)
+    needs: memory_needs.Needs | None = None
+    faults: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def chunk(self) -> int:
+        return chunk_size(self.window, self.factor) if self.window else LEAST
+
+
+def effects(edit, frames: range, compositor, *, find_cuts: bool) -> list[EffectCheck]:
+    """Looks at the effects that the edit's frames show, those of edits in it included.
+
+    compositor: of the device that will render. Files are opened, and of each the first and the last frame that is
+    needed are read.
+    find_cuts: which in-between frames are needed depends on cuts, so that more is read where some are missing: of a
+    film without any, all of it. Otherwise they are counted as if there were no cuts."""
+    # It asks no device, which would have to wait for its first picture: states and windows are known without.
+    looking = RenderSession(lambda: ("cpu", None), lambda: None)
+    try:
+        return [_effect(looking, *shown, compositor, find_cuts) for shown in _shown_effects(edit, frames)]
+    finally:
+        looking.forget()
+
+
+def _shown_effects(film, frames: range) -> Iterator[tuple]:
+    """(edit, effect, strip, frames) of every effect that is shown at one of the film's frames."""
+    wanted = dict(requirements.edits_at(film, frames))
+    for edit, effect, parts in job_snapshots.shown_effects(film):
+        found: set[float] = set()
+        for part in parts if edit in wanted else ():
+            start = strips.timeline_frame(part, 0)  # a strip may begin between frames
+            at = frame_ranges.common(requirements.shown_frames(edit, part), wanted[edit])
+            found |= {start + math.floor(frame - start) for frame in at}
+        if found:
+            yield edit, effect, parts[0], found
+
+
+def _effect(looking: RenderSession, edit, effect, strip, frames: set[float], compositor, find_cuts) -> EffectCheck:
+    found = EffectCheck(edit, strip.name, frames, len(effect.shutters))
+    if not _look_at_footage(found, effect, strip):
+        return found
+    try:
+        requests = _requests(looking, snapshot.take(edit, effect, strip, frames), found)
+    except session.FAULTS as error:
+        found.faults.append(str(error))
+        return found
+    if requests:
+        source = next(iter(requests.values())).renderer.source
+        found.window = max(request.state.options.window for request in requests.values())
+        found.factor = source.step
+        _look_at_frames(found, source, requests, find_cuts)
+        _look_at_mattes(found, source, requests)
+        found.needs = _needs(requests, compositor)
+        found.notes += _notes(found, requests)
+    return found
+
+
+def _requests(looking: RenderSession, taken, found: EffectCheck) -> dict[float, FrameRequest]:
+    """What each frame asks for, where it can be shown; faults of others are noted, each at the first of its frames."""
+    requests, faults = {}, {}
+    for frame in sorted(taken.frames):
+        try:
+            requests[frame] = looking.request(taken, frame)
+        except session.FAULTS as error:
+            kind = re.sub(r"\bframe -?[\d.]+", "", str(error))
+            faults.setdefault(kind, []).append(str(error))
+    for sentences in faults.values():
+        more = f" (and at {len(sentences) - 1} more frames)" if len(sentences) > 1 else ""
+        found.faults.append(sentences[0] + more)
+    return requests
+
+
+def _look_at_footage(found: EffectCheck, effect, strip) -> bool:
+    """Whether the footage can be opened; and whether it is what it was when the edit was saved: the effect's scene has
+    the size of it."""
+    try:
+        source = strips.source_of(found.edit, effect, strip)
+        medium = source_media.open_media(source)
+    except UserError as error:
+        found.faults.append(str(error))
+        return False
+    medium.close()
+    found.source, found.size = os.path.normpath(medium.path), (medium.width, medium.height)
+    saved = effect.scene.render.resolution_x, effect.scene.render.resolution_y
+    if saved != found.size:
+        words = "{}×{}, but was {}×{} when the edit was saved".format(*found.size, *saved)
+        found.faults.append(f"{medium.path.name}: is {words}")
+    if medium.count < source.content_duration:
+        words = f"{medium.count} frames, fewer than the {source.content_duration} of strip"
+        found.faults.append(f'{medium.path.name}: has {words} "{source.name}"')
+    return True
+
+
+def _look_at_frames(found: EffectCheck, source, requests: dict[float, FrameRequest], find_cuts: bool) -> None:
+    """Whether the frames that windows need are there: files of image sequences, in-between frames, and of a movie the
+    first and the last one."""
+    needed = {frame: _needed(request) for frame, request in requests.items()}
+    filmed = {index // source.step for indices in needed.values() for index in indices if index % source.step == 0}
+    found.faults += _unreadable(source, filmed, source.step)
+    if source.step == 1:
+        return
+    lacking = [frame for frame, indices in needed.items() if not all(map(source.has, indices))]
+    for frame in lacking if find_cuts else ():  # beyond a cut none is needed
+        with suppress(UserError):  # a file that cannot be read has been told
+            needed[frame] = _needed(requests[frame], known=False)
+            source.shots.release()
+    between = {index for indices in needed.values() for index in indices if index % source.step}
+    found.pairs = len({index // source.step for index in between})
+    gone = {index for index in between if not source.has(index)}
+    found.missing = {index // source.step + 1 for index in gone}
+    found.lacking = {math.floor(frame) for frame in lacking if needed[frame] & gone}
+    if gone and not find_cuts and any(request.state.options.stop_at_cuts for request in requests.values()):
+        found.notes.append("in-between frames are counted as if there were no cuts, beyond which none are needed")
+
+
+def _needed(request: FrameRequest, *, known: bool = True) -> set[int]:
+    return request.renderer.needed(request.index, request.direction, request.state, known=known)
+
+
+def _unreadable(source, indices: set[int], step: int = 1) -> list[str]:
+    """What is wrong with the files of these filmed frames: those that are not there, and the first and the last frame
+    if they cannot be decoded."""
+    files, missing = source.files, []
+    if len(files) > 1:
+        for path in sorted({files[index] for index in indices}):
+            try:
+                check_file(path)
+            except MediaError as error:
+                missing.append(str(error))
+    if missing:
+        more = f" (and {len(missing) - 1} more files)" if len(missing) > 1 else ""
+        return [missing[0] + more]
+    found = []
+    for index in dict.fromkeys((min(indices), max(indices))) if indices else ():
+        try:
+            source.read(index * step)
+        except UserError as error:
+            found.append(str(error))
+    return found
+
+
+def _look_at_mattes(found: EffectCheck, source, requests: dict[float, FrameRequest]) -> None:
+    shown: dict = {}
+    for request in requests.values():
+        for matte in request.state.mattes:
+            if isinstance(matte.content, FileFrame):
+                shown.setdefault(matte.content.file, {})[matte.content] = request.index // source.step
+    for file, contents in shown.items():
+        try:
+            with file.open() as medium:
+                indices = {content.index(medium, index) for content, index in contents.items()}
+                found.faults += _unreadable(medium, {min(max(index, 0), medium.count - 1) for index in indices})
+        except UserError as error:
+            found.faults.append(str(error))
+
+
+def _notes(found: EffectCheck, requests: dict[float, FrameRequest]) -> list[str]:
+    notes = []
+    if (package := cuts.missing_package()) and any(each.state.options.stop_at_cuts for each in requests.values()):
+        notes.append(f"no cuts are found, and windows run across them: the Python package {package} is missing")
+    if found.needs.sends:
+        notes.append("the GPU has no room for a window: every picture sends its frames anew, which is slow")
+    return notes
+
+
+def _needs(requests: dict[float, FrameRequest], compositor) -> memory_needs.Needs:
+    """The most that one of the windows needs, decoded frames included."""
+    source = next(iter(requests.values())).renderer.source
+    device, most = getattr(compositor, "device", None), memory_needs.Needs(0, 0, False)
+    for window, moved, shutters in {_kind(request.state) for request in requests.values()}:
+        if device is None:
+            needs = memory_needs.of_numpy_window(source, window, moved)
+        else:
+            needs = memory_needs.of_window(device, source, window, moved, shutters)
+        most = max(most, needs)
+    window = max(request.state.options.window for request in requests.values())
+    return most._replace(host=most.host + session.decoded_bytes(source, window))
+
+
+def _kind(state) -> tuple[int, bool, int]:
+    """Frames of a window, whether exposures of it follow something, and the number of shutters."""
+    return state.options.window, state.following is not None, len(state.bars)
+
+
+def left_out(edit, frames: range) -> list[str]:
+    """Why the sequencer leaves effects out of some of these frames."""
+    found = [why for shown, why in requirements.left_out(edit) if frame_ranges.common(shown, frames)]
+    return list(dict.fromkeys(found))

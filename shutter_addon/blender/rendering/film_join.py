@@ -1,0 +1,187 @@
+"""A movie of rendered frames, with the sound and the output settings of the edit that they were rendered from."""
+
+import re
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from ...core import frame_ranges
+from ...core.messages import signed
+from ...media import rendered_pictures
+from ...media.rendered_pictures import RenderedPicture
+from . import film_output
+from .film_output import OutputError
+
+_AT_ONCE = 1000  # pictures of a strip: Blender copies all that it has for each that is added
+_CHANNELS = 128  # of Blender's sequencer
+_CHANGES = {"look": "None", "exposure": 0.0, "gamma": 1.0, "use_curve_mapping": False, "use_white_balance": False}
+
+
+def join(edit, folder: Path, output: Path, frames: tuple[int, int], key: str) -> None:
+    """Makes a movie of the rendered frames, first and last, in a folder; `edit` is changed, and not to be used again.
+
+    key: that of the edit. OutputError, MediaError: frames are missing, broken, unlike each other or of another edit, or
+    the movie cannot be written, which is there whole or not at all. InterruptedRenderError: by Ctrl-C or TERM."""
+    edit.frame_start, edit.frame_end = frames
+    paths = _pictures(folder, range(frames[0], frames[1] + 1, edit.frame_step))
+    size = film_output.size(edit)
+    film_output.check(output, None, size)
+    with film_output.progress(len(paths), "picture") as looked:
+        first = _common(paths, looked, size, key)
+    _refuse_transparency(edit, paths, first)
+    _lay_over(edit, paths, first)
+    _set_output(edit, output, size)
+    film_output.prepare(output.parent)
+    with film_output.progress(len(paths), "frame") as moved:
+        film_output.write(edit, output, moved)
+
+
+def _pictures(folder: Path, frames: range) -> list[Path]:
+    """The picture of each frame. OutputError: some are missing, or are there twice."""
+    found = _numbered(folder)
+    if not found:
+        raise OutputError(f"{folder}: there are no frames, such as 0001.png or 0001.exr")
+    if missing := [frame for frame in frames if frame not in found]:
+        raise OutputError(f"{folder}: {_are(missing)} missing")
+    return [found[frame] for frame in frames]
+
+
+def _numbered(folder: Path) -> dict[int, Path]:
+    """The pictures of a folder whose name is the number of a frame. OutputError: it is no folder, or a frame has two
+    pictures."""
+    try:
+        files = sorted(path for path in folder.iterdir() if path.suffix[1:] in film_output.FORMATS)
+    except OSError as error:
+        raise OutputError(film_output.in_words(error, folder)) from None
+    found: dict[int, Path] = {}
+    for path in files:
+        if re.fullmatch(r"-?\d{1,9}", path.stem):
+            if (frame := int(path.stem)) in found:
+                raise OutputError(f"{folder}: {found[frame].name} and {path.name} are the same frame")
+            found[frame] = path
+    return found
+
+
+def _are(frames: list[int]) -> str:
+    """For use in a sentence: "frame 12 is", or "frames 12, 17 to 20 are"."""
+    return f"{frame_ranges.in_words(frames)} {'is' if len(frames) == 1 else 'are'}"
+
+
+def say_what_is_left_out(folder: Path, frames: tuple[int, int]) -> None:
+    """A word on stderr of pictures that are no frames of the edit."""
+    others = [frame for frame in _numbered(folder) if not frames[0] <= frame <= frames[1]]
+    if others:
+        print(signed(f"{folder}: {_are(others)} not of the edit, and left out"), file=sys.stderr)
+
+
+def _common(paths: list[Path], looked, size: tuple[int, int], key: str) -> RenderedPicture:
+    """What all pictures are; looked: called after each. OutputError: one is broken, unlike the first, or of another
+    edit than that of `key`."""
+    first, pool = None, ThreadPoolExecutor()
+    try:
+        for path, picture in zip(paths, pool.map(rendered_pictures.read, paths), strict=True):
+            if picture is None:
+                raise OutputError(f"{path}: is damaged or cut off")
+            first = first or picture
+            if difference := _difference(path, picture, paths[0], first):
+                raise OutputError(f"{path}: {difference}")
+            looked()
+    finally:
+        pool.shutdown(cancel_futures=True)
+    if first.size != size:
+        raise OutputError(f"{paths[0]}: is {_by(first.size)}, but the edit's frames are {_by(size)}")
+    if first.edit not in (None, key):
+        words = f"{first.edit} of the edit; its file, its footage, the extension and Blender here make version {key}"
+        raise OutputError(f"{paths[0]}: is of version {words}")
+    return first
+
+
+def _difference(path: Path, picture: RenderedPicture, other: Path, first: RenderedPicture) -> str:
+    """How a picture is unlike the first one; "": it is not."""
+    name = other.name
+    if path.suffix != other.suffix:
+        return f"is another format than {name}"
+    if picture.size != first.size:
+        return f"is {_by(picture.size)}, but {name} is {_by(first.size)}"
+    if (picture.channels, picture.samples) != (first.channels, first.samples):
+        words = [f"{each.channels} channels of {each.samples}" for each in (picture, first)]
+        return f"has {words[0]}, but {name} has {words[1]}"
+    if picture.edit == first.edit:
+        return ""
+    if picture.edit and first.edit:
+        return f"is of another version of the edit ({picture.edit}) than {name} ({first.edit})"
+    return "says" + (" " if picture.edit else " not ") + f"of which version of the edit it is, unlike {name}"
+
+
+def _by(size: tuple[int, int]) -> str:
+    return "{}×{}".format(*size)
+
+
+def _refuse_transparency(edit, paths: list[Path], first: RenderedPicture) -> None:
+    """OutputError: PNG files of which Blender's own film would show other colours. It applies the view to what lies
+    over black, where they have it applied to the colours that shine through."""
+    is_changed = paths[0].suffix == ".png" and _shown(edit).view_settings.view_transform != "Standard"
+    if is_changed and first.channels in (2, 4):
+        for path in paths:
+            if rendered_pictures.is_transparent(path):
+                words = "is transparent, which a film shows otherwise under this view"
+                raise OutputError(f"{path}: {words}; render EXR, or without transparency")
+
+
+def _shown(edit):
+    """What has the display and the view that the edit's output has."""
+    settings = edit.render.image_settings
+    return settings if settings.color_management == "OVERRIDE" else edit
+
+
+def _lay_over(edit, paths: list[Path], first: RenderedPicture) -> None:
+    """Has the pictures cover all else that the edit shows. Its sounds are heard."""
+    editor = edit.sequence_editor
+    editor.display_stack(None)  # out of meta strips: Blender renders what was open when the file was saved
+    channel = max((strip.channel for strip in editor.strips), default=0) + 1
+    if channel > _CHANNELS:
+        raise OutputError("the edit has strips in the uppermost channel, where the frames are to lie; move them down")
+    editor.channels[channel].mute = False
+    space = _keep_colours(edit, paths[0].suffix, first)
+    shown = [paths[i // edit.frame_step] for i in range(edit.frame_end - edit.frame_start + 1)]
+    for start in range(0, len(shown), _AT_ONCE):
+        part = shown[start : start + _AT_ONCE]
+        strip = editor.strips.new_image(part[0].name, str(part[0]), channel, edit.frame_start + start)
+        for path in part[1:]:
+            strip.elements.append(path.name)
+        strip.blend_type = "REPLACE"
+        strip.use_float = first.samples != "uint8" or first.channels in (2, 4)
+        if space:
+            strip.colorspace_settings.name = space
+
+
+def _keep_colours(edit, suffix: str, first: RenderedPicture) -> str | None:
+    """Has the view of PNG files, which are finished, change nothing any more; the colour space that they are in. EXR
+    files are scene-linear: None."""
+    if suffix == ".exr":
+        return None
+    shown = _shown(edit)
+    try:
+        shown.view_settings.view_transform = "Standard"
+    except TypeError:
+        raise OutputError("PNG frames need the view Standard, which this OpenColorIO configuration lacks") from None
+    for name, value in _CHANGES.items():
+        setattr(shown.view_settings, name, value)
+    if first.samples == "uint8":
+        edit.render.dither_intensity = 0  # it has been added to them
+    return shown.display_settings.display_device
+
+
+def _set_output(edit, output: Path, size: tuple[int, int]) -> None:
+    """The edit's own settings, if its output is a movie, else those of the command's films; the container by the
+    output's ending. Nothing is burnt in again, and what else makes a picture of another size or place is off."""
+    render = edit.render
+    if render.image_settings.media_type == "VIDEO":
+        render.ffmpeg.format = film_output.MOVIES[output.suffix.lower()][0]
+        render.ffmpeg.use_autosplit = False
+        film_output.set_place(render, output)
+    else:
+        film_output.set_output(edit, output, "png", alpha=False)
+    render.resolution_x, render.resolution_y = size
+    render.resolution_percentage = 100
+    render.use_stamp = render.use_stamp_note = False

@@ -1,0 +1,131 @@
+"""Frames of a saved edit in a folder that many machines may share: each is rendered by one of them, and once."""
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+from ...core import edit_version, frame_ranges, job_file
+from ...core.claims import Claims
+from ...core.edit_version import EditVersion
+from ...core.messages import signed
+from ...media import rendered_pictures
+from ..data import versions
+from . import film_output
+
+RUN = 8  # frames that are claimed at once
+_PAUSE = 1.0  # seconds between two looks at what others have finished
+
+
+@contextmanager
+def of_same_footage(edit) -> Iterator[list[Path]]:
+    """Gives a list for the pictures that are rendered inside. They are removed if the footage is written to meanwhile:
+    they carry the key of what it was, and would count as finished. OutputError: it was."""
+    before, rendered = versions.stamps(edit), []
+    try:
+        yield rendered
+    finally:
+        changed = [path for path, stamp in versions.stamps(edit).items() if stamp != before.get(path)]
+        if changed:
+            for picture in rendered:
+                picture.unlink(missing_ok=True)
+            raise film_output.OutputError(f"{changed[0]}: was written to while frames were rendered from it")
+
+
+def render(edit, folder: Path, file_format: str, version: EditVersion, rendered: list[Path], *, resume: bool) -> None:
+    """Renders the edit's frames, from its first to its last, to pictures that carry the key of its version.
+
+    rendered: gets each picture as it is written
+    resume: leaves frames alone that are finished, and those to others that these are rendering, until they are
+    finished or given up
+    OutputError, InterruptedRenderError: as of film_output.film, or the folder is for another version by now; OSError:
+    the folder cannot be written to"""
+    if resume and edit.render.use_stamp:
+        sentence = "the edit burns metadata into its pictures, so that they carry no version; turn Burn Into Image off"
+        raise film_output.OutputError(f"--resume: {sentence}")
+    film_output.set_pictures(edit, file_format, edit_version.note(version.key))
+    film_output.prepare(folder)
+    samples = film_output.FORMATS[file_format].samples
+    is_finished = partial(_is_finished, film_output.size(edit), samples, version.key, {})
+    pictures = {frame: folder / f"{frame:04d}.{file_format}" for frame in range(edit.frame_start, edit.frame_end + 1)}
+
+    def moving(picture):
+        job_file.guard(folder, version)  # again: it may be for a newer version by now
+        rendered.append(picture)
+
+    with film_output.progress(len(pictures), "frame") as moved:
+        write = partial(film_output.write, edit, folder, moved, moving)
+        if resume:
+            _render_missing(edit, folder, pictures, is_finished, write, moved)
+        else:
+            write()
+
+
+def _render_missing(edit, folder: Path, pictures: dict[int, Path], is_finished, write, moved) -> None:
+    missing, waits = dict(pictures), False
+    with Claims(folder) as claims, film_output.stoppable() as stopped:
+        while True:
+            for frame in [frame for frame, picture in missing.items() if is_finished(picture)]:
+                del missing[frame]
+                moved()
+            if not missing:
+                break
+            if stopped:
+                raise film_output.InterruptedRenderError(f"{folder}: stopped")
+            if run := _claim_run(claims, missing, is_finished):
+                _render_run(edit, claims, run, write)
+                for frame in run:
+                    del missing[frame]
+            else:
+                if not waits:
+                    words = f"waiting for {frame_ranges.in_words(list(missing))}, which other workers have claimed"
+                    print(signed(f"{folder}: {words}"), file=sys.stderr)
+                waits = True
+                time.sleep(_PAUSE)
+        claims.clear(map(_name, pictures.values()))
+
+
+def _claim_run(claims: Claims, missing: dict[int, Path], is_finished) -> dict[int, Path]:
+    """The first frames of those missing, without a gap, that nobody has claimed; none: others have them all."""
+    run: dict[int, Path] = {}
+    for frame, picture in missing.items():
+        if len(run) == RUN or (run and frame - 1 not in run):
+            break
+        if claims.take(_name(picture)):
+            if not is_finished(picture):  # it may be, since the last look
+                run[frame] = picture
+                continue
+            claims.release(_name(picture))
+        if run:
+            break
+    return run
+
+
+def _render_run(edit, claims: Claims, run: dict[int, Path], write) -> None:
+    edit.frame_start, edit.frame_end = min(run), max(run)
+    try:
+        write()
+    finally:
+        for picture in run.values():
+            claims.release(_name(picture))
+
+
+def _name(picture: Path) -> str:
+    """The name of a picture's claim."""
+    return f"{picture.stem}_{picture.suffix[1:]}"
+
+
+def _is_finished(size: tuple[int, int], samples: str, key: str, rejected: dict[Path, tuple], picture: Path) -> bool:
+    """Whether a picture is sound, and of this version of the edit.
+
+    rejected: the stamps of pictures that were not, which are read no second time; it gets more of them"""
+    stamp = rendered_pictures.stamp(picture) if picture.is_file() else None  # a pipe would never open
+    if stamp is None or rejected.get(picture) == stamp:
+        return False
+    found = rendered_pictures.read(picture, key)
+    if found is not None and (found.size, found.samples) == (size, samples):
+        return True
+    rejected[picture] = stamp
+    return False

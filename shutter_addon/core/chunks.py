@@ -1,0 +1,25 @@
+"""How many frames of a film a task of a farm should render."""
+
+# Of the frames that a chunk decodes, one in so many is also decoded by a neighbour, at most.
+ONE_IN = 10
+# Frames of a chunk, at least: before the first one a process has to start, and to open the edit and its footage.
+LEAST = 24
+
+
+def decoded(frames: int, window: int, step: int = 1) -> int:
+    """How many frames of a source, in-between frames included, a chunk of so many timeline frames decodes: those of its
+    first picture's window, and `step` more for each later picture.
+
+    window: frames that a shutter can expose, in-between frames included; step: how many frames the source moves on from
+    one timeline frame to the next, which is the factor of its in-between frames unless it is retimed"""
+    return (frames - 1) * step + window
+
+
+def chunk_size(window: int, step: int = 1) -> int:
+    """The smallest chunk, in timeline frames and LEAST at least, that decodes few frames which are not its own alone:
+    one in ONE_IN. For n frames these are (L − s) of n·s + (L − s), with a window of L frames and s frames from one
+    picture to the next, so n = (ONE_IN − 1)·(L − s) / s.
+
+    Longer chunks decode less in all; shorter ones spread better over machines, and cost less to render again."""
+    overlap = max(window - step, 0)
+    return max(LEAST, -(-(ONE_IN - 1) * overlap // step))

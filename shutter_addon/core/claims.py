@@ -1,0 +1,138 @@
+"""Claims: who works on what, where many processes on many machines share a folder.
+
+A claim is a file that only one process can make. Its holder touches it while it works. Who finds it unchanged for a
+while, by the finder's own clock, takes it over with a claim of the next generation, which again only one can make. No
+clocks are compared and nothing is locked, so it works on network drives. Where the holder was only asleep, both do the
+same work, and nothing else is lost: what is claimed is written whole, and the same whoever writes it.
+"""
+
+import os
+import re
+import secrets
+import socket
+import threading
+import time
+from collections.abc import Iterable
+from contextlib import suppress
+from itertools import count
+from pathlib import Path
+
+PATIENCE = 120.0  # seconds without a change after which a claim counts as abandoned
+BEAT = 10.0  # seconds from one touch to the next; network drives may show it up to a minute later
+
+_NAME = re.compile(r"\.claim-(\w+)-[0-9]+")
+_LONGEST = 256  # bytes of a claim
+_READ = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+
+
+class Claims:
+    """The claims of this process in a folder; use it in a `with`, at whose end they are released. For any thread.
+
+    patience, beat: as PATIENCE and BEAT, in seconds"""
+
+    def __init__(self, folder: Path, patience: float | None = None, beat: float | None = None):
+        self._folder = folder
+        self._patience = PATIENCE if patience is None else patience
+        self._beat = BEAT if beat is None else beat
+        self._held: dict[str, int] = {}  # the generation of each claim
+        self._seen: dict[Path, tuple] = {}  # what others' claims look like, and since when
+        self._lock, self._ended = threading.Lock(), threading.Event()
+        self._thread = threading.Thread(target=self._touch, name="Virtual Shutter claims", daemon=True)
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._ended.set()
+        self._thread.join()
+        for name in list(self._held):
+            self.release(name)
+
+    def take(self, name: str) -> bool:
+        """Whether this process has the claim now; else another has it, or had it a moment ago. What is claimed may have
+        been finished meanwhile: look after this. OSError: the folder cannot be written to.
+
+        name: letters, digits and underscores"""
+        for generation in count():
+            path = self._path(name, generation)
+            if _make(path):
+                with self._lock:
+                    self._held[name] = generation
+                return True
+            if not self._is_abandoned(path):
+                return False
+
+    def release(self, name: str) -> None:
+        """Gives a claim back, and removes those that it was taken over from."""
+        with self._lock:
+            generation = self._held.pop(name)
+        for each in range(generation, -1, -1):
+            _remove(self._path(name, each))
+
+    def clear(self, names: Iterable[str]) -> None:
+        """Removes what killed processes left of claims of what is finished."""
+        names = set(names)
+        with suppress(OSError), os.scandir(self._folder) as entries:
+            for entry in entries:
+                if (found := _NAME.fullmatch(entry.name)) and found[1] in names:
+                    _remove(Path(entry.path))
+
+    def _path(self, name: str, generation: int) -> Path:
+        return self._folder / f".claim-{name}-{generation}"
+
+    def _is_abandoned(self, path: Path) -> bool:
+        now, look = time.monotonic(), _look(path)
+        if self._seen.get(path, (None,))[0] != look:
+            self._seen[path] = look, now
+        return look is not None and now - self._seen[path][1] > self._patience
+
+    def _touch(self) -> None:
+        while not self._ended.wait(self._beat):
+            with self._lock:
+                held = list(self._held.items())
+            for name, generation in held:
+                with suppress(OSError):  # it was taken over, or the drive is away for a moment
+                    os.utime(self._path(name, generation))
+
+
+def is_claim(name: str) -> bool:
+    """Whether it is the name of a claim's file."""
+    return _NAME.fullmatch(name) is not None
+
+
+def _make(path: Path) -> bool:
+    """Whether the claim was made; else there is one. What it holds is for people who wonder whose it is, and tells it
+    from one that was made later by the same name."""
+    try:
+        file = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
+    except FileExistsError:
+        return False
+    try:
+        os.write(file, f"{secrets.token_hex(8)} {socket.gethostname()} {os.getpid()}\n".encode()[:_LONGEST])
+    except OSError:
+        _remove(path)
+        raise
+    finally:
+        os.close(file)
+    return True
+
+
+def _look(path: Path):
+    """What changes when a claim is touched or made anew; None: there is none. It is opened, as network drives tell the
+    news then."""
+    try:
+        file = os.open(path, _READ)
+        try:
+            return os.read(file, _LONGEST), os.fstat(file).st_mtime_ns
+        finally:
+            os.close(file)
+    except FileNotFoundError:
+        return None
+    except OSError as error:  # a folder, a link, or another user's; it is as good as a claim that nobody touches
+        return error.errno
+
+
+def _remove(path: Path) -> None:
+    with suppress(OSError):  # it was removed by another, or is another user's
+        path.unlink()

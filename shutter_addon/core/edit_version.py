@@ -1,0 +1,89 @@
+"""The version of an edit: what tells pictures of it from those of another version, on any machine."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from dataclasses import asdict, dataclass
+
+_NOTE = "virtual_shutter edit "  # what a picture's metadata say, before the key
+
+
+@dataclass(frozen=True)
+class Footage:
+    """Files that the edit reads: a movie, a picture, or those of an image sequence.
+
+    name: of the first file; files: how many; content: a digest of theirs, in hexadecimal, "" where one is missing"""
+
+    name: str
+    files: int
+    content: str
+
+
+@dataclass(frozen=True)
+class EditVersion:
+    """All that an edit's pictures depend on, but for the device that composes them.
+
+    blend: SHA-256 of the .blend file, in hexadecimal; extension, blender: their versions
+    colours: of the OpenColorIO configuration, its SHA-256 or the name of one that OpenColorIO brings; "": Blender's own
+    footage: in the order in which the .blend names it"""
+
+    blend: str
+    extension: str
+    blender: str
+    colours: str
+    footage: tuple[Footage, ...]
+
+    @property
+    def key(self) -> str:
+        """16 hexadecimal digits: equal for copies of the edit, wherever its files lie and whatever they are called."""
+        footage = [(each.files, each.content) for each in self.footage]
+        parts = self.blend, self.extension, self.blender, self.colours, footage
+        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
+
+    def difference(self, other: EditVersion) -> str | None:
+        """What is different here from another version, the first thing of all, as the end of a sentence about that
+        version; None: nothing is."""
+        if self.key == other.key:
+            return None
+        if self.extension != other.extension:
+            return f"is of version {other.extension} of the extension, this machine has {self.extension}"
+        if self.blender != other.blender:
+            return f"is of Blender {other.blender}, this machine has {self.blender}"
+        if self.colours != other.colours:
+            return f"is of {_configuration(other)}, this machine has {_configuration(self)}"
+        if self.blend != other.blend:
+            return "is of another version of the .blend file"
+        for here, there in zip(self.footage, other.footage, strict=False):
+            if (here.files, here.content) != (there.files, there.content):
+                fault = "has other content" if here.content else "is missing or cannot be read"
+                name = here.name if here.files == 1 else f"one of the {here.files} files from {here.name} on"
+                return f"is of other footage: {name} {fault} on this machine"
+        return "is of other footage"
+
+    def as_data(self) -> dict:
+        """For JSON."""
+        return {**asdict(self), "key": self.key}
+
+    @classmethod
+    def from_data(cls, data: dict) -> EditVersion:
+        """What `as_data` gave. KeyError, TypeError, ValueError: it gave no such thing."""
+        footage = tuple(Footage(str(one["name"]), int(one["files"]), str(one["content"])) for one in data["footage"])
+        return cls(*(str(data[name]) for name in ("blend", "extension", "blender", "colours")), footage)
+
+
+def _configuration(version: EditVersion) -> str:
+    which = version.colours[:16] or "of Blender"
+    return f"the OpenColorIO configuration {which}"
+
+
+def note(key: str) -> str:
+    """What the metadata of a picture say of its edit's version."""
+    return _NOTE + key
+
+
+def key_in(text: str) -> str | None:
+    """The key in what a picture's metadata say; None: they say nothing of an edit."""
+    found = re.fullmatch(re.escape(_NOTE) + "([0-9a-f]{16})", text)
+    return found and found[1]

@@ -1,0 +1,92 @@
+"""Frames as movies hold them: luma and subsampled chroma, and the RGB that libswscale makes of them, to the bit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+# Of the matrices, by the numbers of ITU-T H.273: red of Cr, blue of Cb, green of Cb and of Cr, which is taken away; in
+# libswscale's units of 1/65536 for samples of limited range. Where a file names none, it is BT.601.
+_BT601 = 104597, 132201, 25675, 53279
+_MATRICES = {1: (117489, 138438, 13975, 34925), 2: _BT601, 5: _BT601, 6: _BT601}
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """Whole numbers by which samples become RGB. offset: of luma, in 1/512 of a level; the others are factors."""
+
+    offset: int
+    luma: int
+    red_of_cr: int
+    green_of_cb: int
+    green_of_cr: int
+    blue_of_cb: int
+
+
+def matrix(space: int, full: bool) -> Matrix | None:
+    """That of a colour space, by its number in ITU-T H.273; None: another than BT.601 or BT.709.
+
+    full: samples are of full range"""
+    if space not in _MATRICES:
+        return None
+    red, blue, *green = _MATRICES[space]
+    factors = red, -green[0], -green[1], blue
+    if full:
+        return Matrix(0, 1 << 13, *(_rounded(int(factor * 224 / 255)) for factor in factors))
+    return Matrix(16 << 9, _rounded((255 << 16) // 219), *map(_rounded, factors))
+
+
+def _rounded(factor: int) -> int:
+    """In units of 1/8192, of which libswscale keeps no finer ones."""
+    return (factor + 4) >> 3
+
+
+def chroma_step(length: int) -> int:
+    """By how much a pixel's place in the planes of chroma moves on from one to the next, in 1/65536 of a sample, where
+    so many pixels lie along an axis: pixel i has the sample (i · step + step // 2) >> 16."""
+    return (((length + 1) // 2 << 16) + length // 2) // length
+
+
+@dataclass(frozen=True)
+class Planes:
+    """An opaque 8-bit frame with a sample of chroma for 2 × 2 pixels.
+
+    luma: uint8 (H, W), top row first
+    chroma: Cb and Cr, each uint8 (⌈H/2⌉, ⌈W/2⌉)
+    matrix: what makes RGB of them
+    rgba: makes the whole frame, as FrameSource.read gives it
+    """
+
+    luma: np.ndarray
+    chroma: tuple[np.ndarray, np.ndarray]
+    matrix: Matrix
+    rgba: Callable[[], np.ndarray]
+
+    @property
+    def nbytes(self) -> int:
+        return sum(plane.nbytes for plane in (self.luma, *self.chroma))
+
+    def samples(self, rows: slice, columns: slice) -> np.ndarray:
+        """RGB uint8 (h, w, 3) of the pixels in these rows and columns: those of the frame of `rgba`, and nothing else
+        is converted."""
+        m, (down, right) = self.matrix, map(_chroma_places, (rows, columns), self.luma.shape)
+        luma = ((self.luma[rows, columns].astype(np.int32) << 9) - m.offset) * m.luma + (1 << 21)
+        cb, cr = ((plane[down][:, right].astype(np.int32) - 128) << 9 for plane in self.chroma)
+        found = np.empty((*luma.shape, 3), np.uint8)
+        # Sums wrap around beyond 32 bits, as libswscale's do.
+        colours = cr * m.red_of_cr, cb * m.green_of_cb + cr * m.green_of_cr, cb * m.blue_of_cb
+        for channel, chroma in enumerate(colours):
+            found[..., channel] = (luma + chroma).clip(0, (1 << 30) - 1) >> 22
+        return found
+
+
+def _chroma_places(chosen: slice, length: int) -> np.ndarray:
+    step = chroma_step(length)
+    return (np.arange(*chosen.indices(length)) * step + step // 2) >> 16
+
+
+def as_rgba(frame: np.ndarray | Planes) -> np.ndarray:
+    """A frame of FrameSource.decoded as its `read` gives it."""
+    return frame.rgba() if isinstance(frame, Planes) else frame

@@ -1,0 +1,95 @@
+"""Pictures that a render has written: whether they are sound, and what they are of."""
+
+import os
+import struct
+import zlib
+from pathlib import Path
+from typing import NamedTuple
+
+from OpenImageIO import ImageInput, geterror
+
+from ..core import edit_version
+from .files import check_name
+
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_PART = 1 << 20  # bytes that are read at once
+
+
+class RenderedPicture(NamedTuple):
+    """size: width and height in pixels; channels: how many; samples: as "uint16"
+    edit: the key of the edit's version (core.edit_version); None: the picture has none"""
+
+    size: tuple[int, int]
+    channels: int
+    samples: str
+    edit: str | None
+
+
+def read(path: Path, edit: str | None = None) -> RenderedPicture | None:
+    """What a PNG or EXR file holds; None: there is none, or it is damaged anywhere. A PNG's checksums are compared, an
+    EXR is decoded.
+
+    edit: the key of an edit's version; None too, and little is read, of pictures of another"""
+    image = ImageInput.open(check_name(path)) if path.is_file() else None
+    if image is None:
+        geterror()
+        return None
+    try:
+        spec = image.spec()
+        key = edit_version.key_in(spec.get_string_attribute("Note"))
+        if edit not in (None, key) or not _is_sound(path, image):
+            return None
+        return RenderedPicture((spec.width, spec.height), spec.nchannels, str(spec.format), key)
+    except (OSError, UnicodeDecodeError):  # the latter of names in a damaged file
+        return None
+    finally:
+        image.close()
+
+
+def stamp(path: Path) -> tuple[int, int, int] | None:
+    """What changes when a picture is replaced; None: there is none. It is opened, as network drives tell the news
+    then."""
+    try:
+        with path.open("rb") as file:
+            status = os.fstat(file.fileno())
+            return status.st_ino, status.st_size, status.st_mtime_ns
+    except OSError:
+        return None
+
+
+def is_transparent(path: Path) -> bool:
+    """Whether a pixel of a sound picture, whose last channel is alpha, is not opaque."""
+    image = ImageInput.open(check_name(path))
+    try:
+        alpha = image.spec().nchannels - 1
+        return image.read_image(0, 0, alpha, alpha + 1, "float").min() < 1
+    finally:
+        image.close()
+
+
+def _is_sound(path: Path, image: ImageInput) -> bool:
+    if path.suffix.lower() == ".png":
+        return _is_sound_png(path)
+    return image.read_image(image.spec().format) is not None
+
+
+def _is_sound_png(path: Path) -> bool:
+    """Whether the file is a PNG whose chunks all match their checksums, to the last one."""
+    with path.open("rb") as file:
+        if file.read(len(_SIGNATURE)) != _SIGNATURE:
+            return False
+        name = b""
+        while name != b"IEND":
+            head = file.read(8)
+            if len(head) < 8:
+                return False
+            length, name = struct.unpack(">I4s", head)
+            checksum = zlib.crc32(name)
+            while length > 0:
+                part = file.read(min(length, _PART))
+                if not part:
+                    return False
+                checksum, length = zlib.crc32(part, checksum), length - len(part)
+            if file.read(4) != checksum.to_bytes(4):
+                return False
+        return True

@@ -1,0 +1,394 @@
+"""The command `check`: planted faults are told, all of them, each by its place; and what a sound edit will take."""
+
+import json
+import shutil
+import wave
+
+import numpy as np
+import pytest
+from support import noise_film, recipe, write_frames
+
+from shutter_addon.core import chunks, frame_ranges, job_file
+from shutter_addon.core import recipe as recipes
+from shutter_addon.media.rendered_pictures import read
+
+FRAMES, WINDOW = 8, 4
+
+
+@pytest.fixture
+def noise(edit, tmp_path):
+    """Has an edit of noise under an effect open."""
+    frames = np.random.default_rng(1).integers(0, 256, (FRAMES, 48, 64, 3), dtype=np.uint8)
+    noise_film(edit, frames, tmp_path)
+
+
+def now():
+    """Scene, effect and its strip of the edit that is open: the command opens another than the test began with."""
+    import bpy
+
+    edit = bpy.context.scene
+    return edit, edit.virtual_shutter.effects[0], edit.sequence_editor.strips["Shutter"]
+
+
+@pytest.fixture
+def check(bpy, tmp_path, capsys):
+    """Saves the open edit, and runs the command on it in this process: exit code, sentences, report."""
+    from shutter_addon.blender import command
+
+    def run(*options, change=lambda: None):
+        path = tmp_path / "edit.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=False)
+        change()
+        capsys.readouterr()
+        code = command.main([str(argument) for argument in ("check", path, "--json", *options)])
+        told = capsys.readouterr()
+        report = json.loads(told.out[told.out.index("{") :]) if "{" in told.out else None
+        sentences = [line.removeprefix("Virtual Shutter: ") for line in told.err.splitlines()]
+        assert report is None or report["faults"] == sentences
+        assert code == (2 if sentences else 0)
+        return code, sentences, report
+
+    return run
+
+
+def test_a_sound_edit(noise, check, tmp_path):
+    from shutter_addon.blender.data import versions
+
+    code, sentences, report = check("--output", tmp_path / "out")
+    assert (code, sentences) == (0, [])
+    assert report["frames"] == [1, FRAMES]
+    assert report["size"] == [64, 48]
+    assert report["effects"] == [
+        {
+            "strip": "Shutter",
+            "source": str(tmp_path / "in" / "f0001.png"),
+            "size": [64, 48],
+            "window": WINDOW,
+            "shutters": 2,
+            "inbetween": 1,
+            "pairs": 0,
+            "missing": [],
+        }
+    ]
+    assert report["extension"] == {"here": versions.extension(), "saved": versions.extension()}
+    assert report["disk"]["frame"] == 64 * 48 * 4 * 2
+    assert report["disk"]["all"] == FRAMES * report["disk"]["frame"]
+    assert report["device"]
+    assert report["chunk"] == FRAMES
+    assert job_file.read(tmp_path / "out").key == report["key"]
+
+
+def test_the_report_for_people(noise, check, bpy, tmp_path, capsys):
+    from shutter_addon.blender import command
+
+    check()
+    assert command.main(["check", str(tmp_path / "edit.blend"), "--frames", "2-3"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "Frames: 2 to 3, 64×48" in lines
+    assert any(line.startswith("Effect Shutter: ") and "windows of 4 frames, 2 shutters" in line for line in lines)
+    assert lines[-1] == "Chunk size: 2 frames"
+    assert command.main(["check", str(tmp_path / "edit.blend"), "--device", "cpu", "--gpu-memory", "0"]) == 0
+    assert next(line for line in capsys.readouterr().out.splitlines() if "Memory" in line).endswith(
+        "kB for decoded frames"
+    )
+
+
+def test_the_device_and_its_memory_are_those_that_are_asked_for(noise, check, monkeypatch):
+    from shutter_addon.blender.rendering import session
+
+    report = check("--device", "cpu")[2]
+    assert (report["device"], report["memory"]["gpu_limit"]) == ("NumPy", None)
+    monkeypatch.setattr(session, "_budget", None)  # as in a process of its own
+    report = check("--gpu-memory", "123")[2]
+    assert report["device"] == "NumPy" or report["memory"]["gpu_limit"] == 123 << 20
+
+
+def test_the_key_is_what_pictures_carry(noise, check, tmp_path):
+    from shutter_addon.blender import command
+
+    report = check()[2]
+    options = ["--output", str(tmp_path / "out"), "--frames", "2"]
+    assert command.main(["render", str(tmp_path / "edit.blend"), *options]) == 0
+    assert read(tmp_path / "out" / "0002.png").edit == report["key"]
+
+
+def _replace(folder, size=(48, 64), count=FRAMES):
+    write_frames(folder / "in", np.zeros((count, *size, 3), np.uint8))
+
+
+@pytest.mark.parametrize(
+    ("plant", "sentences"),
+    [
+        (lambda folder: shutil.rmtree(folder / "in"), ["f0001.png: no such file in "]),
+        (lambda folder: (folder / "in" / "f0005.png").unlink(), ["f0005.png: no such file in "]),
+        (
+            lambda folder: [(folder / "in" / f"f000{n}.png").unlink() for n in (5, 6, 8)],
+            ["f0005.png: no such file in ", "(and 2 more files)"],
+        ),
+        (lambda folder: (folder / "in" / "f0008.png").write_bytes(b"no picture"), ["f0008.png: cannot be read"]),
+        (lambda folder: _replace(folder, (24, 32)), ["f0001.png: is 32×24, but was 64×48 when the edit was saved"]),
+    ],
+)
+def test_footage(noise, check, tmp_path, plant, sentences):
+    _, found, _ = check(change=lambda: plant(tmp_path))
+    assert len(found) == 1
+    assert found[0].startswith('"Shutter": ')
+    assert all(sentence in found[0] for sentence in sentences)
+
+
+def test_footage_that_the_frames_do_not_need(noise, check, tmp_path):
+    """Frames 1 and 2 expose the first five."""
+    change = (tmp_path / "in" / "f0006.png").unlink
+    assert check("--frames", "1:2", change=change)[0] == 0
+
+
+def _movie(path, count):
+    import av
+
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for i in range(count):
+            picture = np.random.default_rng(i).integers(0, 256, (48, 64, 3), dtype=np.uint8)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        container.mux(stream.encode())
+
+
+def test_a_movie_that_is_shorter_than_its_strip(edit, check, tmp_path):
+    from shutter_addon.blender.editing import add_effect, shutter_edits
+
+    _movie(tmp_path / "film.mp4", 9)
+    edit.render.resolution_x, edit.render.resolution_y, edit.frame_end = 64, 48, 9
+    _, effect = add_effect.add_effect(
+        edit, edit.sequence_editor.strips.new_movie("m", str(tmp_path / "film.mp4"), 1, 1)
+    )
+    shutter_edits.start(effect)
+    _, found, _ = check(change=lambda: _movie(tmp_path / "film.mp4", 6))
+    assert found == ['"Shutter": film.mp4: has 6 frames, fewer than the 9 of strip "m"']
+
+
+def test_a_shutter_that_never_opens(noise, check):
+    _, effect, _ = now()
+    for bar in effect.shutters[1].bars:
+        bar.weight = 0
+    code, found, _ = check()
+    assert code == 2
+    assert len(found) == 1
+    assert found[0].startswith('"Shutter": shutter "S1" at frame 1: ')
+    assert found[0].endswith("(and at 7 more frames)")
+
+
+def test_several_faults_are_all_told(noise, check, tmp_path):
+    edit, effect, _ = now()
+    for bar in effect.shutters[0].bars:
+        bar.weight = 0
+    edit.sequence_editor.strips.new_movie("gone", str(tmp_path / "gone.mp4"), 6, 1)
+    _, found, _ = check(change=lambda: _replace(tmp_path, (24, 32)))
+    assert len(found) == 3
+    assert "f0001.png: is 32×24" in found[0]
+    assert 'shutter "S0" at frame 1' in found[1]
+    assert found[2].startswith('strip "gone": gone.mp4: no such file')
+
+
+def _matte(tmp_path):
+    from shutter_addon.blender.data import recipe_import
+
+    edit, effect, strip = now()
+    write_frames(tmp_path / "matte", np.full((FRAMES, 48, 64, 3), 128, np.uint8), "m")
+    region = {"shutter": "S1", "kind": "matte", "path": "matte/m0001.png"}
+    data = recipe(WINDOW, np.ones(WINDOW), [1, 0, 0, 0], regions=[region])
+    recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data)), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("plant", "sentence"),
+    [
+        (lambda folder: shutil.rmtree(folder / "matte"), "m0001.png: no such file"),
+        (lambda folder: (folder / "matte" / "m0001.png").write_bytes(b"none"), "m0001.png: cannot be read"),
+        (lambda folder: (folder / "matte" / "m0008.png").write_bytes(b"none"), "m0008.png: cannot be read"),
+    ],
+)
+def test_mattes(noise, check, tmp_path, plant, sentence):
+    _matte(tmp_path)
+    assert check()[1] == []
+    _, found, _ = check(change=lambda: plant(tmp_path))
+    assert len(found) == 1
+    assert sentence in found[0]
+
+
+def test_a_mask_and_a_strip_that_are_gone(noise, check, tmp_path):
+    _matte(tmp_path)
+    now()[1].regions[0].matte = "MASK"
+    assert "it has no mask" in check()[1][0]
+    now()[1].regions[0].matte = "STRIP"
+    assert "it has no matte strip" in check()[1][0]
+
+
+def test_in_between_frames(noise, check, tmp_path):
+    """The command that is told builds what is missing, and no more is asked for."""
+    from shutter_addon.blender import command
+
+    now()[1].inbetween = "2"
+    _, found, report = check()
+    assert report["effects"][0]["pairs"] == FRAMES - 1
+    assert report["effects"][0]["missing"] == [[1, FRAMES - 1]]
+    path = tmp_path / "edit.blend"
+    assert report["build"] == f"python -m shutter_addon inbetween {path} --frames 1:7"
+    assert found == [f'"Shutter": in-between frames of source frames 1 to 7 are missing; build them: {report["build"]}']
+    assert check("--frames", "1")[2]["effects"][0]["missing"] == [[1, 4]]
+    code, sentences, report = check("--inbetweens-later")
+    assert (code, sentences, report["effects"][0]["missing"]) == (0, [], [[1, FRAMES - 1]])
+    assert command.main(["inbetween", str(path), "--frames", "1:2"]) == 0
+    scene = now()[0]
+    scene.frame_start, scene.frame_end = 1, FRAMES  # the command has set others
+    assert check("--frames", "1:2")[1] == []
+    assert check()[2]["effects"][0]["missing"] == [[6, 7]]
+
+
+def test_the_command_that_is_told_may_be_pasted(noise, check, bpy, tmp_path, capsys):
+    import shlex
+
+    from shutter_addon.blender import command
+
+    now()[1].inbetween = "2"
+    path = tmp_path / 'an "edit" of $HOME.blend'
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+    capsys.readouterr()
+    assert command.main(["check", str(path), "--frames", "1"]) == 2
+    told = capsys.readouterr().err.strip()
+    build = shlex.split(told[told.index("build them: ") :].removeprefix("build them: "))
+    assert build == ["python", "-m", "shutter_addon", "inbetween", str(path), "--frames", "1:1"]
+
+
+def test_a_fault_of_the_system_that_names_no_file(noise, check, monkeypatch, tmp_path):
+    from shutter_addon.blender.data import versions
+
+    def no_more(_edit):
+        raise OSError(24, "Too many open files")
+
+    monkeypatch.setattr(versions, "of_edit", no_more)
+    assert check()[1] == [f"{tmp_path / 'edit.blend'}: Too many open files"]
+
+
+def test_beyond_a_cut_no_in_between_frame_is_needed(edit, check, tmp_path):
+    """As the build sees it, too."""
+    from shutter_addon.blender.data import snapshot
+    from shutter_addon.blender.rendering import session
+
+    rng = np.random.default_rng(3)
+    shots = [rng.integers(0, 256, (6, 8, 3), dtype=np.uint8).repeat(8, 0).repeat(8, 1) for _ in range(2)]
+    noise_film(edit, np.stack([np.roll(shots[k // 6], k, axis=1) for k in range(12)]), tmp_path)
+    now()[1].inbetween = "2"
+    report = check("--frames", "4:6")[2]
+    assert report["effects"][0]["missing"] == [[4, 6]]
+    assert report["build"].endswith("--frames 4:6")
+    assert report["notes"] == []
+    assert session.pairs(snapshot.take(*now(), range(4, 7))) == {3, 4, 5}
+    later = check("--frames", "4:6", "--inbetweens-later")[2]  # no cuts are looked for
+    assert later["effects"][0]["missing"] == [[4, 9]]
+    assert "as if there were no cuts" in later["notes"][0]
+
+
+def test_without_the_package_that_finds_cuts(noise, check, monkeypatch):
+    from shutter_addon.media import cuts
+
+    monkeypatch.setattr(cuts, "missing_package", lambda: "scenedetect")
+    _, found, report = check()
+    assert (found, len(report["notes"])) == ([], 1)
+    assert "the Python package scenedetect is missing" in report["notes"][0]
+
+
+def test_plain_strips(noise, check, tmp_path):
+    edit = now()[0]
+    editor = edit.sequence_editor
+    with wave.open(str(tmp_path / "tone.wav"), "wb") as file:
+        file.setparams((1, 2, 48000, 0, "NONE", ""))
+        file.writeframes(bytes(9600))
+    _movie(tmp_path / "plain.mp4", 9)
+    write_frames(tmp_path / "plain", np.zeros((3, 8, 8, 3), np.uint8))
+    editor.strips.new_sound("sound", str(tmp_path / "tone.wav"), 5, 1)
+    editor.strips.new_movie("movie", str(tmp_path / "plain.mp4"), 6, 1)
+    images = editor.strips.new_image("plain", str(tmp_path / "plain" / "f0001.png"), 7, 1)
+    images.elements.append("f0002.png")
+    images.elements.append("f0003.png")
+    assert check()[1] == []
+
+    def plant():
+        (tmp_path / "tone.wav").unlink()
+        (tmp_path / "plain.mp4").write_bytes(b"no movie")
+        (tmp_path / "plain" / "f0002.png").unlink()
+
+    _, found, _ = check(change=plant)
+    assert sorted(sentence[: sentence.index(": ")] for sentence in found) == [
+        'strip "movie"',
+        'strip "plain"',
+        'strip "sound"',
+    ]
+
+
+def test_an_effect_whose_scene_was_deleted(noise, check, bpy):
+    bpy.data.scenes.remove(now()[2].scene)
+    assert check()[1] == ['the scene of "Shutter" was deleted']
+
+
+def test_a_newer_extension_and_blender(noise, check, bpy, tmp_path, monkeypatch):
+    from shutter_addon.blender.data import versions
+
+    def newer():
+        path = tmp_path / "edit.blend"
+        content = path.read_bytes()
+        assert b"v0502" in content[:20]
+        path.write_bytes(content.replace(b"v0502", b"v0503", 1))
+
+    here = versions.extension()
+    with monkeypatch.context() as patch:
+        patch.setattr(versions, "extension", lambda: "99.1.0")
+        check()  # saves the edit
+    saved = (tmp_path / "edit.blend").read_bytes()
+    _, found, _ = check(change=lambda: ((tmp_path / "edit.blend").write_bytes(saved), newer()))
+    assert found[0] == f"the edit was saved by version 99.1.0 of the extension, this machine has {here}"
+    assert found[1].startswith("the edit was saved by Blender 5.3, this machine has 5.2")
+
+
+def test_output(noise, check, tmp_path, monkeypatch):
+    (tmp_path / "file").write_bytes(b"")
+    assert check("--output", tmp_path / "file" / "out")[1][0].endswith("Not a directory")
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage._replace(free=64 * 48 * 4 * 2 * FRAMES - 1))
+    _, found, _ = check("--output", tmp_path / "out")
+    assert found == [f"{tmp_path / 'out'}: 8 frames may take 192.0 kB, 192.0 kB are free"]
+    assert job_file.read(tmp_path / "out") is None
+    edit = now()[0]
+    edit.render.resolution_x = 65
+    edit.render.image_settings.media_type = "VIDEO"
+    assert "a movie has even sizes, not 65×48" in check()[1][0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["none.blend"], "no such file"),
+        (["edit.blend", "--frames", "3:99"], "--frames: 3:99 is not within the edit's frames 1:8"),
+    ],
+)
+def test_what_cannot_be_checked(noise, check, tmp_path, capsys, arguments, sentence):
+    from shutter_addon.blender import command
+
+    check()
+    assert command.main(["check", str(tmp_path / arguments[0]), *arguments[1:]]) == 2
+    assert sentence in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("window", "step"), [(1, 1), (4, 1), (16, 1), (256, 1), (64, 8), (128, 16)])
+def test_a_chunk_reads_little_that_is_not_its_own(window, step):
+    size = chunks.chunk_size(window, step)
+    share = [1 - n * step / chunks.decoded(n, window, step) for n in (size, size - 1)]
+    assert share[0] <= 1 / chunks.ONE_IN
+    assert size == chunks.LEAST or share[1] > 1 / chunks.ONE_IN
+
+
+@pytest.mark.parametrize(
+    ("frames", "words"), [([3], "frame 3"), ([5, 4], "frames 4 to 5"), ([9, 1, 3, 2, 12], "frames 1 to 3, 9, 12")]
+)
+def test_frames_in_words(frames, words):
+    assert frame_ranges.in_words(frames) == words

@@ -1,0 +1,284 @@
+"""The command `join`: frames and the edit's sound become the film that the edit itself renders."""
+
+import shutil
+import wave
+from dataclasses import replace
+from pathlib import Path
+
+import av
+import numpy as np
+import OpenImageIO
+import pytest
+from support import noise_film
+
+from shutter_addon.core import job_file
+
+FRAMES = 8
+
+
+@pytest.fixture(scope="module")
+def saved(bpy, tmp_path_factory):
+    """Builds an edit of noise and a tone once, under a view that changes colours, saves it with a lossless movie as
+    its output, and renders it: to that movie, and to folders of frames. A folder with all of these."""
+    folder = tmp_path_factory.mktemp("saved")
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    edit = bpy.context.scene
+    edit.sequence_editor_create()
+    frames = np.random.default_rng(1).integers(0, 256, (FRAMES, 48, 64, 3), dtype=np.uint8)
+    noise_film(edit, frames, folder)
+    _tone(folder / "tone.wav")
+    edit.sequence_editor.strips.new_sound("tone", str(folder / "tone.wav"), 4, -2)
+    edit.view_settings.view_transform = "AgX"
+    edit.view_settings.exposure = 0.5
+    edit.render.resolution_percentage, edit.render.dither_intensity = 100, 0
+    edit.render.fps, edit.render.fps_base = 30, 1.001
+    _render(bpy, edit, folder / "png", "PNG", "16")
+    _render(bpy, edit, folder / "eight", "PNG", "8")
+    _render(bpy, edit, folder / "exr", "OPEN_EXR", "32")
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "pictures.blend"), copy=True)
+    edit.render.image_settings.media_type = "VIDEO"
+    edit.render.image_settings.color_mode = "RGB"
+    edit.render.use_file_extension = False
+    edit.render.ffmpeg.format, edit.render.ffmpeg.codec, edit.render.ffmpeg.audio_codec = "MKV", "FFV1", "FLAC"
+    edit.render.filepath = str(folder / "film.mkv")
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "edit.blend"), copy=True)
+    bpy.ops.render.render(animation=True, scene=edit.name)
+    from shutter_addon.blender import command
+
+    assert command.main(["render", str(folder / "edit.blend"), "--output", str(folder / "ours")]) == 0
+    return folder
+
+
+def _tone(path):
+    with wave.open(str(path), "wb") as file:
+        file.setparams((1, 2, 48000, 0, "NONE", ""))
+        samples = 8000 * np.sin(np.arange(48000) * 0.05 * (1 + np.arange(48000) / 48000))
+        file.writeframes(samples.astype("<i2").tobytes())
+
+
+def _render(bpy, edit, folder, file_format, depth):
+    settings = edit.render.image_settings
+    settings.file_format, settings.color_depth, settings.color_mode = file_format, depth, "RGB"
+    edit.render.filepath = f"{folder}/"
+    bpy.ops.render.render(animation=True, scene=edit.name)
+
+
+@pytest.fixture
+def join(saved, tmp_path, capsys):
+    """Runs the command on an edit of `saved`, in this process; the exit code, what it said, and where the film is."""
+    from shutter_addon.blender import command
+
+    def run(folder, *options, edit="edit", ending=".mkv"):
+        capsys.readouterr()
+        output = tmp_path / f"joined{ending}"
+        arguments = ["join", folder, "--edit", saved / f"{edit}.blend", "--output", output, *options]
+        code = command.main([str(argument) for argument in arguments])
+        return code, capsys.readouterr().err, output
+
+    return run
+
+
+@pytest.fixture
+def frames(saved, tmp_path):
+    """A copy of the 16-bit PNG frames, to be damaged."""
+    return shutil.copytree(saved / "png", tmp_path / "frames")
+
+
+def _pictures(path):
+    with av.open(str(path)) as container:
+        return np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]).astype(int)
+
+
+def _sound(path):
+    """Samples (n, 2)."""
+    with av.open(str(path)) as container:
+        return np.concatenate([frame.to_ndarray().reshape(-1, 2) for frame in container.decode(audio=0)])
+
+
+def _rate(path):
+    with av.open(str(path)) as container:
+        return container.streams.video[0].average_rate
+
+
+@pytest.mark.parametrize(
+    ("folder", "levels", "share"), [("png", 1, 0.01), ("ours", 1, 0.01), ("eight", 0, 0), ("exr", 0, 0)]
+)
+def test_the_film_is_the_one_that_the_edit_renders(saved, join, folder, levels, share):
+    """Of 16 bits 8 are made twice, which rounds otherwise where a value lies between two levels."""
+    code, said, output = join(saved / folder)
+    assert (code, said) == (0, "")
+    difference = np.abs(_pictures(output) - _pictures(saved / "film.mkv"))
+    assert difference.max() <= levels
+    assert (difference > 0).mean() <= share
+    assert np.array_equal(_sound(output), _sound(saved / "film.mkv"))
+    assert _rate(output) == _rate(saved / "film.mkv")
+
+
+def test_some_frames_with_their_sound(saved, join):
+    code, said, output = join(saved / "exr", "--frames", "3:6")
+    assert (code, said) == (0, "")
+    assert np.array_equal(_pictures(output), _pictures(saved / "film.mkv")[2:6])
+    whole, part, start = _sound(saved / "film.mkv"), _sound(output), round(2 * 48000 * 1.001 / 30)
+    assert np.array_equal(part[:4000], whole[start : start + 4000])
+
+
+@pytest.mark.parametrize(("ending", "codec"), [(".mp4", "h264"), (".webm", "vp9")])
+def test_an_edit_that_renders_pictures_becomes_a_film_by_its_ending(saved, join, ending, codec):
+    code, said, output = join(saved / "png", edit="pictures", ending=ending)
+    assert (code, said) == (0, "")
+    with av.open(str(output)) as container:
+        assert codec in container.streams.video[0].codec_context.name
+        assert len(container.streams.audio) == 1
+
+
+def test_a_codec_that_the_container_cannot_have(saved, join):
+    code, said, output = join(saved / "png", ending=".webm")
+    assert code == 2
+    assert "unsupported codec" in said
+    assert not output.exists()
+
+
+def _flip(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 4
+    path.write_bytes(content)
+
+
+def _cut(path):
+    path.write_bytes(path.read_bytes()[:-20])
+
+
+def _write(path, width=64, channels=3, kind=np.uint16):
+    spec = OpenImageIO.ImageSpec(width, 48, channels, np.dtype(kind).name)
+    output = OpenImageIO.ImageOutput.create(str(path))
+    output.open(str(path), spec)
+    output.write_image(np.zeros((48, width, channels), kind))
+    output.close()
+
+
+def _remove(*frames):
+    return lambda folder: [(folder / f"{frame:04d}.png").unlink() for frame in frames]
+
+
+def _changed(change, *arguments, **options):
+    return lambda folder: change(folder / "0003.png", *arguments, **options)
+
+
+@pytest.mark.parametrize(
+    ("plant", "sentence"),
+    [
+        (_remove(2, 5, 6, 7), "frames 2, 5 to 7 are missing"),
+        (_remove(8), "frame 8 is missing"),
+        (_remove(*range(1, FRAMES + 1)), "there are no frames, such as 0001.png or 0001.exr"),
+        (shutil.rmtree, "No such file or directory"),
+        (_changed(_flip), "0003.png: is damaged or cut off"),
+        (_changed(_cut), "0003.png: is damaged or cut off"),
+        (lambda folder: (folder / "0003.png").write_bytes(b""), "0003.png: is damaged or cut off"),
+        (_changed(_write, width=60), "0003.png: is 60×48, but 0001.png is 64×48"),
+        (_changed(_write, channels=4), "0003.png: has 4 channels of uint16, but 0001.png has 3 channels of uint16"),
+        (_changed(_write, kind=np.uint8), "0003.png: has 3 channels of uint8, but 0001.png has 3 channels of uint16"),
+        (lambda folder: _write(folder / "0003.exr", kind=np.float32), "0003.exr and 0003.png are the same frame"),
+        (lambda folder: _write(folder / "00003.png"), "00003.png and 0003.png are the same frame"),
+    ],
+)
+def test_faults_are_told_by_name(frames, join, plant, sentence):
+    plant(frames)
+    code, said, output = join(frames)
+    assert (code, said.count("\n")) == (2, 1)
+    assert said.startswith(f"Virtual Shutter: {frames}")
+    assert sentence in said
+    assert not output.exists()
+
+
+def test_another_format_among_the_frames(saved, frames, join):
+    (frames / "0003.png").unlink()
+    shutil.copy(saved / "exr" / "0003.exr", frames)
+    assert "0003.exr: is another format than 0001.png" in join(frames)[1]
+
+
+def test_a_damaged_exr(saved, tmp_path, join):
+    folder = shutil.copytree(saved / "exr", tmp_path / "exr")
+    _cut(folder / "0004.exr")
+    code, said, _ = join(folder)
+    assert code == 2
+    assert "0004.exr: is damaged or cut off" in said
+
+
+def test_frames_of_another_size_than_the_edit(frames, join):
+    for path in frames.iterdir():
+        _write(path, width=32)
+    assert "0001.png: is 32×48, but the edit's frames are 64×48" in join(frames)[1]
+
+
+def test_what_is_no_frame_of_the_edit_is_left_out(saved, frames, join):
+    for name in ("0009.png", "0012.png", "0010.png"):
+        shutil.copy(saved / "png" / "0001.png", frames / name)
+    (frames / "preview.png").write_bytes(b"another's")
+    code, said, output = join(frames)
+    assert code == 0
+    assert said == f"Virtual Shutter: {frames}: frames 9 to 10, 12 are not of the edit, and left out\n"
+    assert len(_pictures(output)) == FRAMES
+
+
+def test_transparent_frames_under_a_view(saved, frames, join):
+    for path in frames.iterdir():
+        _write(path, channels=4)
+    code, said, _ = join(frames)
+    assert code == 2
+    assert "0001.png: is transparent, which a film shows otherwise under this view" in said
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (Path.unlink, "tone.wav: no such file"),
+        (lambda tone: tone.write_bytes(b"no sound"), "tone.wav: has no sound, or cannot be read"),
+    ],
+)
+def test_sound_that_cannot_be_had(saved, join, change, words):
+    tone = saved / "tone.wav"
+    content = tone.read_bytes()
+    change(tone)
+    code, said, output = join(saved / "png")
+    tone.write_bytes(content)
+    assert code == 2
+    assert f'strip "tone": {words}' in said
+    assert not output.exists()
+
+
+def test_more_pictures_than_a_strip_is_given(saved, join, monkeypatch):
+    from shutter_addon.blender.rendering import film_join
+
+    monkeypatch.setattr(film_join, "_AT_ONCE", 3)
+    _, _, output = join(saved / "exr")
+    assert np.array_equal(_pictures(output), _pictures(saved / "film.mkv"))
+
+
+def test_frames_of_another_version_of_the_edit(saved, tmp_path, join):
+    code, said, output = join(saved / "ours", edit="pictures")
+    assert code == 2
+    assert "0001.png: is of version " in said
+    assert not output.exists()
+
+
+@pytest.mark.parametrize(("one", "others", "words"), [("png", "ours", "says not"), ("ours", "png", "says")])
+def test_a_frame_among_those_of_the_edit_that_may_be_of_any(saved, tmp_path, join, one, others, words):
+    folder = shutil.copytree(saved / others, tmp_path / "mixed")
+    shutil.copy(saved / one / "0004.png", folder)
+    code, said, _ = join(folder)
+    assert code == 2
+    assert f"0004.png: {words} of which version of the edit it is, unlike 0001.png" in said
+
+
+def test_frames_of_a_job_of_another_version(bpy, saved, frames, join):
+    """Plain Blender's frames do not say it, but the file beside them does."""
+    from shutter_addon.blender.data import versions
+
+    bpy.ops.wm.open_mainfile(filepath=str(saved / "edit.blend"))
+    version = versions.of_edit(bpy.context.scene)
+    job_file.write(frames, version)
+    assert join(frames)[0] == 0
+    job_file.write(frames, replace(version, extension="0.0.1"))
+    code, said, _ = join(frames)
+    assert code == 2
+    assert f"is of version 0.0.1 of the extension, this machine has {version.extension}" in said

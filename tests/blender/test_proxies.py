@@ -1,0 +1,150 @@
+"""Proxies that Blender itself has built, found where it puts them."""
+
+import av
+import numpy as np
+import OpenImageIO
+import pytest
+from support import sequencer, write_frames
+
+COUNT, WIDTH, HEIGHT = 6, 72, 48
+
+
+def pictures():
+    """A bright field on a dark one, which moves by a quarter of its width a frame."""
+    frames = np.full((COUNT, HEIGHT, WIDTH, 3), 40, np.uint8)
+    for index, frame in enumerate(frames):
+        frame[12:36, 6 * index : 6 * index + 24] = 200, 120, 160
+    return frames
+
+
+@pytest.fixture
+def built(bpy, edit, tmp_path):
+    """Sets up a strip, has Blender build its proxies of a half, and gives the strip."""
+
+    def strip(kind):
+        strips = edit.sequence_editor.strips
+        if kind == "IMAGE":
+            images = strips.new_image("images", str(write_frames(tmp_path / "in", pictures()[:1])), 1, 1)
+            write_frames(tmp_path / "in", pictures())
+            for index in range(2, COUNT + 1):
+                images.elements.append(f"f{index:04d}.png")
+            return images
+        with av.open(str(tmp_path / "movie.mp4"), "w") as movie:
+            stream = movie.add_stream("libx264", rate=25, options={"qp": "10"})
+            stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
+            for frame in pictures():
+                movie.mux(stream.encode(av.VideoFrame.from_ndarray(frame)))
+            movie.mux(stream.encode())
+        return strips.new_movie("movie", str(tmp_path / "movie.mp4"), 2, 1)
+
+    def build(kind, **settings):
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
+        found = strip(kind)
+        found.select = found.use_proxy = found.proxy.build_50 = True
+        for name, value in settings.items():
+            setattr(found.proxy, name, value)
+        with sequencer(bpy):
+            assert bpy.ops.sequencer.rebuild_proxy() == {"FINISHED"}
+        return found
+
+    return build
+
+
+def proxied(edit, strip):
+    """The strip's medium at half its size, as a preview reads it."""
+    from shutter_addon.blender.data import source_media, strip_proxies
+
+    return source_media.spec(strip).open(2, strip_proxies.proxy_of(edit, strip, 50))
+
+
+def assert_read(edit, strip):
+    """Every frame is from a proxy, and nearest to the footage's own."""
+    from shutter_addon.blender.data import source_media
+
+    with proxied(edit, strip) as source, source_media.spec(strip).open(2) as footage:
+        assert source.from_proxy
+        assert (source.width, source.height, source.count) == (WIDTH // 2, HEIGHT // 2, COUNT)
+        own = np.array([footage.read(index) for index in range(COUNT)]).astype(int)
+        for index in range(COUNT):
+            apart = np.abs(source.read(index) - own).mean(axis=(1, 2, 3))
+            assert (apart.argmin(), apart[index] > 0, apart[index] < 8) == (index, True, True)
+
+
+@pytest.mark.parametrize("kind", ["MOVIE", "IMAGE"])
+@pytest.mark.parametrize("place", ["beside", "strip", "project", "project's default"])
+def test_where_blender_puts_them(edit, built, kind, place):
+    editor = edit.sequence_editor
+    editor.proxy_storage = "PROJECT" if "project" in place else "PER_STRIP"
+    editor.proxy_dir = "//of the project" if place == "project" else ""
+    own = {"use_proxy_custom_directory": True, "directory": "//own"} if place == "strip" else {}
+    assert_read(edit, built(kind, **own))
+
+
+@pytest.mark.parametrize("kind", ["MOVIE", "IMAGE"])
+def test_when_they_are_read(bpy, edit, built, tmp_path, kind):
+    from shutter_addon.blender.data.strip_proxies import proxy_of
+
+    strip = built(kind)
+    first = proxy_of(edit, strip, 50)
+    assert first == proxy_of(edit, strip, 50)
+    assert proxy_of(edit, strip, 25) is None  # not to be built
+    strip.proxy.build_25 = True
+    assert proxy_of(edit, strip, 25) is None  # not there
+    strip.use_proxy = False
+    assert proxy_of(edit, strip, 50) is None
+    strip.use_proxy = True
+    edit.sequencer_colorspace_settings.name = "Linear Rec.709"
+    assert (proxy_of(edit, strip, 50) is None) == (kind == "IMAGE")
+    edit.sequencer_colorspace_settings.name = "sRGB"
+    strip.proxy.quality = 20
+    with sequencer(bpy):
+        bpy.ops.sequencer.rebuild_proxy()
+    assert proxy_of(edit, strip, 50) not in (None, first)
+    for file in (file for file in tmp_path.rglob("BL_proxy/**/*") if file.is_file()):
+        file.unlink()
+    assert not proxied(edit, strip).from_proxy
+
+
+def test_a_file_of_the_strips_own(edit, built, tmp_path):
+    (file,) = (built("MOVIE"), *tmp_path.rglob("proxy_50.avi"))[1:]
+    file.rename(tmp_path / "mine.avi")
+    strip = edit.sequence_editor.strips[0]
+    strip.proxy.use_proxy_custom_file, strip.proxy.filepath = True, "//mine.avi"
+    assert_read(edit, strip)
+
+
+@pytest.mark.parametrize(
+    ("name", "samples", "space"),
+    [
+        ("f.png", "uint8", "Non-Color"),
+        ("f.png", "uint8", "Linear Rec.709"),
+        ("f.png", "uint16", "Filmic sRGB"),
+        ("f.tif", "uint16", "sRGB"),
+        ("f.exr", "half", "Linear Rec.709"),
+        ("f.exr", "float", "ACEScg"),
+        ("f.exr", "half", "Non-Color"),
+    ],
+)
+@pytest.mark.parametrize("divisor", [1, 2])
+def test_samples_of_images(bpy, edit, tmp_path, name, samples, space, divisor):
+    """Whatever Blender makes of them, it is the footage's light; brighter than white too, where that has it."""
+    from shutter_addon.blender.data import source_media, strip_proxies
+
+    picture = np.full((HEIGHT, WIDTH, 3), 0.25, np.float32)
+    picture[:, WIDTH // 2 :] = 3.0 if name == "f.exr" else 0.6
+    image = OpenImageIO.ImageBuf(picture)
+    image.set_write_format(samples)
+    image.write(str(tmp_path / name))
+    strip = edit.sequence_editor.strips.new_image("image", str(tmp_path / name), 1, 1)
+    strip.colorspace_settings.name = space
+    strip.select = strip.use_proxy = strip.proxy.build_50 = True
+    strip.proxy.quality = 95
+    with sequencer(bpy):
+        bpy.ops.sequencer.rebuild_proxy()
+    spec, proxy = source_media.spec(strip), strip_proxies.proxy_of(edit, strip, 50)
+    with spec.open(divisor, proxy) as source, spec.open(divisor) as footage:
+        assert source.from_proxy
+        ours, own = source.read(0), footage.read(0)
+    assert (ours.dtype, ours.shape) == (own.dtype, own.shape)
+    places = (5, 5, -6), (5, -6, 5)
+    np.testing.assert_allclose(ours[places].astype(float), own[places].astype(float), rtol=0.02)

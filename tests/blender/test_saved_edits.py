@@ -1,0 +1,470 @@
+"""Saved edits, rendered by many processes in chunks: the same bits as Blender's own render, each frame once."""
+
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import noise_film, read_picture, small_disk
+
+from shutter_addon.core import claims, job_file
+
+ROOT = Path(__file__).parents[2]
+COUNT = 14  # frames
+# A worker whose patience is short: it says which frames Blender has written.
+WORKER = """
+import sys
+import bpy
+from bpy.app.handlers import persistent
+from shutter_addon import blender
+from shutter_addon.blender.command import main
+from shutter_addon.core import claims
+
+@persistent
+def wrote(scene, *_):
+    print("wrote", scene.frame_current, file=sys.stderr, flush=True)
+
+blender.register()
+bpy.app.handlers.render_write.append(wrote)
+claims.PATIENCE, claims.BEAT = 5.0, 0.2
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@pytest.fixture
+def noise():
+    return np.random.default_rng(3).integers(0, 256, (COUNT, 24, 40, 3), dtype=np.uint8)
+
+
+@pytest.fixture
+def save(bpy, tmp_path):
+    """Saves the edit that is open, with the paths of its footage relative to it."""
+
+    def saved(name="edit.blend"):
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / name))
+        bpy.ops.file.make_paths_relative()
+        bpy.ops.wm.save_mainfile()
+        return tmp_path / name
+
+    return saved
+
+
+@pytest.fixture
+def saved(bpy, edit, noise, save, tmp_path):
+    """An edit that is more than a source and its effect: the source goes on behind the effect, which lets it shine
+    through, below a second strip of footage; with dither, a view transform and a size of its own."""
+    _source, _effect, strip = noise_film(edit, noise, tmp_path)
+    strip.blend_alpha = 0.75
+    strip.right_handle = COUNT - 1
+    other = edit.sequence_editor.strips.new_image("other", str(tmp_path / "in" / "f0001.png"), 5, 4)
+    other.right_handle, other.blend_alpha = 9, 0.25
+    edit.view_settings.view_transform, edit.render.dither_intensity = "AgX", 1
+    edit.render.resolution_x, edit.render.resolution_y, edit.render.resolution_percentage = 80, 48, 50
+    edit.frame_step = 3
+    return save()
+
+
+@pytest.fixture
+def run(bpy, capfd):
+    """Runs the command in this process: its exit code, and what it says on stderr."""
+    from shutter_addon.blender import command
+
+    def main(*arguments):
+        capfd.readouterr()
+        return command.main([str(argument) for argument in arguments]), capfd.readouterr().err
+
+    return main
+
+
+def refused(done, *words):
+    code, said = done
+    assert code == 2
+    (line,) = said.strip().splitlines()
+    assert line.startswith("Virtual Shutter: ")
+    for word in words:
+        assert word in line
+
+
+def bits(folder, ending="png"):
+    return {path.name: read_picture(path).tobytes() for path in sorted(folder.glob(f"*.{ending}"))}
+
+
+def places(folder):
+    """What changes where a file is written anew."""
+    return {path.name: (path.stat().st_ino, path.stat().st_mtime_ns) for path in folder.glob("*.png")}
+
+
+@pytest.mark.parametrize("file_format", ["png", "exr"])
+def test_chunks_in_any_order_are_blenders_own_render(bpy, saved, run, tmp_path, file_format):
+    chunks = ["1:3", "4", "5-11", "12:14"]
+    random.Random(7).shuffle(chunks)
+    for chunk in chunks:
+        more = ["--resume"] if chunk == "4" else []
+        output = "--output", tmp_path / "out", "--format", file_format
+        assert run("render", saved, *output, "--frames", chunk, *more) == (0, "")
+    bpy.ops.wm.open_mainfile(filepath=str(saved))
+    scene = bpy.context.scene
+    settings = scene.render.image_settings
+    settings.media_type = "IMAGE"
+    settings.file_format, settings.color_depth = {"png": ("PNG", "16"), "exr": ("OPEN_EXR", "32")}[file_format]
+    scene.render.filepath, scene.frame_step = str(tmp_path / "own") + "/", 1
+    bpy.ops.render.render(animation=True)
+    found = bits(tmp_path / "out", file_format)
+    assert found == bits(tmp_path / "own", file_format)
+    assert list(found) == [f"{frame:04d}.{file_format}" for frame in range(1, COUNT + 1)]
+    assert len(set(found.values())) == COUNT
+    assert sorted(os.listdir(tmp_path / "out")) == list(found)
+
+
+def test_resume_renders_what_is_missing_damaged_or_of_another_version(bpy, saved, run, tmp_path):
+    out, other = tmp_path / "out", tmp_path / "other"
+    assert run("render", saved, "--output", out)[0] == 0
+    whole, before = bits(out), places(out)
+    assert run("render", saved, "--output", out, "--resume") == (0, "")
+    assert places(out) == before
+    bpy.ops.wm.open_mainfile(filepath=str(saved))
+    bpy.context.scene.sequence_editor.strips["other"].blend_alpha = 0.5
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "changed.blend"))
+    assert run("render", tmp_path / "changed.blend", "--output", other, "--frames", "5")[0] == 0
+    assert bits(other)["0005.png"] != whole["0005.png"]
+    (out / "0002.png").unlink()
+    content = bytearray((out / "0003.png").read_bytes())
+    content[len(content) // 2] ^= 1
+    (out / "0003.png").write_bytes(content)
+    (out / "0004.png").write_bytes(content[: len(content) // 2])
+    shutil.copy(other / "0005.png", out / "0005.png")
+    shutil.copy(tmp_path / "in" / "f0007.png", out / "0007.png")
+    (out / ".claim-0009_png-0").touch()  # of a frame that its holder finished before it was killed
+    before = places(out)
+    assert run("render", saved, "--output", out, "--resume") == (0, "")
+    after = places(out)
+    changed = [name for name in sorted(after) if after[name] != before.get(name)]
+    assert changed == ["0002.png", "0003.png", "0004.png", "0005.png", "0007.png"]
+    assert bits(out) == whole
+    assert sorted(os.listdir(out)) == sorted(whole)
+    footage = tmp_path / "in" / "f0014.png"
+    footage.write_bytes(footage.read_bytes()[:-12] + bytes(12))  # other content: all is of another version
+    assert run("render", saved, "--output", out, "--resume", "--frames", "1:2")[0] == 0
+    assert [name for name in sorted(after) if places(out)[name] != after[name]] == ["0001.png", "0002.png"]
+
+
+@contextmanager
+def worker(*arguments):
+    command = [sys.executable, "-c", WORKER, *map(str, arguments)]
+    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def test_a_killed_worker_and_two_at_once_render_each_frame_once(saved, run, tmp_path):
+    out = tmp_path / "out"
+    assert run("render", saved, "--output", tmp_path / "whole")[0] == 0
+    with worker("render", saved, "--output", out, "--resume") as killed:
+        said = [killed.stderr.readline(), killed.stderr.readline()]
+        os.kill(killed.pid, signal.SIGKILL)
+        assert killed.wait() == -signal.SIGKILL
+    assert said == ["wrote 1\n", "wrote 2\n"]
+    assert [name for name in os.listdir(out) if claims.is_claim(name)]
+    finished = {int(path.stem) for path in out.glob("*.png")}
+    assert 1 in finished
+    assert len(finished) < COUNT
+    again = "render", saved, "--output", out, "--resume"
+    with worker(*again) as one, worker(*again) as two:
+        said = "\n".join(each.communicate()[1] for each in (one, two))  # the last line of one may have no end
+        assert (one.returncode, two.returncode) == (0, 0)
+    assert "which other workers have claimed\n" in said  # it looks as if nothing went on
+    wrote = [int(line.removeprefix("wrote ")) for line in said.splitlines() if line.startswith("wrote ")]
+    assert sorted(wrote) == [frame for frame in range(1, COUNT + 1) if frame not in finished]
+    assert bits(out) == bits(tmp_path / "whole")
+    assert not [name for name in os.listdir(out) if claims.is_claim(name)]
+
+
+def test_a_job_of_another_version_is_refused(bpy, saved, run, tmp_path):
+    from shutter_addon.blender.data import versions
+
+    out = tmp_path / "out"
+    out.mkdir()
+    bpy.ops.wm.open_mainfile(filepath=str(saved))
+    version = versions.of_edit(bpy.context.scene)
+    job_file.write(out, version)
+    copy = tmp_path / "elsewhere"
+    copy.mkdir()
+    shutil.copytree(tmp_path / "in", copy / "in")
+    shutil.copy(saved, copy)
+    assert run("render", copy / saved.name, "--output", out, "--frames", "2") == (0, "")
+    other = version.as_data() | {"extension": "9.9.9"}
+    job_file.write(out, version.from_data(other))
+    refused(run("render", saved, "--output", out, "--frames", "3"), job_file.NAME, "version 9.9.9 of the extension")
+    job_file.write(out, version)
+    footage = copy / "in" / "f0003.png"
+    footage.write_bytes(footage.read_bytes() + b"\0")
+    refused(run("render", copy / saved.name, "--output", out, "--frames", "3"), "f0001.png on has other content")
+    (out / job_file.NAME).write_text("{")
+    refused(run("render", saved, "--output", out, "--frames", "3"), job_file.NAME, "damaged")
+    assert sorted(os.listdir(out)) == ["0002.png", job_file.NAME]
+
+
+@pytest.fixture
+def at_frame(bpy):
+    """Has something done after a frame was rendered, before its picture is moved to its place."""
+    handlers = []
+
+    def at(frame, do):
+        handlers.append(bpy.app.handlers.persistent(lambda scene, *_: scene.frame_current == frame and do()))
+        bpy.app.handlers.render_write.append(handlers[-1])
+
+    yield at
+    for handler in handlers:
+        bpy.app.handlers.render_write.remove(handler)
+
+
+def test_pictures_of_another_version_are_read_once(saved, run, tmp_path, monkeypatch):
+    """There may be thousands of them, on a network drive."""
+    from shutter_addon.media import rendered_pictures
+
+    out, looked = tmp_path / "out", []
+    out.mkdir()
+    for number in range(1, COUNT + 1):
+        shutil.copy(tmp_path / "in" / "f0007.png", out / f"{number:04d}.png")
+
+    def read(path, *key, read=rendered_pictures.read):
+        looked.append(path.name)
+        return read(path, *key)
+
+    monkeypatch.setattr(rendered_pictures, "read", read)
+    assert run("render", saved, "--output", out, "--resume")[0] == 0
+    assert sorted(looked) == [f"{number:04d}.png" for number in range(1, COUNT + 1)]
+    assert all(read(path).edit for path in out.iterdir())
+
+
+def test_an_edit_that_is_saved_over_while_it_is_opened(saved, run, tmp_path, monkeypatch):
+    from shutter_addon.blender.editing import saved_edit
+
+    def open_edit(path, opened=saved_edit.open_edit):
+        found = opened(path)
+        path.write_bytes(path.read_bytes() + b"newer")
+        return found
+
+    monkeypatch.setattr(saved_edit, "open_edit", open_edit)
+    refused(run("render", saved, "--output", tmp_path / "out"), str(saved), "saved over while it was opened")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("resume", [[], ["--resume"]])
+def test_a_job_of_a_newer_version_ends_an_older_ones_render(bpy, saved, run, at_frame, tmp_path, resume):
+    from shutter_addon.blender.data import versions
+
+    bpy.ops.wm.open_mainfile(filepath=str(saved))
+    newer = replace(versions.of_edit(bpy.context.scene), blend="00" * 32)
+    out = tmp_path / "out"
+    at_frame(3, lambda: job_file.write(out, newer))
+    refused(run("render", saved, "--output", out, *resume), job_file.NAME, "another version of the .blend file")
+    assert sorted(os.listdir(out)) == ["0001.png", "0002.png", job_file.NAME]
+
+
+def test_footage_that_is_written_to_costs_only_what_was_rendered_of_it(saved, run, at_frame, tmp_path):
+    out = tmp_path / "out"
+    assert run("render", saved, "--output", out)[0] == 0
+    whole = places(out)
+
+    def write():
+        footage = tmp_path / "in" / "f0014.png"
+        footage.write_bytes(footage.read_bytes() + b"newer")
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    at_frame(2, write)
+    refused(run("render", saved, "--output", out), "f0014.png: was written to while frames were rendered")
+    assert places(out) == {name: place for name, place in whole.items() if name > "0002.png"}
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts a small disk")
+def test_a_full_disk_and_one_that_cannot_be_written(saved, run, tmp_path):
+    assert run("render", saved, "--output", tmp_path / "whole")[0] == 0
+    size = (tmp_path / "whole" / "0001.png").stat().st_size
+    page = resource.getpagesize()
+    with small_disk(tmp_path / "disk", 1 << 20) as disk:
+        out = disk / "out"
+        out.mkdir()
+        (disk / "filler").write_bytes(bytes((1 << 20) - 5 * (-(-size // page)) * page - 8 * page))
+        refused(run("render", saved, "--output", out, "--resume"), "no space left")
+        left = bits(out)
+        assert 0 < len(left) < COUNT
+        assert sorted(os.listdir(out)) == sorted(left)
+        taken = sum(-(-path.stat().st_size // page) for path in out.iterdir())
+        (disk / "filler").write_bytes(bytes((1 << 20) - taken * page))
+        refused(run("render", saved, "--output", out, "--resume"), "o space left")
+        (disk / "filler").unlink()
+        subprocess.run(["mount", "-o", "remount,ro", str(disk)], check=True)
+        refused(run("render", saved, "--output", out, "--resume"), str(out), "Read-only")
+        refused(run("render", saved, "--output", out), str(out), "Read-only")
+        subprocess.run(["mount", "-o", "remount,rw", str(disk)], check=True)
+        assert run("render", saved, "--output", out, "--resume") == (0, "")
+        assert bits(out) == bits(tmp_path / "whole")
+        assert sorted(os.listdir(disk)) == ["out"]
+
+
+@pytest.mark.parametrize("name", ["f0001.png", "f0003.png", "title.png"])
+def test_missing_footage_is_named(bpy, saved, run, save, tmp_path, name):
+    """Blender would render on without it."""
+    bpy.ops.wm.open_mainfile(filepath=str(saved))
+    shutil.copy(tmp_path / "in" / "f0001.png", tmp_path / "in" / "title.png")
+    bpy.context.scene.sequence_editor.strips.new_image("title", str(tmp_path / "in" / "title.png"), 7, 2)
+    saved = save()
+    (tmp_path / "in" / name).unlink()
+    done = run("render", saved, "--output", tmp_path / "out", "--frames", "2:3")
+    refused(done, f"{name}: no such file in {tmp_path / 'in'}")
+    assert not (tmp_path / "out" / "0003.png").exists()  # which needs each of them
+
+
+def test_missing_media_are_those_of_the_frames(bpy, edit, run, save, tmp_path):
+    """Whatever lies in a strip, in a scene or in a material of it, and whichever command asks."""
+
+    def image(name):
+        made = bpy.data.images.new(name, 4, 4)
+        made.source, made.filepath = "FILE", str(tmp_path / name)
+        return made
+
+    room, material = bpy.data.scenes.new("Room"), bpy.data.materials.new("paint")
+    mesh = bpy.data.meshes.new("mesh")
+    mesh.materials.append(material)
+    room.collection.objects.link(bpy.data.objects.new("thing", mesh))
+    tree = material.node_tree
+    tree.nodes.new("ShaderNodeTexImage").image = image("paint.png")
+    tiles = image("wood.<UDIM>.png")
+    tiles.source = "TILED"
+    tiles.tiles.new(1012)
+    (tmp_path / "wood.1001.png").write_bytes(b"wood")
+    tree.nodes.new("ShaderNodeTexImage").image = tiles
+    image("unused.png").use_fake_user = True
+    new = edit.sequence_editor.strips
+    new.new_effect("grey", "COLOR", 1, 1, length=9)
+    new.new_scene("room", room, 3, 4).right_handle = 7
+    edit.frame_start, edit.frame_end = 1, 9
+    edit.render.resolution_x, edit.render.resolution_y = 16, 8
+    saved, out = save(), ("--output", tmp_path / "out")
+    assert run("check", saved, "--frames", "1:3") == (0, "")
+    assert run("render", saved, "--frames", "3", *out) == (0, "")
+    code, said = run("check", saved, "--frames", "3:4")
+    assert code == 2
+    faults = ['image "paint.png": paint.png: no such', 'image "wood.<UDIM>.png": wood.1012.png: no such']
+    assert [any(fault in line for line in said.splitlines()) for fault in faults] == [True, True]
+    assert len(said.splitlines()) == 2
+    refused(run("render", saved, "--frames", "3:4", *out), "no such file in")
+    assert sorted(os.listdir(tmp_path / "out")) == ["0003.png"]
+
+
+def test_an_edit_without_an_effect_renders(bpy, edit, run, save, tmp_path):
+    strip = edit.sequence_editor.strips.new_effect("grey", "COLOR", 1, 1, length=2)
+    strip.color = 0.5, 0.25, 0.125
+    edit.frame_start, edit.frame_end = 1, 2
+    edit.render.resolution_x, edit.render.resolution_y = 16, 8
+    assert run("render", save(), "--output", tmp_path / "out") == (0, "")
+    assert np.abs(read_picture(tmp_path / "out" / "0002.png")[0, 0, :3] - [127.5, 63.75, 31.875]).max() <= 0.5
+
+
+def test_in_betweens_of_an_edits_frames_are_built_and_shared(bpy, edit, noise, run, save, tmp_path):
+    _source, effect, _strip = noise_film(edit, noise, tmp_path)
+    effect.inbetween = "2"
+    saved, out = save(), tmp_path / "out"
+    refused(run("render", saved, "--output", out, "--frames", "3:4"), "in-between frames", "are missing")
+    assert run("inbetween", saved, "--frames", "3:4")[0] == 0
+    (cache,) = (tmp_path / "virtual_shutter_inbetween").iterdir()
+    built = {line.split()[1] for path in (cache / "checks").iterdir() for line in path.read_text().splitlines()}
+    assert built
+    assert run("render", saved, "--output", out, "--frames", "3:4") == (0, "")
+    assert run("render", saved, "--output", out, "--frames", "9")[0] == 2
+    assert run("inbetween", saved) == (0, "")
+    assert run("render", saved, "--output", out, "--resume") == (0, "")
+    assert len(bits(out)) == COUNT
+    refused(run("inbetween", saved, "--factor", "2"), "--factor")
+    refused(run("inbetween", tmp_path / "in" / "f0001.png"), "--factor is missing")
+
+
+def test_what_cannot_be_done_is_one_sentence(bpy, saved, run, save, tmp_path):
+    out = "--output", tmp_path / "out"
+    for arguments, *words in [
+        ((saved,), "--output"),
+        ((saved, "--output", tmp_path / "film.mp4"), "film.mp4", "folder of pictures"),
+        ((saved, *out, "--recipe", tmp_path / "r.json"), "--recipe"),
+        ((saved, *out, "--weights", tmp_path / "w"), "--weights"),
+        ((saved, *out, "--inbetween-method", "quick"), "--inbetween-method"),
+        ((saved, *out, "--frames", "3:15"), "3:15", "the edit's frames 1:14"),
+        ((saved, *out, "--frames", "3:"), "3:"),
+        ((tmp_path / "none.blend", *out), "none.blend", "no such file"),
+        ((tmp_path / "in" / "f0001.png", *out), "--recipe"),
+        ((tmp_path / "in" / "f0001.png", *out, "--recipe", tmp_path / "r.json", "--resume"), "--resume"),
+    ]:
+        refused(run("render", *arguments), *words)
+    for content in (b"", b"BLENDER nonsense", saved.read_bytes()[:5000]):
+        (tmp_path / "bad.blend").write_bytes(content)
+        refused(run("render", tmp_path / "bad.blend", *out), "bad.blend")
+    bpy.ops.wm.open_mainfile(filepath=str(saved))
+    bpy.context.scene.render.use_stamp = True
+    refused(run("render", save("burnt.blend"), *out, "--resume"), "--resume", "Burn Into Image")
+    bpy.ops.wm.open_mainfile(filepath=str(saved))
+    name, bpy.context.window.scene = bpy.context.scene.name, bpy.data.scenes.new("Empty")
+    refused(run("render", save("two.blend"), *out), "Empty", f'make "{name}" the active one')
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("place", ["nowhere", "edit", "inner", "object", "material"])
+def test_a_driver_that_needs_scripts_is_named(bpy, edit, run, save, tmp_path, place):
+    """Wherever it drives what the edit shows; others are nobody's concern, nor are those that Blender does evaluate."""
+    edit.sequence_editor.strips.new_effect("grey", "COLOR", 1, 1, length=2)
+    edit.frame_start, edit.frame_end = 1, 2
+    edit.render.resolution_x, edit.render.resolution_y = 16, 8
+    inner, room = bpy.data.scenes.new("Inner"), bpy.data.scenes.new("Room")
+    inner.sequence_editor_create().strips.new_scene("room", room, 1, 1)
+    strip = edit.sequence_editor.strips.new_scene("inner", inner, 2, 1)
+    strip.scene_input, strip.right_handle = "SEQUENCER", 3
+    mesh, material = bpy.data.meshes.new("mesh"), bpy.data.materials.new("Paint")
+    mesh.materials.append(material)
+    thing, unused = bpy.data.objects.new("Thing", mesh), bpy.data.objects.new("Unused", None)
+    room.collection.objects.link(thing)
+    thing.driver_add("hide_render").driver.expression = "max([0, 0]) + frame * 0"
+    unused.driver_add("hide_render").driver.expression = "bpy.data.is_dirty"
+    if place == "nowhere":
+        assert run("render", save(), "--output", tmp_path / "out")[0] == 0
+        return
+    owner, name, path = {
+        "edit": (edit, edit.name, "audio_volume"),
+        "inner": (inner, "Inner", "audio_volume"),
+        "object": (thing, "Thing", "pass_index"),
+        "material": (material.node_tree, "Paint", 'nodes["Principled BSDF"].inputs["IOR"].default_value'),
+    }[place]
+    owner.driver_add(path).driver.expression = "bpy.context.scene.frame_current"
+    code, said = run("render", save(), "--output", tmp_path / "out")
+    assert code == 2
+    assert f'"{name}" needs scripts, which are not run (bpy.context' in said.splitlines()[-1]  # Blender tells it, too
+
+
+def test_pictures_are_not_written_over_footage(edit, noise, run, save, tmp_path):
+    source, _effect, _strip = noise_film(edit, noise, tmp_path)
+    for index, element in enumerate(source.elements, start=1):
+        (tmp_path / "in" / element.filename).rename(tmp_path / "in" / f"{index:04d}.png")
+        element.filename = f"{index:04d}.png"
+    saved = save()
+    before = bits(tmp_path / "in")
+    refused(run("render", saved, "--output", tmp_path / "in"), "0001.png", "which is read")
+    assert bits(tmp_path / "in") == before
+
+
+def test_a_stopped_worker_leaves_finished_frames_alone(saved, tmp_path):
+    out = tmp_path / "out"
+    with worker("render", saved, "--output", out, "--resume") as stopped:
+        stopped.stderr.readline()
+        stopped.send_signal(signal.SIGTERM)
+        assert "stopped" in stopped.communicate()[1]
+        assert stopped.returncode == 130
+    assert 0 < len(bits(out)) < COUNT
+    assert sorted(os.listdir(out)) == sorted(bits(out))

@@ -1,0 +1,58 @@
+"""What a window is said to need is what it takes."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from shutter_addon.compute import memory_needs
+from shutter_addon.compute.budget import Budget
+from shutter_addon.compute.cpu import CPUCompositor
+from shutter_addon.compute.device import NoDeviceError
+from shutter_addon.compute.renderer import open_gl
+from shutter_addon.compute.window import beside, open_window
+
+WINDOW, SHUTTERS = 6, 3
+
+
+def source(dtype, alpha):
+    shape = {"width": 70, "height": 50, "count": 20, "dtype": np.dtype(dtype)}
+    return SimpleNamespace(**shape, alpha=alpha, transfer="srgb", shots=None)
+
+
+@pytest.fixture(scope="module")
+def device():
+    try:
+        device = open_gl(Budget(4 << 20))
+    except NoDeviceError as error:
+        pytest.skip(str(error))
+    yield device
+    device.release()
+
+
+@pytest.mark.parametrize("moved", [False, True])
+@pytest.mark.parametrize(("dtype", "alpha"), [(np.uint8, "opaque"), (np.uint16, "straight"), (np.float32, "opaque")])
+def test_on_a_gpu(device, dtype, alpha, moved):
+    with device.current():
+        window = open_window(device, source(dtype, alpha), WINDOW, moved, SHUTTERS)
+        taken = device.budget.used
+        window.release()
+    needs = memory_needs.of_window(device, source(dtype, alpha), WINDOW, moved, SHUTTERS)
+    assert needs == (taken + beside(source(dtype, alpha), SHUTTERS), 0, False)
+
+
+def test_without_room_the_frames_stay_on_the_host(device):
+    needs = memory_needs.of_window(device, source(np.float32, "opaque"), 250, False, SHUTTERS)
+    assert needs.sends
+    assert needs.host == 250 * 70 * 50 * 16
+    assert needs.gpu <= device.budget.limit
+
+
+@pytest.mark.parametrize(("dtype", "alpha", "moved"), [(np.uint8, "opaque", False), (np.uint16, "straight", False)])
+def test_with_numpy(dtype, alpha, moved):
+    pictures = source(dtype, alpha)
+    pictures.read = lambda index: np.zeros((50, 70, 4), dtype)
+    window = CPUCompositor().window(pictures, WINDOW, moved)
+    sums = getattr(window, "_sums", [])
+    taken = sum(each.nbytes for each in sums) or WINDOW * pictures.read(0).nbytes
+    assert memory_needs.of_numpy_window(pictures, WINDOW, moved) == (0, taken, False)

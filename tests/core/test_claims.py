@@ -1,0 +1,162 @@
+"""Claims: one holder at a time among processes, and another one when that is killed."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from itertools import chain
+from pathlib import Path
+
+import pytest
+
+from shutter_addon.core import claims
+from shutter_addon.core.claims import Claims
+
+ROOT = Path(__file__).parents[2]
+BEAT, PATIENCE = 0.05, 0.5  # seconds
+# Takes what it can of names, each time that it gets a line of them; says what it has got.
+WORKER = """
+import json, sys
+from pathlib import Path
+from shutter_addon.core.claims import Claims
+
+with Claims(Path(sys.argv[1]), patience=0.5, beat=0.05) as claims:
+    print("ready", flush=True)
+    for line in sys.stdin:
+        print(json.dumps([name for name in json.loads(line) if claims.take(name)]), flush=True)
+"""
+
+
+class Worker:
+    """A process with claims."""
+
+    def __init__(self, folder):
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+        self.process = subprocess.Popen([sys.executable, "-c", WORKER, str(folder)], cwd=ROOT, **pipes)
+        assert self.process.stdout.readline() == "ready\n"
+
+    def ask(self, *names):
+        self.process.stdin.write(json.dumps(names) + "\n")
+        self.process.stdin.flush()
+
+    def took(self):
+        return json.loads(self.process.stdout.readline())
+
+    def take(self, *names):
+        self.ask(*names)
+        return self.took()
+
+
+@pytest.fixture
+def worker(tmp_path):
+    made = []
+
+    def make():
+        made.append(Worker(tmp_path))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.process.kill()
+        each.process.communicate()
+
+
+def until(condition):
+    """Waits for a condition, for a minute at most."""
+    end = time.monotonic() + 60
+    while not (found := condition()):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    return found
+
+
+def test_a_name_has_one_holder(worker):
+    names = [f"{number:04d}" for number in range(500)]
+    workers = [worker() for _ in range(4)]
+    for each in workers:
+        each.ask(*names)
+    took = [each.took() for each in workers]
+    assert sorted(chain.from_iterable(took)) == names
+
+
+def test_a_killed_holders_claim_goes_to_one_alone(worker, tmp_path):
+    holder, *others = (worker() for _ in range(4))
+    assert holder.take("a", "b") == ["a", "b"]
+    assert others[0].take("a") == []
+    holder.process.kill()
+    taken = []
+
+    def try_all():
+        for each in others:
+            each.ask("a", "b")
+        taken.extend(chain.from_iterable(each.took() for each in others))
+        return len(taken) == 2
+
+    until(try_all)
+    assert sorted(taken) == ["a", "b"]
+    for _ in range(3):
+        try_all()
+    assert sorted(taken) == ["a", "b"]
+
+
+def test_a_holder_that_works_keeps_its_claim(worker, tmp_path):
+    """However long it works: its claim is touched again and again, for many times the other's patience."""
+    holder = worker()
+    assert holder.take("a") == ["a"]
+    (path,) = tmp_path.iterdir()
+    seen = set()
+    with Claims(tmp_path, PATIENCE, BEAT) as mine:
+
+        def touched_often():
+            assert not mine.take("a")
+            seen.add(path.stat().st_mtime_ns)
+            return len(seen) > 3 * PATIENCE / BEAT
+
+        until(touched_often)
+        os.kill(holder.process.pid, 9)
+        until(lambda: mine.take("a"))
+
+
+def test_nothing_remains_of_what_was_released(worker, tmp_path):
+    holder = worker()
+    assert holder.take("a", "b") == ["a", "b"]
+    holder.process.kill()
+    with Claims(tmp_path, PATIENCE, BEAT) as mine:
+        until(lambda: mine.take("a"))
+        mine.release("a")
+        assert sorted(os.listdir(tmp_path)) == [".claim-b-0"]
+        assert mine.take("a")
+        assert mine.take("c")
+    assert os.listdir(tmp_path) == [".claim-b-0"]
+    (tmp_path / "0001.png").touch()
+    mine.clear(["b"])
+    assert os.listdir(tmp_path) == ["0001.png"]
+
+
+def test_what_a_stranger_put_there_holds_nothing_up(tmp_path):
+    (tmp_path / "elsewhere").touch()
+    (tmp_path / ".claim-a-0").symlink_to("elsewhere")
+    (tmp_path / ".claim-b-0").mkdir()
+    os.mkfifo(tmp_path / ".claim-c-0")
+    with Claims(tmp_path, 0.05, BEAT) as mine:
+        for name in "abc":
+            until(lambda name=name: mine.take(name))
+
+
+def test_a_folder_that_cannot_be_written_is_told(tmp_path):
+    with Claims(tmp_path / "none") as mine, pytest.raises(FileNotFoundError):
+        mine.take("a")
+
+
+def test_a_full_disk_leaves_no_claim(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    with Claims(tmp_path) as mine:
+        monkeypatch.setattr(claims.os, "write", full)
+        with pytest.raises(OSError, match="No space"):
+            mine.take("a")
+        monkeypatch.undo()
+        assert os.listdir(tmp_path) == []
+        assert mine.take("a")

@@ -1,0 +1,77 @@
+"""A small edit with sound and in-betweens, and what a farm makes of it."""
+
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import av
+
+ROOT = Path(__file__).parents[2]
+FARM = ROOT / "farm"
+FRAMES = 32
+SIZE = 160, 90
+RECIPE = {
+    "version": 1,
+    "window": 4,
+    "inbetween": 2,
+    "border": True,
+    "shutters": [{"name": "Long", "bars": [1, 1, 1, 1]}, {"name": "Sharp", "bars": [1, 0, 0, 0]}],
+    "regions": [{"shutter": "Sharp", "kind": "line", "width": 0.1, "strokes": [[[0.3, 0.3], [0.6, 0.7]]]}],
+}
+
+
+@dataclass
+class Job:
+    """A folder with an edit, its footage, and room for what a farm makes of it."""
+
+    folder: Path
+
+    @property
+    def edit(self):
+        return self.folder / "edit.blend"
+
+    @property
+    def pictures(self):
+        return self.folder / "pictures"
+
+    @property
+    def movie(self):
+        return self.folder / "film.mp4"
+
+    def result(self):
+        """The bytes of every picture and of the movie, by name."""
+        return {path.name: path.read_bytes() for path in [*sorted(self.pictures.glob("*.png")), self.movie]}
+
+    def check(self, expected):
+        """Fails where a result is not the same bits as another's."""
+        found, wanted = self.result(), expected.result()
+        assert found.keys() == wanted.keys(), sorted(found)
+        others = [name for name in wanted if found[name] != wanted[name]]
+        assert not others, f"other bits in {', '.join(others)}: {self.folder} and {expected.folder}"
+
+
+def shutter(*arguments):
+    subprocess.run(
+        [sys.executable, "-m", "shutter_addon", *map(str, arguments)], check=True, capture_output=True, timeout=120
+    )
+
+
+def shrink(source, path):
+    """The first frames of a movie and its sound, small."""
+    with av.open(str(source)) as movie, av.open(str(path), "w") as out:
+        picture, sound = movie.streams.video[0], movie.streams.audio[0]
+        small = out.add_stream("libx264", rate=picture.average_rate, options={"crf": "12"})
+        small.width, small.height, small.pix_fmt = *SIZE, "yuv420p"
+        copied = out.add_stream_from_template(sound)
+        length = FRAMES / picture.average_rate
+        for packet in movie.demux(sound):
+            if packet.dts is not None and packet.pts * packet.time_base < length:
+                packet.stream = copied
+                out.mux(packet)
+        movie.seek(0)
+        for index, frame in zip(range(FRAMES), movie.decode(picture), strict=False):
+            frame = frame.reformat(*SIZE, format="yuv420p")
+            frame.pts, frame.time_base = index, 1 / picture.average_rate
+            out.mux(small.encode(frame))
+        out.mux(small.encode())

@@ -1,0 +1,548 @@
+"""A farm's bad nights: whatever goes wrong is told, nothing wrong is delivered, and the same job, submitted again once
+the fault is gone, gives the very files that a night without faults gives."""
+
+import ctypes
+import json
+import os
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import av
+import numpy as np
+import OpenImageIO
+import pytest
+
+from shutter_addon.core import edit_version
+
+ROOT = Path(__file__).parents[2]
+FRAMES, CHUNKS = 24, ("1:9", "10-24")
+WIDTH, HEIGHT = 128, 72
+JOB = "virtual_shutter_job.json"
+OLD = b"the film of last night"
+RECIPE = {
+    "version": 1,
+    "window": 8,
+    "inbetween": 2,
+    "shutters": [{"name": "Long", "bars": [1] * 8}, {"name": "Sharp", "bars": [1] + [0] * 7}],
+    "regions": [{"name": "side", "shutter": "Sharp", "kind": "matte", "path": "matte.mkv", "channel": "red"}],
+}
+
+# Runs one command after another in a process: a line of JSON is a command, a line of JSON is what came of it. Claims of
+# killed workers count as abandoned after a moment, for there is nobody else who works.
+WORKER = """
+import contextlib, io, json, sys
+import bpy
+from shutter_addon import blender
+from shutter_addon.blender import command
+from shutter_addon.core import claims
+
+claims.PATIENCE = 0.5
+blender.register()
+for line in sys.stdin:
+    with contextlib.redirect_stderr(io.StringIO()) as said, contextlib.redirect_stdout(io.StringIO()):
+        code = command.main(json.loads(line))
+    print("\\n" + json.dumps([code, said.getvalue()]), flush=True)
+"""
+
+
+@dataclass(frozen=True)
+class Node:
+    """A machine's view of a job: a folder with the edit and its footage, and where frames and film go."""
+
+    folder: Path
+
+    @property
+    def edit(self):
+        return self.folder / "edit.blend"
+
+    @property
+    def inbetween(self):
+        return self.folder / "virtual_shutter_inbetween"
+
+    @property
+    def pictures(self):
+        return self.folder.parent / "pictures"
+
+    @property
+    def film(self):
+        return self.folder.parent / "films" / "film.mp4"
+
+    def check(self):
+        return "check", self.edit, "--output", self.pictures, "--inbetweens-later"
+
+    def build(self):
+        return "inbetween", self.edit
+
+    def render(self, frames=f"1:{FRAMES}"):
+        return "render", self.edit, "--output", self.pictures, "--frames", frames, "--resume", "--device", "cpu"
+
+    def join(self):
+        return "join", self.pictures, "--edit", self.edit, "--output", self.film
+
+    def steps(self):
+        """The commands of a whole submission, in their order."""
+        return [self.check(), self.build(), *map(self.render, CHUNKS), self.join()]
+
+
+def _started(arguments, before=()):
+    """The process of a command; before: a program that runs it."""
+    command = [*before, sys.executable, "-m", "shutter_addon", *arguments]
+    return subprocess.Popen(
+        list(map(str, command)), cwd=ROOT, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True
+    )
+
+
+def _ended(process):
+    """The exit code of a process, and its one sentence."""
+    with process:
+        _, said = process.communicate(timeout=120)
+    return process.returncode, said
+
+
+def _run(*arguments, before=()):
+    return _ended(_started(arguments, before))
+
+
+def _refused(done, *words, code=2):
+    assert done[0] == code, done
+    assert done[1].startswith("Virtual Shutter: ")
+    assert done[1].count("\n") == 1, done[1]
+    for word in words:
+        assert str(word).lower() in done[1].lower()
+
+
+def _without_waiting(said):
+    """What a worker said, but that it waits for others."""
+    lines = said.splitlines(keepends=True)
+    return "".join(line for line in lines if not line.endswith("which other workers have claimed\n"))
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A node whose job went well, each step in one piece and in a process of its own."""
+    node = Node(tmp_path_factory.mktemp("whole") / "node")
+    node.folder.mkdir()
+    _write_film(node.folder / "film.mkv", _passing(), sound=True)
+    _write_film(node.folder / "matte.mkv", _halves())
+    recipe = node.folder / "recipe.json"
+    recipe.write_text(json.dumps(RECIPE))
+    for step in [
+        ("render", node.folder / "film.mkv", "--recipe", recipe, "--save", node.edit),
+        node.check(),
+        ("render", node.edit, "--output", node.pictures, "--device", "cpu"),
+        node.join(),
+    ]:
+        assert _run(*step) == (0, "")
+    assert len(_pictures(node)) == FRAMES
+    return node
+
+
+def _passing():
+    """Pictures of blocks that pass by."""
+    random = np.random.default_rng(3)
+    blocks = random.integers(0, 256, (HEIGHT // 4, (WIDTH + 3 * FRAMES) // 4, 3), dtype=np.uint8)
+    wide = blocks.repeat(4, 0).repeat(4, 1)
+    return [np.ascontiguousarray(wide[:, 3 * i : 3 * i + WIDTH]) for i in range(FRAMES)]
+
+
+def _halves():
+    """Pictures that are black at the left, and white at the right from a place that moves."""
+    return [np.where(np.arange(WIDTH)[:, None] > 30 + 2 * i, 255, 0) + np.zeros((HEIGHT, 1, 3)) for i in range(FRAMES)]
+
+
+def _write_film(path, pictures, sound=False):
+    with av.open(str(path), "w") as file:
+        stream = file.add_stream("ffv1", rate=FRAMES)
+        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "bgr0"
+        heard = file.add_stream("pcm_s16le", rate=8000, layout="mono") if sound else None
+        for picture in pictures:
+            frame = av.VideoFrame.from_ndarray(np.asarray(picture, np.uint8), format="rgb24")
+            file.mux(stream.encode(frame.reformat(format="bgr0")))
+        file.mux(stream.encode())
+        if heard:
+            tone = (8000 * np.sin(np.arange(8000) * 0.3)).astype(np.int16)
+            frame = av.AudioFrame.from_ndarray(tone[None], format="s16", layout="mono")
+            frame.sample_rate = 8000
+            file.mux(heard.encode(frame))
+
+
+@pytest.fixture(scope="module")
+def worker():
+    """Runs a command in a process that runs many: exit code, and what it said."""
+    command = [sys.executable, "-c", WORKER]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, cwd=ROOT, **pipes) as process:
+
+        def run(*arguments):
+            print(json.dumps(list(map(str, arguments))), file=process.stdin, flush=True)
+            return next(tuple(json.loads(line)) for line in process.stdout if line.startswith("["))
+
+        yield run
+        process.stdin.close()
+
+
+@pytest.fixture
+def node(whole, tmp_path):
+    """A node that has all that the job needs, in-betweens too, and a film of last night; nothing is rendered."""
+    node = Node(tmp_path / "Knoten Süd 1" / "node")
+    shutil.copytree(whole.folder, node.folder)
+    node.film.parent.mkdir()
+    node.film.write_bytes(OLD)
+    return node
+
+
+@pytest.fixture
+def submit(whole, worker):
+    """Submits a node's job, and compares what it gives with that of the night without faults."""
+
+    def run(node):
+        for step in node.steps():
+            code, said = worker(*step)
+            assert (code, _without_waiting(said)) == (0, "")
+        assert _pictures(node) == _pictures(whole)
+        assert {path.name for path in node.pictures.iterdir() if not path.name.startswith(".part-")} == {
+            path.name for path in whole.pictures.iterdir()
+        }
+        assert node.film.read_bytes() == whole.film.read_bytes()
+
+    return run
+
+
+def _pictures(node):
+    return {path.name: path.read_bytes() for path in node.pictures.glob("*.png")}
+
+
+def _all_are_right(node, whole):
+    """Whether whatever pictures there are are those of the night without faults, and whole."""
+    return _pictures(node).items() <= _pictures(whole).items()
+
+
+def _wait_for(found, process):
+    """Waits until something is found, while the process runs."""
+    while not (result := found()):
+        assert process.poll() is None
+    return result
+
+
+def _put(node, whole, frames=range(1, FRAMES + 1)):
+    """Puts rendered frames, and the job's file, where the node's job has its own."""
+    node.pictures.mkdir()
+    for name in [JOB, *(f"{frame:04d}.png" for frame in frames)]:
+        shutil.copy(whole.pictures / name, node.pictures)
+
+
+# The command, what it writes, and how many files that are in the end.
+KILLED = {
+    "frames": (Node.render, lambda node: list(node.pictures.glob("*.png")), FRAMES),
+    "in-betweens": (Node.build, lambda node: list(node.inbetween.glob("*/*.png")), FRAMES - 1),
+    "join": (Node.join, lambda node: list(node.film.parent.glob(".part-*/*")), 2),
+}
+
+
+@pytest.mark.parametrize("step", KILLED)
+def test_a_killed_worker(whole, node, submit, step):
+    command, written, count = KILLED[step]
+    _put(node, whole, range(1, FRAMES + 1) if step == "join" else ())
+    if step == "in-betweens":
+        shutil.rmtree(node.inbetween)
+    process = _started(command(node))
+    _wait_for(lambda: written(node), process)
+    process.kill()
+    assert _ended(process) == (-signal.SIGKILL, "")
+    assert 0 < len(written(node)) < count
+    assert _all_are_right(node, whole)
+    assert node.film.read_bytes() == OLD
+    submit(node)
+
+
+def test_a_worker_that_is_asked_to_leave(whole, node, submit):
+    _put(node, whole, ())
+    process = _started(node.render())
+    _wait_for(lambda: _pictures(node), process)
+    process.terminate()
+    _refused(_ended(process), "stopped", code=130)
+    assert _all_are_right(node, whole)
+    assert 0 < len(_pictures(node)) < FRAMES
+    assert {path.name for path in node.pictures.iterdir()} == {JOB, *_pictures(node)}
+    submit(node)
+
+
+@contextmanager
+def _small_disk(folder, size):
+    """Puts an empty disk of so many bytes there; gives what makes it larger."""
+    folder.mkdir(exist_ok=True)
+    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", folder], check=True)
+    try:
+        yield lambda: subprocess.run(["mount", "-o", "remount,size=8m", folder], check=True)
+    finally:
+        subprocess.run(["umount", "--lazy", folder], check=True)  # the worker may read there
+
+
+FULL = {
+    "frames": (Node.render, lambda node: node.pictures, 96 << 10),
+    "in-betweens": (Node.build, lambda node: node.inbetween, 96 << 10),
+    "join": (Node.join, lambda node: node.film.parent, 24 << 10),
+}
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts a small disk")
+@pytest.mark.parametrize("step", FULL)
+def test_a_full_disk(whole, node, submit, step):
+    command, place, size = FULL[step]
+    if step == "join":
+        _put(node, whole)
+    elif step == "in-betweens":
+        shutil.rmtree(node.inbetween)
+    with _small_disk(place(node), size) as enlarge:
+        node.film.write_bytes(OLD)
+        _refused(_run(*command(node)), place(node), "no space left")
+        assert _all_are_right(node, whole)
+        assert node.film.read_bytes() == OLD
+        enlarge()
+        submit(node)
+
+
+def _seeing_read_only(folder):
+    """What goes before a command that sees a folder read-only; nobody else does, and nothing stays mounted."""
+    script = 'mount --bind "$0" "$0" && mount -o remount,bind,ro "$0" && exec "$@"'
+    return "unshare", "--mount", "sh", "-c", script, folder
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts")
+@pytest.mark.parametrize(("command", "place"), [(Node.render, "pictures"), (Node.join, "films")])
+def test_a_read_only_output(whole, node, submit, command, place):
+    _put(node, whole, range(1, FRAMES + 1) if place == "films" else range(1, 10))
+    folder = node.folder.parent / place
+    _refused(_run(*command(node), before=_seeing_read_only(folder)), folder, "read-only file system")
+    assert _all_are_right(node, whole)
+    assert node.film.read_bytes() == OLD
+    submit(node)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts")
+def test_a_read_only_edit_with_all_that_it_needs(whole, node, submit):
+    """Footage, edit and in-betweens lie on a drive that a node may only read."""
+    before = _seeing_read_only(node.folder)
+    for step in (node.check(), node.build(), node.render("3:4")):
+        assert _run(*step, before=before) == (0, "")
+    submit(node)
+
+
+def _film_of(count):
+    return lambda node: _write_film(node.folder / "film.mkv", _passing()[:count], sound=True)
+
+
+def _flip(path):
+    """Turns one bit of a file over, in its midst."""
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 4
+    path.write_bytes(content)
+
+
+def _cut(path):
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def _inbetween(node):
+    return min(node.inbetween.glob("*/0000003*.png"))
+
+
+def _change_job(name, value):
+    def change(node):
+        job = json.loads((node.pictures / JOB).read_text())
+        job["edit"][name] = value
+        (node.pictures / JOB).write_text(json.dumps(job))
+
+    return change
+
+
+# What is planted, and words of the sentence of the worker that meets it.
+FOUND_BY_RENDER = {
+    "footage missing": (lambda node: (node.folder / "film.mkv").unlink(), ["film.mkv", "no such file"]),
+    "footage shorter": (_film_of(FRAMES - 4), ["film.mkv has other content on this machine"]),
+    "footage half copied": (lambda node: _cut(node.folder / "film.mkv"), ["film.mkv has other content"]),
+    "other footage": (lambda node: _flip(node.folder / "film.mkv"), ["film.mkv has other content on this machine"]),
+    "matte missing": (lambda node: (node.folder / "matte.mkv").unlink(), ["matte.mkv is missing"]),
+    "other matte": (lambda node: _flip(node.folder / "matte.mkv"), ["matte.mkv has other content on this machine"]),
+    "other extension": (_change_job("extension", "0.0.9"), ["is of version 0.0.9 of the extension, this machine has"]),
+    "other Blender": (_change_job("blender", "5.1.0"), ["is of Blender 5.1.0, this machine has"]),
+    "job file damaged": (lambda node: _cut(node.pictures / JOB), [JOB, "is damaged; check the edit again"]),
+    "in-between damaged": (lambda node: _flip(_inbetween(node)), ["in-between frame is damaged or gone"]),
+    "in-between missing": (lambda node: _inbetween(node).unlink(), ["in-between frames of frame 1", "are missing"]),
+    "edit cut off": (lambda node: _cut(node.edit), ["edit.blend"]),
+    "no edit": (lambda node: node.edit.write_bytes(b"BLENDER"), ["edit.blend"]),
+}
+
+
+@pytest.mark.parametrize("fault", FOUND_BY_RENDER)
+def test_a_fault_that_a_worker_meets(whole, node, worker, submit, fault):
+    plant, words = FOUND_BY_RENDER[fault]
+    _put(node, whole, range(1, 10))
+    plant(node)
+    _refused(worker(*node.render(CHUNKS[1])), *words)
+    assert _all_are_right(node, whole)
+    assert node.film.read_bytes() == OLD
+    shutil.copytree(whole.folder, node.folder, dirs_exist_ok=True)
+    submit(node)
+
+
+def _rewrite(path, size=(WIDTH, HEIGHT), key="0123456789abcdef"):
+    """A picture like a frame's, of that size, and of another version of the edit."""
+    spec = OpenImageIO.ImageSpec(*size, 4, "uint16")
+    spec.attribute("Note", edit_version.note(key))
+    output = OpenImageIO.ImageOutput.create(str(path))
+    output.open(str(path), spec)
+    output.write_image(np.zeros((size[1], size[0], 4), np.uint16))
+    output.close()
+
+
+def _remove(node, *frames):
+    for frame in frames:
+        (node.pictures / f"{frame:04d}.png").unlink()
+
+
+# What is planted among finished frames, and words of the sentence of the join that meets it.
+FOUND_BY_JOIN = {
+    "gap": (lambda node: _remove(node, 3, 7, 8, 9), ["frames 3, 7 to 9 are missing"]),
+    "truncated": (lambda node: _cut(node.pictures / "0007.png"), ["0007.png: is damaged or cut off"]),
+    "flipped bit": (lambda node: _flip(node.pictures / "0007.png"), ["0007.png: is damaged or cut off"]),
+    "empty": (lambda node: (node.pictures / "0007.png").write_bytes(b""), ["0007.png: is damaged or cut off"]),
+    "other size": (lambda node: _rewrite(node.pictures / "0007.png", (64, 36)), ["0007.png: is 64×36"]),
+    "other edit": (
+        lambda node: _rewrite(node.pictures / "0007.png"),
+        ["0007.png: is of another version of the edit (0123456789abcdef) than 0001.png"],
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FOUND_BY_JOIN)
+def test_a_fault_among_finished_frames(whole, node, worker, submit, fault):
+    plant, words = FOUND_BY_JOIN[fault]
+    _put(node, whole)
+    plant(node)
+    _refused(worker(*node.join()), *words)
+    assert node.film.read_bytes() == OLD
+    submit(node)
+
+
+@pytest.mark.parametrize("frames", ["20:30", "0", "9:3", "all", ""])
+def test_frames_that_the_edit_has_not(node, worker, frames):
+    for command in (node.check(), node.build(), node.render(), node.join()):
+        _refused(worker(*command, "--frames", frames), "--frames: ")
+    assert not list(node.folder.parent.glob("pictures/*.png"))
+    assert node.film.read_bytes() == OLD
+
+
+def test_an_edit_that_is_saved_anew_amid_its_job(whole, node, worker, submit):
+    """The rest of the job is refused; the new edit's job takes none of the old one's frames for its own."""
+    _put(node, whole, range(1, 10))
+    recipe = node.folder / "recipe.json"
+    recipe.write_text(json.dumps(RECIPE | {"inbetween": 1}))
+    assert worker("render", node.folder / "film.mkv", "--recipe", recipe, "--save", node.edit) == (0, "")
+    _refused(worker(*node.render(CHUNKS[1])), "the job is of another version of the .blend file")
+    assert _pictures(node).items() <= _pictures(whole).items()
+    _refused(worker(*node.join()), "the job is of another version of the .blend file")
+    for step in node.steps():
+        assert worker(*step) == (0, "")
+    assert not _pictures(node).items() & _pictures(whole).items()
+    assert node.film.read_bytes() not in (OLD, whole.film.read_bytes())
+    shutil.copytree(whole.folder, node.folder, dirs_exist_ok=True)
+    submit(node)
+
+
+def test_claims_of_a_machine_that_died(whole, node, worker, submit):
+    _put(node, whole, range(1, 10))
+    for name in ("0012_png-0", "0012_png-1", "0013_png-0"):
+        (node.pictures / f".claim-{name}").write_text("0123456789abcdef node 4711\n")
+    submit(node)
+
+
+@contextmanager
+def _moved_into(folder):
+    """Gives a list that gets the names of all files that are moved into a folder, at the end."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    watch, moved_to = libc.inotify_init1(os.O_NONBLOCK), 0x80
+    assert libc.inotify_add_watch(watch, os.fsencode(folder), moved_to) >= 0
+    names = []
+    try:
+        yield names
+        events = os.read(watch, 1 << 20)
+        while events:
+            length = 16 + struct.unpack_from("iIII", events)[3]
+            names.append(events[16:length].rstrip(b"\0").decode())
+            events = events[length:]
+    finally:
+        os.close(watch)
+
+
+def test_two_schedulers_at_once(whole, node, submit):
+    """While one worker has claimed frames, another works on the rest: none is rendered twice."""
+    _put(node, whole, ())
+    with _moved_into(node.pictures) as moved:
+        first = _started(node.render())
+        _wait_for(lambda: list(node.pictures.glob(".claim-*")), first)
+        first.send_signal(signal.SIGSTOP)
+        second = _started(node.render())
+        _wait_for(lambda: list(node.pictures.glob("0009.png")), second)
+        first.send_signal(signal.SIGCONT)
+        ended = [_ended(first), _ended(second)]
+        assert [(code, _without_waiting(said)) for code, said in ended] == [(0, "")] * 2
+    assert sorted(moved) == sorted(_pictures(whole))
+    assert _pictures(node) == _pictures(whole)
+    submit(node)
+
+
+def test_footage_that_is_written_to_while_it_is_rendered(whole, node, submit):
+    """What was rendered meanwhile may be of either, and does not stay."""
+    _put(node, whole, range(1, 10))
+    process = _started(node.render())
+    _wait_for(lambda: (node.pictures / "0010.png").exists(), process)
+    process.send_signal(signal.SIGSTOP)
+    shutil.copy(node.folder / "matte.mkv", node.folder / "film.mkv")
+    process.send_signal(signal.SIGCONT)
+    _refused(_ended(process), "film.mkv: was written to while frames were rendered from it")
+    assert _pictures(node).items() <= _pictures(whole).items()
+    assert len(_pictures(node)) == 9
+    shutil.copytree(whole.folder, node.folder, dirs_exist_ok=True)
+    submit(node)
+
+
+PLANT = """
+import sys
+import bpy
+
+edit, marker, kind = sys.argv[1:]
+touch = f"__import__('pathlib').Path({marker!r}).touch()"
+bpy.ops.wm.open_mainfile(filepath=edit)
+if kind == "text":
+    text = bpy.data.texts.new("startup.py")
+    text.write(touch)
+    text.use_module = True
+else:
+    bpy.context.scene["driven"] = 1.0
+    bpy.context.scene.driver_add('["driven"]').driver.expression = f"{touch} or 1.0"
+bpy.ops.wm.save_mainfile()
+bpy.ops.wm.open_mainfile(filepath=edit, use_scripts=True)
+"""
+
+
+@pytest.mark.parametrize("kind", ["text", "driver"])
+def test_scripts_of_a_stranger_are_not_run(whole, node, worker, submit, tmp_path, kind):
+    """Where pictures may depend on one, it is told."""
+    marker = tmp_path / "was run"
+    subprocess.run([sys.executable, "-c", PLANT, node.edit, marker, kind], check=True, capture_output=True)
+    marker.unlink()
+    for step in node.steps():
+        if kind == "text":
+            assert worker(*step) == (0, "")
+        else:
+            _refused(worker(*step), "edit.blend: a driver of the scene", "needs scripts, which are not run")
+        assert not marker.exists()
+    shutil.copytree(whole.folder, node.folder, dirs_exist_ok=True)
+    submit(node)

@@ -1,0 +1,62 @@
+"""What Flamenco's built-in job and its like start: a plain Blender with the extension, on a chunk of a saved edit."""
+
+import os
+import re
+import shlex
+import subprocess
+
+import numpy as np
+import OpenImageIO
+import pytest
+from farm_job import ROOT
+
+EXTENSION = "bl_ext.user_default.virtual_shutter"
+CHUNKS = (1, 4), (5, 8)
+
+
+@pytest.fixture(scope="module")
+def blender(real_blender, tmp_path_factory):
+    """Runs a real Blender that has the checkout for an extension."""
+    extensions = tmp_path_factory.mktemp("user") / "extensions" / "user_default"
+    extensions.mkdir(parents=True)
+    (extensions / "virtual_shutter").symlink_to(ROOT)
+    resources = {"BLENDER_USER_RESOURCES": str(extensions.parents[1])}
+
+    def run(*arguments):
+        command = [*real_blender, "--factory-startup", "--addons", EXTENSION, *map(str, arguments)]
+        return subprocess.run(command, env=os.environ | resources, capture_output=True, text=True, timeout=240)
+
+    return run
+
+
+def task(edit, pictures, first, last):
+    """The arguments of a farm's task, as docs/farms.md has them."""
+    (line,) = re.findall(r"(?m)^blender (-b .*--render-frame.*)$", (ROOT / "docs" / "farms.md").read_text())
+    told = {"FILE.blend": str(edit), "PICTURES/######": f"{pictures}/######", "1..16": f"{first}..{last}"}
+    return [told.get(word, word) for word in shlex.split(line, comments=False)]
+
+
+def levels(path):
+    """A picture in 8-bit levels."""
+    image = OpenImageIO.ImageBuf(str(path))
+    return np.round(image.get_pixels(OpenImageIO.FLOAT) * 255)
+
+
+def test_chunks_have_the_pixels_of_the_command(blender, job, single):
+    (job.folder / "virtual_shutter_inbetween").symlink_to(single.folder / "virtual_shutter_inbetween")
+    for chunk in CHUNKS:
+        done = blender(*task(job.edit, job.folder / "plain", *chunk))
+        assert done.returncode == 0, done.stderr
+    done = blender("-c", "shutter", "render", job.edit, "--output", job.pictures, "--frames", "1:8")
+    assert done.returncode == 0, done.stderr
+    for frame in range(1, 9):
+        found = levels(job.folder / "plain" / f"{frame:06d}.png")
+        assert np.array_equal(found, levels(job.pictures / f"{frame:04d}.png")), frame
+
+
+def test_missing_footage_fails_the_task(blender, job):
+    (job.folder / "footage.mp4").unlink()
+    done = blender(*task(job.edit, job.folder / "plain", 1, 4))
+    assert done.returncode == 2
+    assert "Virtual Shutter: footage.mp4: no such file" in done.stderr
+    assert not (job.folder / "plain").exists()
