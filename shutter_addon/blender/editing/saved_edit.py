@@ -27,7 +27,8 @@ def open_edit(path: Path):
         raise SavedEditError(f"{path}: no such file")
     try:
         with film_output.quiet():
-            bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
+            # With its windows, as `blender -b` does: load_ui=False would hold for all that this process opens after it.
+            bpy.ops.wm.open_mainfile(filepath=str(path), use_scripts=False)
     except RuntimeError as error:
         raise SavedEditError(f"{path}: {film_output.message(error)}") from None
     edit = bpy.context.scene
