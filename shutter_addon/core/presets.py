@@ -66,11 +66,6 @@ def last(window: int) -> np.ndarray:
     return still(window, window - 1)
 
 
-def rolling_pair(window: int) -> np.ndarray:
-    """First and last frame as two shutters (2, L)."""
-    return np.stack([first(window), last(window)])
-
-
 # name: (label, description, function, parameters). "Custom" is no preset: it is whatever the bars are.
 PRESETS = {
     "STILL": ("Still Frame", "One sharp frame", still, {}),

@@ -81,6 +81,10 @@ class MovieSource(FrameSource):
         with self._named(index):
             return self._pixels(self._frame(index))
 
+    def _picture(self, index, frame):
+        with self._named(index):
+            return self._pixels(frame)
+
     def decoded(self, index):
         """As `read`, or the frame's planes, where they are 8-bit 4:2:0 and as large as the frame, and BT.601 or 709.
 
@@ -90,7 +94,7 @@ class MovieSource(FrameSource):
             if (found := self._matrix(frame)) is None:
                 return self._pixels(frame)
             luma, *chroma = map(samples_of, frame.planes)
-            return Planes(luma, tuple(chroma), found, partial(self._pixels, frame))
+            return Planes(luma, tuple(chroma), found, partial(self._picture, index, frame))
 
     def _frame(self, index):
         check_index(self, index)
@@ -193,7 +197,7 @@ class MovieChannel(MovieSource):
 
 def _is_opaque_yuv(pixels):
     """Whether a frame's format has luma and chroma, and no alpha."""
-    return not pixels.is_rgb and [each.is_chroma for each in pixels.components] == [False, True, True]
+    return not pixels.is_rgb and len(pixels.components) == 3 and not any(each.is_alpha for each in pixels.components)
 
 
 def _is_grey(frame):

@@ -43,7 +43,9 @@ class PrefetchSource(SourceWrapper):
 
         An error of the source's `read` is raised here once; the next call decodes the frame again. MediaError as well
         if `close` is called meanwhile."""
-        return as_rgba(self.decoded(index))
+        picture = as_rgba(self.decoded(index))
+        picture.flags.writeable = False
+        return picture
 
     def decoded(self, index: int) -> np.ndarray | Planes:
         """As `read`, but for the conversion."""

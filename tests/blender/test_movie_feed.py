@@ -1,7 +1,9 @@
 """Movies are rendered from files of finished levels: the same pictures as by the engine."""
 
 import os
+import shutil
 import tempfile
+from pathlib import Path
 
 import numpy as np
 import OpenImageIO
@@ -20,6 +22,11 @@ def film(bpy, edit, tmp_path):
     return edit
 
 
+def blenders_own(bpy):
+    """Its colour configuration."""
+    return Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"), "config.ocio")
+
+
 def rendered(edit, folder):
     """The film as pictures of 8 bits, over black as a movie's: (frames, H, W, 3)."""
     import bpy
@@ -35,7 +42,7 @@ def test_levels_are_those_of_the_engine(bpy, film, tmp_path, monkeypatch):
     """And what a killed render has left is removed. OCIO is as a Blender with a window has it: its own file."""
     from shutter_addon.blender.rendering import movie_feed
 
-    monkeypatch.setenv("OCIO", bpy.utils.system_resource("DATAFILES", path="colormanagement/config.ocio"))
+    monkeypatch.setenv("OCIO", str(blenders_own(bpy)))
     monkeypatch.setattr(tempfile, "tempdir", str(place := tmp_path / "temporary"))
     left = place / f".part-{0:016x}"
     left.mkdir(parents=True)
@@ -53,6 +60,38 @@ def test_levels_are_those_of_the_engine(bpy, film, tmp_path, monkeypatch):
     assert apart.max() <= 1
     assert (apart > 0).mean() < 0.001
     assert [strip.name for strip in film.sequence_editor.strips_all] == before
+
+
+def test_a_studios_colour_configuration_leaves_the_film_to_the_engine(bpy, film, tmp_path, monkeypatch):
+    from shutter_addon.blender.rendering import movie_feed
+
+    own, studio = blenders_own(bpy), tmp_path / "config.ocio"
+    studio.write_text(f"# of a studio\n{own.read_text()}")
+    before = [strip.name for strip in film.sequence_editor.strips_all]
+    for given, fed in ((own, True), (studio, False)):
+        monkeypatch.setenv("OCIO", str(given))
+        with movie_feed.feeding(film):
+            assert ([strip.name for strip in film.sequence_editor.strips_all] != before) == fed
+
+
+def test_a_file_that_is_gone_ends_the_film(bpy, film, tmp_path, monkeypatch, capfd):
+    """Blender would show it as a picture of one colour."""
+    from shutter_addon.blender.rendering import movie_feed
+
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+
+    def lose(edit, *_):
+        if edit.frame_current == 4:
+            for folder in (tmp_path / "temporary").glob(".part-*"):
+                shutil.rmtree(folder)
+
+    film.render.filepath = f"{tmp_path / 'out'}/"
+    bpy.app.handlers.render_post.append(lose)
+    with movie_feed.feeding(film):
+        assert bpy.ops.render.render(animation=True) == {"CANCELLED"}
+    assert len(list((tmp_path / "out").iterdir())) == 4
+    assert "picture.tif: No such file or directory" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("height", [5, 64, 65, 200])

@@ -43,6 +43,7 @@ def built(bpy, edit, tmp_path):
         found.select = found.use_proxy = found.proxy.build_50 = True
         for name, value in settings.items():
             setattr(found.proxy, name, value)
+        bpy.ops.render.render()  # after a film that was stopped Blender builds none, until something is rendered
         with sequencer(bpy):
             assert bpy.ops.sequencer.rebuild_proxy() == {"FINISHED"}
         return found
@@ -78,6 +79,24 @@ def test_where_blender_puts_them(edit, built, kind, place):
     editor.proxy_dir = "//of the project" if place == "project" else ""
     own = {"use_proxy_custom_directory": True, "directory": "//own"} if place == "strip" else {}
     assert_read(edit, built(kind, **own))
+
+
+@pytest.mark.parametrize("kind", ["MOVIE", "IMAGE"])
+def test_of_a_linked_edit(bpy, edit, built, tmp_path, kind):
+    """Paths are from the file that the edit is in."""
+    strip = built(kind)
+    if kind == "MOVIE":
+        strip.filepath = "//movie.mp4"
+    else:
+        strip.directory = "//in/"
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    (tmp_path / "main").mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "main" / "main.blend"))
+    with bpy.data.libraries.load(str(tmp_path / "edit.blend"), link=True) as (_, linked):
+        linked.scenes = ["Scene"]
+    (scene,) = linked.scenes
+    assert_read(scene, scene.sequence_editor.strips[0])
 
 
 @pytest.mark.parametrize("kind", ["MOVIE", "IMAGE"])

@@ -25,7 +25,6 @@ def test_shapes():
     assert presets.ramp_down(4).tolist() == [1, 0.75, 0.5, 0.25]
     assert presets.triangle(5) == pytest.approx([0.2, 0.6, 1, 0.6, 0.2])
     assert presets.stutter(8, 3).tolist() == [1, 0, 0, 1, 0, 0, 1, 0]
-    assert presets.rolling_pair(3).tolist() == [[1, 0, 0], [0, 0, 1]]
 
 
 def test_gaussian_and_trail_by_their_definitions():

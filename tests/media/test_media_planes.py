@@ -11,7 +11,7 @@ from shutter_addon.compute.renderer import open_gl
 from shutter_addon.compute.window import Sums
 from shutter_addon.core.frame_state import Options
 from shutter_addon.core.planes import Planes
-from shutter_addon.media import PrefetchSource, open_source
+from shutter_addon.media import MediaError, PrefetchSource, movie, open_source
 from shutter_addon.media.cuts import ShotSource, signature
 
 ALL = slice(None), slice(None)
@@ -79,6 +79,7 @@ def test_a_device_makes_the_bits_of_libswscale(gl, tmp_path, monkeypatch, size, 
             window = Sums(gl, source, 3)
             try:
                 window.load(np.arange(3), Options(window=3, light=light), range(source.count))
+                assert ("luma" in window._sent) == planar
                 sums = np.concatenate([gl.read(texture).ravel() for texture in window.textures])
                 found.append(sums.copy())
             finally:
@@ -98,14 +99,48 @@ def test_other_frames_are_as_they_are_read(tmp_path, pixels, space, given):
         assert np.array_equal(source.decoded(1), source.read(1))
 
 
+@pytest.mark.parametrize("pixels", ["yuv420p", "yuv422p", "yuv444p", "yuv411p", "yuv410p"])
+@pytest.mark.parametrize("given", [{}, {"divisor": 2}, {"deinterlace": True}], ids=str)
+def test_conversion_by_way_of_planes_has_the_same_bits(tmp_path, monkeypatch, pixels, given):
+    path = film(tmp_path / "noise.mkv", (64, 48), BT709, LIMITED, pixels)
+    assert movie._is_opaque_yuv(av.VideoFormat(pixels))
+    with open_source(path, **given) as by_planes, open_source(path, **given) as directly:
+        found = by_planes.read(1)
+        monkeypatch.setattr(movie, "_is_opaque_yuv", lambda _: False)
+        assert np.array_equal(found, directly.read(1))
+
+
+@pytest.mark.parametrize("pixels", ["yuva420p", "gray", "rgb24", "gbrp", "rgba", "pal8"])
+def test_what_has_no_planes_of_chroma_alone(pixels):
+    assert not movie._is_opaque_yuv(av.VideoFormat(pixels))
+
+
+def test_a_conversion_that_fails_is_said_of_its_frame(bunny, monkeypatch):
+    def fails(*_):
+        raise av.error.MemoryError(12, "Cannot allocate memory")
+
+    with open_source(bunny) as source:
+        planes = source.decoded(5)
+        monkeypatch.setattr(source, "_converted", fails)
+        for converted in (planes.rgba, lambda: source.read(5)):
+            with pytest.raises(MediaError, match=r"^frame 5 of .* cannot be decoded"):
+                converted()
+
+
 @pytest.mark.parametrize("planes", [True, False])
 def test_through_wrappers(bunny, planes):
-    with open_source(bunny) as movie, ShotSource(PrefetchSource(open_source(bunny), planes=planes)) as source:
+    with open_source(bunny) as direct, ShotSource(PrefetchSource(open_source(bunny), planes=planes)) as source:
         source.want(range(4))
         source.around(1, 0, 3)
         for index in range(4):
             assert isinstance(source.decoded(index), Planes) == planes
-            assert np.array_equal(source.read(index), movie.read(index))
+            assert np.array_equal(source.read(index), direct.read(index))
+
+
+@pytest.mark.parametrize("planes", [True, False])
+def test_what_is_read_ahead_is_read_only(bunny, planes):
+    with PrefetchSource(open_source(bunny), planes=planes) as source:
+        assert not source.read(3).flags.writeable
 
 
 def test_a_signature_of_planes_is_that_of_the_frame(bunny):

@@ -12,7 +12,7 @@ def name() -> str:
     """Of one that OpenColorIO brings, its name; of a file, its SHA-256 in hexadecimal; "": Blender's own, wherever it
     is installed. Of the tables that a file names, only the names count."""
     # Blender itself sets OCIO to its own file as it starts, and what it starts inherits that.
-    path = os.environ.get("BLENDER_OCIO") or os.environ.get("OCIO") or ""
+    path = os.environ.get("BLENDER_OCIO", os.environ.get("OCIO", ""))
     if path.startswith("ocio://"):
         return path
     digest = _digest(Path(path))

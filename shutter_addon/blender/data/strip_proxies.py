@@ -27,12 +27,12 @@ def proxy_of(edit, strip, percent: int) -> Proxy | None:
     if by_strip and strip.proxy.use_proxy_custom_file:
         return _proxy(_absolute(strip.proxy.filepath))
     if strip.type == "MOVIE":
-        movie = _absolute(strip.filepath)
+        movie = _absolute(strip.filepath, strip.id_data.library)
         stream = f"_st{strip.stream_index}" if strip.stream_index else ""
         return _proxy(_folder(edit, strip, movie.parent) / movie.name / f"proxy_{percent}{stream}.avi")
     if edit.sequencer_colorspace_settings.name != "sRGB":  # what Blender keeps its pictures in
         return None
-    folder = _folder(edit, strip, _absolute(strip.directory)) / "images" / str(percent)
+    folder = _folder(edit, strip, _absolute(strip.directory, strip.id_data.library)) / "images" / str(percent)
     ends = strip.elements[0], strip.elements[-1]
     return _proxy(folder, *(of_image(folder, element.filename) for element in ends))
 
@@ -60,5 +60,6 @@ def _proxy(path: Path, *files: Path) -> Proxy | None:
     return Proxy(path, bool(files), tuple((status.st_mtime_ns, status.st_size) for status in found))
 
 
-def _absolute(path: str) -> Path:
-    return Path(bpy.path.abspath(path))
+def _absolute(path: str, library=None) -> Path:
+    """Footage is found from the file that its strip is in; folders of proxies Blender finds from the open one."""
+    return Path(bpy.path.abspath(path, library=library))

@@ -116,11 +116,10 @@ class BlenderDevice(PagedDevice):
         if width * height * TEXEL_BYTES["r32f"] > _SENT_BYTES:
             return super().send(texture, frame)
         data = _buffer("FLOAT", _packed(frame, _OPAQUE_BYTES))
-        sent = gpu.types.GPUTexture((width, height), layers=1, format="R32F", data=data)
-        return Texture(sent, (width, height, 1), "r32f")
+        return Texture(_of_numbers((width, height), "R32F", data), (width, height, 1), "r32f")
 
     def _send(self, stored: gpu.types.GPUTexture, program: Pass, size: tuple[int, int], kind: str, data, top, layer):
-        textures = {"sent": gpu.types.GPUTexture(size, layers=1, format=kind, data=data)}
+        textures = {"sent": _of_numbers(size, kind, data)}
         constants = {"size": size, "top": top, "layer": layer}
         BlenderDevice._dispatch(self, program, program.groups(size), textures, {"stored": stored}, {}, constants)
 
@@ -228,6 +227,14 @@ def _exchanged(texture: Texture) -> tuple:
     if (found := FORMATS[texture.kind]) is None:
         raise TypeError(f"{texture.kind}: such a texture is written and read by passes alone on Blender's GPU")
     return found
+
+
+def _of_numbers(size: tuple[int, int], kind: str, data: gpu.types.Buffer) -> gpu.types.GPUTexture:
+    """A texture of these numbers. NoDeviceError: the GPU has no room for it."""
+    try:
+        return gpu.types.GPUTexture(size, layers=1, format=kind, data=data)
+    except RuntimeError as error:
+        raise NoDeviceError(str(error)) from None
 
 
 def _buffer(kind: str, array: np.ndarray) -> gpu.types.Buffer:

@@ -80,6 +80,8 @@ def in_words(error: BaseException) -> str:
         return str(error) or "not enough memory"
     if isinstance(error, KeyboardInterrupt):
         return "the render was stopped"
+    if isinstance(error, OSError) and error.filename:
+        return f"{error.filename}: {error.strerror}"
     traceback.print_exception(error)
     return f"internal error: {error!r}"
 

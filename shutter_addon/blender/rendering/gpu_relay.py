@@ -27,7 +27,7 @@ _REST = 1.0  # seconds without a call, after which the main thread looks for non
 
 _calls: queue.SimpleQueue[tuple] = queue.SimpleQueue()
 _lock = threading.Lock()
-_looks_until: float | None = None  # when the main thread stops to look for calls; None: it does not
+_looks, _looks_until = False, 0.0  # whether the main thread looks for calls, and until when at least
 _looked = 0.0  # when it looked last
 _unfinished, _batch = 0, 8  # passes that may be under way, and after how many they are waited for
 
@@ -123,11 +123,13 @@ def _finish_some() -> None:
 
 def _called(function) -> Future:
     """The function, called on the main thread after all calls before."""
+    global _looks
     done = Future()
     _calls.put((done, function))
+    _keep_looking()
     with _lock:
-        if _looks_until is None:
-            _keep_looking()
+        if not _looks:
+            _looks = True
             bpy.app.timers.register(_look, persistent=True)
     return done
 
@@ -139,13 +141,12 @@ def _keep_looking() -> None:
 
 def _look() -> float | None:
     """A timer."""
-    global _looks_until, _looked
+    global _looks, _looked
     serve(min(max(time.monotonic() - _looked, _LEAST), _MOST))
     _looked = time.monotonic()
     with _lock:
-        if _calls.empty() and time.monotonic() > _looks_until:
-            _looks_until = None
-    return None if _looks_until is None else 0.0
+        _looks = not _calls.empty() or time.monotonic() < _looks_until
+        return 0.0 if _looks else None
 
 
 def _has_context() -> bool:

@@ -5,6 +5,7 @@ which take more of the processor than all else that it does for a frame. So the 
 uncompressed file of the levels that the movie will have, above the effect strip, which it then does not render.
 """
 
+import os
 import struct
 import tempfile
 from contextlib import ExitStack, contextmanager, suppress
@@ -92,9 +93,11 @@ class LevelsFile:
         self._file = path.open("r+b", buffering=0)
 
     def write(self, levels: np.ndarray) -> None:
-        """levels: uint8 (H, W, 4), top row first."""
+        """levels: uint8 (H, W, 4), top row first. OSError: there is no such file any more, which Blender would show as
+        a picture of one colour."""
         self._file.seek(len(self._head))
         self._file.write(levels)
+        os.utime(self.path)
 
     def close(self) -> None:
         self._file.close()
