@@ -420,7 +420,7 @@ class Sums(RunningSums, Window):
         return _in_tiles(self.source.width, height, self.layers) if self.tiled else super()._size(height)
 
     def _hold(self, *names: str) -> None:
-        """Has the textures that a frame is sent to: "frame", or "luma" and "chroma", which take less. The others go."""
+        """Has the textures that a frame is sent to: "frame", or "luma" and "chroma". The others go."""
         if self._sent.keys() == set(names):
             return
         self._free_sent()
