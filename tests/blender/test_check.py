@@ -392,3 +392,16 @@ def test_a_chunk_reads_little_that_is_not_its_own(window, step):
 )
 def test_frames_in_words(frames, words):
     assert frame_ranges.in_words(frames) == words
+
+
+def test_faults_have_an_order(noise, check, bpy, tmp_path):
+    """Not that of where Blender keeps things in memory."""
+    room = bpy.data.scenes.new("Room")
+    for number in range(12):
+        image = bpy.data.images.new(f"wood {number:02d}", 4, 4)
+        image.source, image.filepath = "FILE", str(tmp_path / f"wood {number:02d}.png")
+        thing = bpy.data.objects.new(f"thing {11 - number:02d}", None)
+        thing.empty_display_type, thing.data = "IMAGE", image
+        room.collection.objects.link(thing)
+    now()[0].sequence_editor.strips.new_scene("room", room, 5, 1)
+    assert [fault.split(":")[0] for fault in check()[1]] == [f'image "wood {number:02d}"' for number in range(12)]

@@ -19,8 +19,8 @@ VERSION = EditVersion("ab" * 32, "0.1.0", "5.2.0", "", FOOTAGE)
         ({"colours": "12" * 32}, "is of the OpenColorIO configuration of Blender, this machine has the OpenColorIO"),
         ({"blend": "00" * 32}, "the job is of another version of the .blend file"),
         (
-            {"footage": (VERSION.footage[0], Footage("f0001.png", 9, ""))},
-            "9 files from f0001.png on is missing",
+            {"footage": (VERSION.footage[0], Footage("f0001.png", 9, "12", "f0003.png"))},
+            "f0003.png is missing",
         ),
         ({"footage": (Footage("film.mp4", 1, "11"), VERSION.footage[1])}, ": film.mp4 has other content"),
         ({"footage": VERSION.footage[:1]}, "is of other footage"),
