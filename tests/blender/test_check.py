@@ -71,7 +71,7 @@ def test_a_sound_edit(noise, check, tmp_path):
         }
     ]
     assert report["extension"] == {"here": versions.extension(), "saved": versions.extension()}
-    assert report["disk"]["frame"] == 64 * 48 * 4 * 2
+    assert 64 * 48 * 4 * 2 < report["disk"]["frame"] < 64 * 48 * 4 * 2 * 1.25
     assert report["disk"]["all"] == FRAMES * report["disk"]["frame"]
     assert report["device"]
     assert report["chunk"] == FRAMES
@@ -352,16 +352,127 @@ def test_a_newer_extension_and_blender(noise, check, bpy, tmp_path, monkeypatch)
 
 def test_output(noise, check, tmp_path, monkeypatch):
     (tmp_path / "file").write_bytes(b"")
-    assert check("--output", tmp_path / "file" / "out")[1][0].endswith("Not a directory")
+    assert check("--output", tmp_path / "file" / "out")[1] == [f"{tmp_path / 'file'}: is a file, and no folder"]
+    frame = check()[2]["disk"]["frame"]
     usage = shutil.disk_usage(tmp_path)
-    monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage._replace(free=64 * 48 * 4 * 2 * FRAMES - 1))
+    monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage._replace(free=frame * FRAMES - 1))
     _, found, _ = check("--output", tmp_path / "out")
-    assert found == [f"{tmp_path / 'out'}: 8 frames may take 192.0 kB, 192.0 kB are free"]
-    assert job_file.read(tmp_path / "out") is None
+    assert found == [f"{tmp_path / 'out'}: 8 frames may take 230.8 kB, 230.7 kB are free"]
+    assert not (tmp_path / "out").exists()
     edit = now()[0]
     edit.render.resolution_x = 65
     edit.render.image_settings.media_type = "VIDEO"
     assert "a movie has even sizes, not 65×48" in check()[1][0]
+
+
+def test_pictures_take_no_more_than_is_told(noise, check, tmp_path):
+    """Those of noise, in all channels."""
+    from shutter_addon.blender import command
+
+    edit = now()[0]
+    edit.render.image_settings.color_mode = "RGBA"
+    edit.render.image_settings.compression = 0
+    for file_format in ("png", "exr"):
+        options = "--output", tmp_path / file_format, "--format", file_format
+        most = check(*options, "--frames", "1")[2]["disk"]["frame"]
+        arguments = "render", tmp_path / "edit.blend", *options, "--frames", "1"
+        assert command.main([str(argument) for argument in arguments]) == 0
+        assert (tmp_path / file_format / f"0001.{file_format}").stat().st_size <= most
+
+
+def test_room_for_in_between_frames(noise, check, tmp_path, monkeypatch):
+    """They lie beside the edit, and share its disk with the frames."""
+    now()[1].inbetween = "2"
+    report = check("--inbetweens-later")[2]
+    assert report["disk"]["inbetweens"] > (FRAMES - 1) * 64 * 48 * 4
+    usage = shutil.disk_usage(tmp_path)
+    free = report["disk"]["all"] + report["disk"]["inbetweens"]
+    monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage._replace(free=free))
+    assert check("--inbetweens-later", "--output", tmp_path / "out")[1] == []
+    monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage._replace(free=free - 1))
+    (fault,) = check("--inbetweens-later", "--output", tmp_path / "out")[1]
+    assert fault.startswith(f"{tmp_path / 'out'}: 8 frames and in-between frames may take ")
+
+
+def test_a_folder_of_in_between_frames_that_cannot_be_written_to(noise, check, tmp_path):
+    now()[1].inbetween = "2"
+    (tmp_path / "virtual_shutter_inbetween").write_bytes(b"")
+    (fault,) = check("--inbetweens-later")[1]
+    assert fault == f"{tmp_path / 'virtual_shutter_inbetween'}: is a file, and no folder"
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "sentence"),
+    [
+        ("in", [], "f0001.png"),
+        ("in\\to", [], "Blender cannot write to a path with \\"),
+        ("out.mp4", [], "a saved edit is rendered to a folder of pictures, not to a movie"),
+        ("out.v2", [], "out.v2: neither a folder nor one of .mp4"),
+        ("out.v2", ["--format", "png"], ""),
+    ],
+)
+def test_a_place_that_render_refuses(noise, check, tmp_path, name, options, sentence):
+    for number in range(1, FRAMES + 1):  # as pictures are called
+        (tmp_path / "in" / f"{number:04d}.png").hardlink_to(tmp_path / "in" / f"f{number:04d}.png")
+    _, found, _ = check("--output", tmp_path / name, *options)
+    assert len(found) == bool(sentence)
+    if sentence:
+        assert sentence in found[0]
+        assert not (tmp_path / name / job_file.NAME).exists()
+        assert (tmp_path / name).exists() == (name == "in")
+
+
+def test_an_edit_that_cannot_be_resumed(noise, check):
+    now()[0].render.use_stamp = True
+    assert check()[1] == []
+    (fault,) = check("--resume")[1]
+    assert fault.startswith("--resume: the edit burns metadata into its pictures")
+
+
+def _odd(edit):
+    edit.render.resolution_x = 65
+
+
+def _uppermost(edit):
+    edit.sequence_editor.strips.new_effect("grey", "COLOR", 128, 1, length=1)
+
+
+def _lossless(edit):
+    edit.render.image_settings.media_type = "VIDEO"
+    edit.render.ffmpeg.codec = "FFV1"
+
+
+def _gap(edit):
+    edit.view_settings.view_transform = "AgX"
+    edit.render.image_settings.color_mode = "RGBA"
+    edit.frame_end = FRAMES + 2
+
+
+@pytest.mark.parametrize(
+    ("change", "name", "sentence"),
+    [
+        (lambda edit: None, "film.mp4", ""),
+        (lambda edit: None, "film", "film: none of .mp4"),
+        (lambda edit: None, "edit.blend", "edit.blend: none of .mp4"),
+        (lambda edit: None, "in/f0001.png/film.mp4", "f0001.png: is a file, and no folder"),
+        (_odd, "film.mp4", "film.mp4: a movie has even sizes, not 65×48"),
+        (_uppermost, "film.mp4", "the edit has strips in the uppermost channel"),
+        (_lossless, "film.mkv", ""),
+        (_lossless, "film.webm", "film.webm: "),
+        (_gap, "film.mp4", "frames 9 to 10 are transparent, as no strip is shown"),
+    ],
+)
+def test_a_movie_that_join_refuses(noise, check, tmp_path, change, name, sentence):
+    change(now()[0])
+    _, found, _ = check("--movie", tmp_path / name, "--output", tmp_path / "out")
+    assert [sentence in fault for fault in found] == [True] * bool(sentence)
+    assert (tmp_path / "out").exists() == (not sentence)
+    assert not list(tmp_path.glob("film*"))
+
+
+def test_a_gap_is_none_to_exr(noise, check, tmp_path):
+    _gap(now()[0])
+    assert check("--movie", tmp_path / "film.mp4", "--format", "exr")[1] == []
 
 
 @pytest.mark.parametrize(

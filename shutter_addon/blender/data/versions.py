@@ -42,6 +42,11 @@ def read_files(edit) -> list[Path]:
     return [path for files in _footage_files(edit) for path in files]
 
 
+def sounds() -> list[Path]:
+    """The files of all sounds."""
+    return [path for sound in bpy.data.sounds for path in external_files.named(sound)]
+
+
 def stamps(edit) -> dict[Path, tuple[int, int] | None]:
     """The stamp of each of `read_files`."""
     return {path: stamp(path) for path in read_files(edit)}

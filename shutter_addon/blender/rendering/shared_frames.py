@@ -19,6 +19,25 @@ RUN = 8  # frames that are claimed at once
 _PAUSE = 1.0  # seconds between two looks at what others have finished
 
 
+def check(folder: Path, file_format: str | None, frames: tuple[int, int], read: list[Path]) -> None:
+    """OutputError: an edit's frames, first and last, cannot be rendered there.
+
+    file_format: None for PNG, where the folder is not to be taken for a file; read: what is not to be written over"""
+    if film_output.is_movie(folder):
+        words = "a saved edit is rendered to a folder of pictures, not to a movie"
+        raise film_output.OutputError(f"{folder}: {words}")
+    film_output.check_folder(folder, file_format)
+    film_output.for_blender(str(folder))
+    film_output.spare(film_output.pictures_of(folder, file_format or "png", frames), read)
+
+
+def check_resumable(edit) -> None:
+    """OutputError: the edit's pictures do not say which version of it they are of."""
+    if edit.render.use_stamp:
+        words = "the edit burns metadata into its pictures, so that they carry no version; turn Burn Into Image off"
+        raise film_output.OutputError(f"--resume: {words}")
+
+
 @contextmanager
 def of_same_footage(edit) -> Iterator[list[Path]]:
     """Gives a list for the pictures that are rendered inside. They are removed if the footage is written to meanwhile:
@@ -42,9 +61,8 @@ def render(edit, folder: Path, file_format: str, version: EditVersion, rendered:
     finished or given up
     OutputError, InterruptedRenderError: as of film_output.film, or the folder is for another version by now; OSError:
     the folder cannot be written to"""
-    if resume and edit.render.use_stamp:
-        sentence = "the edit burns metadata into its pictures, so that they carry no version; turn Burn Into Image off"
-        raise film_output.OutputError(f"--resume: {sentence}")
+    if resume:
+        check_resumable(edit)
     film_output.set_pictures(edit, file_format, edit_version.note(version.key))
     film_output.prepare(folder)
     samples = film_output.FORMATS[file_format].samples
