@@ -39,24 +39,28 @@ def check_resumable(edit) -> None:
 
 
 @contextmanager
-def of_same_footage(edit) -> Iterator[list[Path]]:
-    """Gives a list for the pictures that are rendered inside. They are removed if the footage is written to meanwhile:
-    they carry the key of what it was, and would count as finished. OutputError: it was."""
-    before, rendered = versions.stamps(edit), []
+def of_same_footage(edit) -> Iterator[dict[Path, tuple]]:
+    """Gives a dictionary for the pictures that are rendered inside, with their stamps. They are removed if the footage
+    is written to meanwhile: they carry the key of what it was, and would count as finished. Pictures that others have
+    put in their places stay. OutputError: it was written to."""
+    before, rendered = versions.stamps(edit), {}
     try:
         yield rendered
     finally:
         changed = [path for path, stamp in versions.stamps(edit).items() if stamp != before.get(path)]
         if changed:
-            for picture in rendered:
-                picture.unlink(missing_ok=True)
+            for picture, stamp in rendered.items():
+                if rendered_pictures.stamp(picture) == stamp:
+                    picture.unlink(missing_ok=True)
             raise film_output.OutputError(f"{changed[0]}: was written to while frames were rendered from it")
 
 
-def render(edit, folder: Path, file_format: str, version: EditVersion, rendered: list[Path], *, resume: bool) -> None:
+def render(
+    edit, folder: Path, file_format: str, version: EditVersion, rendered: dict[Path, tuple], *, resume: bool
+) -> None:
     """Renders the edit's frames, from its first to its last, to pictures that carry the key of its version.
 
-    rendered: gets each picture as it is written
+    rendered: gets each picture with its stamp, as it is written
     resume: leaves frames alone that are finished, and those to others that these are rendering, until they are
     finished or given up
     OutputError, InterruptedRenderError: as of film_output.film, or the folder is for another version by now; OSError:
@@ -69,12 +73,14 @@ def render(edit, folder: Path, file_format: str, version: EditVersion, rendered:
     is_finished = partial(_is_finished, film_output.size(edit), samples, version.key, {})
     pictures = {frame: folder / f"{frame:04d}.{file_format}" for frame in range(edit.frame_start, edit.frame_end + 1)}
 
-    def moving(picture):
+    def move(part, picture):
         job_file.guard(folder, version)  # again: it may be for a newer version by now
-        rendered.append(picture)
+        stamp = rendered_pictures.stamp(part)
+        part.replace(picture)
+        rendered[picture] = stamp
 
     with film_output.progress(len(pictures), "frame") as moved:
-        write = partial(film_output.write, edit, folder, moved, moving)
+        write = partial(film_output.write, edit, folder, moved, move)
         if resume:
             _render_missing(edit, folder, pictures, is_finished, write, moved)
         else:
