@@ -266,7 +266,8 @@ def test_pictures_of_another_version_are_read_once(saved, run, tmp_path, monkeyp
     assert all(read(path).edit for path in out.iterdir())
 
 
-def test_an_edit_that_is_saved_over_while_it_is_opened(saved, run, tmp_path, monkeypatch):
+@pytest.mark.parametrize("command", ["render", "check", "join"])
+def test_an_edit_that_is_saved_over_while_it_is_opened(saved, run, tmp_path, monkeypatch, command):
     from shutter_addon.blender.editing import saved_edit
 
     def open_edit(path, opened=saved_edit.open_edit):
@@ -275,8 +276,11 @@ def test_an_edit_that_is_saved_over_while_it_is_opened(saved, run, tmp_path, mon
         return found
 
     monkeypatch.setattr(saved_edit, "open_edit", open_edit)
-    refused(run("render", saved, "--output", tmp_path / "out"), str(saved), "saved over while it was opened")
-    assert not (tmp_path / "out").exists()
+    out = tmp_path / "out"
+    arguments = [tmp_path / "in", "--edit", saved, "--output", tmp_path / "film.mp4"]
+    done = run(command, *(arguments if command == "join" else [saved, "--output", out]))
+    refused((done[0], done[1].splitlines()[-1]), str(saved), "saved over while it was opened")
+    assert not out.exists()
 
 
 @pytest.mark.parametrize("resume", [[], ["--resume"]])

@@ -48,11 +48,12 @@ def add(commands) -> None:
 
 
 def run(arguments) -> None:
+    opened = versions.stamp(arguments.edit)
     edit = saved_edit.open_edit(arguments.edit)
     first, last = command_line.frames(arguments.frames, (edit.frame_start, edit.frame_end), "edit")
     frames = range(first, last + 1)
     with session.using(session.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)):
-        report = _report(arguments, edit, frames)
+        report = _report(arguments, edit, frames, saved_edit.version(edit, arguments.edit, opened))
     if arguments.json:
         print(json.dumps(report, indent=1, ensure_ascii=False))
     else:
@@ -65,10 +66,9 @@ def run(arguments) -> None:
         sys.exit(2)
 
 
-def _report(arguments, edit, frames: range) -> dict:
+def _report(arguments, edit, frames: range, version: EditVersion) -> dict:
     """What is found, as JSON has it (docs/command.md)."""
     faults, notes = [*_version_faults(edit), *_setting_faults(arguments, edit)], []
-    version = versions.of_edit(edit)
     device, found, limit = _on_device(edit, frames, faults, notes, find_cuts=not arguments.inbetweens_later)
     build = _builds(arguments.edit, edit, frames, found)
     for each in found:

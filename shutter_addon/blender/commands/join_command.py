@@ -21,6 +21,7 @@ def add(commands) -> None:
 
 
 def run(arguments) -> None:
+    opened = versions.stamp(arguments.edit)
     edit = saved_edit.open_edit(arguments.edit)
     whole = edit.frame_start, edit.frame_end
     frames = command_line.frames(arguments.frames, whole, "edit")
@@ -28,6 +29,6 @@ def run(arguments) -> None:
     for fault in missing_media.sound_faults(edit, range(frames[0], frames[1] + 1)):
         raise film_output.OutputError(fault)  # Blender would make a silent film
     film_join.say_what_is_left_out(arguments.folder, whole)
-    version = versions.of_edit(edit)
+    version = saved_edit.version(edit, arguments.edit, opened)
     job_file.guard(arguments.folder, version)
     film_join.join(edit, arguments.folder, arguments.output, frames, version.key)

@@ -75,9 +75,7 @@ def _render_edit(arguments) -> None:
         raise film_output.OutputError(fault)  # Blender would render on without it
     settings = session.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)
     with session.using(settings), shared_frames.of_same_footage(edit) as rendered:
-        version = versions.of_edit(edit)
-        if versions.stamp(source) != opened:  # its key is not that of what was opened
-            raise film_output.OutputError(f"{source}: was saved over while it was opened; render it again")
+        version = saved_edit.version(edit, source, opened)
         job_file.guard(output, version)
         read = [source, *versions.read_files(edit)]
         shared_frames.check(output, arguments.format, frames, read)

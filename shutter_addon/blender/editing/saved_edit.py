@@ -4,8 +4,9 @@ from pathlib import Path
 
 import bpy
 
+from ...core.edit_version import EditVersion
 from ...core.messages import UserError, sentence
-from ..data import used_data
+from ..data import used_data, versions
 from ..rendering import film_output
 
 ENDING = ".blend"
@@ -45,6 +46,17 @@ def open_edit(path: Path):
         words += f" ({sentence(driver.expression, 40)}); bake it to keyframes, and save the file"
         raise SavedEditError(f"{path}: {words}")
     return edit
+
+
+def version(edit, path: Path, opened: tuple[int, int] | None) -> EditVersion:
+    """The version of an edit that was opened from a file.
+
+    opened: the file's stamp before (versions.stamp). SavedEditError: it was saved over since, so that its key would be
+    that of another edit; OSError: it is gone"""
+    found = versions.of_edit(edit)
+    if versions.stamp(path) != opened:
+        raise SavedEditError(f"{path}: was saved over while it was opened; start again")
+    return found
 
 
 def _scripts(edit) -> list[tuple]:
