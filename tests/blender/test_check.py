@@ -1,18 +1,23 @@
 """The command `check`: planted faults are told, all of them, each by its place; and what a sound edit will take."""
 
 import json
+import os
 import shutil
+import subprocess
+import sys
 import wave
+from pathlib import Path
 
 import numpy as np
 import pytest
 from support import noise_film, recipe, write_frames
 
-from shutter_addon.core import chunks, frame_ranges, job_file
+from shutter_addon.core import job_file
 from shutter_addon.core import recipe as recipes
 from shutter_addon.media.rendered_pictures import read
 
 FRAMES, WINDOW = 8, 4
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture
@@ -80,11 +85,13 @@ def test_a_sound_edit(noise, check, tmp_path):
 
 def test_the_report_for_people(noise, check, bpy, tmp_path, capsys):
     from shutter_addon.blender import command
+    from shutter_addon.blender.data import versions
 
     check()
     assert command.main(["check", str(tmp_path / "edit.blend"), "--frames", "2-3"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert "Frames: 2 to 3, 64×48" in lines
+    assert f"Virtual Shutter: {versions.extension()}, the edit was saved by {versions.extension()}" in lines
     assert any(line.startswith("Effect Shutter: ") and "windows of 4 frames, 2 shutters" in line for line in lines)
     assert lines[-1] == "Chunk size: 2 frames"
     assert command.main(["check", str(tmp_path / "edit.blend"), "--device", "cpu", "--gpu-memory", "0"]) == 0
@@ -478,7 +485,9 @@ def test_a_gap_is_none_to_exr(noise, check, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["none.blend"], "no such file"),
+        (["none.blend"], "none.blend: no such file"),
+        (["."], ": is no file"),
+        (["edit.blend", "--frames=-1"], '--frames: "-1" is not A:B'),
         (["edit.blend", "--frames", "3:99"], "--frames: 3:99 is not within the edit's frames 1:8"),
     ],
 )
@@ -488,21 +497,6 @@ def test_what_cannot_be_checked(noise, check, tmp_path, capsys, arguments, sente
     check()
     assert command.main(["check", str(tmp_path / arguments[0]), *arguments[1:]]) == 2
     assert sentence in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(("window", "step"), [(1, 1), (4, 1), (16, 1), (256, 1), (64, 8), (128, 16)])
-def test_a_chunk_reads_little_that_is_not_its_own(window, step):
-    size = chunks.chunk_size(window, step)
-    share = [1 - n * step / chunks.decoded(n, window, step) for n in (size, size - 1)]
-    assert share[0] <= 1 / chunks.ONE_IN
-    assert size == chunks.LEAST or share[1] > 1 / chunks.ONE_IN
-
-
-@pytest.mark.parametrize(
-    ("frames", "words"), [([3], "frame 3"), ([5, 4], "frames 4 to 5"), ([9, 1, 3, 2, 12], "frames 1 to 3, 9, 12")]
-)
-def test_frames_in_words(frames, words):
-    assert frame_ranges.in_words(frames) == words
 
 
 def test_faults_have_an_order(noise, check, bpy, tmp_path):
@@ -516,3 +510,47 @@ def test_faults_have_an_order(noise, check, bpy, tmp_path):
         room.collection.objects.link(thing)
     now()[0].sequence_editor.strips.new_scene("room", room, 5, 1)
     assert [fault.split(":")[0] for fault in check()[1]] == [f'image "wood {number:02d}"' for number in range(12)]
+
+
+def test_an_edit_without_an_effect_says_no_version(edit, check, tmp_path, capsys):
+    from shutter_addon.blender import command
+
+    edit.sequence_editor.strips.new_effect("grey", "COLOR", 1, 1, length=2)
+    check()
+    assert command.main(["check", str(tmp_path / "edit.blend")]) == 0
+    assert "the edit does not say which saved it" in capsys.readouterr().out
+
+
+@pytest.fixture
+def printed(bpy, noise, tmp_path):
+    """What a process of its own says on stderr that checks the edit, and its exit code."""
+    path = tmp_path / "edit.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+
+    def run(stdout, **environment):
+        arguments = [sys.executable, "-m", "shutter_addon", "check", str(path)]
+        environment = os.environ | environment
+        done = subprocess.run(arguments, cwd=ROOT, env=environment, stdout=stdout, stderr=subprocess.PIPE, check=False)
+        return done.returncode, done.stderr.decode()
+
+    return run
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_nobody_reads_the_report(printed, unbuffered):
+    reader, writer = os.pipe()
+    os.close(reader)
+    assert printed(writer, PYTHONUNBUFFERED=unbuffered) == (0, "")
+    os.close(writer)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full device")
+def test_a_report_that_cannot_be_written(printed):
+    with open("/dev/full", "wb") as full:
+        assert printed(full) == (2, "Virtual Shutter: stdout: No space left on device\n")
+
+
+def test_a_terminal_without_all_characters(printed, tmp_path):
+    with (tmp_path / "report").open("wb") as report:
+        assert printed(report, PYTHONIOENCODING="ascii") == (0, "")
+    assert "Frames: 1 to 8, 64?48" in (tmp_path / "report").read_text()

@@ -485,6 +485,17 @@ def test_a_driver_that_needs_scripts_is_named(bpy, edit, run, save, tmp_path, pl
     assert f'"{name}" needs scripts, which are not run (bpy.context' in said.splitlines()[-1]  # Blender tells it, too
 
 
+def test_a_driver_that_needs_no_script_is_blenders_concern(bpy, edit, run, save, tmp_path):
+    """What it reads may be gone: Blender renders on, and so would its own render."""
+    edit.sequence_editor.strips.new_effect("grey", "COLOR", 1, 1, length=2)
+    edit.frame_start, edit.frame_end = 1, 2
+    edit.render.resolution_x, edit.render.resolution_y = 16, 8
+    driver = edit.driver_add("audio_volume").driver
+    driver.type = "AVERAGE"
+    driver.variables.new().targets[0].data_path = "gone"
+    assert run("render", save(), "--output", tmp_path / "out")[0] == 0
+
+
 def test_pictures_are_not_written_over_footage(edit, noise, run, save, tmp_path):
     source, _effect, _strip = noise_film(edit, noise, tmp_path)
     for index, element in enumerate(source.elements, start=1):

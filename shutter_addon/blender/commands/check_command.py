@@ -6,7 +6,6 @@ import re
 import shlex
 import subprocess
 import sys
-from contextlib import suppress
 from pathlib import Path
 
 import bpy
@@ -54,12 +53,7 @@ def run(arguments) -> None:
     frames = range(first, last + 1)
     with session.using(session.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)):
         report = _report(arguments, edit, frames, saved_edit.version(edit, arguments.edit, opened))
-    if arguments.json:
-        print(json.dumps(report, indent=1, ensure_ascii=False))
-    else:
-        print("\n".join(_lines(report)))
-    with suppress(BrokenPipeError):  # nobody reads on
-        sys.stdout.flush()
+    command_line.tell(json.dumps(report, indent=1) if arguments.json else "\n".join(_lines(report)))
     for fault in report["faults"]:
         print(signed(fault), file=sys.stderr)
     if report["faults"]:
@@ -258,4 +252,5 @@ def _lines(report: dict) -> list[str]:
 
 
 def _saved_by(name: str, version: dict) -> str:
-    return f"{name}: {version['here']}, the edit was saved by {version['saved'] or 'an older one'}"
+    saved = f"was saved by {version['saved']}" if version["saved"] else "does not say which saved it"
+    return f"{name}: {version['here']}, the edit {saved}"

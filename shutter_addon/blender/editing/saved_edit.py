@@ -25,7 +25,7 @@ def open_edit(path: Path):
     """Opens a .blend file, none of whose scripts is run: it may be a stranger's. Its active scene, which Blender
     would render. SavedEditError: it cannot be opened, or shows no edit."""
     if not path.is_file():
-        raise SavedEditError(f"{path}: no such file")
+        raise SavedEditError(f"{path}: " + ("is no file" if path.exists() else "no such file"))
     try:
         with film_output.quiet():
             # With its windows, as `blender -b` does: load_ui=False would hold for all that this process opens after it.
@@ -64,7 +64,8 @@ def _scripts(edit) -> list[tuple]:
     edit's pictures are made of."""
     used = used_data.used(edit, range(edit.frame_start, edit.frame_end + 1))
     drivers = [(item, curve.driver) for item in used for curve in _driven(item)]
-    complex_ones = [(owner, driver) for owner, driver in drivers if not driver.is_simple_expression]
+    scripted = ((owner, driver) for owner, driver in drivers if driver.type == "SCRIPTED")
+    complex_ones = [(owner, driver) for owner, driver in scripted if not driver.is_simple_expression]
     if complex_ones:  # only once they are evaluated it is known of them
         with film_output.quiet():
             for scene in used.intersection(bpy.data.scenes):

@@ -101,7 +101,7 @@ def _numbered(folder: Path) -> dict[int, Path]:
         raise OutputError(film_output.in_words(error, folder)) from None
     found: dict[int, Path] = {}
     for path in files:
-        if re.fullmatch(r"-?\d{1,9}", path.stem):
+        if re.fullmatch(r"\d{1,9}", path.stem):
             if (frame := int(path.stem)) in found:
                 raise OutputError(f"{folder}: {found[frame].name} and {path.name} are the same frame")
             found[frame] = path
