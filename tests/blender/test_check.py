@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import wave
@@ -397,7 +398,7 @@ def test_room_for_in_between_frames(noise, check, tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage._replace(free=free))
     assert check("--inbetweens-later", "--output", tmp_path / "out")[1] == []
     monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage._replace(free=free - 1))
-    (fault,) = check("--inbetweens-later", "--output", tmp_path / "out")[1]
+    (fault,) = check("--inbetweens-later", "--output", tmp_path / "out", "--movie", tmp_path / "film.mp4")[1]
     assert fault.startswith(f"{tmp_path / 'out'}: 8 frames and in-between frames may take ")
 
 
@@ -462,6 +463,7 @@ def _gap(edit):
         (lambda edit: None, "film", "film: none of .mp4"),
         (lambda edit: None, "edit.blend", "edit.blend: none of .mp4"),
         (lambda edit: None, "in/f0001.png/film.mp4", "f0001.png: is a file, and no folder"),
+        (lambda edit: None, "folder.mp4", "folder.mp4: is a folder, not a movie"),
         (_odd, "film.mp4", "film.mp4: a movie has even sizes, not 65×48"),
         (_uppermost, "film.mp4", "the edit has strips in the uppermost channel"),
         (_lossless, "film.mkv", ""),
@@ -470,11 +472,26 @@ def _gap(edit):
     ],
 )
 def test_a_movie_that_join_refuses(noise, check, tmp_path, change, name, sentence):
+    (tmp_path / "folder.mp4").mkdir()
     change(now()[0])
     _, found, _ = check("--movie", tmp_path / name, "--output", tmp_path / "out")
     assert [sentence in fault for fault in found] == [True] * bool(sentence)
     assert (tmp_path / "out").exists() == (not sentence)
     assert not list(tmp_path.glob("film*"))
+
+
+def test_a_rehearsal_that_is_stopped(noise, check, bpy, tmp_path):
+    from shutter_addon.blender import command
+
+    check()
+    stop = bpy.app.handlers.persistent(lambda *_: os.kill(os.getpid(), signal.SIGTERM))
+    bpy.app.handlers.render_write.append(stop)
+    try:
+        options = "--movie", str(tmp_path / "film.mp4"), "--output", str(tmp_path / "out")
+        assert command.main(["check", str(tmp_path / "edit.blend"), *options]) == 130
+    finally:
+        bpy.app.handlers.render_write.remove(stop)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_gap_is_none_to_exr(noise, check, tmp_path):

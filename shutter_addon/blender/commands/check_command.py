@@ -62,7 +62,7 @@ def run(arguments) -> None:
 
 def _report(arguments, edit, frames: range, version: EditVersion) -> dict:
     """What is found, as JSON has it (docs/command.md)."""
-    faults, notes = [*_version_faults(edit), *_setting_faults(arguments, edit)], []
+    faults, notes = [*_version_faults(edit), *_setting_faults(arguments, edit, frames)], []
     device, found, limit = _on_device(edit, frames, faults, notes, find_cuts=not arguments.inbetweens_later)
     build = _builds(arguments.edit, edit, frames, found)
     for each in found:
@@ -121,13 +121,13 @@ def _numbers(version: str) -> list[int]:
     return [int(number) for number in re.findall(r"\d+", version)]
 
 
-def _setting_faults(arguments, edit) -> list[str]:
+def _setting_faults(arguments, edit, frames: range) -> list[str]:
     """Whether what the edit's output is can be written, and lie where it is wanted."""
     read = [arguments.edit, *versions.read_files(edit)]
     found = _fault(shared_frames.check_resumable, edit) if arguments.resume else []
     if arguments.output:
-        frames = command_line.frames(arguments.frames, (edit.frame_start, edit.frame_end), "edit")
-        found += _fault(shared_frames.check, arguments.output, arguments.format, frames, read)
+        ends = frames[0], frames[-1]
+        found += _fault(shared_frames.check, arguments.output, arguments.format, ends, read)
     if arguments.movie:
         return found + _fault(film_join.check, arguments.movie, [*read, *versions.sounds()])
     is_movie = edit.render.image_settings.media_type == "VIDEO"
@@ -138,6 +138,8 @@ def _fault(check, *arguments) -> list[str]:
     """The sentence of the error that a check raises, if it does."""
     try:
         check(*arguments)
+    except film_output.InterruptedRenderError:
+        raise
     except (UserError, OSError) as error:
         return [film_output.in_words(error, arguments[0])]
     return []

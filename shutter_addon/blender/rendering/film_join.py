@@ -34,6 +34,7 @@ def rehearse(edit, output: Path, file_format: str, frames: range) -> None:
     """Joins one black picture to a movie that is thrown away; `edit` is changed, and not to be used again.
 
     OutputError, MediaError, OSError: these frames, of such a format, could not be joined to that movie."""
+    film_output.check(output, None, film_output.size(edit))
     _refuse_gaps(edit, file_format, frames)
     with tempfile.TemporaryDirectory() as place:
         folder, trial = Path(place), Path(place, f"movie{output.suffix}")
@@ -41,7 +42,7 @@ def rehearse(edit, output: Path, file_format: str, frames: range) -> None:
         try:
             join(edit, folder, trial, (frames[0], frames[0]), "", progress=lambda *_: nullcontext(lambda: None))
         except OutputError as error:
-            raise OutputError(str(error).replace(str(trial), str(output))) from None
+            raise type(error)(str(error).replace(str(trial), str(output))) from None
 
 
 def _refuse_gaps(edit, file_format: str, frames: range) -> None:

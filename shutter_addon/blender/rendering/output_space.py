@@ -32,7 +32,7 @@ def faults(needs: list[Need]) -> list[str]:
     for disk in disks.values():
         size, left = sum(need.size for need in disk), free(disk[0].folder)
         if size > left:
-            what = " and ".join(dict.fromkeys(need.what for need in disk))
+            what = " and ".join(dict.fromkeys(need.what for need in disk if need.size))
             found.append(f"{disk[0].folder}: {what} may take {in_units(size)}, {in_units(left)} are free")
     return found
 
