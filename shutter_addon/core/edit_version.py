@@ -14,11 +14,13 @@ _NOTE = "virtual_shutter edit "  # what a picture's metadata say, before the key
 class Footage:
     """Files that the edit reads: a movie, a picture, or those of an image sequence.
 
-    name: of the first file; files: how many; content: a digest of theirs, in hexadecimal, "" where one is missing"""
+    name: of the first file; files: how many; content: a digest of theirs, in hexadecimal
+    missing: the name of the first that is missing or cannot be read; "": none is"""
 
     name: str
     files: int
     content: str
+    missing: str = ""
 
 
 @dataclass(frozen=True)
@@ -57,9 +59,10 @@ class EditVersion:
             return "is of another version of the .blend file"
         for here, there in zip(self.footage, other.footage, strict=False):
             if (here.files, here.content) != (there.files, there.content):
-                fault = "has other content" if here.content else "is missing or cannot be read"
+                if here.missing:
+                    return f"is of other footage: {here.missing} is missing or cannot be read on this machine"
                 name = here.name if here.files == 1 else f"one of the {here.files} files from {here.name} on"
-                return f"is of other footage: {name} {fault} on this machine"
+                return f"is of other footage: {name} has other content on this machine"
         return "is of other footage"
 
     def as_data(self) -> dict:
@@ -69,7 +72,10 @@ class EditVersion:
     @classmethod
     def from_data(cls, data: dict) -> EditVersion:
         """What `as_data` gave. KeyError, TypeError, ValueError: it gave no such thing."""
-        footage = tuple(Footage(str(one["name"]), int(one["files"]), str(one["content"])) for one in data["footage"])
+        footage = tuple(
+            Footage(str(one["name"]), int(one["files"]), str(one["content"]), str(one["missing"]))
+            for one in data["footage"]
+        )
         return cls(*(str(data[name]) for name in ("blend", "extension", "blender", "colours")), footage)
 
 

@@ -1,6 +1,7 @@
 """The file beside a job's pictures that says what they are of: no machine renders another version among them."""
 
 import json
+import stat
 from pathlib import Path
 
 from . import atomic_write
@@ -24,11 +25,14 @@ def write(folder: Path, version: EditVersion) -> None:
 
 
 def read(folder: Path) -> EditVersion | None:
-    """The version of the edit that the pictures' folder is for; None: there is no job. JobError: the file is damaged.
-    OSError: it cannot be read."""
+    """The version of the edit that the pictures' folder is for; None: there is no job. JobError: the file is damaged,
+    or a pipe or the like. OSError: it cannot be read."""
     path = folder / NAME
     try:
-        if path.stat().st_size > _LARGEST:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):  # a pipe would never open
+            raise JobError(f"{path}: is no file")
+        if status.st_size > _LARGEST:
             raise ValueError
         data = json.loads(path.read_bytes())
         if data["version"] != _VERSION:

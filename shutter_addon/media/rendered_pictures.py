@@ -26,8 +26,9 @@ class RenderedPicture(NamedTuple):
 
 
 def read(path: Path, edit: str | None = None) -> RenderedPicture | None:
-    """What a PNG or EXR file holds; None: there is none, or it is damaged anywhere. A PNG's checksums are compared, an
-    EXR is decoded.
+    """What a PNG or EXR file holds; None: there is none, or it is damaged. A PNG's checksums are compared. An EXR is
+    decoded, which finds damage of its pixels where ZIP or ZIPS made these smaller, whose streams have checksums; of
+    other codecs, and of noise, only that something is missing or cannot be decoded.
 
     edit: the key of an edit's version; None too, and little is read, of pictures of another"""
     image = ImageInput.open(check_name(path)) if path.is_file() else None

@@ -198,19 +198,28 @@ def _numbered(path):
     parts = _last_number(path.stem)
     if parts is None:
         return [0], [path], None
-    prefix, digits, suffix = parts
-    alike = re.compile(re.escape(prefix) + r"(\d+)" + re.escape(suffix + path.suffix))
-    first, found = int(digits), {}
-    for file in sorted(_listed(path.parent)):
-        match = alike.fullmatch(file.name)
-        number = int(match[1]) - first if match else -1
-        if number >= 0 and (number not in found or len(match[1]) == len(digits)):
+    first, found = int(parts[1]), {}
+    for file in numbered_alike(path):
+        digits = _last_number(file.stem)[1]
+        number = int(digits) - first
+        if number >= 0 and (number not in found or len(digits) == len(parts[1])):
             found[number] = file
     numbers = sorted(found)
     gaps = (i for i, (a, b) in enumerate(pairwise(numbers), 1) if b - a > MISSING + 1 or b >= LONGEST)
     end = next(gaps, len(numbers))
     files = [found[number] for number in numbers]
     return numbers[:end], files[:end], files[end] if end < len(files) else None
+
+
+def numbered_alike(path):
+    """The files in a file's folder, in order, whose name differs from its own in the last number only, if at all.
+    MediaError: the folder cannot be listed."""
+    parts = _last_number(path.stem)
+    if parts is None:
+        return [path] if path.exists() else []
+    prefix, _, suffix = parts
+    alike = re.compile(re.escape(prefix) + r"\d+" + re.escape(suffix + path.suffix))
+    return [file for file in sorted(_listed(path.parent)) if alike.fullmatch(file.name)]
 
 
 def _last_number(stem):

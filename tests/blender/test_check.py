@@ -1,18 +1,24 @@
 """The command `check`: planted faults are told, all of them, each by its place; and what a sound edit will take."""
 
 import json
+import os
 import shutil
+import signal
+import subprocess
+import sys
 import wave
+from pathlib import Path
 
 import numpy as np
 import pytest
 from support import noise_film, recipe, write_frames
 
-from shutter_addon.core import chunks, frame_ranges, job_file
+from shutter_addon.core import job_file
 from shutter_addon.core import recipe as recipes
 from shutter_addon.media.rendered_pictures import read
 
 FRAMES, WINDOW = 8, 4
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture
@@ -71,7 +77,7 @@ def test_a_sound_edit(noise, check, tmp_path):
         }
     ]
     assert report["extension"] == {"here": versions.extension(), "saved": versions.extension()}
-    assert report["disk"]["frame"] == 64 * 48 * 4 * 2
+    assert 64 * 48 * 4 * 2 < report["disk"]["frame"] < 64 * 48 * 4 * 2 * 1.25
     assert report["disk"]["all"] == FRAMES * report["disk"]["frame"]
     assert report["device"]
     assert report["chunk"] == FRAMES
@@ -80,11 +86,13 @@ def test_a_sound_edit(noise, check, tmp_path):
 
 def test_the_report_for_people(noise, check, bpy, tmp_path, capsys):
     from shutter_addon.blender import command
+    from shutter_addon.blender.data import versions
 
     check()
     assert command.main(["check", str(tmp_path / "edit.blend"), "--frames", "2-3"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert "Frames: 2 to 3, 64×48" in lines
+    assert f"Virtual Shutter: {versions.extension()}, the edit was saved by {versions.extension()}" in lines
     assert any(line.startswith("Effect Shutter: ") and "windows of 4 frames, 2 shutters" in line for line in lines)
     assert lines[-1] == "Chunk size: 2 frames"
     assert command.main(["check", str(tmp_path / "edit.blend"), "--device", "cpu", "--gpu-memory", "0"]) == 0
@@ -352,22 +360,151 @@ def test_a_newer_extension_and_blender(noise, check, bpy, tmp_path, monkeypatch)
 
 def test_output(noise, check, tmp_path, monkeypatch):
     (tmp_path / "file").write_bytes(b"")
-    assert check("--output", tmp_path / "file" / "out")[1][0].endswith("Not a directory")
+    assert check("--output", tmp_path / "file" / "out")[1] == [f"{tmp_path / 'file'}: is a file, and no folder"]
+    frame = check()[2]["disk"]["frame"]
     usage = shutil.disk_usage(tmp_path)
-    monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage._replace(free=64 * 48 * 4 * 2 * FRAMES - 1))
+    monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage._replace(free=frame * FRAMES - 1))
     _, found, _ = check("--output", tmp_path / "out")
-    assert found == [f"{tmp_path / 'out'}: 8 frames may take 192.0 kB, 192.0 kB are free"]
-    assert job_file.read(tmp_path / "out") is None
+    assert found == [f"{tmp_path / 'out'}: 8 frames may take 230.8 kB, 230.7 kB are free"]
+    assert not (tmp_path / "out").exists()
     edit = now()[0]
     edit.render.resolution_x = 65
     edit.render.image_settings.media_type = "VIDEO"
     assert "a movie has even sizes, not 65×48" in check()[1][0]
 
 
+def test_pictures_take_no_more_than_is_told(noise, check, tmp_path):
+    """Those of noise, in all channels."""
+    from shutter_addon.blender import command
+
+    edit = now()[0]
+    edit.render.image_settings.color_mode = "RGBA"
+    edit.render.image_settings.compression = 0
+    for file_format in ("png", "exr"):
+        options = "--output", tmp_path / file_format, "--format", file_format
+        most = check(*options, "--frames", "1")[2]["disk"]["frame"]
+        arguments = "render", tmp_path / "edit.blend", *options, "--frames", "1"
+        assert command.main([str(argument) for argument in arguments]) == 0
+        assert (tmp_path / file_format / f"0001.{file_format}").stat().st_size <= most
+
+
+def test_room_for_in_between_frames(noise, check, tmp_path, monkeypatch):
+    """They lie beside the edit, and share its disk with the frames."""
+    now()[1].inbetween = "2"
+    report = check("--inbetweens-later")[2]
+    assert report["disk"]["inbetweens"] > (FRAMES - 1) * 64 * 48 * 4
+    usage = shutil.disk_usage(tmp_path)
+    free = report["disk"]["all"] + report["disk"]["inbetweens"]
+    monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage._replace(free=free))
+    assert check("--inbetweens-later", "--output", tmp_path / "out")[1] == []
+    monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage._replace(free=free - 1))
+    (fault,) = check("--inbetweens-later", "--output", tmp_path / "out", "--movie", tmp_path / "film.mp4")[1]
+    assert fault.startswith(f"{tmp_path / 'out'}: 8 frames and in-between frames may take ")
+
+
+def test_a_folder_of_in_between_frames_that_cannot_be_written_to(noise, check, tmp_path):
+    now()[1].inbetween = "2"
+    (tmp_path / "virtual_shutter_inbetween").write_bytes(b"")
+    (fault,) = check("--inbetweens-later")[1]
+    assert fault == f"{tmp_path / 'virtual_shutter_inbetween'}: is a file, and no folder"
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "sentence"),
+    [
+        ("in", [], "f0001.png"),
+        ("in\\to", [], "Blender cannot write to a path with \\"),
+        ("out.mp4", [], "a saved edit is rendered to a folder of pictures, not to a movie"),
+        ("out.v2", [], "out.v2: neither a folder nor one of .mp4"),
+        ("out.v2", ["--format", "png"], ""),
+    ],
+)
+def test_a_place_that_render_refuses(noise, check, tmp_path, name, options, sentence):
+    for number in range(1, FRAMES + 1):  # as pictures are called
+        (tmp_path / "in" / f"{number:04d}.png").hardlink_to(tmp_path / "in" / f"f{number:04d}.png")
+    _, found, _ = check("--output", tmp_path / name, *options)
+    assert len(found) == bool(sentence)
+    if sentence:
+        assert sentence in found[0]
+        assert not (tmp_path / name / job_file.NAME).exists()
+        assert (tmp_path / name).exists() == (name == "in")
+
+
+def test_an_edit_that_cannot_be_resumed(noise, check):
+    now()[0].render.use_stamp = True
+    assert check()[1] == []
+    (fault,) = check("--resume")[1]
+    assert fault.startswith("--resume: the edit burns metadata into its pictures")
+
+
+def _odd(edit):
+    edit.render.resolution_x = 65
+
+
+def _uppermost(edit):
+    edit.sequence_editor.strips.new_effect("grey", "COLOR", 128, 1, length=1)
+
+
+def _lossless(edit):
+    edit.render.image_settings.media_type = "VIDEO"
+    edit.render.ffmpeg.codec = "FFV1"
+
+
+def _gap(edit):
+    edit.view_settings.view_transform = "AgX"
+    edit.render.image_settings.color_mode = "RGBA"
+    edit.frame_end = FRAMES + 2
+
+
+@pytest.mark.parametrize(
+    ("change", "name", "sentence"),
+    [
+        (lambda edit: None, "film.mp4", ""),
+        (lambda edit: None, "film", "film: none of .mp4"),
+        (lambda edit: None, "edit.blend", "edit.blend: none of .mp4"),
+        (lambda edit: None, "in/f0001.png/film.mp4", "f0001.png: is a file, and no folder"),
+        (lambda edit: None, "folder.mp4", "folder.mp4: is a folder, not a movie"),
+        (_odd, "film.mp4", "film.mp4: a movie has even sizes, not 65×48"),
+        (_uppermost, "film.mp4", "the edit has strips in the uppermost channel"),
+        (_lossless, "film.mkv", ""),
+        (_lossless, "film.webm", "film.webm: "),
+        (_gap, "film.mp4", "frames 9 to 10 are transparent, as no strip is shown"),
+    ],
+)
+def test_a_movie_that_join_refuses(noise, check, tmp_path, change, name, sentence):
+    (tmp_path / "folder.mp4").mkdir()
+    change(now()[0])
+    _, found, _ = check("--movie", tmp_path / name, "--output", tmp_path / "out")
+    assert [sentence in fault for fault in found] == [True] * bool(sentence)
+    assert (tmp_path / "out").exists() == (not sentence)
+    assert not list(tmp_path.glob("film*"))
+
+
+def test_a_rehearsal_that_is_stopped(noise, check, bpy, tmp_path):
+    from shutter_addon.blender import command
+
+    check()
+    stop = bpy.app.handlers.persistent(lambda *_: os.kill(os.getpid(), signal.SIGTERM))
+    bpy.app.handlers.render_write.append(stop)
+    try:
+        options = "--movie", str(tmp_path / "film.mp4"), "--output", str(tmp_path / "out")
+        assert command.main(["check", str(tmp_path / "edit.blend"), *options]) == 130
+    finally:
+        bpy.app.handlers.render_write.remove(stop)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_gap_is_none_to_exr(noise, check, tmp_path):
+    _gap(now()[0])
+    assert check("--movie", tmp_path / "film.mp4", "--format", "exr")[1] == []
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["none.blend"], "no such file"),
+        (["none.blend"], "none.blend: no such file"),
+        (["."], ": is no file"),
+        (["edit.blend", "--frames=-1"], '--frames: "-1" is not A:B'),
         (["edit.blend", "--frames", "3:99"], "--frames: 3:99 is not within the edit's frames 1:8"),
     ],
 )
@@ -379,16 +516,58 @@ def test_what_cannot_be_checked(noise, check, tmp_path, capsys, arguments, sente
     assert sentence in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("window", "step"), [(1, 1), (4, 1), (16, 1), (256, 1), (64, 8), (128, 16)])
-def test_a_chunk_reads_little_that_is_not_its_own(window, step):
-    size = chunks.chunk_size(window, step)
-    share = [1 - n * step / chunks.decoded(n, window, step) for n in (size, size - 1)]
-    assert share[0] <= 1 / chunks.ONE_IN
-    assert size == chunks.LEAST or share[1] > 1 / chunks.ONE_IN
+def test_faults_have_an_order(noise, check, bpy, tmp_path):
+    """Not that of where Blender keeps things in memory."""
+    room = bpy.data.scenes.new("Room")
+    for number in range(12):
+        image = bpy.data.images.new(f"wood {number:02d}", 4, 4)
+        image.source, image.filepath = "FILE", str(tmp_path / f"wood {number:02d}.png")
+        thing = bpy.data.objects.new(f"thing {11 - number:02d}", None)
+        thing.empty_display_type, thing.data = "IMAGE", image
+        room.collection.objects.link(thing)
+    now()[0].sequence_editor.strips.new_scene("room", room, 5, 1)
+    assert [fault.split(":")[0] for fault in check()[1]] == [f'image "wood {number:02d}"' for number in range(12)]
 
 
-@pytest.mark.parametrize(
-    ("frames", "words"), [([3], "frame 3"), ([5, 4], "frames 4 to 5"), ([9, 1, 3, 2, 12], "frames 1 to 3, 9, 12")]
-)
-def test_frames_in_words(frames, words):
-    assert frame_ranges.in_words(frames) == words
+def test_an_edit_without_an_effect_says_no_version(edit, check, tmp_path, capsys):
+    from shutter_addon.blender import command
+
+    edit.sequence_editor.strips.new_effect("grey", "COLOR", 1, 1, length=2)
+    check()
+    assert command.main(["check", str(tmp_path / "edit.blend")]) == 0
+    assert "the edit does not say which saved it" in capsys.readouterr().out
+
+
+@pytest.fixture
+def printed(bpy, noise, tmp_path):
+    """What a process of its own says on stderr that checks the edit, and its exit code."""
+    path = tmp_path / "edit.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+
+    def run(stdout, **environment):
+        arguments = [sys.executable, "-m", "shutter_addon", "check", str(path)]
+        environment = os.environ | environment
+        done = subprocess.run(arguments, cwd=ROOT, env=environment, stdout=stdout, stderr=subprocess.PIPE, check=False)
+        return done.returncode, done.stderr.decode()
+
+    return run
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_nobody_reads_the_report(printed, unbuffered):
+    reader, writer = os.pipe()
+    os.close(reader)
+    assert printed(writer, PYTHONUNBUFFERED=unbuffered) == (0, "")
+    os.close(writer)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full device")
+def test_a_report_that_cannot_be_written(printed):
+    with open("/dev/full", "wb") as full:
+        assert printed(full) == (2, "Virtual Shutter: stdout: No space left on device\n")
+
+
+def test_a_terminal_without_all_characters(printed, tmp_path):
+    with (tmp_path / "report").open("wb") as report:
+        assert printed(report, PYTHONIOENCODING="ascii") == (0, "")
+    assert "Frames: 1 to 8, 64?48" in (tmp_path / "report").read_text()

@@ -97,6 +97,13 @@ def bits(folder, ending="png"):
     return {path.name: read_picture(path).tobytes() for path in sorted(folder.glob(f"*.{ending}"))}
 
 
+def flip(path):
+    """Changes one bit in the midst of a file."""
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 4
+    path.write_bytes(content)
+
+
 def places(folder):
     """What changes where a file is written anew."""
     return {path.name: (path.stat().st_ino, path.stat().st_mtime_ns) for path in folder.glob("*.png")}
@@ -154,6 +161,18 @@ def test_resume_renders_what_is_missing_damaged_or_of_another_version(bpy, saved
     footage.write_bytes(footage.read_bytes()[:-12] + bytes(12))  # other content: all is of another version
     assert run("render", saved, "--output", out, "--resume", "--frames", "1:2")[0] == 0
     assert [name for name in sorted(after) if places(out)[name] != after[name]] == ["0001.png", "0002.png"]
+
+
+@pytest.mark.parametrize("codec", ["NONE", "PIZ", "DWAA"])
+def test_a_damaged_exr_is_rendered_again(bpy, saved, run, save, tmp_path, codec):
+    """Whatever codec the edit has: not all have checksums, nor are all lossless."""
+    bpy.context.scene.render.image_settings.exr_codec = codec
+    out = "--output", tmp_path / "out", "--format", "exr", "--frames", "1:2"
+    assert run("render", save(), *out)[0] == 0
+    whole = bits(tmp_path / "out", "exr")
+    flip(tmp_path / "out" / "0002.exr")
+    assert run("render", saved, *out, "--resume")[0] == 0
+    assert bits(tmp_path / "out", "exr") == whole
 
 
 @contextmanager
@@ -247,7 +266,8 @@ def test_pictures_of_another_version_are_read_once(saved, run, tmp_path, monkeyp
     assert all(read(path).edit for path in out.iterdir())
 
 
-def test_an_edit_that_is_saved_over_while_it_is_opened(saved, run, tmp_path, monkeypatch):
+@pytest.mark.parametrize("command", ["render", "check", "join"])
+def test_an_edit_that_is_saved_over_while_it_is_opened(saved, run, tmp_path, monkeypatch, command):
     from shutter_addon.blender.editing import saved_edit
 
     def open_edit(path, opened=saved_edit.open_edit):
@@ -256,8 +276,11 @@ def test_an_edit_that_is_saved_over_while_it_is_opened(saved, run, tmp_path, mon
         return found
 
     monkeypatch.setattr(saved_edit, "open_edit", open_edit)
-    refused(run("render", saved, "--output", tmp_path / "out"), str(saved), "saved over while it was opened")
-    assert not (tmp_path / "out").exists()
+    out = tmp_path / "out"
+    arguments = [tmp_path / "in", "--edit", saved, "--output", tmp_path / "film.mp4"]
+    done = run(command, *(arguments if command == "join" else [saved, "--output", out]))
+    refused((done[0], done[1].splitlines()[-1]), str(saved), "saved over while it was opened")
+    assert not out.exists()
 
 
 @pytest.mark.parametrize("resume", [[], ["--resume"]])
@@ -285,6 +308,20 @@ def test_footage_that_is_written_to_costs_only_what_was_rendered_of_it(saved, ru
     at_frame(2, write)
     refused(run("render", saved, "--output", out), "f0014.png: was written to while frames were rendered")
     assert places(out) == {name: place for name, place in whole.items() if name > "0002.png"}
+
+
+def test_footage_that_is_written_to_costs_no_picture_of_another_worker(saved, run, at_frame, tmp_path):
+    out = tmp_path / "out"
+
+    def write():
+        footage = tmp_path / "in" / "f0014.png"
+        footage.write_bytes(footage.read_bytes() + b"newer")
+        shutil.copy(footage, tmp_path / "another's")
+        (tmp_path / "another's").replace(out / "0002.png")
+
+    at_frame(4, write)
+    refused(run("render", saved, "--output", out), "f0014.png: was written to while frames were rendered")
+    assert os.listdir(out) == ["0002.png"]
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts a small disk")
@@ -446,6 +483,17 @@ def test_a_driver_that_needs_scripts_is_named(bpy, edit, run, save, tmp_path, pl
     code, said = run("render", save(), "--output", tmp_path / "out")
     assert code == 2
     assert f'"{name}" needs scripts, which are not run (bpy.context' in said.splitlines()[-1]  # Blender tells it, too
+
+
+def test_a_driver_that_needs_no_script_is_blenders_concern(bpy, edit, run, save, tmp_path):
+    """What it reads may be gone: Blender renders on, and so would its own render."""
+    edit.sequence_editor.strips.new_effect("grey", "COLOR", 1, 1, length=2)
+    edit.frame_start, edit.frame_end = 1, 2
+    edit.render.resolution_x, edit.render.resolution_y = 16, 8
+    driver = edit.driver_add("audio_volume").driver
+    driver.type = "AVERAGE"
+    driver.variables.new().targets[0].data_path = "gone"
+    assert run("render", save(), "--output", tmp_path / "out")[0] == 0
 
 
 def test_pictures_are_not_written_over_footage(edit, noise, run, save, tmp_path):

@@ -43,3 +43,57 @@ def test_each_file_of_a_long_sequence_counts(bpy, saved, tmp_path, size):
     assert before.footage[0].files == 300
     first.with_name("f0002.png").write_bytes(bytes(size - 1) + b"1")
     assert versions.of_edit(saved).key != before.key
+
+
+def _tiles(bpy, folder):
+    image = bpy.data.images.new("wood", 4, 4, tiled=True)
+    image.filepath = str(folder / "wood.<UDIM>.png")
+    image.tiles.new(1002)
+
+
+def _uv_tiles(bpy, folder):
+    _tiles(bpy, folder)
+    bpy.data.images["wood"].filepath = str(folder / "wood.<UVTILE>.png")
+
+
+def _volumes(bpy, folder):
+    smoke = bpy.data.volumes.new("smoke")
+    smoke.filepath, smoke.is_sequence = str(folder / "smoke_0002.vdb"), True
+
+
+def _images(bpy, folder):
+    write_frames(folder, np.zeros((2, 4, 4, 3), np.uint8))
+    bpy.data.images.load(str(folder / "f0002.png")).source = "SEQUENCE"
+
+
+@pytest.mark.parametrize(
+    ("name_files", "names"),
+    [
+        (_tiles, ["wood.1001.png", "wood.1002.png"]),
+        (_uv_tiles, ["wood.u1_v1.png", "wood.u2_v1.png"]),
+        (_volumes, ["smoke_0001.vdb", "smoke_0002.vdb", "smoke_0003.vdb"]),
+        (_images, ["f0001.png", "f0002.png"]),
+    ],
+)
+def test_each_file_of_what_is_shown_counts(bpy, saved, tmp_path, name_files, names):
+    """Blender shows files of a sequence by their number, those before the one that is named as well."""
+    name_files(bpy, tmp_path)
+    paths = [tmp_path / name for name in names]
+    keys = []
+    for path in [None, *paths]:
+        for each in paths:
+            each.write_bytes(b"newer" if each == path else b"as it was")
+        keys.append(versions.of_edit(saved).key)
+    assert len(set(keys)) == len(keys)
+    assert set(paths) <= set(versions.read_files(saved))
+
+
+def test_a_missing_file_hides_no_other(bpy, saved, tmp_path):
+    _tiles(bpy, tmp_path)
+    (tmp_path / "wood.1002.png").write_bytes(b"as it was")
+    before = versions.of_edit(saved)
+    assert before.footage[0].missing == "wood.1001.png"
+    (tmp_path / "wood.1002.png").write_bytes(b"newer")
+    newer = versions.of_edit(saved)
+    (tmp_path / "wood.1002.png").rename(tmp_path / "wood.1001.png")
+    assert len({before.key, newer.key, versions.of_edit(saved).key}) == 3

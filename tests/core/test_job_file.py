@@ -1,5 +1,6 @@
 """The file that says which version of an edit a job's pictures are of."""
 
+import os
 from dataclasses import replace
 
 import pytest
@@ -19,8 +20,8 @@ VERSION = EditVersion("ab" * 32, "0.1.0", "5.2.0", "", FOOTAGE)
         ({"colours": "12" * 32}, "is of the OpenColorIO configuration of Blender, this machine has the OpenColorIO"),
         ({"blend": "00" * 32}, "the job is of another version of the .blend file"),
         (
-            {"footage": (VERSION.footage[0], Footage("f0001.png", 9, ""))},
-            "9 files from f0001.png on is missing",
+            {"footage": (VERSION.footage[0], Footage("f0001.png", 9, "12", "f0003.png"))},
+            "f0003.png is missing",
         ),
         ({"footage": (Footage("film.mp4", 1, "11"), VERSION.footage[1])}, ": film.mp4 has other content"),
         ({"footage": VERSION.footage[:1]}, "is of other footage"),
@@ -56,6 +57,14 @@ def test_a_folder_without_a_job_takes_all(tmp_path):
 def test_a_damaged_file_is_told(tmp_path, content):
     (tmp_path / job_file.NAME).write_text(content)
     with pytest.raises(job_file.JobError, match="is damaged"):
+        job_file.read(tmp_path)
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir])
+def test_what_is_no_file_is_told(tmp_path, make):
+    """A pipe would be waited for without end."""
+    make(tmp_path / job_file.NAME)
+    with pytest.raises(job_file.JobError, match="is no file"):
         job_file.read(tmp_path)
 
 

@@ -4,23 +4,22 @@ import json
 import os
 import re
 import shlex
-import shutil
 import subprocess
 import sys
-from contextlib import suppress
 from pathlib import Path
 
 import bpy
 
 from ...compute.budget import machine_memory
 from ...compute.device import NoDeviceError
-from ...core import atomic_write, chunks, frame_ranges, job_file
+from ...core import chunks, frame_ranges, job_file
 from ...core.edit_version import EditVersion
-from ...core.messages import signed
+from ...core.messages import UserError, signed
 from ..data import missing_media, versions
 from ..editing import saved_edit
-from ..rendering import edit_check, film_output, machine, session
+from ..rendering import edit_check, film_join, film_output, machine, output_space, session, shared_frames
 from ..rendering.edit_check import EffectCheck
+from ..rendering.output_space import Need, in_units
 from . import command_line
 
 
@@ -31,7 +30,14 @@ def add(commands) -> None:
     parser.add_argument(
         "--output", type=command_line.place, metavar="DIR", help="where the frames are to go: it gets the job's file"
     )
-    parser.add_argument("--format", choices=tuple(film_output.FORMATS), default="png", help="of the frames")
+    parser.add_argument("--format", choices=tuple(film_output.FORMATS), help="of the frames (default: png)")
+    parser.add_argument("--resume", action="store_true", help="the frames will be rendered with --resume")
+    parser.add_argument(
+        "--movie",
+        type=command_line.place,
+        metavar="FILE",
+        help=f"what the frames will be joined to ({', '.join(film_output.MOVIES)})",
+    )
     parser.add_argument(
         "--inbetweens-later", action="store_true", help="in-between frames may be missing: they are built after this"
     )
@@ -41,27 +47,22 @@ def add(commands) -> None:
 
 
 def run(arguments) -> None:
+    opened = versions.stamp(arguments.edit)
     edit = saved_edit.open_edit(arguments.edit)
     first, last = command_line.frames(arguments.frames, (edit.frame_start, edit.frame_end), "edit")
     frames = range(first, last + 1)
     with session.using(session.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)):
-        report = _report(arguments, edit, frames)
-    if arguments.json:
-        print(json.dumps(report, indent=1, ensure_ascii=False))
-    else:
-        print("\n".join(_lines(report)))
-    with suppress(BrokenPipeError):  # nobody reads on
-        sys.stdout.flush()
+        report = _report(arguments, edit, frames, saved_edit.version(edit, arguments.edit, opened))
+    command_line.tell(json.dumps(report, indent=1) if arguments.json else "\n".join(_lines(report)))
     for fault in report["faults"]:
         print(signed(fault), file=sys.stderr)
     if report["faults"]:
         sys.exit(2)
 
 
-def _report(arguments, edit, frames: range) -> dict:
+def _report(arguments, edit, frames: range, version: EditVersion) -> dict:
     """What is found, as JSON has it (docs/command.md)."""
-    faults, notes = [*_version_faults(edit), *_setting_faults(edit)], []
-    version = versions.of_edit(edit)
+    faults, notes = [*_version_faults(edit), *_setting_faults(arguments, edit, frames)], []
     device, found, limit = _on_device(edit, frames, faults, notes, find_cuts=not arguments.inbetweens_later)
     build = _builds(arguments.edit, edit, frames, found)
     for each in found:
@@ -75,12 +76,10 @@ def _report(arguments, edit, frames: range) -> dict:
     faults += missing_media.sound_faults(edit, frames)
     memory = _memory(found, limit)
     if memory["host"] > (machine_memory() or memory["host"]):
-        words = f"{_bytes(memory['host'])} of memory, the machine has {_bytes(machine_memory())}"
+        words = f"{in_units(memory['host'])} of memory, the machine has {in_units(machine_memory())}"
         faults.append(f"a frame needs {words}")
-    disk = _disk(arguments, edit, frames, faults)
-    if arguments.output:
-        faults += _output_faults(arguments.output, None if faults else version)
-    return {
+    disk = _disk(arguments, edit, frames, found, faults)
+    report = {
         "edit": str(arguments.edit),
         "key": version.key,
         "frames": [frames[0], frames[-1]],
@@ -96,6 +95,11 @@ def _report(arguments, edit, frames: range) -> dict:
         "notes": notes,
         "faults": faults,
     }
+    if arguments.movie and film_output.is_movie(arguments.movie):  # last: it changes the edit
+        faults += _fault(film_join.rehearse, edit, arguments.movie, arguments.format or "png", frames)
+    if arguments.output and not faults:
+        faults += _fault(_write_job, arguments.output, version)
+    return report
 
 
 def _version_faults(edit) -> list[str]:
@@ -117,13 +121,27 @@ def _numbers(version: str) -> list[int]:
     return [int(number) for number in re.findall(r"\d+", version)]
 
 
-def _setting_faults(edit) -> list[str]:
-    """Whether Blender can write pictures of the edit's size, and the movie, if that is its output."""
+def _setting_faults(arguments, edit, frames: range) -> list[str]:
+    """Whether what the edit's output is can be written, and lie where it is wanted."""
+    read = [arguments.edit, *versions.read_files(edit)]
+    found = _fault(shared_frames.check_resumable, edit) if arguments.resume else []
+    if arguments.output:
+        ends = frames[0], frames[-1]
+        found += _fault(shared_frames.check, arguments.output, arguments.format, ends, read)
+    if arguments.movie:
+        return found + _fault(film_join.check, arguments.movie, [*read, *versions.sounds()])
     is_movie = edit.render.image_settings.media_type == "VIDEO"
+    return found + _fault(film_output.check, Path("film.mp4" if is_movie else "frames"), None, film_output.size(edit))
+
+
+def _fault(check, *arguments) -> list[str]:
+    """The sentence of the error that a check raises, if it does."""
     try:
-        film_output.check(Path("film.mp4" if is_movie else "frames"), None, film_output.size(edit))
-    except film_output.OutputError as error:
-        return [str(error)]
+        check(*arguments)
+    except film_output.InterruptedRenderError:
+        raise
+    except (UserError, OSError) as error:
+        return [film_output.in_words(error, arguments[0])]
     return []
 
 
@@ -154,36 +172,31 @@ def _memory(found: list[EffectCheck], limit: int | None) -> dict:
     return {"gpu": min(gpu, limit or gpu), "gpu_limit": limit, "host": host}
 
 
-def _disk(arguments, edit, frames: range, faults: list[str]) -> dict:
-    """Bytes that the frames take at most, as noise does, which is not compressed: no frame is rendered for this. Those
-    that are there already are not counted."""
-    width, height = film_output.size(edit)
-    frame, free = width * height * 4 * film_output.FORMATS[arguments.format].bits // 8, None
+def _disk(arguments, edit, frames: range, found: list[EffectCheck], faults: list[str]) -> dict:
+    """Bytes that the frames and the in-between frames that are missing take at most, as noise does, which is not
+    compressed: no frame is rendered for this. Those that are there already are not counted."""
+    file_format, needs = arguments.format or "png", []
+    frame = output_space.picture(*film_output.size(edit), film_output.FORMATS[file_format].bits // 8)
     if output := arguments.output:
-        paths = (output / f"{number:04d}.{arguments.format}" for number in frames)
-        left = sum(not path.exists() for path in paths)
-        place = next(path for path in (output, *output.parents) if path.exists())
-        free = shutil.disk_usage(place).free
-        if left * frame > free:
-            words = f"{left} frames may take {_bytes(left * frame)}, {_bytes(free)} are free"
-            faults.append(f"{output}: {words}")
-    return {"format": arguments.format, "frame": frame, "all": len(frames) * frame, "free": free}
+        pictures = film_output.pictures_of(output, file_format, (frames[0], frames[-1]))
+        left = sum(not path.exists() for path in pictures)
+        needs.append(Need(output, left * frame, f"{left} frames"))
+    if arguments.movie:
+        needs.append(Need(arguments.movie.parent, 0, "the movie"))
+    needs += [Need(each.folder, each.bytes, "in-between frames") for each in found if each.missing]
+    faults += output_space.faults(needs)
+    return {
+        "format": file_format,
+        "frame": frame,
+        "all": len(frames) * frame,
+        "inbetweens": sum(each.bytes for each in found),
+        "free": output_space.free(output) if output else None,
+    }
 
 
-def _output_faults(folder: Path, job: EditVersion | None) -> list[str]:
-    """Whether the folder can be written to. It gets the job's file, if there is a job."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        atomic_write.clear_up(folder)
-        with atomic_write.part_folder(folder):
-            pass
-        if job:
-            job_file.write(folder, job)
-    except FileExistsError:
-        return [f"{folder}: is a file, and no folder"]
-    except OSError as error:
-        return [film_output.in_words(error, folder)]
-    return []
+def _write_job(folder: Path, job: EditVersion) -> None:
+    film_output.prepare(folder)
+    job_file.write(folder, job)
 
 
 def _effect(found: EffectCheck) -> dict:
@@ -230,20 +243,16 @@ def _lines(report: dict) -> list[str]:
     lines.append(f"Device: {report['device'] or 'none'}")
     if is_known := all(effect["source"] for effect in report["effects"]):
         limit = memory["gpu_limit"]
-        gpu = f"{_bytes(memory['gpu'])} of the {_bytes(limit)} that may be taken of the GPU, " if limit else ""
-        lines.append(f"Memory: {gpu}{_bytes(memory['host'])} for decoded frames")
-    free = f", {_bytes(disk['free'])} are free" if disk["free"] is not None else ""
-    most = f"at most {_bytes(disk['frame'])} a frame as {disk['format']}, {_bytes(disk['all'])} in all{free}"
+        gpu = f"{in_units(memory['gpu'])} of the {in_units(limit)} that may be taken of the GPU, " if limit else ""
+        lines.append(f"Memory: {gpu}{in_units(memory['host'])} for decoded frames")
+    most = f"at most {in_units(disk['frame'])} a frame as {disk['format']}, {in_units(disk['all'])} in all"
+    most += f", in-between frames at most {in_units(disk['inbetweens'])}" if disk["inbetweens"] else ""
+    most += f", {in_units(disk['free'])} are free" if disk["free"] is not None else ""
     lines.append(f"Disk: {most}")
     lines += [f"Chunk size: {report['chunk']} frames"] if is_known else []
     return lines + [f"Note: {note}" for note in report["notes"]]
 
 
 def _saved_by(name: str, version: dict) -> str:
-    return f"{name}: {version['here']}, the edit was saved by {version['saved'] or 'an older one'}"
-
-
-def _bytes(count: int) -> str:
-    sizes = {"GB": 1 << 30, "MB": 1 << 20, "kB": 1 << 10}
-    unit = next((unit for unit, size in sizes.items() if count >= size), "kB")
-    return f"{count / sizes[unit]:.1f} {unit}"
+    saved = f"was saved by {version['saved']}" if version["saved"] else "does not say which saved it"
+    return f"{name}: {version['here']}, the edit {saved}"

@@ -69,10 +69,21 @@ def frames(text: str | None, whole: tuple[int, int], what: str = "clip") -> tupl
     OutputError: what is rendered has no such frames."""
     if text is None:
         return whole
-    numbers = re.fullmatch(r"(-?\d{1,9})(?:[:-](-?\d{1,9}))?", text)
+    numbers = re.fullmatch(r"(\d{1,9})(?:[:-](\d{1,9}))?", text)
     if not numbers:
         raise film_output.OutputError(f'--frames: "{sentence(text, 40)}" is not A:B')
     first, last = int(numbers[1]), int(numbers[2] or numbers[1])
     if not whole[0] <= first <= last <= whole[1]:
         raise film_output.OutputError(f"--frames: {text} is not within the {what}'s frames {whole[0]}:{whole[1]}")
     return first, last
+
+
+def tell(text: str) -> None:
+    """Prints it on stdout; characters that a terminal lacks as "?". OutputError: it cannot be written there."""
+    encoding = sys.stdout.encoding or "utf-8"
+    try:
+        print(text.encode(encoding, "replace").decode(encoding), flush=True)
+    except BrokenPipeError:  # nobody reads on
+        pass
+    except OSError as error:
+        raise film_output.OutputError(f"stdout: {error.strerror or error}") from None

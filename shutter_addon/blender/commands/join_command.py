@@ -1,9 +1,5 @@
 """The command `join`: rendered frames, and the sound of their edit, as a movie."""
 
-from pathlib import Path
-
-import bpy
-
 from ...core import job_file
 from ..data import missing_media, versions
 from ..editing import saved_edit
@@ -25,19 +21,14 @@ def add(commands) -> None:
 
 
 def run(arguments) -> None:
-    if not film_output.is_movie(arguments.output):
-        raise film_output.OutputError(f"{arguments.output}: none of {', '.join(film_output.MOVIES)}")
+    opened = versions.stamp(arguments.edit)
     edit = saved_edit.open_edit(arguments.edit)
     whole = edit.frame_start, edit.frame_end
     frames = command_line.frames(arguments.frames, whole, "edit")
-    film_output.spare([arguments.output], [arguments.edit, *versions.read_files(edit), *_sounds()])
+    film_join.check(arguments.output, [arguments.edit, *versions.read_files(edit), *versions.sounds()])
     for fault in missing_media.sound_faults(edit, range(frames[0], frames[1] + 1)):
         raise film_output.OutputError(fault)  # Blender would make a silent film
     film_join.say_what_is_left_out(arguments.folder, whole)
-    version = versions.of_edit(edit)
+    version = saved_edit.version(edit, arguments.edit, opened)
     job_file.guard(arguments.folder, version)
     film_join.join(edit, arguments.folder, arguments.output, frames, version.key)
-
-
-def _sounds() -> list[Path]:
-    return [Path(bpy.path.abspath(sound.filepath, library=sound.library)) for sound in bpy.data.sounds]

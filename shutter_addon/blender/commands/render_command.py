@@ -67,9 +67,6 @@ def _render_edit(arguments) -> None:
     source, output, file_format = arguments.source, arguments.output, arguments.format or "png"
     if output is None:
         raise film_output.OutputError("nothing to do: give --output")
-    if film_output.is_movie(output):
-        raise film_output.OutputError(f"{output}: a saved edit is rendered to a folder of pictures, not to a movie")
-    film_output.check_folder(output, arguments.format)
     opened = versions.stamp(source)
     edit = saved_edit.open_edit(source)
     whole = edit.frame_start, edit.frame_end
@@ -78,11 +75,10 @@ def _render_edit(arguments) -> None:
         raise film_output.OutputError(fault)  # Blender would render on without it
     settings = session.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)
     with session.using(settings), shared_frames.of_same_footage(edit) as rendered:
-        version = versions.of_edit(edit)
-        if versions.stamp(source) != opened:  # its key is not that of what was opened
-            raise film_output.OutputError(f"{source}: was saved over while it was opened; render it again")
+        version = saved_edit.version(edit, source, opened)
         job_file.guard(output, version)
-        film_output.spare(film_output.pictures_of(output, file_format, frames), [source, *versions.read_files(edit)])
+        read = [source, *versions.read_files(edit)]
+        shared_frames.check(output, arguments.format, frames, read)
         _check_device(arguments)
         shared_frames.render(edit, output, file_format, version, rendered, resume=arguments.resume)
 

@@ -1,14 +1,13 @@
 """Media of an edit that are not there, or cannot be read."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import bpy
 
 from ...core import frame_ranges
 from ...media import MediaError, open_source
 from ...media.files import check_file, check_sound
-from . import requirements, strips, used_data
+from . import external_files, requirements, strips, used_data
 
 
 def faults(edit, frames: range, *, sources: bool) -> list[str]:
@@ -20,7 +19,7 @@ def faults(edit, frames: range, *, sources: bool) -> list[str]:
     found = _of_strips(edit, frames, strips.SOURCES, sources=sources)
     used, data = used_data.used(edit, frames) - _clips(edit), bpy.data
     for items in (data.images, data.volumes, data.cache_files, data.movieclips, data.fonts):
-        found += [_words(item, fault) for item in used.intersection(items) for fault in _of_item(item)]
+        found += [_words(item, fault) for item in items if item in used for fault in _of_item(item)]
     found += [_words(library, fault) for library in data.libraries for fault in _of_item(library)]
     return list(dict.fromkeys(found))
 
@@ -53,10 +52,10 @@ def _of_strips(edit, frames: range, kinds: tuple[str, ...], *, sources: bool) ->
 
 def _of_strip(strip, frames: range) -> Iterator[str]:
     if strip.type == "MOVIE":
-        yield from _fault(lambda: open_source(_path(strip, strip.filepath)).close())
+        yield from _fault(lambda: open_source(external_files.absolute(strip, strip.filepath)).close())
     elif strip.type == "IMAGE":
         elements = {element.filename for frame in frames if (element := strip.strip_elem_from_frame(frame))}
-        folder = _path(strip, strip.directory)
+        folder = external_files.absolute(strip, strip.directory)
         gone = [fault for name in sorted(elements) for fault in _fault(check_file, folder / name)]
         yield from [gone[0] + (f" (and {len(gone) - 1} more files)" if len(gone) > 1 else "")] if gone else ()
     elif strip.type == "MOVIECLIP":
@@ -68,25 +67,8 @@ def _of_strip(strip, frames: range) -> Iterator[str]:
 def _of_item(item, check=check_file) -> Iterator[str]:
     """Of a sound, a library, an image or the like; of a sequence its first file. check: raises MediaError for a
     file."""
-    source = getattr(item, "source", "FILE")
-    is_made = source in ("GENERATED", "VIEWER") or item.filepath in ("", "<builtin>")
-    if is_made or getattr(item, "packed_file", None):
-        return
-    for name in _tiles(item) if source == "TILED" else (item.filepath,):
-        yield from _fault(check, _path(item, name))
-
-
-def _tiles(image) -> Iterator[str]:
-    """The files of an image in tiles."""
-    for tile in image.tiles:
-        v, u = divmod(tile.number - 1001, 10)
-        yield image.filepath.replace("<UDIM>", str(tile.number)).replace("<UVTILE>", f"u{u + 1}_v{v + 1}")
-
-
-def _path(owner, path: str) -> Path:
-    """An absolute path, where an ID or a strip of one names it."""
-    library = owner.library if isinstance(owner, bpy.types.ID) else owner.id_data.library
-    return Path(bpy.path.abspath(path, library=library))
+    for path in external_files.named(item):
+        yield from _fault(check, path)
 
 
 def _fault(function, *arguments) -> Iterator[str]:

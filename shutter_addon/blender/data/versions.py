@@ -1,6 +1,7 @@
 """The versions of the extension, of Blender, and of the edit that is open."""
 
 import hashlib
+import os
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -11,8 +12,7 @@ import bpy
 
 from ...core.edit_version import EditVersion, Footage
 from ...media import MediaError, inbetween_cache
-from ...media.sequence import ImageFiles
-from . import colour_configuration, source_media, strips
+from . import colour_configuration, external_files, source_media, strips
 
 MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
 _FEW = 256  # files of a sequence; of a longer one's, blocks are hashed: to read all of it would take hours
@@ -42,6 +42,11 @@ def read_files(edit) -> list[Path]:
     return [path for files in _footage_files(edit) for path in files]
 
 
+def sounds() -> list[Path]:
+    """The files of all sounds."""
+    return [path for sound in bpy.data.sounds for path in external_files.named(sound)]
+
+
 def stamps(edit) -> dict[Path, tuple[int, int] | None]:
     """The stamp of each of `read_files`."""
     return {path: stamp(path) for path in read_files(edit)}
@@ -65,9 +70,8 @@ def _footage_files(edit):
                 yield files
     data = bpy.data
     for item in (*data.images, *data.movieclips, *data.fonts, *data.cache_files, *data.volumes, *data.libraries):
-        if item.filepath not in ("", "<builtin>") and not getattr(item, "packed_file", None):
-            path = Path(bpy.path.abspath(item.filepath, library=getattr(item, "library", None)))
-            yield _sequence(path) if getattr(item, "source", "") == "SEQUENCE" else [path]
+        if files := external_files.every(item):
+            yield files
 
 
 def _files_of(strip) -> list[Path]:
@@ -77,22 +81,21 @@ def _files_of(strip) -> list[Path]:
         return []
 
 
-def _sequence(path: Path) -> list[Path]:
-    try:
-        return ImageFiles(path).files
-    except MediaError:
-        return [path]
-
-
 def _footage(files: list[Path]) -> Footage:
     """The digest of files: of an image sequence's, in order."""
     files = [path for path, _ in groupby(files)]  # a still that is held is one file
     whole = inbetween_cache.WHOLE if len(files) <= _FEW else _BLOCKS
-    content = hashlib.sha256()
+    content, missing = hashlib.sha256(), ""
+    with ThreadPoolExecutor(_READERS) as pool:
+        for path, digest in zip(files, pool.map(partial(_digest, whole=whole), files), strict=True):
+            missing = missing or ("" if digest else path.name)
+            content.update(digest or b"missing: " + os.fsencode(path.name))
+    return Footage(files[0].name, len(files), content.hexdigest(), missing)
+
+
+def _digest(path: Path, whole: int) -> bytes | None:
+    """As inbetween_cache.content_digest; None: the file is missing, or cannot be read."""
     try:
-        with ThreadPoolExecutor(_READERS) as pool:
-            for digest in pool.map(partial(inbetween_cache.content_digest, whole=whole), files):
-                content.update(digest)
+        return inbetween_cache.content_digest(path, whole)
     except MediaError:
-        return Footage(files[0].name, len(files), "")
-    return Footage(files[0].name, len(files), content.hexdigest())
+        return None

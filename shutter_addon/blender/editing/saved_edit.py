@@ -4,8 +4,9 @@ from pathlib import Path
 
 import bpy
 
+from ...core.edit_version import EditVersion
 from ...core.messages import UserError, sentence
-from ..data import used_data
+from ..data import used_data, versions
 from ..rendering import film_output
 
 ENDING = ".blend"
@@ -24,7 +25,7 @@ def open_edit(path: Path):
     """Opens a .blend file, none of whose scripts is run: it may be a stranger's. Its active scene, which Blender
     would render. SavedEditError: it cannot be opened, or shows no edit."""
     if not path.is_file():
-        raise SavedEditError(f"{path}: no such file")
+        raise SavedEditError(f"{path}: " + ("is no file" if path.exists() else "no such file"))
     try:
         with film_output.quiet():
             # With its windows, as `blender -b` does: load_ui=False would hold for all that this process opens after it.
@@ -47,12 +48,24 @@ def open_edit(path: Path):
     return edit
 
 
+def version(edit, path: Path, opened: tuple[int, int] | None) -> EditVersion:
+    """The version of an edit that was opened from a file.
+
+    opened: the file's stamp before (versions.stamp). SavedEditError: it was saved over since, so that its key would be
+    that of another edit; OSError: it is gone"""
+    found = versions.of_edit(edit)
+    if versions.stamp(path) != opened:
+        raise SavedEditError(f"{path}: was saved over while it was opened; start again")
+    return found
+
+
 def _scripts(edit) -> list[tuple]:
     """(owner, driver) of each driver that Blender does not evaluate because it could do anything, of all that the
     edit's pictures are made of."""
     used = used_data.used(edit, range(edit.frame_start, edit.frame_end + 1))
     drivers = [(item, curve.driver) for item in used for curve in _driven(item)]
-    complex_ones = [(owner, driver) for owner, driver in drivers if not driver.is_simple_expression]
+    scripted = ((owner, driver) for owner, driver in drivers if driver.type == "SCRIPTED")
+    complex_ones = [(owner, driver) for owner, driver in scripted if not driver.is_simple_expression]
     if complex_ones:  # only once they are evaluated it is known of them
         with film_output.quiet():
             for scene in used.intersection(bpy.data.scenes):

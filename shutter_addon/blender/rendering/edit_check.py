@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import bpy
 
@@ -17,7 +18,7 @@ from ...core.messages import UserError
 from ...media import MediaError, cuts
 from ...media.files import check_file
 from ..data import requirements, snapshot, source_media, strips
-from . import job_snapshots, session
+from . import job_snapshots, output_space, session
 from .session import FrameRequest, RenderSession
 
 
@@ -30,6 +31,8 @@ class EffectCheck:
     factor: of its in-between frames, 1: none; pairs: how many pairs of source frames the frames need in-betweens of
     missing: those of them that are not built, each by its first source frame, from 1 on
     lacking: the timeline frames of its edit that need these
+    folder: of its in-between frames, None: it has none; bytes: what those that are missing take at most
+    needs: memory for a frame, None: its frames cannot be asked for
     faults, notes: sentences; notes are of what can be rendered, but otherwise than one may think"""
 
     edit: bpy.types.Scene
@@ -43,6 +46,8 @@ class EffectCheck:
     pairs: int = 0
     missing: set[int] = field(default_factory=set)
     lacking: set[int] = field(default_factory=set)
+    folder: Path | None = None
+    bytes: int = 0
     needs: memory_needs.Needs | None = None
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -85,7 +90,9 @@ def _effect(looking: RenderSession, edit, effect, strip, frames: set[float], com
     if not _look_at_footage(found, effect, strip):
         return found
     try:
-        requests = _requests(looking, snapshot.take(edit, effect, strip, frames), found)
+        taken = snapshot.take(edit, effect, strip, frames)
+        found.folder = taken.inbetween.folder if taken.inbetween else None
+        requests = _requests(looking, taken, found)
     except session.FAULTS as error:
         found.faults.append(str(error))
         return found
@@ -153,6 +160,7 @@ def _look_at_frames(found: EffectCheck, source, requests: dict[float, FrameReque
     found.pairs = len({index // source.step for index in between})
     gone = {index for index in between if not source.has(index)}
     found.missing = {index // source.step + 1 for index in gone}
+    found.bytes = len(gone) * output_space.picture(*found.size, source.dtype.itemsize)
     found.lacking = {math.floor(frame) for frame in lacking if needed[frame] & gone}
     if gone and not find_cuts and any(request.state.options.stop_at_cuts for request in requests.values()):
         found.notes.append("in-between frames are counted as if there were no cuts, beyond which none are needed")

@@ -2,13 +2,18 @@
 
 import re
 import sys
+import tempfile
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from pathlib import Path
+
+import numpy as np
 
 from ...core import frame_ranges
 from ...core.messages import signed
-from ...media import rendered_pictures
+from ...media import image_writing, rendered_pictures
 from ...media.rendered_pictures import RenderedPicture
+from ..data import requirements
 from . import film_output
 from .film_output import OutputError
 
@@ -17,22 +22,64 @@ _CHANNELS = 128  # of Blender's sequencer
 _CHANGES = {"look": "None", "exposure": 0.0, "gamma": 1.0, "use_curve_mapping": False, "use_white_balance": False}
 
 
-def join(edit, folder: Path, output: Path, frames: tuple[int, int], key: str) -> None:
+def check(output: Path, read: list[Path]) -> None:
+    """OutputError: the movie cannot lie there; read: what is not to be written over."""
+    if not film_output.is_movie(output):
+        raise OutputError(f"{output}: none of {', '.join(film_output.MOVIES)}")
+    film_output.for_blender(str(output))
+    film_output.spare([output], read)
+
+
+def rehearse(edit, output: Path, file_format: str, frames: range) -> None:
+    """Joins one black picture to a movie that is thrown away; `edit` is changed, and not to be used again.
+
+    OutputError, MediaError, OSError: these frames, of such a format, could not be joined to that movie."""
+    film_output.check(output, None, film_output.size(edit))
+    _refuse_gaps(edit, file_format, frames)
+    with tempfile.TemporaryDirectory() as place:
+        folder, trial = Path(place), Path(place, f"movie{output.suffix}")
+        _write_black(folder / f"{frames[0]:04d}.{file_format}", film_output.size(edit))
+        try:
+            join(edit, folder, trial, (frames[0], frames[0]), "", progress=lambda *_: nullcontext(lambda: None))
+        except OutputError as error:
+            raise type(error)(str(error).replace(str(trial), str(output))) from None
+
+
+def _refuse_gaps(edit, file_format: str, frames: range) -> None:
+    """OutputError: frames at which no strip is shown are transparent, and would be refused for it."""
+    if file_format == "png" and edit.render.image_settings.color_mode == "RGBA" and _changes_transparency(edit):
+        strips = [strip for strip in edit.sequence_editor.strips_all if strip.type not in ("SOUND", "META")]
+        shown = set().union(*(requirements.shown_frames(edit, strip) for strip in strips))
+        if gaps := [frame for frame in frames if frame not in shown]:
+            words = f"{_are(gaps)} transparent, as no strip is shown, which a film shows otherwise under this view"
+            raise OutputError(f"{words}; render EXR, or without transparency")
+
+
+def _write_black(path: Path, size: tuple[int, int]) -> None:
+    width, height = size
+    if path.suffix == ".exr":
+        image_writing.write_exr(path, np.zeros((height, width, 3), np.float32), ["R", "G", "B"])
+    else:
+        image_writing.write_grey(path, np.zeros((height, width), np.float32))
+
+
+def join(edit, folder: Path, output: Path, frames: tuple[int, int], key: str, progress=film_output.progress) -> None:
     """Makes a movie of the rendered frames, first and last, in a folder; `edit` is changed, and not to be used again.
 
-    key: that of the edit. OutputError, MediaError: frames are missing, broken, unlike each other or of another edit, or
-    the movie cannot be written, which is there whole or not at all. InterruptedRenderError: by Ctrl-C or TERM."""
+    key: that of the edit; progress: as film_output.progress. OutputError, MediaError: frames are missing, broken,
+    unlike each other or of another edit, or the movie cannot be written, which is there whole or not at all.
+    InterruptedRenderError: by Ctrl-C or TERM."""
     edit.frame_start, edit.frame_end = frames
     paths = _pictures(folder, range(frames[0], frames[1] + 1, edit.frame_step))
     size = film_output.size(edit)
     film_output.check(output, None, size)
-    with film_output.progress(len(paths), "picture") as looked:
+    with progress(len(paths), "picture") as looked:
         first = _common(paths, looked, size, key)
     _refuse_transparency(edit, paths, first)
     _lay_over(edit, paths, first)
     _set_output(edit, output, size)
     film_output.prepare(output.parent)
-    with film_output.progress(len(paths), "frame") as moved:
+    with progress(len(paths), "frame") as moved:
         film_output.write(edit, output, moved)
 
 
@@ -55,7 +102,7 @@ def _numbered(folder: Path) -> dict[int, Path]:
         raise OutputError(film_output.in_words(error, folder)) from None
     found: dict[int, Path] = {}
     for path in files:
-        if re.fullmatch(r"-?\d{1,9}", path.stem):
+        if re.fullmatch(r"\d{1,9}", path.stem):
             if (frame := int(path.stem)) in found:
                 raise OutputError(f"{folder}: {found[frame].name} and {path.name} are the same frame")
             found[frame] = path
@@ -120,12 +167,15 @@ def _by(size: tuple[int, int]) -> str:
 def _refuse_transparency(edit, paths: list[Path], first: RenderedPicture) -> None:
     """OutputError: PNG files of which Blender's own film would show other colours. It applies the view to what lies
     over black, where they have it applied to the colours that shine through."""
-    is_changed = paths[0].suffix == ".png" and _shown(edit).view_settings.view_transform != "Standard"
-    if is_changed and first.channels in (2, 4):
+    if paths[0].suffix == ".png" and first.channels in (2, 4) and _changes_transparency(edit):
         for path in paths:
             if rendered_pictures.is_transparent(path):
                 words = "is transparent, which a film shows otherwise under this view"
                 raise OutputError(f"{path}: {words}; render EXR, or without transparency")
+
+
+def _changes_transparency(edit) -> bool:
+    return _shown(edit).view_settings.view_transform != "Standard"
 
 
 def _shown(edit):

@@ -173,6 +173,8 @@ def set_pictures(edit, file_format: str, note: str) -> None:
 
 def _set_format(settings, kind: PictureFormat) -> None:
     settings.file_format, settings.color_depth = kind.blender, str(kind.bits)
+    if kind.blender == "OPEN_EXR":
+        settings.exr_codec = "ZIP"  # lossless, and with checksums, by which a damaged file is known
 
 
 def _stamp_nothing(render) -> None:
@@ -192,11 +194,11 @@ def film(edit, output: Path) -> None:
         write(edit, output, moved)
 
 
-def write(edit, output: Path, moved: Callable[[], None], moving: Callable[[Path], None] = lambda picture: None) -> None:
+def write(edit, output: Path, moved: Callable[[], None], move: Callable[[Path, Path], object] = Path.replace) -> None:
     """Renders the frames of any edit to a movie, or to the pictures that its settings say in a prepared folder. Blender
     writes into a folder beside the output, and what is finished moves out of it.
 
-    moved: called after each frame; moving: with each picture's place before it moves there, unless it raises an error
+    moved: called after each frame; move: moves a picture to its place, or raises an error
     OutputError, InterruptedRenderError: as of `film`."""
     kept = edit.render.filepath
     faults: list[str] = []
@@ -209,7 +211,7 @@ def write(edit, output: Path, moved: Callable[[], None], moving: Callable[[Path]
                 stoppable() as stopped,
                 quiet(),
                 _uncached(edit),
-                _moved(part, output, edit, moved, moving) as missing,
+                _moved(part, output, edit, moved, move) as missing,
             ):
                 bpy.ops.render.render(animation=True, scene=edit.name)
             if is_movie(output) and not faults and not stopped:
@@ -272,7 +274,7 @@ def message(error: RuntimeError) -> str:
 
 
 @contextmanager
-def _moved(part: Path, output: Path, edit, update: Callable[[], None], moving: Callable[[Path], None]):
+def _moved(part: Path, output: Path, edit, update: Callable[[], None], move: Callable[[Path, Path], object]):
     """Moves each finished picture from `part` to `output`, and calls both. Gives the pictures that are missing so
     far, by name; none of a movie's."""
     frames = edit.frame_start, edit.frame_end
@@ -287,8 +289,7 @@ def _moved(part: Path, output: Path, edit, update: Callable[[], None], moving: C
             for name in [path.name for path in part.iterdir() if path.name in missing]:
                 if not is_whole_picture(part / name):
                     raise OutputError(f"{output / name}: could not be written whole; {why_short(part)}")
-                moving(missing[name])
-                (part / name).replace(missing.pop(name))
+                move(part / name, missing.pop(name))
         except (UserError, OSError) as error:
             render_job.fail(in_words(error, output))
 

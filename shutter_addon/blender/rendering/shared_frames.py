@@ -19,44 +19,68 @@ RUN = 8  # frames that are claimed at once
 _PAUSE = 1.0  # seconds between two looks at what others have finished
 
 
+def check(folder: Path, file_format: str | None, frames: tuple[int, int], read: list[Path]) -> None:
+    """OutputError: an edit's frames, first and last, cannot be rendered there.
+
+    file_format: None for PNG, where the folder is not to be taken for a file; read: what is not to be written over"""
+    if film_output.is_movie(folder):
+        words = "a saved edit is rendered to a folder of pictures, not to a movie"
+        raise film_output.OutputError(f"{folder}: {words}")
+    film_output.check_folder(folder, file_format)
+    film_output.for_blender(str(folder))
+    film_output.spare(film_output.pictures_of(folder, file_format or "png", frames), read)
+
+
+def check_resumable(edit) -> None:
+    """OutputError: the edit's pictures do not say which version of it they are of."""
+    if edit.render.use_stamp:
+        words = "the edit burns metadata into its pictures, so that they carry no version; turn Burn Into Image off"
+        raise film_output.OutputError(f"--resume: {words}")
+
+
 @contextmanager
-def of_same_footage(edit) -> Iterator[list[Path]]:
-    """Gives a list for the pictures that are rendered inside. They are removed if the footage is written to meanwhile:
-    they carry the key of what it was, and would count as finished. OutputError: it was."""
-    before, rendered = versions.stamps(edit), []
+def of_same_footage(edit) -> Iterator[dict[Path, tuple]]:
+    """Gives a dictionary for the pictures that are rendered inside, with their stamps. They are removed if the footage
+    is written to meanwhile: they carry the key of what it was, and would count as finished. Pictures that others have
+    put in their places stay. OutputError: it was written to."""
+    before, rendered = versions.stamps(edit), {}
     try:
         yield rendered
     finally:
         changed = [path for path, stamp in versions.stamps(edit).items() if stamp != before.get(path)]
         if changed:
-            for picture in rendered:
-                picture.unlink(missing_ok=True)
+            for picture, stamp in rendered.items():
+                if rendered_pictures.stamp(picture) == stamp:
+                    picture.unlink(missing_ok=True)
             raise film_output.OutputError(f"{changed[0]}: was written to while frames were rendered from it")
 
 
-def render(edit, folder: Path, file_format: str, version: EditVersion, rendered: list[Path], *, resume: bool) -> None:
+def render(
+    edit, folder: Path, file_format: str, version: EditVersion, rendered: dict[Path, tuple], *, resume: bool
+) -> None:
     """Renders the edit's frames, from its first to its last, to pictures that carry the key of its version.
 
-    rendered: gets each picture as it is written
+    rendered: gets each picture with its stamp, as it is written
     resume: leaves frames alone that are finished, and those to others that these are rendering, until they are
     finished or given up
     OutputError, InterruptedRenderError: as of film_output.film, or the folder is for another version by now; OSError:
     the folder cannot be written to"""
-    if resume and edit.render.use_stamp:
-        sentence = "the edit burns metadata into its pictures, so that they carry no version; turn Burn Into Image off"
-        raise film_output.OutputError(f"--resume: {sentence}")
+    if resume:
+        check_resumable(edit)
     film_output.set_pictures(edit, file_format, edit_version.note(version.key))
     film_output.prepare(folder)
     samples = film_output.FORMATS[file_format].samples
     is_finished = partial(_is_finished, film_output.size(edit), samples, version.key, {})
     pictures = {frame: folder / f"{frame:04d}.{file_format}" for frame in range(edit.frame_start, edit.frame_end + 1)}
 
-    def moving(picture):
+    def move(part, picture):
         job_file.guard(folder, version)  # again: it may be for a newer version by now
-        rendered.append(picture)
+        stamp = rendered_pictures.stamp(part)
+        part.replace(picture)
+        rendered[picture] = stamp
 
     with film_output.progress(len(pictures), "frame") as moved:
-        write = partial(film_output.write, edit, folder, moved, moving)
+        write = partial(film_output.write, edit, folder, moved, move)
         if resume:
             _render_missing(edit, folder, pictures, is_finished, write, moved)
         else:
