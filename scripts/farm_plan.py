@@ -3,27 +3,33 @@
     python scripts/farm_plan.py FOOTAGE [--hours 2] [--exposure 16] [--nodes 1,10,1000] [--cores 16] [--json PARTS]
     python scripts/farm_plan.py --parts PARTS [--nodes 1,10,1000] [--cores 16] [--network 10]
 
-Needs Blender as a library (bpy). The command is run on FOOTAGE as on a node: in-betweens of a few pairs of frames, and
-chunks of two lengths, whose difference is the time of a picture, and whose rest is what every chunk pays anew: the
-start, and the frames of its window that lie behind its last picture. Three shutters, scribbled; an exposure of 16
-source frames, which at factor 8 are 128 of the window. Times are processor times of one core: a GPU that composes takes
-its share out of them. A node works on one chunk after another, with all of its cores.
+Needs Blender as a library (bpy), and Linux. The command is run on FOOTAGE as on a node: in-betweens of a few pairs of
+frames, and chunks of two lengths, whose difference is the time of a picture, and whose rest is what every chunk pays
+anew: the start, and the frames of its window that lie behind its last picture. Three shutters, scribbled; an exposure
+of 16 source frames, which at factor 8 are 128 of the window.
+
+Times are processor times, which other work on the machine lengthens less than waits. Much of a picture's is one
+thread's, so that no process keeps many cores busy: a node has a worker for each of its cores, and the join, which is
+one process, takes as long as its longest thread. What so many workers lose to memory's speed is not counted, nor what a
+GPU that composes would save.
 """
 
 import argparse
 import json
 import math
-import resource
+import os
 import subprocess
 import sys
 import tempfile
+import time
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from shutter_addon.core import chunks, presets
 from shutter_addon.media import open_source
 
-LENGTHS = {1: (1, 6), 8: (1, 3)}  # pictures of the chunks that are measured, by factor
+LENGTHS = {1: (1, 13), 8: (1, 4)}  # pictures of the chunks that are measured, by factor
 FIRST = 9  # their first timeline frame
 
 
@@ -32,16 +38,20 @@ class Parts:
     """What was measured at a factor of in-between frames. Times in seconds of a core, sizes in bytes.
 
     window: frames that a shutter exposes, in-between frames included
-    once: what a chunk pays whatever its length; picture: one more of its pictures
-    pair: the in-between frames of a pair of source frames; join: a picture of the film
-    source, between, output: a frame's file"""
+    once: what a chunk pays whatever its length; picture: one more of its pictures; picture_thread: its longest thread
+    pair: the in-between frames of a pair of source frames
+    join: a picture of the film; join_thread: its longest thread
+    memory: of a process that renders; source, between, output: a frame's file"""
 
     factor: int
     window: int
     once: float
     picture: float
+    picture_thread: float
     pair: float
     join: float
+    join_thread: float
+    memory: float
     source: float
     between: float
     output: float
@@ -57,13 +67,22 @@ class Parts:
 
 
 @dataclass(frozen=True)
+class Use:
+    """What a command used: seconds of all its threads together and of its longest one, bytes of memory at most."""
+
+    total: float
+    thread: float
+    memory: float
+
+
+@dataclass(frozen=True)
 class Plan:
     """What a film costs on so many nodes.
 
     chunk: pictures of one; work: core-hours of all
-    hours: until in-betweens and pictures are done; join: hours of the join, which is one process
-    anew: share of the pictures' core-hours that goes into what chunks pay anew; storage, traffic: bytes that are kept,
-    and that are read and written in all"""
+    hours: until in-betweens and pictures are done; join: hours of the join, were it as fast as its longest thread
+    anew: share of the pictures' core-hours that goes into what chunks pay anew; storage: bytes that are kept
+    traffic: bytes that are read and written until the pictures are done; joined: those that the join reads"""
 
     chunk: int
     work: float
@@ -72,26 +91,30 @@ class Plan:
     anew: float
     storage: float
     traffic: float
+    joined: float
 
 
-def plan(parts: Parts, pictures: int, nodes: int, cores: int, chunk: int) -> Plan:
-    """chunk: pictures of one at most; there is one for each node at least."""
-    chunk = min(chunk, math.ceil(pictures / nodes))
+def plan(parts: Parts, pictures: int, nodes: int, cores: int, longest: int) -> Plan:
+    """Each core has a worker of its own. longest: pictures of a chunk at most; all workers are busy to the end."""
+    workers = nodes * cores
+    rounds = math.ceil(pictures / (longest * workers))
+    chunk = math.ceil(pictures / (rounds * workers))
     count = math.ceil(pictures / chunk)
     rendered, built = count * parts.once + pictures * parts.picture, pictures * parts.pair
-    longest = math.ceil(count / nodes) * parts.chunk(chunk)
     betweens = pictures * (parts.factor - 1) * parts.between
     written = betweens + pictures * parts.output
-    # What windows read; what in-betweens are made of; and the pictures, for the film.
-    read = count * parts.read(chunk) + (pictures * parts.source if parts.factor > 1 else 0) + pictures * parts.output
+    # What windows read, and what in-betweens are made of.
+    read = count * parts.read(chunk) + (pictures * parts.source if parts.factor > 1 else 0)
     return Plan(
-        chunk,
-        (rendered + built + pictures * parts.join) / 3600,
-        (longest + built / nodes) / cores / 3600,
-        pictures * parts.join / cores / 3600,
-        count * parts.once / rendered,
-        written + pictures * parts.source,
-        written + read,
+        chunk=chunk,
+        work=(rendered + built + pictures * parts.join) / 3600,
+        hours=rounds * (parts.chunk(chunk) + chunk * parts.pair) / 3600,
+        join=pictures * parts.join_thread / 3600,
+        anew=count * parts.once / rendered,
+        storage=written + pictures * parts.source,
+        traffic=written + read,
+        # It compares all checksums before Blender reads the first picture: no machine's memory has them by then.
+        joined=2 * pictures * parts.output,
     )
 
 
@@ -104,11 +127,10 @@ def measured(footage: Path, factor: int, exposure: int, folder: Path) -> Parts:
     pair = 0.0
     if factor > 1:
         frames = f"{FIRST}:{FIRST + pairs - 1}"
-        pair = seconds("inbetween", footage, "--factor", factor, "--cache", cache, "--frames", frames) / pairs
-    edit = folder / f"{factor}.blend"
-    outputs = {length: folder / f"{factor}-{length}" for length in (short, long)}
-    times = {
-        length: seconds(
+        pair = used("inbetween", footage, "--factor", factor, "--cache", cache, "--frames", frames).total / pairs
+    edit, outputs = folder / f"{factor}.blend", {length: folder / f"{factor}-{length}" for length in (short, long)}
+    rendered = {
+        length: used(
             *("render", footage, "--recipe", recipe, "--output", output, "--cache", cache),
             *("--save", edit),
             *("--frames", f"{FIRST}:{FIRST + length - 1}"),
@@ -116,13 +138,31 @@ def measured(footage: Path, factor: int, exposure: int, folder: Path) -> Parts:
         for length, output in outputs.items()
     }
     join = "join", outputs[long], "--edit", edit, "--output", folder / "film.mp4"
-    picture = (times[long] - times[short]) / (long - short)
-    joined = {length: seconds(*join, "--frames", f"{FIRST}:{FIRST + length - 1}") for length in (short, long)}
+    joined = {length: used(*join, "--frames", f"{FIRST}:{FIRST + length - 1}") for length in (short, long)}
+    picture, film = per_picture(rendered), per_picture(joined)
     with open_source(footage) as medium:
         source = sum(path.stat().st_size for path in medium.files) / medium.count
-    between, output = mean_size(cache.rglob("*.png")), mean_size(outputs[long].glob("*.png"))
-    once, join_one = times[short] - short * picture, (joined[long] - joined[short]) / (long - short)
-    return Parts(factor, window, once, picture, pair, join_one, source, between, output)
+    return Parts(
+        factor=factor,
+        window=window,
+        once=rendered[short].total - short * picture.total,
+        picture=picture.total,
+        picture_thread=picture.thread,
+        pair=pair,
+        join=film.total,
+        join_thread=film.thread,
+        memory=rendered[long].memory,
+        source=source,
+        between=mean_size(cache.rglob("*.png")),
+        output=mean_size(outputs[long].glob("*.png")),
+    )
+
+
+def per_picture(found: dict[int, Use]) -> Use:
+    """What one more picture takes; found: what so many take."""
+    (short, less), (long, more) = found.items()
+    count = long - short
+    return Use((more.total - less.total) / count, (more.thread - less.thread) / count, more.memory)
 
 
 def mean_size(paths) -> float:
@@ -144,42 +184,73 @@ def effect_recipe(window: int, factor: int) -> dict:
     }
 
 
-def seconds(*arguments) -> float:
-    """Processor time of the command."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run([sys.executable, "-m", "shutter_addon", *map(str, arguments)], check=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+def used(*arguments) -> Use:
+    """What the command used. subprocess.CalledProcessError: it failed."""
+    command = [sys.executable, "-m", "shutter_addon", *map(str, arguments)]
+    process, threads = subprocess.Popen(command), {}
+    while True:
+        pid, status, usage = os.wait4(process.pid, os.WNOHANG)
+        if pid:
+            break
+        threads |= thread_times(process.pid)
+        time.sleep(0.05)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, command)
+    return Use(usage.ru_utime + usage.ru_stime, max(threads.values()), usage.ru_maxrss * 1024)
+
+
+def thread_times(pid: int) -> dict[str, float]:
+    """Seconds of processor time of each of a process's threads."""
+    times = {}
+    for thread in Path(f"/proc/{pid}/task").glob("*"):
+        with suppress(OSError):  # it has come to its end
+            user, system = (thread / "stat").read_text().rpartition(")")[2].split()[11:13]
+            times[thread.name] = (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+    return times
 
 
 def parts_table(found: list[Parts]) -> str:
-    """Markdown."""
+    """Markdown. In brackets: of it, what the longest thread takes."""
     lines = [
-        "| factor | window | chunk, anew | picture | in-betweens | join | source | in-between | picture |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| factor | window | chunk, anew | picture | in-betweens | join | memory | source | in-between | picture |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for each in found:
-        times = " | ".join(f"{time:.1f} s" if time else "" for time in (each.once, each.picture, each.pair, each.join))
+        picture = f"{each.picture:.1f} s ({each.picture_thread:.1f} s)"
+        join = f"{each.join:.1f} s ({each.join_thread:.1f} s)"
+        times = f"{each.once:.1f} s | {picture} | {f'{each.pair:.1f} s' if each.pair else ''} | {join}"
         sizes = " | ".join(f"{size / 1e6:.1f} MB" if size else "" for size in (each.source, each.between, each.output))
-        lines.append(f"| {each.factor} | {each.window} | {times} | {sizes} |")
+        lines.append(f"| {each.factor} | {each.window} | {times} | {each.memory / 1e9:.1f} GB | {sizes} |")
     return "\n".join(lines)
 
 
 def plans_table(found: list[Parts], pictures: int, nodes: list[int], cores: int, network: float) -> str:
     """Markdown. The network's column is what the traffic takes alone; network: of the storage, in Gbit/s."""
     lines = [
-        "| factor | nodes | chunk | core-hours | anew | pictures | join | network | storage | traffic | of a node |",
+        "| factor | nodes | chunk | core-hours | anew | pictures | network | join | network | storage | traffic |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for parts in found:
         for count in nodes:
             each = plan(parts, pictures, count, cores, chunks.chunk_size(parts.window, parts.factor))
-            speed = each.traffic * 8 / (each.hours * 3600 * count) / 1e6
-            times = f"{span(each.hours)} | {span(each.join)} | {span(each.traffic * 8 / network / 1e9 / 3600)}"
-            size = f"{each.storage / 1e12:.1f} TB | {each.traffic / 1e12:.1f} TB | {speed:,.0f} Mbit/s"
+            loads = [span(load / speed(network) / 3600) for load in (each.traffic, each.joined)]
+            times = f"{span(each.hours)} | {loads[0]} | {span(each.join)} | {loads[1]}"
+            size = f"{each.storage / 1e12:.1f} TB | {(each.traffic + each.joined) / 1e12:.1f} TB"
             work = f"{each.work:,.0f} | {each.anew:.1%}"
             lines.append(f"| {parts.factor} | {count:,} | {each.chunk} | {work} | {times} | {size} |")
     return "\n".join(lines)
+
+
+def speed(network: float) -> float:
+    """Bytes a second; network: in Gbit/s."""
+    return network * 1e9 / 8
+
+
+def served(parts: Parts, pictures: int, cores: int, network: float) -> float:
+    """How many nodes the storage serves before they wait for it, while they work on in-betweens and pictures."""
+    one = plan(parts, pictures, 1, cores, chunks.chunk_size(parts.window, parts.factor))
+    return speed(network) * one.hours * 3600 / one.traffic
 
 
 def span(hours: float) -> str:
@@ -222,7 +293,9 @@ def main(arguments=None) -> int:
     pictures = round(options.hours * 3600 * options.rate)
     print(plans_table(found, pictures, options.nodes, options.cores, options.network))
     for each in found:
+        nodes = served(each, pictures, options.cores, options.network)
         print(f"factor {each.factor}: most of it is paid anew below {dominated(each):.1f} pictures a chunk")
+        print(f"factor {each.factor}: the storage serves {nodes:.1f} nodes")
     return 0
 
 

@@ -117,9 +117,9 @@ def request(edit, effect, strip, frame):
 @contextmanager
 def small_disk(folder, size):
     """A folder on a disk of that many bytes."""
-    folder.mkdir()
+    folder.mkdir(exist_ok=True)
     subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)], check=True)
     try:
         yield folder
     finally:
-        subprocess.run(["umount", str(folder)], check=True)
+        subprocess.run(["umount", "--lazy", str(folder)], check=True)  # a worker may still read there

@@ -1,5 +1,6 @@
-"""A small edit with sound and in-betweens, and what a farm makes of it."""
+"""The demo's edit, small, shorter, and with in-betweens; and what a farm makes of it."""
 
+import json
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -11,14 +12,7 @@ ROOT = Path(__file__).parents[2]
 FARM = ROOT / "farm"
 FRAMES = 32
 SIZE = 160, 90
-RECIPE = {
-    "version": 1,
-    "window": 4,
-    "inbetween": 2,
-    "border": True,
-    "shutters": [{"name": "Long", "bars": [1, 1, 1, 1]}, {"name": "Sharp", "bars": [1, 0, 0, 0]}],
-    "regions": [{"shutter": "Sharp", "kind": "line", "width": 0.1, "strokes": [[[0.3, 0.3], [0.6, 0.7]]]}],
-}
+RECIPE = json.loads((ROOT / "assets" / "bunny.json").read_text()) | {"inbetween": 2}
 
 
 @dataclass

@@ -9,18 +9,21 @@ import signal
 import struct
 import subprocess
 import sys
+import time
 from contextlib import contextmanager
-from dataclasses import dataclass
-from pathlib import Path
 
 import av
 import numpy as np
 import OpenImageIO
 import pytest
+from farm_job import ROOT, Job
 
 from shutter_addon.core import edit_version
 
-ROOT = Path(__file__).parents[2]
+sys.path.insert(1, str(ROOT / "tests" / "blender"))
+
+from support import small_disk
+
 FRAMES, CHUNKS = 24, ("1:9", "10-24")
 WIDTH, HEIGHT = 128, 72
 JOB = "virtual_shutter_job.json"
@@ -51,15 +54,8 @@ for line in sys.stdin:
 """
 
 
-@dataclass(frozen=True)
-class Node:
-    """A machine's view of a job: a folder with the edit and its footage, and where frames and film go."""
-
-    folder: Path
-
-    @property
-    def edit(self):
-        return self.folder / "edit.blend"
+class Node(Job):
+    """A machine's view of a job. Its pictures and its film lie elsewhere."""
 
     @property
     def inbetween(self):
@@ -70,10 +66,10 @@ class Node:
         return self.folder.parent / "pictures"
 
     @property
-    def film(self):
+    def movie(self):
         return self.folder.parent / "films" / "film.mp4"
 
-    def check(self):
+    def look(self):
         return "check", self.edit, "--output", self.pictures, "--inbetweens-later"
 
     def build(self):
@@ -83,11 +79,11 @@ class Node:
         return "render", self.edit, "--output", self.pictures, "--frames", frames, "--resume", "--device", "cpu"
 
     def join(self):
-        return "join", self.pictures, "--edit", self.edit, "--output", self.film
+        return "join", self.pictures, "--edit", self.edit, "--output", self.movie
 
     def steps(self):
         """The commands of a whole submission, in their order."""
-        return [self.check(), self.build(), *map(self.render, CHUNKS), self.join()]
+        return [self.look(), self.build(), *map(self.render, CHUNKS), self.join()]
 
 
 def _started(arguments, before=()):
@@ -134,7 +130,7 @@ def whole(tmp_path_factory):
     recipe.write_text(json.dumps(RECIPE))
     for step in [
         ("render", node.folder / "film.mkv", "--recipe", recipe, "--save", node.edit),
-        node.check(),
+        node.look(),
         ("render", node.edit, "--output", node.pictures, "--device", "cpu"),
         node.join(),
     ]:
@@ -192,8 +188,8 @@ def node(whole, tmp_path):
     """A node that has all that the job needs, in-betweens too, and a film of last night; nothing is rendered."""
     node = Node(tmp_path / "Knoten Süd 1" / "node")
     shutil.copytree(whole.folder, node.folder)
-    node.film.parent.mkdir()
-    node.film.write_bytes(OLD)
+    node.movie.parent.mkdir()
+    node.movie.write_bytes(OLD)
     return node
 
 
@@ -209,7 +205,7 @@ def submit(whole, worker):
         assert {path.name for path in node.pictures.iterdir() if not path.name.startswith(".part-")} == {
             path.name for path in whole.pictures.iterdir()
         }
-        assert node.film.read_bytes() == whole.film.read_bytes()
+        assert node.movie.read_bytes() == whole.movie.read_bytes()
 
     return run
 
@@ -227,6 +223,7 @@ def _wait_for(found, process):
     """Waits until something is found, while the process runs."""
     while not (result := found()):
         assert process.poll() is None
+        time.sleep(0.002)  # less than the shortest step that is watched
     return result
 
 
@@ -241,7 +238,7 @@ def _put(node, whole, frames=range(1, FRAMES + 1)):
 KILLED = {
     "frames": (Node.render, lambda node: list(node.pictures.glob("*.png")), FRAMES),
     "in-betweens": (Node.build, lambda node: list(node.inbetween.glob("*/*.png")), FRAMES - 1),
-    "join": (Node.join, lambda node: list(node.film.parent.glob(".part-*/*")), 2),
+    "join": (Node.join, lambda node: list(node.movie.parent.glob(".part-*/*")), 2),
 }
 
 
@@ -257,7 +254,7 @@ def test_a_killed_worker(whole, node, submit, step):
     assert _ended(process) == (-signal.SIGKILL, "")
     assert 0 < len(written(node)) < count
     assert _all_are_right(node, whole)
-    assert node.film.read_bytes() == OLD
+    assert node.movie.read_bytes() == OLD
     submit(node)
 
 
@@ -273,21 +270,10 @@ def test_a_worker_that_is_asked_to_leave(whole, node, submit):
     submit(node)
 
 
-@contextmanager
-def _small_disk(folder, size):
-    """Puts an empty disk of so many bytes there; gives what makes it larger."""
-    folder.mkdir(exist_ok=True)
-    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", folder], check=True)
-    try:
-        yield lambda: subprocess.run(["mount", "-o", "remount,size=8m", folder], check=True)
-    finally:
-        subprocess.run(["umount", "--lazy", folder], check=True)  # the worker may read there
-
-
 FULL = {
     "frames": (Node.render, lambda node: node.pictures, 96 << 10),
     "in-betweens": (Node.build, lambda node: node.inbetween, 96 << 10),
-    "join": (Node.join, lambda node: node.film.parent, 24 << 10),
+    "join": (Node.join, lambda node: node.movie.parent, 24 << 10),
 }
 
 
@@ -299,12 +285,12 @@ def test_a_full_disk(whole, node, submit, step):
         _put(node, whole)
     elif step == "in-betweens":
         shutil.rmtree(node.inbetween)
-    with _small_disk(place(node), size) as enlarge:
-        node.film.write_bytes(OLD)
+    with small_disk(place(node), size) as disk:
+        node.movie.write_bytes(OLD)
         _refused(_run(*command(node)), place(node), "no space left")
         assert _all_are_right(node, whole)
-        assert node.film.read_bytes() == OLD
-        enlarge()
+        assert node.movie.read_bytes() == OLD
+        subprocess.run(["mount", "-o", "remount,size=8m", disk], check=True)
         submit(node)
 
 
@@ -321,7 +307,7 @@ def test_a_read_only_output(whole, node, submit, command, place):
     folder = node.folder.parent / place
     _refused(_run(*command(node), before=_seeing_read_only(folder)), folder, "read-only file system")
     assert _all_are_right(node, whole)
-    assert node.film.read_bytes() == OLD
+    assert node.movie.read_bytes() == OLD
     submit(node)
 
 
@@ -329,7 +315,7 @@ def test_a_read_only_output(whole, node, submit, command, place):
 def test_a_read_only_edit_with_all_that_it_needs(whole, node, submit):
     """Footage, edit and in-betweens lie on a drive that a node may only read."""
     before = _seeing_read_only(node.folder)
-    for step in (node.check(), node.build(), node.render("3:4")):
+    for step in (node.look(), node.build(), node.render("3:4")):
         assert _run(*step, before=before) == (0, "")
     submit(node)
 
@@ -387,7 +373,7 @@ def test_a_fault_that_a_worker_meets(whole, node, worker, submit, fault):
     plant(node)
     _refused(worker(*node.render(CHUNKS[1])), *words)
     assert _all_are_right(node, whole)
-    assert node.film.read_bytes() == OLD
+    assert node.movie.read_bytes() == OLD
     shutil.copytree(whole.folder, node.folder, dirs_exist_ok=True)
     submit(node)
 
@@ -427,16 +413,16 @@ def test_a_fault_among_finished_frames(whole, node, worker, submit, fault):
     _put(node, whole)
     plant(node)
     _refused(worker(*node.join()), *words)
-    assert node.film.read_bytes() == OLD
+    assert node.movie.read_bytes() == OLD
     submit(node)
 
 
 @pytest.mark.parametrize("frames", ["20:30", "0", "9:3", "all", ""])
 def test_frames_that_the_edit_has_not(node, worker, frames):
-    for command in (node.check(), node.build(), node.render(), node.join()):
+    for command in (node.look(), node.build(), node.render(), node.join()):
         _refused(worker(*command, "--frames", frames), "--frames: ")
     assert not list(node.folder.parent.glob("pictures/*.png"))
-    assert node.film.read_bytes() == OLD
+    assert node.movie.read_bytes() == OLD
 
 
 def test_an_edit_that_is_saved_anew_amid_its_job(whole, node, worker, submit):
@@ -451,7 +437,7 @@ def test_an_edit_that_is_saved_anew_amid_its_job(whole, node, worker, submit):
     for step in node.steps():
         assert worker(*step) == (0, "")
     assert not _pictures(node).items() & _pictures(whole).items()
-    assert node.film.read_bytes() not in (OLD, whole.film.read_bytes())
+    assert node.movie.read_bytes() not in (OLD, whole.movie.read_bytes())
     shutil.copytree(whole.folder, node.folder, dirs_exist_ok=True)
     submit(node)
 

@@ -85,7 +85,9 @@ def end(daemon):
 
 
 def told(environment, *command):
-    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False).stdout.strip()
+    """What a command says. An error, too: where Slurm does not answer, its queue is not empty."""
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    return subprocess.run(command, env=environment, check=False, **pipes).stdout.strip()
 
 
 def wait(what, pause=0.5):
@@ -129,6 +131,11 @@ def waiting(slurm):
     return [line.split()[0] for line in lines if line.endswith("BeginTime")]
 
 
+def nodes(slurm, name):
+    """Those that ran tasks of a job."""
+    return set(told(slurm, "squeue", "-h", "-r", "-t", "all", "-n", name, "-o", "%N").split())
+
+
 def test_a_killed_task_is_run_again_and_gives_the_bits_of_one_process(slurm, submit, job, single):
     submitted = submit()
     assert submitted.returncode == 0, submitted.stderr
@@ -137,8 +144,9 @@ def test_a_killed_task_is_run_again_and_gives_the_bits_of_one_process(slurm, sub
     # Slurm itself waits for two minutes.
     subprocess.run(["scontrol", "update", f"JobId={again}", "StartTime=now"], env=slurm, check=True)
     wait(lambda: not told(slurm, "squeue", "-h"))
+    assert nodes(slurm, "edit-inbetweens") == nodes(slurm, "edit-frames") == {"n1", "n2"}
     logs = {path: path.read_text() for path in job.folder.glob("slurm-*.out")}
-    assert len(logs) == 2 * CHUNKS + 2
+    assert len(logs) == 2 * CHUNKS + 2, told(slurm, "scontrol", "show", "jobs", "-o")
     assert sum("Killed" in text for text in logs.values()) == 1
     assert job.movie.exists(), "\n".join(logs.values())
     job.check(single)
