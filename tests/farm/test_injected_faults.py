@@ -70,7 +70,7 @@ class Node(Job):
         return self.folder.parent / "films" / "film.mp4"
 
     def look(self):
-        return "check", self.edit, "--output", self.pictures, "--inbetweens-later"
+        return "check", self.edit, "--output", self.pictures, "--inbetweens-later", "--resume", "--movie", self.movie
 
     def build(self):
         return "inbetween", self.edit
