@@ -17,7 +17,7 @@ from .edge_diffusion_gpu import EdgeDiffusion
 from .matting import Matting
 from .passes import LOCAL_ROW, Image, Pass
 from .tables import moved_tables, padded, table
-from .window import BLOCK, TILE, Frames, PackedFrames, Sums, WholeFrames, decoding, open_window
+from .window import BLOCK, Frames, PackedFrames, Sums, WholeFrames, decoding, open_window
 
 # Rows of pixels that one invocation of compose_sums composes.
 PAIR = 2
@@ -114,7 +114,7 @@ def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, encoded
             "LEVELS": int(levels),
         },
         blocks={"table": (1 + rows) * (2 * groups + 1)},
-        local_size=(16, TILE[1] // PAIR, 1),
+        local_size=(64, 2, 1),
     )
 
 
