@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 LONGEST = 300  # characters of a sentence, as users see it
 
 
@@ -31,6 +33,11 @@ def sentence(text: object, longest: int = LONGEST) -> str:
         return line
     head = (longest - 3) // 2
     return f"{line[:head]} … {line[head + 3 - longest :]}"
+
+
+def of_file(error: OSError, place="") -> str:
+    """What the system says of a file, its place first. place: where the error has none."""
+    return f"{os.fsdecode(error.filename or place)}: {error.strerror or error}"
 
 
 def signed(text: object) -> str:

@@ -26,6 +26,15 @@ def check_file(path):
     return path
 
 
+def stamp(path) -> tuple[int, int] | None:
+    """What changes when a file is written to or replaced, or a folder's entries are; None: there is none."""
+    try:
+        status = os.stat(path)
+    except (OSError, ValueError):  # a name with a null character
+        return None
+    return status.st_mtime_ns, status.st_size
+
+
 def check_sound(path):
     """MediaError unless it is a file that has sound; without PyAV, unless it is a file."""
     path = check_file(path)

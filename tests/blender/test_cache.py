@@ -252,8 +252,8 @@ def asked(monkeypatch):
     """The files of which it was asked whether they are the same."""
     from shutter_addon.blender.data import source_media
 
-    asked, stamp = [], source_media._stamp
-    monkeypatch.setattr(source_media, "_stamp", lambda path: asked.append(path) or stamp(path))
+    asked, stamp = [], source_media.stamp
+    monkeypatch.setattr(source_media, "stamp", lambda path: asked.append(path) or stamp(path))
     return asked
 
 

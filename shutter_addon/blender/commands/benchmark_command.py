@@ -37,8 +37,8 @@ def run(arguments) -> None:
                 part.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     finally:
         compositor.release()
-    print("\n".join(f"- {heading}: {value}" for heading, value in described.items()))
-    print(f"\n{benchmark.table(rows, plays)}\n\n{benchmark.MEASURED}")
+    lines = "\n".join(f"- {heading}: {value}" for heading, value in described.items())
+    command_line.tell(f"{lines}\n\n{benchmark.table(rows, plays)}\n\n{benchmark.MEASURED}")
 
 
 def _sizes(text: str) -> list[tuple[int, int]]:

@@ -1,6 +1,5 @@
 """What the mattes and ramps of an effect show, as plain data (core.mattes.Content)."""
 
-import os
 from collections.abc import Callable
 from contextlib import closing
 from functools import lru_cache
@@ -13,6 +12,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...core import keyframes, mattes, retiming
 from ...core.effect import PlacedRamp
 from ...media import MediaError
+from ...media.files import stamp
 from ...media.matte_files import MatteFile
 from ...media.sequence import ImageFiles
 from . import inbetween_settings, mask_reading, matte_strips, source_media, strip_timing, strips, validation
@@ -63,11 +63,11 @@ def image_file(region) -> MatteFile:
     path = image_path(region)
     files = (path,) if region.image.source == "FILE" else None
     folder = path.parent if region.image.source == "SEQUENCE" else path
-    stamp = _stamp(path), _stamp(folder)
+    stamps = stamp(path), stamp(folder)
     if region.image.source == "SEQUENCE":
-        listed = _listed(path, stamp)
-        stamp = *stamp, source_media.between((region.image.session_uid,), len(listed), listed.__getitem__)
-    return MatteFile(path, channel(region), files, stamp=stamp)
+        listed = _listed(path, stamps)
+        stamps = *stamps, source_media.between((region.image.session_uid,), len(listed), listed.__getitem__)
+    return MatteFile(path, channel(region), files, stamp=stamps)
 
 
 @lru_cache(64)
@@ -155,12 +155,3 @@ def _of_strip(strip, word: str) -> MatteFile:
     """A channel of what a movie, image or clip strip reads. MediaError: it has no files."""
     spec = source_media.spec(strip)
     return MatteFile(spec.path, word, spec.files, spec.options["stream"], spec.key)
-
-
-def _stamp(path: Path):
-    """Tells a file or a folder that has changed from what it was; None: there is none."""
-    try:
-        status = os.stat(path)
-    except (OSError, ValueError):
-        return None
-    return status.st_mtime_ns, status.st_size

@@ -1,6 +1,5 @@
 """The medium of a source strip: what it is, opened as shutter_addon.media has it."""
 
-import os
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,6 +8,7 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...media import MediaError, open_source
+from ...media.files import stamp
 from ...media.opening import with_proxy
 from ...media.sequence import by_number
 from ...media.source import FrameSource
@@ -47,7 +47,7 @@ def files_key(strip) -> tuple:
     count, path = _files(strip)
     ends = dict.fromkeys((path(0), path(count - 1)))
     place = strip.id_data.session_uid, strip.name
-    return count, *((str(end), _stamp(end)) for end in ends), between(place, count, path)
+    return count, *((str(end), stamp(end)) for end in ends), between(place, count, path)
 
 
 def look_again() -> None:
@@ -87,7 +87,7 @@ def between(place: tuple, count: int, path) -> int:
     changed = False
     for index in range(look.next, look.next + max(look.due, min(_AT_ONCE, count))):
         file = path(index % count)
-        found, known = (file, _stamp(file)), look.known[index % count]
+        found, known = (file, stamp(file)), look.known[index % count]
         if found != known and (known is None or found[1] is not None or found[0] != known[0]):
             look.known[index % count], changed = found, True
     look.next, look.due, look.when = (index + 1) % count, 0, time.monotonic()
@@ -218,12 +218,3 @@ def _clip_files(strip):
     if clip.source == "MOVIE" or beside is None:
         return 1, lambda _i: path
     return max(clip.frame_duration, 1), lambda i: beside(clip.frame_offset + i)
-
-
-def _stamp(path: Path):
-    """Tells a file that was replaced from what it was; None for a missing one."""
-    try:
-        status = os.stat(path)
-    except OSError:
-        return None
-    return status.st_mtime_ns, status.st_size

@@ -1,10 +1,11 @@
 """Where Blender's sequencer keeps the proxies of a strip."""
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
+
+from ...media.files import stamp
 
 
 @dataclass(frozen=True)
@@ -53,11 +54,8 @@ def _folder(edit, strip, beside: Path) -> Path:
 
 def _proxy(path: Path, *files: Path) -> Proxy | None:
     """files: those of a folder that are looked at. None: one is missing."""
-    try:
-        found = [os.stat(file) for file in files or (path,)]
-    except OSError:
-        return None
-    return Proxy(path, bool(files), tuple((status.st_mtime_ns, status.st_size) for status in found))
+    stamps = tuple(map(stamp, files or (path,)))
+    return None if None in stamps else Proxy(path, bool(files), stamps)
 
 
 def _absolute(path: str, library=None) -> Path:

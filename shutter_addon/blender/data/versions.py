@@ -12,6 +12,7 @@ import bpy
 
 from ...core.edit_version import EditVersion, Footage
 from ...media import MediaError, inbetween_cache
+from ...media.files import stamp
 from . import colour_configuration, external_files, source_media, strips
 
 MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
@@ -50,15 +51,6 @@ def sounds() -> list[Path]:
 def stamps(edit) -> dict[Path, tuple[int, int] | None]:
     """The stamp of each of `read_files`."""
     return {path: stamp(path) for path in read_files(edit)}
-
-
-def stamp(path: Path) -> tuple[int, int] | None:
-    """What changes when a file is written to; None: it is not there."""
-    try:
-        status = path.stat()
-        return status.st_size, status.st_mtime_ns
-    except OSError:
-        return None
 
 
 def _footage_files(edit):

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import bpy
 import numpy as np
 
-from ...core.messages import signed
+from ...core.messages import of_file, signed
 from ..data.snapshot import Snapshot
 from ..data.strips import ENGINE
 from . import invalidation, job_snapshots, render_job, session
@@ -81,7 +81,7 @@ def in_words(error: BaseException) -> str:
     if isinstance(error, KeyboardInterrupt):
         return "the render was stopped"
     if isinstance(error, OSError) and error.filename:
-        return f"{error.filename}: {error.strerror}"
+        return of_file(error)
     traceback.print_exception(error)
     return f"internal error: {error!r}"
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import bpy
 
 from ...core import atomic_write
-from ...core.messages import UserError
+from ...core.messages import UserError, of_file
 from ...media.completeness import is_whole_movie, is_whole_picture, whole_pictures, why_short
 from ..data import strips
 from . import movie_feed, render_job
@@ -303,7 +303,7 @@ def _moved(part: Path, output: Path, edit, update: Callable[[], None], move: Cal
 def in_words(error: Exception, place) -> str:
     """A fault as a sentence, the place first. place: where there is none in an OSError."""
     if isinstance(error, OSError):
-        return f"{os.fsdecode(error.filename or place)}: {error.strerror or error}"
+        return of_file(error, place)
     return str(error)
 
 
