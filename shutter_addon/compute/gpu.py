@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from ..core import compositor, shutters
+from ..core import compositor
 from ..core.frame_source import FrameSource
 from ..core.frame_state import FrameState, Options
 from . import cpu
@@ -262,7 +262,7 @@ def _from_frames(
     rows: pieces in the table; shortened: as for way_of"""
     options, source, summed = state.options, window.source, isinstance(window, Sums)
     given = {"images": {}, "textures": {}, "rows": rows, "direction": direction}
-    given["first"], given["last"] = shutters.open_span(state.bars)
+    given["first"], given["last"] = state.open_span
     if summed:
         lowest, decode, edges = window.start, 0, 2 if shortened else 0
         given |= _extent(window)
@@ -409,10 +409,9 @@ class GPUCompositor:
         if state.following is not None:
             return self._draw_moved(window, index, direction, state, handle, block, levels)
         options, values = state.options, table(state)
-        first, last = shutters.open_span(state.bars)
-        origin = int(compositor.window_positions(options, index, direction)[0])
-        reach = sorted((origin + direction * first, origin + direction * (last - 1)))
-        shortened = options.edges == "shorten" and (reach[0] < window.shot.start or reach[1] >= window.shot.stop)
+        first, last = state.open_span
+        origin, (low, high) = compositor.origin(options, index, direction), compositor.reach(state, index, direction)
+        shortened = options.edges == "shorten" and (low < window.shot.start or high >= window.shot.stop)
         way = way_of(window, options, values, (first, last), shortened)
         if way == "sums":
             program, given = _from_sums(window, state, values, origin, direction, levels)
@@ -445,7 +444,7 @@ class GPUCompositor:
         of these to what those before have."""
         options, (width, height) = state.options, (window.source.width, window.source.height)
         frames = compositor.window_indices(options, index, window.shot, direction)
-        first, last = shutters.open_span(state.bars)
+        first, last = state.open_span
         values, moves = moved_tables(state, frames)
         motions, there = len(moves) // len(frames), np.flatnonzero(frames >= 0)
         shortened, packed = bool((frames[first:last] < 0).any()), isinstance(window, PackedFrames)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core import compositor, scribbles, shutters
+from ..core import compositor, scribbles
 from ..core.frame_source import FrameSource
 from ..core.frame_state import FrameState
 from ..core.mattes import MatteReader
@@ -148,9 +148,11 @@ class Renderer:
         Where frames of them are left out (edges "shorten"), all positions of the window that have a frame: the nearest
         may be needed in place of those."""
         positions = compositor.window_positions(state.options, index, direction)
+        exposed = slice(*state.open_span)
+        if state.options.edges != "shorten":
+            return positions[exposed]
         frames = compositor.source_frames(state.options, positions, shot)
-        low, high = shutters.open_span(state.bars)
-        return positions[low:high] if (frames[low:high] >= 0).all() else positions[frames >= 0]
+        return positions[exposed] if (frames[exposed] >= 0).all() else positions[frames >= 0]
 
     def needed(self, index: int, direction: int, state: FrameState, *, known: bool = True) -> set[int]:
         """The source frames at `positions`, and those that guide the diffusion. known: as for `shot`."""
@@ -190,10 +192,9 @@ class Renderer:
     def _reach(self, index: int, direction: int, state: FrameState) -> tuple[int, int]:
         """The first and the last of all positions that any shutter exposes, and of `index` itself with the frames that
         guide the diffusion."""
-        positions = compositor.window_positions(state.options, index, direction)
         beside = guide.reach(state.options.step) if self._is_guided(state) else 0
-        reach = [index - beside, index + beside, *positions[slice(*shutters.open_span(state.bars))].tolist()]
-        return min(reach), max(reach)
+        low, high = compositor.reach(state, index, direction)
+        return min(low, index - beside), max(high, index + beside)
 
     @property
     def _everywhere(self) -> int:

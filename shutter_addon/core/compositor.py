@@ -18,8 +18,19 @@ def window_positions(options: Options, index: int, direction: int = 1) -> np.nda
     direction: 1, or −1 where the source plays in reverse, and the window's next frames are those before `index`. A
     filmed frame lasts until the next one, so that in reverse its in-between frames come first, from the last one on.
     """
-    first = index if direction > 0 else index + options.step - 1
-    return first + direction * (np.arange(options.window) - options.before)
+    return origin(options, index, direction) + direction * np.arange(options.window)
+
+
+def reach(state: FrameState, index: int, direction: int = 1) -> tuple[int, int]:
+    """The first and the last of the positions that any shutter exposes."""
+    first = origin(state.options, index, direction)
+    ends = [first + direction * place for place in (state.open_span[0], state.open_span[1] - 1)]
+    return min(ends), max(ends)
+
+
+def origin(options: Options, index: int, direction: int = 1) -> int:
+    """The position of the window's first frame; arguments as of `window_positions`."""
+    return (index if direction > 0 else index + options.step - 1) - direction * options.before
 
 
 def source_frames(options: Options, positions: np.ndarray, shot: range) -> np.ndarray:
@@ -30,7 +41,7 @@ def source_frames(options: Options, positions: np.ndarray, shot: range) -> np.nd
     "shorten" leaves frames out, but keeps the nearest when all lie outside.
     """
     first, count = shot.start, len(shot)
-    held = np.clip(positions, first, shot.stop - 1)
+    held = np.minimum(np.maximum(positions, first), shot.stop - 1)
     if options.edges == "mirror" and count > 1:
         folded = np.mod(positions - first, 2 * (count - 1))
         return first + np.where(folded < count, folded, 2 * (count - 1) - folded)

@@ -7,7 +7,9 @@ of whoever made it: a recipe's count from 1, Blender's are the edit's timeline f
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -40,6 +42,11 @@ class Drawings:
     eases: tuple[str, ...]
     aspect: float
     placement: Channel | None = None
+
+    @property
+    def is_still(self) -> bool:
+        """Whether they are the same at every frame."""
+        return len(self.frames) < 2 and (self.placement is None or keyframes.are_constant(self.placement))
 
     def at(self, frame: float) -> list[np.ndarray]:
         """Strokes (n, 2) in fractions of the picture. FarStrokeError: a point is nowhere near it."""
@@ -80,6 +87,12 @@ class Region:
     location: Channel
     rotation: Channel
     scale: Channel
+
+    @property
+    def is_still(self) -> bool:
+        """Whether it is the same at every frame."""
+        numbers = self.kind, self.width, self.location, self.rotation, self.scale
+        return self.drawings.is_still and keyframes.are_constant(*numbers)
 
     def at(self, frame: float) -> scribbles.Shape:
         location, rotation, scale = (channel.at(frame) for channel in (self.location, self.rotation, self.scale))
@@ -135,6 +148,11 @@ class MatteRegion:
     location: Channel
     rotation: Channel
     scale: Channel
+
+    @property
+    def is_still(self) -> bool:
+        """Whether its matte is the same at every frame."""
+        return keyframes.are_constant(self.content, self.opacity, self.feather)
 
     def at(self, frame: float) -> mattes.Matte:
         """The matte at a frame."""
@@ -229,8 +247,24 @@ class Effect:
     edge_aware: Channel = field(default=keyframes.Constant(0.0))
     camera: Camera = STILL_CAMERA
 
+    @cached_property
+    def is_still(self) -> bool:
+        """Whether its state is the same at every frame."""
+        parts = (*(shutter.bars for shutter in self.shutters), *self.regions)
+        return keyframes.are_constant(self.options, self.edge_aware) and all(part.is_still for part in parts)
+
     def at(self, frame: float) -> FrameState:
         """The effect at a frame. EffectError: no picture can be made of it."""
+        if self.is_still:
+            with suppress(EffectError):  # which names the frame
+                return self._still
+        return self._state(frame)
+
+    @cached_property
+    def _still(self) -> FrameState:
+        return self._state(0.0)
+
+    def _state(self, frame: float) -> FrameState:
         options = replace(self.options.at(frame), edge_aware=float(self.edge_aware.at(frame)))
         bars = [self.bars_at(index, frame) for index in range(len(self.shutters))]
         laid = [region.at(frame) for region in self.regions if isinstance(region, MatteRegion)]

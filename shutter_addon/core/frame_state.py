@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
-from . import scribbles
+from . import scribbles, shutters
 from .mattes import Matte
 
 Interpolation = Literal["displacement", "value"]
@@ -111,7 +112,12 @@ class FrameState:
             return np.ones_like(exposures)
         return exposures / (self.reference or exposures[0])
 
-    @property
+    @cached_property
+    def open_span(self) -> tuple[int, int]:
+        """As shutters.open_span of the bars."""
+        return shutters.open_span(self.bars)
+
+    @cached_property
     def key(self) -> tuple:
         """Hashable, and equal for states that give the same picture of the same frames."""
         shapes = ((s.shutter, s.kind, s.width, *(stroke.tobytes() for stroke in s.strokes)) for s in self.shapes)

@@ -64,6 +64,11 @@ class Constant:
         return _given(self.value)
 
 
+def are_constant(*channels: Channel) -> bool:
+    """Whether all of them are the same at every frame."""
+    return all(isinstance(channel, Constant) for channel in channels)
+
+
 @dataclass(frozen=True)
 class Keys:
     """Numbers or arrays at ascending frames, linear in between after the ease of the span (eased)."""
@@ -127,6 +132,11 @@ class Bars:
     channel: Channel
     keys: tuple[tuple[float, str], ...] = ()
     share: Channel | None = None
+
+    @property
+    def is_still(self) -> bool:
+        """Whether they are the same at every frame."""
+        return not self.keys and are_constant(self.channel)
 
     def at(self, frame: float, interpolation: str) -> np.ndarray:
         """Between keys by displacement (paper §3.4.1, over time), or by `channel`: where interpolation is "value", and

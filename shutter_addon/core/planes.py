@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -72,19 +73,29 @@ class Planes:
         """RGB uint8 (h, w, 3) of the pixels in these rows and columns: those of the frame of `rgba`, and nothing else
         is converted."""
         m, (down, right) = self.matrix, map(_chroma_places, (rows, columns), self.luma.shape)
-        luma = ((self.luma[rows, columns].astype(np.int32) << 9) - m.offset) * m.luma + (1 << 21)
-        cb, cr = ((plane[down][:, right].astype(np.int32) - 128) << 9 for plane in self.chroma)
-        found = np.empty((*luma.shape, 3), np.uint8)
+        luma = self.luma[rows, columns].astype(np.int32)
+        luma *= m.luma << 9
+        luma += (1 << 21) - m.offset * m.luma
+        cb, cr = (plane[down][:, right].astype(np.int32) for plane in self.chroma)
+        for plane in (cb, cr):
+            plane -= 128
+            plane <<= 9
+        found = np.empty((len(luma), 3, luma.shape[1]), np.uint8)
         # Sums wrap around beyond 32 bits, as libswscale's do.
         colours = cr * m.red_of_cr, cb * m.green_of_cb + cr * m.green_of_cr, cb * m.blue_of_cb
         for channel, chroma in enumerate(colours):
-            found[..., channel] = (luma + chroma).clip(0, (1 << 30) - 1) >> 22
-        return found
+            chroma += luma
+            found[:, channel] = chroma.clip(0, (1 << 30) - 1, out=chroma) >> 22
+        return np.moveaxis(found, 1, -1)
 
 
-def _chroma_places(chosen: slice, length: int) -> np.ndarray:
+@lru_cache(8)
+def _chroma_places(chosen: slice, length: int) -> np.ndarray | slice:
+    """The samples of chroma that pixels have; a slice, which is quicker, where they lie evenly."""
     step = chroma_step(length)
-    return (np.arange(*chosen.indices(length)) * step + step // 2) >> 16
+    places = (np.arange(*chosen.indices(length)) * step + step // 2) >> 16
+    even = slice(places[0], None, (places[-1] - places[0]) // max(len(places) - 1, 1) or 1) if len(places) else None
+    return even if even and np.array_equal(np.arange(places[-1] + 1)[even], places) else places
 
 
 def as_rgba(frame: np.ndarray | Planes) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Cuts within a source, found by PySceneDetect, and frames that repeat the one before: decisions about few neighbouring
 frames, made of a small picture of each; and a source that knows where its shots end."""
 
-from functools import cache
+from functools import cache, lru_cache
 from itertools import pairwise, product
 
 import numpy as np
@@ -53,24 +53,27 @@ def signature(frame: np.ndarray | Planes, transfer: str, alpha: str = "opaque") 
     height, width = (frame.luma if planar else frame).shape[:2]
     down, right = max(1, height // (5 * _ROWS)), max(1, width // (10 * _COLUMNS))
     chosen = slice(down // 2, None, down), slice(right // 2, None, right)
-    samples = frame.samples(*chosen) if planar else np.ascontiguousarray(frame[chosen])
-    scale = np.float32(1 / np.iinfo(samples.dtype).max if samples.dtype.kind == "u" else 1)
-    colours = samples * scale  # an alpha as well: NumPy is quickest with all that lies in a row
-    if samples.dtype.kind == "f":
-        colours = np.nan_to_num(colours, copy=False).clip(0, 1)  # one sun would outweigh the rest of the picture
+    samples = frame.samples(*chosen) if planar else frame[chosen]
+    whole = samples.dtype.kind == "u"
+    most = np.float32(np.iinfo(samples.dtype).max if whole else 1)
+    samples = np.moveaxis(samples, -1, 1)  # rows of each colour, of which NumPy makes sums the quickest
+    colours = np.ascontiguousarray(samples[:, :3], np.float32)  # sums of whole numbers are exact
+    if not whole:
+        colours = np.nan_to_num(colours, copy=False).clip(0, most)  # one sun would outweigh the rest of the picture
     if alpha == "straight":
-        colours[..., :3] *= samples[..., 3:] * scale
-    (rows, heights), (columns, widths) = map(_blocks, colours.shape, (_ROWS, _COLUMNS))
-    colours = np.add.reduceat(colours.reshape(len(colours), -1), rows, axis=0).reshape(len(rows), *colours.shape[1:])
-    colours = np.add.reduceat(colours / heights[:, None, None], columns, axis=1) / widths[:, None]
-    colours = np.ascontiguousarray(colours[..., :3])
+        colours *= samples[:, 3:] / most
+    (rows, heights), (columns, widths) = _blocks(len(colours), _ROWS), _blocks(colours.shape[2], _COLUMNS)
+    colours = np.stack([colours[row : row + height].sum(axis=0) for row, height in zip(rows, heights, strict=True)])
+    colours = np.add.reduceat(colours, columns, axis=2) / (most * np.outer(heights, widths).astype(np.float32)[:, None])
+    colours = np.ascontiguousarray(np.moveaxis(colours, 1, -1))
     return 255 * (light.to_encoded(colours) if transfer == "linear" else colours)
 
 
+@lru_cache(8)
 def _blocks(length: int, most: int) -> tuple[np.ndarray, np.ndarray]:
     """Where blocks of so many samples begin, and how long they are: as many as there are samples, `most` at most."""
     edges = np.linspace(0, length, min(most, length) + 1).astype(int)
-    return edges[:-1], np.diff(edges).astype(np.float32)
+    return edges[:-1], np.diff(edges)
 
 
 @cache
@@ -132,7 +135,14 @@ def _differ(before: Signature, after: Signature, least: float, share: float = 1.
     from scenedetect.detectors import ContentDetector
 
     threshold = max(share * CHANGE * min(max(before.mean(), after.mean()) / GREY, 1.0), least)
+    # That of most neighbours is far below. PySceneDetect's, which takes long to ask, differs by rounding, 1 at most.
+    if np.abs(_brightness(before) - _brightness(after)).mean() + 1 < threshold:
+        return False
     return _finds(ContentDetector(threshold, min_scene_len=0, luma_only=True), [before, after], 1)
+
+
+def _brightness(picture: Signature) -> np.ndarray:
+    return np.maximum(np.maximum(picture[..., 0], picture[..., 1]), picture[..., 2])
 
 
 def _unlike(before: Signature, after: Signature, apart: float) -> bool:

@@ -94,13 +94,14 @@ def test_a_file_that_is_gone_ends_the_film(bpy, film, tmp_path, monkeypatch, cap
     assert "picture.tif: No such file or directory" in capfd.readouterr().err
 
 
+@pytest.mark.parametrize("width", [7, 16, 40])
 @pytest.mark.parametrize("height", [5, 64, 65, 200])
-def test_a_file_whose_pixels_are_replaced(tmp_path, height):
+def test_a_file_whose_pixels_are_replaced(tmp_path, width, height):
     from shutter_addon.blender.rendering.movie_feed import LevelsFile
 
-    levels = np.random.default_rng(0).integers(0, 256, (2, height, 7, 4), dtype=np.uint8)
+    levels = np.random.default_rng(0).integers(0, 256, (2, height, width, 4), dtype=np.uint8)
     levels[..., 3] = 255
-    file = LevelsFile(tmp_path / "levels.tif", 7, height)
+    file = LevelsFile(tmp_path / "levels.tif", width, height)
     for shown in levels:
         file.write(shown)
         assert np.array_equal(OpenImageIO.ImageBuf(str(file.path)).get_pixels("uint8"), shown)

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from shutter_addon.core import compositor, light, shutters
 from shutter_addon.core.frame_state import FrameState, Options
@@ -47,6 +49,21 @@ def test_backward():
     assert compositor.window_indices(Options(4), 5, range(10), -1).tolist() == [5, 4, 3, 2]
     assert compositor.window_indices(Options(4, edges="mirror"), 1, range(10), -1).tolist() == [1, 0, 1, 2]
     assert compositor.window_indices(Options(4, position="end"), 5, range(10), -1).tolist() == [8, 7, 6, 5]
+
+
+@given(
+    st.integers(1, 12).flatmap(lambda window: st.lists(st.booleans(), min_size=window, max_size=window).filter(any)),
+    st.sampled_from(["start", "center", "end"]),
+    st.sampled_from([1, 2, 4]),
+    st.sampled_from([1, -1]),
+)
+def test_what_a_window_reaches_is_what_its_shutters_expose(exposed, position, step, direction):
+    options = Options(len(exposed), position=position, step=step)
+    positions = compositor.window_positions(options, 20, direction)
+    assert compositor.origin(options, 20, direction) == positions[0]
+    state = FrameState(options, np.array([exposed], float))
+    shown = positions[np.flatnonzero(exposed)]
+    assert compositor.reach(state, 20, direction) == (shown.min(), shown.max())
 
 
 def test_a_clip_of_one_frame():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shutter_addon.core import effect, keyframes, limits
+from shutter_addon.core import effect, keyframes, limits, mattes
 from shutter_addon.core.frame_state import Options
 from shutter_addon.core.keyframes import Bars, Constant, Keys, Samples, SourceTime
 from shutter_addon.core.messages import EffectError
@@ -28,6 +28,65 @@ def test_an_error_among_samples_is_raised_at_its_frame_alone():
         made(bars).at(2)
     with pytest.raises(KeyError):
         made(bars).at(3)
+
+
+def keyed(first, last) -> Keys:
+    return Keys((1.0, 5.0), tuple(map(np.array, (first, last))), ("linear", "linear"))
+
+
+def changed(**channels) -> effect.Effect:
+    """An effect of a shutter, a scribble and a matte, all still but for these."""
+    options, edge_aware, bars = (
+        channels.pop(name, still)
+        for name, still in (("options", Constant(Options(4))), ("edge_aware", Constant(0)), ("bars", Constant(FIRST)))
+    )
+    strokes, placement = ([np.array([[0.1, 0.2], [0.5, 0.9]])], [np.zeros((2, 2))]), channels.pop("placement", None)
+    frames = channels.pop("drawn", (1.0,))
+    drawings = effect.Drawings(frames, strokes[: len(frames)], ("linear",) * len(frames), 1.0, placement)
+    numbers = {"kind": "line", "width": 0.1, "location": (0, 0), "rotation": 0.0, "scale": 1.0}
+    scribble = {name: channels.pop(name, Constant(value)) for name, value in numbers.items()}
+    ramp = Constant(mattes.Ramp("linear", (0, 0), 0.0, 1.0))
+    matte = {"content": ramp, "opacity": Constant(1.0), "feather": Constant(0.0)} | channels
+    moves = {name: Constant(numbers[name]) for name in ("location", "rotation", "scale")}
+    regions = (
+        effect.Region("Face", 0, drawings=drawings, **scribble),
+        effect.MatteRegion("Sky", 0, blend="over", invert=False, **matte, **moves),
+    )
+    return effect.Effect((effect.Shutter("Sharp", (1, 1, 1), Bars(bars)),), regions, options, edge_aware=edge_aware)
+
+
+def test_the_state_of_a_still_effect_is_made_once():
+    still = changed(placement=Constant(np.eye(3)))
+    assert still.at(1) is still.at(3.5)
+    closed = changed(bars=Constant(0 * FIRST))
+    for frame in (1, 3):
+        with pytest.raises(EffectError, match=f"at frame {frame}: all bars are zero"):
+            closed.at(frame)
+
+
+@pytest.mark.parametrize(
+    "channels",
+    [
+        {"bars": keyed(FIRST, LAST)},
+        {"options": Samples({1: Options(4), 3: Options(4, border=True)})},
+        {"edge_aware": keyed(0.0, 1.0)},
+        {"kind": Samples({1: "line", 3: "lasso"})},
+        {"width": keyed(0.1, 0.2)},
+        {"location": keyed((0, 0), (1, 1))},
+        {"rotation": keyed(0, 90)},
+        {"scale": keyed(1, 2)},
+        {"drawn": (1.0, 5.0)},
+        {"placement": Samples({1: np.eye(3), 3: np.diag([0.5, 0.5, 1])})},
+        {"content": Samples({i: mattes.Ramp("linear", (i, 0), 0.0, 1.0) for i in (1, 3)})},
+        {"opacity": keyed(1.0, 0.5)},
+        {"feather": keyed(0.0, 0.5)},
+    ],
+    ids=lambda channels: next(iter(channels)),
+)
+def test_what_changes_over_time_changes_the_state(channels):
+    found = changed(**channels)
+    assert found.at(1).key != found.at(3).key
+    assert found.at(1).key == found.at(1).key == changed(**channels).at(1).key
 
 
 def test_bars_move_between_keys_by_their_share():

@@ -9,6 +9,7 @@ import pytest
 
 from shutter_addon.core.frame_source import FrameSource
 from shutter_addon.media import MediaError, open_source
+from shutter_addon.media import cuts as media_cuts
 from shutter_addon.media.cuts import NEIGHBOURS, ShotSource, is_cut, is_duplicate, signature
 
 ROOT = Path(__file__).parents[2]
@@ -41,6 +42,20 @@ def cuts(*parts, **kind) -> list[int]:
 
 def lit(frames, gain=1.0, more=0.0):
     return np.clip(frames * gain + more, 0, 255).astype(np.uint8)
+
+
+def test_the_quick_look_agrees_with_pyscenedetect(monkeypatch):
+    """Neighbours that it takes for none of a cut are none by PySceneDetect either."""
+    chance = np.random.default_rng(0)
+    pairs = []
+    for _ in range(300):
+        before = (chance.random((18, 32, 3)) * chance.integers(1, 256)).astype(np.float32)
+        change = chance.normal(chance.uniform(-60, 60), chance.uniform(0, 8), before.shape)
+        pairs.append((before, (before + change).clip(0, 255).astype(np.float32)))
+    quick = [media_cuts.may_be_cut(*pair) for pair in pairs]
+    monkeypatch.setattr(media_cuts, "_brightness", lambda _picture: np.float32(np.nan))  # so that it is always asked
+    assert quick == [media_cuts.may_be_cut(*pair) for pair in pairs]
+    assert 30 < sum(quick) < 270
 
 
 def test_films_without_cuts_have_none(film, bunny):

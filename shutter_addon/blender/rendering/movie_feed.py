@@ -21,7 +21,10 @@ from ..data import colour_configuration, snapshot, strips
 from . import render_job, session
 from .engine import in_words, say
 
-_ROWS = 64  # of a strip of the file: of a single one, libtiff makes as many as there are rows, in twice the time
+# Of the file's tiles, which lie one below the other. Strips take twice the time: Blender reads rows upwards, for which
+# OpenImageIO takes 64 MB anew for each picture.
+_ROWS = 64
+_COLUMNS = 16  # a tile's width is a multiple of these
 
 
 @contextmanager
@@ -88,13 +91,17 @@ class LevelsFile:
     def __init__(self, path: Path, width: int, height: int):
         """OSError: it cannot be written. After this there is room for all that is written to it."""
         self.path = path
-        self._head = _tiff_head(width, height)
-        path.write_bytes(self._head + bytes(4 * width * height))
+        self._beside, tiles = -width % _COLUMNS, -(-height // _ROWS)
+        tile = 4 * (width + self._beside) * _ROWS
+        self._head = _tiff_head(width, height, tiles, tile)
+        path.write_bytes(self._head + bytes(tiles * tile))
         self._file = path.open("r+b", buffering=0)
 
     def write(self, levels: np.ndarray) -> None:
         """levels: uint8 (H, W, 4), top row first. OSError: there is no such file any more, which Blender would show as
         a picture of one colour."""
+        if self._beside:
+            levels = np.pad(levels, ((0, 0), (0, self._beside), (0, 0)))
         self._file.seek(len(self._head))
         self._file.write(levels)
         os.utime(self.path)
@@ -103,23 +110,21 @@ class LevelsFile:
         self._file.close()
 
 
-def _tiff_head(width: int, height: int) -> bytes:
-    """All of a little-endian TIFF before its pixels, which are strips of _ROWS rows."""
-    short, long, count = 3, 4, 10
-    strips = -(-height // _ROWS)
+def _tiff_head(width: int, height: int, tiles: int, size: int) -> bytes:
+    """All of a little-endian TIFF before its pixels: so many tiles of so many bytes, one below the other."""
+    short, long, count = 3, 4, 11
     depths = 8 + 2 + 12 * count + 4  # behind the header of 8 bytes, the number of fields, the fields, and their end
     places = depths + 8
-    pixels = places + 8 * strips if strips > 1 else places
-    sizes = [4 * width * min(_ROWS, height - top) for top in range(0, height, _ROWS)]
-    starts = [pixels + 4 * width * top for top in range(0, height, _ROWS)]
+    pixels = places + 8 * tiles if tiles > 1 else places
+    starts, sizes = [pixels + tile * size for tile in range(tiles)], [size] * tiles
+    table = struct.pack(f"<{2 * tiles}I", *starts, *sizes) if tiles > 1 else b""
     fields = [
         *((256, long, 1, width), (257, long, 1, height)),
         *((258, short, 4, depths), (259, short, 1, 1), (262, short, 1, 2)),  # bits of samples, not compressed, RGB
-        # Where the strips are, samples of each pixel, rows and bytes of each strip.
-        *((273, long, strips, places if strips > 1 else pixels), (277, short, 1, 4)),
-        *((278, long, 1, _ROWS), (279, long, strips, places + 4 * strips if strips > 1 else sizes[0])),
+        *((277, short, 1, 4), (322, long, 1, size // (4 * _ROWS)), (323, long, 1, _ROWS)),  # channels, columns, rows
+        (324, long, tiles, places if table else pixels),  # where the tiles are
+        (325, long, tiles, places + 4 * tiles if table else size),  # their bytes
         (338, short, 1, 2),  # straight alpha
     ]
     packed = b"".join(struct.pack("<HHII", *field) for field in fields) + bytes(4) + struct.pack("<4H", 8, 8, 8, 8)
-    tables = struct.pack(f"<{2 * strips}I", *starts, *sizes) if strips > 1 else b""
-    return struct.pack("<2sHIH", b"II", 42, 8, count) + packed + tables
+    return struct.pack("<2sHIH", b"II", 42, 8, count) + packed + table

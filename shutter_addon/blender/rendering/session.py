@@ -59,7 +59,7 @@ def _never() -> bool:
 def _result(future: Future, stopped):
     """The future's result. StoppedError: it is not waited for any longer. NoDeviceError: it cannot be waited for, as
     Blender's GPU is not current."""
-    while not wait([future], 0 if in_window() else _PATIENCE).done:
+    while not (future.done() or wait([future], 0 if in_window() else _PATIENCE).done):
         if in_window() and not gpu_relay.serve():
             raise NoDeviceError(rpt_("Blender's GPU cannot be used until a window is drawn"))
         if stopped():
@@ -493,9 +493,11 @@ def _say_of_cuts(say) -> None:
 
 def shortages(request: FrameRequest) -> list[str]:
     """Sentences about what is slow in pictures as requested, for the GPU has no room."""
-    found, source = request.renderer.shortages(), request.renderer.source
+    if not (found := request.renderer.shortages()):
+        return []
+    source = request.renderer.source
     words = {"width": source.width, "height": source.height, "frames": request.state.options.window}
-    words["limit"] = memory().limit // MEGABYTE if found else 0
+    words["limit"] = memory().limit // MEGABYTE
     sentences = {
         "window": rpt_(
             "the {limit} MB that may be taken of the GPU are too few for {frames} frames of {width}×{height}: all are"
