@@ -5,6 +5,7 @@ Renders of one frame go to SHUTTER_PICTURES, whatever was shown before; what the
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
 import json
 import sys
+import time
 from pathlib import Path
 
 sys.path[:0] = [str(Path(__file__).parent)]
@@ -151,6 +152,25 @@ def stopped():
     yield 1.0
 
 
+def kept_time():
+    """Playing with Frame Dropping: when each picture was drawn, at which frame, and of which frame it was composed."""
+    edit, drawn = story.edit(), []
+
+    def note():
+        ((_snapshot, composed_of, _request),) = session()._window._requests.values()
+        drawn.append((time.perf_counter(), edit.frame_current, composed_of))
+
+    edit.sync_mode = "FRAME_DROP"
+    edit.frame_set(1)
+    yield from played(0.5)
+    handler = bpy.types.SpaceSequenceEditor.draw_handler_add(note, (), "PREVIEW", "POST_PIXEL")
+    yield 3.0
+    bpy.types.SpaceSequenceEditor.draw_handler_remove(handler, "PREVIEW")
+    yield from stopped()
+    edit.sync_mode = "NONE"
+    driver.saw(drawn=drawn, rate=edit.render.fps / edit.render.fps_base)
+
+
 def in_a_handler(name):
     def render(*_):
         by_script(name)
@@ -211,6 +231,8 @@ def told():
     yield from story.movie_added()
     story.edit().frame_set(FRAME)
     yield from effect_added()
+    yield from shown("at_100", proxy_render_size="PROXY_100")
+    yield from kept_time()
     yield from sizes()
     yield from proxies()
     yield from tricked()

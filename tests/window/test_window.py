@@ -329,7 +329,8 @@ def block_means(picture, side=8):
 
 
 def test_previews_of_any_size_and_renders_after_them(tmp_path):
-    """At 100, 50 and 25 %, in all views and by scopes; whatever was shown before, a render is the full picture."""
+    """At 100, 50 and 25 %, in all views and by scopes; whatever was shown before, a render is the full picture. Playing
+    keeps time."""
     seen, console = tell("preview_sizes_story.py", "opengl", linked(tmp_path))
     assert "Traceback" not in console
     steps = {entry["step"]: entry for entry in seen if "step" in entry}
@@ -350,6 +351,12 @@ def test_previews_of_any_size_and_renders_after_them(tmp_path):
     ours, blenders = (block_means(pictures[name]) for name in ("proxy_still", "proxy_by_blender"))
     assert np.abs(ours - blenders).mean() < 1.5
     assert (pictures["waveform"] > 60).mean() > 0.05
+    (played,) = (entry for entry in seen if "drawn" in entry)
+    when, frames, composed_of = zip(*played["drawn"], strict=True)
+    assert frames == composed_of
+    # On a software renderer few of the film's frames come in time. The next ones are those of their time.
+    off = [(frame - frames[0]) / played["rate"] - (at - when[0]) for at, frame in zip(when, frames, strict=True)]
+    assert len(when) > 5 and max(off) - min(off) < 0.8
     background = pixels(tmp_path / "background_0050.png")
     for name in ("job", "script", "script_again", "playing", "handler", "scene_strip", "job_after"):
         assert np.array_equal(pixels(tmp_path / f"{name}.png"), background), name
