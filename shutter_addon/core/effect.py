@@ -45,7 +45,7 @@ class Drawings:
 
     @property
     def is_still(self) -> bool:
-        """Whether they are the same at every frame."""
+        """Whether they are known to be the same at every frame."""
         return len(self.frames) < 2 and (self.placement is None or keyframes.are_constant(self.placement))
 
     def at(self, frame: float) -> list[np.ndarray]:
@@ -90,7 +90,7 @@ class Region:
 
     @property
     def is_still(self) -> bool:
-        """Whether it is the same at every frame."""
+        """Whether it is known to be the same at every frame."""
         numbers = self.kind, self.width, self.location, self.rotation, self.scale
         return self.drawings.is_still and keyframes.are_constant(*numbers)
 
@@ -151,8 +151,9 @@ class MatteRegion:
 
     @property
     def is_still(self) -> bool:
-        """Whether its matte is the same at every frame."""
-        return keyframes.are_constant(self.content, self.opacity, self.feather)
+        """Whether its matte is known to be the same at every frame."""
+        placed = isinstance(self.content, PlacedRamp) and self.content.is_still
+        return (placed or keyframes.are_constant(self.content)) and keyframes.are_constant(self.opacity, self.feather)
 
     def at(self, frame: float) -> mattes.Matte:
         """The matte at a frame."""
@@ -180,6 +181,11 @@ class PlacedRamp:
     location: Channel
     rotation: Channel
     scale: Channel
+
+    @property
+    def is_still(self) -> bool:
+        """Whether it is known to be the same at every frame."""
+        return keyframes.are_constant(self.location, self.rotation, self.scale)
 
     def at(self, frame: float) -> mattes.Ramp:
         placed = _placement(self, frame)
@@ -249,14 +255,14 @@ class Effect:
 
     @cached_property
     def is_still(self) -> bool:
-        """Whether its state is the same at every frame."""
+        """Whether its state is known to be the same at every frame."""
         parts = (*(shutter.bars for shutter in self.shutters), *self.regions)
         return keyframes.are_constant(self.options, self.edge_aware) and all(part.is_still for part in parts)
 
     def at(self, frame: float) -> FrameState:
         """The effect at a frame. EffectError: no picture can be made of it."""
         if self.is_still:
-            with suppress(EffectError):  # which names the frame
+            with suppress(EffectError):  # it is raised below, and names this frame
                 return self._still
         return self._state(frame)
 

@@ -65,7 +65,7 @@ class Constant:
 
 
 def are_constant(*channels: Channel) -> bool:
-    """Whether all of them are the same at every frame."""
+    """Whether all of them are known to be the same at every frame."""
     return all(isinstance(channel, Constant) for channel in channels)
 
 
@@ -135,7 +135,7 @@ class Bars:
 
     @property
     def is_still(self) -> bool:
-        """Whether they are the same at every frame."""
+        """Whether they are known to be the same at every frame."""
         return not self.keys and are_constant(self.channel)
 
     def at(self, frame: float, interpolation: str) -> np.ndarray:

@@ -72,7 +72,11 @@ class Planes:
     def samples(self, rows: slice, columns: slice) -> np.ndarray:
         """RGB uint8 (h, w, 3) of the pixels in these rows and columns: those of the frame of `rgba`, and nothing else
         is converted."""
-        m, (down, right) = self.matrix, map(_chroma_places, (rows, columns), self.luma.shape)
+        m, shape = self.matrix, self.luma.shape
+        down, right = (
+            _chroma_places(range(*chosen.indices(length)), length)
+            for chosen, length in zip((rows, columns), shape, strict=True)
+        )
         luma = self.luma[rows, columns].astype(np.int32)
         luma *= m.luma << 9
         luma += (1 << 21) - m.offset * m.luma
@@ -90,12 +94,14 @@ class Planes:
 
 
 @lru_cache(8)
-def _chroma_places(chosen: slice, length: int) -> np.ndarray | slice:
+def _chroma_places(chosen: range, length: int) -> np.ndarray | slice:
     """The samples of chroma that pixels have; a slice, which is quicker, where they lie evenly."""
     step = chroma_step(length)
-    places = (np.arange(*chosen.indices(length)) * step + step // 2) >> 16
-    even = slice(places[0], None, (places[-1] - places[0]) // max(len(places) - 1, 1) or 1) if len(places) else None
-    return even if even and np.array_equal(np.arange(places[-1] + 1)[even], places) else places
+    places = (np.array(chosen, int) * step + step // 2) >> 16
+    apart = np.diff(places)
+    if len(apart) and apart[0] > 0 and (apart == apart[0]).all():
+        return slice(places[0], places[-1] + 1, apart[0])
+    return places
 
 
 def as_rgba(frame: np.ndarray | Planes) -> np.ndarray:

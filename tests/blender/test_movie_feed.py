@@ -102,6 +102,8 @@ def test_a_file_whose_pixels_are_replaced(tmp_path, width, height):
     levels = np.random.default_rng(0).integers(0, 256, (2, height, width, 4), dtype=np.uint8)
     levels[..., 3] = 255
     file = LevelsFile(tmp_path / "levels.tif", width, height)
+    spec = OpenImageIO.ImageBuf(str(file.path)).spec()
+    assert (spec.tile_width % 16, spec.tile_height) == (0, 64)
     for shown in levels:
         file.write(shown)
         assert np.array_equal(OpenImageIO.ImageBuf(str(file.path)).get_pixels("uint8"), shown)

@@ -111,7 +111,7 @@ def test_what_is_drawn_is_read_once_until_something_changes(bpy, found, monkeypa
     def drawn():
         asked.clear()
         invalidation.invalidate_changed(edit)
-        return {id(invalidation.current(edit, effect, strip, 5)) for _ in range(3)}
+        return {invalidation.current(edit, effect, strip, 5) for _ in range(3)}
 
     assert len(drawn()) == 1
     assert asked == ["files", "take"]

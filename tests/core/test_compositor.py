@@ -60,7 +60,6 @@ def test_backward():
 def test_what_a_window_reaches_is_what_its_shutters_expose(exposed, position, step, direction):
     options = Options(len(exposed), position=position, step=step)
     positions = compositor.window_positions(options, 20, direction)
-    assert compositor.origin(options, 20, direction) == positions[0]
     state = FrameState(options, np.array([exposed], float))
     shown = positions[np.flatnonzero(exposed)]
     assert compositor.reach(state, 20, direction) == (shown.min(), shown.max())

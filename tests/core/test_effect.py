@@ -58,6 +58,8 @@ def changed(**channels) -> effect.Effect:
 def test_the_state_of_a_still_effect_is_made_once():
     still = changed(placement=Constant(np.eye(3)))
     assert still.at(1) is still.at(3.5)
+    placed = effect.PlacedRamp("linear", *map(Constant, ((0, 0), 0.0, 1.0)))
+    assert (ramped := changed(content=placed)).at(1) is ramped.at(3.5)
     closed = changed(bars=Constant(0 * FIRST))
     for frame in (1, 3):
         with pytest.raises(EffectError, match=f"at frame {frame}: all bars are zero"):
@@ -78,6 +80,7 @@ def test_the_state_of_a_still_effect_is_made_once():
         {"drawn": (1.0, 5.0)},
         {"placement": Samples({1: np.eye(3), 3: np.diag([0.5, 0.5, 1])})},
         {"content": Samples({i: mattes.Ramp("linear", (i, 0), 0.0, 1.0) for i in (1, 3)})},
+        {"content": effect.PlacedRamp("linear", Constant((0, 0)), keyed(0.0, 90.0), Constant(1.0))},
         {"opacity": keyed(1.0, 0.5)},
         {"feather": keyed(0.0, 0.5)},
     ],

@@ -25,6 +25,16 @@ def enable():
     assert module, "the extension could not be enabled"
 
 
+def video_editing_opened():
+    """A new file of Blender's template for it, with the extension, which a new file disables; generator: yield from
+    it."""
+    bpy.context.preferences.view.render_display_type = "NONE"  # its window would cover the other
+    enable()
+    bpy.ops.wm.read_homefile(app_template="Video_Editing")
+    yield 1.0
+    enable()
+
+
 def play(story, seconds=STEP):
     """Runs a story step by step; quits Blender with its end or its first failure."""
     OUT.mkdir(parents=True, exist_ok=True)

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 import support
 import traces
-from driver import OUT, area_of, enable, key, move, play, region_of, saw, shot, until
+from driver import OUT, area_of, key, move, play, region_of, saw, shot, until, video_editing_opened
 
 FRAMES, BROKEN = 200, 15
 rendering = partial(bpy.app.is_job_running, "RENDER")
@@ -61,11 +61,7 @@ def begun(path, first, last):
 
 
 def story():
-    bpy.context.preferences.view.render_display_type = "NONE"  # its window would cover the other
-    enable()
-    bpy.ops.wm.read_homefile(app_template="Video_Editing")
-    yield 1.0
-    enable()
+    yield from video_editing_opened()
     edit = edit_now()
     edit.render.resolution_x, edit.render.resolution_y = 640, 360
     add_effect()

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 import bpy
-from driver import enable, override
+from driver import override, video_editing_opened
 
 
 def edit():
@@ -14,11 +14,7 @@ def edit():
 
 def opened():
     """Generator: yield from it."""
-    bpy.context.preferences.view.render_display_type = "NONE"  # its window would cover the other
-    enable()
-    bpy.ops.wm.read_homefile(app_template="Video_Editing")
-    yield 1.0
-    enable()
+    yield from video_editing_opened()
     bpy.context.window_manager.windows[0].workspace.sequencer_scene.name = "Edit"
     editor = edit().sequence_editor_create()
     editor.use_cache_raw = editor.use_cache_final = False

@@ -153,21 +153,22 @@ def stopped():
 
 
 def kept_time():
-    """Playing with Frame Dropping: when each picture was drawn, at which frame, and of which frame it was composed."""
+    """Playing with Frame Dropping: when each picture was drawn, at which frame, and of which source frame it is."""
     edit, drawn = story.edit(), []
 
     def note():
-        ((_snapshot, composed_of, _request),) = session()._window._requests.values()
-        drawn.append((time.perf_counter(), edit.frame_current, composed_of))
+        ((_key, renderer),) = session()._window._renderers.values()
+        (index, *_), _exact, _picture = renderer._drawn
+        drawn.append((time.perf_counter(), edit.frame_current, index))
 
-    edit.sync_mode = "FRAME_DROP"
+    kept, edit.sync_mode = edit.sync_mode, "FRAME_DROP"
     edit.frame_set(1)
     yield from played(0.5)
     handler = bpy.types.SpaceSequenceEditor.draw_handler_add(note, (), "PREVIEW", "POST_PIXEL")
     yield 3.0
     bpy.types.SpaceSequenceEditor.draw_handler_remove(handler, "PREVIEW")
     yield from stopped()
-    edit.sync_mode = "NONE"
+    edit.sync_mode = kept
     driver.saw(drawn=drawn, rate=edit.render.fps / edit.render.fps_base)
 
 
@@ -203,7 +204,6 @@ def tricked():
     render = story.edit().render
     render.image_settings.media_type, render.image_settings.file_format = "IMAGE", "PNG"
     render.dither_intensity = 0
-    bpy.context.preferences.view.render_display_type = "NONE"
     space().proxy_render_size = "PROXY_25"
     yield 1.0
     yield from in_a_job("job")
@@ -231,7 +231,7 @@ def told():
     yield from story.movie_added()
     story.edit().frame_set(FRAME)
     yield from effect_added()
-    yield from shown("at_100", proxy_render_size="PROXY_100")
+    space().proxy_render_size = "PROXY_100"
     yield from kept_time()
     yield from sizes()
     yield from proxies()

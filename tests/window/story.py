@@ -71,10 +71,7 @@ def seen(name):
 
 
 def opened():
-    driver.enable()
-    bpy.ops.wm.read_homefile(app_template="Video_Editing")
-    yield 1.0
-    driver.enable()
+    yield from driver.video_editing_opened()
     scene = bpy.data.scenes[0]
     scene.name = "Edit"
     scene.render.resolution_x, scene.render.resolution_y = 1280, 720

@@ -21,7 +21,7 @@ import bpy
 import numpy as np
 import support
 import traces
-from driver import OUT, enable, override, play, saw, until
+from driver import OUT, override, play, saw, until, video_editing_opened
 
 FRAMES, ACTIONS, PER_FRAME, SIZE = 90, 200, 3, (64, 96)
 rendering = partial(bpy.app.is_job_running, "RENDER")
@@ -65,11 +65,7 @@ def opened():
     """An edit of two effects, the first of which is the film's; saved as edit.blend."""
     frames = np.random.default_rng(1).integers(0, 256, (FRAMES, *SIZE, 3), dtype=np.uint8)
     support.write_frames(OUT / "frames", frames)
-    bpy.context.preferences.view.render_display_type = "NONE"  # its window would cover the other
-    enable()
-    bpy.ops.wm.read_homefile(app_template="Video_Editing")
-    yield 1.0
-    enable()
+    yield from video_editing_opened()
     bpy.context.window_manager.windows[0].workspace.sequencer_scene.name = "Edit"
     render = edit().render
     render.resolution_y, render.resolution_x = SIZE

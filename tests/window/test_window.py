@@ -352,12 +352,12 @@ def test_previews_of_any_size_and_renders_after_them(tmp_path):
     assert np.abs(ours - blenders).mean() < 1.5
     assert (pictures["waveform"] > 60).mean() > 0.05
     (played,) = (entry for entry in seen if "drawn" in entry)
-    when, frames, composed_of = zip(*played["drawn"], strict=True)
-    assert frames == composed_of
-    # On a software renderer few of the film's frames come in time. The next ones are those of their time.
+    when, frames, composed = zip(*played["drawn"], strict=True)
+    assert composed == tuple(frame - 1 for frame in frames)
+    # On a software renderer few of the film's frames come in time. What is shown instead is the frame of that time.
     off = [(frame - frames[0]) / played["rate"] - (at - when[0]) for at, frame in zip(when, frames, strict=True)]
     assert len(when) > 5
-    assert max(off) - min(off) < 0.8
+    assert max(off) - min(off) < 1.2
     background = pixels(tmp_path / "background_0050.png")
     for name in ("job", "script", "script_again", "playing", "handler", "scene_strip", "job_after"):
         assert np.array_equal(pixels(tmp_path / f"{name}.png"), background), name

@@ -13,7 +13,7 @@ sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "ble
 import bpy
 import numpy as np
 import support
-from driver import OUT, area_of, enable, play, region_of, saw, shot, until
+from driver import OUT, area_of, play, region_of, saw, shot, until, video_editing_opened
 
 NAME = "bl_ext.user_default.virtual_shutter"
 
@@ -67,10 +67,7 @@ def devices_named():
 
 
 def story():
-    enable()
-    bpy.ops.wm.read_homefile(app_template="Video_Editing")
-    yield 1.0
-    enable()
+    yield from video_editing_opened()
     yield from devices_named()
     edit = edit_now()
     edit.render.resolution_x, edit.render.resolution_y, edit.render.dither_intensity = 64, 36, 0

@@ -21,10 +21,9 @@ from ..data import colour_configuration, snapshot, strips
 from . import render_job, session
 from .engine import in_words, say
 
-# Of the file's tiles, which lie one below the other. Strips take twice the time: Blender reads rows upwards, for which
-# OpenImageIO takes 64 MB anew for each picture.
-_ROWS = 64
-_COLUMNS = 16  # a tile's width is a multiple of these
+# Rows of a tile of the file; its columns are a multiple of 16. A TIFF without tiles takes twice the time: Blender reads
+# rows upwards, for which OpenImageIO then allocates 64 MB for each picture.
+_ROWS, _COLUMNS = 64, 16
 
 
 @contextmanager
@@ -36,7 +35,7 @@ def feeding(edit):
     engine renders as ever."""
     with ExitStack() as until_the_end:
         if not colour_configuration.name():
-            with suppress(OSError):
+            with suppress(OSError, struct.error):  # of pictures beyond the 4 GB of a TIFF
                 atomic_write.clear_up(place := Path(tempfile.gettempdir()))
                 folder = until_the_end.enter_context(atomic_write.part_folder(place))
                 size = edit.render.resolution_x, edit.render.resolution_y
@@ -91,17 +90,16 @@ class LevelsFile:
     def __init__(self, path: Path, width: int, height: int):
         """OSError: it cannot be written. After this there is room for all that is written to it."""
         self.path = path
-        self._beside, tiles = -width % _COLUMNS, -(-height // _ROWS)
-        tile = 4 * (width + self._beside) * _ROWS
-        self._head = _tiff_head(width, height, tiles, tile)
-        path.write_bytes(self._head + bytes(tiles * tile))
+        self._padding, tiles = -width % _COLUMNS, -(-height // _ROWS)
+        self._head = _tiff_head(width, height, width + self._padding, tiles)
+        path.write_bytes(self._head + bytes(4 * (width + self._padding) * _ROWS * tiles))
         self._file = path.open("r+b", buffering=0)
 
     def write(self, levels: np.ndarray) -> None:
         """levels: uint8 (H, W, 4), top row first. OSError: there is no such file any more, which Blender would show as
         a picture of one colour."""
-        if self._beside:
-            levels = np.pad(levels, ((0, 0), (0, self._beside), (0, 0)))
+        if self._padding:
+            levels = np.pad(levels, ((0, 0), (0, self._padding), (0, 0)))
         self._file.seek(len(self._head))
         self._file.write(levels)
         os.utime(self.path)
@@ -110,9 +108,9 @@ class LevelsFile:
         self._file.close()
 
 
-def _tiff_head(width: int, height: int, tiles: int, size: int) -> bytes:
-    """All of a little-endian TIFF before its pixels: so many tiles of so many bytes, one below the other."""
-    short, long, count = 3, 4, 11
+def _tiff_head(width: int, height: int, columns: int, tiles: int) -> bytes:
+    """All of a little-endian TIFF before its pixels: so many tiles, so many columns wide, one below the other."""
+    short, long, count, size = 3, 4, 11, 4 * columns * _ROWS
     depths = 8 + 2 + 12 * count + 4  # behind the header of 8 bytes, the number of fields, the fields, and their end
     places = depths + 8
     pixels = places + 8 * tiles if tiles > 1 else places
@@ -121,7 +119,7 @@ def _tiff_head(width: int, height: int, tiles: int, size: int) -> bytes:
     fields = [
         *((256, long, 1, width), (257, long, 1, height)),
         *((258, short, 4, depths), (259, short, 1, 1), (262, short, 1, 2)),  # bits of samples, not compressed, RGB
-        *((277, short, 1, 4), (322, long, 1, size // (4 * _ROWS)), (323, long, 1, _ROWS)),  # channels, columns, rows
+        *((277, short, 1, 4), (322, long, 1, columns), (323, long, 1, _ROWS)),  # channels, columns, rows
         (324, long, tiles, places if table else pixels),  # where the tiles are
         (325, long, tiles, places + 4 * tiles if table else size),  # their bytes
         (338, short, 1, 2),  # straight alpha

@@ -59,7 +59,7 @@ def _never() -> bool:
 def _result(future: Future, stopped):
     """The future's result. StoppedError: it is not waited for any longer. NoDeviceError: it cannot be waited for, as
     Blender's GPU is not current."""
-    while not (future.done() or wait([future], 0 if in_window() else _PATIENCE).done):
+    while not wait([future], 0 if in_window() else _PATIENCE).done:
         if in_window() and not gpu_relay.serve():
             raise NoDeviceError(rpt_("Blender's GPU cannot be used until a window is drawn"))
         if stopped():
