@@ -191,6 +191,22 @@ def test_faults_are_told_by_name(frames, join, plant, sentence):
     assert not output.exists()
 
 
+def test_a_frame_that_is_removed_meanwhile(bpy, frames, join):
+    @bpy.app.handlers.persistent  # the command opens the edit
+    def remove(scene, *_):
+        if scene.frame_current == 2:
+            (frames / "0004.png").unlink()
+
+    bpy.app.handlers.render_post.append(remove)
+    try:
+        code, said, output = join(frames)
+    finally:
+        bpy.app.handlers.render_post.remove(remove)
+    assert (code, said.count("\n")) == (2, 1)
+    assert "0004.png: no such file; its first 3 frames are in joined.part.mkv" in said
+    assert not output.exists()
+
+
 def test_another_format_among_the_frames(saved, frames, join):
     (frames / "0003.png").unlink()
     shutil.copy(saved / "exr" / "0003.exr", frames)

@@ -26,16 +26,17 @@ def edit_now():
 def add_effect():
     frames = np.random.default_rng(1).integers(0, 256, (1, 360, 640, 3), dtype=np.uint8).repeat(FRAMES, 0)
     first = support.write_frames(OUT / "frames", frames)
-    strips = edit_now().sequence_editor_create().strips
-    strip = strips.new_image("Noise", str(first), 1, 1)
-    for path in sorted(first.parent.iterdir())[1:]:
-        strip.elements.append(path.name)
-    # Missing, not cut off: of such a file, Blender's own thumbnails crash now and then.
-    first.with_name(f"f{BROKEN:04d}.png").unlink()
-    edit_now().sequence_editor.active_strip = strip
+    files = [{"name": path.name} for path in sorted(first.parent.iterdir())]
     area = area_of("SEQUENCE_EDITOR", "SEQUENCER")
     window = bpy.context.window_manager.windows[0]
     with bpy.context.temp_override(window=window, area=area, region=region_of(area)):
+        # Not by elements.append, which leaves their sizes to chance: of a missing file Blender makes a picture of such.
+        bpy.ops.sequencer.image_strip_add(
+            "EXEC_DEFAULT", directory=str(first.parent), files=files, channel=1, frame_start=1, move_strips=False
+        )
+        # Missing, not cut off: of such a file, Blender's own thumbnails crash now and then.
+        first.with_name(f"f{BROKEN:04d}.png").unlink()
+        edit_now().sequence_editor.active_strip = edit_now().sequence_editor.strips[0]
         assert bpy.ops.shutter.add_effect("INVOKE_DEFAULT") == {"FINISHED"}
     effect = edit_now().virtual_shutter.effects[0]
     effect.shutters[0].bars[0].weight = 1

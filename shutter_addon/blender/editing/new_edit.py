@@ -40,7 +40,11 @@ def make_source(path: Path, medium):
     # Dither would add noise to a still frame; Standard shows code values as the source has them.
     render.dither_intensity = 0
     edit.view_settings.view_transform = "Standard"
-    return _add_source(edit.sequence_editor_create(), path, medium)
+    editor = edit.sequence_editor_create()
+    # Of a file that is gone Blender would make a picture of the size that its element has: none where Python has added
+    # it, but what lay in memory there.
+    editor.show_missing_media = False
+    return _add_source(editor, path, medium)
 
 
 def length(medium, source_recipe) -> int:

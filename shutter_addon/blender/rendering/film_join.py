@@ -4,9 +4,10 @@ import re
 import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
+import bpy
 import numpy as np
 
 from ...core import frame_ranges
@@ -14,7 +15,7 @@ from ...core.messages import signed
 from ...media import image_writing, rendered_pictures
 from ...media.rendered_pictures import RenderedPicture
 from ..data import requirements
-from . import film_output
+from . import film_output, render_job
 from .film_output import OutputError
 
 _AT_ONCE = 1000  # pictures of a strip: Blender copies all that it has for each that is added
@@ -79,8 +80,27 @@ def join(edit, folder: Path, output: Path, frames: tuple[int, int], key: str, pr
     _lay_over(edit, paths, first)
     _set_output(edit, output, size)
     film_output.prepare(output.parent)
-    with progress(len(paths), "frame") as moved:
+    with progress(len(paths), "frame") as moved, _ended_by_gaps(edit, paths):
         film_output.write(edit, output, moved)
+
+
+@contextmanager
+def _ended_by_gaps(edit, paths: list[Path]):
+    """Inside, the film ends before a frame whose picture is gone by then: Blender would show a colour in its place."""
+
+    def look(scene, *_):
+        if not render_job.is_film(scene):
+            return
+        path = paths[(scene.frame_current - edit.frame_start) // edit.frame_step]
+        if not path.is_file():
+            render_job.fail(f"{path}: no such file")
+            render_job.cancel()
+
+    bpy.app.handlers.render_pre.append(look)
+    try:
+        yield
+    finally:
+        bpy.app.handlers.render_pre.remove(look)
 
 
 def _pictures(folder: Path, frames: range) -> list[Path]:
