@@ -9,7 +9,7 @@ from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.device import NoDeviceError
 from shutter_addon.compute.gpu import GPUCompositor
 
-BORROWED = "composing on Blender's own GPU"
+BORROWED = "composing on Blender's own GPU, "  # and its name
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import re
 import pytest
 from all_passes import PASSES
 
-from shutter_addon.compute.passes import body
+from shutter_addon.compute.passes import SHADERS, body
 
 # Images, samplers and uniform blocks of a pass; bytes of a block, and of all constants; invocations of a workgroup
 # along each axis, and in all.
@@ -101,6 +101,13 @@ def test_no_name_is_a_word_of_metal(program):
     named = {*NAMED.findall(code(program)), *program.constants, *program.samplers, *program.images, *program.blocks}
     assert named
     assert not named & WORDS_OF_METAL
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in SHADERS.glob("show_*.glsl")))
+def test_what_draws_in_previews_has_no_name_that_is_a_word_of_metal(name):
+    text = re.sub(r"//.*", "", body(name))
+    assert not set(NAMED.findall(text)) & WORDS_OF_METAL
+    assert not MISSING.findall(text)
 
 
 @each_pass

@@ -39,7 +39,7 @@ def choose(wanted: str) -> tuple[str, str | None]:
     if wanted != "opengl":
         if not bpy.app.background or _blender_in_background():
             way = "blender" if bpy.app.background else "relayed"
-            return way, f"{lacking[0]}; composing on Blender's own GPU" if wanted == "auto" else None
+            return way, f"{lacking[0]}; composing on Blender's own GPU, {name(way)}" if wanted == "auto" else None
         lacking.append("Blender's own GPU cannot be used without a window here")
     if wanted == "auto":
         return "cpu", f"{', and '.join(lacking)}; composing with NumPy, which is slow"
