@@ -51,6 +51,7 @@ def rendered():
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], scene=edit):
         bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
     yield from until(lambda: ended, "the render ends", 30)
+    yield from until(lambda: not bpy.app.is_job_running("RENDER"), "its job ends")  # the file is written by then
 
 
 def devices_named():
