@@ -3,6 +3,7 @@
 import os
 import re
 import shlex
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -63,3 +64,27 @@ def same_pixels(tmp_path):
         pytest.fail(f"{difference.max():.3f} levels apart at {place}, {levels} allowed; pictures in {tmp_path}")
 
     return compare
+
+
+@pytest.fixture(scope="session")
+def to_metal(tmp_path_factory):
+    """Translates GLSL for Vulkan to the Metal Shading Language, by way of SPIR-V; stage: vert, frag or comp."""
+    if not all(map(shutil.which, ("glslangValidator", "spirv-cross"))):
+        pytest.skip("NO TRANSLATION TO METAL: install Debian's glslang-tools and spirv-cross")
+    folder = tmp_path_factory.mktemp("metal")
+    binary, metal = folder / "shader.spv", folder / "shader.metal"
+
+    def translated(source: str, stage: str) -> str:
+        compiled = subprocess.run(
+            ["glslangValidator", "-V", "--target-env", "vulkan1.2", "--stdin", "-S", stage, "-o", binary],
+            input=source,
+            capture_output=True,
+            text=True,
+        )
+        assert compiled.returncode == 0, compiled.stdout
+        command = ["spirv-cross", binary, "--msl", "--msl-version", "20200", "--output", metal]
+        done = subprocess.run(command, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return metal.read_text()
+
+    return translated

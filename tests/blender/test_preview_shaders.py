@@ -1,23 +1,13 @@
 """The shaders that draw in previews translate to the Metal Shading Language, as passes do (compute/test_metal.py)."""
 
-import shutil
-import subprocess
-
 import pytest
 
 from shutter_addon.compute.passes import body
 
-TOOLS = "glslangValidator", "spirv-cross"
 SAMPLERS = {"FLOAT_2D_ARRAY": "sampler2DArray", "UINT_2D_ARRAY": "usampler2DArray"}
 # Beside what preview.py gives each of them, those that all have.
 COMMON = {"ModelViewProjectionMatrix": "MAT4", "srgbTarget": "BOOL"}
 SHADERS = "show_picture", "show_coefficients", "show_scribbles"
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _tools():
-    if not all(map(shutil.which, TOOLS)):
-        pytest.skip("NO TRANSLATION TO METAL: install Debian's glslang-tools and spirv-cross")
 
 
 def completed(preview, name: str, stage: str) -> str:
@@ -45,18 +35,8 @@ def test_these_are_all(bpy):
 
 @pytest.mark.parametrize("name", SHADERS)
 @pytest.mark.parametrize(("stage", "function"), [("vert", "vertex"), ("frag", "fragment")])
-def test_a_shader_translates(bpy, tmp_path, name, stage, function):
+def test_a_shader_translates(bpy, to_metal, name, stage, function):
     from shutter_addon.blender.interface import preview
 
-    binary, metal = tmp_path / "shader.spv", tmp_path / "shader.metal"
-    compiled = subprocess.run(
-        ["glslangValidator", "-V", "--target-env", "vulkan1.2", "--stdin", "-S", stage, "-o", binary],
-        input=completed(preview, name, stage),
-        capture_output=True,
-        text=True,
-    )
-    assert compiled.returncode == 0, compiled.stdout
-    command = ["spirv-cross", binary, "--msl", "--msl-version", "20200", "--output", metal]
-    translated = subprocess.run(command, capture_output=True, text=True)
-    assert translated.returncode == 0, translated.stderr
-    assert f"\n{function} main0_out main0(" in metal.read_text()
+    text = to_metal(completed(preview, name, stage), stage)
+    assert f"\n{function} main0_out main0(" in text

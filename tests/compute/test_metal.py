@@ -1,21 +1,11 @@
 """Passes translate to the Metal Shading Language, by way of SPIR-V."""
 
 import re
-import shutil
-import subprocess
 
 import pytest
 from all_passes import PASSES
 
 from shutter_addon.compute.passes import body
-
-TOOLS = "glslangValidator", "spirv-cross"
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _tools():
-    if not all(map(shutil.which, TOOLS)):
-        pytest.skip("NO TRANSLATION TO METAL: install Debian's glslang-tools and spirv-cross")
 
 
 def completed(program) -> str:
@@ -37,19 +27,8 @@ def completed(program) -> str:
 
 
 @pytest.mark.parametrize("program", PASSES, ids=lambda program: program.name)
-def test_a_pass_translates(program, tmp_path):
-    binary, metal = tmp_path / "pass.spv", tmp_path / "pass.metal"
-    compiled = subprocess.run(
-        ["glslangValidator", "-V", "--target-env", "vulkan1.2", "--stdin", "-S", "comp", "-o", binary],
-        input=completed(program),
-        capture_output=True,
-        text=True,
-    )
-    assert compiled.returncode == 0, compiled.stdout
-    command = ["spirv-cross", binary, "--msl", "--msl-version", "20200", "--output", metal]
-    translated = subprocess.run(command, capture_output=True, text=True)
-    assert translated.returncode == 0, translated.stderr
-    text = metal.read_text()
+def test_a_pass_translates(program, to_metal):
+    text = to_metal(completed(program), "comp")
     assert "kernel void" in text
     bound = re.findall(r"(\w+) \[\[texture\(\d+\)\]\]", text)
     assert set(bound) == {*program.images, *program.samplers}
