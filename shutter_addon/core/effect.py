@@ -46,7 +46,7 @@ class Drawings:
     @property
     def is_still(self) -> bool:
         """Whether they are known to be the same at every frame."""
-        return len(self.frames) < 2 and (self.placement is None or keyframes.are_constant(self.placement))
+        return len(self.frames) < 2 and (self.placement is None or keyframes.are_still(self.placement))
 
     def at(self, frame: float) -> list[np.ndarray]:
         """Strokes (n, 2) in fractions of the picture. FarStrokeError: a point is nowhere near it."""
@@ -91,8 +91,7 @@ class Region:
     @property
     def is_still(self) -> bool:
         """Whether it is known to be the same at every frame."""
-        numbers = self.kind, self.width, self.location, self.rotation, self.scale
-        return self.drawings.is_still and keyframes.are_constant(*numbers)
+        return keyframes.are_still(self.drawings, self.kind, self.width, self.location, self.rotation, self.scale)
 
     def at(self, frame: float) -> scribbles.Shape:
         location, rotation, scale = (channel.at(frame) for channel in (self.location, self.rotation, self.scale))
@@ -152,8 +151,7 @@ class MatteRegion:
     @property
     def is_still(self) -> bool:
         """Whether its matte is known to be the same at every frame."""
-        placed = isinstance(self.content, PlacedRamp) and self.content.is_still
-        return (placed or keyframes.are_constant(self.content)) and keyframes.are_constant(self.opacity, self.feather)
+        return keyframes.are_still(self.content, self.opacity, self.feather)
 
     def at(self, frame: float) -> mattes.Matte:
         """The matte at a frame."""
@@ -185,7 +183,7 @@ class PlacedRamp:
     @property
     def is_still(self) -> bool:
         """Whether it is known to be the same at every frame."""
-        return keyframes.are_constant(self.location, self.rotation, self.scale)
+        return keyframes.are_still(self.location, self.rotation, self.scale)
 
     def at(self, frame: float) -> mattes.Ramp:
         placed = _placement(self, frame)
@@ -256,8 +254,8 @@ class Effect:
     @cached_property
     def is_still(self) -> bool:
         """Whether its state is known to be the same at every frame."""
-        parts = (*(shutter.bars for shutter in self.shutters), *self.regions)
-        return keyframes.are_constant(self.options, self.edge_aware) and all(part.is_still for part in parts)
+        bars = (shutter.bars for shutter in self.shutters)
+        return keyframes.are_still(self.options, self.edge_aware, *bars, *self.regions)
 
     def at(self, frame: float) -> FrameState:
         """The effect at a frame. EffectError: no picture can be made of it."""

@@ -60,13 +60,15 @@ class Constant:
 
     value: Any
 
+    is_still = True
+
     def at(self, _frame: float) -> Any:
         return _given(self.value)
 
 
-def are_constant(*channels: Channel) -> bool:
-    """Whether all of them are known to be the same at every frame."""
-    return all(isinstance(channel, Constant) for channel in channels)
+def are_still(*parts) -> bool:
+    """Whether all of them, channels or what is made of channels, are known to be the same at every frame."""
+    return all(getattr(part, "is_still", False) for part in parts)
 
 
 @dataclass(frozen=True)
@@ -136,7 +138,7 @@ class Bars:
     @property
     def is_still(self) -> bool:
         """Whether they are known to be the same at every frame."""
-        return not self.keys and are_constant(self.channel)
+        return not self.keys and are_still(self.channel)
 
     def at(self, frame: float, interpolation: str) -> np.ndarray:
         """Between keys by displacement (paper §3.4.1, over time), or by `channel`: where interpolation is "value", and
