@@ -15,6 +15,7 @@ import bpy
 OUT = Path(os.environ.get("SHUTTER_PICTURES", "/tmp/shutter-window"))
 STEP = 0.25  # seconds that Blender gets for events and redraws
 _seen = []
+_texts = 0  # characters of the last text in the status bar
 
 
 def enable():
@@ -88,6 +89,26 @@ def shot(name):
     path = OUT / f"{name}.png"
     subprocess.run(["import", "-window", "root", str(path)], check=True)
     return path
+
+
+def shown():
+    """Waits until the screen shows what Blender has been told: it draws late where the machine is busy, and Vulkan
+    presents later still; generator: yield from it. A new text in the status bar, which redraws nothing else, is drawn
+    with all that waits to be."""
+    global _texts
+    _texts = _texts % 20 + 1
+    before = _status_bar()
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window):
+        window.workspace.status_text_set("#" * _texts)
+    yield from until(lambda: _status_bar() != before, "the screen shows what is drawn", 30)
+
+
+def _status_bar():
+    """The pixels of its left end."""
+    height = bpy.context.window_manager.windows[0].height
+    box = f"300x16+0+{height - 18}"
+    return subprocess.run(["import", "-window", "root", "-crop", box, "rgb:-"], check=True, capture_output=True).stdout
 
 
 def xdotool(*arguments):

@@ -66,6 +66,7 @@ def seen(name):
     region = preview()
     driver.move(region, region.width / 2, region.height + 12)
     yield 0.8
+    yield from driver.shown()
     driver.shot(name)
     driver.saw(step=name, facts=facts(), crop=crop(), frame=edit().frame_current)
 
@@ -257,6 +258,7 @@ def in_agreement(frame=70):
         region = preview()
         driver.move(region, 5, region.height - 5)
         yield 1.5
+        yield from driver.shown()
         driver.shot(name)
         left, top = driver.screen(region, region.width / 2 - 640, region.height / 2 + 360)
         driver.saw(picture=name, box=[left, top + 1, left + 1280, top + 721])
@@ -264,6 +266,7 @@ def in_agreement(frame=70):
     bpy.context.window_manager.virtual_shutter.live = True
     edit().render.sequencer_gl_preview = "SOLID"
     yield 1.5
+    yield from driver.shown()
     driver.shot("drawn")
     driver.saw(picture="drawn", box=[left, top + 1, left + 1280, top + 721])
     edit().render.sequencer_gl_preview = "RENDERED"
