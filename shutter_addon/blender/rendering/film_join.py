@@ -91,16 +91,17 @@ def _ended_by_gaps(edit, paths: list[Path]):
     def look(scene, *_):
         if not render_job.is_film(scene):
             return
-        path = paths[(scene.frame_current - edit.frame_start) // edit.frame_step]
+        path = _picture_at(scene.frame_current, edit, paths)
         if not path.is_file():
             render_job.fail(f"{path}: no such file")
             render_job.cancel()
 
-    bpy.app.handlers.render_pre.append(look)
-    try:
+    with render_job.calling(bpy.app.handlers.render_pre, look):
         yield
-    finally:
-        bpy.app.handlers.render_pre.remove(look)
+
+
+def _picture_at(frame: int, edit, paths: list[Path]) -> Path:
+    return paths[(frame - edit.frame_start) // edit.frame_step]
 
 
 def _pictures(folder: Path, frames: range) -> list[Path]:
@@ -213,7 +214,7 @@ def _lay_over(edit, paths: list[Path], first: RenderedPicture) -> None:
         raise OutputError("the edit has strips in the uppermost channel, where the frames are to lie; move them down")
     editor.channels[channel].mute = False
     space = _keep_colours(edit, paths[0].suffix, first)
-    shown = [paths[i // edit.frame_step] for i in range(edit.frame_end - edit.frame_start + 1)]
+    shown = [_picture_at(frame, edit, paths) for frame in range(edit.frame_start, edit.frame_end + 1)]
     for start in range(0, len(shown), _AT_ONCE):
         part = shown[start : start + _AT_ONCE]
         strip = editor.strips.new_image(part[0].name, str(part[0]), channel, edit.frame_start + start)

@@ -293,11 +293,8 @@ def _moved(part: Path, output: Path, edit, update: Callable[[], None], move: Cal
         except (UserError, OSError) as error:
             render_job.fail(in_words(error, output))
 
-    bpy.app.handlers.render_write.append(moved)
-    try:
+    with render_job.calling(bpy.app.handlers.render_write, moved):
         yield missing
-    finally:
-        bpy.app.handlers.render_write.remove(moved)
 
 
 def in_words(error: Exception, place) -> str:

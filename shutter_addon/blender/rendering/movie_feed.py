@@ -47,13 +47,14 @@ def feeding(edit):
 def _fed(edit, picture):
     effect_strip = strips.effect_strips(edit)[0]
     strip = _above(effect_strip, picture.path)
-    handler = partial(fill, effect_strip, picture, [])
-    bpy.app.handlers.render_pre.append(handler)
+    filled = partial(fill, effect_strip, picture, [])
     try:
-        with session.using(replace(session.settings(), levels=True)):
+        with (
+            render_job.calling(bpy.app.handlers.render_pre, filled),
+            session.using(replace(session.settings(), levels=True)),
+        ):
             yield
     finally:
-        bpy.app.handlers.render_pre.remove(handler)
         edit.sequence_editor.strips.remove(strip)
         picture.close()
 

@@ -126,6 +126,16 @@ def telling(to: Callable[[str], None]):
         _tell = before
 
 
+@contextmanager
+def calling(handlers: list, function: Callable):
+    """Inside, one of bpy.app.handlers has that function."""
+    handlers.append(function)
+    try:
+        yield
+    finally:
+        handlers.remove(function)
+
+
 def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None):
     """What a function gives on Blender's main thread, where its data and its operators belong; None: it was not waited
     for, and is not called any more. ended: whether nobody waits for it any longer; without it, the window is not waited
