@@ -39,9 +39,12 @@ def video_editing_opened():
 def play(story, seconds=STEP):
     """Runs a story step by step; quits Blender with its end or its first failure."""
     OUT.mkdir(parents=True, exist_ok=True)
-    steps = story()
+    steps, handled = story(), False
 
     def step():
+        nonlocal handled
+        if handled := not handled:  # a busy Blender runs this before what came meanwhile: that first
+            return 0.01
         try:
             wait = next(steps)
         except StopIteration:
