@@ -1,6 +1,6 @@
 """Films as jobs of the window on Blender's own GPU, moderngl hidden: a whole one, while a second window opens and
-closes; one that Esc ends; ten short ones; one that is refused; one during which the file is loaded again, and one more.
-Run inside Blender, by test_window.py.
+closes; one that Esc ends; ten short ones; two that the window waits for; one during which the file is loaded again, and
+one more. Run inside Blender, by test_window.py.
 
 SHUTTER_BESIDE=1 measures in place of that: films on Blender's GPU and on moderngl's in turn, and the longest wait
 between two redraws of the window. SHUTTER_FOOTAGE has the source, SHUTTER_RECIPE the effect."""
@@ -76,7 +76,13 @@ def story():
         begun("short", 1 + number, 3 + number)
         yield from ended()
         saw(short=held())
-    yield from refused()
+    yield from sequencer_animation("waited", 1, 4)
+    device = bpy.context.preferences.addons[traces.NAME].preferences
+    device.device = "GPU"
+    yield from sequencer_animation("refused", 1, 4)
+    key("Escape")  # the menu that says why
+    device.device = "AUTO"
+    yield 0.5
     begun("left")
     yield from until(lambda: written("left") > 2, "frames are rendered", 100)
     yield from second_window_closed()  # until another one is drawn, Blender's GPU is not current
@@ -87,17 +93,15 @@ def story():
     saw(after=held())
 
 
-def refused():
+def sequencer_animation(folder, first, last):
     """View ▸ Render Sequencer Animation: the window, which has the GPU, waits for its job."""
-    edit().frame_start, edit().frame_end = 1, FRAMES
-    edit().render.filepath = str(OUT / "refused_")
+    edit().frame_start, edit().frame_end = first, last
+    edit().render.filepath = f"{OUT / folder}/"
     with override("PREVIEW"):
         bpy.ops.render.opengl("INVOKE_DEFAULT", animation=True, sequencer=True)
     yield from ended()
     yield 0.5
-    shot("refused")
-    key("Escape")  # the menu that says why
-    yield 0.5
+    shot(folder)
 
 
 def second_window_closed():

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import bpy
 import gpu
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...compute.device import NoDeviceError
 from ...compute.gpu import GPUCompositor
@@ -24,11 +25,11 @@ OPEN = {
 }
 
 
-def choose(wanted: str) -> tuple[str, str | None]:
+def choose(wanted: str, *, window_waits: bool = False) -> tuple[str, str | None]:
     """The device that renders, a key of OPEN; and where "auto" found a lesser one, why, a sentence for the user.
     NoDeviceError: there is none as it is wanted.
 
-    wanted: one of CHOICES"""
+    wanted: one of CHOICES; window_waits: for the picture, so that it cannot lend its GPU"""
     if wanted == "cpu":
         return "cpu", None
     lacking = []
@@ -37,10 +38,15 @@ def choose(wanted: str) -> tuple[str, str | None]:
             return "opengl", None
         lacking.append(opengl().lacking)
     if wanted != "opengl":
-        if not bpy.app.background or _blender_in_background():
+        if window_waits:
+            lacking.append(
+                rpt_("View > Render Sequencer Animation cannot use Blender's own GPU, as Render > Render Animation can")
+            )
+        elif not bpy.app.background or _blender_in_background():
             way = "blender" if bpy.app.background else "relayed"
             return way, f"{lacking[0]}; composing on Blender's own GPU, {name(way)}" if wanted == "auto" else None
-        lacking.append("Blender's own GPU cannot be used without a window here")
+        else:
+            lacking.append("Blender's own GPU cannot be used without a window here")
     if wanted == "auto":
         return "cpu", f"{', and '.join(lacking)}; composing with NumPy, which is slow"
     raise NoDeviceError(", and ".join(lacking))

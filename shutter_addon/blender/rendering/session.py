@@ -417,6 +417,9 @@ _budget: tuple[int, Budget] | None = None  # with the megabytes that it was made
 # belongs to the main thread, and has none.
 _offscreen = RenderSession(lambda: devices.choose(wanted()), _ask_window)
 _window = RenderSession(lambda: ("blender", None), _ask_offscreen)
+# For a thread whose pictures the window waits for, where _offscreen has them made by the window.
+_waited_for = RenderSession(lambda: devices.choose(wanted(), window_waits=True), lambda: None)
+_SESSIONS = _offscreen, _window, _waited_for
 
 
 def device_names() -> tuple[str, str]:
@@ -431,8 +434,14 @@ def in_window() -> bool:
 
 
 def here() -> RenderSession:
-    """The session of whoever calls: the window's own on its main thread, else the offscreen one."""
-    return _window if in_window() else _offscreen
+    """The session of whoever calls: the window's own on its main thread, else one for renders. NoDeviceError: these
+    have none."""
+    if in_window():
+        return _window
+    if not render_job.window_waits() or _offscreen.device != "relayed":
+        return _offscreen
+    _waited_for.settle()
+    return _waited_for
 
 
 def settle() -> None:
@@ -441,6 +450,7 @@ def settle() -> None:
     if _budget is not None and _budget[0] != _wanted_memory():
         forget()
         _budget = None
+    _waited_for.forget()
     _offscreen.settle()
 
 
@@ -462,10 +472,6 @@ def picture(
     """
     if stopped():
         raise StoppedError
-    if render_job.window_waits() and here().device == "relayed":
-        raise NoDeviceError(
-            rpt_("View > Render Sequencer Animation cannot use Blender's own GPU: use Render > Render Animation")
-        )
     request = here().request(snapshot, frame, say, detail, stopped)
     if request.state.options.stop_at_cuts:
         _say_of_cuts(say)
@@ -555,14 +561,14 @@ def end_job() -> None:
 def drop_removed() -> None:
     """Closes the sources of effect scenes that are gone, and frees their frames."""
     scenes = {scene.session_uid for scene in bpy.data.scenes}
-    _offscreen.keep(scenes)
-    _window.keep(scenes)
+    for session in _SESSIONS:
+        session.keep(scenes)
 
 
 def forget(*_) -> None:
     """Closes all sources and frees the devices: when a file is loaded, and when the extension goes."""
-    _offscreen.forget()
-    _window.forget()
+    for session in _SESSIONS:
+        session.forget()
 
 
 def resized(picture: np.ndarray, width: int, height: int, divisor: int = 1) -> np.ndarray:

@@ -72,9 +72,9 @@ MESSAGES = {
     " NumPy rechnet sie, und das ist langsam",
     (
         "*",
-        "View > Render Sequencer Animation cannot use Blender's own GPU: use Render > Render Animation",
-    ): "Ansicht > Sequencer-Animation rendern kann Blenders eigene GPU nicht nutzen: Rendern > Animation rendern"
-    " kann es",
+        "View > Render Sequencer Animation cannot use Blender's own GPU, as Render > Render Animation can",
+    ): "Ansicht > Sequencer-Animation rendern kann Blenders eigene GPU nicht nutzen, anders als Rendern > Animation"
+    " rendern",
     ("*", "Blender's GPU cannot be used until a window is drawn"): "Blenders GPU lässt sich erst nutzen, wenn ein"
     " Fenster gezeichnet wurde",
     ("*", "the effect was deleted while it was rendered"): "der Effekt wurde gelöscht, während er gerendert wurde",
