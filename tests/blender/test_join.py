@@ -192,16 +192,15 @@ def test_faults_are_told_by_name(frames, join, plant, sentence):
 
 
 def test_a_frame_that_is_removed_meanwhile(bpy, frames, join):
+    from shutter_addon.blender.rendering import render_job
+
     @bpy.app.handlers.persistent  # the command opens the edit
     def remove(scene, *_):
         if scene.frame_current == 2:
             (frames / "0004.png").unlink()
 
-    bpy.app.handlers.render_post.append(remove)
-    try:
+    with render_job.calling(bpy.app.handlers.render_post, remove):
         code, said, output = join(frames)
-    finally:
-        bpy.app.handlers.render_post.remove(remove)
     assert (code, said.count("\n")) == (2, 1)
     assert "0004.png: no such file; its first 3 frames are in joined.part.mkv" in said
     assert not output.exists()

@@ -63,8 +63,9 @@ NAMED = re.compile(r"\b(?:void|bool|u?int|float|[biu]?vec[234]|mat[234]|Column)\
 each_pass = pytest.mark.parametrize("program", PASSES, ids=lambda program: program.name)
 
 
-def code(program) -> str:
-    return re.sub(r"//.*", "", body(program.name))
+def code(name: str) -> str:
+    """The source of a shader without its comments."""
+    return re.sub(r"//.*", "", body(name))
 
 
 @pytest.mark.parametrize("api", LIMITS)
@@ -93,26 +94,31 @@ def test_images_have_a_format_that_every_vulkan_has(program):
 
 @each_pass
 def test_a_source_has_nothing_that_some_device_lacks(program):
-    assert not MISSING.findall(code(program))
+    assert not MISSING.findall(code(program.name))
 
 
 @each_pass
 def test_no_name_is_a_word_of_metal(program):
-    named = {*NAMED.findall(code(program)), *program.constants, *program.samplers, *program.images, *program.blocks}
+    named = {
+        *NAMED.findall(code(program.name)),
+        *program.constants,
+        *program.samplers,
+        *program.images,
+        *program.blocks,
+    }
     assert named
     assert not named & WORDS_OF_METAL
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in SHADERS.glob("show_*.glsl")))
 def test_what_draws_in_previews_has_no_name_that_is_a_word_of_metal(name):
-    text = re.sub(r"//.*", "", body(name))
-    assert not set(NAMED.findall(text)) & WORDS_OF_METAL
-    assert not MISSING.findall(text)
+    assert not set(NAMED.findall(code(name))) & WORDS_OF_METAL
+    assert not MISSING.findall(code(name))
 
 
 @each_pass
 def test_a_source_is_as_cpp_takes_it(program):
     """Blender makes C++ of it by macros: there, arrays are no values, and a struct without a constructor has none."""
-    text = code(program)
+    text = code(program.name)
     assert not re.findall(r"[(,]\s*(?:in\s+)?(?!out|inout)\w+\s+\w+\[", text)
     assert not [name for name in re.findall(r"\bstruct\s+(\w+)", text) if re.search(rf"\b{name}\(", text)]

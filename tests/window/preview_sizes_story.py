@@ -61,8 +61,7 @@ def shown(name, **settings):
     driver.move(region, region.width / 2, region.height + 12)
     region.tag_redraw()
     yield 1.0
-    yield from driver.shown()
-    driver.shot(name)
+    yield from driver.shot_when_shown(name)
     driver.saw(step=name, crop=story.crop(), composed=composed())
 
 

@@ -66,8 +66,7 @@ def seen(name):
     region = preview()
     driver.move(region, region.width / 2, region.height + 12)
     yield 0.8
-    yield from driver.shown()
-    driver.shot(name)
+    yield from driver.shot_when_shown(name)
     driver.saw(step=name, facts=facts(), crop=crop(), frame=edit().frame_current)
 
 
@@ -258,16 +257,14 @@ def in_agreement(frame=70):
         region = preview()
         driver.move(region, 5, region.height - 5)
         yield 1.5
-        yield from driver.shown()
-        driver.shot(name)
+        yield from driver.shot_when_shown(name)
         left, top = driver.screen(region, region.width / 2 - 640, region.height / 2 + 360)
         driver.saw(picture=name, box=[left, top + 1, left + 1280, top + 721])
     # Where the sequencer does not render its preview, the draw handler draws the result itself.
     bpy.context.window_manager.virtual_shutter.live = True
     edit().render.sequencer_gl_preview = "SOLID"
     yield 1.5
-    yield from driver.shown()
-    driver.shot("drawn")
+    yield from driver.shot_when_shown("drawn")
     driver.saw(picture="drawn", box=[left, top + 1, left + 1280, top + 721])
     edit().render.sequencer_gl_preview = "RENDERED"
     with driver.override("PREVIEW"):

@@ -438,10 +438,7 @@ def here() -> RenderSession:
     have none."""
     if in_window():
         return _window
-    if not render_job.window_waits() or _offscreen.device != "relayed":
-        return _offscreen
-    _waited_for.settle()
-    return _waited_for
+    return _waited_for if render_job.window_waits() and _offscreen.device == "relayed" else _offscreen
 
 
 def settle() -> None:
@@ -450,7 +447,7 @@ def settle() -> None:
     if _budget is not None and _budget[0] != _wanted_memory():
         forget()
         _budget = None
-    _waited_for.forget()
+    _waited_for.forget()  # its frames take the machine's own memory
     _offscreen.settle()
 
 
@@ -472,6 +469,8 @@ def picture(
     """
     if stopped():
         raise StoppedError
+    if render_job.window_waits():  # for a film of which Blender does not say that it begins
+        _waited_for.settle()
     request = here().request(snapshot, frame, say, detail, stopped)
     if request.state.options.stop_at_cuts:
         _say_of_cuts(say)
