@@ -206,6 +206,8 @@ class CPUCompositor:
     def current(self):
         return nullcontext(self)
 
+    freeing = current
+
     def window(self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4) -> Frames | Sums:
         """A window of `capacity` frames; moved: pictures of it have FrameState.following."""
         return (Sums if Sums.fit(source, capacity) and not moved else Frames)(source, capacity)

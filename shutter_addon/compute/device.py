@@ -22,7 +22,7 @@ class Texture(Protocol):
     kind: str
 
     def release(self) -> None:
-        """Frees its memory."""
+        """Frees its memory; inside `Device.current` or `Device.freeing`."""
 
 
 class Device(Protocol):
@@ -43,7 +43,10 @@ class Device(Protocol):
     takes_planes: bool
 
     def current(self) -> AbstractContextManager:
-        """Makes the device usable on this thread until the `with` block ends."""
+        """Makes the device usable on this thread until the `with` block ends. NoDeviceError: it cannot be, just now."""
+
+    def freeing(self) -> AbstractContextManager:
+        """Makes textures of the device releasable until the `with` block ends, on any one thread, at any time."""
 
     def texture(self, width: int, height: int, layers: int, kind: str) -> Texture:
         """A texture array of undefined content. NoDeviceError: the device has no room for it.
@@ -82,4 +85,4 @@ class Device(Protocol):
         """Notes that a window was freed."""
 
     def release(self) -> None:
-        """Frees the device, but not its textures: each has its own `release`."""
+        """Frees the device, at any time, but not its textures: each has its own `release`."""

@@ -117,6 +117,8 @@ class GLDevice(PagedDevice):
         with _kept_context(), self._context:
             yield self
 
+    freeing = current  # without it, textures of another context that have the same numbers would be freed
+
     def _make(self, width: int, height: int, layers: int, kind: str) -> moderngl.TextureArray:
         components, dtype, _ = FORMATS[kind]
         texture = self._context.texture_array((width, height, layers), components, dtype=dtype)

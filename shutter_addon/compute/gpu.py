@@ -359,6 +359,10 @@ class GPUCompositor:
         """A context manager: all other methods are called inside it, on any one thread (Device.current)."""
         return self.device.current()
 
+    def freeing(self):
+        """A context manager: what windows, solvers and matting hold is released inside it (Device.freeing)."""
+        return self.device.freeing()
+
     def window(self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4) -> Frames | Sums:
         """A window of `capacity` frames on the device; moved: pictures of it have FrameState.following; shutters: of
         these pictures."""
@@ -503,7 +507,7 @@ class GPUCompositor:
         return texture
 
     def release(self) -> None:
-        with self.device.current():
+        with self.device.freeing():
             for texture in self._textures.values():
                 texture.release()
             self._textures.clear()

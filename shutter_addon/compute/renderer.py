@@ -282,7 +282,7 @@ class Renderer:
 
     def release_window(self) -> None:
         """Frees the window's frames, and those that the search for cuts has read. The next picture reads them again."""
-        with self.compositor.current():  # another's textures may have the same numbers
+        with self.compositor.freeing():
             if self._window is not None:
                 self._window.release()
                 self._window = self._drawn = None
@@ -298,7 +298,7 @@ class Renderer:
 
     def release(self) -> None:
         """Frees what the renderer has on the device. The next picture makes it again."""
-        with self.compositor.current():
+        with self.compositor.freeing():
             self.release_window()
             self._solver.release()
             self._matting.release()

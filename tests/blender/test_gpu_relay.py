@@ -14,7 +14,7 @@ def test_a_call_that_is_made_before_anyone_looks(bpy, monkeypatch):
 
     looking = []
     monkeypatch.setattr(gpu_relay, "_calls", TakenAtOnce())
-    monkeypatch.setattr(gpu_relay, "_has_context", lambda: True)
+    monkeypatch.setattr(gpu_relay, "has_context", lambda: True)
     monkeypatch.setattr(gpu_relay, "_finish_some", lambda: None)
     monkeypatch.setattr(bpy.app.timers, "register", lambda look, **_: looking.append(look))
     assert gpu_relay._called(lambda: "made").result(0) == "made"

@@ -388,6 +388,23 @@ def test_renders_that_end_early(tmp_path):
     assert [entry["shown"][0] for entry in seen if "shown" in entry] == [[360, 640, 4]]
 
 
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+@pytest.mark.parametrize("part", ["first", "second", "rendered", "modal", "handler", "current"])
+def test_blender_lives_where_its_gpu_is_not_current(part, backend, tmp_path):
+    """Whatever lets go of what it holds there, by whoever; and the preview is the same afterwards."""
+    path = tmp_path / "recipe.json"
+    line = {"shutter": "Sharp", "strokes": [[[0.2, 0.2], [0.6, 0.9]]], "width": 0.1}
+    shutters = [{"name": "Long", "bars": [1] * 6}, {"name": "Sharp", "bars": [1] + [0] * 5}]
+    path.write_text(json.dumps({"version": 1, "window": 6, "border": True, "shutters": shutters, "regions": [line]}))
+    seen, console = tell("gpu_life_story.py", backend, linked(tmp_path), recipe=path, part=part)
+    assert "Traceback" not in console
+    assert {entry["lost"] for entry in seen} == {part != "current"}
+    assert ("Blender's GPU cannot be used until a window is drawn" in console) == (part == "second")
+    assert not (tmp_path / "refused.png").exists()
+    pictures = [pixels(tmp_path / f"{name}.png", (300, 54, 900, 380)) for name in ("before", "after")]
+    assert_alike(*pictures, tmp_path / "difference.png", tolerance=0)
+
+
 @pytest.mark.parametrize(("backend", "hidden"), [("opengl", "moderngl"), ("vulkan", "")])
 def test_a_film_shows_what_was_when_it_began(backend, hidden, tmp_path):
     """200 changes while a film renders, at the end the strip deleted: no frame is another one before, and then the

@@ -15,7 +15,7 @@ from ...core.frame_state import FrameState
 from ...media import MediaError
 from ..data import annotations, geometry, selection, strips
 from ..data.properties import CONTEXT
-from ..rendering import invalidation, session
+from ..rendering import blender_gpu, invalidation, render_job, session
 from ..rendering.blender_gpu import Texture
 from . import drawing, preview_areas, previewing
 from .previewing import RESULTS, Shown, shown
@@ -94,7 +94,8 @@ def _draw() -> None:
     """The draw handler of the previews."""
     context = bpy.context
     settings = context.window_manager.virtual_shutter
-    if bpy.app.is_job_running("RENDER"):
+    blender_gpu.free_unused()
+    if bpy.app.is_job_running("RENDER") or render_job.ends_films():
         return
     invalidation.drop_lesser()
     # Blender tells nobody of strokes that are drawn or erased, but it draws the preview again.
@@ -350,6 +351,7 @@ def unregister():
     for timer in _TIMERS:
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
+    blender_gpu.free(*_shaders.values())
     _shaders.clear()
     del bpy.types.WindowManager.virtual_shutter
     for cls in reversed(classes):

@@ -18,6 +18,7 @@ from itertools import pairwise
 import bpy
 import gpu
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...compute.budget import Budget, is_software, machine_memory
 from ...compute.device import NoDeviceError
@@ -50,6 +51,37 @@ LETTING_GO = Pass(
 )
 
 
+_unused: list = []  # objects of the gpu module that are to be freed
+
+
+def has_context() -> bool:
+    """Whether Blender's GPU is current on this thread: it is where Blender draws. It is not after a window was closed,
+    until another one is drawn; a pass that is run then ends Blender, as does another one's shader that is freed."""
+    try:
+        gpu.types.GPUTexture((1, 1))
+    except (RuntimeError, SystemError):  # the latter in the background, where nobody has called gpu.init()
+        return False
+    return True
+
+
+def require_context() -> None:
+    """NoDeviceError: Blender's GPU is not current on this thread."""
+    if not has_context():
+        raise NoDeviceError(rpt_("Blender's GPU cannot be used until a window is drawn"))
+
+
+def free(*objects) -> None:
+    """Frees textures and shaders to which nothing else refers: now, or once Blender's GPU is current."""
+    _unused.extend(objects)
+    if has_context():
+        free_unused()
+
+
+def free_unused() -> None:
+    """Frees what was to be freed while Blender's GPU was not current; called where it is."""
+    _unused.clear()
+
+
 @dataclass
 class Texture:
     """A small texture array beside the device's own: its gpu.types.GPUTexture, (width, height, layers), and format (as
@@ -75,6 +107,16 @@ class BlenderDevice(PagedDevice):
         self.budget.tell(machine_memory() if is_software(self.name) else None)
 
     def current(self):
+        """See Device. NoDeviceError: Blender's GPU is not current on this thread."""
+        require_context()
+        free_unused()
+        return self._cleared()
+
+    def freeing(self):
+        """See Device."""
+        return nullcontext(self)
+
+    def _cleared(self):
         if gpu.platform.backend_type_get() == "OPENGL":
             self._let_go()
         return nullcontext(self)
@@ -97,7 +139,7 @@ class BlenderDevice(PagedDevice):
             raise NoDeviceError(str(error)) from None
 
     def _free(self, own: gpu.types.GPUTexture) -> None:
-        """Nothing else refers to it: it goes with this call."""
+        free(own)
 
     def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
         height, width = array.shape[:2]
@@ -173,6 +215,7 @@ class BlenderDevice(PagedDevice):
         gpu.compute.dispatch(shader, *groups)  # which makes the next one wait for what this one stores
 
     def release(self) -> None:
+        free(*self._shaders.values(), self._spare)
         self._shaders, self._spare = {}, None
 
 

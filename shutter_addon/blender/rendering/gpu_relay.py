@@ -17,7 +17,7 @@ import gpu
 
 from ...compute.paging import PagedDevice
 from ...compute.passes import Pass
-from .blender_gpu import BlenderDevice
+from .blender_gpu import BlenderDevice, has_context
 
 # Seconds of the main thread that calls take at once, if none takes longer: as many as all else took, within these.
 _LEAST, _MOST = 0.02, 0.05
@@ -42,6 +42,10 @@ class RelayedDevice(BlenderDevice):
     def __init__(self, *memory):
         super().__init__(*memory)
         self._passes: list[Future] = []
+
+    def current(self):
+        """See Device. Whether Blender's GPU is current is for the main thread to see."""
+        return self._cleared()
 
     def _make(self, *arguments) -> list:
         return self._wait_for(lambda: [BlenderDevice._make(self, *arguments)])
@@ -89,7 +93,8 @@ def ask(function: Callable[[], None], seconds: float) -> None:
 def serve(seconds: float = _LEAST) -> bool:
     """Makes calls, on the main thread while it waits for another that may call, for these seconds or a call more.
     False: there are some, but Blender's GPU is not current."""
-    if not _has_context():
+    if not has_context():
+        _redraw()
         time.sleep(_GAP)
         return _calls.empty()
     end = time.monotonic() + seconds
@@ -149,13 +154,8 @@ def _look() -> float | None:
         return 0.0 if _looks else None
 
 
-def _has_context() -> bool:
-    """Whether Blender's GPU is current here. It is not after a window was closed, until another one is drawn."""
-    try:
-        gpu.types.GPUTexture((1, 1))
-    except RuntimeError:
-        for window in bpy.context.window_manager.windows:
-            for area in window.screen.areas:
-                area.tag_redraw()
-        return False
-    return True
+def _redraw() -> None:
+    """Has all windows drawn, after which Blender's GPU is current."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            area.tag_redraw()

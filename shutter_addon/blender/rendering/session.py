@@ -32,6 +32,7 @@ from ..data import preferences
 from ..data.snapshot import Snapshot, translated
 from ..data.strip_proxies import Proxy
 from . import devices, gpu_relay, render_job
+from .blender_gpu import require_context
 
 FAULTS = (EffectError, MediaError, NoDeviceError, MemoryError)
 
@@ -54,17 +55,6 @@ class StoppedError(Exception):
 
 def _never() -> bool:
     return False
-
-
-def _result(future: Future, stopped):
-    """The future's result. StoppedError: it is not waited for any longer. NoDeviceError: it cannot be waited for, as
-    Blender's GPU is not current."""
-    while not wait([future], 0 if in_window() else _PATIENCE).done:
-        if in_window() and not gpu_relay.serve():
-            raise NoDeviceError(rpt_("Blender's GPU cannot be used until a window is drawn"))
-        if stopped():
-            raise StoppedError
-    return future.result()
 
 
 @dataclass(frozen=True)
@@ -206,7 +196,17 @@ class RenderSession:
 
     def run(self, function, *arguments, stopped=_never):
         """The result of a function that uses the device. StoppedError: it is not waited for any longer."""
-        return _result(self._submit(function, *arguments), stopped)
+        return self._result(self._submit(function, *arguments), stopped)
+
+    def _result(self, future: Future, stopped):
+        """The future's result. StoppedError: it is not waited for any longer. NoDeviceError: it cannot be waited for,
+        as Blender's GPU is not current."""
+        while not wait([future], 0 if in_window() else _PATIENCE).done:
+            if in_window() and not gpu_relay.serve() and self.device == "relayed":
+                require_context()
+            if stopped():
+                raise StoppedError
+        return future.result()
 
     def _submit(self, function, *arguments) -> Future:
         """The result to come of a function that uses the device. Such functions are called one after the other."""
@@ -252,7 +252,7 @@ class RenderSession:
         key, begun = self._begun.pop(scene, (None, None))
         if begun is not None:
             if key == request.key:
-                return _result(begun, stopped)
+                return self._result(begun, stopped)
             begun.cancel()
         return self.run(request.picture, stopped=stopped)
 
@@ -296,7 +296,7 @@ class RenderSession:
             if message := self._chosen[1]:
                 say(message)
         try:
-            return _result(self._compositor, stopped)
+            return self._result(self._compositor, stopped)
         except NoDeviceError:
             self._compositor = None
             raise
@@ -434,9 +434,9 @@ def in_window() -> bool:
 
 
 def here() -> RenderSession:
-    """The session of whoever calls: the window's own on its main thread, else one for renders. NoDeviceError: these
-    have none."""
-    if in_window():
+    """The session of whoever calls: the window's own for what its main thread draws, else one for renders, a script's
+    on the main thread among them: there Blender's GPU need not be current. NoDeviceError: these have none."""
+    if in_window() and not render_job.ends_films():
         return _window
     return _waited_for if render_job.window_waits() and _offscreen.device == "relayed" else _offscreen
 
