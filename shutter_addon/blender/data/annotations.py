@@ -47,5 +47,11 @@ def layer_of(effect, region):
 def annotation(effect):
     """What the effect's scribbles are drawn on; made where somebody has removed it."""
     if effect.scene.annotation is None:
-        effect.scene.annotation = bpy.data.annotations.new(data_("Scribbles {effect}").format(effect=effect.name))
+        new_annotation(effect.scene, data_("Scribbles {effect}").format(effect=effect.name))
     return effect.scene.annotation
+
+
+def new_annotation(scene, name: str) -> None:
+    """Gives an effect's scene an empty annotation, which goes with it."""
+    scene.annotation = bpy.data.annotations.new(name)
+    scene.annotation.virtual_shutter_made = scene.virtual_shutter.identity
