@@ -36,6 +36,7 @@ def _after_load(*_):
 @persistent
 def _before_save(*_):
     lifecycle.update()  # a script may have removed strips, since Blender last told
+    lifecycle.leave_to_user()
     for edit in bpy.data.scenes:
         if edit.virtual_shutter.effects and edit.library is None:
             edit.virtual_shutter.version = versions.extension()

@@ -175,9 +175,9 @@ alone = {}  # what a file has without effects
 
 def gone(name):
     """Nothing is left of any effect, in the picture, in Blender and in a file."""
-    assert space().annotation is None
-    assert not story.edit().virtual_shutter.effects
+    yield from driver.until(lambda: space().annotation is None, "the preview lets go of the scribbles")
     assert kept(name) == alone, kept(name)
+    assert not story.edit().virtual_shutter.effects
     yield from seen(name)
 
 
@@ -221,6 +221,7 @@ def deleted():
     yield from back(known, "8_undone_removal")
     for scene in [strip.scene for strip in halves()]:
         bpy.data.scenes.remove(scene)
+    driver.area_of("SEQUENCE_EDITOR", "PREVIEW").tag_redraw()  # Blender does not by itself
     yield from gone("7_scene_removed")
     # What nobody's mend can have left there.
     space().annotation = None

@@ -10,6 +10,7 @@ from .validation import EffectError
 
 # Pixels of a strip's side on the image, below which nobody sees where its scribbles are.
 _SMALLEST = 4
+USERS = "user"  # in place of an effect's identity: the annotation is the user's own, whatever its name
 
 
 def picture_size(effect) -> tuple[int, int]:

@@ -573,6 +573,7 @@ def register():
     # That the source was muted when the effect was made, and shall show again when it goes.
     bpy.types.Strip.virtual_shutter_muted = BoolProperty(options={"HIDDEN"})
     # Of annotations and cameras that were made for an effect: its scene's identity. They go with it.
+    # annotations.USERS: the user's own.
     bpy.types.ID.virtual_shutter_made = StringProperty(options={"HIDDEN"})
 
 

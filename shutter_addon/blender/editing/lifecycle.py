@@ -4,7 +4,7 @@ import uuid
 
 import bpy
 
-from ..data import fcurves, requirements, strips
+from ..data import annotations, fcurves, requirements, strips
 from ..rendering import invalidation, render_job, session
 from . import copies, match_source, shown_annotations, undelete
 from .add_effect import add_camera
@@ -59,7 +59,6 @@ def _mend(strip) -> None:
 def take_over() -> None:
     """Marks in a file of an older version what was made for effects, and removes what is left of those that are gone:
     annotations of such a name that nothing but previews uses."""
-    is_older = not any(shown_annotations.is_own(annotation) for annotation in bpy.data.annotations)
     for scene in _effect_scenes():
         made = [scene.annotation]
         if scene.camera is not None and scene.camera.name == f"{scene.name} Camera":
@@ -67,11 +66,21 @@ def take_over() -> None:
         for each in made:
             if each is not None and each.library is None:
                 each.virtual_shutter_made = scene.virtual_shutter.identity
-    for annotation in bpy.data.annotations if is_older else ():
-        is_named = annotation.name.startswith(_OLDER_NAMES) and annotation.library is None
-        if is_named and annotation.users == shown_annotations.shown_by(annotation) > 0:
+    for annotation in _unmarked():
+        if annotation.users == shown_annotations.shown_by(annotation) > 0:
             annotation.virtual_shutter_made = "gone"
     _remove_left()
+
+
+def leave_to_user() -> None:
+    """Annotations of such a name that the user made stay where the file is opened again."""
+    for annotation in _unmarked():
+        annotation.virtual_shutter_made = annotations.USERS
+
+
+def _unmarked() -> list:
+    found = [each for each in bpy.data.annotations if each.library is None and not each.virtual_shutter_made]
+    return [each for each in found if each.name.startswith(_OLDER_NAMES)]
 
 
 def follow_sources() -> None:
@@ -170,7 +179,7 @@ def _remove(scene) -> None:
             bpy.data.cameras.remove(data)
     if annotation is not None and annotation.library is None:
         if shown_annotations.is_own(annotation):
-            shown_annotations.let_go([annotation])
+            shown_annotations.let_go(annotation)
         if not annotation.users:
             bpy.data.annotations.remove(annotation)
 
@@ -180,7 +189,7 @@ def _remove_left() -> None:
     on, as is a copy."""
     scenes = _effect_scenes()
     for annotation in _left(bpy.data.annotations, [scene.annotation for scene in scenes]):
-        shown_annotations.let_go([annotation])
+        shown_annotations.let_go(annotation)
         if not annotation.users:
             bpy.data.annotations.remove(annotation)
     for camera in _left(bpy.data.cameras, [scene.camera.data for scene in scenes if scene.camera]):
@@ -191,13 +200,14 @@ def _remove_left() -> None:
 
 
 def _left(collection, used) -> list:
-    """Those of a collection of data that were made for an effect which is gone. One that the effect does not use, but
-    another, is no longer marked."""
+    """Those of a collection of data that were made for an effect which is gone. They, and those that their effect does
+    not use, as copies, are the user's from now on."""
     identities = {scene.virtual_shutter.identity for scene in bpy.data.scenes}
-    unused = [each for each in collection if each.virtual_shutter_made and each.library is None and each not in used]
+    marked = [each for each in collection if each.virtual_shutter_made not in ("", annotations.USERS)]
+    unused = [each for each in marked if each.library is None and each not in used]
     gone = [each for each in unused if each.virtual_shutter_made not in identities]
     for each in unused:
-        each.virtual_shutter_made = ""
+        each.virtual_shutter_made = annotations.USERS
     return gone
 
 
@@ -217,7 +227,7 @@ def _identify() -> None:
 
 def _claim(made, identity: str) -> None:
     """What was made for an effect, and copied with it, is marked as its own."""
-    if made is not None and made.library is None and made.virtual_shutter_made not in ("", identity):
+    if made is not None and made.library is None and made.virtual_shutter_made not in ("", annotations.USERS, identity):
         made.virtual_shutter_made = identity
 
 

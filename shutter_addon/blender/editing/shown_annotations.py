@@ -7,7 +7,7 @@ that is not shown: each is a user of it, and would bring it into the saved file.
 
 import bpy
 
-from ..data import selection
+from ..data import annotations, selection
 
 _emptied: set[int] = set()  # addresses of spaces whose annotation was an effect's, until none was seen or it went
 
@@ -31,7 +31,7 @@ def is_other(space, found) -> bool:
 
 def is_own(annotation) -> bool:
     """Whether an annotation was made for an effect."""
-    return annotation.virtual_shutter_made != ""
+    return annotation.virtual_shutter_made not in ("", annotations.USERS)
 
 
 def give(space, annotation) -> None:
@@ -44,10 +44,10 @@ def give(space, annotation) -> None:
     (_emptied.discard if annotation else _emptied.add)(space.as_pointer())
 
 
-def let_go(annotations) -> None:
-    """Takes these annotations away from all previews."""
+def let_go(annotation) -> None:
+    """Takes an annotation away from all previews."""
     for space in _spaces():
-        if space.annotation is not None and space.annotation in annotations:
+        if space.annotation == annotation:
             give(space, None)
 
 
