@@ -204,6 +204,13 @@ def deleted():
     bpy.ops.ed.undo_push(message="selected")
     known = counted()
     yield from seen("6_before")
+    for scene in [strip.scene for strip in halves()]:
+        bpy.data.scenes.remove(scene)
+    driver.area_of("SEQUENCE_EDITOR", "PREVIEW").tag_redraw()  # Blender does not by itself
+    yield from gone("7_scene_removed")
+    bpy.ops.ed.undo_push(message="scenes removed")
+    yield from pressed("ctrl+z", lambda: halves()[0].scene is not None, "undo brings the scenes back")
+    yield from back(known, "8_undone_scene")
     yield from pressed("x", lambda: not halves(), "X deletes the strips")
     yield from gone("7_deleted")
     yield from pressed("ctrl+z", lambda: len(halves()) == 2, "undo brings them back")
@@ -219,14 +226,11 @@ def deleted():
     bpy.ops.ed.undo_push(message="removed")
     yield from pressed("ctrl+z", lambda: len(halves()) == 2, "undo brings them back")
     yield from back(known, "8_undone_removal")
-    for scene in [strip.scene for strip in halves()]:
-        bpy.data.scenes.remove(scene)
-    driver.area_of("SEQUENCE_EDITOR", "PREVIEW").tag_redraw()  # Blender does not by itself
-    yield from gone("7_scene_removed")
-    # What nobody's mend can have left there.
-    space().annotation = None
     for strip in halves():
         story.edit().sequence_editor.strips.remove(strip)
+    yield 0.5
+    # What nobody's mend can have left there.
+    space().annotation = None
     yield from seen("9_plain")
 
 
