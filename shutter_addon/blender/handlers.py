@@ -7,8 +7,8 @@ from functools import partial
 import bpy
 from bpy.app.handlers import persistent
 
-from .data import inbetween_settings, revision, selection, source_media, strips, versions
-from .editing import copies, lifecycle, track_region, undelete
+from .data import inbetween_settings, revision, source_media, strips, versions
+from .editing import copies, lifecycle, shown_annotations, track_region, undelete
 from .interface import inbetween_operators, preview_areas
 from .rendering import invalidation, job_snapshots, render_job, session
 
@@ -29,10 +29,14 @@ def _after_load(*_):
     session.drop_removed()  # what a render job took up while the file was loaded
     copies.adopt()
     lifecycle.mend()
+    lifecycle.take_over()
+    shown_annotations.follow()
 
 
 @persistent
 def _before_save(*_):
+    lifecycle.update()  # a script may have removed strips, since Blender last told
+    lifecycle.leave_to_user()
     for edit in bpy.data.scenes:
         if edit.virtual_shutter.effects and edit.library is None:
             edit.virtual_shutter.version = versions.extension()
@@ -52,21 +56,18 @@ def _update(scene=None, depsgraph=None):
 
 
 @persistent
+def _before_undo(*_):
+    shown_annotations.before_undo()
+
+
+@persistent
 def _after_undo(*_):
     revision.changed()
     track_region.data_replaced()
     for edit in bpy.data.scenes:
         strips.invalidate(edit)
     session.drop_removed()
-    _show_scribbles()
-
-
-def _show_scribbles():
-    """Previews lose their annotation when undo removes it, and do not find it again with redo."""
-    found = selection.active(bpy.context)
-    for _window, area in preview_areas.previews(bpy.context):
-        if found and area.spaces.active.annotation is None:
-            area.spaces.active.annotation = found[1].scene.annotation
+    shown_annotations.follow()
 
 
 @persistent
@@ -124,6 +125,8 @@ HANDLERS = {
     "load_post": _after_load,
     "save_pre": _before_save,
     "depsgraph_update_post": _update,
+    "undo_pre": _before_undo,
+    "redo_pre": _before_undo,
     "undo_post": _after_undo,
     "redo_post": _after_undo,
     "render_init": _before_render,

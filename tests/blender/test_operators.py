@@ -371,11 +371,18 @@ ALIKE = {
     "match_source": "The Shutter strip is like its source",
     "copy_modifiers": "The Shutter strip has the modifiers of its source",
 }
+UNSEEN = "Move the playhead onto the Shutter strip"
 REGION_NEEDED = dict.fromkeys(("erase", "region_assign", "region_remove", "region_move", "region_key"), NO_REGION)
+REGION_UNSEEN = REGION_NEEDED | {"erase": UNSEEN}
 
 
 def nothing(bpy, edit, effect, tmp_path):
     edit.sequence_editor.active_strip = None
+    edit.frame_set(50)  # past the effect
+
+
+def not_seen(bpy, edit, effect, tmp_path):
+    edit.frame_set(50)
 
 
 def no_sequencer(bpy, edit, effect, tmp_path):
@@ -423,6 +430,7 @@ SITUATIONS = {
     sound: (SELECT, {"add_effect": NO_SOURCE}),
     color: (SELECT, {"add_effect": NO_SOURCE}),
     plain: (SELECT, {"add_effect": None}),
+    not_seen: (None, {"add_effect": NO_SOURCE, "draw": UNSEEN, "region_take": UNSEEN, **ALIKE, **REGION_UNSEEN}),
     linked: (LINKED, {}),
     no_shutter: (NO_SHUTTER, {"add_effect": NO_SOURCE, **dict.fromkeys(ANY_EFFECT), **ALIKE, **REGION_NEEDED}),
     no_region: (None, {"add_effect": NO_SOURCE, "region_take": NO_LAYER, **ALIKE, **REGION_NEEDED}),

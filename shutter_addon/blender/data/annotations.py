@@ -10,6 +10,7 @@ from .validation import EffectError
 
 # Pixels of a strip's side on the image, below which nobody sees where its scribbles are.
 _SMALLEST = 4
+USERS = "user"  # in place of an effect's identity: the annotation is the user's own, whatever its name
 
 
 def picture_size(effect) -> tuple[int, int]:
@@ -47,5 +48,11 @@ def layer_of(effect, region):
 def annotation(effect):
     """What the effect's scribbles are drawn on; made where somebody has removed it."""
     if effect.scene.annotation is None:
-        effect.scene.annotation = bpy.data.annotations.new(data_("Scribbles {effect}").format(effect=effect.name))
+        new_annotation(effect.scene, data_("Scribbles {effect}").format(effect=effect.name))
     return effect.scene.annotation
+
+
+def new_annotation(scene, name: str) -> None:
+    """Gives an effect's scene an empty annotation, which goes with it."""
+    scene.annotation = bpy.data.annotations.new(name)
+    scene.annotation.virtual_shutter_made = scene.virtual_shutter.identity

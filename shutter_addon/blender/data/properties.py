@@ -572,11 +572,15 @@ def register():
     bpy.types.Strip.virtual_shutter_effect = StringProperty(options={"HIDDEN"})
     # That the source was muted when the effect was made, and shall show again when it goes.
     bpy.types.Strip.virtual_shutter_muted = BoolProperty(options={"HIDDEN"})
+    # Of annotations and cameras that were made for an effect: its scene's identity. They go with it.
+    # annotations.USERS: the user's own.
+    bpy.types.ID.virtual_shutter_made = StringProperty(options={"HIDDEN"})
 
 
 def unregister():
     for name in ("source", "matte", "effect", "muted"):
         delattr(bpy.types.Strip, f"virtual_shutter_{name}")
+    del bpy.types.ID.virtual_shutter_made
     del bpy.types.Scene.virtual_shutter
     for cls in reversed(classes):
         bpy.utils.unregister_class(cls)

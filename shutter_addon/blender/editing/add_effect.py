@@ -6,7 +6,7 @@ import bpy
 from bpy.app.translations import pgettext_data as data_
 
 from ...core.limits import MAX_FRAME
-from ..data import source_media
+from ..data import annotations, source_media
 from ..data.strips import ENGINE, effect_of, origin
 
 _COLOR = "COLOR_06"
@@ -24,8 +24,7 @@ def add_effect(edit, source):
     if not source.virtual_shutter_source:
         source.virtual_shutter_source = uuid.uuid4().hex
     name = data_("Shutter {source}").format(source=source.name)
-    scene = new_scene(edit, name, (medium.width, medium.height))
-    scene.virtual_shutter.identity = uuid.uuid4().hex
+    scene = new_scene(edit, uuid.uuid4().hex, name, (medium.width, medium.height))
     level = (source.parent_meta() or edit.sequence_editor).strips
     taken = {s.channel for s in level if _overlap(s, source)}
     channel = next(c for c in range(source.channel + 1, source.channel + len(taken) + 2) if c not in taken)
@@ -79,9 +78,10 @@ def copy_look(source, strip) -> None:
         setattr(strip, name, getattr(source, name))
 
 
-def new_scene(edit, name: str, size):
+def new_scene(edit, identity: str, name: str, size):
     """A scene for an effect of the edit, with a camera and an empty annotation."""
     scene = bpy.data.scenes.new(name)
+    scene.virtual_shutter.identity = identity
     scene.render.engine = ENGINE
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
@@ -91,7 +91,7 @@ def new_scene(edit, name: str, size):
     # A Scene strip plays at its scene's rate; at the edit's it shows one frame per timeline frame.
     scene.render.fps, scene.render.fps_base = edit.render.fps, edit.render.fps_base
     add_camera(scene)
-    scene.annotation = bpy.data.annotations.new(name)
+    annotations.new_annotation(scene, name)
     return scene
 
 
@@ -99,5 +99,6 @@ def add_camera(scene) -> None:
     """Without a camera, Blender renders a Scene strip empty and never asks the engine."""
     name = f"{scene.name} Camera"
     camera = bpy.data.objects.new(name, bpy.data.cameras.new(name))
+    camera.data.virtual_shutter_made = scene.virtual_shutter.identity
     scene.collection.objects.link(camera)
     scene.camera = camera

@@ -4,12 +4,13 @@ import uuid
 
 import bpy
 
-from ..data import fcurves, requirements, strips
+from ..data import annotations, fcurves, requirements, strips
 from ..rendering import invalidation, render_job, session
-from . import copies, match_source, undelete
+from . import copies, match_source, shown_annotations, undelete
 from .add_effect import add_camera
 
 EFFECTS = "virtual_shutter.effects"
+_OLDER_NAMES = "Shutter ", "Scribbles ", "Verschluss ", "Markierungen "  # of annotations made for effects
 
 _layer_names: dict[int, list[str]] = {}  # by session_uid of an annotation, as they were at the last update
 
@@ -32,6 +33,7 @@ def update(updated=None) -> None:
     _follow_layers(edits)
     _remove_scenes(updated)
     _identify()
+    _remove_left()
     if not render_job.runs():  # a film keeps its size
         follow_sources()
     for edit in _edits():
@@ -54,6 +56,33 @@ def _mend(strip) -> None:
         add_camera(strip.scene)
 
 
+def take_over() -> None:
+    """Marks in a file of an older version what was made for effects, and removes what is left of those that are gone:
+    annotations of such a name that nothing but previews uses."""
+    for scene in _effect_scenes():
+        made = [scene.annotation]
+        if scene.camera is not None and scene.camera.name == f"{scene.name} Camera":
+            made.append(scene.camera.data)
+        for each in made:
+            if each is not None and each.library is None:
+                each.virtual_shutter_made = scene.virtual_shutter.identity
+    for annotation in _unmarked():
+        if annotation.users == shown_annotations.shown_by(annotation) > 0:
+            annotation.virtual_shutter_made = "gone"
+    _remove_left()
+
+
+def leave_to_user() -> None:
+    """Annotations of such a name that the user made stay where the file is opened again."""
+    for annotation in _unmarked():
+        annotation.virtual_shutter_made = annotations.USERS
+
+
+def _unmarked() -> list:
+    found = [each for each in bpy.data.annotations if each.library is None and not each.virtual_shutter_made]
+    return [each for each in found if each.name.startswith(_OLDER_NAMES)]
+
+
 def follow_sources() -> None:
     """Gives the scene of each effect its edit's rate and its source's size."""
     for edit in _edits():
@@ -64,6 +93,7 @@ def forget() -> None:
     """Forgets what the annotations and the media of a file were, before another one is loaded."""
     _layer_names.clear()
     match_source.forget()
+    shown_annotations.forget()
 
 
 def _edits() -> list:
@@ -147,8 +177,38 @@ def _remove(scene) -> None:
         bpy.data.objects.remove(camera)
         if not data.users:
             bpy.data.cameras.remove(data)
-    if annotation is not None and annotation.library is None and not annotation.users:
-        bpy.data.annotations.remove(annotation)
+    if annotation is not None and annotation.library is None:
+        if shown_annotations.is_own(annotation):
+            shown_annotations.let_go(annotation)
+        if not annotation.users:
+            bpy.data.annotations.remove(annotation)
+
+
+def _remove_left() -> None:
+    """Removes what was made for effects whose scene somebody removed. What is used elsewhere is the user's from then
+    on, as is a copy."""
+    scenes = _effect_scenes()
+    for annotation in _left(bpy.data.annotations, [scene.annotation for scene in scenes]):
+        shown_annotations.let_go(annotation)
+        if not annotation.users:
+            bpy.data.annotations.remove(annotation)
+    for camera in _left(bpy.data.cameras, [scene.camera.data for scene in scenes if scene.camera]):
+        for each in [each for each in bpy.data.objects if each.data == camera and not each.users]:
+            bpy.data.objects.remove(each)
+        if not camera.users:
+            bpy.data.cameras.remove(camera)
+
+
+def _left(collection, used) -> list:
+    """Those of a collection of data that were made for an effect which is gone. They, and those that their effect does
+    not use, as copies, are the user's from now on."""
+    identities = {scene.virtual_shutter.identity for scene in bpy.data.scenes}
+    marked = [each for each in collection if each.virtual_shutter_made not in ("", annotations.USERS)]
+    unused = [each for each in marked if each.library is None and each not in used]
+    gone = [each for each in unused if each.virtual_shutter_made not in identities]
+    for each in unused:
+        each.virtual_shutter_made = annotations.USERS
+    return gone
 
 
 def _identify() -> None:
@@ -158,10 +218,17 @@ def _identify() -> None:
         if scene.virtual_shutter.identity in taken:
             scene.virtual_shutter.identity = uuid.uuid4().hex
         taken.add(scene.virtual_shutter.identity)
+        _claim(scene.annotation, scene.virtual_shutter.identity)
     for edit in _edits():
         for strip in strips.effect_strips(edit):
             if strip.virtual_shutter_effect != strip.scene.virtual_shutter.identity:
                 strip.virtual_shutter_effect = strip.scene.virtual_shutter.identity
+
+
+def _claim(made, identity: str) -> None:
+    """What was made for an effect, and copied with it, is marked as its own."""
+    if made is not None and made.library is None and made.virtual_shutter_made not in ("", annotations.USERS, identity):
+        made.virtual_shutter_made = identity
 
 
 def _follow_layers(edits) -> None:

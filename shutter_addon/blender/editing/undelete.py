@@ -42,8 +42,7 @@ def restore(edit, identity: str):
     """Makes a kept effect again in an edit. Returns its scene, or None where none was kept under this identity."""
     if (data := _effects.get(identity)) is None:
         return None
-    scene = add_effect.new_scene(edit, *data["scene"])
-    scene.virtual_shutter.identity = identity
+    scene = add_effect.new_scene(edit, identity, *data["scene"])
     effect = edit.virtual_shutter.effects.add()
     _fill(effect, data["effect"])
     effect.scene = scene

@@ -10,7 +10,7 @@ from bpy.types import Gizmo, GizmoGroup
 
 from ..data import consistency, selection
 from ..data.validation import EffectError
-from ..editing import bar_edits
+from ..editing import bar_edits, track_region
 from . import drawing, gizmo_keymaps
 
 _MARGIN, _HEIGHT, _BAR = 16, 96, 16  # in units of the interface
@@ -75,7 +75,7 @@ def painted(values, place: Layout, start, end, snap: bool) -> np.ndarray:
 
 def bar_under(context, x: float, y: float) -> int | None:
     """The bar of the active shutter at a point of the preview's region, or None."""
-    found = selection.active(context)
+    found = selection.in_picture(context)
     if found is None or context.region is None or context.region.type != "PREVIEW":
         return None
     if (shown := _shown(found[1])) is None:
@@ -108,7 +108,8 @@ class SHUTTER_GT_bars(Gizmo):
         self.use_grab_cursor = False
 
     def draw(self, context):
-        found = selection.active(context)
+        if (found := selection.in_picture(context)) is None:
+            return
         effect = found[1]
         if (shown := _shown(effect)) is None:
             return
@@ -122,6 +123,7 @@ class SHUTTER_GT_bars(Gizmo):
     def invoke(self, context, event):
         effect = selection.active(context)[1]
         self.index = effect.active_shutter
+        self.target = track_region.Target.of(effect, None)  # while it plays, another may come into the picture
         self.before = consistency.bars(effect.shutters[self.index])
         # Between keys what is shown, and painted on, is not what is stored.
         self.values = bar_edits.bars_now(effect, self.index)
@@ -143,17 +145,17 @@ class SHUTTER_GT_bars(Gizmo):
         return {"RUNNING_MODAL"}
 
     def _paint(self, context, point, snap: bool):
-        effect = selection.active(context)[1]
+        if (effect := self.target.effect()) is None:
+            return
         self.values = painted(self.values, self.place, self.point, point, snap)
         bar_edits.paint(effect, self.index, self.values)
         self.point = point
         context.area.tag_redraw()
 
     def exit(self, context, cancel):
-        found = selection.active(context)
-        if found is None or not self.paints:
+        effect = self.target.effect()
+        if effect is None or not self.paints:
             return
-        effect = found[1]
         if cancel:
             bar_edits.set_bars(effect.shutters[self.index], self.before)
             return
@@ -196,7 +198,7 @@ class SHUTTER_GGT_bars(GizmoGroup):
 
     @classmethod
     def poll(cls, context):
-        found = selection.active(context)
+        found = selection.in_picture(context)
         return found is not None and selection.active_shutter(found[1]) is not None and found[0].is_editable
 
     @classmethod

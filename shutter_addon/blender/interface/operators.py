@@ -13,7 +13,15 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 from ...core import presets, recipe
 from ..data import annotations, consistency, recipe_import, selection, strips, validation
 from ..data.properties import CONTEXT, STROKES
-from ..editing import add_effect, bar_edits, collection_edits, match_source, region_edits, shutter_edits
+from ..editing import (
+    add_effect,
+    bar_edits,
+    collection_edits,
+    match_source,
+    region_edits,
+    shown_annotations,
+    shutter_edits,
+)
 from ..rendering import matte_export
 from ..rendering.session import FAULTS
 from . import icons, preview_areas
@@ -36,9 +44,10 @@ def redraw(context) -> None:
 
 
 class _OfEffect:
-    """Works on the effect of the active strip."""
+    """Works on the effect that is seen, or where none is, on that of the active strip."""
 
     bl_options = UNDOABLE
+    only_seen = False  # it does something in the picture
 
     @classmethod
     def poll(cls, context):
@@ -47,6 +56,8 @@ class _OfEffect:
             return refused(cls, rpt_("Select a Shutter strip or its source strip"))
         if not found[0].is_editable:
             return refused(cls, rpt_("The edit is linked from another file"))
+        if cls.only_seen and selection.in_picture(context) is None:
+            return refused(cls, selection.why_unseen(found[0], found[2]))
         return cls.possible(found[1])
 
     @classmethod
@@ -351,6 +362,7 @@ class SHUTTER_OT_draw(_OfShutter, Operator):
 
     bl_idname = "shutter.draw"
     bl_label = "Draw"
+    only_seen = True
 
     # Blender would use again what a button was pressed with before.
     new: BoolProperty(
@@ -387,6 +399,7 @@ class SHUTTER_OT_erase(_OfStrokes, Operator):
 
     bl_idname = "shutter.erase"
     bl_label = "Erase"
+    only_seen = True
 
     def change(self, context, effect):
         if not drawing_tool(context, effect, selection.active_region(effect), "builtin.annotate_eraser"):
@@ -401,7 +414,7 @@ def drawing_tool(context, effect, region, tool: str) -> bool:
     annotation = effect.scene.annotation
     found = False
     for window, area in preview_areas.previews(context):
-        area.spaces.active.annotation = annotation
+        shown_annotations.give(area.spaces.active, annotation)
         area.spaces.active.preview_overlay.show_annotation = True
         with context.temp_override(window=window, area=area, region=preview_areas.preview_region(area)):
             bpy.ops.wm.tool_set_by_id(name=tool, space_type="SEQUENCE_EDITOR")
@@ -429,6 +442,7 @@ class SHUTTER_OT_region_take(_OfShutter, Operator):
 
     bl_idname = "shutter.region_take"
     bl_label = "Add Region from Annotation Layer"
+    only_seen = True
 
     layer: EnumProperty(name="Layer", items=_layers, translation_context=contexts.no_translation)
 
@@ -448,7 +462,7 @@ class SHUTTER_OT_region_take(_OfShutter, Operator):
         layer = annotation_of(context).layers[self.layer]
         region_edits.take_layer(effect, selection.active_shutter(effect), layer)
         for _window, area in preview_areas.previews(context):
-            area.spaces.active.annotation = effect.scene.annotation
+            shown_annotations.give(area.spaces.active, effect.scene.annotation)
 
 
 _shutter_items = []

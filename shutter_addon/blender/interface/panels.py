@@ -118,6 +118,8 @@ class _Shutters:
             layout.operator("shutter.add_effect", icon="ADD")
             return
         effect = found[1]
+        if selection.in_picture(context) is None:
+            layout.label(text=selection.why_unseen(found[0], found[2]), icon="INFO", translate=False)
         _draw_live(layout, context)
         _draw_source(layout, effect)
         row = layout.row()
@@ -529,7 +531,7 @@ class _InSidebar:
 
     @classmethod
     def poll(cls, context):
-        return selection.active_strip(context) is not None
+        return selection.active_strip(context) is not None or selection.active(context) is not None
 
 
 class STRIP_PT_shutter(_Shutters, _InProperties, Panel):

@@ -15,6 +15,7 @@ from ...core.frame_state import FrameState
 from ...media import MediaError
 from ..data import annotations, geometry, selection, strips
 from ..data.properties import CONTEXT
+from ..editing import shown_annotations
 from ..rendering import blender_gpu, invalidation, render_job, session
 from ..rendering.blender_gpu import Texture
 from . import drawing, preview_areas, previewing
@@ -38,17 +39,7 @@ def _redraw_once() -> None:
 
 
 def _follow_once() -> None:
-    """Previews that have the scribbles of another effect get those of the active one, and the pen draws there."""
-    if (found := selection.active(bpy.context)) is None:
-        return
-    for _window, area in preview_areas.previews(bpy.context):
-        if _is_of_another(area.spaces.active.annotation, *found[:2]):
-            area.spaces.active.annotation = found[1].scene.annotation
-
-
-def _is_of_another(annotation, edit, effect) -> bool:
-    others = (other.scene.annotation for other in edit.virtual_shutter.effects if other.scene)
-    return annotation is not None and annotation != effect.scene.annotation and annotation in others
+    shown_annotations.follow()
 
 
 _TIMERS = (_redraw_once, _follow_once)
@@ -102,16 +93,18 @@ def _draw() -> None:
     edit = selection.edit_of(context)
     if edit is not None and edit.library is None and invalidation.invalidate_changed(edit):
         bpy.app.timers.register(_redraw_once)  # what is tagged while it is drawn is not drawn again
-    active = selection.active(context)
-    if active is not None and _is_of_another(context.space_data.annotation, *active[:2]):
-        bpy.app.timers.register(_follow_once)  # nothing may be changed while it is drawn
     # A stroke that is being drawn would lie below our picture: Blender's own shows the same.
-    if not settings.live or any(op.bl_idname == "GPENCIL_OT_annotate" for op in context.window.modal_operators):
+    if any(op.bl_idname == "GPENCIL_OT_annotate" for op in context.window.modal_operators):
         return
-    found = shown(context)
-    if found is None:
+    if shown_annotations.is_other(context.space_data, selection.seen(edit)):
+        bpy.app.timers.register(_follow_once)  # nothing may be changed while it is drawn
+    if not settings.live:
         return
     say = _Notes(context.region)
+    found = shown(context)
+    if found is None:
+        _tell_unseen(context, say)
+        return
     with drawing.pixel_space(context.region):
         try:
             _show(context, found, settings, say)
@@ -129,6 +122,16 @@ def request_of(context, found: Shown) -> session.FrameRequest:
     request = session.here().request(snapshot, frame, detail=detail)
     is_result = context.window_manager.virtual_shutter.view in RESULTS and _is_rendered(found)
     return request if is_result and not context.screen.is_animation_playing else request.draft()
+
+
+def _tell_unseen(context, say) -> None:
+    """Says why nothing of the active effect is in the picture."""
+    active = selection.active(context)
+    if active is None or selection.in_picture(context) or not context.space_data.show_overlays:
+        return
+    say(selection.why_unseen(active[0], active[2]))
+    with drawing.pixel_space(context.region):
+        say.draw()
 
 
 def _is_rendered(found: Shown) -> bool:

@@ -38,34 +38,12 @@ class Shown:
 
 
 def shown(context) -> Shown | None:
-    """The effect strip under the playhead that the preview shows: the active one, or the highest."""
+    """The effect strip under the playhead that the preview shows, as selection.seen has it."""
     edit, space = selection.edit_of(context), context.space_data
-    if edit is None or edit.sequence_editor is None or space.display_mode != "IMAGE" or space.display_channel:
+    if space.display_mode != "IMAGE" or space.display_channel or (found := selection.seen(edit)) is None:
         return None
-    visible = _visible(edit)
-    found = [
-        strip for strip in visible if strip.type == "SCENE" and strip.scene and strips.effect_of(edit, strip.scene)
-    ]
-    if not found:
-        return None
-    active = selection.active(context)
-    strip = next((s for s in found if active and s == active[2]), max(found, key=lambda s: s.channel))
-    above = any(other.channel > strip.channel for other in visible)
-    return Shown(edit, strips.effect_of(edit, strip.scene), strip, above)
-
-
-def _visible(edit) -> list:
-    """Strips with a picture under the playhead, not muted, of the edit or of the meta strip that is open."""
-    editor, frame = edit.sequence_editor, edit.frame_current
-    level = editor.meta_stack[-1] if editor.meta_stack else editor
-    return [
-        strip
-        for strip in level.strips
-        if strip.left_handle <= frame < strip.right_handle
-        and strip.type != "SOUND"
-        and not strip.mute
-        and not level.channels[strip.channel].mute
-    ]
+    above = any(other.channel > found[2].channel for other in selection.visible(edit))
+    return Shown(*found, above)
 
 
 def detail(context, edit, effect, strip) -> session.Detail:

@@ -10,7 +10,7 @@ from bpy.types import Gizmo, GizmoGroup
 
 from ...core import scribbles
 from ..data import annotations, geometry, revision, selection, snapshot, validation
-from ..editing import bar_edits, region_edits
+from ..editing import bar_edits, region_edits, track_region
 from ..editing.motion_keys import MotionKeys
 from . import drawing, gizmo_keymaps
 
@@ -51,8 +51,8 @@ def _strokes_now(edit, effect, strip) -> list[np.ndarray]:
 
 
 def place(context) -> Place | None:
-    """The place of the active region's handles, or None where there is no region, or nothing of it is drawn."""
-    found = selection.active(context)
+    """The place of the active region's handles, or None where none is seen, or nothing of it is drawn."""
+    found = selection.in_picture(context)
     region = selection.active_region(found[1]) if found else None
     if region is None:
         return None
@@ -124,7 +124,10 @@ class SHUTTER_GT_region(Gizmo):
         return 0 if np.hypot(*(handle - location)) <= drawing.ui_scale() * _RADIUS * 1.5 else -1
 
     def invoke(self, context, event):
-        region = selection.active_region(selection.active(context)[1])
+        effect = selection.active(context)[1]
+        region = selection.active_region(effect)
+        # While it plays, another effect may come into the picture.
+        self.target = track_region.Target.of(effect, effect.active_region)
         self.before = tuple(region.location), region.rotation, region.scale
         self.grabbed = event.mouse_region_x, event.mouse_region_y
         self.where = place(context)
@@ -134,7 +137,9 @@ class SHUTTER_GT_region(Gizmo):
         mouse = event.mouse_region_x, event.mouse_region_y
         fine = 0.1 if "PRECISE" in tweak or event.shift else 1.0
         point = np.array(self.grabbed) + fine * (np.array(mouse) - self.grabbed)
-        region = selection.active_region(selection.active(context)[1])
+        if (effect := self.target.effect()) is None:
+            return {"RUNNING_MODAL"}
+        region = effect.regions[self.target.index]
         (self._turn if self.turns else self._move)(region, point, "SNAP" in tweak or event.ctrl)
         context.area.tag_redraw()
         return {"RUNNING_MODAL"}
@@ -153,14 +158,13 @@ class SHUTTER_GT_region(Gizmo):
         region.scale = self.before[2] * max(np.hypot(*end) / max(np.hypot(*start), 1.0), 0.01)
 
     def exit(self, context, cancel):
-        found = selection.active(context)
-        region = selection.active_region(found[1]) if found else None
-        if region is None:
+        if (effect := self.target.effect()) is None:
             return
+        index = self.target.index
+        region = effect.regions[index]
         if cancel:
             region.location, region.rotation, region.scale = self.before
             return
-        effect, index = found[1], found[1].active_region
         if bar_edits.auto_key(context) or MotionKeys(effect, index, region.motion).are_made():
             _key(context, effect, index)
             context.area.tag_redraw()  # panels show keys
@@ -191,7 +195,7 @@ class SHUTTER_GGT_region(GizmoGroup):
 
     @classmethod
     def poll(cls, context):
-        settings, found = context.window_manager.virtual_shutter, selection.active(context)
+        settings, found = context.window_manager.virtual_shutter, selection.in_picture(context)
         # A handle under the pointer would take it from the probe, and a stroke from the pen.
         if (settings.live and settings.probe) or _is_drawing(context):
             return False

@@ -39,6 +39,7 @@ class _Tracks:
     """Tracks what has an `index`, as for selection.moving, from the current frame in a `direction` of DIRECTIONS."""
 
     bl_options = {"UNDO"}
+    only_seen = True
 
     def index(self, effect) -> int | None:
         return effect.active_region

@@ -49,6 +49,12 @@ MESSAGES = {
     ("*", "Name"): "Name",
     ("*", "Name of the effect"): "Name des Effekts",
     ("*", "Select a Shutter strip or its source strip"): "Einen Verschlussstreifen oder seinen Quellstreifen auswählen",
+    ("*", "Move the playhead onto the Shutter strip"): "Den Abspielkopf auf den Verschlussstreifen bewegen",
+    ("*", "Unmute the Shutter strip"): "Die Stummschaltung des Verschlussstreifens aufheben",
+    (
+        "*",
+        "Open the meta strip that the Shutter strip is in",
+    ): "Den Meta-Streifen öffnen, in dem der Verschlussstreifen liegt",
     ("*", "Select a movie, image or clip strip"): "Einen Film-, Bild- oder Clipstreifen auswählen",
     (
         "*",

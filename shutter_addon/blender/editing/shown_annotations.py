@@ -1,0 +1,74 @@
+"""Which annotation the previews show: that of the effect that is seen, none where none is seen, and never another one
+in place of one that the user made.
+
+A sequencer keeps its annotation in every one of its spaces, those too that lie behind another editor or in a workspace
+that is not shown: each is a user of it, and would bring it into the saved file.
+"""
+
+import bpy
+
+from ..data import annotations, selection
+
+_emptied: set[int] = set()  # addresses of spaces whose annotation was an effect's, until none was seen or it went
+
+
+def follow() -> None:
+    """Previews that are shown, and have an effect's scribbles, get those of the effect that is seen."""
+    for window in bpy.data.window_managers[0].windows:
+        found = selection.seen(window.workspace.sequencer_scene or window.scene)
+        for area in window.screen.areas:
+            if area.type == "SEQUENCE_EDITOR" and is_other(area.spaces.active, found):
+                give(area.spaces.active, found[1].scene.annotation if found else None)
+
+
+def is_other(space, found) -> bool:
+    """Whether a preview has to get another annotation, for what selection.seen has found in its edit."""
+    wanted = found[1].scene.annotation if found else None
+    if space.annotation is None:
+        return wanted is not None and space.as_pointer() in _emptied
+    return space.annotation != wanted and is_own(space.annotation)
+
+
+def is_own(annotation) -> bool:
+    """Whether an annotation was made for an effect."""
+    return annotation.virtual_shutter_made not in ("", annotations.USERS)
+
+
+def give(space, annotation) -> None:
+    """Makes an effect's annotation that of a preview; one of the user's goes on without it. None: takes it away until
+    an effect is seen."""
+    before = space.annotation
+    if before is not None and annotation is not None and not is_own(before):
+        before.use_fake_user = True  # or it would not be saved
+    space.annotation = annotation
+    (_emptied.discard if annotation else _emptied.add)(space.as_pointer())
+
+
+def let_go(annotation) -> None:
+    """Takes an annotation away from all previews."""
+    for space in _spaces():
+        if space.annotation == annotation:
+            give(space, None)
+
+
+def before_undo() -> None:
+    """Notes where scribbles are shown: Blender takes away what undo removes, and does not give it back."""
+    for space in _spaces():
+        if space.annotation is not None and is_own(space.annotation):
+            _emptied.add(space.as_pointer())
+
+
+def shown_by(annotation) -> int:
+    """How many previews have an annotation."""
+    return sum(space.annotation == annotation for space in _spaces())
+
+
+def forget() -> None:
+    """Forgets the previews of a file, before another one is loaded."""
+    _emptied.clear()
+
+
+def _spaces():
+    for screen in bpy.data.screens:
+        for area in screen.areas:
+            yield from (space for space in area.spaces if space.type == "SEQUENCE_EDITOR")

@@ -1,0 +1,205 @@
+"""What is edited is the effect that is seen; and no preview keeps an annotation of an effect that is gone."""
+
+import numpy as np
+import pytest
+from support import sequencer, write_frames
+
+from shutter_addon.blender.data import selection
+from shutter_addon.blender.editing import add_effect, lifecycle, shown_annotations, shutter_edits
+
+
+@pytest.fixture(autouse=True)
+def _no_exception(capfd):
+    """Blender prints what a handler raises, and goes on."""
+    yield
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def seen(edit):
+    found = selection.seen(edit)
+    return found and found[2]
+
+
+def active(bpy):
+    found = selection.active(bpy.context)
+    return found and found[2]
+
+
+def another(bpy, edit, tmp_path, channel=5, start=1):
+    """A second effect, on a source of its own, from a channel and a frame on."""
+    first = write_frames(tmp_path / f"in{channel}", np.zeros((1, 24, 40, 3), dtype=np.uint8))
+    source = edit.sequence_editor.strips.new_image("other", str(first), channel, start)
+    source.right_handle = start + 40
+    strip, effect = add_effect.add_effect(edit, source)
+    shutter_edits.start(effect)
+    return strip
+
+
+def strip_of(edit, effect):
+    return next(s for s in edit.sequence_editor.strips_all if s.type == "SCENE" and s.scene == effect.scene)
+
+
+def source_of(edit, effect):
+    return next(s for s in edit.sequence_editor.strips_all if s.virtual_shutter_source == effect.source)
+
+
+def test_after_a_cut_the_half_under_the_playhead_is_edited(bpy, edit, effect):
+    left = strip_of(edit, effect)
+    right = left.split(21, "SOFT")
+    for chosen in (left, right, source_of(edit, effect)):
+        edit.sequence_editor.active_strip = chosen
+        for frame, half in ((20, left), (21, right)):
+            edit.frame_set(frame)
+            assert seen(edit) == active(bpy) == half
+            assert selection.in_picture(bpy.context)[2] == half
+
+
+def test_halves_that_were_moved_apart_have_an_effect_each(bpy, edit, effect):
+    left = strip_of(edit, effect)
+    right = left.split(21, "SOFT")
+    right.content_start += 10
+    lifecycle.update()
+    edit.sequence_editor.active_strip = left
+    edit.frame_set(35)
+    assert selection.active(bpy.context)[1].scene == right.scene != left.scene
+    edit.frame_set(25)
+    assert seen(edit) is None
+    assert selection.in_picture(bpy.context) is None
+    assert active(bpy) == left
+    assert selection.why_unseen(edit, left) == "Move the playhead onto the Shutter strip"
+
+
+def test_of_effects_on_top_of_each_other_the_active_one_is_edited(bpy, edit, effect, tmp_path):
+    low, high = strip_of(edit, effect), another(bpy, edit, tmp_path)
+    for chosen, expected in ((low, low), (high, high), (source_of(edit, effect), low), (None, high)):
+        edit.sequence_editor.active_strip = chosen
+        assert seen(edit) == active(bpy) == expected
+
+
+def test_what_is_muted_is_not_edited(bpy, edit, effect, tmp_path):
+    low, high = strip_of(edit, effect), another(bpy, edit, tmp_path)
+    edit.sequence_editor.active_strip = high
+    high.mute = True
+    assert seen(edit) == active(bpy) == low
+    edit.sequence_editor.channels[low.channel].mute = True
+    assert seen(edit) is None
+    assert active(bpy) == high
+    assert selection.why_unseen(edit, high) == selection.why_unseen(edit, low) == "Unmute the Shutter strip"
+
+
+def test_an_effect_in_a_closed_meta_strip_is_not_edited_in_the_picture(bpy, edit, effect):
+    meta = edit.sequence_editor.strips.new_meta("meta", 7, 1)
+    meta.right_handle = 41
+    strip = strip_of(edit, effect)
+    strip.move_to_meta(meta)
+    edit.sequence_editor.active_strip = strip
+    assert seen(edit) is None
+    assert selection.why_unseen(edit, strip) == "Open the meta strip that the Shutter strip is in"
+    edit.sequence_editor.display_stack(meta)
+    assert seen(edit) == strip
+
+
+def test_of_a_strip_without_an_effect_nothing_is_active(bpy, edit, effect):
+    edit.sequence_editor.active_strip = edit.sequence_editor.strips.new_effect("title", "TEXT", 9, 1, length=40)
+    assert active(bpy) is None
+    assert selection.in_picture(bpy.context) is None
+    assert seen(edit) == strip_of(edit, effect)
+
+
+@pytest.fixture
+def previews(bpy, edit, effect):
+    """A preview that has the effect's annotation, and one behind another editor that has it as well."""
+    screen = bpy.data.window_managers[0].windows[0].screen
+    with sequencer(bpy) as area:
+        area.spaces.active.view_type = "PREVIEW"
+        hidden = screen.areas[1]
+        hidden.type = "SEQUENCE_EDITOR"
+        found = [area.spaces.active, hidden.spaces.active]
+        for space in found:
+            shown_annotations.give(space, effect.scene.annotation)
+        hidden.type = "CONSOLE"
+        yield [area.spaces.active, next(s for s in hidden.spaces if s.type == "SEQUENCE_EDITOR")]
+
+
+def by_strip(bpy, edit, effect):
+    edit.sequence_editor.strips.remove(strip_of(edit, effect))
+
+
+def by_scene(bpy, edit, effect):
+    bpy.data.scenes.remove(effect.scene)
+
+
+def by_edit(bpy, edit, effect):
+    bpy.context.window.workspace.sequencer_scene = bpy.context.window.scene = bpy.data.scenes.new("Other")
+    bpy.data.scenes.remove(edit)
+
+
+@pytest.mark.parametrize("delete", [by_strip, by_scene, by_edit])
+def test_no_preview_keeps_what_a_deleted_effect_had(bpy, edit, effect, previews, delete, tmp_path):
+    delete(bpy, edit, effect)
+    path = str(tmp_path / "saved.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)  # in the same step, before Blender updates anything
+    assert [space.annotation for space in previews] == [None, None]
+    assert not bpy.data.annotations
+    assert not bpy.data.cameras
+    with bpy.data.libraries.load(path) as (found, _):
+        assert (len(found.scenes), found.annotations, found.cameras, found.objects) == (1, [], [], [])
+
+
+def test_annotations_of_the_user_stay(bpy, edit, effect, previews, tmp_path):
+    """Those that are shown in place of an effect's, copies, and those that are used elsewhere."""
+    drawn, copied = bpy.data.annotations.new("Shutter of mine"), effect.scene.annotation.copy()
+    previews[0].annotation, previews[1].annotation = drawn, copied
+    lifecycle.update()
+    other = bpy.data.scenes.new("Other")
+    other.annotation = used = effect.scene.annotation
+    by_strip(bpy, edit, effect)
+    lifecycle.update()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    lifecycle.take_over()
+    assert [space.annotation for space in previews] == [drawn, copied]
+    assert other.annotation == used
+    assert len(bpy.data.annotations) == 3
+
+
+def test_drawing_keeps_the_annotation_that_the_preview_had(bpy, edit, effect, previews):
+    previews[0].annotation = drawn = bpy.data.annotations.new("Notes")
+    shown_annotations.give(previews[0], effect.scene.annotation)
+    assert drawn.use_fake_user
+
+
+def test_previews_follow_what_is_seen(bpy, edit, effect, previews, tmp_path):
+    other = another(bpy, edit, tmp_path, start=101)
+    own = effect.scene.annotation  # it may have moved in memory
+    for frame, expected in ((110, other.scene.annotation), (20, own), (70, None), (20, own)):
+        edit.frame_set(frame)
+        shown_annotations.follow()
+        assert previews[0].annotation == expected, frame
+    previews[0].annotation = None  # by the user
+    shown_annotations.follow()
+    assert previews[0].annotation is None
+
+
+def test_undo_shows_the_scribbles_again(bpy, edit, effect, previews):
+    bpy.ops.ed.undo_push(message="before")
+    by_strip(bpy, edit, effect)
+    lifecycle.update()
+    bpy.ops.ed.undo_push(message="deleted")
+    bpy.ops.ed.undo()
+    edit = bpy.context.scene
+    assert previews[0].annotation == edit.virtual_shutter.effects[0].scene.annotation is not None
+
+
+def test_an_older_file_is_mended(bpy, edit, effect, previews, tmp_path, monkeypatch):
+    """One that was saved with the annotation of a deleted effect, before such were marked."""
+    left = bpy.data.annotations.new("Shutter deleted.mp4")
+    notes = bpy.data.annotations.new("Notes")
+    previews[0].annotation, previews[1].annotation = left, notes
+    effect.scene.annotation.virtual_shutter_made = effect.scene.camera.data.virtual_shutter_made = ""
+    monkeypatch.setattr(lifecycle, "leave_to_user", lambda: None)  # which older versions did not have
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
+    scene = bpy.data.scenes["Scene"].virtual_shutter.effects[0].scene
+    assert {annotation.name for annotation in bpy.data.annotations} == {scene.annotation.name, "Notes"}
+    assert scene.annotation.virtual_shutter_made == scene.virtual_shutter.identity
+    assert scene.camera.data.virtual_shutter_made == scene.virtual_shutter.identity
