@@ -305,6 +305,7 @@ def begun():
     bpy.ops.wm.save_as_mainfile(filepath=FILE)
     bpy.ops.wm.open_mainfile(filepath=FILE)  # with nothing to undo
     yield 0.5
+    copied()  # so that there is something to paste
 
 
 def story():
