@@ -106,7 +106,7 @@ def _zoom(window, area, rows: float) -> None:
     region = preview_areas.preview_region(area)
     with bpy.context.temp_override(window=window, area=area, region=region):
         # The operator shows the height divided by the ratio, and a half, rounded up.
-        bpy.ops.sequencer.view_zoom_ratio(ratio=region.height / (rows - 0.51))
+        bpy.ops.sequencer.view_zoom_ratio(ratio=region.height / (rows - 0.6))
 
 
 def _centre(window, area, centre) -> None:
