@@ -49,7 +49,7 @@ def between(first, second, factor: int, method="quick", transfer="srgb", alpha="
 
 
 def luma(frame, transfer: str, alpha: str) -> np.ndarray:
-    """A frame (H, W, 4) of a source as a grey picture (H, W) uint8 of what is displayed; transfer, alpha: the source's."""
+    """A frame (H, W, 4) of a source, as it is displayed, in grey (H, W) uint8; transfer, alpha: the source's."""
     return _luma(_encoded(frame, transfer, alpha))
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 sys.path[:0] = [str(Path(__file__).parent)]
 
-import bpy
 import driver
 import preview_sizes_story as sizes
 import story

@@ -375,7 +375,7 @@ def test_one_look_at_full_quality(backend, tmp_path):
     assert "Traceback" not in console
     steps = {entry["step"]: entry for entry in seen if "step" in entry}
     composed = {name: entry["composed"] for name, entry in steps.items()}
-    assert composed == dict.fromkeys(steps, [[640, 360]]) | {"full": [[1280, 720]]}
+    assert composed == {name: [[640, 360]] for name in steps} | {"full": [[1280, 720]]}
     for name in ("back", "next", "changed"):
         assert steps[name]["view"] == pytest.approx(steps["before"]["view"], abs=1.1), name
     assert np.abs(crop(tmp_path, steps["back"]) - crop(tmp_path, steps["before"])).mean() < 1

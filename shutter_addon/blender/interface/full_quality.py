@@ -123,12 +123,17 @@ def forget() -> None:
     _before = previewing.whole = None
 
 
+classes = (SHUTTER_OT_full_quality,)
+
+
 def register():
-    bpy.utils.register_class(SHUTTER_OT_full_quality)
+    for cls in classes:
+        bpy.utils.register_class(cls)
 
 
 def unregister():
     forget()
     if bpy.app.timers.is_registered(_end_when_over):
         bpy.app.timers.unregister(_end_when_over)
-    bpy.utils.unregister_class(SHUTTER_OT_full_quality)
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)
