@@ -22,11 +22,13 @@ BUTTON = "shutter.smooth_streaks"
 
 
 def frame(number):
-    """Bars and dots over a ramp, SPEED pixels further in every frame."""
+    """Thin lines over a texture, SPEED pixels further in every frame."""
     import cv2
 
     noise = np.random.default_rng(4).integers(0, 256, (48, 96, 3), dtype=np.uint8)
-    texture = cv2.resize(noise, None, fx=8, fy=8, interpolation=cv2.INTER_CUBIC)
+    texture = cv2.resize(noise, None, fx=8, fy=8, interpolation=cv2.INTER_CUBIC) // 4
+    for line in range(20, texture.shape[1], 70):
+        texture[:, line : line + 3] = 255
     return texture[: SIZE[0], number * SPEED : number * SPEED + SIZE[1]].copy()
 
 

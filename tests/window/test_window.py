@@ -390,6 +390,27 @@ def test_one_look_at_full_quality(backend, tmp_path):
     assert min(np.abs(patch - part).max() for part in parts) <= TOLERANCE
 
 
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_too_few_frames_for_a_streak(backend, tmp_path):
+    """Said in the preview, with a button that builds what the strip needs, by which the steps go; undone and redone."""
+    given = {"packages": packages(tmp_path / "packages")}
+    seen, console = tell("strobing_story.py", backend, linked(tmp_path), **given)
+    assert "Traceback" not in console
+    steps = {entry["step"]: entry for entry in seen if "step" in entry}
+    found = {name: (entry["factor"], entry["bars"], entry["label"] is None) for name, entry in steps.items()}
+    stepped, smooth = ("1", [8, 8], False), ("4", [32, 32], True)
+    assert found == {"1_steps": stepped, "2_smooth": smooth, "3_undone": stepped, "4_redone": smooth}
+    for name in ("1_steps", "3_undone"):
+        assert steps[name]["label"].startswith("4× In-Between Frames: about "), name
+    before, after = (crop(tmp_path, steps[name])[120:280] for name in ("1_steps", "2_smooth"))  # the picture alone
+    assert detail(after) < 0.8 * detail(before)
+
+
+def detail(picture):
+    """How much neighbours along a row differ beyond what a smooth slope does."""
+    return np.abs(np.diff(picture, 2, axis=1)).mean()
+
+
 def test_renders_that_end_early(tmp_path):
     """A picture that fails ends the job, as Esc does: the movie is finished up to there, and a menu says why."""
     seen, console = tell("failing.py", "opengl", linked(tmp_path))

@@ -74,8 +74,7 @@ def time_in_words(seconds: float) -> str:
 
 def strobing_in_words(found: strobing.Strobing) -> str:
     """That an exposure has too few frames."""
-    sentence = rpt_("Too few frames: {pixels} pixels from one to the next, streaks have steps")
-    return sentence.format(pixels=f"{found.step:.0f}")
+    return rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{found.step:.0f}")
 
 
 def smoothing_in_words(found: strobing.Strobing) -> str | None:

@@ -30,12 +30,14 @@ def clear(region) -> None:
         del _placed[key]
 
 
+def width(button: Button) -> float:
+    """In pixels of a region."""
+    return drawing.text_width(button.label) + 2 * _PAD * drawing.ui_scale()
+
+
 def place(region, left: float, bottom: float, button: Button) -> None:
-    """Puts a button into a region, or as far to the left as it has to be: its gizmo draws it."""
-    unit = drawing.ui_scale()
-    width = drawing.text_width(button.label) + 2 * _PAD * unit
-    left = max(min(left, region.width - width - _PAD * unit), 0.0)
-    box = left, bottom, left + width, bottom + HEIGHT * unit
+    """Puts a button into a region: its gizmo draws it."""
+    box = left, bottom, left + width(button), bottom + HEIGHT * drawing.ui_scale()
     _placed[region.as_pointer(), button.operator] = box, button
 
 

@@ -54,6 +54,7 @@ def _is_of_another(annotation, edit, effect) -> bool:
     return annotation is not None and annotation != effect.scene.annotation and annotation in others
 
 
+_NAVIGATION = 56  # units at the right of a preview, where Blender's own buttons lie
 _STILL = 0.4  # seconds after which a frame that is shown stays
 
 
@@ -376,11 +377,14 @@ class _Notes:
     def draw(self):
         unit = drawing.ui_scale()
         y = self._region.height - 18 * unit
+        high = (note_buttons.HEIGHT + 5) * unit
         for line, button in self._lines:
-            y -= (18 if button is None else note_buttons.HEIGHT + 5) * unit
+            y -= 18 * unit if button is None else high
             drawing.text(16 * unit, y, line)
             if button is not None:
                 left = 26 * unit + drawing.text_width(line)
+                if left + note_buttons.width(button) > self._region.width - _NAVIGATION * unit:  # below the sentence
+                    left, y = 16 * unit, y - high
                 note_buttons.place(self._region, left, y - 6 * unit, button)
 
 

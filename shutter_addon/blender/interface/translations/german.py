@@ -689,10 +689,7 @@ MESSAGES = {
     ("Operator", "Smooth Streaks"): "Spuren glätten",
     ("*", "In-between frames are missing"): "Zwischenbilder fehlen",
     ("*", "Build"): "Erstellen",
-    (
-        "*",
-        "Too few frames: {pixels} pixels from one to the next, streaks have steps",
-    ): "Zu wenige Bilder: {pixels} Pixel von einem zum nächsten, Spuren haben Stufen",
+    ("*", "Too few frames: steps of {pixels} pixels"): "Zu wenige Bilder: Stufen von {pixels} Pixeln",
     ("*", "{factor}× In-Between Frames"): "{factor}× Zwischenbilder",
     ("*", "{factor}× In-Between Frames: about {time}, {size}"): "{factor}× Zwischenbilder: etwa {time}, {size}",
     ("*", "In-between frames are built"): "Die Zwischenbilder sind erstellt",
