@@ -156,7 +156,7 @@ def _show(context, found: Shown, settings, say) -> None:
         is_still = not context.screen.is_animation_playing
         _tell_detail(request.renderer.source, size, request is not exact, is_still, say)
         if is_still:
-            _tell_strobing(strobing.look(found.effect, found.strip, snapshot, exact), say)
+            _tell_strobing(found, snapshot, exact, say)
     has_result = settings.view in RESULTS
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
     # Else the engine has composed it, and it lies there in its place among the other strips.
@@ -206,14 +206,22 @@ def _tell_detail(source, size: tuple[int, int], is_draft: bool, is_still: bool, 
         say(rpt_("Preview: {what}").format(what=", ".join(less)), button)
 
 
-def _tell_strobing(found: strobing.Strobing | None, say) -> None:
+def _tell_strobing(found: Shown, snapshot, request, say) -> None:
     """Says that the exposure has too few frames, and gives the way to more."""
-    if found is not None and inbetween_build.running() is None:
-        say(inbetween_operators.strobing_in_words(found), _smoothing(found))
+    told = strobing.last(found.effect)
+    known = strobing.look(found.effect, found.strip, snapshot, request)
+    if known is not None and inbetween_build.running() is None:
+        say(inbetween_operators.strobing_in_words(known), _smoothing(known))
+    if known != told and not bpy.app.timers.is_registered(_redraw_panels):
+        bpy.app.timers.register(_redraw_panels)  # which may have been drawn before
     if strobing.is_busy():
         if bpy.app.timers.is_registered(_measure):
             bpy.app.timers.unregister(_measure)
         bpy.app.timers.register(_measure, first_interval=_STILL)  # once a frame stays
+
+
+def _redraw_panels() -> None:
+    inbetween_operators.redraw_panels(bpy.context)
 
 
 def _smoothing(found: strobing.Strobing) -> Button | None:
@@ -225,7 +233,6 @@ def _measure() -> float | None:
     """Has measured what tells of strobing, a little at a time."""
     if strobing.advance():
         redraw(None, bpy.context)
-        inbetween_operators.redraw_panels(bpy.context)
     return inbetween_operators.TICK if strobing.is_busy() else None
 
 
@@ -405,7 +412,7 @@ def unregister():
     global _handler
     bpy.types.SpaceSequenceEditor.draw_handler_remove(_handler, "PREVIEW")
     _handler = None
-    for timer in (_redraw_once, _follow_once, _measure):
+    for timer in (_redraw_once, _follow_once, _redraw_panels, _measure):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
     _shaders.clear()
