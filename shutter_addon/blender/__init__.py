@@ -4,9 +4,11 @@ from . import handlers
 from .data import preferences, properties
 from .interface import (
     bar_editor,
+    full_quality,
     icons,
     inbetween_operators,
     matte_operators,
+    note_buttons,
     operators,
     panels,
     preview,
@@ -31,7 +33,9 @@ _modules = (
     inbetween_operators,
     track_operators,
     matte_operators,
+    full_quality,
     panels,
+    note_buttons,
     bar_editor,
     region_gizmo,
     split_gizmo,

@@ -48,6 +48,16 @@ def between(first, second, factor: int, method="quick", transfer="srgb", alpha="
         yield _decoded(_mixed(ends, [path.at(t) for path in paths], t), first.dtype, transfer, alpha)
 
 
+def luma(frame, transfer: str, alpha: str) -> np.ndarray:
+    """A frame (H, W, 4) of a source, as it is displayed, in grey (H, W) uint8; transfer, alpha: the source's."""
+    return _luma(_encoded(frame, transfer, alpha))
+
+
+def vectors(first, second) -> np.ndarray:
+    """Where the pixels of a small picture (H, W) uint8 go in another one, quickly: vectors (H, W, 2) in pixels."""
+    return np.nan_to_num(_dis(first, second, finest=0, stride=4), posinf=0, neginf=0)
+
+
 def _dis(first, second, finest: int, stride: int) -> np.ndarray:
     """Vectors (H, W, 2) from the first picture's pixels to the second's.
 

@@ -10,7 +10,9 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, as_completed, wait
 from functools import partial
+from itertools import islice
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +20,7 @@ from ..core.claims import Claims
 from ..core.frame_source import FrameSource
 from . import cuts
 from .completeness import why_short
-from .errors import MediaError
+from .errors import MediaError, NotBuiltError
 from .files import check_index
 from .inbetween_cache import InbetweenCache, State, pair_line, unwritable, write_picture
 from .source import SourceWrapper
@@ -52,12 +54,13 @@ class InbetweenSource(SourceWrapper):
         return self._is_there(index)
 
     def check(self, index: int) -> None:
-        """MediaError: the frame is not built."""
+        """NotBuiltError: the frame is not built."""
         if not self.has(index):
-            raise MediaError(
+            sentence = (
                 f"{self.path.name}: in-between frames of frame {index // self.factor + 1} are missing; "
                 f"build them first (in {self._cache.folder})"
             )
+            raise NotBuiltError(sentence, self.factor)
 
     def read(self, index: int) -> np.ndarray:
         """The frame as a new array (height, width, 4), RGBA, top row first.
@@ -145,6 +148,38 @@ def estimate(source: FrameSource, factor: int) -> int:
                 raise MediaError(f"{folder}: a picture could not be written whole ({why_short(path.parent)})")
             sizes.append(path.stat().st_size)
     return (source.count - 1) * (factor - 1) * sum(sizes) // len(sizes)
+
+
+class Cost(NamedTuple):
+    """What in-between frames of a source cost: seconds for each pair and for each of its frames, and bytes of these."""
+
+    pair: float
+    frame: float
+    size: float
+
+    def seconds(self, pairs: int, factor: int) -> float:
+        return pairs * (self.pair + (factor - 1) * self.frame)
+
+    def bytes(self, pairs: int, factor: int) -> float:
+        return pairs * (factor - 1) * self.size
+
+
+def cost(source: FrameSource, pair: int, method: str, between=None) -> Cost:
+    """About what in-between frames of a source cost, by two that are made of one pair, and written: several pairs at a
+    time take hardly less each, as one has all processors already. between: as for `build`. MediaError: they cannot be
+    made."""
+    if between is None:
+        from .flow import between
+    when = [time.perf_counter()]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "picture.png" if source.dtype.kind == "u" else "picture.exr")
+        first, second = source.read(pair), source.read(pair + 1)
+        for picture in islice(between(first, second, 4, method, source.transfer, source.alpha), 2):
+            write_picture(path, picture, source.alpha)
+            when.append(time.perf_counter())
+        size = path.stat().st_size if path.exists() else 0
+    frame = when[2] - when[1]
+    return Cost(max(when[1] - when[0] - frame, 0.0), frame, size)
 
 
 def _pairs(source: FrameSource, frames: tuple[int, int] | None) -> range:

@@ -387,6 +387,50 @@ def test_previews_of_any_size_and_renders_after_them(tmp_path):
         assert_alike(pixels(tmp_path / f"{name}.png"), background, tmp_path / "opengl_difference.png")
 
 
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_one_look_at_full_quality(backend, tmp_path):
+    """From a preview that is composed at half size, by the button at its note: what F12 gives, pixel by pixel. It ends
+    by a second click, with the frame, and with a change, and the view is as before."""
+    seen, console = tell("full_quality_story.py", backend, linked(tmp_path))
+    assert "Traceback" not in console
+    steps = {entry["step"]: entry for entry in seen if "step" in entry}
+    composed = {name: entry["composed"] for name, entry in steps.items()}
+    assert composed == {name: [[640, 360]] for name in steps} | {"full": [[1280, 720]]}
+    for name in ("back", "next", "changed"):
+        assert steps[name]["view"] == pytest.approx(steps["before"]["view"], abs=1.1), name
+    assert np.abs(crop(tmp_path, steps["back"]) - crop(tmp_path, steps["before"])).mean() < 1
+    full, final = pixels(tmp_path / "full.png"), pixels(tmp_path / "final.png")
+    left, top, width, height = steps["full"]["crop"]
+    x, y = steps["full"]["middle"]
+    rows, columns = (top + 90, top + height - 40), (left + width // 2 + 60, left + width - 80)  # beside notes and bars
+    patch = full[slice(*rows), slice(*columns)]
+    # Where the view lies on the picture Blender tells to a pixel.
+    places = [(rows[0] - y + 360 + down, columns[0] - x + 640 + right) for down in (0, 1) for right in (-1, 0)]
+    parts = [final[row : row + patch.shape[0], column : column + patch.shape[1]] for row, column in places]
+    assert min(np.abs(patch - part).max() for part in parts) <= TOLERANCE
+
+
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_too_few_frames_for_a_streak(backend, tmp_path):
+    """Said in the preview, with a button that builds what the strip needs, by which the steps go; undone and redone."""
+    given = {"packages": packages(tmp_path / "packages")}
+    seen, console = tell("strobing_story.py", backend, linked(tmp_path), **given)
+    assert "Traceback" not in console
+    steps = {entry["step"]: entry for entry in seen if "step" in entry}
+    found = {name: (entry["factor"], entry["bars"], entry["label"] is None) for name, entry in steps.items()}
+    stepped, smooth = ("1", [8, 8], False), ("4", [32, 32], True)
+    assert found == {"1_steps": stepped, "2_smooth": smooth, "3_undone": stepped, "4_redone": smooth}
+    for name in ("1_steps", "3_undone"):
+        assert steps[name]["label"].startswith("4× In-Between Frames: about "), name
+    before, after = (crop(tmp_path, steps[name])[120:280] for name in ("1_steps", "2_smooth"))  # the picture alone
+    assert detail(after) < 0.8 * detail(before)
+
+
+def detail(picture):
+    """How much neighbours along a row differ beyond what a smooth slope does."""
+    return np.abs(np.diff(picture, 2, axis=1)).mean()
+
+
 def test_renders_that_end_early(tmp_path):
     """A picture that fails ends the job, as Esc does: the movie is finished up to there, and a menu says why."""
     seen, console = tell("failing.py", "opengl", linked(tmp_path))

@@ -69,6 +69,12 @@ def text(x: float, y: float, words: str, size: float = 11, color=(1, 1, 1, 0.9),
     blf.disable(0, blf.CLIPPING)
 
 
+def text_width(words: str, size: float = 11) -> float:
+    """How wide `text` draws words, in pixels."""
+    blf.size(0, size * ui_scale())
+    return blf.dimensions(0, words)[0]
+
+
 def _draw(kind: str, corners, colors, indices) -> None:
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     gpu.state.blend_set("ALPHA")

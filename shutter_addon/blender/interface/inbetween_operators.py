@@ -4,23 +4,28 @@ from concurrent.futures import wait
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import EnumProperty
 from bpy.types import Operator
 
 from ...core import messages
 from ..data import inbetween_settings, selection, strips, validation
-from ..rendering import inbetween_build
+from ..data.properties import INBETWEENS
+from ..rendering import inbetween_build, strobing
 from ..rendering.session import FAULTS
-from .operators import _OfEffect, redraw, refused
+from .operators import UNDOABLE, _OfEffect, redraw, refused
 
 TICK = 0.25  # seconds
+_RUNS = n_("In-between frames are being built; Esc stops that")
 
 _timer = None
 
 
 def stop() -> None:
-    """As inbetween_build.stop, and the status bar is Blender's again."""
+    """As inbetween_build.stop, and the status bar is Blender's again; and nothing is measured any more."""
     inbetween_build.stop()
+    strobing.forget()
     _show_end()
 
 
@@ -60,6 +65,39 @@ def size_in_words(size: int) -> str:
     return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.0f} MB" if size >= 1e6 else f"{size / 1e3:.0f} kB"
 
 
+def time_in_words(seconds: float) -> str:
+    """Seconds as "3 min", say."""
+    if seconds >= 3600:
+        return f"{seconds / 3600:.1f} h"
+    return f"{seconds / 60:.0f} min" if seconds >= 60 else f"{max(seconds, 1):.0f} s"
+
+
+def strobing_in_words(found: strobing.Strobing) -> str:
+    """That an exposure has too few frames."""
+    return rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{found.step:.0f}")
+
+
+def smoothing_in_words(found: strobing.Strobing) -> str | None:
+    """What helps against that, and what it takes; None: nothing does."""
+    if found.factor is None:
+        return None
+    if found.seconds is None:
+        return iface_("{factor}× In-Between Frames").format(factor=found.factor)
+    sentence = iface_("{factor}× In-Between Frames: about {time}, {size}")
+    size, time = size_in_words(found.size), time_in_words(found.seconds)
+    return sentence.format(factor=found.factor, time=time, size=size)
+
+
+def draw_strobing(layout, effect) -> None:
+    """In a panel: that the exposure that the preview shows has too few frames, and the button that helps."""
+    if (found := strobing.last(effect)) is None or inbetween_build.running() is not None:
+        return
+    column = layout.column(align=True)
+    column.label(text=strobing_in_words(found), icon="INFO", translate=False)
+    if (words := smoothing_in_words(found)) is not None:
+        column.operator("shutter.smooth_streaks", text=words, translate=False).factor = str(found.factor)
+
+
 class _OfInbetweens(_OfEffect):
     """Works on files, which are not undone."""
 
@@ -68,7 +106,7 @@ class _OfInbetweens(_OfEffect):
     @classmethod
     def possible(cls, effect):
         if inbetween_build.running() is not None:
-            return refused(cls, rpt_("In-between frames are being built; Esc stops that"))
+            return refused(cls, rpt_(_RUNS))
         try:
             inbetween_settings.settings(effect)
         except validation.EffectError as error:
@@ -76,17 +114,10 @@ class _OfInbetweens(_OfEffect):
         return True
 
 
-class SHUTTER_OT_inbetween_build(_OfInbetweens, Operator):
-    """Build the in-between frames that are missing, as files that are kept (Esc stops, and keeps what is built)"""
+class _Building(_OfInbetweens):
+    """Builds, and shows how far it is."""
 
-    bl_idname = "shutter.inbetween_build"
-    bl_label = "Build In-Between Frames"
-
-    @classmethod
-    def possible(cls, effect):
-        if effect.inbetween == "1":
-            return refused(cls, rpt_("Choose a factor first"))
-        return super().possible(effect)
+    _wanted = None  # factor of what the strip needs; None: all of the source's, of the effect's own
 
     def invoke(self, context, _event):
         if bpy.app.background:
@@ -101,7 +132,7 @@ class SHUTTER_OT_inbetween_build(_OfInbetweens, Operator):
 
     def _begin(self, context) -> bool:
         try:
-            self._build = inbetween_build.start(*selection.active(context))
+            self._build = inbetween_build.start(*selection.active(context), self._wanted)
         except FAULTS as error:
             self.report({"ERROR"}, str(error))
             return False
@@ -141,10 +172,54 @@ class SHUTTER_OT_inbetween_build(_OfInbetweens, Operator):
             return {"CANCELLED"}
         if state.name == "ready":
             self.report({"INFO"}, rpt_("In-between frames are built"))
-            return {"FINISHED"}
+            return self._built()
         sentence = rpt_("Stopped: {done} of {total} are built")
         self.report({"WARNING"}, sentence.format(done=state.done, total=state.total))
         return {"CANCELLED"}
+
+    def _built(self):
+        return {"FINISHED"}
+
+
+class SHUTTER_OT_inbetween_build(_Building, Operator):
+    """Build the in-between frames that are missing, as files that are kept (Esc stops, and keeps what is built)"""
+
+    bl_idname = "shutter.inbetween_build"
+    bl_label = "Build In-Between Frames"
+
+    @classmethod
+    def possible(cls, effect):
+        if effect.inbetween == "1":
+            return refused(cls, rpt_("Choose a factor first"))
+        return super().possible(effect)
+
+
+class SHUTTER_OT_smooth_streaks(_Building, Operator):
+    """Build the in-between frames that smooth streaks take, and use them (Esc stops, and keeps what is built)"""
+
+    bl_idname = "shutter.smooth_streaks"
+    bl_label = "Smooth Streaks"
+    bl_options = UNDOABLE
+
+    factor: EnumProperty(name="Factor", items=INBETWEENS[1:])
+
+    @classmethod
+    def possible(cls, effect):  # what else is wrong is reported: where it is clicked, nothing is greyed out
+        return inbetween_build.running() is None or refused(cls, rpt_(_RUNS))
+
+    def _begin(self, context) -> bool:
+        self._wanted = int(self.factor)
+        return super()._begin(context)
+
+    def _built(self):
+        """The factor is set now, so that the picture never lacks frames, and nothing is left of a build that was
+        stopped."""
+        effects = (effect for edit in bpy.data.scenes for effect in edit.virtual_shutter.effects)
+        effect = next((each for each in effects if each.scene and each.scene.session_uid == self._build.scene), None)
+        if effect is None:
+            return {"CANCELLED"}
+        effect.inbetween = self.factor
+        return {"FINISHED"}
 
 
 class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
@@ -178,7 +253,7 @@ class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
         return None
 
 
-classes = (SHUTTER_OT_inbetween_build, SHUTTER_OT_inbetween_purge)
+classes = (SHUTTER_OT_inbetween_build, SHUTTER_OT_smooth_streaks, SHUTTER_OT_inbetween_purge)
 
 
 def register():

@@ -122,6 +122,7 @@ class _Shutters:
             layout.label(text=selection.why_unseen(found[0], found[2]), icon="INFO", translate=False)
         _draw_live(layout, context)
         _draw_source(layout, effect)
+        inbetween_operators.draw_strobing(layout, effect)
         row = layout.row()
         row.template_list("SHUTTER_UL_shutters", "", effect, "shutters", effect, "active_shutter", rows=4)
         _list_buttons(row, "shutter", "SHUTTER_MT_shutters")

@@ -5,6 +5,7 @@ from dataclasses import replace
 import bpy
 import gpu
 import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty
 from bpy.types import PropertyGroup
@@ -13,12 +14,14 @@ from gpu_extras.batch import batch_for_shader
 from ...compute.passes import body
 from ...core.frame_state import FrameState
 from ...media import MediaError
+from ...media.errors import NotBuiltError
 from ..data import annotations, geometry, selection, strips
 from ..data.properties import CONTEXT
 from ..editing import shown_annotations
-from ..rendering import blender_gpu, invalidation, render_job, session
+from ..rendering import blender_gpu, inbetween_build, invalidation, render_job, session, strobing
 from ..rendering.blender_gpu import Texture
-from . import drawing, preview_areas, previewing
+from . import drawing, inbetween_operators, note_buttons, preview_areas, previewing
+from .note_buttons import Button
 from .previewing import RESULTS, Shown, shown
 
 VIEWS = (
@@ -42,7 +45,8 @@ def _follow_once() -> None:
     shown_annotations.follow()
 
 
-_TIMERS = (_redraw_once, _follow_once)
+_NAVIGATION = 56  # units at the right of a preview, where Blender's own buttons lie
+_STILL = 0.4  # seconds after which a frame that is shown stays
 
 
 class ShutterPreview(PropertyGroup):
@@ -86,6 +90,7 @@ def _draw() -> None:
     context = bpy.context
     settings = context.window_manager.virtual_shutter
     blender_gpu.free_unused()
+    note_buttons.clear(context.region)
     if bpy.app.is_job_running("RENDER") or render_job.ends_films():
         return
     invalidation.drop_lesser()
@@ -103,25 +108,31 @@ def _draw() -> None:
     say = _Notes(context.region)
     found = shown(context)
     if found is None:
+        previewing.whole = None
         _tell_unseen(context, say)
         return
     with drawing.pixel_space(context.region):
         try:
             _show(context, found, settings, say)
         except session.FAULTS as error:
-            say(_fault(error))
+            _tell_fault(error, say)
         say.draw()
 
 
 def request_of(context, found: Shown) -> session.FrameRequest:
     """What the effect strip shows at the current frame, in the previews' size, as a draft where a still result is not
     exact anyway. One of session.FAULTS: it cannot be shown."""
-    frame = found.edit.frame_current
-    snapshot = invalidation.current(found.edit, found.effect, found.strip, frame)
-    detail = previewing.detail(context, found.edit, found.effect, found.strip)
-    request = session.here().request(snapshot, frame, detail=detail)
+    return _drafted(context, found, previewing.requested(context, found, _snapshot(found)))
+
+
+def _snapshot(found: Shown):
+    return invalidation.current(found.edit, found.effect, found.strip, found.edit.frame_current)
+
+
+def _drafted(context, found: Shown, request) -> session.FrameRequest:
     is_result = context.window_manager.virtual_shutter.view in RESULTS and _is_rendered(found)
-    return request if is_result and not context.screen.is_animation_playing else request.draft()
+    is_exact = previewing.whole is not None or (is_result and not context.screen.is_animation_playing)
+    return request if is_exact else request.draft()
 
 
 def _tell_unseen(context, say) -> None:
@@ -140,11 +151,16 @@ def _is_rendered(found: Shown) -> bool:
 
 
 def _show(context, found: Shown, settings, say) -> None:
-    request = request_of(context, found)
+    snapshot = _snapshot(found)
+    exact = previewing.requested(context, found, snapshot)
+    request = _drafted(context, found, exact)
     size = annotations.picture_size(found.effect)
     quad = Quad(context.region, found.strip, size)
     if context.space_data.show_overlays:
-        _tell_detail(request.renderer.source, size, say)
+        is_still = not context.screen.is_animation_playing
+        _tell_detail(request.renderer.source, size, request is not exact, is_still, say)
+        if is_still:
+            _tell_strobing(found, snapshot, exact, say)
     has_result = settings.view in RESULTS
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
     # Else the engine has composed it, and it lies there in its place among the other strips.
@@ -177,15 +193,51 @@ def _warn(found: Shown, say) -> None:
         say(rpt_("This view has the view transform Standard"))
 
 
-def _tell_detail(source, size: tuple[int, int], say) -> None:
-    """Says in how much detail the picture is composed, where that is less than a render's; size: of a render's."""
-    scale, is_small = f"1/{round(size[0] / source.width)}", source.width < size[0]
-    if is_small and source.from_proxy:
-        say(rpt_("Composed at {scale} size, from a proxy").format(scale=scale))
-    elif is_small:
-        say(rpt_("Composed at {scale} size").format(scale=scale))
-    elif source.from_proxy:
-        say(rpt_("Composed from a proxy"))
+def _tell_detail(source, size: tuple[int, int], is_draft: bool, is_still: bool, say) -> None:
+    """Says in what the picture is less than a render's; size: of that. And gives the way to see that one, and back."""
+    if previewing.whole is not None:
+        say(rpt_("Full quality, as it will be rendered"), Button("shutter.full_quality", iface_("Back")))
+        return
+    less = []
+    if source.width < size[0]:
+        less.append(rpt_("{scale} of the size").format(scale=f"1/{round(size[0] / source.width)}"))
+    if source.from_proxy:
+        less.append(rpt_("from a proxy"))
+    if is_draft:
+        less.append(rpt_("a draft of the edges"))
+    if less:
+        button = Button("shutter.full_quality", iface_("Full Quality")) if is_still else None
+        say(rpt_("Preview: {what}").format(what=", ".join(less)), button)
+
+
+def _tell_strobing(found: Shown, snapshot, request, say) -> None:
+    """Says that the exposure has too few frames, and gives the way to more."""
+    told = strobing.last(found.effect)
+    known = strobing.look(found.effect, found.strip, snapshot, request)
+    if known is not None and inbetween_build.running() is None:
+        say(inbetween_operators.strobing_in_words(known), _smoothing(known))
+    if known != told and not bpy.app.timers.is_registered(_redraw_panels):
+        bpy.app.timers.register(_redraw_panels)  # which may have been drawn before
+    if strobing.is_busy():
+        if bpy.app.timers.is_registered(_measure):
+            bpy.app.timers.unregister(_measure)
+        bpy.app.timers.register(_measure, first_interval=_STILL)  # once a frame stays
+
+
+def _redraw_panels() -> None:
+    inbetween_operators.redraw_panels(bpy.context)
+
+
+def _smoothing(found: strobing.Strobing) -> Button | None:
+    label = inbetween_operators.smoothing_in_words(found)
+    return label and Button("shutter.smooth_streaks", label, {"factor": str(found.factor)})
+
+
+def _measure() -> float | None:
+    """Has measured what tells of strobing, a little at a time."""
+    if strobing.advance():
+        redraw(None, bpy.context)
+    return inbetween_operators.TICK if strobing.is_busy() else None
 
 
 def _tell_missing(request, say) -> None:
@@ -193,11 +245,16 @@ def _tell_missing(request, say) -> None:
     try:
         request.check()
     except MediaError as error:
-        say(_fault(error))
+        _tell_fault(error, say)
 
 
-def _fault(error: Exception) -> str:
-    return rpt_("Shutter: {fault}").format(fault=error)
+def _tell_fault(error: Exception, say) -> None:
+    """Says why there is no picture."""
+    if isinstance(error, NotBuiltError) and inbetween_build.running() is None:
+        button = Button("shutter.smooth_streaks", iface_("Build"), {"factor": str(error.factor)})
+        say(rpt_("In-between frames are missing"), button)
+    else:
+        say(rpt_("Shutter: {fault}").format(fault=error))
 
 
 def _show_strokes(context, quad, effect, request) -> None:
@@ -320,18 +377,26 @@ def _shader(name: str):
 
 
 class _Notes:
-    """Sentences at the upper left of a region."""
+    """Sentences at the upper left of a region, each with a button or none."""
 
     def __init__(self, region):
         self._region, self._lines = region, []
 
-    def __call__(self, sentence: str):
-        self._lines.append(sentence)
+    def __call__(self, sentence: str, button: Button | None = None):
+        self._lines.append((sentence, button))
 
     def draw(self):
         unit = drawing.ui_scale()
-        for i, line in enumerate(self._lines):
-            drawing.text(16 * unit, self._region.height - (i + 2) * 18 * unit, line)
+        y = self._region.height - 18 * unit
+        high = (note_buttons.HEIGHT + 5) * unit
+        for line, button in self._lines:
+            y -= 18 * unit if button is None else high
+            drawing.text(16 * unit, y, line)
+            if button is not None:
+                left = 26 * unit + drawing.text_width(line)
+                if left + note_buttons.width(button) > self._region.width - _NAVIGATION * unit:  # below the sentence
+                    left, y = 16 * unit, y - high
+                note_buttons.place(self._region, left, y - 6 * unit, button)
 
 
 classes = (ShutterPreview,)
@@ -351,7 +416,7 @@ def unregister():
     global _handler
     bpy.types.SpaceSequenceEditor.draw_handler_remove(_handler, "PREVIEW")
     _handler = None
-    for timer in _TIMERS:
+    for timer in (_redraw_once, _follow_once, _redraw_panels, _measure):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
     blender_gpu.free(*_shaders.values())

@@ -37,6 +37,34 @@ class Shown:
     strips_above: bool
 
 
+@dataclass
+class Whole:
+    """The picture that is looked at as it will be rendered, by the effect's scene and the timeline frame.
+
+    key: of its request (FrameRequest.key), its renderer excepted; None: it was not drawn yet"""
+
+    scene: int
+    frame: int
+    key: tuple | None = None
+
+
+whole: Whole | None = None
+
+
+def requested(context, found: Shown, snapshot: Snapshot) -> session.FrameRequest:
+    """What an effect strip shows at the current frame, in the previews' detail: in full, while it is looked at so. That
+    ends here with the frame and with a change of the effect. One of session.FAULTS: it cannot be shown."""
+    global whole
+    frame, here = found.edit.frame_current, session.here()
+    if whole is not None and (whole.scene, whole.frame) == (snapshot.scene, frame) and not _is_playing(context):
+        request = here.request(snapshot, frame, detail=session.FULL)
+        if whole.key in (None, request.key[1:]):
+            whole.key = request.key[1:]
+            return request
+    whole = None
+    return here.request(snapshot, frame, detail=detail(context, found.edit, found.effect, found.strip))
+
+
 def shown(context) -> Shown | None:
     """The effect strip under the playhead that the preview shows, as selection.seen has it."""
     edit, space = selection.edit_of(context), context.space_data
@@ -140,11 +168,14 @@ def _needed(snapshot: Snapshot, frame: float) -> tuple[session.Detail, bool]:
         return session.FULL, False
     edit, found = selection.edit_of(context), shown(context)
     if found is None or found.effect.scene.session_uid != snapshot.scene or edit.frame_current != frame:
+        if whole is not None:
+            return session.FULL, False
         strip = next((s for s in strips.effect_strips(edit) if s.scene.session_uid == snapshot.scene), None)
         effect = strip and strips.effect_of(edit, strip.scene)
         return (detail(context, edit, effect, strip) if effect else session.FULL), False
-    wanted = detail(context, edit, found.effect, found.strip)
-    return wanted, is_drawn(context, found, session.here().request(snapshot, frame, detail=wanted))
+    request = requested(context, found, snapshot)
+    wanted = session.FULL if whole is not None else detail(context, edit, found.effect, found.strip)
+    return wanted, is_drawn(context, found, request)
 
 
 def register():

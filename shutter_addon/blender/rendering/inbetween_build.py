@@ -6,9 +6,12 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from typing import NamedTuple
 
+from ...core.messages import EffectError
+from ...core.shutters import ShutterError
 from ...media import MediaError, inbetween_cache
 from ...media.inbetween import build, estimate
-from ..data import inbetween_settings, source_media, strips
+from ..data import inbetween_settings, snapshot, source_media, strips
+from . import strobing
 
 _FRESH = 1.0  # seconds that files are not asked again, as panels are drawn often
 _KEPT = 16
@@ -77,23 +80,26 @@ def _in_thread(function, *arguments) -> Future:
 class Build:
     """In-between frames of an effect that are being built, by a thread that touches no bpy.
 
-    scene: session_uid of the effect's scene; done, total: pairs of neighbouring source frames
+    scene: session_uid of the effect's scene; done, total: pairs of neighbouring source frames; settings: what it builds
     future: how far it came, an inbetween_cache.State; or MediaError"""
 
-    def __init__(self, edit, effect, strip):
-        """EffectError, MediaError: it cannot begin."""
-        settings, medium = (
-            inbetween_settings.settings(effect),
-            source_media.open_media(strips.source_of(edit, effect, strip)),
-        )
+    def __init__(self, edit, effect, strip, factor: int | None = None):
+        """factor: builds what the strip needs with it, in place of all of the source with its own. EffectError,
+        MediaError: it cannot begin."""
+        self.settings = inbetween_settings.settings(effect)
+        medium, pairs = source_media.open_media(strips.source_of(edit, effect, strip)), None
+        if factor is not None:
+            self.settings = self.settings._replace(factor=factor)
+            pairs = _needed(edit, effect, strip, medium, self.settings)
         self.scene = effect.scene.session_uid
-        self.done, self.total = 0, medium.count - 1
+        self.done, self.total = 0, medium.count - 1 if pairs is None else len(pairs)
         self._stopped = threading.Event()
-        self.future = _in_thread(self._build, medium, *settings)
+        self.future = _in_thread(self._build, medium, pairs)
 
-    def _build(self, medium, *settings):
+    def _build(self, medium, pairs):
         with medium:
-            return build(medium, *settings, update=self._update, cancelled=self._stopped.is_set)
+            told = {"update": self._update, "cancelled": self._stopped.is_set}
+            return build(medium, *self.settings, **told, pairs=pairs)
 
     def _update(self, done, _total):
         self.done = done
@@ -103,15 +109,25 @@ class Build:
         self._stopped.set()
 
 
+def _needed(edit, effect, strip, medium, settings) -> list[int]:
+    frames = range(strip.left_handle, strip.right_handle)
+    try:
+        return strobing.pairs(snapshot.take(edit, effect, strip, frames), medium, settings)
+    except ShutterError as error:
+        raise EffectError(str(error)) from None
+    finally:
+        medium.close()  # it opens again as it is read
+
+
 def running() -> Build | None:
     """The build that runs: one at a time, as it uses the whole machine."""
     return _running
 
 
-def start(edit, effect, strip) -> Build:
-    """Begins a build. EffectError, MediaError: it cannot begin."""
+def start(edit, effect, strip, factor: int | None = None) -> Build:
+    """Begins a build; factor: as of Build. EffectError, MediaError: it cannot begin."""
     global _running
-    _running = Build(edit, effect, strip)
+    _running = Build(edit, effect, strip, factor)
     inbetween_settings.built.hold()
     return _running
 

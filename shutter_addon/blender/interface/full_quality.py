@@ -1,0 +1,139 @@
+"""One look at the shown frame as it will be rendered: composed in full, exactly, and a pixel of the picture to one of
+the screen. It ends with a second click, with the frame, and with a change of the effect; then the view is as before."""
+
+from dataclasses import dataclass
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import Operator
+
+from . import preview_areas, previewing
+from .operators import refused
+
+_TICK = 0.1  # seconds between two looks at whether it has ended
+
+
+@dataclass
+class _View:
+    """How a preview was before; area: its address; rows, centre: as of _view_of."""
+
+    area: int
+    size: str
+    proxies: bool
+    rows: float
+    centre: tuple[float, float]
+
+
+_before: _View | None = None
+
+
+class SHUTTER_OT_full_quality(Operator):
+    """Show this frame as it will be rendered, each of its pixels on one of the screen's, or end that"""
+
+    bl_idname = "shutter.full_quality"
+    bl_label = "Full Quality"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context):
+        return _shown(context) is not None or refused(cls, rpt_("No preview shows a Shutter strip"))
+
+    def execute(self, context):
+        if previewing.whole is not None:
+            previewing.whole = None
+            _end()
+        else:
+            window, area, found = _shown(context)
+            previewing.whole = previewing.Whole(found.effect.scene.session_uid, found.edit.frame_current)
+            found.strip.invalidate_cache("RAW")
+            _begin(window, area)
+        return {"FINISHED"}
+
+
+def _shown(context):
+    """Window, area and previewing.Shown of the preview that is looked at: the context's own, else another; or None."""
+    areas = sorted(preview_areas.previews(context), key=lambda pair: pair[1] != context.area)
+    for window, area in areas:
+        with context.temp_override(window=window, area=area, region=preview_areas.preview_region(area)):
+            if (found := previewing.shown(bpy.context)) is not None:
+                return window, area, found
+    return None
+
+
+def _begin(window, area) -> None:
+    global _before
+    space, region = area.spaces.active, preview_areas.preview_region(area)
+    _before = _View(area.as_pointer(), space.proxy_render_size, space.use_proxies, *_view_of(region))
+    space.proxy_render_size, space.use_proxies = "SCENE", False
+    _zoom(window, area, region.height)
+    bpy.app.timers.register(_end_when_over, first_interval=_TICK)
+    preview_areas.redraw(bpy.context)
+
+
+def _end_when_over() -> float | None:
+    if _before is None:
+        return None
+    if previewing.whole is None:
+        _end()
+        return None
+    return _TICK
+
+
+def _end() -> None:
+    """Has the view as before: what of it the user has not changed since."""
+    global _before
+    before, _before = _before, None
+    found = [pair for pair in preview_areas.previews(bpy.context) if before and pair[1].as_pointer() == before.area]
+    for window, area in found:
+        space, region = area.spaces.active, preview_areas.preview_region(area)
+        if (space.proxy_render_size, space.use_proxies) == ("SCENE", False):
+            space.proxy_render_size, space.use_proxies = before.size, before.proxies
+        if abs(_view_of(region)[0] - region.height) < 1:
+            _zoom(window, area, before.rows)
+            _centre(window, area, before.centre)
+    preview_areas.redraw(bpy.context)
+
+
+def _view_of(region) -> tuple[float, tuple[float, float]]:
+    """How many rows of the sequencer's picture a region shows, and what lies in its centre."""
+    size = region.width, region.height
+    (left, bottom), (right, top) = (region.view2d.region_to_view(*at) for at in ((0, 0), size))
+    # Blender takes the region for one pixel smaller.
+    return (top - bottom) * (region.height - 1) / region.height, ((left + right) / 2, (bottom + top) / 2)
+
+
+def _zoom(window, area, rows: float) -> None:
+    region = preview_areas.preview_region(area)
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        # The operator shows the height divided by the ratio, and a half, rounded up.
+        bpy.ops.sequencer.view_zoom_ratio(ratio=region.height / (rows - 0.6))
+
+
+def _centre(window, area, centre) -> None:
+    region = preview_areas.preview_region(area)
+    rows, now = _view_of(region)
+    x, y = ((wanted - here) * region.height / rows for wanted, here in zip(centre, now, strict=True))
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.view2d.pan(deltax=round(x), deltay=round(y))
+
+
+def forget() -> None:
+    """Ends it, and leaves the view as it is."""
+    global _before
+    _before = previewing.whole = None
+
+
+classes = (SHUTTER_OT_full_quality,)
+
+
+def register():
+    for cls in classes:
+        bpy.utils.register_class(cls)
+
+
+def unregister():
+    forget()
+    if bpy.app.timers.is_registered(_end_when_over):
+        bpy.app.timers.unregister(_end_when_over)
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

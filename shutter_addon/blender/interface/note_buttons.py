@@ -1,0 +1,102 @@
+"""Buttons at the ends of the preview's notes, each of which calls an operator."""
+
+from dataclasses import dataclass, field
+
+import bpy
+from bpy.types import Gizmo, GizmoGroup
+
+from . import drawing, previewing
+
+HEIGHT = 19  # in units of the interface
+_PAD = 8
+OPERATORS = "shutter.full_quality", "shutter.smooth_streaks"
+
+
+@dataclass(frozen=True)
+class Button:
+    """operator: one of OPERATORS; values: of its properties"""
+
+    operator: str
+    label: str
+    values: dict = field(default_factory=dict)
+
+
+_placed: dict[tuple[int, str], tuple[tuple, Button]] = {}  # by region and operator: left, bottom, right, top
+
+
+def clear(region) -> None:
+    """Takes all buttons from a region."""
+    for key in [key for key in _placed if key[0] == region.as_pointer()]:
+        del _placed[key]
+
+
+def width(button: Button) -> float:
+    """In pixels of a region."""
+    return drawing.text_width(button.label) + 2 * _PAD * drawing.ui_scale()
+
+
+def place(region, left: float, bottom: float, button: Button) -> None:
+    """Puts a button into a region: its gizmo draws it."""
+    box = left, bottom, left + width(button), bottom + HEIGHT * drawing.ui_scale()
+    _placed[region.as_pointer(), button.operator] = box, button
+
+
+class SHUTTER_GT_note_button(Gizmo):
+    bl_idname = "SHUTTER_GT_note_button"
+
+    def draw(self, context):
+        if (found := _placed.get((context.region.as_pointer(), self.operator))) is None:
+            return
+        (left, bottom, right, top), button = found
+        look = context.preferences.themes[0].user_interface.wcol_tool
+        unit = drawing.ui_scale()
+        with drawing.pixel_space(context.region):
+            drawing.rectangles([(left, bottom, right, top)], [(*look.outline[:3], 1.0)])
+            inner = (left + 1, bottom + 1, right - 1, top - 1)
+            drawing.rectangles([inner], [(*(look.inner_sel if self.is_highlight else look.inner)[:3], 1.0)])
+            color = look.text_sel if self.is_highlight else look.text
+            drawing.text(left + _PAD * unit, bottom + 6 * unit, button.label, color=(*color, 1.0))
+
+    def test_select(self, context, location):
+        if (found := _placed.get((context.region.as_pointer(), self.operator))) is None:
+            return -1
+        (left, bottom, right, top), _button = found
+        return 0 if left <= location[0] <= right and bottom <= location[1] <= top else -1
+
+
+class SHUTTER_GGT_note_buttons(GizmoGroup):
+    bl_idname = "SHUTTER_GGT_note_buttons"
+    bl_label = "Buttons of Notes"
+    bl_space_type = "SEQUENCE_EDITOR"
+    bl_region_type = "PREVIEW"
+    bl_options = {"PERSISTENT"}
+
+    @classmethod
+    def poll(cls, context):
+        return context.window_manager.virtual_shutter.live and previewing.shown(context) is not None
+
+    def setup(self, _context):
+        for operator in OPERATORS:
+            gizmo = self.gizmos.new(SHUTTER_GT_note_button.bl_idname)
+            gizmo.operator = operator
+            gizmo.target_set_operator(operator)
+
+    def draw_prepare(self, context):
+        for gizmo in self.gizmos:
+            found = _placed.get((context.region.as_pointer(), gizmo.operator))
+            for name, value in (found[1].values if found else {}).items():
+                setattr(gizmo.target_set_operator(gizmo.operator), name, value)
+
+
+classes = (SHUTTER_GT_note_button, SHUTTER_GGT_note_buttons)
+
+
+def register():
+    for cls in classes:
+        bpy.utils.register_class(cls)
+
+
+def unregister():
+    _placed.clear()
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

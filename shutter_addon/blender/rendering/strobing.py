@@ -1,0 +1,217 @@
+"""Whether an exposure has too few frames for its streaks: how far what it shows moves from one frame of it to the next,
+how many in-between frames help, and what these cost.
+
+It is measured in a thread that touches no bpy, of a few frames of the footage, and only when the interface says so
+(`advance`): drawing asks for what is known, and never waits."""
+
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import compositor, shutters
+from ...core.frame_state import FrameState
+from ...core.motions import Similarity
+from ...media import MediaError, inbetween, steps
+from ...media.cuts import ShotSource
+from ..data import inbetween_settings
+from ..data.snapshot import Snapshot
+from . import session
+
+FACTORS = 2, 4, 8, 16
+_PAIRS = 4  # of neighbouring frames that are measured for a picture, at most
+_KEPT = 64  # pairs whose motion is kept, of half a megabyte each
+
+
+class Strobing(NamedTuple):
+    """An exposure with too few frames.
+
+    step: pixels of the footage from one of its frames to the next
+    factor: of in-between frames, with which it looks smooth, or as smooth as can be; None: there is none
+    seconds, size: of all that the strip needs, and bytes, about; None: that is not known yet"""
+
+    step: float
+    factor: int | None
+    seconds: float | None = None
+    size: float | None = None
+
+
+_moved: dict[tuple, steps.Moved | None] = {}  # by a source's key and a pair
+_costs: dict[tuple, inbetween.Cost | None] = {}  # by a source's key and a method
+_found: dict[int, tuple[float, Strobing | None]] = {}  # by scene: the timeline frame that was looked at last
+_wanted: Callable[[], None] | None = None
+_job: Future | None = None
+_stopped = threading.Event()
+
+
+def look(effect, strip, snapshot: Snapshot, request: session.FrameRequest) -> Strobing | None:
+    """What is known of a picture's exposure; None: nothing, or it is smooth. What is not known is asked for."""
+    global _wanted
+    _wanted = None
+    frame, found = effect.id_data.frame_current, None
+    if steps.is_possible():
+        found = _look(effect, strip, snapshot, request)
+    _found[snapshot.scene] = frame, found
+    return found
+
+
+def last(effect) -> Strobing | None:
+    """What the last look has found, if it was at the effect's current frame."""
+    frame, found = _found.get(effect.scene.session_uid, (None, None))
+    return found if frame == effect.id_data.frame_current else None
+
+
+def _look(effect, strip, snapshot, request):
+    global _wanted
+    ways = _ways(request)
+    pairs = _chosen(sorted(ways))
+    if lacking := [pair for pair in pairs if (snapshot.source.key, pair) not in _moved]:
+        _wanted = partial(_measure_motion, snapshot.source, lacking)
+        return None
+    known = [(found, way) for pair in pairs for way in ways[pair] if (found := _moved[snapshot.source.key, pair])]
+    height = effect.scene.render.resolution_y
+    step = max((steps.step(found, *way) for found, way in known), default=0.0) * height / request.state.options.step
+    if step <= steps.smooth(height):
+        return None
+    factor = _factor(request.state, step / steps.smooth(height))
+    if factor is None:
+        return Strobing(step, None)
+    key = snapshot.source.key, inbetween_settings.method(effect)
+    if key not in _costs:
+        _wanted = partial(_measure_cost, snapshot.source, pairs[0], key)
+    if (cost := _costs.get(key)) is None:
+        return Strobing(step, factor)
+    count = _count(strip, snapshot, request)
+    return Strobing(step, factor, cost.seconds(count, factor), cost.bytes(count, factor))
+
+
+def _ways(request) -> dict[int, list[tuple[Similarity, Similarity]]]:
+    """By pairs of filmed frames, each by its first, over which a shutter stays open that is seen: where the points of
+    the shown picture lie in the two, in heights of the picture, for each of these shutters."""
+    state, source = request.state, request.renderer.source
+    options, count, found = state.options, state.options.step, {}
+    shot = request.renderer.shot(request.index, request.direction, state, known=True)
+    frames = compositor.window_indices(options, request.index, shot, request.direction)
+    for i in _seen(state):
+        is_open = state.bars[i] > 0
+        both = is_open[1:] & is_open[:-1] & (frames[1:] != frames[:-1]) & (frames[1:] >= 0) & (frames[:-1] >= 0)
+        for pair in set((np.minimum(frames[1:], frames[:-1])[both] // count).tolist()):
+            ends = pair * count, (pair + 1) * count
+            found.setdefault(pair, []).append(tuple(_way(state, i, end, source.height) for end in ends))
+    return found
+
+
+def _seen(state: FrameState) -> set[int]:
+    """The shutters that pixels are exposed with."""
+    drawn = {shape.shutter for shape in state.shapes if len(shape.strokes)}
+    if state.options.border or not drawn:
+        drawn.add(0)
+    return drawn | {matte.shutter for matte in state.mattes}
+
+
+def _way(state: FrameState, shutter: int, frame: int, height: int) -> Similarity:
+    if state.following is None:
+        return Similarity()
+    turns, shifts = state.following.at([frame])
+    return Similarity(complex(turns[0, shutter]), complex(shifts[0, shutter]) / height)
+
+
+def _chosen(pairs: list[int]) -> list[int]:
+    """A few of them: those of neighbouring pictures are the same, mostly."""
+    apart = 1
+    while len(pairs) > apart * _PAIRS:
+        apart *= 2
+    return [pair for pair in pairs if pair % apart == 0] or pairs[:1]
+
+
+def _factor(state: FrameState, ratio: float) -> int | None:
+    """The least factor with which steps get smaller by a ratio, or the largest that there is room for."""
+    now, window = state.options.step, state.options.window
+    possible = [factor for factor in FACTORS if factor > now and window * factor // now <= shutters.MAX_WINDOW]
+    return next((factor for factor in possible if factor >= ratio * now), possible[-1] if possible else None)
+
+
+def _count(strip, snapshot: Snapshot, request) -> int:
+    """About how many pairs the strip's pictures need, or a few more."""
+    source, options = request.renderer.source, request.state.options
+    most = source.filmed - 1
+    if snapshot.timing is None:
+        return most
+    ends = (session.source_index(snapshot, at, source)[0] for at in (strip.left_handle, strip.right_handle - 1))
+    first, final = (index // options.step for index in ends)
+    return min(abs(final - first) + -(-options.window // options.step), most)
+
+
+def pairs(snapshot: Snapshot, medium, settings: inbetween_settings.Settings) -> list[int]:
+    """The pairs of filmed frames, each by its first, ascending, whose in-between frames an effect strip needs with
+    these settings, in place of its own, at the snapshot's frames: those across cuts as well, which take no time.
+    EffectError, MediaError: that cannot be known."""
+    factor, found = settings.factor, set()
+    source = ShotSource(inbetween.InbetweenSource(medium, *settings), factor)
+    has_trails = any(shutter.trail for shutter in snapshot.effect.shutters)
+    for frame in snapshot.frames:
+        state = snapshot.state(frame)
+        options, position = state.options, state.options.position
+        bars = np.stack([shutters.multiplied(row, options.step, factor, position) for row in state.bars])
+        options = replace(options, step=factor, window=bars.shape[1])
+        index, backward = session.source_index(snapshot, frame, source)
+        places = compositor.window_positions(options, index, -1 if backward else 1)
+        if options.edges == "mirror":  # at a cut, on the other side of it
+            places = np.arange(places.min() - options.window, places.max() + options.window + 1)
+        elif options.edges == "hold" and not has_trails:
+            places = places[slice(*shutters.open_span(bars))]
+        shown = compositor.source_frames(options, np.append(places, index), range(source.count))
+        found.update((shown[(shown >= 0) & (shown % factor > 0)] // factor).tolist())
+    return sorted(found)
+
+
+def is_busy() -> bool:
+    """Whether something is measured, or asked for."""
+    return _job is not None or _wanted is not None
+
+
+def advance() -> bool:
+    """Begins to measure what was asked for last; True: something was measured meanwhile."""
+    global _job, _wanted
+    if _job is not None and not _job.done():
+        return False
+    ended, _job = _job is not None, None
+    if _wanted is not None:
+        pool = ThreadPoolExecutor(1, "Virtual Shutter")
+        _stopped.clear()
+        _job, _wanted = pool.submit(_wanted), None
+        pool.shutdown(wait=False)
+    return ended
+
+
+def forget() -> None:
+    """Ends what is measured, and forgets what was: when a file is loaded, and when the extension goes."""
+    global _job, _wanted
+    _stopped.set()
+    if _job is not None:
+        wait([_job])
+    _job = _wanted = None
+    for known in (_moved, _costs, _found):
+        known.clear()
+
+
+def _measure_motion(spec, lacking: list[int]) -> None:
+    for pair in lacking:
+        _moved[spec.key, pair] = None  # what cannot be read is not tried again
+    with suppress(MediaError, OSError), spec.open() as medium:
+        for pair in lacking:
+            if not _stopped.is_set():
+                _moved[spec.key, pair] = steps.moved(medium, pair)
+    while len(_moved) > _KEPT:
+        del _moved[next(iter(_moved))]
+
+
+def _measure_cost(spec, pair: int, key: tuple) -> None:
+    _costs[key] = None
+    with suppress(MediaError, OSError), spec.open() as medium:
+        _costs[key] = inbetween.cost(medium, pair, key[1])

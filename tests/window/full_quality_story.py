@@ -1,0 +1,94 @@
+"""One look at a frame as it will be rendered, by the button at the preview's note: and back by a second click, by
+another frame, by a change. Run inside Blender, by test_window.py."""
+
+# ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
+import sys
+from pathlib import Path
+
+sys.path[:0] = [str(Path(__file__).parent)]
+
+import driver
+import preview_sizes_story as sizes
+import story
+
+FRAME = 50
+_part = "bl_ext.user_default.virtual_shutter.shutter_addon.blender.{}".format
+
+
+def interface(name):
+    return sys.modules[_part(f"interface.{name}")]
+
+
+def button(operator="shutter.full_quality"):
+    """The middle of a note's button in the preview; None: it has none."""
+    found = interface("note_buttons")._placed.get((story.preview().as_pointer(), operator))
+    return found and ((found[0][0] + found[0][2]) / 2, (found[0][1] + found[0][3]) / 2)
+
+
+def clicked():
+    yield from driver.until(button, "the button is there")
+    region = story.preview()
+    driver.move(region, *button())
+    yield 0.5
+    driver.xdotool("click", 1)
+    yield 0.5
+    driver.move(region, region.width / 2, region.height + 12)
+
+
+def view():
+    rows, centre = interface("full_quality")._view_of(story.preview())
+    return [rows, *centre]
+
+
+def shown(name):
+    yield 1.0
+    yield from driver.shot_when_shown(name)
+    region = story.preview()
+    x, y = region.view2d.view_to_region(0, 0, clip=False)  # of the picture's middle
+    left, bottom = driver.screen(region, x, y)
+    zoom = view()
+    driver.saw(step=name, crop=story.crop(), composed=sizes.composed(), view=zoom, middle=[left, bottom + 1])
+
+
+def prepared():
+    yield from story.opened()
+    yield from story.movie_added()
+    story.edit().frame_set(FRAME)
+    yield from sizes.effect_added()
+    story.effect().edge_aware = 1.0
+    space = sizes.space()
+    space.show_gizmo = space.show_overlays = True
+    space.preview_overlay.show_annotation = False
+    yield 1.0
+
+
+def looked():
+    yield from shown("before")
+    yield from clicked()
+    full = [[1280, 720]]
+    yield from driver.until(lambda: sizes.composed() == full, "it is composed in full", 20)
+    yield from shown("full")
+    yield from clicked()
+    yield from shown("back")
+    yield from clicked()
+    yield from driver.until(lambda: sizes.composed() == full, "it is composed in full", 20)
+    driver.key("Right")
+    yield from driver.until(lambda: story.edit().frame_current == FRAME + 1, "the next frame is shown")
+    yield from shown("next")
+    driver.key("Left")
+    yield from driver.until(lambda: story.edit().frame_current == FRAME, "the frame is shown")
+    yield from clicked()
+    yield from driver.until(lambda: sizes.composed() == full, "it is composed in full", 20)
+    story.effect().edge_aware = 0.0
+    yield from shown("changed")
+    story.effect().edge_aware = 1.0
+
+
+def told():
+    yield from prepared()
+    yield from looked()
+    yield from story.rendered()
+
+
+if __name__ == "__main__":
+    driver.play(told)
