@@ -109,7 +109,7 @@ def split():
 def moved():
     if strip := chosen("IMAGE"):
         for other in strips():
-            other.select = other == strip or other in strip.connections
+            other.select = other == strip or other in list(strip.connections)
         with override("SEQUENCER"):
             bpy.ops.transform.seq_slide("EXEC_DEFAULT", True, value=(random_.randint(-5, 5), random_.randint(0, 2)))
 
