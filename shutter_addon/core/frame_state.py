@@ -120,7 +120,9 @@ class FrameState:
     @cached_property
     def key(self) -> tuple:
         """Hashable, and equal for states that give the same picture of the same frames."""
-        shapes = ((s.shutter, s.kind, s.width, *(stroke.tobytes() for stroke in s.strokes)) for s in self.shapes)
+        shapes = (
+            (s.shutter, s.kind, s.width, s.opacity, *(stroke.tobytes() for stroke in s.strokes)) for s in self.shapes
+        )
         bars = self.bars.shape, self.bars.tobytes()
         following = self.following and self.following.key
         return self.options, *bars, self.reference, following, self.mattes, tuple(shapes)

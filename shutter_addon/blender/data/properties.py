@@ -20,7 +20,7 @@ from bpy.props import (
 )
 from bpy.types import PropertyGroup
 
-from ...core.limits import MAX_BAR, MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE
+from ...core.limits import MAX_BAR, MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE, MAX_SMOOTH
 from ...core.shutters import MAX_WINDOW
 from . import consistency, matte_strips, revision, selection, strips, validation
 
@@ -230,6 +230,25 @@ class Shutter(PropertyGroup):
     follow_region: StringProperty(
         name="Followed Region", description="Name of the region that the exposure moves with", update=_changed
     )
+    follow_motion: EnumProperty(
+        name="Motion",
+        description="What of its motion is followed",
+        items=MOTIONS,
+        default="SCALE",
+        update=_changed,
+        options=_UNKEYED,
+        translation_context=CONTEXT,
+    )
+    follow_smooth: IntProperty(
+        name="Smoothness",
+        description="Frames before and after each over which the motion is averaged, as the mass of a camera does: "
+        "at 0 it is followed as it is",
+        min=0,
+        max=MAX_SMOOTH,
+        soft_max=24,
+        update=_changed,
+        options=_UNKEYED,
+    )
     length: EnumProperty(
         name="Length",
         description="What says how long the exposure is",
@@ -391,7 +410,7 @@ class ShutterRegion(_Tracked, PropertyGroup):
     )
     opacity: FloatProperty(
         name="Opacity",
-        description="How much of the matte counts",
+        description="How much of the region counts: at 0 the picture is as without it",
         subtype="FACTOR",
         default=1.0,
         min=0.0,
@@ -419,6 +438,12 @@ class ShutterRegion(_Tracked, PropertyGroup):
         soft_max=0.5,
         update=_changed,
     )
+    track_ends: BoolProperty(
+        name="End with Track",
+        description="Track keys the opacity, so that the region fades out where its track ends, and ends with its shot",
+        default=True,
+        options=_UNKEYED,
+    )
     location: _location("Distance from where the region was drawn, as a fraction of the picture")
     rotation: _rotation("Rotation about the region's center")
     scale: _scale("Scale about the region's center")
@@ -437,6 +462,15 @@ class ShutterRegion(_Tracked, PropertyGroup):
 
 class ShutterCamera(_Tracked, PropertyGroup):
     name: StringProperty(name="Name", description="Name of the camera's animation channels", default="Camera")
+    influence: FloatProperty(
+        name="Influence",
+        description="How much is left of exposures that follow the camera: at 0 the shown frame alone",
+        subtype="FACTOR",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        update=_changed,
+    )
     location: _location("Where what the camera sees has moved to, as a fraction of the picture")
     rotation: _rotation("Rotation of what the camera sees, about the picture's center")
     scale: _scale("Scale of what the camera sees, about the picture's center")
