@@ -310,6 +310,13 @@ class _Tracked:
         description="Keep a key at every tracked frame, in place of those that the motion needs within a pixel",
         options=_UNKEYED,
     )
+    track_ends: BoolProperty(
+        name="End with Track",
+        description="Track keys a region's opacity, or the camera's influence, so that it fades where the track ends; "
+        "a region ends with its shot",
+        default=True,
+        options=_UNKEYED,
+    )
     follow_clip: PointerProperty(
         name="Clip",
         description="Movie clip of the source's footage, in which something is tracked",
@@ -437,12 +444,6 @@ class ShutterRegion(_Tracked, PropertyGroup):
         max=MAX_DISTANCE,
         soft_max=0.5,
         update=_changed,
-    )
-    track_ends: BoolProperty(
-        name="End with Track",
-        description="Track keys the opacity, so that the region fades out where its track ends, and ends with its shot",
-        default=True,
-        options=_UNKEYED,
     )
     location: _location("Distance from where the region was drawn, as a fraction of the picture")
     rotation: _rotation("Rotation about the region's center")
