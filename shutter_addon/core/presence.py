@@ -38,16 +38,19 @@ class Gap(NamedTuple):
     hard_last: bool
 
 
-def keys(seen: Collection[int], stops: Iterable[Stop], kept: Collection[int], fade: int = FADE) -> list[Key]:
+def keys(
+    seen: Collection[int], stops: Iterable[Stop], kept: Collection[int], fade: int = FADE, beside: int = 0
+) -> list[Key]:
     """Keys of how much something counts, ascending; none where its track has no end.
 
     seen: the frames at which it was found. A gap goes from a stop to the next of them; a stop at one of them, behind
     which it is found by another way, is as long as that frame
     kept: frames at which all of it counts, if only one beside a gap
     fade: frames over which it comes and goes, fewer between gaps that are close; at a cut it does so at once, as a fade
-    would show there"""
+    would show there
+    beside: frames on each side of a gap at which it counts for nothing as well"""
     found, before = [], -math.inf
-    for gap, following in pairwise([*gaps(seen, stops), None]):
+    for gap, following in pairwise([*gaps(seen, stops, beside), None]):
         after = following.first if following else math.inf
         if math.isfinite(gap.first):
             kept_before = max((frame for frame in kept if frame < gap.first), default=-math.inf)
@@ -70,10 +73,11 @@ def _last_at_each(found: list[Key]) -> list[int]:
     return sorted({key.frame: place for place, key in enumerate(found)}.values())
 
 
-def gaps(seen: Collection[int], stops: Iterable[Stop]) -> list[Gap]:
+def gaps(seen: Collection[int], stops: Iterable[Stop], beside: int = 0) -> list[Gap]:
     """Where nothing is there, ascending and apart; arguments as of `keys`."""
     merged: list[Gap] = []
-    for gap in sorted(_gap(seen, stop) for stop in stops):
+    for first, last, *hard in sorted(_gap(seen, stop) for stop in stops):
+        gap = Gap(first - beside, last + beside, *hard)
         if merged and gap.first <= merged[-1].last + 1:
             last = max(merged[-1], gap, key=lambda each: each.last)
             gap = Gap(merged[-1].first, last.last, merged.pop().hard_first, last.hard_last)

@@ -20,7 +20,7 @@ from ...core.effect import Camera, Region
 from ...core.keyframes import Samples
 from ...media import camera_tracking, tracking
 from ...media.tracking import Tracked
-from ..data import annotations, selection, snapshot, strips, validation
+from ..data import annotations, inbetween_settings, selection, snapshot, strips, validation
 from ..data.validation import EffectError
 from ..rendering import session
 from . import motion_keys
@@ -150,7 +150,7 @@ def track(
                 kept = found if all_keys else _thinned(effect, subject, found, {start, *anchors, *ends})
                 _write(keys, [found[frame] for frame in kept], found.values())
                 _mark(effect, index, found, stops, reach)
-                _key_ends(effect, index)
+                key_ends(effect, index)
                 if index is not None:
                     effect.regions[index].follow_stamp = ""  # what it followed would undo this
     if len(found) == 1:
@@ -182,16 +182,23 @@ def _track(effect, index: int | None) -> tuple[list[int], list[presence.Stop]]:
     ]
 
 
-def _key_ends(effect, index: int | None) -> None:
+def key_ends(effect, index: int | None) -> None:
     """Keys how much it counts by where its track ends, or takes such keys back."""
-    moving, keys, found = selection.moving(effect, index), MotionKeys(effect, index, "SCALE"), []
-    if moving.track_ends:
-        seen, stops = _track(effect, index)
-        kept = keys.edited(range(min(seen), max(seen) + 1))
-        # An exposure that follows the camera is to be over where frames begin whose motion nobody knows.
-        fade = presence.FADE if index is not None else max(presence.FADE, validation.number(effect, "window"))
-        found = presence.keys(seen, stops, kept, fade)
+    keys, (seen, stops), found = MotionKeys(effect, index, "SCALE"), _track(effect, index), []
+    if selection.moving(effect, index).track_ends and seen:
+        if index is None:
+            found = presence.keys(seen, stops, (), _reach(effect), beside=1)
+        else:
+            found = presence.keys(seen, stops, keys.edited(range(min(seen), max(seen) + 1)))
     keys.fade(motion_keys.ENDS[index is None], found)
+
+
+def _reach(effect) -> int:
+    """The frames over which the camera's influence fades: so no exposure reaches one whose motion nobody knows."""
+    step = inbetween_settings.factor(effect)
+    window = -(-validation.number(effect, "window") // step)
+    before = {"START": 0, "CENTER": (window - 1) // 2, "END": window - 1}[validation.word(effect, "position")]
+    return max(before, window - 1 - before, presence.FADE)
 
 
 def confidence_at(effect, index: int | None, frame: float) -> float | None:
