@@ -100,7 +100,9 @@ class Region:
     def at(self, frame: float) -> scribbles.Shape:
         location, rotation, scale = (channel.at(frame) for channel in (self.location, self.rotation, self.scale))
         moved = scribbles.transform(self.unmoved(frame), location, rotation, scale, self.drawings.aspect)
-        return scribbles.Shape(self.shutter, self.kind.at(frame), self.width.at(frame), moved, float(self.opacity.at(frame)))
+        return scribbles.Shape(
+            self.shutter, self.kind.at(frame), self.width.at(frame), moved, float(self.opacity.at(frame))
+        )
 
     def placement(self, frame: float) -> Placement:
         """Its keyed numbers at a frame."""

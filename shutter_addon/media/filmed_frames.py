@@ -79,7 +79,10 @@ class FilmedFrames:
         for place in self._beside(frame):
             if place not in found:
                 side = 1 if place > self.start else -1
-                return max((at for at in faults if 0 < side * (at - self.start) <= side * (place - self.start)), key=lambda at: side * at)
+                return max(
+                    (at for at in faults if 0 < side * (at - self.start) <= side * (place - self.start)),
+                    key=lambda at: side * at,
+                )
             if place in faults:
                 return place
         return None

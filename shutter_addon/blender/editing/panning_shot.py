@@ -7,7 +7,6 @@ from ..data.validation import EffectError
 from . import shutter_edits
 from .motion_keys import MotionKeys
 
-
 SMOOTHNESS = 6  # frames before and after each: half a second in all
 
 
