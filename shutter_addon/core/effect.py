@@ -88,7 +88,7 @@ class Region:
     location: Channel
     rotation: Channel
     scale: Channel
-    opacity: Channel = keyframes.Constant(1.0)
+    opacity: Channel = field(default=keyframes.Constant(1.0))
 
     @property
     def is_still(self) -> bool:
@@ -100,9 +100,8 @@ class Region:
     def at(self, frame: float) -> scribbles.Shape:
         location, rotation, scale = (channel.at(frame) for channel in (self.location, self.rotation, self.scale))
         moved = scribbles.transform(self.unmoved(frame), location, rotation, scale, self.drawings.aspect)
-        return scribbles.Shape(
-            self.shutter, self.kind.at(frame), self.width.at(frame), moved, float(self.opacity.at(frame))
-        )
+        kind, width, opacity = (channel.at(frame) for channel in (self.kind, self.width, self.opacity))
+        return scribbles.Shape(self.shutter, kind, width, moved, float(opacity))
 
     def placement(self, frame: float) -> Placement:
         """Its keyed numbers at a frame."""
@@ -205,7 +204,7 @@ class Camera:
     location: Channel
     rotation: Channel
     scale: Channel
-    influence: Channel = keyframes.Constant(1.0)
+    influence: Channel = field(default=keyframes.Constant(1.0))
 
     def placement(self, frame: float) -> Placement:
         """Its keyed numbers at a frame."""

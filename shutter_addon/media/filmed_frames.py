@@ -75,14 +75,12 @@ class FilmedFrames:
                 yield replace(there, placement=moved)
 
     def _fault(self, frame: int, faults: Mapping[int, str], found: Mapping[int, Tracked]) -> int | None:
-        """The place of the fault for which what a timeline frame shows was not tracked, or was tracked anew; or None."""
+        """The place of the fault by which what a timeline frame shows was not tracked, or was tracked anew; or None."""
         for place in self._beside(frame):
             if place not in found:
                 side = 1 if place > self.start else -1
-                return max(
-                    (at for at in faults if 0 < side * (at - self.start) <= side * (place - self.start)),
-                    key=lambda at: side * at,
-                )
+                passed = [at for at in faults if 0 < side * (at - self.start) <= side * (place - self.start)]
+                return max(passed, key=lambda at: side * at)
             if place in faults:
                 return place
         return None
