@@ -46,6 +46,12 @@ class Options:
         center, end = (filmed - 1) // 2 * self.step, max(self.window - self.step, 0)
         return {"start": 0, "center": center, "end": end}[self.position]
 
+    @property
+    def reach(self) -> int:
+        """How many filmed frames of the window lie on that side of the shown one where there are most."""
+        filmed, before = -(-self.window // self.step), self.before // self.step
+        return max(before, filmed - 1 - before)
+
 
 @dataclass(frozen=True)
 class Following:

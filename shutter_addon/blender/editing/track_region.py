@@ -17,6 +17,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core import limits, motions, presence, region_keys
 from ...core.effect import Camera, Region
+from ...core.frame_state import Options
 from ...core.keyframes import Samples
 from ...media import camera_tracking, tracking
 from ...media.tracking import Tracked
@@ -195,10 +196,8 @@ def key_ends(effect, index: int | None) -> None:
 
 def _reach(effect) -> int:
     """The frames over which the camera's influence fades: so no exposure reaches one whose motion nobody knows."""
-    step = inbetween_settings.factor(effect)
-    window = -(-validation.number(effect, "window") // step)
-    before = {"START": 0, "CENTER": (window - 1) // 2, "END": window - 1}[validation.word(effect, "position")]
-    return max(before, window - 1 - before, presence.FADE)
+    window, position = validation.number(effect, "window"), validation.word(effect, "position").lower()
+    return max(Options(window, position, step=inbetween_settings.factor(effect)).reach, presence.FADE)
 
 
 def confidence_at(effect, index: int | None, frame: float) -> float | None:
