@@ -1,4 +1,4 @@
-"""A region ends where its track ends and with its shot, and Tripod goes on where the camera's track is broken: by mouse.
+"""A region ends where its track ends and with its shot, and Tripod goes on where the camera's track is broken, by mouse.
 Run inside Blender, by test_window.py, on a film that it makes: the walkers, who are covered at the end, between two
 shots of another film, the second behind some grey frames."""
 
@@ -17,12 +17,17 @@ from one_stroke_story import part
 FRAME, LAST = 50, 110
 
 
-def ends(path):
-    """Of the F-curve of how much something counts: frame, value and type of its keys."""
+def curve_of(path):
+    """The F-curve of how much something counts, or None."""
     from bpy_extras.anim_utils import action_get_channelbag_for_slot as bag_of
 
     data = story.edit().animation_data
-    curve = bag_of(data.action, data.action_slot).fcurves.find(f"virtual_shutter.effects[0].{path}") if data else None
+    return bag_of(data.action, data.action_slot).fcurves.find(f"virtual_shutter.effects[0].{path}")
+
+
+def ends(path):
+    """Frame, value and type of its keys."""
+    curve = curve_of(path)
     return [(int(key.co[0]), round(key.co[1], 3), key.type) for key in curve.keyframe_points] if curve else []
 
 
@@ -53,9 +58,9 @@ def ended():
     yield from driver.until(lambda: story.curves() == after, "and redo brings them again")
     frames = (20, FRAME, 61, 76)
     yield from looked_at("there", frames)
-    name, one_stroke_story.region().shutter = one_stroke_story.region().shutter, "nobody's"
+    curve_of("regions[0].opacity").mute, one_stroke_story.region().opacity = True, 0  # its handles stay
     yield from looked_at("without", frames)
-    one_stroke_story.region().shutter = name
+    curve_of("regions[0].opacity").mute = False
 
 
 def on_a_tripod():
