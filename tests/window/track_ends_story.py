@@ -1,4 +1,4 @@
-"""A region ends where its track ends and with its shot, and Tripod goes on where the camera's track is broken, by mouse.
+"""A region ends where its track ends and with its shot; Tripod goes on where the camera's track is broken: by mouse.
 Run inside Blender, by test_window.py, on a film that it makes: the walkers, who are covered at the end, between two
 shots of another film, the second behind some grey frames."""
 
