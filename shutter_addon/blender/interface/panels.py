@@ -300,7 +300,8 @@ def _draw_tracking(layout, effect, index: int | None) -> None:
         text = iface_("Confidence: {percent} %").format(percent=f"{100 * confidence:.0f}")
         row.label(text=text, icon="CHECKMARK" if confidence >= SURE else "ERROR", translate=False)
         row.operator(f"{track}_look")
-    _draw_gaps(layout, effect, index)
+    if index is None:  # a region's gaps go from its stops on
+        _draw_gaps(layout, effect, index)
     for frame, reason, is_fault in track_region.stops(effect, index):
         row = layout.row(align=True)
         row.label(text=reason, icon="ERROR" if is_fault else "INFO", translate=False)
