@@ -197,6 +197,17 @@ class Matting:
         pass
 
 
+class Mixing:
+    """Shares of coefficients, with the methods of compute.mixing.Mixing."""
+
+    def add(self, mixed: np.ndarray | None, added: np.ndarray, share: float, size: tuple[int, int]) -> np.ndarray:
+        part = np.broadcast_to(added * np.float32(share), (len(added), *size))
+        return part if mixed is None else mixed + part
+
+    def release(self) -> None:
+        pass
+
+
 class CPUCompositor:
     """Composes with NumPy; the same methods as GPUCompositor."""
 
@@ -217,6 +228,9 @@ class CPUCompositor:
 
     def matting(self) -> Matting:
         return Matting()
+
+    def mixing(self) -> Mixing:
+        return Mixing()
 
     def constant(self, values: np.ndarray) -> np.ndarray:
         return np.asarray(values, dtype=np.float32)[:, None, None]

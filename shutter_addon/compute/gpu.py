@@ -15,6 +15,7 @@ from .diffusion_gpu import Diffusion
 from .edge_diffusion import follows_edges
 from .edge_diffusion_gpu import EdgeDiffusion
 from .matting import Matting
+from .mixing import Mixing
 from .passes import LOCAL_ROW, Image, Pass
 from .tables import moved_tables, padded, table
 from .window import BLOCK, Frames, PackedFrames, Sums, WholeFrames, decoding, open_window
@@ -375,6 +376,10 @@ class GPUCompositor:
     def matting(self) -> Matting:
         """What lays mattes over coefficients. What it gives is valid until its next."""
         return Matting(self.device)
+
+    def mixing(self) -> Mixing:
+        """What adds up shares of coefficients. What it gives is valid until its next sum."""
+        return Mixing(self.device)
 
     def constant(self, values: np.ndarray):
         """Coefficients (N,) of the whole picture, as a texture of one texel. Valid until the next call."""

@@ -3,6 +3,8 @@ compose."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..core import compositor, scribbles
@@ -46,7 +48,7 @@ class Renderer:
 
     def __init__(self, compositor, source: FrameSource, mattes: MatteReader | None = None):
         self.compositor, self.source, self._mattes = compositor, source, mattes
-        self._solver, self._matting = compositor.solver(), compositor.matting()
+        self._solver, self._matting, self._mixing = compositor.solver(), compositor.matting(), compositor.mixing()
         self._guides = guide.Guides(source)
         self._window = self._kind = None
         self._labelled = self._solved = self._laid = self._drawn = None
@@ -110,7 +112,7 @@ class Renderer:
 
     def labels(self, state: FrameState) -> np.ndarray:
         """Labels (h, w) uint16 of pixels, or of blocks as for `coefficients`: 0 free, 1 + shutter scribbled."""
-        return self._labelling(state)[0]
+        return self._labelling(state)[0].labels
 
     def _sole(self, state: FrameState) -> int | None:
         """The shutter that holds for the whole picture, if one does."""
@@ -118,13 +120,16 @@ class Renderer:
 
     def _scribbled(self, state: FrameState) -> int | None:
         """The shutter that the scribbles give to the whole picture, if it is one."""
-        return self._labelling(state)[1]
+        first, *others = self._labelling(state)
+        return first.sole if all(layer.sole == first.sole for layer in others) else None
 
-    def _labelling(self, state: FrameState) -> tuple[np.ndarray, int | None]:
+    def _labelling(self, state: FrameState) -> list[_Layer]:
+        """Of each of scribbles.layers."""
         key = self._grid(state), state.options.border, state.key[-1]
         if self._labelled is None or self._labelled[0] != key:
-            labels = scribbles.rasterise(state.shapes, *key[0], border=key[1])
-            self._labelled = key, (labels, _sole(labels))
+            parts = scribbles.layers(state.shapes)
+            drawn = [(share, scribbles.rasterise(shapes, *key[0], border=key[1])) for share, shapes in parts]
+            self._labelled = key, [_Layer(share, labels, _sole(labels)) for share, labels in drawn]
         return self._labelled[1]
 
     def shot(self, index: int, direction: int, state: FrameState, *, known: bool = False) -> range:
@@ -253,17 +258,29 @@ class Renderer:
     def _diffused(self, index: int, state: FrameState, direction: int, quick: bool = False):
         """Coefficients on the device. They are solved for only if labels or what guides them changed since the last
         call, or if the last solution was a quick one and this must not be."""
-        labels, options, count = self.labels(state), state.options, len(state.bars)
+        layers, options, count = self._labelling(state), state.options, len(state.bars)
         frames = self._guiding(index, state, self.shot(index, direction, state)) if options.edge_aware else ()
         key = count, frames and (frames, options.edge_aware)
         same = self._solved and self._solved[0] == key
-        same = same and (self._solved[1] is labels or np.array_equal(self._solved[1], labels))
+        same = same and (self._solved[1] is layers or _equal(self._solved[1], layers))
         if not same or not (quick or self._solved[2]):
             self._keep_guides(index, direction, state)
             guided = (self._guides.guide(frames, options.aggregate), options.edge_aware) if frames else ()
             self._solution += 1
-            self._solved = key, labels, not quick, self._solver.solve(labels, count, *guided, warm=quick)
+            self._solved = key, layers, not quick, self._mixed(layers, count, guided, quick)
         return self._solved[3]
+
+    def _mixed(self, layers: list[_Layer], count: int, guided: tuple, quick: bool):
+        """The coefficients of all layers, solved for one after the other and added up. A solution that another layer
+        has begun from would depend on that one."""
+        if len(layers) == 1:
+            return self._solver.solve(layers[0].labels, count, *guided, warm=quick)
+        mixed = None
+        for share, labels, sole in layers:
+            solid = self.compositor.constant(np.eye(count)[sole]) if sole is not None else None
+            found = self._solver.solve(labels, count, *guided) if solid is None else solid
+            mixed = self._mixing.add(mixed, found, share, labels.shape)
+        return mixed
 
     def _kind_for(self, state: FrameState) -> tuple[int, bool, int]:
         """The length of the window, whether its frames are seen elsewhere than where they are, and the number of all
@@ -302,6 +319,7 @@ class Renderer:
             self.release_window()
             self._solver.release()
             self._matting.release()
+            self._mixing.release()
         self._solved = self._laid = None
 
     def close(self) -> None:
@@ -310,6 +328,22 @@ class Renderer:
         if self._mattes is not None:
             self._mattes.close()
         self.source.close()
+
+
+class _Layer(NamedTuple):
+    """Labels that count for a share of the coefficients; sole: the shutter that they give to the whole picture, if it
+    is one."""
+
+    share: float
+    labels: np.ndarray
+    sole: int | None
+
+
+def _equal(layers: list[_Layer], others: list[_Layer]) -> bool:
+    return len(layers) == len(others) and all(
+        one.share == other.share and np.array_equal(one.labels, other.labels)
+        for one, other in zip(layers, others, strict=True)
+    )
 
 
 def _sole(labels: np.ndarray) -> int | None:

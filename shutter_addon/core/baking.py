@@ -57,6 +57,7 @@ def baked(effect: Effect, shown: range, inbetween_method: str, mattes=()) -> rec
         edge_aware=_number(effect.edge_aware, shown),
         time=_time(effect.time, shown) if effect.time else [],
         camera=_camera(effect.camera, shown),
+        camera_influence=_number(effect.camera.influence, shown),
         **{name: value for name, value in asdict(options).items() if name not in ("step", "edge_aware")},
     )
     return recipe.parse(recipe.dump(found))
@@ -101,7 +102,9 @@ def _follows(effect: Effect, names: list[str]) -> list[str | None]:
 def _following(shutter: Shutter, found: recipe.Shutter, follow: str | None, shown: range) -> recipe.Shutter:
     """A recipe's shutter with what it follows, and how far."""
     trail = _number(shutter.trail, shown) if follow and shutter.trail else None
-    return replace(found, follow=follow, trail=trail)
+    if not follow:
+        return found
+    return replace(found, follow=follow, trail=trail, follow_motion=shutter.motion, follow_smooth=shutter.smooth)
 
 
 def _shutter(effect: Effect, index: int, name: str, interpolation: str, shown: range) -> recipe.Shutter:
@@ -176,6 +179,7 @@ def _region(region: Region, name: str, shutter: str, shown: range) -> recipe.Reg
             recipe.RegionKey(_frame(frame, shown), *_place_words(region, frame), redrawn.get(frame), ease)
             for frame, ease in keys
         ],
+        _number(region.opacity, shown),
     )
 
 

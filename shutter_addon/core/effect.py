@@ -77,7 +77,8 @@ class Region:
 
     shutter: index of the shutter; kind: "line" or "lasso", and
     width: of its lines, fraction of the picture's height
-    location: (2,) fractions of the picture; rotation: degrees counter-clockwise; scale: about the shape's centre"""
+    location: (2,) fractions of the picture; rotation: degrees counter-clockwise; scale: about the shape's centre
+    opacity: 0 to 1, as of scribbles.layers"""
 
     name: str
     shutter: int
@@ -87,16 +88,20 @@ class Region:
     location: Channel
     rotation: Channel
     scale: Channel
+    opacity: Channel = field(default=keyframes.Constant(1.0))
 
     @property
     def is_still(self) -> bool:
         """Whether it is known to be the same at every frame."""
-        return keyframes.are_still(self.drawings, self.kind, self.width, self.location, self.rotation, self.scale)
+        return keyframes.are_still(
+            self.drawings, self.kind, self.width, self.location, self.rotation, self.scale, self.opacity
+        )
 
     def at(self, frame: float) -> scribbles.Shape:
         location, rotation, scale = (channel.at(frame) for channel in (self.location, self.rotation, self.scale))
         moved = scribbles.transform(self.unmoved(frame), location, rotation, scale, self.drawings.aspect)
-        return scribbles.Shape(self.shutter, self.kind.at(frame), self.width.at(frame), moved)
+        kind, width, opacity = (channel.at(frame) for channel in (self.kind, self.width, self.opacity))
+        return scribbles.Shape(self.shutter, kind, width, moved, float(opacity))
 
     def placement(self, frame: float) -> Placement:
         """Its keyed numbers at a frame."""
@@ -192,11 +197,14 @@ class PlacedRamp:
 
 @dataclass(frozen=True)
 class Camera:
-    """How what the camera sees moves in the picture, about the picture's centre; its numbers are as a Region's."""
+    """How what the camera sees moves in the picture, about the picture's centre; its numbers are as a Region's.
+
+    influence: 0 to 1, what is left of the exposure that follows it: at 0 the shown frame alone"""
 
     location: Channel
     rotation: Channel
     scale: Channel
+    influence: Channel = field(default=keyframes.Constant(1.0))
 
     def placement(self, frame: float) -> Placement:
         """Its keyed numbers at a frame."""
@@ -223,13 +231,17 @@ def _placement(moving: Region | MatteRegion | PlacedRamp | Camera, frame: float)
 class Shutter:
     """name, color: RGB display values, 0 to 1; follow: what its exposure moves with, None: nothing
     trail: channel of how far that moves while the shutter is open, in fractions of the picture's height; None: the bars
-    say for how many frames it is open"""
+    say for how many frames it is open
+    motion: what of its motion is followed: the location, its rotation too, or its scale as well
+    smooth: frames before and after each over which that motion is averaged"""
 
     name: str
     color: tuple[float, float, float]
     bars: Bars
     follow: Region | MatteRegion | Camera | None = None
     trail: Channel | None = None
+    motion: motions.Motion = "scale"
+    smooth: int = 0
 
 
 @dataclass(frozen=True)

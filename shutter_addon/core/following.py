@@ -15,10 +15,10 @@ from dataclasses import replace
 import numpy as np
 
 from . import compositor, motions, trails
-from .effect import Camera, Effect, Region
+from .effect import Camera, Effect, Shutter
 from .frame_source import FrameSource
 from .frame_state import Following, FrameState, Options
-from .motions import Similarity
+from .motions import Placement, Similarity
 
 # Below this scale a subject is a point, and says nothing of where the others are.
 _SMALLEST = 1e-6
@@ -28,6 +28,40 @@ def reach(window: int) -> int:
     """How many timeline frames before and after the shown one say where the source frames of a window lie: enough for
     footage that is slowed down to a quarter. Source frames shown beyond have the motion of the nearest within."""
     return 4 * window
+
+
+def smoothing(smooth: int) -> np.ndarray:
+    """Weights (2 · smooth + 1,), Σ = 1, of the frames before and after one: a bell, without the jolts that a box has
+    where something sudden enters and leaves it."""
+    bell = 1 + np.cos(np.pi * np.arange(-smooth, smooth + 1) / (smooth + 1))
+    return bell / bell.sum()
+
+
+class _Followed:
+    """What a shutter follows of a region or the camera, asked as these are: its location alone, perhaps, and averaged
+    over time. It depends on keys around a frame, and on no other picture."""
+
+    def __init__(self, shutter: Shutter):
+        self._subject, self._motion, self._smooth = shutter.follow, shutter.motion, shutter.smooth
+        self._weights, self._own, self._found = smoothing(shutter.smooth), {}, {}
+
+    def at(self, frame: float) -> tuple[Placement, np.ndarray | None]:
+        """The placement and the centre (2,), None: nothing is drawn."""
+        if not self._smooth:
+            return self._at(frame)
+        if frame not in self._found:
+            around = [self._at(frame + k) for k in range(-self._smooth, self._smooth + 1)]
+            placements, centres = zip(*around, strict=True)
+            is_drawn = all(centre is not None for centre in centres)
+            centre = self._weights @ np.array(centres) if is_drawn else None
+            self._found[frame] = motions.averaged(placements, self._weights), centre
+        return self._found[frame]
+
+    def _at(self, frame: float) -> tuple[Placement, np.ndarray | None]:
+        if frame not in self._own:
+            placement = motions.only(self._subject.placement(frame), self._motion)
+            self._own[frame] = placement, self._subject.centre(frame)
+        return self._own[frame]
 
 
 def followed(
@@ -52,9 +86,13 @@ def followed(
     times = _times(shown, frame, index, frames, reach(state.options.window))
     turns = np.ones((len(frames), len(subjects)), np.complex128)
     shifts = np.zeros_like(turns)
-    for subject in {id(subject): subject for subject in subjects if subject}.values():
+    ways = [(id(shutter.follow), shutter.motion, shutter.smooth) for shutter in effect.shutters]
+    for way, shutter in dict(zip(ways, effect.shutters, strict=True)).items():
+        if shutter.follow is None:
+            continue
+        subject = _Followed(shutter)
         found = [_motion(subject, frame, time, (source.width, source.height)) for time in times]
-        followers = [other is subject for other in subjects]
+        followers = [other == way for other in ways]
         turns[:, followers] = np.array([motion.turn for motion in found])[:, None]
         shifts[:, followers] = np.array([motion.shift for motion in found])[:, None]
     following = Following(frames.start, turns, shifts)
@@ -79,6 +117,9 @@ def _with_trails(
             places = np.outer(turns[:, i], corners) + shifts[:, i, None]
             way = trails.travelled(places) / source.height
             bars[i], open_for[i] = trails.with_length(bars[i], way, float(shutter.trail.at(frame)), shown_at)
+        share = float(shutter.follow.influence.at(frame)) if isinstance(shutter.follow, Camera) else 1.0
+        if share < 1:
+            bars[i], open_for[i] = trails.shortened(bars[i], share, shown_at)
     return bars, open_for
 
 
@@ -108,14 +149,13 @@ def _times(shown: Callable[[float], int], frame: float, index: int, wanted: rang
     return [times[source] for source in nearest.tolist()]
 
 
-def _motion(subject: Region | Camera, frame: float, time: float, size) -> Similarity:
+def _motion(subject: _Followed, frame: float, time: float, size) -> Similarity:
     """The motion of the picture from a timeline frame to a time that may lie between two; none where nothing is drawn
     that could be followed."""
     whole = frame + math.floor(time - frame)
     share = time - whole
     frames = [frame, whole, whole + 1 if share else whole]
-    start, *placements = (subject.placement(number) for number in frames)
-    before, *centres = (subject.centre(number) for number in frames)
+    (start, *placements), (before, *centres) = zip(*map(subject.at, frames), strict=True)
     if before is None or any(centre is None for centre in centres) or abs(start.scale) < _SMALLEST:
         return Similarity()
     placement = motions.between(*placements, share)

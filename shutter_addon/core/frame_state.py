@@ -46,6 +46,12 @@ class Options:
         center, end = (filmed - 1) // 2 * self.step, max(self.window - self.step, 0)
         return {"start": 0, "center": center, "end": end}[self.position]
 
+    @property
+    def reach(self) -> int:
+        """How many filmed frames of the window lie on that side of the shown one where there are most."""
+        filmed, before = -(-self.window // self.step), self.before // self.step
+        return max(before, filmed - 1 - before)
+
 
 @dataclass(frozen=True)
 class Following:
@@ -120,7 +126,9 @@ class FrameState:
     @cached_property
     def key(self) -> tuple:
         """Hashable, and equal for states that give the same picture of the same frames."""
-        shapes = ((s.shutter, s.kind, s.width, *(stroke.tobytes() for stroke in s.strokes)) for s in self.shapes)
+        shapes = (
+            (s.shutter, s.kind, s.width, s.opacity, *(stroke.tobytes() for stroke in s.strokes)) for s in self.shapes
+        )
         bars = self.bars.shape, self.bars.tobytes()
         following = self.following and self.following.key
         return self.options, *bars, self.reference, following, self.mattes, tuple(shapes)

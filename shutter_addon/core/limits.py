@@ -17,6 +17,8 @@ MAX_REGIONS = 1000
 MAX_POINTS = 100_000
 # Of one shutter, of one region, and of the source time: an hour with a key at every frame.
 MAX_KEYS = 100_000
+# Frames before and after each over which a motion is averaged: each of them is asked for its keys.
+MAX_SMOOTH = 250
 # In characters: as long as Blender's own, and the channels of an EXR file.
 MAX_NAME = 63
 # In characters: the path of a file, as long as Blender's own, and the name of a channel in it.

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 
 # Of the directions in which a shape's farthest points are looked for: the others are farther by 1/2 % at most.
 _DIRECTIONS = np.exp(1j * np.linspace(0, 2 * np.pi, 32, endpoint=False))
+
+# What of a motion counts beside the location.
+Motion = Literal["location", "rotation", "scale"]
 
 # From a pixel's corner to its middle.
 _CORNER = 0.5 + 0.5j
@@ -114,6 +118,18 @@ def between(first: Placement, second: Placement, share: float) -> Placement:
     """A share 0 to 1 of the way from one placement to another, each number by itself, as between linear keys."""
     numbers = (1 - share) * _numbers([first]) + share * _numbers([second])
     x, y, rotation, scale = (float(number) for number in numbers[0])
+    return Placement((x, y), rotation, scale)
+
+
+def only(placement: Placement, motion: Motion) -> Placement:
+    """What of a placement counts for a motion: what does not is as if it had never changed."""
+    rotation = 0.0 if motion == "location" else placement.rotation
+    return Placement(placement.location, rotation, placement.scale if motion == "scale" else 1.0)
+
+
+def averaged(placements: Sequence[Placement], weights: np.ndarray) -> Placement:
+    """The mean of placements, each number by itself; weights (n,), Σ = 1."""
+    x, y, rotation, scale = (float(number) for number in weights @ _numbers(placements))
     return Placement((x, y), rotation, scale)
 
 

@@ -20,7 +20,7 @@ from typing import Literal, get_args, get_origin
 
 import numpy as np
 
-from . import atomic_write, effect, keyframes, limits, mattes, shutters
+from . import atomic_write, effect, keyframes, limits, mattes, motions, shutters
 from .frame_state import Edges, Exposure, FrameState, Interpolation, Light, Options, Position
 from .messages import UserError, sentence
 
@@ -70,7 +70,8 @@ class Shutter:
 
     follow: a region's name, or CAMERA
     trail: how far that moves while the shutter is open, in fractions of the picture's height; None: the bars say for
-    how many frames it is open"""
+    how many frames it is open
+    follow_motion, follow_smooth: as motion and smooth of effect.Shutter"""
 
     name: str
     color: tuple[float, float, float] = (0.8, 0.8, 0.8)
@@ -78,11 +79,14 @@ class Shutter:
     keys: list[ShutterKey] = field(default_factory=list)
     follow: str | None = None
     trail: Keyable | None = None
+    follow_motion: motions.Motion = "scale"
+    follow_smooth: int = 0
 
     def over_time(self, follow: effect.Region | effect.Camera | None = None) -> effect.Shutter:
         """As plain data; follow: what is followed, in the same form."""
         trail = None if self.trail is None else _numbers(self.trail)
-        return effect.Shutter(self.name, self.color, self._bars_over_time(), follow, trail)
+        how = self.follow_motion, self.follow_smooth
+        return effect.Shutter(self.name, self.color, self._bars_over_time(), follow, trail, *how)
 
     def _bars_over_time(self) -> keyframes.Bars:
         if not self.keys:
@@ -134,6 +138,7 @@ class Region:
     width: float = 0.02
     strokes: list[Stroke] = field(default_factory=list)
     keys: list[RegionKey] = field(default_factory=list)
+    opacity: Keyable = 1.0
 
     def drawings(self) -> list[tuple[RegionKey | None, list[Stroke]]]:
         """The key that starts each drawing, and its strokes, in time."""
@@ -152,7 +157,7 @@ class Region:
             aspect,
         )
         fixed = self.name, shutter, keyframes.Constant(self.kind), keyframes.Constant(self.width), drawings
-        return effect.Region(*fixed, *_moves(self.keys))
+        return effect.Region(*fixed, *_moves(self.keys), _numbers(self.opacity))
 
 
 @dataclass(frozen=True)
@@ -238,6 +243,7 @@ class Recipe:
     inbetween_method: Literal["quick", "good"] = "quick"
     time: list[ValueKey] = field(default_factory=list)
     camera: list[CameraKey] = field(default_factory=list)
+    camera_influence: Keyable = 1.0
 
     @property
     def options(self) -> Options:
@@ -258,7 +264,7 @@ class Recipe:
             else region.over_time(order[region.shutter], files and files(region))
             for region in self.regions
         )
-        camera = effect.Camera(*_moves(self.camera))
+        camera = effect.Camera(*_moves(self.camera), _numbers(self.camera_influence))
         followed = {region.name: region for region in regions} | {CAMERA: camera, None: None}
         return effect.Effect(
             tuple(shutter.over_time(followed[shutter.follow]) for shutter in self.shutters),
@@ -404,10 +410,15 @@ def save(recipe: Recipe, path: str | Path) -> None:
         part.write_text(dump(recipe), encoding="utf-8")
 
 
+# Values that say nothing, of fields that few recipes need.
+_UNTOLD = {"opacity": 1.0, "follow_motion": "scale", "follow_smooth": 0, "camera_influence": 1.0}
+
+
 def _compact(value):
     if isinstance(value, dict):
         keys = "keys", "time", "camera"
-        return {k: _compact(v) for k, v in value.items() if v is not None and (v or k not in keys)}
+        told = {k: v for k, v in value.items() if v is not None and (k not in _UNTOLD or v != _UNTOLD[k])}
+        return {k: _compact(v) for k, v in told.items() if v or k not in keys}
     return [_compact(v) for v in value] if isinstance(value, (list, tuple)) else value
 
 
@@ -613,11 +624,13 @@ def _check(recipe: Recipe) -> None:
         if shutter.trail is not None:
             _require(shutter.follow, f"shutters[{i}].trail", "the shutter follows nothing that could move so far")
             _check_number(shutter.trail, f"shutters[{i}].trail", limits.MAX_DISTANCE)
+        _require_within(shutter.follow_smooth, limits.MAX_SMOOTH, f"shutters[{i}].follow_smooth", 0)
     _check_values(recipe.time, "time", limits.MAX_FRAME)
     _check_frames(recipe.camera, "camera")
     for k, key in enumerate(recipe.camera):
         _check_placement(key, f"camera[{k}]")
     _check_number(recipe.edge_aware, "edge_aware", 1)
+    _check_number(recipe.camera_influence, "camera_influence", 1)
     for i, region in enumerate(recipe.regions):
         there_is_none = f"there is no shutter {_shown(region.shutter)}"
         _require(region.shutter in places, f"regions[{i}].shutter", there_is_none)
@@ -667,6 +680,7 @@ def _check_region(region: Region, place: str) -> None:
     _check_name(region.name, f"{place}.name")
     _require(region.width >= 0, f"{place}.width", f"{region.width} is negative")
     _require_within(region.width, limits.MAX_DISTANCE, f"{place}.width", 0)
+    _check_number(region.opacity, f"{place}.opacity", 1)
     _require(region.drawings()[0][1], f"{place}.strokes", "empty: nothing is drawn")
     _check_frames(region.keys, f"{place}.keys")
     redrawn = any(key.strokes is not None for key in region.keys)

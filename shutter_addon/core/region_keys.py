@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from . import effect, motions
+from . import effect, keyframes, motions, presence
 from .motions import Placement
-from .recipe import CameraKey, Recipe, Region, RegionKey
+from .recipe import CameraKey, Keyable, Recipe, Region, RegionKey, ValueKey
 
 _DIGITS = 6  # of what was measured: far below a pixel
 # Pixels by which a thinned camera may be off: unlike a region, it carries the picture itself.
@@ -90,3 +90,20 @@ def _redrawn(region: Region, drawn: dict) -> Region:
 def _rounded(placement: Placement) -> Placement:
     x, y = (round(number, _DIGITS) for number in placement.location)
     return Placement((x, y), round(placement.rotation, _DIGITS), round(placement.scale, _DIGITS))
+
+
+def with_ends(value: Keyable, keys: list[presence.Key], frames: range) -> Keyable:
+    """How much something counts, with keys of where it is tracked (presence.keys), in place of those that it has at
+    these frames; beyond them it stays what it is. All of it is what it was at most."""
+    if not isinstance(value, list):
+        return [ValueKey(key.frame, value * key.value, key.ease) for key in keys] if keys else value
+    columns = zip(*((key.frame, key.value, key.ease) for key in value), strict=True)
+    at, whole = keyframes.Keys(*columns).at, max(key.value for key in value)
+    first, last = frames[0], frames[-1]
+    before, after = [k for k in value if k.frame < first], [k for k in value if k.frame > last]
+    made = [ValueKey(key.frame, whole * key.value, key.ease) for key in keys if first <= key.frame <= last]
+    start = whole * keys[0].value if keys else whole
+    made = made if made and made[0].frame == first else [ValueKey(first, start, "constant"), *made]
+    held = [ValueKey(first - 1, float(at(first - 1)), "constant")] if before and before[-1].frame < first - 1 else []
+    back = [ValueKey(last + 1, float(at(last + 1)))] if after and after[0].frame > last + 1 else []
+    return [*before, *held, *made, *back, *after]

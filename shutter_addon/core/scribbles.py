@@ -28,6 +28,15 @@ class Shape:
     kind: str  # line | lasso
     width: float
     strokes: tuple[np.ndarray, ...]
+    opacity: float = 1.0  # 0 to 1
+
+
+def layers(shapes) -> list[tuple[float, tuple[Shape, ...]]]:
+    """What coefficients are the mean of where shapes are not quite opaque: shares, which add up to 1, each with the
+    shapes that hold in it; the first has all that hold anywhere. So coefficients at an opacity of one half are halfway
+    between those with the shape and those without it, and nothing jumps where it goes."""
+    steps = sorted({0.0, 1.0, *(shape.opacity for shape in shapes)})
+    return [(high - low, tuple(s for s in shapes if s.opacity >= high)) for low, high in pairwise(steps)]
 
 
 def resample(stroke, count: int, aspect: float = 1.0) -> np.ndarray:

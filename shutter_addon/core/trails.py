@@ -28,6 +28,18 @@ def travelled(places: np.ndarray) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(own)])
 
 
+def shortened(bars: np.ndarray, share: float, shown: float) -> tuple[np.ndarray, float]:
+    """Bars (L,) of the same shape and sum, open for a share 0 to 1 of their time about the shown frame, and for that
+    frame at least. And for how many frames that is.
+
+    shown: the middle of the shown frame's bar, in 0 … L; of bars that are closed there, the nearest that is open"""
+    bars = np.where(bars > _CLOSED * bars.sum(), bars, 0)
+    first, last = shutters.open_span(bars)
+    own = min(max(shown - 0.5, first), last - 1)
+    start, end = own + share * (first - own), own + 1 + share * (last - own - 1)
+    return shutters.spanning(bars, start, end), end - start
+
+
 def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) -> tuple[np.ndarray, float]:
     """Bars (L,) of the same shape and sum, open while a subject moves by `length`, no longer than that takes; for the
     whole window, where it moves less. And for how many frames that is.

@@ -14,13 +14,14 @@ import numpy as np
 
 from ..core import scribbles
 from ..core.effect import Camera, Region
-from ..core.motions import Similarity
+from ..core.motions import Placement, Similarity
 from . import registration, tracking
 from .registration import Motion, Part
 from .tracking import Footage, Tracked, TrackingError
 
 BARE = "what the regions leave of the picture has too few corners to follow"
 UNLIKE = "the picture is too unlike those before"
+GOES_ON = "the picture is too unlike those before, and it goes on from here"
 
 _ANEW = 0.6  # below this confidence the last frame is compared as well, and becomes the anchor if that is surer
 _LEAST = 0.12  # below it nothing was found
@@ -49,10 +50,56 @@ class _CameraTrack(tracking.Track):
     def __init__(self, camera: Camera, regions: Sequence[Region], *arguments):
         super().__init__(camera, *arguments)
         self._regions = regions
+        self._begun: dict[int, Placement] = {}  # where it has begun anew
+
+    def _placement(self, frame: int) -> Placement:
+        return self._begun.get(frame) or super()._placement(frame)
+
+    def _onward(self, start: int, frames: range) -> Iterator[Tracked]:
+        """As `_from`; where that ends, it begins anew, in place of where it was last: behind a cut, for windows end
+        there; and where two frames can be compared again. How it moved in between, nobody knows: there is a fault."""
+        last, fault = Tracked(start, self._placement(start), 1.0), None
+        for found in self._from(start, frames):
+            if found.fault:
+                fault = found
+            else:
+                last = found
+                yield found
+        if fault is None:
+            return
+        rest = frames[frames.index(fault.frame) :]
+        begin = self._next_begin(rest)
+        is_cut = fault.fault == tracking.SHOT_ENDS
+        if begin is None or begin != fault.frame:
+            yield replace(fault, fault=BARE) if is_cut else fault
+        elif not is_cut:
+            yield replace(fault, fault=GOES_ON)
+        if begin is not None:
+            self._begun[begin] = last.placement
+            yield Tracked(begin, last.placement, 1.0)
+            yield from self._onward(begin, rest[rest.index(begin) + 1 :])
+
+    def _next_begin(self, frames: range) -> int | None:
+        """The first of these frames with which the next one, or none of its shot, can be compared; None: there is
+        none."""
+        self._footage.want(frames)
+        for frame, after in zip(frames, [*frames[1:], None], strict=True):
+            if not self._has_part(frame):
+                continue
+            if after is None or self._cut(frame, after):
+                return frame
+            if self._pursuit(frame)[1].next(after) is not None:
+                return frame
+        return None
+
+    def _cut(self, frame: int, after: int) -> bool:
+        self._footage.picture(after)  # in the order in which they are read, before cuts are looked for
+        return self._footage.cut(frame, after)
 
     def _part(self, frame: int) -> tuple[Part, float]:
         width, height = self._footage.size
-        shapes = [replace(region.at(frame), shutter=0) for region in self._regions]
+        shapes = [region.at(frame) for region in self._regions]
+        shapes = [replace(shape, shutter=0) for shape in shapes if shape.opacity]
         covered = scribbles.rasterise(shapes, width, height) > 0
         free = registration.distances(covered) > _MARGIN * height if covered.any() else ~covered
         if not free.any():

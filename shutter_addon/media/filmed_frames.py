@@ -53,7 +53,7 @@ class FilmedFrames:
         found, faults = {}, {}
         for each in tracked:
             if each.fault:
-                faults[each.frame > self.start] = each.fault
+                faults[each.frame] = each.fault
             else:
                 found[each.frame] = each
         first, centre = subject.placement(self._begin), subject.centre(self._begin)
@@ -61,16 +61,29 @@ class FilmedFrames:
         origin = (self._between(subject, self._begin, found) or found[self.start]).placement
         yield Tracked(self._begin, first, 1.0)
         for rest in (range(self._begin + 1, max(self._times) + 1), range(self._begin - 1, min(self._times) - 1, -1)):
+            told = set()
             for frame in rest:
-                there = self._between(subject, frame, found)
+                there, fault = self._between(subject, frame, found), self._fault(frame, faults, found)
+                if fault is not None and fault not in told:
+                    told.add(fault)
+                    yield Tracked(frame, first, 0.0, faults[fault])
                 if there is None:
-                    lost = next(place for place in self._beside(frame) if place not in found)
-                    yield Tracked(frame, first, 0.0, faults[lost > self.start])
-                    break
+                    continue
                 after = subject.centre(frame)
                 motion = motions.motion_between(origin, there.placement, centre, after, size)
                 moved = motions.unwound(motions.carried(first, motion, centre, after, size), there.placement)
                 yield replace(there, placement=moved)
+
+    def _fault(self, frame: int, faults: Mapping[int, str], found: Mapping[int, Tracked]) -> int | None:
+        """The place of the fault by which what a timeline frame shows was not tracked, or was tracked anew; or None."""
+        for place in self._beside(frame):
+            if place not in found:
+                side = 1 if place > self.start else -1
+                passed = [at for at in faults if 0 < side * (at - self.start) <= side * (place - self.start)]
+                return max(passed, key=lambda at: side * at)
+            if place in faults:
+                return place
+        return None
 
     def _beside(self, frame: int) -> tuple[int, int]:
         """The places of the filmed frames beside what a timeline frame shows; one twice, where it shows that."""

@@ -7,11 +7,11 @@ Equal pictures give equal results, whatever the number of threads.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
-from ..core.motions import Similarity
+from ..core.motions import Motion, Similarity
 from .errors import MediaError
 
 try:
@@ -20,7 +20,6 @@ except ImportError:  # a package without wheels; the extension registers without
     cv2 = None
 
 # What may change beside the location, each with what comes before it.
-Motion = Literal["location", "rotation", "scale"]
 MOTIONS = get_args(Motion)
 
 MOST_CORNERS = 200

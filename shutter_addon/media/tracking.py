@@ -223,9 +223,17 @@ class Track(ABC):
         for rest in (range(start + 1, frames.stop), range(start - 1, frames.start - 1, -1)):
             anchor = next((frame for frame in rest if frame in anchors), None)
             if anchor is None:
-                yield from self._from(start, rest)
+                yield from self._onward(start, rest)
             else:
                 yield from self._between(start, anchor)
+
+    def _onward(self, start: int, frames: range) -> Iterator[Tracked]:
+        """Frames one after another, away from `start`, where no anchor waits."""
+        return self._from(start, frames)
+
+    def _placement(self, frame: int) -> Placement:
+        """Where it is at a frame that something is tracked from."""
+        return self._subject.placement(frame)
 
     def _between(self, start: int, anchor: int) -> Iterator[Tracked]:
         """From `start` towards an anchor, and then blended with the way back from there."""
@@ -252,7 +260,7 @@ class Track(ABC):
         """Frames one after another, away from `start`."""
         self._footage.want(frames)
         origin, pursuit, worth = self._pursuit(start)
-        last, shown, lost = Tracked(start, self._subject.placement(start), 1.0), start, []
+        last, shown, lost = Tracked(start, self._placement(start), 1.0), start, []
         for frame in frames:
             self._footage.picture(frame)  # in the order in which they are read, before cuts are looked for
             if self._footage.cut(shown, frame):
@@ -281,7 +289,7 @@ class Track(ABC):
 
     def _carried(self, origin: int, frame: int, motion: Similarity, near: Placement) -> Placement:
         before, after = self._centres[origin], self._centres[frame]
-        moved = motions.carried(self._subject.placement(origin), motion, before, after, self._footage.size)
+        moved = motions.carried(self._placement(origin), motion, before, after, self._footage.size)
         return motions.unwound(moved, near)
 
     def _bridged(self, last: Tracked, found: Tracked, lost: list[int]) -> Iterator[Tracked]:

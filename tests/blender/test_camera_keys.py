@@ -5,7 +5,7 @@ import math
 import cv2
 import numpy as np
 import pytest
-from support import write_frames
+from support import request, write_frames
 
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips, validation
 from shutter_addon.blender.editing import (
@@ -217,13 +217,50 @@ def test_a_flat_wall_and_a_single_frame(bpy, edit, tmp_path, count, sentence):
     refuses(bpy, "track_camera", sentence)
 
 
-def test_it_stops_at_a_cut(bpy, edit, tmp_path):
-    dark = texture(WIDTH, HEIGHT) // 4
-    shots = [*(picture(i) for i in range(8)), *(np.roll(dark, i, axis=1) for i in range(8))]
+DARK = texture(WIDTH, HEIGHT) // 4
+
+
+def test_it_goes_on_behind_a_cut(bpy, edit, tmp_path):
+    shots = [*(picture(i) for i in range(8)), *(np.roll(DARK, i, axis=1) for i in range(8))]
     effect = new_effect(edit, new_source(edit, write_frames(tmp_path / "cut", shots)))
     assert call(bpy, "track_camera") == {"FINISHED"}
-    assert keys(bpy)[0][-1][0] == 18
-    assert track_region.stops(effect, None) == [(19, "the shot ends here", False)]
+    assert track_region.stops(effect, None) == []
+    found = placements(bpy)
+    assert found[18].location == pytest.approx(found[19].location, abs=0.25 / WIDTH)
+    assert (found[26].location[0] - found[19].location[0]) * WIDTH == pytest.approx(7, abs=0.3)
+    assert not keys(bpy, "influence")
+
+
+def flash(edit, folder, black=range(20, 50), count=70):
+    """A wall that glides by, a pixel a frame; it is black meanwhile."""
+    shots = [np.roll(DARK * 4, 2 * i, axis=1) * np.uint8(i not in black) for i in range(count)]
+    source = new_source(edit, write_frames(folder / "black", shots))
+    strip, effect = add_effect.add_effect(edit, source)
+    shutter_edits.start(effect)
+    effect.stop_at_cuts = False
+    selection.choose(edit, strip)
+    edit.frame_set(16)
+    return effect
+
+
+def test_where_the_cameras_motion_is_unknown_exposures_become_short(bpy, edit, tmp_path):
+    """No exposure reaches over the edge of what is tracked, and from frame to frame none changes by more than two
+    frames; behind that it goes on. Without the keys, they would be open throughout."""
+    effect = flash(edit, tmp_path)
+    call(bpy, "tripod")
+    assert track_region.stops(effect, None) == [(31, camera_tracking.BARE, True)]
+    assert [(gap.first, gap.last) for gap in track_region.gaps(effect, None)] == [(31, 60)]
+    state = {frame: request(*active(bpy), frame).state for frame in range(11, 81)}
+    spans = {frame: np.flatnonzero(found.bars[0] > 1e-6) - found.options.before for frame, found in state.items()}
+    for frame, span in spans.items():
+        beyond = {frame + k for k in span.tolist()} & set(range(31, 61))
+        assert beyond <= {frame}, (frame, span)
+    lengths = [len(span) for span in spans.values()]
+    assert max(abs(np.diff(lengths))) <= 2
+    assert (lengths[5], lengths[25], lengths[-8]) == (8, 1, 8)
+    for curve in fcurves.curves_under(edit, f"{effect.camera.path_from_id()}.influence"):
+        curve.mute = True
+    assert len(np.flatnonzero(request(*active(bpy), 40).state.bars[0])) == 8
 
 
 def test_a_button_goes_to_the_frames_that_need_a_look(bpy, edit, effect):

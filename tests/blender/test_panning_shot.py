@@ -56,6 +56,9 @@ def test_one_click_tracks_and_follows_and_one_undo_takes_it_back(bpy, region):
     assert shutters[1][:2] == ("Long", "NOTHING")
     assert (names, position) == ([("Sharp", "Sharp")], "CENTER")
     assert len(keys(bpy, "confidence")[0]) == COUNT, "all of the strip is tracked"
+    moving = request(*active(bpy), FRAME).state.following
+    assert (moving.turns == 1).all(), "the subject turns and grows, and nothing turns with it"
+    assert active(bpy)[1].shutters[0].follow_smooth == 6
     bpy.ops.ed.undo()
     assert everything(bpy) == before
     bpy.ops.ed.redo()

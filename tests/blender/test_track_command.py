@@ -170,7 +170,22 @@ def test_where_it_ends_is_said(track, tmp_path, shown, last):
     code, said = track(first, *options, recipe=plain() | shown)
     assert (code, said) == (0, f"Virtual Shutter: cross: tracked to frame {last}, where the shot ends")
     assert json.loads((tmp_path / "r.json").read_text())["stops"] == [{"frame": last + 1, "reason": tracking.SHOT_ENDS}]
+    region = recipes.load(tmp_path / "t.json").effect(4 / 3).regions[1]
+    assert [region.opacity.at(frame) for frame in (1, last, last + 1, 99)] == [1, 1, 0, 0]
     assert [key.frame for key in keys(tmp_path / "t.json")] == [1, 3, last]
+
+
+def test_opacities_that_a_recipe_has_stay_beyond_the_frames_that_are_tracked(track, film, tmp_path):
+    """And within them, what was is replaced; on demand nothing is written."""
+    faded = [{"frame": 1, "value": 0.0}, {"frame": 4, "value": 0.5, "ease": "constant"}, {"frame": 8, "value": 0.0}]
+    given = {"recipe": plain(opacity=faded)}
+    options = "--region", "cross", "--frame", 8, "--frames", "7:10", "--output", tmp_path / "o.json"
+    assert track(film, *options, **given)[0] == 0
+    found = recipes.load(tmp_path / "o.json").effect(4 / 3).regions[1].opacity
+    assert [found.at(frame) for frame in (1, 4, 6, 7, 8, 10, 12)] == [0, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5]
+    assert track(film, *options, "--hold", **given)[0] == 0
+    before, after = (recipes.load(tmp_path / name).regions[1].opacity for name in ("recipe.json", "o.json"))
+    assert before == after
 
 
 def test_bad_input_is_one_sentence_and_writes_nothing(track, film, tmp_path):

@@ -1,5 +1,7 @@
 """Both devices against the float64 reference: random footage, random shutters, every option."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -396,6 +398,32 @@ def test_labels_are_those_of_the_shapes(device):
             size = (10, 6) if "aggregate" in options else (37, 23)
             expected = rasterise(shapes, *size, border="border" in options)
             assert np.array_equal(renderer.labels(moment), expected)
+
+
+@pytest.mark.parametrize("options", [{}, {"border": True}, {"edge_aware": 1.0}, {"aggregate": 2}])
+def test_what_is_half_there_is_halfway(device, options):
+    """Coefficients go straight from those with a shape to those without it, whatever lies around it."""
+    rng = np.random.default_rng(22)
+    source, renderer = footage(rng), Renderer(device, footage(rng))
+    moment = state(rng, **options)
+
+    def found(*opacities):
+        shapes = tuple(dataclasses.replace(s, opacity=o) for s, o in zip(SHAPES, opacities, strict=True))
+        return renderer.coefficients(3, dataclasses.replace(moment, shapes=shapes))
+
+    both, one, none = found(1, 1, 1), found(0, 1, 1), found(0, 0, 1)
+    assert np.abs(found(0.25, 1, 1) - (0.25 * both + 0.75 * one)).max() < 1e-5
+    assert np.abs(found(0.25, 0.75, 1) - (0.25 * both + 0.5 * one + 0.25 * none)).max() < 1e-5
+    assert np.array_equal(found(0, 1, 1), renderer.coefficients(3, dataclasses.replace(moment, shapes=SHAPES[1:])))
+    fading = tuple(dataclasses.replace(s, opacity=0.3) for s in SHAPES[:1])
+    check(device, source, dataclasses.replace(moment, shapes=fading), 3)
+
+
+def test_a_single_shape_that_goes_leaves_the_default(device):
+    renderer = Renderer(device, footage(np.random.default_rng(23)))
+    moment = state(np.random.default_rng(23), shapes=(dataclasses.replace(SHAPES[0], opacity=0.25),))
+    found = renderer.coefficients(3, moment)
+    assert pytest.approx(np.tile([0.75, 0.25, 0], (37 * 23, 1))) == found.reshape(3, -1).T
 
 
 def test_what_is_needed_is_what_is_read(device):

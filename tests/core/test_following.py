@@ -1,5 +1,6 @@
 """Where the points of the shown picture lie in frames of the source, by keys on the timeline."""
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -99,6 +100,70 @@ def test_the_camera_turns_about_the_pictures_centre():
     motion = motions.Similarity(*(part[0, 0] for part in followed(made(follow="camera", camera=keys), 1, 0).at([1])))
     assert motion(31.5 + 23.5j) == pytest.approx(31.5 + 11.5j)
     assert motion.turn == pytest.approx(1.5)
+
+
+WHIRL = [recipe.RegionKey(1), recipe.RegionKey(2, (0.1, 0), 90, 2)]
+
+
+def with_way(source, **way):
+    return dataclasses.replace(source, shutters=[dataclasses.replace(source.shutters[0], **way)])
+
+
+def test_the_location_alone_is_followed():
+    """The centre goes where it went, and nothing turns or grows about it."""
+    found = followed(with_way(made(WHIRL), follow_motion="location"), 1, 0).at([0, 1])
+    assert found[0] == pytest.approx(np.ones((2, 1)))
+    assert found[1][1, 0] == pytest.approx(6.4)
+    turned = followed(with_way(made(WHIRL), follow_motion="rotation"), 1, 0).at([1])[0][0, 0]
+    assert turned == pytest.approx(-1j)
+
+
+def jittered(rng):
+    return [recipe.RegionKey(n, (0.01 * n + rng.normal(0, 0.01), 0)) for n in range(60)]
+
+
+def test_a_smooth_motion_has_less_jitter_and_the_same_way():
+    """Of a steady pan whose subject jitters."""
+    source, steps = made(jittered(np.random.default_rng(1)), "center"), {}
+    for smooth in (0, 6):
+        way = with_way(source, follow_smooth=smooth)
+        found = (shifts(way, range(f - 2, f + 3), frame=f, index=f - 1).real for f in range(20, 35))
+        steps[smooth] = np.concatenate([np.diff(each) for each in found])
+    assert np.std(steps[6]) < np.std(steps[0]) / 5
+    assert np.mean(steps[6]) == pytest.approx(0.64, abs=0.1)
+
+
+def test_a_straight_way_is_smooth_already():
+    found = shifts(with_way(made(STRAIGHT), follow_smooth=6), [10, 11, 15], frame=31, index=10)
+    assert found == pytest.approx(np.array([0, 1, 5]) * STEP)
+
+
+def test_smoothing_is_the_weighted_mean_of_the_frames_around():
+    jump = [recipe.RegionKey(10, ease="constant"), recipe.RegionKey(20, (0.5, 0))]
+    found = shifts(
+        with_way(made(jump, "center"), follow_smooth=3), [19], frame=17, index=16, shown=lambda f: int(f) - 1
+    )
+    weights = following.smoothing(3)
+    # At frame 20 those from 20 on count, of 17 to 23; at frame 17 the last of 14 to 20.
+    assert found[0] == pytest.approx(32 * (weights[3:].sum() - weights[-1]))
+
+
+def test_shutters_may_follow_one_region_in_ways_of_their_own():
+    source = made(WHIRL)
+    other = dataclasses.replace(source.shutters[0], name="Other", follow_motion="location")
+    found = followed(dataclasses.replace(source, shutters=[*source.shutters, other]), 1, 0).at([1])[0][0]
+    assert found == pytest.approx([-2j, 1])
+
+
+def test_where_the_camera_counts_for_nothing_the_shown_frame_alone_is_exposed():
+    camera = [recipe.CameraKey(0), recipe.CameraKey(100, (1, 0.5))]
+    source = made(position="center", follow="camera", camera=camera)
+    bars = {}
+    for influence in (0.0, 0.5, 1.0):
+        bars[influence] = state_of(dataclasses.replace(source, camera_influence=influence), 11, 10).bars[0]
+    assert bars[0.0] == pytest.approx([0, 0, 6, 0, 0, 0])
+    assert bars[0.5] == pytest.approx(np.array([0, 1, 1, 1, 0.5, 0]) * 6 / 3.5)
+    assert bars[1.0].tolist() == [1.0] * 6
 
 
 @pytest.mark.parametrize("keys", [[], STRAIGHT[:1], [recipe.RegionKey(0, scale=0), recipe.RegionKey(9, (1, 1))]])

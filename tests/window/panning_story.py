@@ -49,7 +49,8 @@ def panned():
     clicked()
     yield from driver.until(lambda: shutters() != before, "the shutters change")
     after = shutters()
-    driver.saw(panned=after)
+    shutter = story.effect().shutters[0]
+    driver.saw(panned=after, way=[shutter.follow_motion, shutter.follow_smooth])
     yield from story.seen("3_panning")
     driver.move(story.preview(), 50, story.preview().height - 50)
     yield

@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import av
+import cv2
 import numpy as np
 import OpenImageIO
 import pytest
@@ -161,15 +163,66 @@ def test_one_stroke(tmp_path):
             assert apart.max() > 60, frame
 
 
-def test_a_panning_shot(tmp_path):
+def broken_film(path):
+    """For track_ends_story.py: 30 frames of a film, 40 of the walkers, covered in the last seven, 10 of grey, and 30 of
+    the other film again, 768×576."""
+    shots = []
+    for name, first, count in (("bigbuckbunny", 0, 30), ("walkers", 50, 40), ("", 0, 10), ("bigbuckbunny", 60, 30)):
+        if not name:
+            shots += [np.full((576, 768, 3), 110, np.uint8)] * count
+            continue
+        with open_source(ROOT / "assets" / f"{name}.mp4") as source:
+            frames = [source.read(first + n)[..., :3] for n in range(count)]
+        shots += [cv2.resize(frame, (768, 576), interpolation=cv2.INTER_AREA) for frame in frames]
+    for n in range(63, 70):
+        shots[n] = shots[n].copy()
+        shots[n][:, 200:560] = 110
+    with av.open(str(path), "w") as film:
+        stream = film.add_stream("libx264", rate=25, options={"crf": "10"})
+        stream.width, stream.height, stream.pix_fmt = 768, 576, "yuv420p"
+        for frame in shots:
+            film.mux(stream.encode(av.VideoFrame.from_ndarray(frame, "rgb24")))
+        film.mux(stream.encode())
+    return path
+
+
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_what_is_tracked_ends_with_its_track(tmp_path, backend):
+    """A region counts in its shot alone, and fades where the subject is covered: elsewhere the picture is that of an
+    effect without it. A camera is tracked through all shots; between them exposures become short, and long again."""
+    given = {"footage": broken_film(tmp_path / "broken.mp4"), "packages": packages(tmp_path / "packages")}
+    seen, console = tell("track_ends_story.py", backend, linked(tmp_path), **given)
+    assert "Traceback" not in console
+    facts = {name: entry[name] for entry in seen for name in entry}
+    first, last = facts["region"][0][0], facts["region"][-1][0]
+    assert 30 <= first < 45, "behind a lamp post, or at the cut"
+    assert 62 <= last <= 66
+    assert [value for _frame, value, _kind in facts["region"]] == [0, 1, 1, 0]
+    assert {kind for *_, kind in facts["region"]} == {"GENERATED"}
+    assert facts["gaps"] == [["-inf", str(first)], [str(last), "inf"]]
+    steps = {entry["step"]: crop(tmp_path, entry) for entry in seen if "step" in entry}
+    above = slice(0, next(iter(steps.values())).shape[0] * 3 // 4)  # the bar editor
+    for frame in (20, 50, 61, 76):
+        apart = np.abs(steps[f"there_{frame:03d}"][above] - steps[f"without_{frame:03d}"][above])
+        assert (apart.max() > 25) == (frame in (50, 61)), frame
+    assert facts["tracked"] == [1, 110]
+    assert facts["camera_gaps"] == [["71", "80"]]
+    values = {frame: value for frame, value, _kind in facts["camera"]}
+    assert (values[70], values[81]) == (0, 0)
+    assert max(values.values()) == 1
+
+
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_a_panning_shot(tmp_path, backend):
     """A walker before a still camera: she is sharp, and the street, which stands still, streaks. A dragged bar shows at
     once. On the other backend than that of a single stroke, to spare time."""
     footage = ROOT / "assets" / "walkers.mp4"
     given = {"footage": shutil.copy(footage, tmp_path), "packages": packages(tmp_path / "packages")}
-    seen, console = tell("panning_story.py", "vulkan", linked(tmp_path), **given)
+    seen, console = tell("panning_story.py", backend, linked(tmp_path), **given)
     assert "Traceback" not in console
     facts = {name: entry[name] for entry in seen for name in entry}
     assert facts["panned"] == [["Sharp", "REGION", "Sharp", [1] * 8], ["Long", "NOTHING", "", [1] * 8]]
+    assert facts["way"] == ["LOCATION", 6]
     steps = {entry["step"]: crop(tmp_path, entry) for entry in seen if "step" in entry}
     height = steps["2_tracked"].shape[0]
     tracked, panned, back, bars = (steps[name][: height * 3 // 4] for name in sorted(steps))  # above the bar editor

@@ -4,7 +4,7 @@ import json
 import sys
 from dataclasses import replace
 
-from ...core import atomic_write, recipe, region_keys, retiming
+from ...core import atomic_write, presence, recipe, region_keys, retiming
 from ...core.effect import Region
 from ...core.messages import signed
 from ...media import PrefetchSource, camera_tracking, filmed_frames, registration, tracking
@@ -30,6 +30,9 @@ def add(commands) -> None:
         "--motion", choices=registration.MOTIONS, default="scale", help="location; rotation too; or scale as well"
     )
     parser.add_argument("--all-keys", action="store_true", help="a key at every frame, needed or not")
+    parser.add_argument(
+        "--hold", action="store_true", help="all of it counts where its track has ended, too: its opacity gets no keys"
+    )
     parser.add_argument(
         "--output", type=command_line.place, required=True, metavar="R2.json", help="the recipe with the keys"
     )
@@ -60,6 +63,8 @@ def run(arguments) -> None:
         size = medium.width, medium.height
     placements = {frame: found.placement for frame, found in tracked.items()}
     with_keys = _keyed(source_recipe, index, placements, {arguments.frame}, size, thin=not arguments.all_keys)
+    if not arguments.hold:
+        with_keys = _ended(with_keys, index, tracked, stops, arguments.frame, range(first, last + 1))
     _write_track(arguments, with_keys, tracked, stops)
     for stop in stops:
         if stop.fault == tracking.SHOT_ENDS:
@@ -114,6 +119,19 @@ def _keyed(source_recipe, index: int | None, *placements, thin: bool) -> recipe.
         return region_keys.with_camera(source_recipe, *placements, thin=thin)
     regions = list(source_recipe.regions)
     regions[index] = region_keys.with_placements(regions[index], *placements, thin=thin)
+    return replace(source_recipe, regions=regions)
+
+
+def _ended(source_recipe, index: int | None, tracked: dict, stops: list, start: int, frames: range) -> recipe.Recipe:
+    """The recipe whose region, or camera, counts only where it was tracked."""
+    seen = [frame for frame, found in tracked.items() if found.confidence > 0]
+    ends = [presence.Stop(stop.frame, stop.frame > start, stop.fault == tracking.SHOT_ENDS) for stop in stops]
+    if index is None:
+        keys = presence.keys(seen, ends, (), max(source_recipe.options.reach, presence.FADE), beside=1)
+        value = region_keys.with_ends(source_recipe.camera_influence, keys, frames)
+        return replace(source_recipe, camera_influence=value)
+    regions, keys = list(source_recipe.regions), presence.keys(seen, ends, {start})
+    regions[index] = replace(regions[index], opacity=region_keys.with_ends(regions[index].opacity, keys, frames))
     return replace(source_recipe, regions=regions)
 
 

@@ -20,7 +20,7 @@ from bpy.props import (
 )
 from bpy.types import PropertyGroup
 
-from ...core.limits import MAX_BAR, MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE
+from ...core.limits import MAX_BAR, MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE, MAX_SMOOTH
 from ...core.shutters import MAX_WINDOW
 from . import consistency, matte_strips, revision, selection, strips, validation
 
@@ -230,6 +230,25 @@ class Shutter(PropertyGroup):
     follow_region: StringProperty(
         name="Followed Region", description="Name of the region that the exposure moves with", update=_changed
     )
+    follow_motion: EnumProperty(
+        name="Motion",
+        description="What of its motion is followed",
+        items=MOTIONS,
+        default="SCALE",
+        update=_changed,
+        options=_UNKEYED,
+        translation_context=CONTEXT,
+    )
+    follow_smooth: IntProperty(
+        name="Smoothness",
+        description="Frames before and after each over which the motion is averaged, as the mass of a camera does: "
+        "at 0 it is followed as it is",
+        min=0,
+        max=MAX_SMOOTH,
+        soft_max=24,
+        update=_changed,
+        options=_UNKEYED,
+    )
     length: EnumProperty(
         name="Length",
         description="What says how long the exposure is",
@@ -289,6 +308,13 @@ class _Tracked:
     track_all_keys: BoolProperty(
         name="All Keys",
         description="Keep a key at every tracked frame, in place of those that the motion needs within a pixel",
+        options=_UNKEYED,
+    )
+    track_ends: BoolProperty(
+        name="End with Track",
+        description="Track keys a region's opacity, or the camera's influence, so that it fades where the track ends; "
+        "a region ends with its shot",
+        default=True,
         options=_UNKEYED,
     )
     follow_clip: PointerProperty(
@@ -391,7 +417,7 @@ class ShutterRegion(_Tracked, PropertyGroup):
     )
     opacity: FloatProperty(
         name="Opacity",
-        description="How much of the matte counts",
+        description="How much of the region counts: at 0 the picture is as without it",
         subtype="FACTOR",
         default=1.0,
         min=0.0,
@@ -437,6 +463,15 @@ class ShutterRegion(_Tracked, PropertyGroup):
 
 class ShutterCamera(_Tracked, PropertyGroup):
     name: StringProperty(name="Name", description="Name of the camera's animation channels", default="Camera")
+    influence: FloatProperty(
+        name="Influence",
+        description="How much is left of exposures that follow the camera: at 0 the shown frame alone",
+        subtype="FACTOR",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        update=_changed,
+    )
     location: _location("Where what the camera sees has moved to, as a fraction of the picture")
     rotation: _rotation("Rotation of what the camera sees, about the picture's center")
     scale: _scale("Scale of what the camera sees, about the picture's center")

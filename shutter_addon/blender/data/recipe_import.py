@@ -43,6 +43,8 @@ def apply(edit, effect, strip, source: recipe.Recipe, folder: Path = Path()) -> 
         _set_number(edit, effect, path, "source_time", source.time, first, group=effect.name)
     _set_number(edit, effect, path, "edge_aware", source.edge_aware, first, group=effect.name)
     _set_moves(edit, effect.camera, f"{path}.camera", source.camera, first, group=effect.camera.name)
+    influence = source.camera_influence
+    _set_number(edit, effect.camera, f"{path}.camera", "influence", influence, first, group=effect.camera.name)
     for i, shutter in enumerate(source.shutters):
         _add_shutter(edit, effect, f"{path}.shutters[{i}]", shutter, first)
     colors = {shutter.name: shutter.color for shutter in source.shutters}
@@ -103,8 +105,8 @@ def _kept(name: str) -> str:
 def _check_keys(source: recipe.Recipe, first: float) -> None:
     """EffectError: keys would lie beyond Blender's timeline, or on the same frame, as it counts in float32."""
     mattes = [region for region in source.regions if not isinstance(region, recipe.Region)]
-    numbers = [source.edge_aware, *(shutter.trail for shutter in source.shutters)]
-    numbers += [number for region in mattes for number in (region.opacity, region.width)]
+    numbers = [source.edge_aware, source.camera_influence, *(shutter.trail for shutter in source.shutters)]
+    numbers += [*(region.opacity for region in source.regions), *(region.width for region in mattes)]
     keyed = [source.time, source.camera, *(number for number in numbers if isinstance(number, list))]
     for keys in (*keyed, *(part.keys for part in (*source.shutters, *source.regions))):
         frames = np.array([key.frame + first for key in keys], dtype=np.float32)
@@ -134,6 +136,7 @@ def _add_shutter(edit, effect, path: str, source: recipe.Shutter, first: float) 
     if source.follow is not None:
         shutter.follow = "CAMERA" if source.follow == recipe.CAMERA else "REGION"
         shutter.follow_region = "" if source.follow == recipe.CAMERA else source.follow
+    shutter.follow_motion, shutter.follow_smooth = source.follow_motion.upper(), source.follow_smooth
     if source.trail is not None:
         shutter.length = "MOTION"
         _set_number(edit, shutter, path, "trail", source.trail, first)
@@ -150,6 +153,7 @@ def _add_region(edit, effect, strip, path: str, source: recipe.Region, color, fi
     region.name, region.shutter, region.width = source.name, source.shutter, source.width
     region.kind = source.kind.upper()
     region.layer = _draw(effect, strip, source, color, first)
+    _set_number(edit, region, path, "opacity", source.opacity, first)
     _set_moves(edit, region, path, source.keys, first)
 
 

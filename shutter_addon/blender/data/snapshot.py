@@ -157,7 +157,8 @@ def _around(effect, frames):
     """The frames at which motions are asked for: where a shutter follows something, those around these frames too."""
     if all(shutter.follow == "NOTHING" for shutter in effect.shutters):
         return frames
-    reach = following.reach(validation.number(effect, "window"))
+    smooth = max(validation.number(shutter, "follow_smooth") for shutter in effect.shutters)
+    reach = following.reach(validation.number(effect, "window")) + smooth
     return np.unique(np.add.outer(sorted(frames), np.arange(-reach, reach + 1))).tolist()
 
 
@@ -307,7 +308,9 @@ def _shutter(
         bars = keyframes.Bars(keyframes.Constant(bars))
     is_trail = follow is not None and validation.word(shutter, "length") == "MOTION"
     trail = _channel(curves, shutter, path, "trail", frames) if is_trail else None
-    return model.Shutter(shutter.name, tuple(shutter.color), bars, follow, trail)
+    motion = validation.word(shutter, "follow_motion").lower()
+    smooth = validation.number(shutter, "follow_smooth")
+    return model.Shutter(shutter.name, tuple(shutter.color), bars, follow, trail, motion, smooth)
 
 
 def _bars(curves: Curves, path: str, shutter, options: keyframes.Channel, frames, thorough: bool) -> keyframes.Bars:
@@ -391,12 +394,14 @@ def _region(curves: Curves, path: str, effect, region, shutter: int, placement, 
         _channel(curves, region, path, "width", frames),
         _drawings(curves, path, effect, region, placement, frames),
         *_moves(curves, region, path, frames),
+        _channel(curves, region, path, "opacity", frames),
     )
 
 
 def _camera(curves: Curves, effect, frames) -> model.Camera:
     path = effect.camera.path_from_id()
-    return model.Camera(*_moves(curves, effect.camera, path, frames))
+    moves = _moves(curves, effect.camera, path, frames)
+    return model.Camera(*moves, _channel(curves, effect.camera, path, "influence", frames))
 
 
 def _moves(curves: Curves, moving, path: str, frames) -> tuple[keyframes.Channel, ...]:

@@ -18,6 +18,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core import presence
 from ...core.motions import Placement
 from ..data import fcurves, selection, validation
 from ..data.validation import EffectError
@@ -31,6 +32,8 @@ NOTHING_KEPT = np.float32(1.70158)
 # The channels, and how many of their components a motion has.
 _COMPONENTS = (("location", 0), ("location", 1), ("rotation", 0), ("scale", 0))
 CHANNELS = ("location", "rotation", "scale")
+# What says how much a region counts, and the camera.
+ENDS = "opacity", "influence"
 _LOCKED = n_('{place}: the F-curve of "{channel}" is locked')
 _MUTED = n_('{place}: the F-curve of "{channel}" is muted')
 _COUNTS = {"LOCATION": 2, "ROTATION": 3, "SCALE": 4}
@@ -112,6 +115,27 @@ class MotionKeys:
         points = fcurves.points_of(curve) if curve else np.empty((0, 2))
         return points[:, 0], points[:, 1] / 100
 
+    def fade(self, name: str, keys: Iterable[presence.Key]) -> None:
+        """Makes keys of how much it counts, a property from 0 to 1, in place of all that were made: between these it is
+        what the editor has it at, keyed or not."""
+        curve = self._curve(name, new=True)
+        moving, path = selection.moving(self.effect, self.index), curve.data_path
+        points, (frames, made) = curve.keyframe_points, _read(curve)
+        # What was made has hidden the number that the editor had set.
+        whole = max((points[i].co[1] for i in np.flatnonzero(made).tolist()), default=getattr(moving, name))
+        for i in np.flatnonzero(made)[::-1].tolist():
+            points.remove(points[i], fast=True)
+        curve.update()
+        own = set(frames[~made].tolist())
+        values = [(key, key.value * (curve.evaluate(key.frame) if own else whole)) for key in keys]
+        for key, value in values:
+            if key.frame not in own:
+                _insert(curve, key.frame, value, key.ease.upper())
+        curve.update()
+        if curve.is_empty:
+            fcurves.remove_curves(self.effect.id_data, path)
+            setattr(moving, name, whole)
+
     def _curve(self, name: str, component: int = 0, *, new: bool = False):
         moving = selection.moving(self.effect, self.index)
         edit, path = self.effect.id_data, f"{moving.path_from_id()}.{name}"
@@ -128,7 +152,7 @@ def placement_now(moving) -> Placement:
 def check_curves(effect, index: int | None) -> None:
     """EffectError: an F-curve of where a region or the camera is cannot be keyed, or its keys would do nothing."""
     moving = selection.moving(effect, index)
-    for name in (*CHANNELS, "confidence"):
+    for name in (*CHANNELS, "confidence", ENDS[index is None]):
         for curve in fcurves.curves_under(effect.id_data, f"{moving.path_from_id()}.{name}"):
             for part in filter(None, (curve, curve.group)):
                 if part.lock or part.mute:
@@ -215,9 +239,9 @@ def _replace(curve, values: dict[int, float], found: Iterable[int]) -> None:
     curve.update()
 
 
-def _insert(curve, frame: int, value: float) -> None:
+def _insert(curve, frame: int, value: float, ease: str = "LINEAR") -> None:
     key = curve.keyframe_points.insert(frame, value, options={"FAST"}, keyframe_type=MADE)
-    key.interpolation, key.back = "LINEAR", key.co[1]
+    key.interpolation, key.back = ease, key.co[1]
 
 
 def _read(curve) -> tuple[np.ndarray, np.ndarray]:

@@ -7,6 +7,8 @@ from ..data.validation import EffectError
 from . import shutter_edits
 from .motion_keys import MotionKeys
 
+SMOOTHNESS = 6  # frames before and after each: half a second in all
+
 
 def is_ready(edit, effect, strip, index: int) -> bool:
     """Whether a region has keys of motion, and those that were tracked reach the current frame; without, it has to be
@@ -27,5 +29,8 @@ def set_up(effect, index: int, key: bool = False) -> None:
     place = effect.shutters.find(region.shutter)
     shutter_edits.follow(effect, place, "REGION", key)
     region.name = consistency.unique(region.name, {other.name for other in effect.regions if other != region})
-    effect.shutters[place].follow_region = region.name
+    shutter = effect.shutters[place]
+    shutter.follow_region = region.name
+    # Turns and scales of a small subject are unsure, and whirl what is far from it; and a camera on its head has mass.
+    shutter.follow_motion, shutter.follow_smooth = "LOCATION", SMOOTHNESS
     shutter_edits.move_shutter(effect, place, 0)

@@ -64,6 +64,7 @@ def follow(effect, index: int, subject: str, key: bool) -> None:
     frame; key: keys the bars at the current frame. EffectError: the window has no length, and nothing has changed."""
     shutter, bars = effect.shutters[index], presets.bars("ANGLE_360", validation.number(effect, "window"))
     shutter.follow, shutter.length, effect.position = subject, "FRAMES", "CENTER"
+    shutter.follow_motion, shutter.follow_smooth = "SCALE", 0
     bar_edits.paint(effect, index, bars, key)
 
 

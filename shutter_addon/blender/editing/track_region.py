@@ -15,12 +15,13 @@ import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import limits, motions, region_keys
+from ...core import limits, motions, presence, region_keys
 from ...core.effect import Camera, Region
+from ...core.frame_state import Options
 from ...core.keyframes import Samples
 from ...media import camera_tracking, tracking
 from ...media.tracking import Tracked
-from ..data import annotations, selection, snapshot, strips, validation
+from ..data import annotations, inbetween_settings, selection, snapshot, strips, validation
 from ..data.validation import EffectError
 from ..rendering import session
 from . import motion_keys
@@ -38,6 +39,7 @@ _FAULTS = (
     n_("the frame lies outside what can be tracked"),
     n_("what the regions leave of the picture has too few corners to follow"),
     n_("the picture is too unlike those before"),
+    n_("the picture is too unlike those before, and it goes on from here"),
 )
 
 _replacements = 0  # how often Blender's data has been replaced, by undo or by another file
@@ -149,6 +151,7 @@ def track(
                 kept = found if all_keys else _thinned(effect, subject, found, {start, *anchors, *ends})
                 _write(keys, [found[frame] for frame in kept], found.values())
                 _mark(effect, index, found, stops, reach)
+                key_ends(effect, index)
                 if index is not None:
                     effect.regions[index].follow_stamp = ""  # what it followed would undo this
     if len(found) == 1:
@@ -162,6 +165,39 @@ def stops(effect, index: int | None) -> list[tuple[int, str, bool]]:
     return sorted(
         (round(effect.start + stop.frame), rpt_(stop.fault), stop.fault != tracking.SHOT_ENDS) for stop in known
     )
+
+
+def gaps(effect, index: int | None) -> list[presence.Gap]:
+    """The timeline frames without a track, from its ends on, ascending."""
+    return presence.gaps(*_track(effect, index))
+
+
+def _track(effect, index: int | None) -> tuple[list[int], list[presence.Stop]]:
+    """The timeline frames at which it was found, and where its track ended."""
+    frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
+    seen = np.round(frames[confidence > 0]).astype(int).tolist()
+    known = [stop for stop in selection.moving(effect, index).stops if math.isfinite(effect.start + stop.frame)]
+    return seen, [
+        presence.Stop(round(effect.start + stop.frame), stop.forward, stop.fault == tracking.SHOT_ENDS)
+        for stop in known
+    ]
+
+
+def key_ends(effect, index: int | None) -> None:
+    """Keys how much it counts by where its track ends, or takes such keys back."""
+    keys, (seen, stops), found = MotionKeys(effect, index, "SCALE"), _track(effect, index), []
+    if selection.moving(effect, index).track_ends and seen:
+        if index is None:
+            found = presence.keys(seen, stops, (), _reach(effect), beside=1)
+        else:
+            found = presence.keys(seen, stops, keys.edited(range(min(seen), max(seen) + 1)))
+    keys.fade(motion_keys.ENDS[index is None], found)
+
+
+def _reach(effect) -> int:
+    """The frames over which the camera's influence fades: so no exposure reaches one whose motion nobody knows."""
+    window, position = validation.number(effect, "window"), validation.word(effect, "position").lower()
+    return max(Options(window, position, step=inbetween_settings.factor(effect)).reach, presence.FADE)
 
 
 def confidence_at(effect, index: int | None, frame: float) -> float | None:

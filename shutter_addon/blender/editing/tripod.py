@@ -1,6 +1,6 @@
 """A tripod, for footage that was held in the hand: an exposure for which the camera stands still."""
 
-from . import shutter_edits
+from . import shutter_edits, track_region
 from .motion_keys import MotionKeys
 
 
@@ -20,3 +20,4 @@ def set_up(effect, key: bool = False) -> None:
         index = 0
     shutter_edits.follow(effect, index, "CAMERA", key)
     effect.active_shutter = index
+    track_region.key_ends(effect, None)  # the window lies elsewhere now

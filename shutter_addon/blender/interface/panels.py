@@ -1,5 +1,7 @@
 """Panels, lists and menus: in the Properties editor's Strip tab, and as a tab in the sequencer's sidebar."""
 
+import math
+
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
@@ -159,8 +161,15 @@ def _draw_follow(layout, effect, shutter) -> None:
         layout.prop(shutter, "length")
         if shutter.length == "MOTION":
             layout.prop(shutter, "trail")
+        _draw_followed_motion(layout, shutter)
     if shutter.follow == "CAMERA":
         _draw_tracking(layout, effect, None)
+
+
+def _draw_followed_motion(layout, shutter) -> None:
+    """What of a motion is followed, and how smoothly."""
+    for name in ("follow_motion", "follow_smooth"):
+        layout.prop(shutter, name)
 
 
 def _draw_live(layout, context):
@@ -237,7 +246,9 @@ class _Regions(_WithEffect):
             layout.prop(region, "ramp")
         elif region.kind == "MATTE":
             _draw_matte(layout, matte_look.look(edit, effect, strip, region), region)
-        if not has_strokes:
+        if has_strokes:
+            layout.prop(region, "opacity")
+        else:
             _draw_blend(layout, region)
         column = layout.column(align=True)
         column.prop(region, "location")
@@ -292,12 +303,26 @@ def _draw_tracking(layout, effect, index: int | None) -> None:
         text = iface_("Confidence: {percent} %").format(percent=f"{100 * confidence:.0f}")
         row.label(text=text, icon="CHECKMARK" if confidence >= SURE else "ERROR", translate=False)
         row.operator(f"{track}_look")
+    if index is None:  # a region's gaps go from its stops on
+        _draw_gaps(layout, effect, index)
     for frame, reason, is_fault in track_region.stops(effect, index):
         row = layout.row(align=True)
         row.label(text=reason, icon="ERROR" if is_fault else "INFO", translate=False)
         place = row.row()
         place.ui_units_x = 2.5
         place.operator(f"{track}_look", text=str(frame), translate=False).frame = frame
+
+
+def _draw_gaps(layout, effect, index: int | None) -> None:
+    """The frames at which nothing is tracked."""
+    for gap in track_region.gaps(effect, index):
+        if math.isinf(gap.last):
+            text = iface_("Not tracked: from frame {first} on")
+        elif math.isinf(gap.first):
+            text = iface_("Not tracked: up to frame {last}")
+        else:
+            text = iface_("Not tracked: frames {first} to {last}")
+        layout.label(text=text.format(first=gap.first, last=gap.last), icon="INFO", translate=False)
 
 
 def _active_region(context):
@@ -326,7 +351,7 @@ class _Track(_WithRegion):
 
 
 def _draw_track_options(layout, moving) -> None:
-    for name in ("motion", "track_until", "track_all_keys"):
+    for name in ("motion", "track_until", "track_all_keys", "track_ends"):
         layout.prop(moving, name)
 
 
@@ -377,6 +402,7 @@ class _Camera(_WithEffect):
         column = layout.column(align=True)
         for name in ("location", "rotation", "scale"):
             column.prop(camera, name)
+        layout.prop(camera, "influence")
         _draw_track_options(layout, camera)
         layout.prop(camera, "follow_clip")
         layout.operator("shutter.follow_stabilization", icon="TRACKER")

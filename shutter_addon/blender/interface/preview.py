@@ -266,7 +266,7 @@ def _show_strokes(context, quad, effect, request) -> None:
         layer = annotations.layer_of(effect, region)
         if layer is not None and layer.annotation_hide:
             continue
-        color = (*effect.shutters[shape.shutter].color, 1.0)
+        color = (*effect.shutters[shape.shutter].color, shape.opacity)
         for points in shape.strokes:
             drawing.lines(quad.on_region(points), color, closed=shape.kind == "lasso", width=2)
 

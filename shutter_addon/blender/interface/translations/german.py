@@ -486,7 +486,10 @@ MESSAGES = {
         "What the matte takes comes from the default shutter alone, so that mattes stand side by side",
     ): "Was die Matte nimmt, kommt allein vom Standardverschluss, sodass Matten nebeneinander stehen",
     ("*", "Opacity"): "Deckkraft",
-    ("*", "How much of the matte counts"): "Wie viel von der Matte zählt",
+    (
+        "*",
+        "How much of the region counts: at 0 the picture is as without it",
+    ): "Wie viel von der Region zählt: Bei 0 ist das Bild wie ohne sie",
     ("Virtual Shutter", "Feather"): "Weiche Kante",
     (
         "*",
@@ -851,6 +854,33 @@ MESSAGES = {
         "what the regions leave of the picture has too few corners to follow",
     ): "was die Regionen vom Bild übrig lassen, hat zu wenige Ecken, denen zu folgen wäre",
     ("*", "the picture is too unlike those before"): "das Bild ist denen davor zu unähnlich",
+    (
+        "*",
+        "the picture is too unlike those before, and it goes on from here",
+    ): "das Bild ist denen davor zu unähnlich, und von hier aus geht es weiter",
+    ("*", "Not tracked: from frame {first} on"): "Nicht verfolgt: ab Bild {first}",
+    ("*", "Not tracked: up to frame {last}"): "Nicht verfolgt: bis Bild {last}",
+    ("*", "Not tracked: frames {first} to {last}"): "Nicht verfolgt: Bilder {first} bis {last}",
+    ("*", "End with Track"): "Mit der Verfolgung enden",
+    (
+        "*",
+        "Track keys a region's opacity, or the camera's influence, so that it fades where the track ends; "
+        "a region ends with its shot",
+    ): "Verfolgen gibt der Deckkraft einer Region, oder dem Einfluss der Kamera, Schlüsselbilder: Sie klingt aus, "
+    "wo die Verfolgung endet; eine Region endet mit ihrer Einstellung",
+    ("*", "What of its motion is followed"): "Was von der Bewegung gilt",
+    ("*", "Smoothness"): "Glätte",
+    (
+        "*",
+        "Frames before and after each over which the motion is averaged, as the mass of a camera does: "
+        "at 0 it is followed as it is",
+    ): "Bilder vor und nach jedem, über die die Bewegung gemittelt wird, wie es die Masse einer Kamera tut: "
+    "Bei 0 gilt sie, wie sie ist",
+    ("*", "Influence"): "Einfluss",
+    (
+        "*",
+        "How much is left of exposures that follow the camera: at 0 the shown frame alone",
+    ): "Wie viel von Belichtungen bleibt, die der Kamera folgen: bei 0 das gezeigte Bild allein",
     ("Operator", "Track Camera"): "Kamera verfolgen",
     (
         "*",

@@ -1,0 +1,51 @@
+"""Shares of coefficients, added up on a device: where scribbles are not quite opaque (core.scribbles.layers)."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from .device import Device
+from .passes import LOCAL_ROW, Image, Pass
+
+
+@cache
+def mix_pass(begins: bool) -> Pass:
+    """Adds a share to a sum, or begins one."""
+    return Pass(
+        "mix",
+        images={"added": Image("rgba32f", reads=True, writes=False), "mixed": Image("rgba32f", reads=not begins)},
+        constants={"size": "ivec2", "given": "ivec2", "share": "float"},
+        defines={"BEGINS": int(begins)},
+        local_size=LOCAL_ROW,
+    )
+
+
+class Mixing:
+    """A sum of shares of coefficients."""
+
+    def __init__(self, device: Device):
+        self._device, self._sum = device, None
+
+    def add(self, mixed, added, share: float, size: tuple[int, int]):
+        """The sum with one more share, a texture array rgba32f as of a solver, valid until the next sum is begun.
+
+        mixed: what was returned last; None: this begins a sum
+        added: coefficients, a texture of a solver or of GPUCompositor.constant; size: (h, w) of the sum"""
+        height, width = size
+        if mixed is None and (self._sum is None or self._sum.size != (width, height, added.size[2])):
+            self.release()
+            self._sum = self._device.texture(width, height, added.size[2], "rgba32f")
+        self._device.run(
+            mix_pass(mixed is None),
+            self._sum.size,
+            images={"added": added, "mixed": self._sum},
+            size=(width, height),
+            given=added.size[:2],
+            share=share,
+        )
+        return self._sum
+
+    def release(self) -> None:
+        if self._sum is not None:
+            self._sum.release()
+            self._sum = None

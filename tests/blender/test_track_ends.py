@@ -1,0 +1,145 @@
+"""Regions end where their tracks end, and with their shots: by keys of their opacity, which the editor sees."""
+
+import numpy as np
+import pytest
+from support import request, write_frames
+from test_region_tracking import COUNT, SIZE, active, call, drawn, keys, new_source, picture, texture, track
+
+from shutter_addon.blender.data import fcurves, recipe_export, recipe_import, snapshot
+from shutter_addon.blender.editing import track_region
+from shutter_addon.blender.rendering import session
+from shutter_addon.core import recipe
+
+OTHER = texture(*SIZE[::-1]) // 4
+
+
+def shot(count):
+    """Of another place."""
+    return [np.roll(OTHER, 2 * i, axis=1) for i in range(count)]
+
+
+@pytest.fixture
+def between_cuts(bpy, edit, tmp_path):
+    """The subject's shot, at the timeline frames 19 to 38, between two others."""
+    shots = [*shot(8), *(picture(i) for i in range(COUNT)), *[np.ascontiguousarray(f[::-1]) for f in shot(8)]]
+    region = drawn(edit, new_source(edit, write_frames(tmp_path / "cuts", shots)), at=None)
+    edit.frame_set(19)
+    yield region
+    session.forget()
+
+
+@pytest.fixture
+def covered(bpy, edit, tmp_path):
+    """From frame 30 on nothing is seen of the subject."""
+    frames = [picture(min(i, COUNT - 1), range(COUNT - 1, 60)) for i in range(60)]
+    region = drawn(edit, new_source(edit, write_frames(tmp_path / "covered", frames)))
+    yield region
+    session.forget()
+
+
+def opacity(bpy, frames):
+    edit, effect, strip = active(bpy)
+    region = snapshot.region_at(edit, effect, strip, 0, frames)
+    return [region.at(frame).opacity for frame in frames]
+
+
+def alike(bpy, frame, plain):
+    """Whether a frame's picture is what a shutter makes of it without the region."""
+    return np.array_equal(request(*active(bpy), frame).picture(), plain)
+
+
+def without_region(bpy, frame):
+    _edit, effect, _strip = active(bpy)
+    name, effect.regions[0].shutter = effect.regions[0].shutter, "nobody's"
+    found = request(*active(bpy), frame).picture()
+    effect.regions[0].shutter = name
+    return found
+
+
+def test_it_ends_at_the_cuts_before_and_behind(bpy, between_cuts):
+    bpy.ops.ed.undo_push(message="before")
+    assert call(bpy, "track") == {"FINISHED"}
+    assert opacity(bpy, range(11, 47)) == [0.0] * 8 + [1.0] * 20 + [0.0] * 8
+    for frame, is_there in ((14, False), (18, False), (19, True), (30, True), (38, True), (39, False), (46, False)):
+        assert alike(bpy, frame, without_region(bpy, frame)) != is_there, frame
+    assert {kind for _frame, _value, kind, _ease in keys(bpy, "opacity")[0]} == {"GENERATED"}
+    bpy.ops.ed.undo()
+    assert not keys(bpy, "opacity")
+    assert not keys(bpy), "it is the same step of undo"
+
+
+def test_it_fades_where_the_subject_is_covered_and_the_picture_halfway(bpy, covered):
+    track(bpy)
+    (first,) = (frame for frame, *_ in track_region.stops(active(bpy)[1], 0))
+    shares = opacity(bpy, range(11, 60))
+    assert shares[first - 11 :] == [0.0] * (60 - first)
+    assert shares[: first - 15] == [1.0] * (first - 15)
+    assert shares[first - 15 : first - 11] == pytest.approx([0.8, 0.6, 0.4, 0.2])
+    (gap,) = track_region.gaps(active(bpy)[1], 0)
+    assert gap.first == first
+    fading = request(*active(bpy), first - 2).picture()
+    assert not alike(bpy, first - 2, without_region(bpy, first - 2))
+    for curve in fcurves.curves_under(active(bpy)[0], f"{active(bpy)[1].regions[0].path_from_id()}.opacity"):
+        curve.mute = True
+    assert not np.array_equal(fading, request(*active(bpy), first - 2).picture())
+
+
+def test_tracked_again_the_made_keys_are_replaced_and_the_editors_stay(bpy, edit, covered):
+    _edit, effect, _strip = active(bpy)
+    region = effect.regions[0]
+    region.opacity = 0.5
+    region.keyframe_insert("opacity", frame=13)
+    track(bpy)
+    first = track_region.stops(effect, 0)[0][0]
+    before = keys(bpy, "opacity")
+    assert opacity(bpy, (13, 20, first)) == pytest.approx([0.5, 0.5, 0])
+    track(bpy)
+    assert keys(bpy, "opacity") == before
+    edit.frame_set(first + 4)
+    region.keyframe_insert("location", frame=first + 4)
+    region.track_ends = False
+    edit.frame_set(11)
+    track(bpy)
+    assert [key[:3] for key in keys(bpy, "opacity")[0]] == [(13, 0.5, "KEYFRAME")]
+
+
+def test_without_keys_of_the_editors_nothing_is_left_of_the_made_ones(bpy, edit, covered):
+    _edit, effect, _strip = active(bpy)
+    region = effect.regions[0]
+    region.opacity = 0.75
+    track(bpy)
+    assert opacity(bpy, (11, 59)) == [0.75, 0]
+    edit.frame_set(50)
+    assert region.opacity == 0
+    edit.frame_set(11)
+    region.track_ends = False
+    track(bpy)
+    assert not keys(bpy, "opacity")
+    assert region.opacity == 0.75
+
+
+def test_a_subject_that_stays_has_no_keys(bpy, edit, tmp_path):
+    drawn(edit, new_source(edit, write_frames(tmp_path / "all", [picture(i) for i in range(COUNT)])))
+    track(bpy)
+    assert not keys(bpy, "opacity")
+
+
+def test_a_locked_curve_is_refused(bpy, between_cuts):
+    between_cuts.keyframe_insert("opacity", frame=19)
+    (curve,) = fcurves.curves_under(active(bpy)[0], f"{between_cuts.path_from_id()}.opacity")
+    curve.lock = True
+    with pytest.raises(RuntimeError, match='the F-curve of "Opacity" is locked'):
+        call(bpy, "track")
+
+
+def test_recipes_keep_it(bpy, between_cuts):
+    call(bpy, "track")
+    edit, effect, strip = active(bpy)
+    effect.camera.influence = 0.25
+    found = recipe.parse(recipe.dump(recipe_export.recipe_of(edit, effect, strip)))
+    assert found.camera_influence == 0.25
+    before = opacity(bpy, range(11, 47))
+    assert [found.effect(1.5).regions[0].opacity.at(frame) for frame in range(1, 37)] == before
+    recipe_import.apply(edit, effect, strip, found)
+    assert opacity(bpy, range(11, 47)) == before
+    assert effect.camera.influence == 0.25
