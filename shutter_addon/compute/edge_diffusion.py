@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core import stopping
 from ..core.conductances import cell_side, conductances
 from .diffusion import COLOURS, finished
 
@@ -258,6 +259,7 @@ def _smooth(level, solution, right, colours) -> None:
     """A Gauss-Seidel sweep over the padded solution, in four colours."""
     height, width = level.shape
     for y, x in colours:
+        stopping.check()
         cells = np.s_[y::2, x::2]
         total = right[:, *cells]
         for (dy, dx), weight in level.weights.items():
@@ -269,6 +271,7 @@ def _smooth(level, solution, right, colours) -> None:
 
 def _missing(level, solution, right) -> np.ndarray:
     """What the equations of the live cells of a padded solution still miss, (N, H, W)."""
+    stopping.check()
     total = right - level.diagonal * _inner(solution)
     for offset, weight in level.weights.items():
         total += weight * _part(solution, offset)
