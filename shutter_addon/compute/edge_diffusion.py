@@ -131,6 +131,7 @@ def _prolongation(ties, diagonal, live):
     total = np.where(grounded, diagonal, sum(ties.values()))
     takes = {}
     for (b, a), middle in between.items():
+        stopping.check()
         alone = live if (b, a) == (0, 0) else 0
         in_row = (west, east)[a] if b == 0 else 0
         in_column = (north, south)[b] if a == 0 else 0
@@ -213,6 +214,7 @@ def _ratio(a, b):
 def _prolonged(grid: _Grid, coarse) -> np.ndarray:
     total = np.zeros((len(coarse), *grid.shape), np.float32)
     for (b, a), weights in grid.takes.items():
+        stopping.check()
         rows, columns = (
             np.minimum(np.arange(n) // 2 + k, count - 1)
             for n, k, count in zip(grid.shape, (b, a), coarse.shape[1:], strict=True)
@@ -226,6 +228,7 @@ def _restricted(grid: _Grid, values) -> np.ndarray:
     height, width = ((n + 1) // 2 for n in grid.shape)
     total = np.zeros((len(values), height + 1, width + 1), np.float32)
     for (b, a), weights in grid.takes.items():
+        stopping.check()
         shares = np.pad(weights * values, ((0, 0), (0, grid.shape[0] % 2), (0, grid.shape[1] % 2)))
         total[:, b : b + height, a : a + width] += shares.reshape(len(values), height, 2, width, 2).sum(axis=(2, 4))
     return total[:, :height, :width]

@@ -335,11 +335,13 @@ class RenderSession:
         for _key, renderer in list(self._renderers.values()):
             self.run(renderer.release)
 
-    def rest(self) -> None:
-        """Breaks off the pictures that were begun, decodes nothing in advance, and lets go of the last requests and of
-        their snapshots."""
-        self._drop_begun(list(self._begun))
+    def forget_requests(self) -> None:
+        """Lets go of the last requests, and of their snapshots."""
         self._requests.clear()
+
+    def rest(self) -> None:
+        """Breaks off the pictures that were begun, and decodes nothing in advance."""
+        self._drop_begun(list(self._begun))
         for _key, renderer in list(self._renderers.values()):
             renderer.source.want(())
 
@@ -584,8 +586,11 @@ def open_source(snapshot: Snapshot, detail: Detail = FULL, *, planes: bool = Fal
 
 
 def end_job() -> None:
-    """Lets go of what a job of the window has begun, and of its snapshots."""
-    _offscreen.rest()
+    """Lets go of what a job of the window has begun, and of its snapshots. A script's next still may go on from the
+    one before."""
+    if render_job.in_job():
+        _offscreen.rest()
+    _offscreen.forget_requests()
 
 
 def drop_removed() -> None:

@@ -736,6 +736,7 @@ MESSAGES = {
         "The pixel that is probed, in fractions of the picture from its lower left corner",
     ): "Das Pixel, das die Sonde zeigt, in Bruchteilen des Bildes von seiner unteren linken Ecke",
     ("*", "Shutter: {fault}"): "Verschluss: {fault}",
+    ("*", "Composing…"): "Wird berechnet …",
     ("*", "Composed at {scale} size"): "In {scale} der Größe berechnet",
     ("*", "Composed at {scale} size, from a proxy"): "In {scale} der Größe aus einem Proxy berechnet",
     ("*", "Composed from a proxy"): "Aus einem Proxy berechnet",
