@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from ..core import compositor, light, mattes, shutters
+from ..core import compositor, light, mattes, shutters, stopping
 from ..core.frame_source import FrameSource
 from ..core.frame_state import FrameState, Options
 from .diffusion import diffuse
@@ -131,6 +131,7 @@ class Sums(RunningSums):
         combine = np.add if next_ > known else np.subtract
 
         for tile, sums in zip(self.tiles, self._sums, strict=True):
+            stopping.check()
             for k, colour in enumerate(sums):
                 if same is None:
                     light_ = levels.take(tile.of(picture)[..., k])
@@ -263,6 +264,7 @@ class CPUCompositor:
             moves = state.following.at(frames)
             expose = partial(_followed, window, options, bars, origin, frames >= 0, moves, direction)
         for tile in window.tiles:
+            stopping.check()
             c = tile.coefficients(handle, block)
             planes = expose(tile, c, block)
             planes *= np.float32(window.unit)

@@ -71,7 +71,8 @@ class Device(Protocol):
     def run(
         self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, blocks=None, **constants
     ) -> None:
-        """Runs a pass over `extent` invocations (x, y[, z]). Later passes read what it stored.
+        """Runs a pass over `extent` invocations (x, y[, z]). Later passes read what it stored. StoppedError
+        (core.stopping): the picture is not wanted any longer, and the pass is not run.
 
         textures, images: {name: Texture} for the samplers and the images that the pass declares
         blocks: {name: C-contiguous float32 array (length, 4)} for its blocks

@@ -15,6 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core import stopping
+
 # Largest error × 255 over 81 scenes after 2, 3, 4 cycles: 0.74, 0.19, 0.19 (median 0.31, 0.06, 0.06).
 CYCLES = 3
 # Gauss-Seidel sweeps over a grid before its correction by coarser ones, and again after it, from the finest grid on;
@@ -221,6 +223,7 @@ def _cycle(grids: list[_Grid], number: int, solution: np.ndarray, right: np.ndar
 def _pulls(grid: _Grid, solution: np.ndarray, right: np.ndarray, y: int, x: int):
     """Yields (cells, pull, spare): the right-hand side and all that its neighbours give (N, n) each of a colour's
     cells, and an array (N, n) to compute with."""
+    stopping.check()
     count = solution.shape[2]
     totals, spares = np.empty((2, count, max(1, TOGETHER // count)), np.float32)
     for cells in grid.steps(count):

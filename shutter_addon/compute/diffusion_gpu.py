@@ -165,7 +165,8 @@ class Diffusion:
         little, and the result depends on the last solution as well, within the error.
         """
         warm = self._prepare(labels.shape, count) and warm
-        finest = self._grids[0]
+        finest, made_for = self._grids[0], self._made_for
+        self._made_for = None  # should this be broken off: the next solve goes on from what this one leaves
         self._device.write(finest.textures["labels"], np.ascontiguousarray(labels, dtype=np.uint32))
         self._list_tiles(labels, next(k for k, grid in enumerate(self._grids) if max(grid.size) <= WHOLE))
         self._start(int(warm))
@@ -173,6 +174,7 @@ class Diffusion:
         for _ in range(WARM_CYCLES if warm else CYCLES):
             self._cycle(0)
         self._finish()
+        self._made_for = made_for
         return finest.textures["solution"]
 
     def release(self) -> None:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core import stopping
 from ..core.conductances import cell_side, conductances
 from .diffusion import COLOURS, finished
 
@@ -130,6 +131,7 @@ def _prolongation(ties, diagonal, live):
     total = np.where(grounded, diagonal, sum(ties.values()))
     takes = {}
     for (b, a), middle in between.items():
+        stopping.check()
         alone = live if (b, a) == (0, 0) else 0
         in_row = (west, east)[a] if b == 0 else 0
         in_column = (north, south)[b] if a == 0 else 0
@@ -212,6 +214,7 @@ def _ratio(a, b):
 def _prolonged(grid: _Grid, coarse) -> np.ndarray:
     total = np.zeros((len(coarse), *grid.shape), np.float32)
     for (b, a), weights in grid.takes.items():
+        stopping.check()
         rows, columns = (
             np.minimum(np.arange(n) // 2 + k, count - 1)
             for n, k, count in zip(grid.shape, (b, a), coarse.shape[1:], strict=True)
@@ -225,6 +228,7 @@ def _restricted(grid: _Grid, values) -> np.ndarray:
     height, width = ((n + 1) // 2 for n in grid.shape)
     total = np.zeros((len(values), height + 1, width + 1), np.float32)
     for (b, a), weights in grid.takes.items():
+        stopping.check()
         shares = np.pad(weights * values, ((0, 0), (0, grid.shape[0] % 2), (0, grid.shape[1] % 2)))
         total[:, b : b + height, a : a + width] += shares.reshape(len(values), height, 2, width, 2).sum(axis=(2, 4))
     return total[:, :height, :width]
@@ -258,6 +262,7 @@ def _smooth(level, solution, right, colours) -> None:
     """A Gauss-Seidel sweep over the padded solution, in four colours."""
     height, width = level.shape
     for y, x in colours:
+        stopping.check()
         cells = np.s_[y::2, x::2]
         total = right[:, *cells]
         for (dy, dx), weight in level.weights.items():
@@ -269,6 +274,7 @@ def _smooth(level, solution, right, colours) -> None:
 
 def _missing(level, solution, right) -> np.ndarray:
     """What the equations of the live cells of a padded solution still miss, (N, H, W)."""
+    stopping.check()
     total = right - level.diagonal * _inner(solution)
     for offset, weight in level.weights.items():
         total += weight * _part(solution, offset)

@@ -11,6 +11,7 @@ from functools import cache
 import moderngl
 import numpy as np
 
+from ..core import stopping
 from .budget import Budget, is_software, machine_memory
 from .device import NoDeviceError
 from .paging import PagedDevice
@@ -150,6 +151,7 @@ class GLDevice(PagedDevice):
         self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, blocks=None, **constants
     ) -> None:
         """See Device."""
+        stopping.check()
         if program not in self._programs:
             shader = self._context.compute_shader(source(program))
             self._programs[program] = shader, {name: shader[name] for name in shader}

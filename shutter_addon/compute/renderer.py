@@ -77,6 +77,7 @@ class Renderer:
         key = index, direction, state.key, levels
         lost = self._drawn is None or not self._window.is_open
         if lost or self._drawn[0] != key or not (quick or self._drawn[1]):
+            self._drawn = None  # nothing that is broken off is taken for whole, here and below
             with self.compositor.current():
                 picture = self.compositor.draw(*self._parts(index, state, direction, quick), levels=levels)
             self._drawn = key, not quick, picture
@@ -252,6 +253,7 @@ class Renderer:
             beneath = self.compositor.constant(np.eye(count)[sole])
         key = state.mattes, [key for key, _ in layers], count, sole, self._solution if sole is None else None
         if self._laid is None or self._laid[0] != key:
+            self._laid = None
             self._laid = key, self._matting.lay(beneath, state.mattes, layers)
         return self._laid[1]
 
@@ -267,6 +269,7 @@ class Renderer:
             self._keep_guides(index, direction, state)
             guided = (self._guides.guide(frames, options.aggregate), options.edge_aware) if frames else ()
             self._solution += 1
+            self._solved = None
             self._solved = key, layers, not quick, self._mixed(layers, count, guided, quick)
         return self._solved[3]
 

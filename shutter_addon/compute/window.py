@@ -176,6 +176,7 @@ class Frames(Window):
             layer = index % self.capacity
             if self._held.get(layer) == index:
                 continue
+            self._held.pop(layer, None)  # should it be broken off meanwhile
             frame = self._read(index)
             if self._host is None:
                 self._place(frame, layer)

@@ -12,7 +12,7 @@ from functools import cache, lru_cache, partial
 
 import numpy as np
 
-from ..core import light
+from ..core import light, stopping
 from .errors import MediaError
 
 try:
@@ -104,6 +104,7 @@ class _Paths:
         cells = np.floor((places + np.float32(t) * vectors) / STEP).astype(np.int32)
         # A margin of two takes what leaves the picture.
         np.clip(cells, -2, (w, h), out=cells)
+        stopping.check()
         corners = (cells[:, 1] + 2) * (w + 4) + cells[:, 0] + 2
         # Of several that arrive the cheapest stays, the last; -1, where nothing arrives, takes what is appended.
         chosen = np.full((h + 4) * (w + 4), -1, np.int32)
@@ -116,6 +117,7 @@ class _Paths:
 def _carriers(first, second, flow):
     """Places (n, 2) on every STEPth pixel, vectors (n, 2) and costs (n,), the dearest first: how much, in levels, the
     two ends differ."""
+    stopping.check()
     grid = _grid(*first.shape)
     vectors = np.zeros_like(grid) if min(first.shape) < SMALLEST else flow(first, second)
     vectors = np.nan_to_num(vectors, posinf=0, neginf=0)  # of pictures without any structure
@@ -141,6 +143,7 @@ def _mixed(ends, paths, t: float) -> np.ndarray:
     """Linear light (H, W, 3 or 4) at time t: both frames looked up along each flow's paths."""
     total = weights = 0
     for vectors, shown in paths:
+        stopping.check()
         grid = _grid(*vectors.shape[:2])
         seen = _look(ends[0], grid - np.float32(t) * vectors), _look(ends[1], grid + np.float32(1 - t) * vectors)
         late = np.float32(t) * shown[..., 1]

@@ -9,6 +9,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, as_completed, wait
+from contextlib import suppress
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -16,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core import stopping
 from ..core.claims import Claims
 from ..core.frame_source import FrameSource
 from . import cuts
@@ -293,11 +295,12 @@ def _build_claimed(claims: Claims, cache: InbetweenCache, pair: int, make) -> bo
 def _make(first, second, between, cancelled, cache, pair) -> bool:
     source = cache.source
     pictures = between(first, second, cache.factor, cache.method, source.transfer, source.alpha)
-    for index, picture in zip(cache.steps(pair), pictures, strict=True):
-        if cancelled():
-            return False
-        cache.write(index, picture)
-    return True
+    with suppress(stopping.StoppedError), stopping.once(cancelled):
+        for index, picture in zip(cache.steps(pair), pictures, strict=True):
+            stopping.check()
+            cache.write(index, picture)
+        return True
+    return False
 
 
 def _note_kind(kind, cache, pair) -> bool:

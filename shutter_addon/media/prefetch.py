@@ -4,10 +4,13 @@ import threading
 
 import numpy as np
 
+from ..core import stopping
 from ..core.frame_source import FrameSource
 from ..core.planes import Planes, as_rgba
 from .errors import MediaError
 from .source import SourceWrapper
+
+_PATIENCE = 0.1  # seconds between two looks at whether a frame is still wanted
 
 
 class PrefetchSource(SourceWrapper):
@@ -42,7 +45,7 @@ class PrefetchSource(SourceWrapper):
         """The source's frame, read-only. One that is not decoded yet is decoded next, before all wanted ones.
 
         An error of the source's `read` is raised here once; the next call decodes the frame again. MediaError as well
-        if `close` is called meanwhile."""
+        if `close` is called meanwhile, and core.stopping.StoppedError."""
         picture = as_rgba(self.decoded(index))
         picture.flags.writeable = False
         return picture
@@ -52,8 +55,11 @@ class PrefetchSource(SourceWrapper):
         with self._changed:
             self._asked.append(index)
             self._wake()
-            self._changed.wait_for(lambda: index in self._done or self._thread is None)
-            self._asked.remove(index)
+            try:
+                while not self._changed.wait_for(lambda: index in self._done or self._thread is None, _PATIENCE):
+                    stopping.check()
+            finally:
+                self._asked.remove(index)
             frame = self._done.get(index)
             if isinstance(frame, Exception):
                 self._done.pop(index)

@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..core import light, motions, scribbles
+from ..core import light, motions, scribbles, stopping
 from ..core.effect import Camera, Region
 from ..core.frame_source import FrameSource
 from ..core.motions import Placement, Similarity
@@ -91,7 +91,9 @@ class Footage:
         self._wanted = frames
 
     def picture(self, frame: int) -> np.ndarray:
-        """The picture (H, W) uint8 at a timeline frame. MediaError: it cannot be read."""
+        """The picture (H, W) uint8 at a timeline frame. MediaError: it cannot be read. Tracking may end here
+        (core.stopping)."""
+        stopping.check()
         index = self._index_at(frame)
         if index not in self._kept:
             self._read(index, *self._beside(frame))
@@ -122,6 +124,7 @@ class Footage:
         self._source.want([*block, *(upcoming[:AHEAD] if not backward else ())])
         last = min(before, block[0])
         for i in block:
+            stopping.check()
             self._cut(last, i)  # so that frames are read upwards, and once, to find cuts
             self._kept[i], last = self._grey(self._source.read(i)), i
         while len(self._kept) > KEPT:

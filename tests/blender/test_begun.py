@@ -116,7 +116,7 @@ def test_who_is_stopped_waits_neither_for_a_device_nor_for_others_to_be_closed(f
     from shutter_addon.blender.rendering import job_snapshots, session
 
     scene, answer, half = film[2].scene, threading.Event(), session.Detail(2)
-    waits = session._offscreen._submit(answer.wait, 10)
+    waits = session._offscreen._submit(answer.wait, 10).future
     stops = iter([False])  # and then it is stopped
     with pytest.raises(session.StoppedError):
         picture_of(scene, 1, stopped=lambda: next(stops, True))
@@ -124,7 +124,7 @@ def test_who_is_stopped_waits_neither_for_a_device_nor_for_others_to_be_closed(f
     answer.set()
     first = session._offscreen.request(*job_snapshots.of(scene, 1), detail=session.FULL)
     answer.clear()
-    waits = session._offscreen._submit(answer.wait, 10)
+    waits = session._offscreen._submit(answer.wait, 10).future
     assert session._offscreen.request(*job_snapshots.of(scene, 1), detail=half).renderer is not first.renderer
     assert not waits.done()
     answer.set()

@@ -171,6 +171,27 @@ def test_a_build_that_is_stopped_at_once_has_built_nothing(bpy, inbetween_build,
     assert shown(bpy, inbetween_build) == ("missing", 0, COUNT - 1)
 
 
+def test_a_build_ends_at_once_where_a_pair_takes_long(bpy, inbetween_build, effect, flow):
+    """OpenCV's flow cannot be broken off: Esc does not wait for it. The next build does."""
+    from shutter_addon.blender.data import selection
+
+    begun, answer, found = threading.Event(), threading.Event(), selection.active(bpy.context)
+    flow += [begun.set, lambda: answer.wait(30)]
+    first = inbetween_build.start(*found)
+    assert begun.wait(20)
+    first.stop()
+    inbetween_build.ended()
+    assert first.result() == ("partial", 0, COUNT - 1)
+    assert not first.future.done()
+    second = inbetween_build.start(*found)
+    done, _ = wait([second.future], timeout=0.2)
+    assert not done
+    answer.set()
+    assert second.future.result(30) == ("ready", COUNT - 1, COUNT - 1)
+    assert first.result().done == 0
+    inbetween_build.ended()
+
+
 def test_a_second_build_is_refused_and_nothing_is_removed_meanwhile(bpy, inbetween_build, effect, monkeypatch):
     monkeypatch.setattr(inbetween_build, "_running", SimpleNamespace(scene=0))
     for operator in ("inbetween_build", "inbetween_purge"):

@@ -522,6 +522,38 @@ def test_blender_lives_where_its_gpu_is_not_current(part, backend, tmp_path):
     assert_alike(*pictures, tmp_path / "difference.png", tolerance=0)
 
 
+@pytest.mark.parametrize(("backend", "hidden"), [("opengl", ""), ("vulkan", ""), ("vulkan", "moderngl")])
+def test_esc_ends_a_render_between_two_passes(backend, hidden, tmp_path):
+    """And the render's window shows the frame that was made. What is rendered afterwards is as ever."""
+    shutters = [{"name": "Long", "bars": [1] * 8}, {"name": "Sharp", "bars": [1, *[0] * 7]}]
+    line = {"name": "Line", "shutter": "Sharp", "strokes": [[[0.4, 0.3], [0.45, 0.6]]], "width": 0.02}
+    data = {"version": 1, "window": 8, "border": True, "edge_aware": 1, "shutters": shutters, "regions": [line]}
+    path = tmp_path / "recipe.json"
+    path.write_text(json.dumps(data))
+    seen, console = tell("stopping_story.py", backend, linked(tmp_path), recipe=path, hidden=hidden)
+    assert "Traceback" not in console
+    (ended,) = seen
+    assert ended["whole"] > 300
+    assert ended["after"] <= 5
+    assert ended["finished_after"] == 0
+    screen, written = pixels(tmp_path / "render_window.png"), sorted((tmp_path / "film").iterdir())
+    assert min(apart_on_screen(screen, pixels(frame)) for frame in written) <= TOLERANCE
+    for frame in (tmp_path / "after").iterdir():
+        assert np.array_equal(pixels(frame), pixels(tmp_path / "film" / frame.name))
+
+
+def apart_on_screen(screen, frame):
+    """By how many levels the middle of a frame differs at most from where a screen shows it, pixel for pixel."""
+    import cv2
+
+    height, width = frame.shape[:2]
+    middle = frame[height // 4 : 3 * height // 4, width // 4 : 3 * width // 4].astype(np.uint8)
+    near = cv2.matchTemplate(screen.astype(np.uint8), middle, cv2.TM_SQDIFF)
+    top, left = np.unravel_index(near.argmin(), near.shape)
+    shown = screen[top : top + middle.shape[0], left : left + middle.shape[1]]
+    return np.abs(shown - middle).max()
+
+
 @pytest.mark.parametrize(("backend", "hidden"), [("opengl", "moderngl"), ("vulkan", "")])
 def test_a_film_shows_what_was_when_it_began(backend, hidden, tmp_path):
     """200 changes while a film renders, at the end the strip deleted: no frame is another one before, and then the

@@ -6,6 +6,7 @@ can go along; at the end they are thinned to those that the motion needs within 
 
 import math
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -15,7 +16,7 @@ import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import limits, motions, presence, region_keys
+from ...core import limits, motions, presence, region_keys, stopping
 from ...core.effect import Camera, Region
 from ...core.frame_state import Options
 from ...core.keyframes import Samples
@@ -106,13 +107,22 @@ def frames_to_track(edit, strip, direction: str, until: int = 0) -> range:
 
 
 def track(
-    edit, effect, strip, index: int | None, frames: range, motion: str, *, all_keys: bool = False
-) -> Iterator[int]:
+    edit,
+    effect,
+    strip,
+    index: int | None,
+    frames: range,
+    motion: str,
+    *,
+    all_keys: bool = False,
+    patience: float | None = None,
+) -> Iterator[int | None]:
     """Tracks a region or the camera from the current frame through timeline frames (frames_to_track). Gives each frame
     once it is keyed. Closed early, it keeps what it has. It ends without another key where the region is not there any
     more.
 
-    motion: one of properties.MOTIONS; all_keys: keys are not thinned
+    motion: one of properties.MOTIONS; all_keys: keys are not thinned; patience: seconds after which None is given
+    where no frame was tracked yet, so that Blender goes on; None: it is waited for
     EffectError, MediaError: it cannot be tracked; where no frame has come yet, nothing has changed."""
     moving = selection.moving(effect, index)
     (validation.check_placement if index is None else validation.check_region)(moving)
@@ -131,8 +141,10 @@ def track(
     del edit, effect, strip, keys, moving  # which may not outlive the first step
     with session.open_source(shown) as source:
         try:
-            for tracked in _followed(subject, shown, source, start, frames, motion, anchors):
-                if tracked.fault:
+            for tracked in _followed(subject, shown, source, start, frames, motion, anchors, patience):
+                if tracked is None:
+                    yield None
+                elif tracked.fault:
                     stops.append(tracked)
                 elif tracked.frame != start:
                     if (effect := target.effect()) is None:
@@ -252,14 +264,22 @@ def _standing(moving: Region | Camera, here: Tracked) -> Region | Camera:
     )
 
 
-def _followed(subject: _Subject, shown, source, start: int, frames: range, motion: str, anchors) -> Iterator[Tracked]:
-    """As tracking.follow, its sentences in the user's language."""
+def _followed(
+    subject: _Subject, shown, source, start: int, frames: range, motion: str, anchors, patience
+) -> Iterator[Tracked | None]:
+    """As tracking.follow, its sentences in the user's language, by a thread beside Blender (stopping.beside)."""
     with snapshot.translated():
         try:
             footage = tracking.Footage(source, lambda frame: session.source_index(shown, frame, source)[0])
-            yield from subject.follow(footage, start, frames, motion=motion.lower(), anchors=anchors)
+            found = partial(subject.follow, footage, start, frames, motion=motion.lower(), anchors=anchors)
+            with closing(stopping.beside(_each(found), patience)) as steps:
+                yield from steps
         except tracking.TrackingError as error:
             raise EffectError(rpt_(str(error))) from None
+
+
+def _each(found: Callable[[], Iterator[Tracked]]) -> Iterator[Tracked]:
+    yield from found()
 
 
 def _thinned(effect, subject: _Subject, found: dict[int, Tracked], kept: set[int]) -> list[int]:

@@ -128,7 +128,10 @@ class _Building(_OfInbetweens):
         return {"RUNNING_MODAL"}
 
     def execute(self, context):
-        return self._finish(context) if self._begin(context) else {"CANCELLED"}
+        if not self._begin(context):
+            return {"CANCELLED"}
+        wait([self._build.future])
+        return self._finish(context)
 
     def _begin(self, context) -> bool:
         try:
@@ -144,7 +147,7 @@ class _Building(_OfInbetweens):
             return {"CANCELLED"}
         if event.type == "ESC" and event.value == "PRESS":
             self._build.stop()
-            return {"RUNNING_MODAL"}
+            return self._finish(context)
         if event.type == "TIMER":
             if self._build.future.done():
                 return self._finish(context)
@@ -161,12 +164,11 @@ class _Building(_OfInbetweens):
             stop()
 
     def _finish(self, context):
-        wait([self._build.future])
         inbetween_build.ended()
         _show_end()
         redraw(context)
         try:
-            state = self._build.future.result()
+            state = self._build.result()
         except FAULTS as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

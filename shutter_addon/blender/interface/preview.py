@@ -1,5 +1,6 @@
 """The live preview: what is drawn over the sequencer's picture, composed on Blender's GPU: views, and scribbles."""
 
+import time
 from dataclasses import replace
 
 import bpy
@@ -12,6 +13,7 @@ from bpy.types import PropertyGroup
 from gpu_extras.batch import batch_for_shader
 
 from ...compute.passes import body
+from ...core import stopping
 from ...core.frame_state import FrameState
 from ...media import MediaError
 from ...media.errors import NotBuiltError
@@ -41,12 +43,22 @@ def _redraw_once() -> None:
     redraw(None, bpy.context)
 
 
+def _redraw_when_still() -> float | None:
+    """Blender does not draw again where the playhead is let go, or tracking ends."""
+    if previewing.is_going(bpy.context):
+        return _SOON
+    return _redraw_once()
+
+
 def _follow_once() -> None:
     shown_annotations.follow()
 
 
 _NAVIGATION = 56  # units at the right of a preview, where Blender's own buttons lie
 _STILL = 0.4  # seconds after which a frame that is shown stays
+_SOON = 0.1  # seconds
+_SLICE = 0.2  # seconds
+_slice = None, _SLICE  # what was composed last in slices, and for how many seconds it might be
 
 
 class ShutterPreview(PropertyGroup):
@@ -113,10 +125,26 @@ def _draw() -> None:
         return
     with drawing.pixel_space(context.region):
         try:
-            _show(context, found, settings, say)
+            with stopping.once(_time_up(found) if previewing.may_be_late() else stopping.never):
+                _show(context, found, settings, say)
+        except stopping.StoppedError:
+            say(rpt_("Composing…"))
+            quad = Quad(context.region, found.strip, annotations.picture_size(found.effect))
+            _show_strokes(context, quad, found.effect, request_of(context, found))
+            bpy.app.timers.register(_redraw_once)
         except session.FAULTS as error:
             _tell_fault(error, say)
         say.draw()
+
+
+def _time_up(found: Shown):
+    """What says whether a picture has been composed for so long that Blender has to look at its keys: it goes on when
+    it is drawn again. Each time, it has twice as long, so that it comes to an end."""
+    global _slice
+    shown = found.effect.scene.session_uid, found.edit.frame_current
+    seconds = 2 * _slice[1] if _slice[0] == shown else _SLICE
+    _slice, end = (shown, seconds), time.monotonic() + seconds
+    return lambda: time.monotonic() > end
 
 
 def request_of(context, found: Shown) -> session.FrameRequest:
@@ -131,7 +159,10 @@ def _snapshot(found: Shown):
 
 def _drafted(context, found: Shown, request) -> session.FrameRequest:
     is_result = context.window_manager.virtual_shutter.view in RESULTS and _is_rendered(found)
-    is_exact = previewing.whole is not None or (is_result and not context.screen.is_animation_playing)
+    is_going = previewing.is_going(context)
+    if is_going and not bpy.app.timers.is_registered(_redraw_when_still):
+        bpy.app.timers.register(_redraw_when_still, first_interval=_SOON)
+    is_exact = previewing.whole is not None or (is_result and not is_going)
     return request if is_exact else request.draft()
 
 
@@ -416,7 +447,7 @@ def unregister():
     global _handler
     bpy.types.SpaceSequenceEditor.draw_handler_remove(_handler, "PREVIEW")
     _handler = None
-    for timer in (_redraw_once, _follow_once, _redraw_panels, _measure):
+    for timer in (_redraw_once, _redraw_when_still, _follow_once, _redraw_panels, _measure):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
     blender_gpu.free(*_shaders.values())

@@ -5,6 +5,7 @@ them. Drawn by our handler, the picture stays on the GPU, and is as small as it 
 """
 
 import math
+import time
 from dataclasses import dataclass
 
 import bpy
@@ -18,6 +19,11 @@ from . import preview_areas
 
 # Operators that read the sequencer's pictures, from the window; while an annotation is drawn, Blender shows it alone.
 _READERS, _PEN = {"RENDER_OT_opengl", "SEQUENCER_OT_sample"}, "GPENCIL_OT_annotate"
+# Operators by which one picture comes after another, as where it plays: drafts, so that a key need not wait.
+_GOING = {"ANIM_OT_change_frame", "SHUTTER_OT_track", "SHUTTER_OT_track_camera"}
+_GOING |= {"SHUTTER_OT_panning_shot", "SHUTTER_OT_tripod"}
+_MOMENT = 0.3  # seconds
+_late_until = 0.0
 _READING_TOOL = "builtin.sample"  # reads once before it is one of those that run
 _PERCENT = {"PROXY_25": 25, "PROXY_50": 50, "PROXY_75": 75, "PROXY_100": 100}
 _STANDARD = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
@@ -131,7 +137,7 @@ def is_drawn(context, found: Shown, request: session.FrameRequest) -> bool:
     is_less = source.from_proxy or source.width < annotations.picture_size(found.effect)[0]
     return (
         context.window_manager.virtual_shutter.live
-        and (is_less or _is_playing(context) or context.window_manager.virtual_shutter.view not in RESULTS)
+        and (is_less or is_going(context) or context.window_manager.virtual_shutter.view not in RESULTS)
         and not found.strips_above
         and source.alpha == "opaque"
         and strip.blend_type in ("REPLACE", "ALPHA_OVER")
@@ -146,8 +152,19 @@ def is_drawn(context, found: Shown, request: session.FrameRequest) -> bool:
     )
 
 
-def _is_playing(context) -> bool:
-    return any(window.screen.is_animation_playing for window in context.window_manager.windows)
+def is_going(context) -> bool:
+    """Whether the film plays, the playhead is dragged, or what is tracked is shown."""
+    is_playing = any(window.screen.is_animation_playing for window in context.window_manager.windows)
+    return is_playing or may_be_late()
+
+
+def may_be_late() -> bool:
+    """Whether the playhead is dragged, or what is tracked is shown, or was a moment ago: keys count for more than
+    pictures."""
+    global _late_until
+    if _GOING & render_job.operators_running():
+        _late_until = time.monotonic() + _MOMENT
+    return time.monotonic() < _late_until
 
 
 def _has(item, values: dict) -> bool:

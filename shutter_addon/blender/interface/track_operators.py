@@ -1,6 +1,7 @@
 """Operators that key a region or the camera by the footage: as what is seen moves, or as a movie clip's tracks do; and
 those that make a panning shot of that, or a tripod."""
 
+import math
 import time
 
 import bpy
@@ -14,8 +15,8 @@ from ..editing import bar_edits, follow_stabilization, follow_track, panning_sho
 from ..rendering.session import FAULTS
 from .operators import _OfEffect, _OfRegion, _OfShutter, _OfStrokes, redraw, refused
 
-# Seconds of work, at least, from one look at the window to the next.
-_TICK = 0.05
+# Seconds of work from one look at the window to the next, at least and at most, and between two looks at its thread.
+_TICK, _MOST, _PATIENCE = 0.05, 0.25, 0.02
 
 DIRECTIONS = (
     ("BACKWARD", "Backward", "Towards the strip's first frame", "TRACKING_BACKWARDS", 0),
@@ -60,7 +61,7 @@ class _Tracks:
     def _run(self, context, seconds: float):
         """Tracks for a while, and then whenever Blender has time."""
         try:
-            self._begin(context)
+            self._begin(context, None if math.isinf(seconds) else _PATIENCE)
             goes_on = self._go_on(seconds)
         except FAULTS as error:
             self.report({"ERROR"}, str(error))
@@ -79,9 +80,9 @@ class _Tracks:
             return {"CANCELLED"}
         is_stopped = is_ended = event.type == "ESC" and event.value == "PRESS"
         if event.type == "TIMER":
-            # What it takes to draw a frame, tracking takes at least as well.
+            # What it takes to draw a frame, tracking takes as well, unless Esc would have to wait.
             try:
-                is_ended = not self._go_on(max(_TICK, time.perf_counter() - self._shown))
+                is_ended = not self._go_on(min(max(_TICK, time.perf_counter() - self._shown), _MOST))
             except Exception:  # Blender ends the operator then, and asks for no `cancel`
                 self.cancel(context)
                 raise
@@ -112,7 +113,7 @@ class _Tracks:
         context.window_manager.progress_end()
         context.workspace.status_text_set(None)
 
-    def _begin(self, context):
+    def _begin(self, context, patience: float | None):
         edit, effect, strip = selection.active(context)
         index = self.index(effect)
         moving = selection.moving(effect, index)
@@ -122,15 +123,19 @@ class _Tracks:
             return
         self._frames = track_region.frames_to_track(edit, strip, self.direction, moving.track_until)
         motion, all_keys = validation.word(moving, "motion"), moving.track_all_keys
-        self._steps = track_region.track(edit, effect, strip, index, self._frames, motion, all_keys=all_keys)
+        self._frame = self._start
+        self._steps = track_region.track(
+            edit, effect, strip, index, self._frames, motion, all_keys=all_keys, patience=patience
+        )
 
     def _go_on(self, seconds: float) -> bool:
         """Tracks for a while; whether there is more to track. One of FAULTS: there is nothing to track at all."""
         end = time.perf_counter() + seconds
         try:
             for frame in self._steps:
-                self._frame = frame
-                self._done.add(frame)
+                if frame is not None:
+                    self._frame = frame
+                    self._done.add(frame)
                 if time.perf_counter() >= end:
                     return True
         except FAULTS as error:

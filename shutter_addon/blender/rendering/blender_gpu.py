@@ -24,6 +24,7 @@ from ...compute.budget import Budget, is_software, machine_memory
 from ...compute.device import NoDeviceError
 from ...compute.paging import TEXEL_BYTES, PagedDevice
 from ...compute.passes import LOCAL_ROW, Image, Pass, body
+from ...core import stopping
 
 _TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
 _AS_IT_IS, _WHOLE, _OPAQUE_BYTES, _PAIRS_OF_BYTES, _SIXTEEN_BITS = range(5)
@@ -187,6 +188,7 @@ class BlenderDevice(PagedDevice):
     def run(
         self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, blocks=None, **constants
     ) -> None:
+        stopping.check()
         self.bring([*(textures[name] for name in program.samplers), *(images[name] for name in program.images)])
         self._dispatch(
             program,

@@ -51,14 +51,22 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             invalidation.keep_until_drawn(scene.session_uid)
         if is_drawn:
             return  # nothing, which costs Blender the least
+        last = job_snapshots.pictures.get(scene.session_uid) if render_job.in_job() else None
+        if last is not None and last.shape == (height, width, 4):
+            self._show(last)  # in the render's window, which would be empty until this one is made
         picture = session.picture(shown, frame, self._say, self._stopped, detail)
         picture = session.resized(picture, width, height, detail.divisor)
+        self._show(picture)
+        self.update_progress(1.0)
+        if render_job.in_job():
+            job_snapshots.pictures[scene.session_uid] = picture
+        session.here().begin_next(shown, frame, self._stopped)
+
+    def _show(self, picture: np.ndarray) -> None:
         # A result of a single pixel has Blender make room for the whole picture. One of all would be copied there.
         self.end_result(self.begin_result(0, 0, 1, 1))
         # Blender's rows go up; composed pictures lie so in memory, and this copies nothing.
         self.get_result().layers[0].passes["Combined"].rect.foreach_set(np.ascontiguousarray(picture[::-1]).ravel())
-        self.update_progress(1.0)
-        session.here().begin_next(shown, frame, self._stopped)
 
     def _stopped(self) -> bool:
         return self.test_break() or render_job.stopping()

@@ -23,6 +23,7 @@ from .blender_gpu import BlenderDevice, has_context
 _LEAST, _MOST = 0.02, 0.05
 _GAP = 0.005  # seconds that the main thread waits there for the next call
 _MOMENT = 0.01  # seconds that the passes take for which it waits at once
+_AHEAD = 4  # passes that wait for the main thread at most: they are run, too, where the picture is not wanted any more
 _REST = 1.0  # seconds without a call, after which the main thread looks for none
 
 _calls: queue.SimpleQueue[tuple] = queue.SimpleQueue()
@@ -33,8 +34,8 @@ _unfinished, _batch = 0, 8  # passes that may be under way, and after how many t
 
 
 class RelayedDevice(BlenderDevice):
-    """A compute.device.Device, on any one thread but Blender's main one. What a pass raises is met when something is
-    made, sent or read next.
+    """A compute.device.Device, on any one thread but Blender's main one. What a pass raises is met later, at
+    the latest when something is made, sent or read next.
 
     Its own textures are lists of one, which the main thread empties: on Vulkan Blender crashes where another frees one.
     """
@@ -67,6 +68,8 @@ class RelayedDevice(BlenderDevice):
             BlenderDevice._dispatch(self, program, groups, *bound, *arguments)
 
         self._passes.append(_called(dispatch))
+        if len(self._passes) > _AHEAD:
+            self._passes.pop(0).result()
 
     def release(self) -> None:
         self._wait_for(lambda: BlenderDevice.release(self))

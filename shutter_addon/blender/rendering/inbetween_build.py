@@ -32,6 +32,7 @@ class Look(NamedTuple):
 _media: dict[tuple, tuple] = {}  # by source_media.media_key: the medium, its file not open; bytes for a factor of 2
 _looks: dict[tuple, tuple[float, inbetween_cache.State, int]] = {}  # when it was looked, and what was found
 _running: "Build | None" = None
+_left: tuple[Future, ...] = ()  # of the last build: what it was in the middle of when it was stopped, it still ends
 
 
 def look(edit, effect, strip) -> Look:
@@ -94,9 +95,10 @@ class Build:
         self.scene = effect.scene.session_uid
         self.done, self.total = 0, medium.count - 1 if pairs is None else len(pairs)
         self._stopped = threading.Event()
-        self.future = _in_thread(self._build, medium, pairs)
+        self.future = _in_thread(self._build, _left, medium, pairs)
 
-    def _build(self, medium, pairs):
+    def _build(self, before, medium, pairs):
+        wait(before)
         with medium:
             told = {"update": self._update, "cancelled": self._stopped.is_set}
             return build(medium, *self.settings, **told, pairs=pairs)
@@ -104,8 +106,14 @@ class Build:
     def _update(self, done, _total):
         self.done = done
 
+    def result(self) -> inbetween_cache.State:
+        """How far it came, or has come where it was stopped. MediaError: why it could not go on."""
+        if self.future.done():
+            return self.future.result()
+        return inbetween_cache.State("partial", self.done, self.total)
+
     def stop(self) -> None:
-        """Has it end soon; what is finished is kept."""
+        """Has it end soon, with the step that is under way; what is finished is kept."""
         self._stopped.set()
 
 
@@ -133,9 +141,9 @@ def start(edit, effect, strip, factor: int | None = None) -> Build:
 
 
 def ended() -> None:
-    """What the build that has run to its end has built counts from now on."""
-    global _running
-    _running = None
+    """What the build that was stopped, or has run to its end, has built counts from now on."""
+    global _running, _left
+    _left, _running = (_running.future,), None
     inbetween_settings.built.release()
     _looks.clear()
 
@@ -143,6 +151,7 @@ def ended() -> None:
 def purge(effect, source) -> tuple[int, list[tuple]]:
     """Removes the in-between frames of an effect's source strip, of every factor and method; the bytes that they took,
     and the folders where other files stay, with their number. EffectError, MediaError, OSError: it cannot be done."""
+    wait(_left)
     folder, (medium, _) = inbetween_settings.folder(effect), _known(source_media.spec(source))
     left = []
     freed = inbetween_cache.purge(folder, medium, lambda *place: left.append(place))
@@ -157,8 +166,8 @@ def stop() -> None:
     goes."""
     if _running is not None:
         _running.stop()
-        wait([_running.future])
         ended()
+    wait(_left)
     wait([doubled for _medium, doubled in _media.values()])
     _media.clear()
     _looks.clear()

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 
 import bpy
+import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..data import requirements, snapshot, strips
@@ -18,6 +19,7 @@ from ..data.validation import EffectError
 from . import invalidation, render_job, session
 
 _taken: dict[int, Snapshot | Exception] = {}  # by effect scene: of the job that runs
+pictures: dict[int, np.ndarray] = {}  # likewise: the last one, which the render's window shows until the next is made
 _left_out: list[tuple[range, str]] = []  # of its film, see requirements.left_out
 
 
@@ -40,6 +42,7 @@ def end() -> None:
     """Forgets what was read, after a job."""
     _taken.clear()
     _left_out.clear()
+    pictures.clear()
     session.end_job()
 
 

@@ -8,6 +8,7 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -18,9 +19,10 @@ from ...compute.budget import MEGABYTE, Budget
 from ...compute.device import NoDeviceError
 from ...compute.memory_needs import frame_bytes
 from ...compute.renderer import Renderer
-from ...core import following, retiming
+from ...core import following, retiming, stopping
 from ...core.frame_state import FrameState
 from ...core.messages import EffectError
+from ...core.stopping import StoppedError, never
 from ...media import MediaError, cuts
 from ...media.cuts import ShotSource
 from ...media.image_writing import write_exr
@@ -49,12 +51,43 @@ _ANSWER = 5.0  # seconds that a job waits for the window to free memory
 _said: set[str] = set()  # what is said once
 
 
-class StoppedError(Exception):
-    """A picture was not waited for, as its render ends."""
+class _Work(NamedTuple):
+    """What a session's device does.
+
+    future: its result to come; ended: set, it ends before its next step; relayed: the main thread makes its GPU calls"""
+
+    future: Future
+    ended: threading.Event
+    relayed: bool
+
+    def break_off(self) -> None:
+        self.ended.set()
+        self.future.cancel()
+
+    def result(self, stopped):
+        """As _result. Not waited for, it is broken off."""
+        try:
+            return _result(self.future, self.relayed, stopped)
+        except StoppedError:
+            self.break_off()
+            raise
 
 
-def _never() -> bool:
-    return False
+def _result(future: Future, relayed: bool, stopped):
+    """The future's result. StoppedError: it is not waited for any longer. NoDeviceError: it cannot be waited for, as
+    Blender's GPU is not current."""
+    while not wait([future], 0 if in_window() else _PATIENCE).done:
+        if in_window() and not gpu_relay.serve() and relayed:
+            require_context()
+        if stopped():
+            raise StoppedError
+    return future.result()
+
+
+def _until(stopped, function, *arguments):
+    """What a function gives, unless it is broken off."""
+    with stopping.once(stopped):
+        return function(*arguments)
 
 
 @dataclass(frozen=True)
@@ -180,7 +213,7 @@ class RenderSession:
         self._renderers: dict = {}
         self._requests: dict[int, tuple[Snapshot, float, FrameRequest]] = {}  # by scene: the last one
         self._shown: dict[int, float] = {}  # by scene: the timeline frame that was shown last
-        self._begun: dict[int, tuple[tuple, Future]] = {}  # by scene: the key of a request, its picture
+        self._begun: dict[int, tuple[tuple, _Work]] = {}  # by scene: the key of a request, its picture
 
     @property
     def device(self) -> str:
@@ -194,33 +227,26 @@ class RenderSession:
         """Whether the device belongs to a thread of its own; otherwise to whichever calls."""
         return self.device != "blender"
 
-    def run(self, function, *arguments, stopped=_never):
-        """The result of a function that uses the device. StoppedError: it is not waited for any longer."""
-        return self._result(self._submit(function, *arguments), stopped)
+    def run(self, function, *arguments, stopped=never):
+        """The result of a function that uses the device. StoppedError: it is not waited for any longer, and ends."""
+        return self._submit(function, *arguments, stopped=stopped).result(stopped)
 
-    def _result(self, future: Future, stopped):
-        """The future's result. StoppedError: it is not waited for any longer. NoDeviceError: it cannot be waited for,
-        as Blender's GPU is not current."""
-        while not wait([future], 0 if in_window() else _PATIENCE).done:
-            if in_window() and not gpu_relay.serve() and self.device == "relayed":
-                require_context()
-            if stopped():
-                raise StoppedError
-        return future.result()
-
-    def _submit(self, function, *arguments) -> Future:
-        """The result to come of a function that uses the device. Such functions are called one after the other."""
+    def _submit(self, function, *arguments, stopped=never) -> _Work:
+        """A function that uses the device, called after those before it. stopped: asked where it is called at once."""
+        ended = threading.Event()
         if self.threaded:
             if self._executor is None:
                 self._executor = ThreadPoolExecutor(1, "Virtual Shutter")
             with suppress(RuntimeError):  # Python ends, and its threads take no more work
-                return self._executor.submit(function, *arguments)
+                return _Work(
+                    self._executor.submit(_until, ended.is_set, function, *arguments), ended, self.device == "relayed"
+                )
         done = Future()
-        done.set_result(function(*arguments))
-        return done
+        done.set_result(_until(stopped, function, *arguments))
+        return _Work(done, ended, False)
 
     def request(
-        self, snapshot: Snapshot, frame: float, say=print, detail: Detail | None = None, stopped=_never
+        self, snapshot: Snapshot, frame: float, say=print, detail: Detail | None = None, stopped=never
     ) -> FrameRequest:
         """What an effect strip shows at a timeline frame; say: called with a sentence when the device is a lesser one.
         One of FAULTS: it cannot be shown. StoppedError: the device is not waited for any longer.
@@ -247,16 +273,15 @@ class RenderSession:
         self._requests[snapshot.scene] = snapshot, frame, found
         return found
 
-    def picture(self, scene: int, request: FrameRequest, stopped=_never) -> np.ndarray:
+    def picture(self, scene: int, request: FrameRequest, stopped=never) -> np.ndarray:
         """The requested picture, if need be the one that was begun for it. StoppedError: it is not waited for."""
         key, begun = self._begun.pop(scene, (None, None))
-        if begun is not None:
-            if key == request.key:
-                return self._result(begun, stopped)
-            begun.cancel()
-        return self.run(request.picture, stopped=stopped)
+        if begun is not None and key != request.key:
+            begun.break_off()
+            begun = None
+        return (begun or self._submit(request.picture, stopped=stopped)).result(stopped)
 
-    def begin_next(self, snapshot: Snapshot, frame: float, stopped=_never) -> None:
+    def begin_next(self, snapshot: Snapshot, frame: float, stopped=never) -> None:
         """Begins the picture after the one at that timeline frame, where a film is rendered: if the last two were
         neighbours.
 
@@ -270,7 +295,7 @@ class RenderSession:
                 request = self.request(snapshot, frame + step, detail=FULL, stopped=stopped)
                 self._begun[snapshot.scene] = request.key, self._submit(request.picture)
 
-    def coefficients(self, request: FrameRequest, stopped=_never) -> np.ndarray:
+    def coefficients(self, request: FrameRequest, stopped=never) -> np.ndarray:
         """As Renderer.coefficients."""
         return self.run(request.coefficients, stopped=stopped)
 
@@ -292,11 +317,11 @@ class RenderSession:
     def _opened(self, say, stopped):
         """The compositor, opened if need be."""
         if self._compositor is None:
-            self._compositor = self._submit(devices.OPEN[self.device], memory(), self._ask)
+            self._compositor = self._submit(devices.OPEN[self.device], memory(), self._ask).future
             if message := self._chosen[1]:
                 say(message)
         try:
-            return self._result(self._compositor, stopped)
+            return _result(self._compositor, self.device == "relayed", stopped)
         except NoDeviceError:
             self._compositor = None
             raise
@@ -320,10 +345,23 @@ class RenderSession:
         """Lets go of the last requests, and of their snapshots."""
         self._requests.clear()
 
+    def rest(self) -> None:
+        """Breaks off the pictures that were begun, and decodes nothing in advance."""
+        self._drop_begun(list(self._begun))
+        for _key, renderer in list(self._renderers.values()):
+            renderer.source.want(())
+
+    def _drop_begun(self, places) -> None:
+        for place in places:
+            _key, begun = self._begun.pop(place, (None, None))
+            if begun is not None:
+                begun.break_off()
+
     def keep(self, scenes: set[int]) -> None:
         """Closes what belongs to other scenes than those of these session_uids. A render job may take them away
         meanwhile."""
-        for known in (self._shown, self._begun, self._requests):
+        self._drop_begun(set(self._begun) - scenes)
+        for known in (self._shown, self._requests):
             for place in set(known) - scenes:
                 known.pop(place, None)
         for place in set(self._renderers) - scenes:
@@ -334,7 +372,8 @@ class RenderSession:
     def forget(self) -> None:
         """Closes all sources and frees the device; where Blender's GPU is not current, once it is. A render job may
         take up more meanwhile."""
-        for known in (self._shown, self._begun, self._requests):
+        self._drop_begun(list(self._begun))
+        for known in (self._shown, self._requests):
             known.clear()
         while self._renderers:
             _place, (_key, renderer) = self._renderers.popitem()
@@ -460,7 +499,7 @@ def _in_blocks(state: FrameState, divisor: int) -> FrameState:
 
 
 def picture(
-    snapshot: Snapshot, frame: float, say: Callable[[str], None] = print, stopped=_never, detail: Detail = FULL
+    snapshot: Snapshot, frame: float, say: Callable[[str], None] = print, stopped=never, detail: Detail = FULL
 ) -> np.ndarray:
     """The picture (H, W, 4) of an effect strip at a timeline frame, top row first: scene-linear float32, premultiplied,
     or levels, if the settings ask for them. One of FAULTS: there is none, in one sentence. say: called with a sentence
@@ -553,7 +592,10 @@ def open_source(snapshot: Snapshot, detail: Detail = FULL, *, planes: bool = Fal
 
 
 def end_job() -> None:
-    """Lets go of the snapshots of a job of the window."""
+    """Lets go of what a job of the window has begun, and of its snapshots. A script's next still may go on from the
+    one before."""
+    if render_job.in_job():
+        _offscreen.rest()
     _offscreen.forget_requests()
 
 

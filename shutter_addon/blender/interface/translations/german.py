@@ -769,6 +769,7 @@ MESSAGES = {
     ): "Dieses Bild zeigen, wie es gerendert wird, jedes seiner Pixel auf einem des Schirms, oder das beenden",
     ("*", "No preview shows a Shutter strip"): "Keine Vorschau zeigt einen Verschlussstreifen",
     ("*", "Buttons of Notes"): "Knöpfe an Hinweisen",
+    ("*", "Composing…"): "Wird berechnet …",
     ("*", "The strips above are hidden in this view"): "Die Streifen darüber sind in dieser Ansicht verborgen",
     ("*", "This view has the view transform Standard"): "Diese Ansicht hat die Anzeigetransformation Standard",
     # Tracking and following

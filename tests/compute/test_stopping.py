@@ -1,0 +1,89 @@
+"""Pictures that are broken off between two passes, at any of them: those that come after are the right ones."""
+
+import numpy as np
+import pytest
+from test_composition import SHAPES, device, few_pieces, footage, state  # noqa: F401
+from test_matting import Values, mattes
+from test_moved import following
+
+from shutter_addon.compute import window
+from shutter_addon.compute.renderer import Renderer
+from shutter_addon.core import stopping
+from shutter_addon.core.scribbles import Shape
+
+FIRST, SECOND = 3, 21  # their windows have no frame in common
+OTHER = (*SHAPES[1:], Shape(1, "line", 0.1, (np.array([[0.2, 0.7], [0.9, 0.1]]),)))
+
+
+def plain(rng, _source, shapes):
+    return few_pieces(rng, 6, shapes=shapes)
+
+
+def along_edges(rng, _source, shapes):
+    return few_pieces(rng, 6, shapes=shapes, edge_aware=1.0)
+
+
+def followed(rng, source, shapes):
+    return following(rng, source, state(rng, 6, shapes))
+
+
+def with_mattes(rng, _source, shapes):
+    moment = state(rng, 6, shapes)
+    return type(moment)(moment.options, moment.bars, moment.shapes, mattes=mattes(np.random.default_rng(5), 2))
+
+
+def counted(most=None):
+    """What stops after so many looks, and the looks that it had."""
+    looks = []
+
+    def stopped():
+        looks.append(None)
+        return most is not None and len(looks) > most
+
+    return stopped, looks
+
+
+@pytest.mark.parametrize("kind", [plain, along_edges, followed, with_mattes])
+@pytest.mark.parametrize("dtype", [np.uint8, np.float16])
+def test_what_comes_after_is_whole(device, kind, dtype, monkeypatch):  # noqa: F811
+    monkeypatch.setattr(window, "BAND_BYTES", 60_000)  # pictures take several passes
+    rng = np.random.default_rng(50)
+    source = footage(rng, count=40, dtype=dtype, size=(61, 47))
+    moments = [kind(np.random.default_rng(seed), source, shapes) for seed, shapes in ((51, SHAPES), (52, OTHER))]
+    values = Values(source)
+    asked = list(zip((FIRST, SECOND), moments, strict=True))
+    expected = [Renderer(device, source, values).picture(*one) for one in asked]
+    renderer = Renderer(device, source, values)
+    stopped, looks = counted()
+    renderer.picture(*asked[0])
+    with stopping.once(stopped):
+        renderer.picture(*asked[1])
+    assert len(looks) > 2
+    for most in sorted({int(share * len(looks)) for share in np.linspace(0, 1, 6, endpoint=False)} | {len(looks) - 1}):
+        renderer.picture(*asked[0])
+        stopped, had = counted(most)
+        with stopping.once(stopped), pytest.raises(stopping.StoppedError):
+            renderer.picture(*asked[1])
+        assert len(had) == most + 1  # not another step
+        for one, right in zip(asked, expected, strict=True):
+            assert np.array_equal(renderer.picture(*one), right), most
+    renderer.close()
+
+
+def test_a_quick_picture_starts_from_nothing_half_made(gpu_device):
+    """Its diffusion may start from the last one's: not from one that was broken off."""
+    from shutter_addon.compute.gpu import GPUCompositor
+
+    compositor = GPUCompositor(gpu_device)
+    rng = np.random.default_rng(53)
+    source = footage(rng, count=12, size=(61, 47))
+    before, after = (plain(np.random.default_rng(54), source, shapes) for shapes in (SHAPES, OTHER))
+    renderer = Renderer(compositor, source)
+    right = renderer.coefficients(0, after)
+    for most in range(0, 60, 4):
+        renderer.coefficients(0, before)
+        stopped, _ = counted(most)
+        with gpu_device.current(), stopping.once(stopped), pytest.raises(stopping.StoppedError):
+            renderer.drawn_coefficients(0, after)
+        assert np.abs(renderer.coefficients(0, after) - right).max() < 1e-6
+    renderer.close()

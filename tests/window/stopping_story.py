@@ -1,0 +1,98 @@
+"""A film renders in a window of its own, which shows the frame that was made; Esc in the middle of a picture ends it
+between two passes. Run inside Blender, by test_window.py.
+
+SHUTTER_RECIPE: of a picture that takes hundreds of passes; SHUTTER_HIDDEN: a package that shall be missing."""
+
+# ruff: noqa: E402 (Blender finds the helpers once it knows their folders)
+import os
+import sys
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
+if os.environ.get("SHUTTER_HIDDEN"):
+    sys.modules[os.environ["SHUTTER_HIDDEN"]] = None  # there is no such module
+
+import bpy
+import traces
+from driver import OUT, key, play, saw, shot, until, xdotool
+from given_edit import edit, opened
+
+rendering = partial(bpy.app.is_job_running, "RENDER")
+TICK = 0.01
+
+
+class Passes:
+    """Counts the passes of renders, and those of each picture."""
+
+    def __init__(self):
+        self.all, self.whole, self.begun = 0, [], None
+        devices = [part("blender.rendering.gpu_relay").RelayedDevice]
+        if not os.environ.get("SHUTTER_HIDDEN"):
+            devices.append(part("compute.gl").GLDevice)
+        for device in devices:
+            device._dispatch = self._counted(device._dispatch)
+        renderer = part("compute.renderer").Renderer
+        renderer.picture = self._noted(renderer.picture)
+
+    def _counted(self, dispatch):
+        def counted(*arguments):
+            self.all += 1
+            return dispatch(*arguments)
+
+        return counted
+
+    def _noted(self, picture):
+        def noted(*arguments):
+            self.begun = self.all
+            found = picture(*arguments)
+            self.whole.append(self.all - self.begun)
+            return found
+
+        return noted
+
+    def is_amid(self):
+        """Whether a picture that is begun has most of its passes before it."""
+        return len(self.whole) > 3 and self.whole[-1] / 20 < self.all - self.begun < self.whole[-1] / 3
+
+
+def part(name):
+    return import_module(f"{traces.NAME}.shutter_addon.{name}")
+
+
+def story():
+    yield from opened()
+    passes = Passes()
+    bpy.context.preferences.view.render_display_type = "WINDOW"
+    edit().frame_start, edit().frame_end = 1, 60
+    edit().render.filepath = str(OUT / "film") + "/"
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], scene=edit()):
+        bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
+    yield from until(lambda: len(passes.whole) > 3, "frames are made", 120)
+    yield from until(lambda: len(bpy.context.window_manager.windows) == 2, "the render has its window")
+    window = bpy.context.window_manager.windows[1]
+    xdotool("mousemove", window.x + window.width // 2, 500)
+    yield 0.5
+    shot("render_window")
+    assert rendering()
+    yield from until(passes.is_amid, "a picture is begun", 60, wait=TICK)
+    whole = len(passes.whole)
+    key("Escape")
+    yield from until(lambda: not rendering(), "Esc ends the render", 60, wait=TICK)
+    ended = passes.all
+    last = part("blender.rendering.session")._offscreen._submit(lambda: None)
+    done = getattr(last, "future", last).done
+    yield from until(done, "the render's device is free", 60, wait=TICK)
+    saw(after=passes.all - ended, whole=passes.whole[0], finished_after=len(passes.whole) - whole)
+    # what comes next is right
+    edit().render.filepath = str(OUT / "after") + "/"
+    edit().frame_start, edit().frame_end = 3, 4
+    complete = []
+    bpy.app.handlers.render_complete.append(lambda scene, *_: scene.name == "Edit" and complete.append(True))
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], scene=edit()):
+        bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
+    yield from until(lambda: complete, "another film is rendered", 120)
+
+
+play(story)
