@@ -9,12 +9,13 @@ from bpy.app.handlers import persistent
 
 from .data import inbetween_settings, revision, selection, source_media, strips, versions
 from .editing import copies, lifecycle, track_region, undelete
-from .interface import inbetween_operators, preview_areas
+from .interface import inbetween_operators, preview_areas, sharp_frame
 from .rendering import invalidation, job_snapshots, render_job, session
 
 
 @persistent
 def _before_load(*_):
+    sharp_frame.give_back(bpy.context)
     inbetween_operators.stop()
     track_region.data_replaced()
     session.forget()
@@ -26,6 +27,7 @@ def _before_load(*_):
 
 @persistent
 def _after_load(*_):
+    sharp_frame.listen()
     session.drop_removed()  # what a render job took up while the file was loaded
     copies.adopt()
     lifecycle.mend()
@@ -33,6 +35,7 @@ def _after_load(*_):
 
 @persistent
 def _before_save(*_):
+    sharp_frame.give_back(bpy.context)
     for edit in bpy.data.scenes:
         if edit.virtual_shutter.effects and edit.library is None:
             edit.virtual_shutter.version = versions.extension()
@@ -58,6 +61,7 @@ def _after_undo(*_):
     for edit in bpy.data.scenes:
         strips.invalidate(edit)
     session.drop_removed()
+    sharp_frame.give_back(bpy.context)
     _show_scribbles()
 
 

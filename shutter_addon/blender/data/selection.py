@@ -1,6 +1,6 @@
 """What is active: the edit, the strip, its effect, and the effect's shutter and region."""
 
-from .strips import effect_of, effect_strips
+from .strips import SOURCES, effect_of, effect_strips
 
 
 def edit_of(context):
@@ -9,9 +9,13 @@ def edit_of(context):
 
 
 def active_strip(context):
-    """The active strip of the context's edit, or None."""
+    """The active strip of the context's edit, or None; in place of a movie's sound, which is the active one after both
+    were added, the movie."""
     edit = edit_of(context)
-    return edit.sequence_editor.active_strip if edit and edit.sequence_editor else None
+    strip = edit.sequence_editor.active_strip if edit and edit.sequence_editor else None
+    if strip is None or strip.type != "SOUND":
+        return strip
+    return next((other for other in strip.connections if other.type in SOURCES), strip)
 
 
 def active(context):

@@ -17,7 +17,7 @@ from ..data import annotations, geometry, selection, strips
 from ..data.properties import CONTEXT
 from ..rendering import invalidation, session
 from ..rendering.blender_gpu import Texture
-from . import drawing, preview_areas, previewing
+from . import drawing, preview_areas, previewing, sharp_frame
 from .previewing import RESULTS, Shown, shown
 
 VIEWS = (
@@ -31,6 +31,11 @@ VIEWS = (
 def redraw(_settings, _context) -> None:
     """Draws all previews again: for what is called at changes of properties."""
     preview_areas.redraw(bpy.context)
+
+
+def _view_chosen(settings, context) -> None:
+    sharp_frame.give_back(context)
+    redraw(settings, context)
 
 
 def _redraw_once() -> None:
@@ -58,13 +63,16 @@ class ShutterPreview(PropertyGroup):
     """How the live preview looks: of the window manager, neither saved nor undone."""
 
     live: BoolProperty(
-        name="Live", description="Show scribbles and views of the effect in the preview", default=True, update=redraw
+        name="Live",
+        description="Show scribbles and views of the effect in the preview",
+        default=True,
+        update=_view_chosen,
     )
     view: EnumProperty(
         name="View",
         description="What the live preview shows",
         items=VIEWS,
-        update=redraw,
+        update=_view_chosen,
         translation_context=CONTEXT,
     )
     split: FloatProperty(
@@ -96,6 +104,7 @@ def _draw() -> None:
     settings = context.window_manager.virtual_shutter
     if bpy.app.is_job_running("RENDER"):
         return
+    sharp_frame.follow_pen(context)
     invalidation.drop_lesser()
     # Blender tells nobody of strokes that are drawn or erased, but it draws the preview again.
     edit = selection.edit_of(context)
@@ -104,8 +113,10 @@ def _draw() -> None:
     active = selection.active(context)
     if active is not None and _is_of_another(context.space_data.annotation, *active[:2]):
         bpy.app.timers.register(_follow_once)  # nothing may be changed while it is drawn
+    if sharp_frame.is_shown(context.space_data):
+        _tell_sharp(context.region)
     # A stroke that is being drawn would lie below our picture: Blender's own shows the same.
-    if not settings.live or any(op.bl_idname == "GPENCIL_OT_annotate" for op in context.window.modal_operators):
+    if not settings.live or any(op.bl_idname == sharp_frame.PEN for op in context.window.modal_operators):
         return
     found = shown(context)
     if found is None:
@@ -182,6 +193,13 @@ def _tell_detail(source, size: tuple[int, int], say) -> None:
         say(rpt_("Composed at {scale} size").format(scale=scale))
     elif source.from_proxy:
         say(rpt_("Composed from a proxy"))
+
+
+def _tell_sharp(region) -> None:
+    say = _Notes(region)
+    say(rpt_("The sharp frame, to draw on: the result comes with the stroke"))
+    with drawing.pixel_space(region):
+        say.draw()
 
 
 def _tell_missing(request, say) -> None:
