@@ -118,8 +118,7 @@ class SHUTTER_MT_shutters(Menu):
 def _draw_list(layout, effect, kind: str, items, menu: str | None = None) -> None:
     """The list of shutters or regions, as high as it has to be, and the buttons beside it."""
     row = layout.row()
-    name = f"SHUTTER_UL_{kind}s"
-    row.template_list(name, "", effect, f"{kind}s", effect, f"active_{kind}", rows=_rows(items))
+    row.template_list(f"SHUTTER_UL_{kind}s", "", effect, f"{kind}s", effect, f"active_{kind}", rows=_rows(items))
     column = row.column(align=True)
     if kind == "shutter":
         column.operator("shutter.shutter_add", text="", icon="ADD")
@@ -315,9 +314,11 @@ def _draw_blend(layout, region) -> None:
 def _draw_tracking(layout, index: int | None) -> None:
     """The buttons that track a region or the camera (selection.moving)."""
     row = layout.row(align=True)
+    track = "shutter.track_camera" if index is None else "shutter.track"
     for direction, _name, _description, icon, _number in track_operators.DIRECTIONS:
-        text = ("Track Camera" if index is None else "Track") if direction == "BOTH" else ""
-        button = row.operator("shutter.track_camera" if index is None else "shutter.track", text=text, icon=icon)
+        button = row.operator(
+            track, text=("Track Camera" if index is None else "Track") if direction == "BOTH" else "", icon=icon
+        )
         button.direction = direction
 
 

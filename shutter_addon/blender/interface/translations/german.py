@@ -10,6 +10,7 @@ MESSAGES = {
     ("*", "Shutter"): "Verschluss",
     ("*", "Regions"): "Regionen",
     ("*", "Bars"): "Balken",
+    ("*", "Transform"): "Transformation",
     ("*", "Options"): "Optionen",
     ("*", "Presets"): "Voreinstellungen",
     ("*", "Shutter Specials"): "Verschluss-Spezialmenü",
@@ -186,9 +187,8 @@ MESSAGES = {
     ): "Der Verschlussstreifen hat die Modifikatoren seiner Quelle",
     (
         "*",
-        "Effect strips on the source do not reach the effect",
-    ): "Effektstreifen auf der Quelle erreichen den Effekt nicht",
-    ("*", "Make the Shutter strip their input"): "Den Verschlussstreifen zu ihrer Eingabe machen",
+        "Effect strips on the source do not reach the effect: make the Shutter strip their input",
+    ): "Effektstreifen auf der Quelle erreichen den Effekt nicht: den Verschlussstreifen zu ihrer Eingabe machen",
     # Shutters
     ("Operator", "Add Shutter"): "Verschluss hinzufügen",
     ("*", "Add a shutter that is fully open"): "Einen Verschluss hinzufügen, der ganz offen ist",
@@ -201,6 +201,8 @@ MESSAGES = {
     ("*", "Remove the active shutter and its regions"): "Den aktiven Verschluss und seine Regionen entfernen",
     ("*", "The last shutter of an effect cannot be removed"): "Der letzte Verschluss eines Effekts bleibt",
     ("Operator", "Move Shutter"): "Verschluss verschieben",
+    ("Operator", "Move Up"): "Nach oben",
+    ("Operator", "Move Down"): "Nach unten",
     (
         "*",
         "Move the active shutter in the list (the first one is the default, which holds where nothing is scribbled)",
@@ -301,9 +303,14 @@ MESSAGES = {
     ("Operator", "Draw"): "Zeichnen",
     (
         "*",
-        "Scribble in the preview where the active shutter holds (at another frame, this redraws the active region)",
-    ): "In der Vorschau markieren, wo der aktive Verschluss gilt (bei einem anderen Bild zeichnet das die aktive "
+        "Draw on the sharp frame where the active shutter holds (at another frame, this redraws the active region)",
+    ): "Auf dem scharfen Bild zeichnen, wo der aktive Verschluss gilt (bei einem anderen Bild zeichnet das die aktive "
     "Region neu)",
+    ("Operator", "Draw Shutter"): "Verschluss zeichnen",
+    (
+        "*",
+        "The sharp frame, to draw on: the result comes with the stroke",
+    ): "Das scharfe Bild, zum Zeichnen: Das Ergebnis kommt mit dem Strich",
     ("*", "New Region"): "Neue Region",
     (
         "*",
