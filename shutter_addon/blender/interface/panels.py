@@ -80,8 +80,6 @@ class SHUTTER_MT_presets(Menu):
 
     def draw(self, _context):
         self.layout.operator_enum("shutter.preset", "preset")
-        self.layout.separator()
-        self.layout.operator("shutter.tripod", icon="CON_CAMERASOLVER")
 
 
 class SHUTTER_MT_regions(Menu):
