@@ -1,5 +1,5 @@
-"""From an empty Video Editing file to the first tracked, rendered frame, by mouse and keyboard; every action is counted.
-Run inside Blender, by test_window.py."""
+"""From an empty Video Editing file to the first tracked, rendered frame, by mouse and keyboard; every action is
+counted. Run inside Blender, by test_window.py."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
 import sys
@@ -86,7 +86,7 @@ def movie_dragged():
 
 def gone_to(frame):
     """In the ruler; frame: of the movie, 1 is its first."""
-    movie = story.edit().sequence_editor.strips_all[0]
+    movie = next(strip for strip in story.edit().sequence_editor.strips_all if strip.type == "MOVIE")
     x, _y = timeline().view2d.view_to_region(movie.content_start + frame - 1, 0, clip=False)
     driver.click(timeline(), x, timeline().height - 12)
     acted("click in the ruler")
@@ -161,22 +161,34 @@ def boxed():
     driver.saw(box=[round(left), round(height - high), round(right), round(height - low)])
 
 
-def still_rendered(name):
-    """The result of F12, which is seen once it is there."""
+def plain_seen():
+    """The preview without the effect, to compare with."""
+    effect_strip().mute = True
+    yield from story.seen("5_plain")
+    effect_strip().mute = False
+    yield 1.0
+
+
+def rendered():
     done = []
-    ended = lambda scene, *_: scene.name == "Edit" and done.append(True)  # noqa: E731
-    bpy.app.handlers.render_complete.append(ended)
+    # The preview's pictures of the effect are renders of its own scene.
+    bpy.app.handlers.render_complete.append(lambda scene, *_: scene.name == "Edit" and done.append(True))
     driver.move(story.preview(), 100, story.preview().height - 60)
     yield
     driver.key("F12")
+    acted("F12")
     yield from driver.until(lambda: done and not bpy.app.is_job_running("RENDER"), "the render ends", 60)
-    bpy.app.handlers.render_complete.remove(ended)
-    bpy.data.images["Render Result"].save_render(str(driver.OUT / f"{name}.png"), scene=story.edit())
+    driver.saw(actions=_actions, stroke=one_stroke_story.stroke_at(story.edit().frame_current))
+    bpy.data.images["Render Result"].save_render(str(driver.OUT / "final.png"), scene=story.edit())
 
 
 def told():
     yield from driver.video_editing_opened()
-    bpy.data.scenes[0].name = "Edit"
+    edit = bpy.data.scenes[0]
+    edit.name = "Edit"
+    edit.render.resolution_x, edit.render.resolution_y = 768, 576  # the footage's, to compare with
+    edit.render.dither_intensity = 0
+    edit.view_settings.view_transform = "Standard"
     bpy.context.preferences.view.smooth_view = 0
     yield from footage_chosen()
     yield from movie_dragged()
@@ -189,17 +201,9 @@ def told():
     acted("click on Track", in_tab=True)
     yield from one_stroke_story.ended()
     yield from story.seen("4_tracked")
+    yield from plain_seen()
     yield from gone_to(LATER)
-    story.edit().view_settings.view_transform = "Standard"
-    image = story.edit().render.image_settings
-    image.media_type, image.file_format = "IMAGE", "PNG"
-    yield from still_rendered("final")
-    acted("F12")
-    driver.saw(actions=_actions, stroke=one_stroke_story.stroke_at(story.edit().frame_current))
-    effect_strip().mute = True
-    yield from still_rendered("plain")
-    story.edit().frame_set(story.edit().frame_current - LATER + FRAME)
-    yield from story.seen("5_plain")
+    yield from rendered()
 
 
 if __name__ == "__main__":
