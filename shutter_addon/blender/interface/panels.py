@@ -233,7 +233,7 @@ class _WithEffect:
 class _Move(_WithEffect):
     """What the exposure moves with, and what says how long it is."""
 
-    bl_label = "Follow"
+    bl_label = "Move With"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
@@ -382,7 +382,7 @@ def _draw_track_options(layout, moving) -> None:
 
 
 class _Follow(_WithRegion):
-    bl_label = "Follow"
+    bl_label = "Follow Track"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):

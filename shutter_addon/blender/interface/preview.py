@@ -24,7 +24,7 @@ VIEWS = (
     ("RESULT", "Result", "The finished picture"),
     ("SPLIT", "Split", "The source on the left of the handle, the result on its right"),
     ("SCRIBBLES", "Scribbles", "The source, and where each shutter is scribbled"),
-    ("COEFFICIENTS", "Coefficients", "How much of each shutter a pixel gets, in the shutters' colors"),
+    ("COEFFICIENTS", "Mattes", "How much of each shutter a pixel gets, in the shutters' colors"),
 )
 
 
@@ -86,7 +86,7 @@ class ShutterPreview(PropertyGroup):
     )
     probe: BoolProperty(
         name="Probe",
-        description="Show the shutter and the coefficients of the pixel that the pointer was over last",
+        description="Show the shutter of the pixel that the pointer was over last, and how much of each it gets",
         update=redraw,
     )
     probe_at: FloatVectorProperty(
