@@ -64,8 +64,9 @@ def devices_named():
     yield from until(lambda: opengl.cache_info().currsize, "OpenGL is tried", 10)
     labels = []
     panels = part("interface.panels")
-    panels._sentence = lambda _layout, words, *_: labels.append(words.partition(": ")[0])
+    sentence, panels._sentence = panels._sentence, lambda _layout, words: labels.append(words.partition(": ")[0])
     panels._draw_devices(layout)
+    panels._sentence = sentence
     assert labels == ["Preview", "Renders"], labels
 
 
