@@ -9,12 +9,13 @@ from bpy.app.handlers import persistent
 
 from .data import inbetween_settings, revision, source_media, strips, versions
 from .editing import copies, lifecycle, shown_annotations, track_region, undelete
-from .interface import inbetween_operators, preview_areas
+from .interface import inbetween_operators, preview_areas, sharp_frame
 from .rendering import invalidation, job_snapshots, render_job, session
 
 
 @persistent
 def _before_load(*_):
+    sharp_frame.give_back(bpy.context)
     inbetween_operators.stop()
     track_region.data_replaced()
     session.forget()
@@ -26,6 +27,7 @@ def _before_load(*_):
 
 @persistent
 def _after_load(*_):
+    sharp_frame.listen()
     session.drop_removed()  # what a render job took up while the file was loaded
     copies.adopt()
     lifecycle.mend()
@@ -37,6 +39,7 @@ def _after_load(*_):
 def _before_save(*_):
     lifecycle.update()  # a script may have removed strips, since Blender last told
     lifecycle.leave_to_user()
+    sharp_frame.give_back(bpy.context)
     for edit in bpy.data.scenes:
         if edit.virtual_shutter.effects and edit.library is None:
             edit.virtual_shutter.version = versions.extension()
@@ -67,6 +70,7 @@ def _after_undo(*_):
     for edit in bpy.data.scenes:
         strips.invalidate(edit)
     session.drop_removed()
+    sharp_frame.give_back(bpy.context)
     shown_annotations.follow()
 
 

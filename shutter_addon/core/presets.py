@@ -69,21 +69,21 @@ def last(window: int) -> np.ndarray:
 # name: (label, description, function, parameters). "Custom" is no preset: it is whatever the bars are.
 PRESETS = {
     "STILL": ("Still Frame", "One sharp frame", still, {}),
-    "ANGLE_45": ("45°", "Open for an eighth of the window", angle, {"degrees": 45.0}),
-    "ANGLE_90": ("90°", "Open for a quarter of the window", angle, {"degrees": 90.0}),
-    "ANGLE_180": ("180°", "Open for half of the window, as film cameras are", angle, {"degrees": 180.0}),
-    "ANGLE_270": ("270°", "Open for three quarters of the window", angle, {"degrees": 270.0}),
-    "ANGLE_360": ("360°", "Open for the whole window", angle, {"degrees": 360.0}),
+    "ANGLE_45": ("45°", "Open for an eighth of the frames", angle, {"degrees": 45.0}),
+    "ANGLE_90": ("90°", "Open for a quarter of the frames", angle, {"degrees": 90.0}),
+    "ANGLE_180": ("180°", "Open for half of the frames, as film cameras are", angle, {"degrees": 180.0}),
+    "ANGLE_270": ("270°", "Open for three quarters of the frames", angle, {"degrees": 270.0}),
+    "ANGLE_360": ("360°", "Open for all frames", angle, {"degrees": 360.0}),
     "TWO_CUTS": ("Two Cuts", "Two frames on top of each other", cuts, {"count": 2}),
     "CUTS": ("Four Cuts", "Four frames on top of each other", cuts, {"count": 4}),
-    "RAMP_UP": ("Ramp Up", "Opens over the window: a trail with a sharp end", ramp_up, {}),
-    "RAMP_DOWN": ("Ramp Down", "Closes over the window: a trail with a sharp start", ramp_down, {}),
-    "TRIANGLE": ("Triangle", "Opens to the middle of the window and closes again", triangle, {}),
-    "GAUSSIAN": ("Gaussian", "A bell curve around the middle of the window", gaussian, {}),
+    "RAMP_UP": ("Ramp Up", "Opens from frame to frame: a trail with a sharp end", ramp_up, {}),
+    "RAMP_DOWN": ("Ramp Down", "Closes from frame to frame: a trail with a sharp start", ramp_down, {}),
+    "TRIANGLE": ("Triangle", "Opens to the middle frame and closes again", triangle, {}),
+    "GAUSSIAN": ("Gaussian", "A bell curve around the middle frame", gaussian, {}),
     "TRAIL": ("Exponential Trail", "Fades quickly at first and slowly later on", trail, {}),
     "STUTTER": ("Stutter", "Every fourth frame, as a strobe lights them", stutter, {"every": 4}),
-    "FIRST": ("First Frame", "The first frame of the window alone", first, {}),
-    "LAST": ("Last Frame", "The last frame of the window alone", last, {}),
+    "FIRST": ("First Frame", "The first of the frames alone", first, {}),
+    "LAST": ("Last Frame", "The last of the frames alone", last, {}),
 }
 
 

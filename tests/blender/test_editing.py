@@ -235,10 +235,10 @@ def test_painted_bars_are_keyed_if_asked(effect):
 
 
 def test_a_summary_in_words():
-    assert bar_edits.summary(np.ones(8)) == "360°, 8 frames of light"
-    assert bar_edits.summary([1, 0, 0, 0]) == "90°, 1 frame of light"
-    assert bar_edits.summary([0.5, 0.5]) == "360°, 1 frame of light"
-    assert bar_edits.summary(np.float32([0.1] * 10)) == "360°, 1 frame of light"
+    assert bar_edits.summary(np.ones(8)) == "Angle 360°, light of 8 frames"
+    assert bar_edits.summary([1, 0, 0, 0]) == "Angle 90°, light of 1 frame"
+    assert bar_edits.summary([0.5, 0.5]) == "Angle 360°, light of 1 frame"
+    assert bar_edits.summary(np.float32([0.1] * 10)) == "Angle 360°, light of 1 frame"
     assert "never opens" in bar_edits.summary([0, 0])
 
 

@@ -423,13 +423,14 @@ def no_region(bpy, edit, effect, tmp_path):
     pass
 
 
+MAKES_EFFECT = ("add_effect", "draw")  # draw, where there is none yet
 # Situation: why an operator cannot be used there, and for some of them another reason; None: it can be used.
 SITUATIONS = {
-    nothing: (SELECT, {"add_effect": "Select a movie, image or clip strip"}),
-    no_sequencer: (SELECT, {"add_effect": "Select a movie, image or clip strip"}),
-    sound: (SELECT, {"add_effect": NO_SOURCE}),
-    color: (SELECT, {"add_effect": NO_SOURCE}),
-    plain: (SELECT, {"add_effect": None}),
+    nothing: (SELECT, dict.fromkeys(MAKES_EFFECT, "Select a movie, image or clip strip")),
+    no_sequencer: (SELECT, dict.fromkeys(MAKES_EFFECT, "Select a movie, image or clip strip")),
+    sound: (SELECT, dict.fromkeys(MAKES_EFFECT, NO_SOURCE)),
+    color: (SELECT, dict.fromkeys(MAKES_EFFECT, NO_SOURCE)),
+    plain: (SELECT, dict.fromkeys(MAKES_EFFECT)),
     not_seen: (None, {"add_effect": NO_SOURCE, "draw": UNSEEN, "region_take": UNSEEN, **ALIKE, **REGION_UNSEEN}),
     linked: (LINKED, {}),
     no_shutter: (NO_SHUTTER, {"add_effect": NO_SOURCE, **dict.fromkeys(ANY_EFFECT), **ALIKE, **REGION_NEEDED}),

@@ -127,12 +127,12 @@ def image(effect):
 
 
 IMPOSSIBLE = {
-    "window -5": (lambda e: raw(e, "window", -5), 'effect "Shutter": Window is -5, not 1 to 256'),
-    "window 0": (lambda e: raw(e, "window", 0), 'effect "Shutter": Window is 0'),
-    "window 1e9": (lambda e: raw(e, "window", 10**9), 'effect "Shutter": Window is 1e'),
+    "window -5": (lambda e: raw(e, "window", -5), 'effect "Shutter": Frames is -5, not 1 to 256'),
+    "window 0": (lambda e: raw(e, "window", 0), 'effect "Shutter": Frames is 0'),
+    "window 1e9": (lambda e: raw(e, "window", 10**9), 'effect "Shutter": Frames is 1e'),
     "position": (lambda e: raw(e, "position", 77), 'effect "Shutter": Position is none of its choices'),
     "light": (lambda e: raw(e, "light", -1), 'effect "Shutter": Light is none'),
-    "aggregate": (lambda e: raw(e, "aggregate", 9), 'effect "Shutter": Aggregate is none'),
+    "aggregate": (lambda e: raw(e, "aggregate", 9), 'effect "Shutter": Matte Resolution is none'),
     "inbetween": (lambda e: raw(e, "inbetween", 9), 'effect "Shutter": In-Between Frames is none'),
     "keyed position": (lambda e: key(e, "position", (1, -1)), 'effect "Shutter": Position is none'),
     "keyed light": (lambda e: key(e, "light", (1, NAN)), 'effect "Shutter": Light is none'),
@@ -140,8 +140,8 @@ IMPOSSIBLE = {
     "a bar": (lambda e: raw(e.shutters[0].bars[2], "weight", -4.0), 'shutter "Long", bar 3: Weight is -4, not 0 to'),
     "a nan bar": (lambda e: raw(e.shutters[0].bars[0], "weight", NAN), 'shutter "Long", bar 1: Weight is nan'),
     "a bar 1e30": (lambda e: raw(e.shutters[0].bars[0], "weight", 1e30), "bar 1: Weight is 1e+30, not 0 to 1000000"),
-    "few bars": (lambda e: e.shutters[0].bars.remove(0), 'shutter "Long": 3 bars, the window is 4'),
-    "many bars": (lambda e: e.shutters[1].bars.add(), 'shutter "Sharp": 5 bars, the window is 4'),
+    "few bars": (lambda e: e.shutters[0].bars.remove(0), 'shutter "Long": 3 bars, and 4 frames'),
+    "many bars": (lambda e: e.shutters[1].bars.add(), 'shutter "Sharp": 5 bars, and 4 frames'),
     "no bars": (lambda e: e.shutters[0].bars.clear(), 'shutter "Long": 0 bars'),
     "no keyed bars": (
         lambda e: key(e.shutters[0].bars[3], "weight", (1, 1)) or e.shutters[0].bars.clear(),
@@ -168,7 +168,7 @@ IMPOSSIBLE = {
     "channel": (lambda e: raw(ramp(e, "MATTE", matte="STRIP", strip_name="images"), "channel", 9), "Channel is none"),
     "offset": (lambda e: raw(image(e), "offset", 2**31 - 1), 'region "Ramp": Offset is 2.147484e+09, not'),
     "timing": (lambda e: raw(image(e), "timing", 5), 'region "Ramp": Frames Of is none of its choices'),
-    "follow": (lambda e: raw(e.shutters[0], "follow", 9), 'shutter "Long": Follow is none of its choices'),
+    "follow": (lambda e: raw(e.shutters[0], "follow", 9), 'shutter "Long": Move With is none of its choices'),
     "length": (
         lambda e: follow_camera(e) or raw(e.shutters[0], "length", 7),
         'shutter "Long": Length is none of its choices',
@@ -380,7 +380,7 @@ print(bpy.ops.render.render(write_still=True))
     )
     assert done.returncode == 0, done.stderr
     assert "{'CANCELLED'}" in done.stdout
-    assert done.stderr.strip() == 'Virtual Shutter: effect "Shutter": Window is 1e+09, not 1 to 256'
+    assert done.stderr.strip() == 'Virtual Shutter: effect "Shutter": Frames is 1e+09, not 1 to 256'
     assert not (tmp_path / "out.png").exists()
 
 
@@ -388,7 +388,7 @@ def test_operators_report_it(bpy, edit, effect):
     raw(effect, "window", -5)
     with sequencer(bpy):
         for operator in (bpy.ops.shutter.preset, bpy.ops.shutter.bars_key, bpy.ops.shutter.shutter_add):
-            with pytest.raises(RuntimeError, match='effect "Shutter": Window is -5'):
+            with pytest.raises(RuntimeError, match='effect "Shutter": Frames is -5'):
                 operator()
     assert len(effect.shutters) == 2
 

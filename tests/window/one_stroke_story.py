@@ -19,7 +19,7 @@ FRAME, STROKE = 70, ((0.462, 0.65), (0.465, 0.62), (0.467, 0.59), (0.468, 0.565)
 MENDED = 85
 SHOWN = range(55, 96)
 RENDERED = range(65, 86, 20)
-FOLLOW_EDGES, TRACK = 451, 477  # where they stand in the sidebar, in pixels below its upper edge
+FOLLOW_EDGES, TRACK = 431, 167  # where they stand in the sidebar, in pixels below its upper edge
 
 
 def part(name):
@@ -89,10 +89,14 @@ def ended():
 
 
 def edges_followed():
-    """The slider is dragged to its end."""
+    """The slider, which the first stroke has set, is dragged to its start and to its end."""
     region = sidebar()
     height = region.height - FOLLOW_EDGES
-    yield from driver.drag(region, [(region.width * share, height) for share in (0.45, 0.5, 0.6, 0.7, 0.8, 0.95)])
+    assert story.effect().edge_aware == 1
+    for shares in ((0.8, 0.7, 0.6, 0.5, 0.3), (0.45, 0.5, 0.6, 0.7, 0.8, 0.95)):
+        yield from driver.drag(region, [(region.width * share, height) for share in shares])
+        yield 1.0
+        driver.saw(edges=story.effect().edge_aware)
     yield 2.0
     driver.saw(edge_aware=story.effect().edge_aware)
     driver.shot("5_edges")

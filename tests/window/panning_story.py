@@ -14,7 +14,7 @@ import story
 from one_stroke_story import FRAME, TRACK, sidebar
 
 SHOWN = range(60, 82)
-PANNING_SHOT = TRACK + 24  # where it stands in the sidebar, in pixels below its upper edge
+PANNING_SHOT = TRACK + 26  # where it stands in the sidebar, in pixels below its upper edge
 
 
 def shutters():

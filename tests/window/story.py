@@ -146,7 +146,7 @@ def sidebar():
 
 def chosen_beside_draw(entry):
     """The first of an entry's own menu, in the menu of regions; the sidebar is as high as it needs."""
-    driver.click(sidebar(), sidebar().width * 0.855, sidebar().height - 423)
+    driver.click(sidebar(), sidebar().width * 0.87, sidebar().height - 142)
     yield 0.8
     driver.key(*["Down"] * entry)
     yield 0.3

@@ -213,6 +213,33 @@ def test_what_is_tracked_ends_with_its_track(tmp_path, backend):
 
 
 @pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_the_first_stroke(backend, tmp_path):
+    """From an empty file to a tracked, rendered frame in twelve actions, at most five of them in the tab. Draw and the
+    pen show the sharp frame, and a finished stroke the result: the stroke's subject is sharp, up to her edges."""
+    (tmp_path / "footage").mkdir()
+    footage = shutil.copy(ROOT / "assets" / "walkers.mp4", tmp_path / "footage")
+    given = {"footage": footage, "packages": packages(tmp_path / "packages")}
+    seen, console = tell("first_stroke_story.py", backend, linked(tmp_path), **given)
+    assert "Traceback" not in console
+    facts = {name: entry[name] for entry in seen for name in entry}
+    assert len(facts["actions"]) <= 12
+    assert sum(in_tab for _what, in_tab in facts["actions"]) <= 5
+    left, top, right, bottom = facts["box"]
+    shown = [crop(tmp_path, entry)[top:bottom, left:right] for entry in seen if "step" in entry]
+    sharp, result, pressed, tracked, plain = shown
+    for picture, name in ((sharp, "sharp"), (pressed, "pressed")):
+        assert_alike(picture, plain, tmp_path / f"{name}_difference.png")
+    for picture in (result, tracked):
+        assert (np.abs(picture - plain).max(axis=2) > 30).mean() > 0.02
+    final, (x, y) = pixels(tmp_path / "final.png"), facts["stroke"]
+    with open_source(footage) as source:
+        apart = np.abs(final - source.read(81)[..., :3])
+    row, column = round((1 - y) * apart.shape[0]), round(x * apart.shape[1])
+    assert apart[row - 2 : row + 3, column - 2 : column + 3].max() <= 6
+    assert apart.max() > 60
+
+
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
 def test_a_panning_shot(tmp_path, backend):
     """A walker before a still camera: she is sharp, and the street, which stands still, streaks. A dragged bar shows at
     once. On the other backend than that of a single stroke, to spare time."""

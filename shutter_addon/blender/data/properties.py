@@ -24,14 +24,14 @@ from ...core.limits import MAX_BAR, MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE, MAX_
 from ...core.shutters import MAX_WINDOW
 from . import consistency, matte_strips, revision, selection, strips, validation
 
-# Of labels that Blender translates in another sense ("Window" is one on the screen). Operators have a context anyway.
+# Of labels that Blender translates in another sense ("Frames" is one on the screen). Operators have a context anyway.
 CONTEXT = "Virtual Shutter"
 
 # Enum identifiers are the recipe's words in capitals.
 POSITIONS = (
-    ("START", "Start", "The window begins at the frame"),
-    ("CENTER", "Center", "The frame lies in the middle of the window"),
-    ("END", "End", "The window ends at the frame"),
+    ("START", "Start", "The shown frame is the first of them"),
+    ("CENTER", "Center", "The shown frame lies in their middle"),
+    ("END", "End", "The shown frame is the last of them"),
 )
 INTERPOLATIONS = (
     ("DISPLACEMENT", "Displacement", "Move times between shutters and between keyframes"),
@@ -55,9 +55,9 @@ EDGES = (
     ("SHORTEN", "Shorten", "Leave out what lies beyond the clip's ends"),
 )
 AGGREGATES = (
-    ("1", "1×1", "Every pixel has its own shutter"),
-    ("2", "2×2", "Blocks of 2×2 pixels share a shutter"),
-    ("4", "4×4", "Blocks of 4×4 pixels share a shutter"),
+    ("1", "Full", "Every pixel has its own shutter"),
+    ("2", "Half", "Blocks of 2×2 pixels share a shutter"),
+    ("4", "Quarter", "Blocks of 4×4 pixels share a shutter"),
 )
 INBETWEENS = (
     ("1", "Off", "The source's own frames alone"),
@@ -129,7 +129,7 @@ FOLLOWS = (
 )
 
 LENGTHS = (
-    ("FRAMES", "Frames", "The bars say for how many frames the shutter is open"),
+    ("FRAMES", "Bars", "The bars say for how many frames the shutter is open"),
     ("MOTION", "Motion", "The shutter is open while what it follows moves by a set length; the bars are the shape"),
 )
 
@@ -210,7 +210,7 @@ class Shutter(PropertyGroup):
     name: StringProperty(name="Name", description="Name of the shutter", default="Shutter", set_transform=_renamed)
     color: FloatVectorProperty(
         name="Color",
-        description="Color of the shutter's bars, scribbles and coefficients",
+        description="Color of the shutter's bars, scribbles and matte",
         subtype="COLOR_GAMMA",
         size=3,
         min=0.0,
@@ -221,14 +221,14 @@ class Shutter(PropertyGroup):
     )
     bars: CollectionProperty(type=ShutterBar)
     follow: EnumProperty(
-        name="Follow",
+        name="Move With",
         description="What the exposure moves with",
         items=FOLLOWS,
         update=_changed,
         options=_UNKEYED,
     )
     follow_region: StringProperty(
-        name="Followed Region", description="Name of the region that the exposure moves with", update=_changed
+        name="Moved With", description="Name of the region that the exposure moves with", update=_changed
     )
     follow_motion: EnumProperty(
         name="Motion",
@@ -449,7 +449,7 @@ class ShutterRegion(_Tracked, PropertyGroup):
     rotation: _rotation("Rotation about the region's center")
     scale: _scale("Scale about the region's center")
     follow_kind: EnumProperty(
-        name="Follow", description="What the region follows", items=FOLLOWED, default="TRACK", options=_UNKEYED
+        name="Follow Track", description="What the region follows", items=FOLLOWED, default="TRACK", options=_UNKEYED
     )
     follow_object: StringProperty(
         name="Object", description="Tracking object that has the tracks; without one, the camera"
@@ -483,7 +483,7 @@ class ShutterEffect(PropertyGroup):
     source: StringProperty(name="Source", description="Identity of the source strip")
     start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts", options=_UNKEYED)
     window: IntProperty(
-        name="Window",
+        name="Frames",
         description="Number of source frames that a shutter can expose",
         default=8,
         min=1,
@@ -493,7 +493,10 @@ class ShutterEffect(PropertyGroup):
         translation_context=CONTEXT,
     )
     position: EnumProperty(
-        name="Position", description="Where the window lies around the frame", items=POSITIONS, update=_changed
+        name="Position",
+        description="Where the frames that are exposed lie around the shown one",
+        items=POSITIONS,
+        update=_changed,
     )
     interpolation: EnumProperty(
         name="Interpolation",
@@ -501,7 +504,9 @@ class ShutterEffect(PropertyGroup):
         items=INTERPOLATIONS,
         update=_changed,
     )
-    light: EnumProperty(name="Light", description="How the window's frames are summed", items=LIGHTS, update=_changed)
+    light: EnumProperty(
+        name="Light", description="How the frames that are exposed are summed", items=LIGHTS, update=_changed
+    )
     exposure: EnumProperty(
         name="Exposure",
         description="How bright shutters are that are open for different times",
@@ -511,26 +516,26 @@ class ShutterEffect(PropertyGroup):
     )
     edges: EnumProperty(
         name="Clip Ends",
-        description="What a window gets that reaches beyond the ends of the clip, or of the shot",
+        description="What an exposure gets that reaches beyond the ends of the clip, or of the shot",
         items=EDGES,
         update=_changed,
         translation_context=CONTEXT,
     )
     aggregate: EnumProperty(
-        name="Aggregate",
+        name="Matte Resolution",
         description="Pixels that share a shutter (larger blocks are quicker)",
         items=AGGREGATES,
         update=_changed,
     )
     stop_at_cuts: BoolProperty(
         name="Stop at Cuts",
-        description="Windows end at the source's cuts as they do at the clip's ends",
+        description="Exposures end at the source's cuts as they do at the clip's ends",
         default=True,
         update=_changed,
     )
     border: BoolProperty(
-        name="Border",
-        description="Make the picture's edge a scribble of the default shutter",
+        name="Default at Edge",
+        description="Make the picture's edge a scribble of the default shutter, so that a stroke alone acts locally",
         update=_changed,
     )
     edge_aware: FloatProperty(
@@ -544,7 +549,7 @@ class ShutterEffect(PropertyGroup):
     camera: PointerProperty(name="Camera", description="How what the camera sees moves", type=ShutterCamera)
     bars_per_frame: IntProperty(
         name="Bars per Frame",
-        description="How many bars of the window stand for a source frame",
+        description="How many bars stand for a source frame",
         default=1,
         options={"HIDDEN"},
     )

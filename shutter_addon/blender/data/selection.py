@@ -2,7 +2,7 @@
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from .strips import effect_of, effect_strips
+from .strips import SOURCES, effect_of, effect_strips
 
 
 def edit_of(context):
@@ -11,9 +11,13 @@ def edit_of(context):
 
 
 def active_strip(context):
-    """The active strip of the context's edit, or None."""
+    """The active strip of the context's edit, or None; in place of a movie's sound, which is the active one after both
+    were added, the movie."""
     edit = edit_of(context)
-    return edit.sequence_editor.active_strip if edit and edit.sequence_editor else None
+    strip = edit.sequence_editor.active_strip if edit and edit.sequence_editor else None
+    if strip is None or strip.type != "SOUND":
+        return strip
+    return next((other for other in strip.connections if other.type in SOURCES), strip)
 
 
 def active(context):

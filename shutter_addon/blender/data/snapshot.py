@@ -367,7 +367,7 @@ def _keyed_bars(keys, curves: list, at, frames: dict[float, str], thorough: bool
 def check_bar_count(shutter, window: int) -> None:
     """EffectError: a shutter has not as many bars as the window is long."""
     if len(shutter.bars) != window:
-        sentence = rpt_("{place}: {count} bars, the window is {window}")
+        sentence = rpt_("{place}: {count} bars, and {window} frames")
         raise EffectError(sentence.format(place=validation.place(shutter), count=len(shutter.bars), window=window))
 
 

@@ -19,8 +19,8 @@ def summary(weights) -> str:
         return iface_("All bars are zero: the shutter never opens")
     angle, frames = f"{shutters.open_angle(weights):.0f}", f"{light:.3g}"
     if frames == "1":
-        return iface_("{angle}°, 1 frame of light").format(angle=angle)
-    return iface_("{angle}°, {frames} frames of light").format(angle=angle, frames=frames)
+        return iface_("Angle {angle}°, light of 1 frame").format(angle=angle)
+    return iface_("Angle {angle}°, light of {frames} frames").format(angle=angle, frames=frames)
 
 
 def open_for(edit, effect, strip, index: int) -> str | None:

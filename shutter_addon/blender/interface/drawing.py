@@ -15,6 +15,19 @@ def ui_scale() -> float:
     return bpy.context.preferences.system.ui_scale
 
 
+def wrapped(words: str, width: float) -> list[str]:
+    """Words in lines that are no wider, in pixels, as Blender's interface writes them; a word stays whole."""
+    blf.size(0, bpy.context.preferences.ui_styles[0].widget.points * ui_scale())
+    lines = [""]
+    for word in words.split():
+        longer = f"{lines[-1]} {word}".strip()
+        if lines[-1] and blf.dimensions(0, longer)[0] > width:
+            lines.append(word)
+        else:
+            lines[-1] = longer
+    return lines
+
+
 @contextmanager
 def pixel_space(region):
     """Coordinates are the region's pixels, whatever was drawn before: Blender's own state varies in draw handlers."""

@@ -115,7 +115,7 @@ class SHUTTER_OT_ramp_add(_AddsRegion, Operator):
 
 
 class SHUTTER_OT_time_map(_AddsRegion, Operator):
-    """Show every pixel at its own moment of the window: a ramp from its first frame to its last (slit-scan)"""
+    """Show every pixel at its own moment: a ramp from the first of the frames to the last (slit-scan)"""
 
     bl_idname = "shutter.time_map"
     bl_label = "Time Map"

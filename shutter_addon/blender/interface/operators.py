@@ -24,7 +24,7 @@ from ..editing import (
 )
 from ..rendering import matte_export
 from ..rendering.session import FAULTS
-from . import icons, preview_areas
+from . import icons, preview_areas, sharp_frame
 
 UNDOABLE = {"REGISTER", "UNDO"}
 
@@ -116,28 +116,38 @@ class SHUTTER_OT_add_effect(Operator):
 
     @classmethod
     def poll(cls, context):
-        edit, source = selection.edit_of(context), selection.active_strip(context)
-        if edit is None or source is None:
-            return refused(cls, rpt_("Select a movie, image or clip strip"))
-        if not edit.is_editable:
-            return refused(cls, rpt_("The edit is linked from another file"))
-        if source.type not in strips.SOURCES:
-            return refused(cls, rpt_("The active strip is not a movie, image or clip strip"))
-        return True
+        return takes_effect(cls, context)
 
     def execute(self, context):
-        edit, source = selection.edit_of(context), selection.active_strip(context)
-        try:
-            strip, effect = add_effect.add_effect(edit, source)
-        except FAULTS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        shutter_edits.start(effect)
-        selection.choose(edit, strip)
-        if not bpy.app.background:
-            show_panel(context)
-        redraw(context)
-        return {"FINISHED"}
+        return {"FINISHED"} if effect_added(self, context) else {"CANCELLED"}
+
+
+def takes_effect(cls, context) -> bool:
+    """For poll(): whether the active strip can be given an effect."""
+    edit, source = selection.edit_of(context), selection.active_strip(context)
+    if edit is None or source is None:
+        return refused(cls, rpt_("Select a movie, image or clip strip"))
+    if not edit.is_editable:
+        return refused(cls, rpt_("The edit is linked from another file"))
+    if source.type not in strips.SOURCES:
+        return refused(cls, rpt_("The active strip is not a movie, image or clip strip"))
+    return True
+
+
+def effect_added(operator, context) -> bool:
+    """Gives the active strip an effect, and shows it; the operator says why it cannot be."""
+    edit, source = selection.edit_of(context), selection.active_strip(context)
+    try:
+        strip, effect = add_effect.add_effect(edit, source)
+    except FAULTS as error:
+        operator.report({"ERROR"}, str(error))
+        return False
+    shutter_edits.start(effect)
+    selection.choose(edit, strip)
+    if not bpy.app.background:
+        show_panel(context)
+    redraw(context)
+    return True
 
 
 class SHUTTER_OT_match_source(_OfEffect, Operator):
@@ -358,7 +368,7 @@ class SHUTTER_OT_bar_set(_OfShutter, Operator):
 
 
 class SHUTTER_OT_draw(_OfShutter, Operator):
-    """Scribble in the preview where the active shutter holds (at another frame, this redraws the active region)"""
+    """Draw on the sharp frame where the active shutter holds (at another frame, this redraws the active region)"""
 
     bl_idname = "shutter.draw"
     bl_label = "Draw"
@@ -379,19 +389,31 @@ class SHUTTER_OT_draw(_OfShutter, Operator):
     )
 
     @classmethod
+    def poll(cls, context):
+        if selection.active(context) is None:  # it makes the effect
+            return takes_effect(cls, context)
+        return super().poll(context)
+
+    @classmethod
     def possible(cls, effect):
         if not super().possible(effect):
             return False
         return selection.active_region(effect) is not None or has_room(cls, effect, "regions")
+
+    def execute(self, context):
+        if selection.active(context) is None and not effect_added(self, context):
+            return {"CANCELLED"}
+        return super().execute(context)
 
     def change(self, context, effect):
         region = selection.active_region(effect)
         if self.new or region is None or region.kind in strips.MATTES:
             if sentence := collection_edits.why_full(effect, "regions"):  # poll() does not know what `new` is
                 raise validation.EffectError(sentence)
-            region = region_edits.add_region(effect, selection.active_shutter(effect), self.kind)
+            region = region_edits.first_drawn(effect, selection.active_shutter(effect), self.kind)
         if not drawing_tool(context, effect, region, "builtin.annotate"):
             self.report({"INFO"}, "Open a sequencer with a preview to draw")
+        sharp_frame.show(context)
 
 
 class SHUTTER_OT_erase(_OfStrokes, Operator):

@@ -15,10 +15,30 @@ from ..data.properties import CONTEXT
 from ..editing import bar_edits, follow_track, match_source, track_region
 from ..rendering import devices, inbetween_build, matte_look, session
 from ..rendering.session import FAULTS
-from . import inbetween_operators, track_operators
+from . import drawing, inbetween_operators, track_operators
 
+# Units of the interface beside a sentence in a panel: margins and the tabs of a sidebar; its icon.
+_MARGIN, _ICON = 64, 20
+_MOST_ROWS = 5  # of a list; the rest is scrolled to
 # Beyond this a column of numbers helps nobody: the bar editor and the Graph Editor do.
 _MOST_NUMBERS = 64
+
+
+def _sentence(layout, words: str, icon: str = "NONE", room: float = 1.0, is_quiet: bool = False) -> None:
+    """A sentence, already translated, in as many lines as the panel's width takes; room: its share of that width."""
+    unit, region = drawing.ui_scale(), bpy.context.region
+    width = room * (region.width if region else 300 * unit) - (_MARGIN + (_ICON if icon != "NONE" else 0)) * unit
+    column = layout.column(align=True)
+    column.active = not is_quiet
+    for i, line in enumerate(drawing.wrapped(words, width)):
+        row = column.row()
+        row.scale_y = 0.8 if i else 1.0
+        row.label(text=line, icon=icon if i == 0 or icon == "NONE" else "BLANK1", translate=False)
+
+
+def _rows(items) -> int:
+    """Of a list of so many."""
+    return min(max(len(items), 1), _MOST_ROWS)
 
 
 class SHUTTER_UL_shutters(UIList):
@@ -62,8 +82,6 @@ class SHUTTER_MT_presets(Menu):
 
     def draw(self, _context):
         self.layout.operator_enum("shutter.preset", "preset")
-        self.layout.separator()
-        self.layout.operator("shutter.tripod", icon="CON_CAMERASOLVER")
 
 
 class SHUTTER_MT_regions(Menu):
@@ -90,13 +108,18 @@ class SHUTTER_MT_shutters(Menu):
     def draw(self, _context):
         layout = self.layout
         layout.operator("shutter.shutter_duplicate", icon="DUPLICATE")
+        layout.operator("shutter.shutter_move", text="Move Up", icon="TRIA_UP").direction = "UP"
+        layout.operator("shutter.shutter_move", text="Move Down", icon="TRIA_DOWN").direction = "DOWN"
         layout.separator()
         layout.operator("shutter.recipe_import", icon="IMPORT")
         layout.operator("shutter.recipe_export", icon="EXPORT")
 
 
-def _list_buttons(layout, kind: str, menu: str | None = None):
-    column = layout.column(align=True)
+def _draw_list(layout, effect, kind: str, items, menu: str | None = None) -> None:
+    """The list of shutters or regions, as high as it has to be, and the buttons beside it."""
+    row = layout.row()
+    row.template_list(f"SHUTTER_UL_{kind}s", "", effect, f"{kind}s", effect, f"active_{kind}", rows=_rows(items))
+    column = row.column(align=True)
     if kind == "shutter":
         column.operator("shutter.shutter_add", text="", icon="ADD")
     else:
@@ -104,32 +127,32 @@ def _list_buttons(layout, kind: str, menu: str | None = None):
     column.operator(f"shutter.{kind}_remove", text="", icon="REMOVE")
     if menu:
         column.menu(menu, text="", icon="DOWNARROW_HLT")
-    column.separator()
-    column.operator(f"shutter.{kind}_move", text="", icon="TRIA_UP").direction = "UP"
-    column.operator(f"shutter.{kind}_move", text="", icon="TRIA_DOWN").direction = "DOWN"
-    return column
+    elif len(items) > 1:
+        column.operator(f"shutter.{kind}_move", text="", icon="TRIA_UP").direction = "UP"
+        column.operator(f"shutter.{kind}_move", text="", icon="TRIA_DOWN").direction = "DOWN"
 
 
 class _Shutters:
+    """What an editor needs first, from the top down: it shows without scrolling in Blender's own layout."""
+
     bl_label = "Shutter"
 
     def draw(self, context):
         layout = self.layout
         found = selection.active(context)
         if found is None:
+            layout.operator("shutter.draw", icon="GREASEPENCIL")
             layout.operator("shutter.add_effect", icon="ADD")
             return
         effect = found[1]
         if selection.in_picture(context) is None:
-            layout.label(text=selection.why_unseen(found[0], found[2]), icon="INFO", translate=False)
+            _sentence(layout, selection.why_unseen(found[0], found[2]), "INFO")
         _draw_live(layout, context)
+        _draw_list(layout, effect, "shutter", effect.shutters, "SHUTTER_MT_shutters")
+        _draw_tools(layout, effect)
         _draw_source(layout, effect)
         inbetween_operators.draw_strobing(layout, effect)
-        row = layout.row()
-        row.template_list("SHUTTER_UL_shutters", "", effect, "shutters", effect, "active_shutter", rows=4)
-        _list_buttons(row, "shutter", "SHUTTER_MT_shutters")
-        shutter = selection.active_shutter(effect)
-        if shutter is None:
+        if (shutter := selection.active_shutter(effect)) is None:
             return
         row = layout.row(align=True)
         row.menu("SHUTTER_MT_presets", icon="PRESET")
@@ -137,33 +160,43 @@ class _Shutters:
         row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
         layout.use_property_split = True
         layout.prop(effect, "window")
-        _draw_follow(layout, effect, shutter)
-        try:
-            bars = bar_edits.shown(effect, effect.active_shutter).bars
-        except validation.EffectError as error:
-            layout.label(text=str(error), icon="ERROR", translate=False)
-            return
-        row = layout.row()
-        row.active = not bars.any()
-        row.label(text=bar_edits.summary(bars), icon="NONE" if bars.any() else "ERROR", translate=False)
-        if words := bar_edits.open_for(*found, effect.active_shutter):
-            row = layout.row()
-            row.active = False
-            row.label(text=words, translate=False)
+        if selection.active_region(effect) is not None:
+            _draw_tracked(layout, effect, effect.active_region)
+        if shutter.follow == "CAMERA":
+            _draw_tracked(layout, effect, None)
+        _draw_bars(layout, found)
 
 
-def _draw_follow(layout, effect, shutter) -> None:
-    """What the exposure moves with, and what says how long it is."""
-    layout.prop(shutter, "follow")
-    if shutter.follow == "REGION":
-        layout.prop_search(shutter, "follow_region", effect, "regions", text="Region")
-    if shutter.follow != "NOTHING":
-        layout.prop(shutter, "length")
-        if shutter.length == "MOTION":
-            layout.prop(shutter, "trail")
-        _draw_followed_motion(layout, shutter)
-    if shutter.follow == "CAMERA":
-        _draw_tracking(layout, effect, None)
+def _draw_tools(layout, effect) -> None:
+    """What is done with the picture, and whose the active region is."""
+    row = layout.row(align=True)
+    row.operator("shutter.draw", icon="GREASEPENCIL")
+    row.operator("shutter.erase")
+    row.menu("SHUTTER_MT_regions", text="", icon="DOWNARROW_HLT")
+    _draw_tracking(layout, effect.active_region)
+    row = layout.row(align=True)
+    row.operator("shutter.panning_shot", icon="CON_FOLLOWTRACK")
+    row.operator("shutter.tripod", icon="CON_CAMERASOLVER")
+    if (region := selection.active_region(effect)) is not None:
+        row = layout.split(factor=0.4)
+        label = row.row()
+        label.alignment = "RIGHT"
+        label.label(text="Shutter")
+        row.operator_menu_enum("shutter.region_assign", "shutter", text=region.shutter, translate=False)
+
+
+def _draw_bars(layout, found) -> None:
+    """What the active shutter's bars come to."""
+    effect = found[1]
+    try:
+        bars = bar_edits.shown(effect, effect.active_shutter).bars
+    except validation.EffectError as error:
+        _sentence(layout, str(error), "ERROR")
+        return
+    is_open = bars.any()
+    _sentence(layout, bar_edits.summary(bars), "NONE" if is_open else "ERROR", is_quiet=is_open)
+    if words := bar_edits.open_for(*found, effect.active_shutter):
+        _sentence(layout, words, is_quiet=True)
 
 
 def _draw_followed_motion(layout, shutter) -> None:
@@ -191,17 +224,15 @@ def _draw_source(layout, effect):
     if shown.differences:
         what = ", ".join(iface_(word) for word in shown.differences)
         column = layout.column(align=True)
-        text = iface_("Differs from its source: {what}").format(what=what)
-        column.label(text=text, icon="INFO", translate=False)
+        _sentence(column, iface_("Differs from its source: {what}").format(what=what), "INFO")
         column.operator("shutter.match_source")
     if shown.lacks_modifiers:
         column = layout.column(align=True)
-        column.label(text="Modifiers of the source do not reach the effect", icon="INFO")
+        _sentence(column, iface_("Modifiers of the source do not reach the effect"), "INFO")
         column.operator("shutter.copy_modifiers")
     if shown.has_effects:
-        column = layout.column(align=True)
-        column.label(text="Effect strips on the source do not reach the effect", icon="INFO")
-        column.label(text="Make the Shutter strip their input", icon="BLANK1")
+        words = iface_("Effect strips on the source do not reach the effect: make the Shutter strip their input")
+        _sentence(layout, words, "INFO")
 
 
 class _WithEffect:
@@ -210,35 +241,47 @@ class _WithEffect:
         return super().poll(context) and selection.active(context) is not None
 
 
+class _Move(_WithEffect):
+    """What the exposure moves with, and what says how long it is."""
+
+    bl_label = "Move With"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout, effect = self.layout, selection.active(context)[1]
+        if (shutter := selection.active_shutter(effect)) is None:
+            return
+        layout.use_property_split = True
+        layout.prop(shutter, "follow")
+        if shutter.follow == "REGION":
+            layout.prop_search(shutter, "follow_region", effect, "regions", text="Region")
+        if shutter.follow != "NOTHING":
+            layout.prop(shutter, "length")
+            if shutter.length == "MOTION":
+                layout.prop(shutter, "trail")
+            _draw_followed_motion(layout, shutter)
+        if shutter.follow == "CAMERA":
+            _draw_tracking(layout, None)
+
+
 class _Regions(_WithEffect):
     bl_label = "Regions"
 
     def draw(self, context):
         layout = self.layout
         edit, effect, strip = selection.active(context)
-        row = layout.row()
-        row.template_list("SHUTTER_UL_regions", "", effect, "regions", effect, "active_region", rows=3)
-        _list_buttons(row, "region")
-        row = layout.row(align=True)
-        row.operator("shutter.draw", icon="GREASEPENCIL")
-        row.operator("shutter.erase")
-        row.menu("SHUTTER_MT_regions", text="", icon="DOWNARROW_HLT")
+        shutter = selection.active_shutter(effect)
+        own = [region for region in effect.regions if shutter and region.shutter == shutter.name]
+        _draw_list(layout, effect, "region", own)
         layout.use_property_split = True
         layout.prop(effect, "edge_aware")
         region = selection.active_region(effect)
         if region is None:
             return
-        has_strokes = region.kind not in strips.MATTES
-        if has_strokes:
-            _draw_tracking(layout, effect, effect.active_region)
-        row = layout.split(factor=0.4)
-        row.alignment = "RIGHT"
-        row.label(text="Shutter")
-        row.operator_menu_enum("shutter.region_assign", "shutter", text=region.shutter, translate=False)
         try:
             validation.check_region(region)
         except validation.EffectError as error:
-            layout.label(text=str(error), icon="ERROR", translate=False)
+            _sentence(layout, str(error), "ERROR")
         layout.prop(region, "kind")
         if region.kind == "LINE":
             layout.prop(region, "width")
@@ -246,15 +289,10 @@ class _Regions(_WithEffect):
             layout.prop(region, "ramp")
         elif region.kind == "MATTE":
             _draw_matte(layout, matte_look.look(edit, effect, strip, region), region)
-        if has_strokes:
+        if region.kind not in strips.MATTES:
             layout.prop(region, "opacity")
         else:
             _draw_blend(layout, region)
-        column = layout.column(align=True)
-        column.prop(region, "location")
-        column.prop(region, "rotation")
-        column.prop(region, "scale")
-        layout.operator("shutter.region_key", text="Insert Keyframes", icon="KEY_HLT")
 
 
 def _draw_matte(layout, look, region) -> None:
@@ -276,7 +314,7 @@ def _draw_matte(layout, look, region) -> None:
             layout.prop(region, "channel_name", text="Name")
     for text, icon in ((look.fault, "ERROR"), (look.text, "NONE"), (look.note, "INFO")):
         if text:
-            layout.label(text=text, icon=icon, translate=False)
+            _sentence(layout, text, icon)
 
 
 def _draw_blend(layout, region) -> None:
@@ -285,32 +323,34 @@ def _draw_blend(layout, region) -> None:
         layout.prop(region, name)
 
 
-def _draw_tracking(layout, effect, index: int | None) -> None:
-    """Of a region or the camera (selection.moving) the buttons; how sure tracking was of the current frame, and where
-    it stopped."""
-    track = "shutter.track_camera" if index is None else "shutter.track"
+def _draw_tracking(layout, index: int | None) -> None:
+    """The buttons that track a region or the camera (selection.moving)."""
     row = layout.row(align=True)
+    track = "shutter.track_camera" if index is None else "shutter.track"
     for direction, _name, _description, icon, _number in track_operators.DIRECTIONS:
         button = row.operator(
             track, text=("Track Camera" if index is None else "Track") if direction == "BOTH" else "", icon=icon
         )
         button.direction = direction
-    if index is not None:
-        layout.operator("shutter.panning_shot", icon="CON_FOLLOWTRACK")
+
+
+def _draw_tracked(layout, effect, index: int | None) -> None:
+    """How sure tracking of a region or the camera was of the current frame, and where it stopped."""
+    look = "shutter.track_camera_look" if index is None else "shutter.track_look"
     confidence = track_region.confidence_at(effect, index, effect.id_data.frame_current)
     if confidence is not None:
-        row = layout.row(align=True)
+        column = layout.column(align=True)
         text = iface_("Confidence: {percent} %").format(percent=f"{100 * confidence:.0f}")
-        row.label(text=text, icon="CHECKMARK" if confidence >= SURE else "ERROR", translate=False)
-        row.operator(f"{track}_look")
+        column.label(text=text, icon="CHECKMARK" if confidence >= SURE else "ERROR", translate=False)
+        column.operator(look)
     if index is None:  # a region's gaps go from its stops on
         _draw_gaps(layout, effect, index)
     for frame, reason, is_fault in track_region.stops(effect, index):
         row = layout.row(align=True)
-        row.label(text=reason, icon="ERROR" if is_fault else "INFO", translate=False)
+        _sentence(row, reason, "ERROR" if is_fault else "INFO", room=0.85)
         place = row.row()
         place.ui_units_x = 2.5
-        place.operator(f"{track}_look", text=str(frame), translate=False).frame = frame
+        place.operator(look, text=str(frame), translate=False).frame = frame
 
 
 def _draw_gaps(layout, effect, index: int | None) -> None:
@@ -322,7 +362,7 @@ def _draw_gaps(layout, effect, index: int | None) -> None:
             text = iface_("Not tracked: up to frame {last}")
         else:
             text = iface_("Not tracked: frames {first} to {last}")
-        layout.label(text=text.format(first=gap.first, last=gap.last), icon="INFO", translate=False)
+        _sentence(layout, text.format(first=gap.first, last=gap.last), "INFO")
 
 
 def _active_region(context):
@@ -333,6 +373,20 @@ class _WithRegion(_WithEffect):
     @classmethod
     def poll(cls, context):
         return super().poll(context) and _active_region(context) is not None
+
+
+class _Transform(_WithRegion):
+    bl_label = "Transform"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        region = _active_region(context)
+        column = layout.column(align=True)
+        for name in ("location", "rotation", "scale"):
+            column.prop(region, name)
+        layout.operator("shutter.region_key", text="Insert Keyframes", icon="KEY_HLT")
 
 
 class _Track(_WithRegion):
@@ -356,7 +410,7 @@ def _draw_track_options(layout, moving) -> None:
 
 
 class _Follow(_WithRegion):
-    bl_label = "Follow"
+    bl_label = "Follow Track"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
@@ -368,7 +422,7 @@ class _Follow(_WithRegion):
         if region.follow_clip is not None:
             _draw_tracks(layout, region, region.follow_clip.tracking)
         if follow_track.is_changed(region):
-            layout.label(text="The track has changed", icon="ERROR")
+            _sentence(layout, iface_("The track has changed"), "ERROR")
         row = layout.row(align=True)
         row.operator("shutter.follow", icon="TRACKER")
         row.operator("shutter.follow_update", icon="FILE_REFRESH")
@@ -425,7 +479,7 @@ class _Bars(_WithEffect):
             column.prop(bar, "weight", text=label.format(number=k + 1), translate=False, slider=True)
         if len(shutter.bars) > _MOST_NUMBERS:
             more = iface_("and {count} more, in the bar editor").format(count=len(shutter.bars) - _MOST_NUMBERS)
-            column.label(text=more, translate=False)
+            _sentence(column, more)
 
 
 class _Options(_WithEffect):
@@ -441,13 +495,13 @@ class _Options(_WithEffect):
         package = effect.stop_at_cuts and cuts.missing_package()
         if package:
             text = iface_("Cuts are not found: the Python package {package} is missing").format(package=package)
-            layout.label(text=text, translate=False, icon="ERROR")
+            _sentence(layout, text, "ERROR")
         layout.prop(effect, "use_source_time")
         column = layout.column()
         column.active = effect.use_source_time
         column.prop(effect, "source_time")
         if effect.use_source_time and effect.inbetween == "1":
-            column.label(text="No in-between frames: the nearest source frame is shown", icon="INFO")
+            _sentence(column, iface_("No in-between frames: the nearest source frame is shown"), "INFO")
         _draw_devices(layout)
 
 
@@ -464,10 +518,10 @@ def _draw_devices(layout):
     try:
         preview, render = session.device_names()
     except NoDeviceError as error:
-        column.label(text=str(error), icon="ERROR", translate=False)
+        _sentence(column, str(error), "ERROR")
         return
     for text, device in ((iface_("Preview: {device}"), preview), (iface_("Renders: {device}"), render)):
-        column.label(text=text.format(device=device), translate=False)
+        _sentence(column, text.format(device=device))
 
 
 def _ask_for_opengl() -> None:
@@ -500,7 +554,7 @@ class _Inbetween(_WithEffect):
             try:
                 _draw_look(layout, inbetween_build.look(edit, effect, strip))
             except FAULTS as error:
-                layout.label(text=str(error), icon="ERROR", translate=False)
+                _sentence(layout, str(error), "ERROR")
         row = layout.row(align=True)
         row.operator("shutter.inbetween_build", text="Build")
         row.operator("shutter.inbetween_purge", text="Remove")
@@ -519,7 +573,7 @@ def _draw_look(layout, look) -> None:
     words, icon = _STATES[look.state.name]
     words = iface_(words).format(done=look.state.done, total=look.state.total)
     column = layout.column(align=True)
-    column.label(text=words, icon=icon, translate=False)
+    _sentence(column, words, icon)
     if look.size:
         size = inbetween_operators.size_in_words(look.size)
         column.label(text=iface_("{size} on disk").format(size=size), icon="DISK_DRIVE", translate=False)
@@ -565,16 +619,24 @@ class STRIP_PT_shutter(_Shutters, _InProperties, Panel):
     pass
 
 
+class STRIP_PT_shutter_move(_Move, _InProperties, Panel):
+    bl_parent_id = "STRIP_PT_shutter"
+
+
 class STRIP_PT_shutter_regions(_Regions, _InProperties, Panel):
     bl_parent_id = "STRIP_PT_shutter"
 
 
+class STRIP_PT_shutter_transform(_Transform, _InProperties, Panel):
+    bl_parent_id = "STRIP_PT_shutter_regions"
+
+
 class STRIP_PT_shutter_track(_Track, _InProperties, Panel):
-    bl_parent_id = "STRIP_PT_shutter"
+    bl_parent_id = "STRIP_PT_shutter_regions"
 
 
 class STRIP_PT_shutter_follow(_Follow, _InProperties, Panel):
-    bl_parent_id = "STRIP_PT_shutter"
+    bl_parent_id = "STRIP_PT_shutter_regions"
 
 
 class STRIP_PT_shutter_camera(_Camera, _InProperties, Panel):
@@ -597,16 +659,24 @@ class SEQUENCER_PT_shutter(_Shutters, _InSidebar, Panel):
     pass
 
 
+class SEQUENCER_PT_shutter_move(_Move, _InSidebar, Panel):
+    bl_parent_id = "SEQUENCER_PT_shutter"
+
+
 class SEQUENCER_PT_shutter_regions(_Regions, _InSidebar, Panel):
     bl_parent_id = "SEQUENCER_PT_shutter"
 
 
+class SEQUENCER_PT_shutter_transform(_Transform, _InSidebar, Panel):
+    bl_parent_id = "SEQUENCER_PT_shutter_regions"
+
+
 class SEQUENCER_PT_shutter_track(_Track, _InSidebar, Panel):
-    bl_parent_id = "SEQUENCER_PT_shutter"
+    bl_parent_id = "SEQUENCER_PT_shutter_regions"
 
 
 class SEQUENCER_PT_shutter_follow(_Follow, _InSidebar, Panel):
-    bl_parent_id = "SEQUENCER_PT_shutter"
+    bl_parent_id = "SEQUENCER_PT_shutter_regions"
 
 
 class SEQUENCER_PT_shutter_camera(_Camera, _InSidebar, Panel):
@@ -634,6 +704,7 @@ def _strip_entry(self, context):
     strip = selection.active_strip(context)
     if strip is not None and strip.type in strips.SOURCES:
         self.layout.separator()
+        self.layout.operator("shutter.draw", text="Draw Shutter", icon="GREASEPENCIL")
         self.layout.operator("shutter.add_effect")
 
 
@@ -650,7 +721,9 @@ classes = (
     SHUTTER_MT_regions,
     SHUTTER_MT_shutters,
     STRIP_PT_shutter,
+    STRIP_PT_shutter_move,
     STRIP_PT_shutter_regions,
+    STRIP_PT_shutter_transform,
     STRIP_PT_shutter_track,
     STRIP_PT_shutter_follow,
     STRIP_PT_shutter_camera,
@@ -658,7 +731,9 @@ classes = (
     STRIP_PT_shutter_options,
     STRIP_PT_shutter_inbetween,
     SEQUENCER_PT_shutter,
+    SEQUENCER_PT_shutter_move,
     SEQUENCER_PT_shutter_regions,
+    SEQUENCER_PT_shutter_transform,
     SEQUENCER_PT_shutter_track,
     SEQUENCER_PT_shutter_follow,
     SEQUENCER_PT_shutter_camera,

@@ -22,7 +22,7 @@ from ..data.properties import CONTEXT
 from ..editing import shown_annotations
 from ..rendering import blender_gpu, inbetween_build, invalidation, render_job, session, strobing
 from ..rendering.blender_gpu import Texture
-from . import drawing, inbetween_operators, note_buttons, preview_areas, previewing
+from . import drawing, inbetween_operators, note_buttons, preview_areas, previewing, sharp_frame
 from .note_buttons import Button
 from .previewing import RESULTS, Shown, shown
 
@@ -30,13 +30,18 @@ VIEWS = (
     ("RESULT", "Result", "The finished picture"),
     ("SPLIT", "Split", "The source on the left of the handle, the result on its right"),
     ("SCRIBBLES", "Scribbles", "The source, and where each shutter is scribbled"),
-    ("COEFFICIENTS", "Coefficients", "How much of each shutter a pixel gets, in the shutters' colors"),
+    ("COEFFICIENTS", "Mattes", "How much of each shutter a pixel gets, in the shutters' colors"),
 )
 
 
 def redraw(_settings, _context) -> None:
     """Draws all previews again: for what is called at changes of properties."""
     preview_areas.redraw(bpy.context)
+
+
+def _view_chosen(settings, context) -> None:
+    sharp_frame.give_back(context)
+    redraw(settings, context)
 
 
 def _redraw_once() -> None:
@@ -65,13 +70,16 @@ class ShutterPreview(PropertyGroup):
     """How the live preview looks: of the window manager, neither saved nor undone."""
 
     live: BoolProperty(
-        name="Live", description="Show scribbles and views of the effect in the preview", default=True, update=redraw
+        name="Live",
+        description="Show scribbles and views of the effect in the preview",
+        default=True,
+        update=_view_chosen,
     )
     view: EnumProperty(
         name="View",
         description="What the live preview shows",
         items=VIEWS,
-        update=redraw,
+        update=_view_chosen,
         translation_context=CONTEXT,
     )
     split: FloatProperty(
@@ -85,7 +93,7 @@ class ShutterPreview(PropertyGroup):
     )
     probe: BoolProperty(
         name="Probe",
-        description="Show the shutter and the coefficients of the pixel that the pointer was over last",
+        description="Show the shutter of the pixel that the pointer was over last, and how much of each it gets",
         update=redraw,
     )
     probe_at: FloatVectorProperty(
@@ -105,13 +113,16 @@ def _draw() -> None:
     note_buttons.clear(context.region)
     if bpy.app.is_job_running("RENDER") or render_job.ends_films():
         return
+    sharp_frame.follow_pen(context)
     invalidation.drop_lesser()
     # Blender tells nobody of strokes that are drawn or erased, but it draws the preview again.
     edit = selection.edit_of(context)
     if edit is not None and edit.library is None and invalidation.invalidate_changed(edit):
         bpy.app.timers.register(_redraw_once)  # what is tagged while it is drawn is not drawn again
+    if sharp_frame.is_shown(context.space_data):
+        _tell_sharp(context.region)
     # A stroke that is being drawn would lie below our picture: Blender's own shows the same.
-    if any(op.bl_idname == "GPENCIL_OT_annotate" for op in context.window.modal_operators):
+    if any(op.bl_idname == sharp_frame.PEN for op in context.window.modal_operators):
         return
     if shown_annotations.is_other(context.space_data, selection.seen(edit)):
         bpy.app.timers.register(_follow_once)  # nothing may be changed while it is drawn
@@ -269,6 +280,13 @@ def _measure() -> float | None:
     if strobing.advance():
         redraw(None, bpy.context)
     return inbetween_operators.TICK if strobing.is_busy() else None
+
+
+def _tell_sharp(region) -> None:
+    say = _Notes(region)
+    say(rpt_("The sharp frame, to draw on: the result comes with the stroke"))
+    with drawing.pixel_space(region):
+        say.draw()
 
 
 def _tell_missing(request, say) -> None:

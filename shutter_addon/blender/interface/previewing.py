@@ -15,10 +15,10 @@ from ...media.reduced import DIVISORS
 from ..data import annotations, geometry, selection, strip_proxies, strips
 from ..data.snapshot import Snapshot
 from ..rendering import engine, render_job, session
-from . import preview_areas
+from . import preview_areas, sharp_frame
 
-# Operators that read the sequencer's pictures, from the window; while an annotation is drawn, Blender shows it alone.
-_READERS, _PEN = {"RENDER_OT_opengl", "SEQUENCER_OT_sample"}, "GPENCIL_OT_annotate"
+# Operators that read the sequencer's pictures, from the window.
+_READERS = {"RENDER_OT_opengl", "SEQUENCER_OT_sample"}
 # Operators by which one picture comes after another, as where it plays: drafts, so that a key need not wait.
 _GOING = {"ANIM_OT_change_frame", "SHUTTER_OT_track", "SHUTTER_OT_track_camera"}
 _GOING |= {"SHUTTER_OT_panning_shot", "SHUTTER_OT_tripod"}
@@ -148,7 +148,7 @@ def is_drawn(context, found: Shown, request: session.FrameRequest) -> bool:
         and not edit.render.use_multiview
         and not edit.sequence_editor.show_overlay_frame
         and all(_has(area.spaces.active, _PLAIN_SPACE) for area in _areas_of(context, edit))
-        and _PEN not in render_job.operators_running()
+        and sharp_frame.PEN not in render_job.operators_running()
     )
 
 

@@ -282,7 +282,7 @@ class SHUTTER_OT_follow(_Follows, _OfStrokes, Operator):
     """Key the active region by a track of a movie clip, from where the region is at this frame"""
 
     bl_idname = "shutter.follow"
-    bl_label = "Follow"
+    bl_label = "Follow Track"
 
     def key(self, edit, effect, strip):
         follow_track.follow(edit, effect, strip, effect.active_region)

@@ -54,7 +54,7 @@ _said: set[str] = set()  # what is said once
 class _Work(NamedTuple):
     """What a session's device does.
 
-    future: its result to come; ended: set, it ends before its next step; relayed: its GPU calls are the main thread's"""
+    future: its result to come; ended: set, it ends before its next step; relayed: the main thread has its GPU"""
 
     future: Future
     ended: threading.Event

@@ -1,6 +1,6 @@
 """German, in the terms of Blender's own: strip "Streifen", keyframe "Schlüsselbild", sequencer "Sequenzer".
 
-Ours: shutter "Verschluss", bar "Balken", window "Zeitfenster", region "Region", scribble "Markierung", recipe "Rezept",
+Ours: shutter "Verschluss", bar "Balken", region "Region", scribble "Markierung", recipe "Rezept",
 matte "Matte" (Blender's "Maske" is a mask), ramp "Verlauf", time map "Zeitkarte", feather "Weiche Kante".
 """
 
@@ -10,6 +10,7 @@ MESSAGES = {
     ("*", "Shutter"): "Verschluss",
     ("*", "Regions"): "Regionen",
     ("*", "Bars"): "Balken",
+    ("*", "Transform"): "Transformation",
     ("*", "Options"): "Optionen",
     ("*", "Presets"): "Voreinstellungen",
     ("*", "Shutter Specials"): "Verschluss-Spezialmenü",
@@ -21,8 +22,8 @@ MESSAGES = {
     ("*", "default"): "Standard",
     ("*", "Frame {number}"): "Bild {number}",
     ("*", "and {count} more, in the bar editor"): "und {count} weitere, im Balkeneditor",
-    ("*", "{angle}°, 1 frame of light"): "{angle}°, Licht von 1 Bild",
-    ("*", "{angle}°, {frames} frames of light"): "{angle}°, Licht von {frames} Bildern",
+    ("*", "Angle {angle}°, light of 1 frame"): "Winkel {angle}°, Licht von 1 Bild",
+    ("*", "Angle {angle}°, light of {frames} frames"): "Winkel {angle}°, Licht von {frames} Bildern",
     ("*", "Open for {frames} of {window} frames here"): "Hier {frames} von {window} Bildern lang offen",
     ("*", "All bars are zero: the shutter never opens"): "Alle Balken sind null: Der Verschluss öffnet nie",
     # Names of what is new
@@ -104,7 +105,7 @@ MESSAGES = {
         "*",
         "{place}: {property} has a keyframe at frame {frame}, not {low} to {high}",
     ): "{place}: {property} hat ein Schlüsselbild bei Bild {frame}, nicht {low} bis {high}",
-    ("*", "{place}: {count} bars, the window is {window}"): "{place}: {count} Balken, das Zeitfenster ist {window}",
+    ("*", "{place}: {count} bars, and {window} frames"): "{place}: {count} Balken und {window} Bilder",
     (
         "*",
         "{place}: {count} shutters, {most} are the most",
@@ -192,9 +193,8 @@ MESSAGES = {
     ): "Der Verschlussstreifen hat die Modifikatoren seiner Quelle",
     (
         "*",
-        "Effect strips on the source do not reach the effect",
-    ): "Effektstreifen auf der Quelle erreichen den Effekt nicht",
-    ("*", "Make the Shutter strip their input"): "Den Verschlussstreifen zu ihrer Eingabe machen",
+        "Effect strips on the source do not reach the effect: make the Shutter strip their input",
+    ): "Effektstreifen auf der Quelle erreichen den Effekt nicht: den Verschlussstreifen zu ihrer Eingabe machen",
     # Shutters
     ("Operator", "Add Shutter"): "Verschluss hinzufügen",
     ("*", "Add a shutter that is fully open"): "Einen Verschluss hinzufügen, der ganz offen ist",
@@ -207,6 +207,8 @@ MESSAGES = {
     ("*", "Remove the active shutter and its regions"): "Den aktiven Verschluss und seine Regionen entfernen",
     ("*", "The last shutter of an effect cannot be removed"): "Der letzte Verschluss eines Effekts bleibt",
     ("Operator", "Move Shutter"): "Verschluss verschieben",
+    ("Operator", "Move Up"): "Nach oben",
+    ("Operator", "Move Down"): "Nach unten",
     (
         "*",
         "Move the active shutter in the list (the first one is the default, which holds where nothing is scribbled)",
@@ -219,8 +221,8 @@ MESSAGES = {
     ("*", "Color"): "Farbe",
     (
         "*",
-        "Color of the shutter's bars, scribbles and coefficients",
-    ): "Farbe der Balken, Markierungen und Koeffizienten des Verschlusses",
+        "Color of the shutter's bars, scribbles and matte",
+    ): "Farbe der Balken, Markierungen und Matte des Verschlusses",
     ("*", "The effect has no shutter: add one"): "Der Effekt hat keinen Verschluss: einen hinzufügen",
     ("*", 'shutter "{name}" at frame {frame}: {fault}'): "Verschluss „{name}“ bei Bild {frame}: {fault}",
     ("*", "all bars are zero: the shutter never opens"): "alle Balken sind null, der Verschluss öffnet nie",
@@ -241,18 +243,18 @@ MESSAGES = {
     ("Virtual Shutter", "Still Frame"): "Standbild",
     ("*", "One sharp frame"): "Ein scharfes Bild",
     ("Virtual Shutter", "45°"): "45°",
-    ("*", "Open for an eighth of the window"): "Ein Achtel des Zeitfensters lang offen",
+    ("*", "Open for an eighth of the frames"): "Ein Achtel der Bilder lang offen",
     ("Virtual Shutter", "90°"): "90°",
-    ("*", "Open for a quarter of the window"): "Ein Viertel des Zeitfensters lang offen",
+    ("*", "Open for a quarter of the frames"): "Ein Viertel der Bilder lang offen",
     ("Virtual Shutter", "180°"): "180°",
     (
         "*",
-        "Open for half of the window, as film cameras are",
-    ): "Die Hälfte des Zeitfensters lang offen, wie bei Filmkameras",
+        "Open for half of the frames, as film cameras are",
+    ): "Die Hälfte der Bilder lang offen, wie bei Filmkameras",
     ("Virtual Shutter", "270°"): "270°",
-    ("*", "Open for three quarters of the window"): "Drei Viertel des Zeitfensters lang offen",
+    ("*", "Open for three quarters of the frames"): "Drei Viertel der Bilder lang offen",
     ("Virtual Shutter", "360°"): "360°",
-    ("*", "Open for the whole window"): "Das ganze Zeitfenster lang offen",
+    ("*", "Open for all frames"): "Alle Bilder lang offen",
     ("Virtual Shutter", "Two Cuts"): "Zwei Schlitze",
     ("*", "Two frames on top of each other"): "Zwei Bilder übereinander",
     ("Virtual Shutter", "Four Cuts"): "Vier Schlitze",
@@ -260,28 +262,28 @@ MESSAGES = {
     ("Virtual Shutter", "Ramp Up"): "Rampe aufwärts",
     (
         "*",
-        "Opens over the window: a trail with a sharp end",
-    ): "Öffnet über das Zeitfenster: eine Spur mit scharfem Ende",
+        "Opens from frame to frame: a trail with a sharp end",
+    ): "Öffnet von Bild zu Bild: eine Spur mit scharfem Ende",
     ("Virtual Shutter", "Ramp Down"): "Rampe abwärts",
     (
         "*",
-        "Closes over the window: a trail with a sharp start",
-    ): "Schließt über das Zeitfenster: eine Spur mit scharfem Anfang",
+        "Closes from frame to frame: a trail with a sharp start",
+    ): "Schließt von Bild zu Bild: eine Spur mit scharfem Anfang",
     ("Virtual Shutter", "Triangle"): "Dreieck",
     (
         "*",
-        "Opens to the middle of the window and closes again",
-    ): "Öffnet bis zur Mitte des Zeitfensters und schließt wieder",
+        "Opens to the middle frame and closes again",
+    ): "Öffnet bis zum mittleren Bild und schließt wieder",
     ("Virtual Shutter", "Gaussian"): "Gaußkurve",
-    ("*", "A bell curve around the middle of the window"): "Eine Glockenkurve um die Mitte des Zeitfensters",
+    ("*", "A bell curve around the middle frame"): "Eine Glockenkurve um das mittlere Bild",
     ("Virtual Shutter", "Exponential Trail"): "Exponentielle Spur",
     ("*", "Fades quickly at first and slowly later on"): "Verblasst erst schnell und dann langsam",
     ("Virtual Shutter", "Stutter"): "Stottern",
     ("*", "Every fourth frame, as a strobe lights them"): "Jedes vierte Bild, wie von einem Stroboskop beleuchtet",
     ("Virtual Shutter", "First Frame"): "Erstes Bild",
-    ("*", "The first frame of the window alone"): "Nur das erste Bild des Zeitfensters",
+    ("*", "The first of the frames alone"): "Nur das erste der Bilder",
     ("Virtual Shutter", "Last Frame"): "Letztes Bild",
-    ("*", "The last frame of the window alone"): "Nur das letzte Bild des Zeitfensters",
+    ("*", "The last of the frames alone"): "Nur das letzte der Bilder",
     # Bars
     ("Operator", "Insert Bar Keyframes"): "Schlüsselbilder der Balken einfügen",
     (
@@ -307,9 +309,14 @@ MESSAGES = {
     ("Operator", "Draw"): "Zeichnen",
     (
         "*",
-        "Scribble in the preview where the active shutter holds (at another frame, this redraws the active region)",
-    ): "In der Vorschau markieren, wo der aktive Verschluss gilt (bei einem anderen Bild zeichnet das die aktive "
+        "Draw on the sharp frame where the active shutter holds (at another frame, this redraws the active region)",
+    ): "Auf dem scharfen Bild zeichnen, wo der aktive Verschluss gilt (bei einem anderen Bild zeichnet das die aktive "
     "Region neu)",
+    ("Operator", "Draw Shutter"): "Verschluss zeichnen",
+    (
+        "*",
+        "The sharp frame, to draw on: the result comes with the stroke",
+    ): "Das scharfe Bild, zum Zeichnen: Das Ergebnis kommt mit dem Strich",
     ("*", "New Region"): "Neue Region",
     (
         "*",
@@ -397,9 +404,8 @@ MESSAGES = {
     ("Operator", "Time Map"): "Zeitkarte",
     (
         "*",
-        "Show every pixel at its own moment of the window: a ramp from its first frame to its last (slit-scan)",
-    ): "Jeden Pixel zu seinem eigenen Zeitpunkt des Zeitfensters zeigen: ein Verlauf von dessen erstem Bild zum "
-    "letzten (Slit-Scan)",
+        "Show every pixel at its own moment: a ramp from the first of the frames to the last (slit-scan)",
+    ): "Jeden Pixel zu seinem eigenen Zeitpunkt zeigen: ein Verlauf vom ersten der Bilder zum letzten (Slit-Scan)",
     ("*", "First"): "Erstes",
     ("*", "Last"): "Letztes",
     ("*", "Time Map"): "Zeitkarte",
@@ -526,18 +532,21 @@ MESSAGES = {
     ): "{folder}: der Effekt liest Bilder darin; wählen Sie einen anderen Namen für das Rezept",
     ("*", "{place}: it has no mask"): "{place}: sie hat keine Maske",
     # Options
-    ("Virtual Shutter", "Window"): "Zeitfenster",
+    ("Virtual Shutter", "Frames"): "Bilder",
     (
         "*",
         "Number of source frames that a shutter can expose",
     ): "Anzahl der Bilder der Quelle, die ein Verschluss belichten kann",
     ("*", "Position"): "Position",
-    ("*", "Where the window lies around the frame"): "Wo das Zeitfenster um das Bild liegt",
-    ("*", "The window begins at the frame"): "Das Zeitfenster beginnt beim Bild",
+    (
+        "*",
+        "Where the frames that are exposed lie around the shown one",
+    ): "Wo die belichteten Bilder um das gezeigte liegen",
+    ("*", "The shown frame is the first of them"): "Das gezeigte Bild ist ihr erstes",
     ("*", "Center"): "Zentrum",
-    ("*", "The frame lies in the middle of the window"): "Das Bild liegt in der Mitte des Zeitfensters",
+    ("*", "The shown frame lies in their middle"): "Das gezeigte Bild liegt in ihrer Mitte",
     ("*", "End"): "Ende",
-    ("*", "The window ends at the frame"): "Das Zeitfenster endet beim Bild",
+    ("*", "The shown frame is the last of them"): "Das gezeigte Bild ist ihr letztes",
     ("*", "Interpolation"): "Interpolation",
     (
         "*",
@@ -554,7 +563,7 @@ MESSAGES = {
         "Cross-fade pictures between shutters, and fade every bar by itself between keyframes",
     ): "Bilder zwischen Verschlüssen und jeden Balken für sich zwischen Schlüsselbildern überblenden",
     ("*", "Light"): "Licht",
-    ("*", "How the window's frames are summed"): "Wie die Bilder des Zeitfensters summiert werden",
+    ("*", "How the frames that are exposed are summed"): "Wie die belichteten Bilder summiert werden",
     ("*", "Linear"): "Linear",
     (
         "*",
@@ -580,8 +589,8 @@ MESSAGES = {
     ("Virtual Shutter", "Clip Ends"): "Clip-Enden",
     (
         "*",
-        "What a window gets that reaches beyond the ends of the clip, or of the shot",
-    ): "Was ein Zeitfenster erhält, das über die Enden des Clips oder der Einstellung hinausreicht",
+        "What an exposure gets that reaches beyond the ends of the clip, or of the shot",
+    ): "Was eine Belichtung erhält, die über die Enden des Clips oder der Einstellung hinausreicht",
     ("Virtual Shutter", "Hold"): "Halten",
     (
         "*",
@@ -591,31 +600,31 @@ MESSAGES = {
     ("*", "Play the clip backward beyond its ends"): "Den Clip jenseits seiner Enden rückwärts abspielen",
     ("Virtual Shutter", "Shorten"): "Kürzen",
     ("*", "Leave out what lies beyond the clip's ends"): "Weglassen, was jenseits der Enden des Clips liegt",
-    ("*", "Aggregate"): "Blöcke",
+    ("*", "Matte Resolution"): "Mattenauflösung",
     (
         "*",
         "Pixels that share a shutter (larger blocks are quicker)",
     ): "Pixel, die sich einen Verschluss teilen (größere Blöcke sind schneller)",
-    ("*", "1×1"): "1×1",
+    ("*", "Full"): "Voll",
     ("*", "Every pixel has its own shutter"): "Jedes Pixel hat seinen eigenen Verschluss",
-    ("*", "2×2"): "2×2",
+    ("*", "Half"): "Halb",
     ("*", "Blocks of 2×2 pixels share a shutter"): "Blöcke von 2×2 Pixeln teilen sich einen Verschluss",
-    ("*", "4×4"): "4×4",
+    ("*", "Quarter"): "Viertel",
     ("*", "Blocks of 4×4 pixels share a shutter"): "Blöcke von 4×4 Pixeln teilen sich einen Verschluss",
     ("*", "Stop at Cuts"): "An Schnitten enden",
     (
         "*",
-        "Windows end at the source's cuts as they do at the clip's ends",
-    ): "Zeitfenster enden an den Schnitten der Quelle wie an den Enden des Clips",
+        "Exposures end at the source's cuts as they do at the clip's ends",
+    ): "Belichtungen enden an den Schnitten der Quelle wie an den Enden des Clips",
     (
         "*",
         "Cuts are not found: the Python package {package} is missing",
     ): "Schnitte werden nicht gefunden: das Python-Paket {package} fehlt",
-    ("*", "Border"): "Rand",
+    ("*", "Default at Edge"): "Standard am Rand",
     (
         "*",
-        "Make the picture's edge a scribble of the default shutter",
-    ): "Den Bildrand zu einer Markierung des Standardverschlusses machen",
+        "Make the picture's edge a scribble of the default shutter, so that a stroke alone acts locally",
+    ): "Den Bildrand zu einer Markierung des Standardverschlusses machen, so dass ein einzelner Strich örtlich wirkt",
     ("*", "Follow Edges"): "Kanten folgen",
     (
         "*",
@@ -642,8 +651,8 @@ MESSAGES = {
     ("*", "Bars per Frame"): "Balken pro Bild",
     (
         "*",
-        "How many bars of the window stand for a source frame",
-    ): "Wie viele Balken des Zeitfensters für ein Bild der Quelle stehen",
+        "How many bars stand for a source frame",
+    ): "Wie viele Balken für ein Bild der Quelle stehen",
     (
         "*",
         "{factor}× in-between frames take {count} bars; a shutter has {most} at most",
@@ -734,7 +743,7 @@ MESSAGES = {
         "*",
         "The source, and where each shutter is scribbled",
     ): "Die Quelle, und wo jeder Verschluss markiert ist",
-    ("Virtual Shutter", "Coefficients"): "Koeffizienten",
+    ("Virtual Shutter", "Mattes"): "Matten",
     (
         "*",
         "How much of each shutter a pixel gets, in the shutters' colors",
@@ -747,8 +756,8 @@ MESSAGES = {
     ("*", "Probe"): "Sonde",
     (
         "*",
-        "Show the shutter and the coefficients of the pixel that the pointer was over last",
-    ): "Verschluss und Koeffizienten des Pixels zeigen, über dem der Zeiger zuletzt war",
+        "Show the shutter of the pixel that the pointer was over last, and how much of each it gets",
+    ): "Verschluss des Pixels zeigen, über dem der Zeiger zuletzt war, und wie viel er von jedem erhält",
     ("*", "Probe Position"): "Ort der Sonde",
     (
         "*",
@@ -923,13 +932,12 @@ MESSAGES = {
         "*",
         "The exposure moves with what the camera sees, as if the camera had stood still",
     ): "Die Belichtung bewegt sich mit dem, was die Kamera sieht, als hätte die Kamera still gestanden",
-    ("*", "Followed Region"): "Verfolgte Region",
+    ("*", "Moved With"): "Bewegt mit",
     (
         "*",
         "Name of the region that the exposure moves with",
     ): "Name der Region, mit der sich die Belichtung bewegt",
     ("*", "Length"): "Länge",
-    ("*", "Frames"): "Bilder",
     ("*", "Motion"): "Bewegung",
     ("*", "What says how long the exposure is"): "Was sagt, wie lang die Belichtung ist",
     (
@@ -962,8 +970,9 @@ MESSAGES = {
         "*",
         '{place}: there is no region "{region}" to follow',
     ): "{place}: Es gibt keine Region „{region}“, der zu folgen wäre",
-    ("*", "Follow"): "Folgen",
-    ("Operator", "Follow"): "Folgen",
+    ("*", "Move With"): "Bewegen mit",
+    ("*", "Follow Track"): "Einer Spur folgen",
+    ("Operator", "Follow Track"): "Einer Spur folgen",
     (
         "*",
         "Key the active region by a track of a movie clip, from where the region is at this frame",

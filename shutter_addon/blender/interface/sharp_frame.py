@@ -1,0 +1,100 @@
+"""The source's own frame in the previews, sharp, while somebody draws on it: Blender's own, of the source's channel.
+
+From *Draw* on until a stroke is finished, and again for as long as the pen is down: what our handler draws would hide
+the stroke. It is a setting of the previews, which files keep: before one is saved, the result is given back.
+"""
+
+import bpy
+
+from ..data import selection, strips
+from . import preview_areas
+
+PEN = "GPENCIL_OT_annotate"
+_TOOLS = "builtin.annotate"  # how the tools' names begin
+
+_channel = 0  # that the previews show; 0: they show the result
+_is_down = False  # the pen, when a preview was drawn last
+
+
+def show(context) -> None:
+    """Shows the source of the active effect, if that is beside it and not muted, where the pen draws for the effect."""
+    global _channel
+    found = selection.active(context)
+    source = found and strips.nearest_source(found[0], found[1], found[2])
+    if source is None or source.mute or source.parent_meta() != found[2].parent_meta():
+        return
+    give_back(context)
+    _channel = source.channel
+    for _window, area in preview_areas.previews(context):
+        space = area.spaces.active
+        if not space.display_channel and space.annotation == found[1].scene.annotation:
+            space.display_channel = _channel
+
+
+def give_back(context) -> None:
+    """The previews show the result again."""
+    global _channel
+    for _window, area in preview_areas.previews(context) if _channel else ():
+        if area.spaces.active.display_channel == _channel:
+            area.spaces.active.display_channel = 0
+    _channel = 0
+
+
+def follow_pen(context) -> None:
+    """For what draws a preview, which may change nothing: what the pen asks for comes right after."""
+    global _is_down
+    was_down, _is_down = _is_down, any(op.bl_idname == PEN for op in context.window.modal_operators)
+    if _is_down and not _channel:
+        _soon(_show)
+    elif _channel and was_down and not _is_down:
+        _soon(_give_back)
+
+
+def is_shown(space) -> bool:
+    """Whether a preview shows the sharp frame for the pen."""
+    return bool(_channel) and space.display_channel == _channel
+
+
+def _tool_chosen() -> None:
+    """Who takes another tool draws no more. A new tool draws no preview again."""
+    tool = bpy.context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
+    if tool is not None and not tool.idname.startswith(_TOOLS):
+        give_back(bpy.context)
+
+
+def _show() -> None:
+    if _is_down:
+        show(bpy.context)
+
+
+def _give_back() -> None:
+    if not _is_down:
+        give_back(bpy.context)
+
+
+_OWNER = object()  # of what Blender tells of tools
+_TIMERS = (_show, _give_back)
+
+
+def _soon(change) -> None:
+    if not bpy.app.timers.is_registered(change):
+        bpy.app.timers.register(change)
+
+
+def listen() -> None:
+    """Asks Blender to tell of tools; it forgets that with every file that is opened."""
+    tools = bpy.types.WorkSpace, "tools"
+    bpy.msgbus.clear_by_owner(_OWNER)
+    bpy.msgbus.subscribe_rna(key=tools, owner=_OWNER, args=(), notify=_tool_chosen)
+
+
+def register():
+    listen()
+
+
+def unregister():
+    bpy.msgbus.clear_by_owner(_OWNER)
+    give_back(bpy.context)
+    for timer in _TIMERS:
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)

@@ -1,0 +1,210 @@
+"""From an empty Video Editing file to the first tracked, rendered frame, by mouse and keyboard; every action is
+counted. Run inside Blender, by test_window.py."""
+
+# ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
+import sys
+from pathlib import Path
+
+sys.path[:0] = [str(Path(__file__).parent)]
+
+import bpy
+import driver
+import one_stroke_story
+import story
+from one_stroke_story import FRAME, STROKE, part
+
+LATER = 82
+ICON = 46, 92  # a file's in the browser, in pixels from the left and from above
+ENTRY = 47  # that of the strip's menu, which reaches down to the end of the window, in pixels above that
+_actions = []  # what was done, and whether in the tab
+
+
+def acted(what, in_tab=False):
+    _actions.append((what, in_tab))
+
+
+def timeline():
+    return driver.region_of(driver.area_of("SEQUENCE_EDITOR", "SEQUENCER"))
+
+
+def effect_strip():
+    return part("blender.data.strips").effect_strips(story.edit())[0]
+
+
+def on_preview(*points):
+    """Pixels of the preview's region, of points in fractions of the picture."""
+    geometry, annotations = part("blender.data.geometry"), part("blender.data.annotations")
+    size = annotations.picture_size(story.effect())
+    return geometry.mapped(geometry.picture_to_region(effect_strip(), size, story.preview()), points).tolist()
+
+
+def channel():
+    """That the preview shows; 0: the result."""
+    return driver.area_of("SEQUENCE_EDITOR", "PREVIEW").spaces.active.display_channel
+
+
+def footage_chosen():
+    """In the browser at the left, by its path."""
+    area = driver.area_of("FILE_BROWSER")
+    bar = driver.region_of(area, "UI")
+    driver.click(bar, bar.width * 0.8, bar.height - 28)
+    acted("click on the path")
+    yield 1.0
+    driver.text(Path(story.FOOTAGE).parent)
+    acted("the folder is typed")
+    yield 1.0
+    driver.key("Return")
+    acted("Return")
+    wanted = Path(story.FOOTAGE).parent
+    yield from driver.until(lambda: Path(area.spaces.active.params.directory.decode()) == wanted, "it is the folder")
+    yield 2.0
+
+
+def movie_dragged():
+    files, (x, y) = driver.region_of(driver.area_of("FILE_BROWSER")), ICON
+    to_x, to_y = timeline().view2d.view_to_region(1, 1.5, clip=False)
+    start, end = driver.screen(files, x, files.height - y), driver.screen(timeline(), to_x + 5, to_y)
+    driver.move(files, x - 1, files.height - y + 2)  # the browser marks what the pointer comes to
+    yield 0.5
+    driver.xdotool("click", 1)
+    acted("click on the movie")
+    yield 1.0
+    driver.xdotool("mousemove", *start)
+    yield 0.5
+    driver.xdotool("mousedown", 1)
+    yield 0.5
+    for share in (*(step / 100 for step in range(1, 11)), 0.3, 0.5, 0.7, 0.9, 1):
+        driver.xdotool("mousemove", *(round(a + share * (b - a)) for a, b in zip(start, end, strict=True)))
+        yield 0.1
+    yield 0.5
+    driver.shot("0_dragged")
+    driver.xdotool("mouseup", 1)
+    acted("the movie is dragged into the timeline")
+    yield from driver.until(lambda: len(story.edit().sequence_editor.strips_all), "there is a strip")
+    yield 1.0
+
+
+def gone_to(frame):
+    """In the ruler; frame: of the movie, 1 is its first."""
+    movie = next(strip for strip in story.edit().sequence_editor.strips_all if strip.type == "MOVIE")
+    x, _y = timeline().view2d.view_to_region(movie.content_start + frame - 1, 0, clip=False)
+    driver.click(timeline(), x, timeline().height - 12)
+    acted("click in the ruler")
+    yield 1.0
+    apart = story.edit().frame_current - (movie.content_start + frame - 1)
+    assert abs(apart) <= 1, apart
+    story.edit().frame_set(int(movie.content_start) + frame - 1)  # a pixel is less than a frame
+    yield 0.5
+
+
+def drawing_begun():
+    movie = story.edit().sequence_editor.strips_all[0]
+    x, y = timeline().view2d.view_to_region(story.edit().frame_current + 5, movie.channel + 0.5, clip=False)
+    driver.move(timeline(), x, y)
+    yield
+    driver.xdotool("click", 3)
+    acted("right click on the strip")
+    yield 1.0
+    driver.shot("0_menu")
+    across, _down = driver.screen(timeline(), x, y)
+    driver.xdotool("mousemove", across + 20, bpy.context.window_manager.windows[0].height - ENTRY)
+    yield 0.5
+    driver.xdotool("click", 1)
+    acted("click on Draw Shutter")
+    yield from driver.until(lambda: story.edit().virtual_shutter.effects, "the strip has an effect")
+    sidebar = one_stroke_story.sidebar()
+    yield from driver.until(lambda: sidebar.active_panel_category == "Shutter", "the Shutter tab opens")
+    assert len(story.effect().regions) == 1
+    assert channel() == 1
+
+
+def stroke_drawn():
+    """What the preview shows before, with the pen down, and after."""
+    yield from story.seen("1_sharp")
+    points, region = on_preview(*STROKE), story.preview()
+    driver.move(region, *points[0])
+    yield
+    driver.xdotool("mousedown", 1)
+    yield
+    for point in points[1:]:
+        driver.move(region, *point)
+        yield 0.1
+    assert channel() == 1
+    driver.xdotool("mouseup", 1)
+    acted("the stroke is drawn")
+    yield from driver.until(lambda: channel() == 0, "the stroke gives the result back")
+    assert story.effect().edge_aware == 1
+    tool = bpy.context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
+    assert tool.idname == "builtin.annotate"
+    yield from story.seen("2_result")
+
+
+def pressed_again():
+    """Of a second stroke, which is none of those that are counted: it is taken back."""
+    (point,) = on_preview(STROKE[0])
+    driver.move(story.preview(), *point)
+    yield
+    driver.xdotool("mousedown", 1)
+    yield from driver.until(lambda: channel() == 1, "the pen shows the sharp frame again")
+    yield from driver.shot_when_shown("3_pressed")
+    driver.saw(step="3_pressed", crop=story.crop())
+    driver.xdotool("mouseup", 1)
+    yield from driver.until(lambda: channel() == 0, "and gives it back")
+    driver.key("ctrl+z")
+    yield 1.0
+
+
+def boxed():
+    """Where others walk: left, top, right, bottom in the preview's region."""
+    (left, low), (right, high) = on_preview((0.6, 0.45), (0.8, 0.65))
+    height = story.preview().height
+    driver.saw(box=[round(left), round(height - high), round(right), round(height - low)])
+
+
+def plain_seen():
+    """The preview without the effect, to compare with."""
+    effect_strip().mute = True
+    yield from story.seen("5_plain")
+    effect_strip().mute = False
+    yield 1.0
+
+
+def rendered():
+    done = []
+    # The preview's pictures of the effect are renders of its own scene.
+    bpy.app.handlers.render_complete.append(lambda scene, *_: scene.name == "Edit" and done.append(True))
+    driver.move(story.preview(), 100, story.preview().height - 60)
+    yield
+    driver.key("F12")
+    acted("F12")
+    yield from driver.until(lambda: done and not bpy.app.is_job_running("RENDER"), "the render ends", 60)
+    driver.saw(actions=_actions, stroke=one_stroke_story.stroke_at(story.edit().frame_current))
+    bpy.data.images["Render Result"].save_render(str(driver.OUT / "final.png"), scene=story.edit())
+
+
+def told():
+    yield from driver.video_editing_opened()
+    edit = bpy.data.scenes[0]
+    edit.name = "Edit"
+    edit.render.resolution_x, edit.render.resolution_y = 768, 576  # the footage's, to compare with
+    edit.render.dither_intensity = 0
+    edit.view_settings.view_transform = "Standard"
+    bpy.context.preferences.view.smooth_view = 0
+    yield from footage_chosen()
+    yield from movie_dragged()
+    yield from gone_to(FRAME)
+    yield from drawing_begun()
+    yield from stroke_drawn()
+    boxed()
+    yield from pressed_again()
+    yield from one_stroke_story.tracked()
+    acted("click on Track", in_tab=True)
+    yield from one_stroke_story.ended()
+    yield from story.seen("4_tracked")
+    yield from plain_seen()
+    yield from gone_to(LATER)
+    yield from rendered()
+
+
+if __name__ == "__main__":
+    driver.play(told)
