@@ -204,7 +204,7 @@ def test_what_cannot_be_tracked_is_said_and_changes_nothing(bpy, edit, effect, t
     refuses(bpy, name, 'camera of effect "Shutter": the F-curve of "Rotation" is locked')
     curve.lock = False
     edit.frame_set(5)
-    refuses(bpy, name, "the current frame is outside of the Shutter strip")
+    refuses(bpy, name, "Move the playhead onto the Shutter strip")
     edit.frame_set(16)
     strips.source_of(*active(bpy)).directory = "/nowhere/"
     refuses(bpy, name, "no such file")

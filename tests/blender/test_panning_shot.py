@@ -121,7 +121,7 @@ def test_other_shutters_keep_their_regions_and_a_name_is_one_regions(bpy, region
 def test_what_cannot_be_followed_is_said(bpy, edit, region):
     effect = active(bpy)[1]
     edit.frame_set(5)
-    refuses(bpy, "the current frame is outside of the Shutter strip")
+    refuses(bpy, "Move the playhead onto the Shutter strip")
     edit.frame_set(11)
     layer = annotations.layer_of(effect, region)
     layer.frames.remove(layer.frames[0])

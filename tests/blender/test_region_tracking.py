@@ -552,7 +552,7 @@ def test_what_cannot_be_tracked_is_said(bpy, edit, region):
     effect = active(bpy)[1]
     layer = annotations.layer_of(effect, region)
     edit.frame_set(5)
-    refuses(bpy, "track", "the current frame is outside of the Shutter strip")
+    refuses(bpy, "track", "Move the playhead onto the Shutter strip")
     edit.frame_set(30)
     refuses(bpy, "track", "there is no other frame to track", direction="FORWARD")
     edit.frame_set(11)

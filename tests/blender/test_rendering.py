@@ -234,11 +234,14 @@ def test_an_effect_that_lost_its_scene_is_no_plain_film(bpy, film, tmp_path, cap
 def test_a_linked_effect_that_cannot_be_mended_is_refused(bpy, film, tmp_path, capfd):
     from shutter_addon.blender import handlers
 
-    bpy.app.handlers.depsgraph_update_post.remove(handlers.HANDLERS["depsgraph_update_post"])
+    mending = "depsgraph_update_post", "save_pre"
+    for name in mending:
+        getattr(bpy.app.handlers, name).remove(handlers.HANDLERS[name])
     film.name = "Film"
     bpy.data.objects.remove(effect_scene(film).camera)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
-    bpy.app.handlers.depsgraph_update_post.append(handlers.HANDLERS["depsgraph_update_post"])
+    for name in mending:
+        getattr(bpy.app.handlers, name).append(handlers.HANDLERS[name])
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, wanted):
         wanted.scenes = ["Film"]

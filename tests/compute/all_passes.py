@@ -3,7 +3,7 @@
 import importlib.util
 import itertools
 
-from shutter_addon.compute import diffusion_gpu, edge_diffusion_gpu, gpu, matting, window
+from shutter_addon.compute import diffusion_gpu, edge_diffusion_gpu, gpu, matting, mixing, window
 from shutter_addon.compute.passes import Pass
 
 _WAYS = ("frames", "search", "value")
@@ -35,6 +35,7 @@ def _filling():
     yield window.packing(2, False)
     for adds in (False, True):
         yield matting.blend_pass(2, adds)
+        yield mixing.mix_pass(adds)
 
 
 def _unpacking():
