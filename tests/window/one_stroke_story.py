@@ -72,8 +72,9 @@ def drawn():
 
 def tracked():
     """By the button in the sidebar."""
+    before = kinds()
     driver.click(sidebar(), sidebar().width * 0.45, sidebar().height - TRACK)
-    yield from driver.until(is_tracking, "tracking begins")
+    yield from driver.until(lambda: is_tracking() or kinds() != before, "tracking begins")
 
 
 def sidebar():

@@ -34,6 +34,7 @@ def escaped():
     were."""
     before = shutters()
     clicked()
+    yield from driver.until(lambda: story.edit().frame_current != FRAME, "frames are tracked", wait=0.02)
     driver.key("Escape")
     yield from driver.until(lambda: len(one_stroke_story.kinds()) > 1, "tracking keys the region")
     driver.move(story.preview(), 50, story.preview().height - 50)

@@ -12,7 +12,10 @@ import driver
 import story
 
 TIME_MAP = 5  # the entry in the menu of regions
-RAMP, RADIAL, ROTATION = 529, 575, 701  # where they stand in the sidebar, in pixels below its upper edge
+RAMP, RADIAL = 529, 575  # where they stand in the sidebar, in pixels below its upper edge
+
+
+HANDLE = 140  # of the ramp, in pixels to the right of its middle
 
 
 def on_sidebar(share, below):
@@ -43,10 +46,12 @@ def undone_and_redone():
 
 
 def turned():
-    """The slider is dragged."""
+    """The handle in the picture is dragged about its middle."""
     driver.saw(rotation=region().rotation)
-    yield from driver.drag(story.sidebar(), [on_sidebar(share, ROTATION) for share in (0.5, 0.55, 0.6, 0.7)])
+    x, y = story.preview().width / 2, story.preview().height / 2
+    yield from driver.drag(story.preview(), [(x + HANDLE, y + up) for up in (0, 5, 20, 60, 90)])
     yield from driver.until(lambda: region().rotation > 0.1, "the ramp turns")
+    region().scale = 1.0  # which the handle changes as well
     driver.saw(rotation=region().rotation)
 
 

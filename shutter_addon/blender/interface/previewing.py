@@ -62,7 +62,7 @@ def requested(context, found: Shown, snapshot: Snapshot) -> session.FrameRequest
     ends here with the frame and with a change of the effect. One of session.FAULTS: it cannot be shown."""
     global whole
     frame, here = found.edit.frame_current, session.here()
-    if whole is not None and (whole.scene, whole.frame) == (snapshot.scene, frame) and not _is_playing(context):
+    if whole is not None and (whole.scene, whole.frame) == (snapshot.scene, frame) and not is_going(context):
         request = here.request(snapshot, frame, detail=session.FULL)
         if whole.key in (None, request.key[1:]):
             whole.key = request.key[1:]
