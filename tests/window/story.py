@@ -111,6 +111,7 @@ def effect_added():
 
 
 def scribbled():
+    effect().edge_aware = 0.0  # or Draw would set it, and what is drawn over the preview be a draft
     with driver.override("PREVIEW"):
         bpy.ops.shutter.draw("INVOKE_DEFAULT", True)
     yield 0.5
