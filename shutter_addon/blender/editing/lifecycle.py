@@ -175,13 +175,16 @@ def _remove(scene) -> None:
     if camera is not None and camera.type == "CAMERA" and camera.library is None and not camera.users:
         data = camera.data
         bpy.data.objects.remove(camera)
-        if not data.users:
-            bpy.data.cameras.remove(data)
+        _remove_unused(bpy.data.cameras, data)
     if annotation is not None and annotation.library is None:
         if shown_annotations.is_own(annotation):
             shown_annotations.let_go(annotation)
-        if not annotation.users:
-            bpy.data.annotations.remove(annotation)
+        _remove_unused(bpy.data.annotations, annotation)
+
+
+def _remove_unused(collection, item) -> None:
+    if not item.users:
+        collection.remove(item)
 
 
 def _remove_left() -> None:
@@ -190,13 +193,11 @@ def _remove_left() -> None:
     scenes = _effect_scenes()
     for annotation in _left(bpy.data.annotations, [scene.annotation for scene in scenes]):
         shown_annotations.let_go(annotation)
-        if not annotation.users:
-            bpy.data.annotations.remove(annotation)
+        _remove_unused(bpy.data.annotations, annotation)
     for camera in _left(bpy.data.cameras, [scene.camera.data for scene in scenes if scene.camera]):
         for each in [each for each in bpy.data.objects if each.data == camera and not each.users]:
             bpy.data.objects.remove(each)
-        if not camera.users:
-            bpy.data.cameras.remove(camera)
+        _remove_unused(bpy.data.cameras, camera)
 
 
 def _left(collection, used) -> list:

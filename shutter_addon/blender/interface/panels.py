@@ -344,7 +344,7 @@ def _draw_tracked(layout, effect, index: int | None) -> None:
         column.label(text=text, icon="CHECKMARK" if confidence >= SURE else "ERROR", translate=False)
         column.operator(look)
     if index is None:  # a region's gaps go from its stops on
-        _draw_gaps(layout, effect, index)
+        _draw_camera_gaps(layout, effect)
     for frame, reason, is_fault in track_region.stops(effect, index):
         row = layout.row(align=True)
         _sentence(row, reason, "ERROR" if is_fault else "INFO", room=0.85)
@@ -353,9 +353,9 @@ def _draw_tracked(layout, effect, index: int | None) -> None:
         place.operator(look, text=str(frame), translate=False).frame = frame
 
 
-def _draw_gaps(layout, effect, index: int | None) -> None:
-    """The frames at which nothing is tracked."""
-    for gap in track_region.gaps(effect, index):
+def _draw_camera_gaps(layout, effect) -> None:
+    """The frames at which the camera is not tracked."""
+    for gap in track_region.gaps(effect, None):
         if math.isinf(gap.last):
             text = iface_("Not tracked: from frame {first} on")
         elif math.isinf(gap.first):
