@@ -5,7 +5,7 @@ import pytest
 from support import sequencer, write_frames
 
 from shutter_addon.blender.data import selection
-from shutter_addon.blender.editing import add_effect, lifecycle, shown_annotations, shutter_edits
+from shutter_addon.blender.editing import add_effect, lifecycle, shown_annotations, shutter_edits, undelete
 
 
 @pytest.fixture(autouse=True)
@@ -160,6 +160,19 @@ def test_annotations_of_the_user_stay(bpy, edit, effect, previews, tmp_path):
     assert [space.annotation for space in previews] == [drawn, copied]
     assert other.annotation == used
     assert len(bpy.data.annotations) == 3
+
+
+def test_of_a_removed_scene_that_a_strip_brings_back_one_annotation_is_left(bpy, edit, effect, previews):
+    """The strip stays, and gets its effect again, which was kept when it was deleted before."""
+    scene, strip = effect.scene, strip_of(edit, effect)
+    undelete.keep(edit, effect)
+    previews[0].annotation = scene.annotation
+    bpy.data.scenes.remove(scene)
+    assert strip.scene is None
+    lifecycle.update()
+    assert strip.scene is not None
+    assert [strip.scene.annotation] == list(bpy.data.annotations)
+    assert [strip.scene.camera.data] == list(bpy.data.cameras)
 
 
 def test_drawing_keeps_the_annotation_that_the_preview_had(bpy, edit, effect, previews):

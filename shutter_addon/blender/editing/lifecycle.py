@@ -68,7 +68,7 @@ def take_over() -> None:
                 each.virtual_shutter_made = scene.virtual_shutter.identity
     for annotation in _unmarked():
         if annotation.users == shown_annotations.shown_by(annotation) > 0:
-            annotation.virtual_shutter_made = "gone"
+            annotation.virtual_shutter_made = annotations.GONE
     _remove_left()
 
 

@@ -5,7 +5,7 @@ Blender's clipboard holds a Scene strip without its scene, and outlives the file
 
 import bpy
 
-from ..data import fcurves, property_copy
+from ..data import annotations, fcurves, property_copy
 from . import add_effect
 
 _MOST = 64
@@ -42,6 +42,9 @@ def restore(edit, identity: str):
     """Makes a kept effect again in an edit. Returns its scene, or None where none was kept under this identity."""
     if (data := _effects.get(identity)) is None:
         return None
+    for made in (*bpy.data.annotations, *bpy.data.cameras):
+        if made.virtual_shutter_made == identity and made.library is None:
+            made.virtual_shutter_made = annotations.GONE  # of the scene before, which somebody removed
     scene = add_effect.new_scene(edit, identity, *data["scene"])
     effect = edit.virtual_shutter.effects.add()
     _fill(effect, data["effect"])
