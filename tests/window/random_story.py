@@ -225,6 +225,8 @@ def still_rendered():
     _number += 1
     edit().render.filepath = str(OUT / f"still{_number:03d}.png")
     bpy.ops.render.render(write_still=True, scene="Edit")
+    if (failure := sys.modules[f"{traces.NAME}.shutter_addon.blender.rendering.render_job"].failure) is not None:
+        print(f"refused: {failure}", flush=True)
     saw(still=f"still{_number:03d}.png", shows=expected)
 
 
@@ -233,7 +235,7 @@ def expectation():
     is not known here."""
     frame = edit().frame_current
     seen = [strip for strip in strips() if strip.left_handle <= frame < strip.right_handle and not strip.mute]
-    if not seen:
+    if not seen or any(lacks_source(strip) for strip in seen):  # which ends the render
         return None
     top = max(seen, key=lambda strip: strip.channel)
     below = [strip for strip in seen if strip.type == "IMAGE" and strip.channel < top.channel]
@@ -251,6 +253,15 @@ def source_of(strip):
         [each for each in edit().virtual_shutter.effects if each.scene == strip.scene] if strip.type == "SCENE" else ()
     )
     return effects[0].source if effects else None
+
+
+def lacks_source(strip):
+    """Whether a strip shows an effect whose source is not there, or not at this frame."""
+    if strip.type != "SCENE" or (source := source_of(strip)) is None:
+        return False
+    frame = edit().frame_current
+    sources = [each for each in strips("IMAGE") if each.virtual_shutter_source == source]
+    return not any(each.left_handle <= frame < each.right_handle for each in sources)
 
 
 def has_no_lines(strip):

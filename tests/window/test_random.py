@@ -38,14 +38,20 @@ def footage(tmp_path_factory):
     return folder
 
 
+def assert_right(seen, footage, folder):
+    """Every picture that a story noted is the source's frame, or the effect's as the command renders it."""
+    for entry in seen:
+        assert (folder / entry["still"]).exists(), (entry, folder)
+        (index, through), picture = entry["shows"], pixels(folder / entry["still"])
+        name = f"{index % COUNT + 1:04d}.png"
+        expected = pixels(footage / ("expected" if through else "frames") / name)
+        assert np.abs(picture - expected).max() <= TOLERANCE, (entry, folder)
+
+
 @pytest.mark.parametrize("backend", ["opengl", "vulkan"])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_operators(seed, backend, footage, tmp_path):
     given = {"footage": footage / "frames" / "0001.png", "recipe": footage / "recipe.json"}
     seen, console = tell("random_story.py", backend, linked(tmp_path), **given, seed=seed, steps=STEPS)
     assert "Traceback" not in console
-    for entry in seen:
-        (index, through), picture = entry["shows"], pixels(tmp_path / entry["still"])
-        name = f"{index % COUNT + 1:04d}.png"
-        expected = pixels(footage / ("expected" if through else "frames") / name)
-        assert np.abs(picture - expected).max() <= TOLERANCE, (entry, tmp_path)
+    assert_right(seen, footage, tmp_path)
