@@ -67,8 +67,7 @@ def _before_undo(*_):
 def _after_undo(*_):
     revision.changed()
     track_region.data_replaced()
-    for edit in bpy.data.scenes:
-        strips.invalidate(edit)
+    _drop_frames()
     session.drop_removed()
     sharp_frame.give_back(bpy.context)
     shown_annotations.follow()
@@ -124,6 +123,12 @@ def _after_render(scene, *_):
     source_media.rest(render_job.runs())
 
 
+def _drop_frames():
+    """Drops what the sequencer keeps from while the extension was not enabled: pictures without effects."""
+    for edit in bpy.data.scenes:
+        strips.invalidate(edit)
+
+
 HANDLERS = {
     "load_pre": _before_load,
     "load_post": _after_load,
@@ -143,11 +148,14 @@ HANDLERS = {
 def register():
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).append(function)
+    bpy.app.timers.register(_drop_frames)  # while it registers, Blender's data cannot be had
 
 
 def unregister():
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).remove(function)
+    if bpy.app.timers.is_registered(_drop_frames):
+        bpy.app.timers.unregister(_drop_frames)
     session.forget()
     source_media.forget()
     lifecycle.forget()

@@ -256,7 +256,9 @@ def source_of(strip):
 
 
 def lacks_source(strip):
-    """Whether a strip shows an effect whose source is not there, or not at this frame."""
+    """Whether a strip shows an effect whose scene or source is not there, or not at this frame."""
+    if strip.type == "SCENE" and strip.scene is None:
+        return True
     if strip.type != "SCENE" or (source := source_of(strip)) is None:
         return False
     frame = edit().frame_current
