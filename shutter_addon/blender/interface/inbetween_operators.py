@@ -88,16 +88,6 @@ def smoothing_in_words(found: strobing.Strobing) -> str | None:
     return sentence.format(factor=found.factor, time=time, size=size)
 
 
-def draw_strobing(layout, effect) -> None:
-    """In a panel: that the exposure that the preview shows has too few frames, and the button that helps."""
-    if (found := strobing.last(effect)) is None or inbetween_build.running() is not None:
-        return
-    column = layout.column(align=True)
-    column.label(text=strobing_in_words(found), icon="INFO", translate=False)
-    if (words := smoothing_in_words(found)) is not None:
-        column.operator("shutter.smooth_streaks", text=words, translate=False).factor = str(found.factor)
-
-
 class _OfInbetweens(_OfEffect):
     """Works on files, which are not undone."""
 

@@ -13,7 +13,7 @@ from ...media.tracking import SURE
 from ..data import annotations, selection, strips, validation
 from ..data.properties import CONTEXT
 from ..editing import bar_edits, follow_track, match_source, track_region
-from ..rendering import devices, inbetween_build, matte_look, session
+from ..rendering import devices, inbetween_build, matte_look, session, strobing
 from ..rendering.session import FAULTS
 from . import drawing, inbetween_operators, track_operators
 
@@ -151,7 +151,7 @@ class _Shutters:
         _draw_list(layout, effect, "shutter", effect.shutters, "SHUTTER_MT_shutters")
         _draw_tools(layout, effect)
         _draw_source(layout, effect)
-        inbetween_operators.draw_strobing(layout, effect)
+        _draw_strobing(layout, effect)
         if (shutter := selection.active_shutter(effect)) is None:
             return
         row = layout.row(align=True)
@@ -233,6 +233,16 @@ def _draw_source(layout, effect):
     if shown.has_effects:
         words = iface_("Effect strips on the source do not reach the effect: make the Shutter strip their input")
         _sentence(layout, words, "INFO")
+
+
+def _draw_strobing(layout, effect) -> None:
+    """That the exposure that the preview shows has too few frames, and the button that helps."""
+    if (found := strobing.last(effect)) is None or inbetween_build.running() is not None:
+        return
+    column = layout.column(align=True)
+    _sentence(column, inbetween_operators.strobing_in_words(found), "INFO")
+    if (words := inbetween_operators.smoothing_in_words(found)) is not None:
+        column.operator("shutter.smooth_streaks", text=words, translate=False).factor = str(found.factor)
 
 
 class _WithEffect:
