@@ -58,6 +58,12 @@ def label():
     return found and found[1].label
 
 
+def note():
+    """What is known of the exposure."""
+    strobing = sys.modules["bl_ext.user_default.virtual_shutter.shutter_addon.blender.rendering.strobing"]
+    return strobing.last(story.effect())
+
+
 def shown(name):
     region = story.preview()
     driver.move(region, region.width / 2, region.height + 12)
@@ -80,7 +86,7 @@ def clicked():
 
 def told():
     yield from opened()
-    yield from driver.until(lambda: label() and "about" in label(), "the note says what it takes", 30)
+    yield from driver.until(lambda: note() and note().seconds, "the note says what it takes", 30)
     yield from shown("1_steps")
     yield from clicked()
     yield from driver.until(lambda: story.effect().inbetween != "1", "the in-between frames are used", 60)

@@ -502,9 +502,34 @@ def test_too_few_frames_for_a_streak(backend, tmp_path):
     stepped, smooth = ("1", [8, 8], False), ("4", [32, 32], True)
     assert found == {"1_steps": stepped, "2_smooth": smooth, "3_undone": stepped, "4_redone": smooth}
     for name in ("1_steps", "3_undone"):
-        assert steps[name]["label"].startswith("4× In-Between Frames: about "), name
+        assert steps[name]["label"] == "4× In-Between Frames", name
     before, after = (crop(tmp_path, steps[name])[120:280] for name in ("1_steps", "2_smooth"))  # the picture alone
     assert detail(after) < 0.8 * detail(before)
+
+
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_what_is_needed_first_is_above_the_fold(backend, tmp_path):
+    """In the default layout; the region's shutter is chosen there by the story. And no sentence beneath is cut."""
+    given = {"packages": packages(tmp_path / "packages")}
+    seen, console = tell("fold_story.py", backend, linked(tmp_path), **given)
+    assert "Traceback" not in console
+    assert [entry["step"] for entry in seen] == ["en_US_1.0", "en_US_1.5", "de_DE_1.0", "de_DE_1.5"]
+    wanted = ("draw()", "track(direction='BOTH')", "panning_shot()", "tripod()")
+    for entry in seen:
+        assert {f"bpy.ops.shutter.{name}" for name in wanted} <= set(entry["buttons"]), entry["step"]
+        unit = float(entry["step"][-3:])
+        sentences = crop(tmp_path, entry)[entry["below"] + round(15 * unit) : round(-15 * unit)]
+        assert not ellipses(sentences, unit), entry["step"]
+
+
+def ellipses(picture, unit):
+    """Where Blender has cut a text: columns and rows of three dots beside each other, of bright text in pixels."""
+    bright = (picture.min(axis=2) > 110).astype(np.uint8)
+    _count, _labels, boxes, _centres = cv2.connectedComponentsWithStats(bright)
+    dots = [(x, y) for x, y, width, height, _area in boxes[1:] if max(width, height) <= 3 * unit]
+    return [
+        (x, y) for x, y in dots if sum(abs(low - y) <= 1 and 0 <= right - x <= 12 * unit for right, low in dots) >= 3
+    ]
 
 
 def detail(picture):

@@ -9,15 +9,18 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
 
+SIZE = 11  # of texts, in points
+
 
 def ui_scale() -> float:
     """Pixels per unit of Blender's interface."""
     return bpy.context.preferences.system.ui_scale
 
 
-def wrapped(words: str, width: float) -> list[str]:
-    """Words in lines that are no wider, in pixels, as Blender's interface writes them; a word stays whole."""
-    blf.size(0, bpy.context.preferences.ui_styles[0].widget.points * ui_scale())
+def wrapped(words: str, width: float, size: float | None = None) -> list[str]:
+    """Words in lines that are no wider, in pixels, as `text` draws them, or by default as Blender's interface does; a
+    word stays whole."""
+    blf.size(0, (size or bpy.context.preferences.ui_styles[0].widget.points) * ui_scale())
     lines = [""]
     for word in words.split():
         longer = f"{lines[-1]} {word}".strip()
@@ -67,7 +70,7 @@ def lines(points, color, closed: bool = False, width: float = 1.0) -> None:
     gpu.state.blend_set("NONE")
 
 
-def text(x: float, y: float, words: str, size: float = 11, color=(1, 1, 1, 0.9), until: float | None = None) -> None:
+def text(x: float, y: float, words: str, size: float = SIZE, color=(1, 1, 1, 0.9), until: float | None = None) -> None:
     """Words with their lower left corner at a point; until: the x where they are cut off."""
     blf.size(0, size * ui_scale())
     blf.color(0, *color)
@@ -82,7 +85,7 @@ def text(x: float, y: float, words: str, size: float = 11, color=(1, 1, 1, 0.9),
     blf.disable(0, blf.CLIPPING)
 
 
-def text_width(words: str, size: float = 11) -> float:
+def text_width(words: str, size: float = SIZE) -> float:
     """How wide `text` draws words, in pixels."""
     blf.size(0, size * ui_scale())
     return blf.dimensions(0, words)[0]

@@ -73,19 +73,19 @@ def time_in_words(seconds: float) -> str:
 
 
 def strobing_in_words(found: strobing.Strobing) -> str:
-    """That an exposure has too few frames."""
-    return rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{found.step:.0f}")
+    """That an exposure has too few frames, and what it takes to have more."""
+    sentence = rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{found.step:.0f}")
+    if found.seconds is None:
+        return sentence
+    size, time = size_in_words(found.size), time_in_words(found.seconds)
+    return rpt_("{sentence}. In-between frames take about {time}, {size}").format(
+        sentence=sentence, time=time, size=size
+    )
 
 
 def smoothing_in_words(found: strobing.Strobing) -> str | None:
-    """What helps against that, and what it takes; None: nothing does."""
-    if found.factor is None:
-        return None
-    if found.seconds is None:
-        return iface_("{factor}× In-Between Frames").format(factor=found.factor)
-    sentence = iface_("{factor}× In-Between Frames: about {time}, {size}")
-    size, time = size_in_words(found.size), time_in_words(found.seconds)
-    return sentence.format(factor=found.factor, time=time, size=size)
+    """What helps against that; None: nothing does."""
+    return found.factor and iface_("{factor}× In-Between Frames").format(factor=found.factor)
 
 
 class _OfInbetweens(_OfEffect):

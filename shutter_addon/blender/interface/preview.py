@@ -437,15 +437,18 @@ class _Notes:
     def draw(self):
         unit = drawing.ui_scale()
         y = self._region.height - 18 * unit
+        left, right = 16 * unit, self._region.width - _NAVIGATION * unit
         high = (note_buttons.HEIGHT + 5) * unit
-        for line, button in self._lines:
-            y -= 18 * unit if button is None else high
-            drawing.text(16 * unit, y, line)
+        for sentence, button in self._lines:
+            lines = drawing.wrapped(sentence, right - left, drawing.SIZE)
+            for i, line in enumerate(lines):
+                y -= high if button and i + 1 == len(lines) else 18 * unit
+                drawing.text(left, y, line)
             if button is not None:
-                left = 26 * unit + drawing.text_width(line)
-                if left + note_buttons.width(button) > self._region.width - _NAVIGATION * unit:  # below the sentence
-                    left, y = 16 * unit, y - high
-                note_buttons.place(self._region, left, y - 6 * unit, button)
+                x = left + drawing.text_width(lines[-1]) + 10 * unit
+                if x + note_buttons.width(button) > right:  # below the sentence
+                    x, y = left, y - high
+                note_buttons.place(self._region, x, y - 6 * unit, button)
 
 
 classes = (ShutterPreview,)

@@ -709,7 +709,10 @@ MESSAGES = {
     ("*", "Build"): "Erstellen",
     ("*", "Too few frames: steps of {pixels} pixels"): "Zu wenige Bilder: Stufen von {pixels} Pixeln",
     ("*", "{factor}× In-Between Frames"): "{factor}× Zwischenbilder",
-    ("*", "{factor}× In-Between Frames: about {time}, {size}"): "{factor}× Zwischenbilder: etwa {time}, {size}",
+    (
+        "*",
+        "{sentence}. In-between frames take about {time}, {size}",
+    ): "{sentence}. Zwischenbilder brauchen etwa {time}, {size}",
     ("*", "In-between frames are built"): "Die Zwischenbilder sind erstellt",
     ("*", "Stopped: {done} of {total} are built"): "Angehalten: {done} von {total} sind erstellt",
     ("Operator", "Remove"): "Entfernen",

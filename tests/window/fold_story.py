@@ -1,0 +1,103 @@
+"""What is above the fold of the Shutter tab, in Blender's own layout, at both scales of the interface and in both
+languages: every place that is seen is pointed at. Run inside Blender, by test_window.py."""
+
+# ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
+import itertools
+import os
+import sys
+from pathlib import Path
+
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
+sys.path.append(os.environ["SHUTTER_PACKAGES"])
+
+import bpy
+import driver
+import story
+import strobing_story
+
+SCALES = 1.0, 1.5
+TRIPOD, ROW = "bpy.ops.shutter.tripod()", 27  # the row below it is so much lower, in units of the interface
+LANGUAGES = "en_US", "de_DE"
+
+
+def pointed_at():
+    """The operator of the button under the pointer, as Blender copies it; None: there is none."""
+    manager = bpy.context.window_manager
+    window, area = manager.windows[0], driver.area_of("SEQUENCE_EDITOR", "PREVIEW")
+    manager.clipboard = ""
+    with bpy.context.temp_override(window=window, area=area, region=story.sidebar()):
+        if bpy.ops.ui.copy_python_command_button.poll():
+            bpy.ops.ui.copy_python_command_button()
+    return manager.clipboard or None
+
+
+def buttons():
+    """The operators of all buttons that are seen in the tab, and how far down; generator: yield from it."""
+    found, sidebar = {}, story.sidebar()
+    unit = bpy.context.preferences.system.ui_scale
+    for down in range(int(10 * unit), sidebar.height, int(9 * unit)):
+        for across in (0.15, 0.45, 0.7):
+            driver.move(sidebar, sidebar.width * across, sidebar.height - down)
+            yield 0.06
+            if (button := pointed_at()) and button not in found:
+                found[button] = down
+    return found
+
+
+def drawn():
+    with driver.override("PREVIEW"):
+        bpy.ops.shutter.draw("INVOKE_DEFAULT", True)
+    yield 0.5
+    region = story.preview()
+    w, h = region.width, region.height
+    yield from driver.drag(region, [(w * x, h * 0.6) for x in (0.4, 0.45, 0.5)])
+    assert len(story.effect().regions) == 1
+    with driver.override("PREVIEW"):
+        bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+    yield
+
+
+def told():
+    yield from strobing_story.opened()
+    yield from drawn()
+    source = story.edit().sequence_editor.strips_all["Film"]
+    source.transform.rotation, source.crop.max_x, source.color_saturation, source.use_flip_x = 0.01, 2, 0.9, True
+    for language, scale in itertools.product(LANGUAGES, SCALES):
+        bpy.context.preferences.view.language = language
+        bpy.context.preferences.view.ui_scale = scale
+        yield 1.0
+        yield from seen(f"{language}_{scale}")
+
+
+def seen(name):
+    yield from driver.until(
+        lambda: (found := strobing_story.note()) and found.seconds, "the note says what it takes", 30
+    )
+    found = yield from buttons()
+    sidebar = story.sidebar()
+    below = found[TRIPOD] + round(ROW * bpy.context.preferences.system.ui_scale)
+    yield from shutter_chosen(sidebar, below)
+    left, bottom = driver.screen(sidebar, 0, 0)
+    driver.move(story.preview(), 100, story.preview().height + 12)
+    yield 1.0
+    yield from driver.shot_when_shown(name)
+    crop = [left, bottom - sidebar.height + 1, sidebar.width, sidebar.height]
+    driver.saw(step=name, crop=crop, buttons=found, below=below)
+
+
+def shutter_chosen(sidebar, down):
+    """The active region's, by the menu in the row below Tripod."""
+    assert down < sidebar.height, "it is below the fold"
+    driver.move(sidebar, sidebar.width * 0.7, sidebar.height - down)
+    yield 0.5
+    driver.xdotool("click", 1)
+    yield 1.0
+    driver.shot("menu")
+    driver.key("l")
+    yield from driver.until(lambda: story.effect().regions[0].shutter == "Long", "the region has another shutter")
+    story.effect().regions[0].shutter = "Sharp"
+    story.effect().active_shutter = 1
+
+
+if __name__ == "__main__":
+    driver.play(told)
