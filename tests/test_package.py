@@ -318,7 +318,7 @@ def test_installed_without_wheels(blender, dist, bunny, recipe, tmp_path):
     checkout_renders(bunny, recipe, frames, "1:5")
     edit, first = tmp_path / "edit.blend", frames / "0001.png"
     blender.run("-b", "--python-exit-code", 1, "--python", MAKE_EDIT, "--", first, recipe, edit, NAME)
-    cuts = "Virtual Shutter: Stop at Cuts finds none, and windows run across them: the Python package"
+    cuts = "Virtual Shutter: Stop at Cuts finds none, and exposures run across them: the Python package"
     borrowed = "composing on Blender's own GPU"
     blender.run("-b", edit, "-o", tmp_path / "real" / "####", "-s", 1, "-e", 2, "-a", says=[borrowed, cuts])
     command, options = ("--command", "shutter", "render"), ("--recipe", recipe, "--output", tmp_path / "real")

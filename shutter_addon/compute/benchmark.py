@@ -205,7 +205,7 @@ def run(compositor, sizes=SIZES, windows=WINDOWS, seconds: float = 60.0, update=
 
 def table(rows: list[dict], plays: list[dict]) -> str:
     """Both as Markdown."""
-    heads = "size", "window", "picture, ms", "frames/s", "read back, ms", "device memory, MB", "error, levels"
+    heads = "size", "frames", "picture, ms", "frames/s", "read back, ms", "device memory, MB", "error, levels"
     lines = [f"| {' | '.join(heads)} |", "|---" + "|--:" * (len(heads) - 1) + "|"]
     for row in rows:
         place = f"| {row['width']}×{row['height']} | {row['window']} |"
@@ -215,7 +215,7 @@ def table(rows: list[dict], plays: list[dict]) -> str:
         memory = "–" if row["memory"] is None else f"{row['memory'] / MEGABYTE:.0f}"
         numbers = f"{row['ms']:.1f}", f"{row['fps']:.1f}", f"{row['readback_ms']:.1f}", memory, f"{row['error']:.2f}"
         lines.append(f"{place} {' | '.join(numbers)} |")
-    lines += ["", f"| size | largest window that plays at {RATE} frames/s |", "|---|--:|"]
+    lines += ["", f"| size | most frames that play at {RATE} frames/s |", "|---|--:|"]
     for found in plays:
         known = "none" if found["window"] is None else str(found["window"])
         if found.get("left_out"):

@@ -93,7 +93,7 @@ def test_the_report_for_people(noise, check, bpy, tmp_path, capsys):
     lines = capsys.readouterr().out.splitlines()
     assert "Frames: 2 to 3, 64×48" in lines
     assert f"Virtual Shutter: {versions.extension()}, the edit was saved by {versions.extension()}" in lines
-    assert any(line.startswith("Effect Shutter: ") and "windows of 4 frames, 2 shutters" in line for line in lines)
+    assert any(line.startswith("Effect Shutter: ") and "exposures of 4 frames, 2 shutters" in line for line in lines)
     assert lines[-1] == "Chunk size: 2 frames"
     assert command.main(["check", str(tmp_path / "edit.blend"), "--device", "cpu", "--gpu-memory", "0"]) == 0
     assert next(line for line in capsys.readouterr().out.splitlines() if "Memory" in line).endswith(

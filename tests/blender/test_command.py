@@ -95,7 +95,7 @@ def test_without_pyscenedetect_it_says_once_that_no_cut_is_found(command, noise,
     hidden = tmp_path / "hidden"
     hidden.mkdir()
     (hidden / "sitecustomize.py").write_text("import sys\nsys.modules['scenedetect'] = None\n")
-    said = "Stop at Cuts finds none, and windows run across them: the Python package scenedetect is missing"
+    said = "Stop at Cuts finds none, and exposures run across them: the Python package scenedetect is missing"
     for stops in (True, False):
         data = recipe(4, np.ones(4)) | {"stop_at_cuts": stops}
         arguments = (noise[0], "--output", tmp_path / str(stops), "--frames", "1:3")

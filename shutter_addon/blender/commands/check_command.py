@@ -233,7 +233,7 @@ def _lines(report: dict) -> list[str]:
         _saved_by("Blender", report["blender"]),
     ]
     for effect in report["effects"]:
-        words = "{}, {}×{}, windows of {} frames, {} shutters".format(
+        words = "{}, {}×{}, exposures of {} frames, {} shutters".format(
             effect["source"] or "no footage", *effect["size"], effect["window"], effect["shutters"]
         )
         if effect["inbetween"] > 1:

@@ -210,9 +210,9 @@ def _look_at_mattes(found: EffectCheck, source, requests: dict[float, FrameReque
 def _notes(found: EffectCheck, requests: dict[float, FrameRequest]) -> list[str]:
     notes = []
     if (package := cuts.missing_package()) and any(each.state.options.stop_at_cuts for each in requests.values()):
-        notes.append(f"no cuts are found, and windows run across them: the Python package {package} is missing")
+        notes.append(f"no cuts are found, and exposures run across them: the Python package {package} is missing")
     if found.needs.sends:
-        notes.append("the GPU has no room for a window: every picture sends its frames anew, which is slow")
+        notes.append("the GPU has no room for all frames of an exposure: every picture sends them anew, which is slow")
     return notes
 
 

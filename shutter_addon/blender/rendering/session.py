@@ -531,7 +531,7 @@ def _say_once(sentence: str, say) -> None:
 
 def _say_of_cuts(say) -> None:
     if package := cuts.missing_package():
-        sentence = f"Stop at Cuts finds none, and windows run across them: the Python package {package} is missing"
+        sentence = f"Stop at Cuts finds none, and exposures run across them: the Python package {package} is missing"
         _say_once(sentence, say)
 
 
