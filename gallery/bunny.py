@@ -20,7 +20,7 @@ def still(shots):
         ),
         stills.row(
             Panel(shot.source(FRAME), "Source"),
-            Panel(shot.coefficients(FRAME), "Coefficients"),
+            Panel(shot.coefficients(FRAME), "Mattes"),
             Panel(shot.everywhere(FRAME, "Long"), "The long exposure alone"),
         ),
         caption=ITEM.caption,

@@ -20,7 +20,7 @@ def row(shot: Shot, frame: int):
     return stills.row(
         Panel(shot.source(frame), f"Source, frame {frame}"),
         Panel(shot.scribbles(frame, 0.4), "Scribbles"),
-        Panel(shot.coefficients(frame), "Coefficients"),
+        Panel(shot.coefficients(frame), "Mattes"),
         Panel(shot.result(frame), "Result"),
     )
 

@@ -133,7 +133,7 @@ def undone_meanwhile():
     """The build is no step of undo, and goes on."""
     bpy.ops.ed.undo_push(message="Factor")
     story.effect().border = False
-    bpy.ops.ed.undo_push(message="Border")
+    bpy.ops.ed.undo_push(message="Default at Edge")
     yield from building_begun()
     driver.key("ctrl+z")
     yield from driver.until(lambda: story.effect().border, "the border is back")

@@ -18,7 +18,7 @@ def add(commands) -> None:
     parser.add_argument("--device", choices=devices.CHOICES, help="as for render")
     parser.add_argument("--json", type=command_line.place, metavar="FILE.json", help="also write what was measured")
     parser.add_argument("--sizes", type=_sizes, default=benchmark.SIZES, metavar="WxH,…", help="of pictures")
-    parser.add_argument("--windows", type=_windows, default=benchmark.WINDOWS, metavar="L,…", help="frames of their exposures")
+    parser.add_argument("--windows", type=_windows, default=benchmark.WINDOWS, metavar="L,…", help="frames a picture")
     parser.add_argument(
         "--seconds", type=_seconds, default=60.0, help="about how long it may take; what would take longer is left out"
     )

@@ -34,7 +34,7 @@ def add(commands) -> None:
     )
     command_line.add_device(parser)
     parser.add_argument(
-        "--weights", type=command_line.place, metavar="DIR", help="also write how much of each shutter a pixel gets, as float EXR"
+        "--weights", type=command_line.place, metavar="DIR", help="also write the mattes of the shutters, as float EXR"
     )
     parser.add_argument("--save", type=command_line.place, metavar="FILE.blend", help="keep the edit")
     parser.add_argument(
