@@ -385,3 +385,14 @@ def test_the_extension_leaves_nothing_kept(bpy, edit, add):
         assert not lifecycle._layer_names
     finally:
         handlers.register()
+
+
+def test_an_effect_stays_what_it_is_while_another_edit_gets_a_copy(bpy, edit, add):
+    """Undo takes an edit for unchanged that the last step did not change: a new scene in it would be gone then."""
+    strip = add()
+    scene, identity = strip.scene, strip.scene.virtual_shutter.identity
+    other = bpy.data.scenes.new("A first one")
+    pasted = other.sequence_editor_create().strips.new_scene("Pasted", scene, 1, 1)
+    update(bpy)
+    assert (strip.scene, scene.virtual_shutter.identity) == (scene, identity)
+    assert pasted.scene != scene

@@ -22,13 +22,14 @@ def adopt() -> None:
                     for origin, same in parts.items():
                         own = _copied(scene) if strips.effect_of(original[0], scene) else scene
                         _duplicate(*original, edit, same, origin, own)
+                        taken.add(own)
             else:
                 if scene in taken:  # the edit is a copy, its effects' data copied with it
                     effect.scene = _copied(scene)
                     for strip in (strip for same in parts.values() for strip in same):
                         strip.scene = effect.scene
                 _settle(edit, effect, parts)
-            taken.add(scene)
+                taken.add(scene)
 
 
 def _groups(edit) -> dict:
