@@ -124,7 +124,7 @@ def _after_render(scene, *_):
 
 
 def _drop_frames():
-    """Drops what the sequencer keeps from while the extension was not enabled: pictures without effects."""
+    """Drops the finished frames of all effects."""
     for edit in bpy.data.scenes:
         strips.invalidate(edit)
 
@@ -148,7 +148,8 @@ HANDLERS = {
 def register():
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).append(function)
-    bpy.app.timers.register(_drop_frames)  # while it registers, Blender's data cannot be had
+    # Those that the sequencer keeps from before lack the effects; while this registers, Blender's data cannot be had.
+    bpy.app.timers.register(_drop_frames)
 
 
 def unregister():
