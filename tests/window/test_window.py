@@ -202,7 +202,7 @@ def test_what_is_tracked_ends_with_its_track(tmp_path, backend):
     assert facts["gaps"] == [["-inf", str(first)], [str(last), "inf"]]
     steps = {entry["step"]: crop(tmp_path, entry) for entry in seen if "step" in entry}
     height = next(iter(steps.values())).shape[0]
-    above = slice(height // 8, height * 3 // 4)  # the bar editor, and below notes, which come when they are known
+    above = slice(height // 4, height * 3 // 4)  # the bar editor, and below notes, which come when they are known
     for frame in (20, 50, 61, 76):
         apart = np.abs(steps[f"there_{frame:03d}"][above] - steps[f"without_{frame:03d}"][above])
         assert (apart.max() > 25) == (frame in (50, 61)), frame
