@@ -52,6 +52,7 @@ class PrefetchSource(SourceWrapper):
 
     def decoded(self, index: int) -> np.ndarray | Planes:
         """As `read`, but for the conversion."""
+        stopping.check()
         with self._changed:
             self._asked.append(index)
             self._wake()

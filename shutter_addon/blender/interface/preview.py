@@ -107,6 +107,7 @@ class ShutterPreview(PropertyGroup):
 
 def _draw() -> None:
     """The draw handler of the previews."""
+    global _slice
     context = bpy.context
     settings = context.window_manager.virtual_shutter
     blender_gpu.free_unused()
@@ -138,6 +139,7 @@ def _draw() -> None:
         try:
             with stopping.once(_time_up(found) if previewing.may_be_late() else stopping.never):
                 _show(context, found, settings, say)
+            _slice = None, _SLICE
         except stopping.StoppedError:
             say(rpt_("Composing…"))
             quad = Quad(context.region, found.strip, annotations.picture_size(found.effect))
@@ -150,10 +152,10 @@ def _draw() -> None:
 
 def _time_up(found: Shown):
     """What says whether a picture has been composed for so long that Blender has to look at its keys: it goes on when
-    it is drawn again. Each time, it has twice as long, so that it comes to an end."""
+    it is drawn again. Each time, it has half as long again, so that it comes to an end."""
     global _slice
     shown = found.effect.scene.session_uid, found.edit.frame_current
-    seconds = 2 * _slice[1] if _slice[0] == shown else _SLICE
+    seconds = 1.5 * _slice[1] if _slice[0] == shown else _SLICE
     _slice, end = (shown, seconds), time.monotonic() + seconds
     return lambda: time.monotonic() > end
 
@@ -201,12 +203,14 @@ def _show(context, found: Shown, settings, say) -> None:
     if context.space_data.show_overlays:
         is_still = not context.screen.is_animation_playing
         _tell_detail(request.renderer.source, size, request is not exact, is_still, say)
-        if is_still:
+        if is_still and not previewing.may_be_late():  # what it measures would take from what runs
             _tell_strobing(found, snapshot, exact, say)
     has_result = settings.view in RESULTS
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
+    if previewing.is_tracking():  # a stroke is seen to stay on its subject where that is sharp
+        left = 1.0
     # Else the engine has composed it, and it lies there in its place among the other strips.
-    draws_result = has_result and (not _is_rendered(found) or previewing.is_drawn(context, found, request))
+    draws_result = has_result and left < 1 and (not _is_rendered(found) or previewing.is_drawn(context, found, request))
     if left > 0 or draws_result:
         _warn(found, say)
     if left > 0:

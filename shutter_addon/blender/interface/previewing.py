@@ -20,8 +20,9 @@ from . import preview_areas, sharp_frame
 # Operators that read the sequencer's pictures, from the window.
 _READERS = {"RENDER_OT_opengl", "SEQUENCER_OT_sample"}
 # Operators by which one picture comes after another, as where it plays: drafts, so that a key need not wait.
-_GOING = {"ANIM_OT_change_frame", "SHUTTER_OT_track", "SHUTTER_OT_track_camera"}
-_GOING |= {"SHUTTER_OT_panning_shot", "SHUTTER_OT_tripod"}
+_TRACKING = {"SHUTTER_OT_track", "SHUTTER_OT_track_camera", "SHUTTER_OT_panning_shot", "SHUTTER_OT_tripod"}
+_BUILDING = {"SHUTTER_OT_inbetween_build", "SHUTTER_OT_smooth_streaks"}
+_GOING = {"ANIM_OT_change_frame"} | _TRACKING | _BUILDING
 _MOMENT = 0.3  # seconds
 _late_until = 0.0
 _READING_TOOL = "builtin.sample"  # reads once before it is one of those that run
@@ -153,14 +154,19 @@ def is_drawn(context, found: Shown, request: session.FrameRequest) -> bool:
 
 
 def is_going(context) -> bool:
-    """Whether the film plays, the playhead is dragged, or what is tracked is shown."""
+    """Whether the film plays, or may_be_late."""
     is_playing = any(window.screen.is_animation_playing for window in context.window_manager.windows)
     return is_playing or may_be_late()
 
 
+def is_tracking() -> bool:
+    """Whether what is tracked is shown."""
+    return bool(_TRACKING & render_job.operators_running())
+
+
 def may_be_late() -> bool:
-    """Whether the playhead is dragged, or what is tracked is shown, or was a moment ago: keys count for more than
-    pictures."""
+    """Whether the playhead is dragged, something is tracked or in-between frames are built, or was a moment ago: keys
+    count for more than pictures."""
     global _late_until
     if _GOING & render_job.operators_running():
         _late_until = time.monotonic() + _MOMENT

@@ -16,7 +16,7 @@ from ..rendering.session import FAULTS
 from .operators import _OfEffect, _OfRegion, _OfShutter, _OfStrokes, redraw, refused
 
 # Seconds of work from one look at the window to the next, at least and at most, and between two looks at its thread.
-_TICK, _MOST, _PATIENCE = 0.05, 0.25, 0.02
+_TICK, _MOST, _PATIENCE = 0.05, 0.1, 0.02
 
 DIRECTIONS = (
     ("BACKWARD", "Backward", "Towards the strip's first frame", "TRACKING_BACKWARDS", 0),
