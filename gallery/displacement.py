@@ -2,7 +2,7 @@
 
 from math import pi, radians, sin
 
-from shutter_addon.core import keyframes
+from shutter_addon.core.model import keyframes
 
 from . import stills
 from .item import Item

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from shutter_addon.core import light, recipe
+from shutter_addon.core.frames import light
+from shutter_addon.core.recipes import recipe
 from shutter_addon.media import open_source
 
 from . import stills

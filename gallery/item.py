@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from shutter_addon.compute.renderer import Renderer, open_compositor
-from shutter_addon.core import light, recipe, scribbles
-from shutter_addon.core.frame_state import FrameState
+from shutter_addon.core.frames import light
+from shutter_addon.core.model import scribbles
+from shutter_addon.core.model.frame_state import FrameState
+from shutter_addon.core.recipes import recipe
 from shutter_addon.media import open_source
 from shutter_addon.media.matte_files import MatteFile
 from shutter_addon.media.matte_values import MatteValues

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shutter_addon.core import recipe
+from shutter_addon.core.recipes import recipe
 from shutter_addon.media import open_source
 
 from . import stills

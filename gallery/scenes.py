@@ -15,7 +15,7 @@ import bmesh
 from mathutils import Matrix
 from tqdm import tqdm
 
-from shutter_addon.core import light
+from shutter_addon.core.frames import light
 
 SIZE = 960, 540
 

@@ -47,8 +47,10 @@ from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.passes import LOCAL_ROW, Image, Pass
 from shutter_addon.compute.tables import table as table_of
 from shutter_addon.compute.window import Frames
-from shutter_addon.core import compositor, light, mattes, scribbles, shutters
-from shutter_addon.core.frame_state import Following, FrameState, Options
+from shutter_addon.core.frames import light
+from shutter_addon.core.model import mattes, scribbles, shutters
+from shutter_addon.core.model.frame_state import Following, FrameState, Options
+from shutter_addon.core.pixels import compositor
 
 HERE = Path(__file__).resolve().with_suffix("")
 METHODS = ("ours", "paper", "average", "edges", "follow")

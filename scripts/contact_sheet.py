@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from gallery import stills
 from gallery.item import Shot
 from gallery.stills import Panel
-from shutter_addon.core.recipe import RecipeError
+from shutter_addon.core.recipes.recipe import RecipeError
 from shutter_addon.media import MediaError
 
 

@@ -25,8 +25,8 @@ sys.path.insert(0, str(ROOT))
 
 from shutter_addon.compute import guide  # noqa: E402
 from shutter_addon.compute.renderer import Renderer, open_compositor  # noqa: E402
-from shutter_addon.core.frame_state import FrameState, Options  # noqa: E402
-from shutter_addon.core.scribbles import Shape  # noqa: E402
+from shutter_addon.core.model.frame_state import FrameState, Options  # noqa: E402
+from shutter_addon.core.model.scribbles import Shape  # noqa: E402
 from shutter_addon.media import open_source  # noqa: E402
 from shutter_addon.media.source import SourceWrapper  # noqa: E402
 

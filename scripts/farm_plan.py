@@ -26,7 +26,8 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from shutter_addon.core import chunks, presets
+from shutter_addon.core.farm import chunks
+from shutter_addon.core.model import presets
 from shutter_addon.media import open_source
 
 LENGTHS = {1: (1, 13), 8: (1, 4)}  # pictures of the chunks that are measured, by factor

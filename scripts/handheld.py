@@ -25,7 +25,9 @@ from panning import exposed, run, unfollowing
 from quality import similarity
 
 from gallery import handheld as scene
-from shutter_addon.core import light, motions, recipe
+from shutter_addon.core.frames import light
+from shutter_addon.core.model import motions
+from shutter_addon.core.recipes import recipe
 from shutter_addon.media import open_source
 
 ROOT = Path(__file__).resolve().parents[1]

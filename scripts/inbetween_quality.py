@@ -37,7 +37,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from quality import similarity
 
-from shutter_addon.core import light
+from shutter_addon.core.frames import light
 from shutter_addon.media import MediaError, flow, open_source
 
 ROOT = Path(__file__).resolve().parents[1]

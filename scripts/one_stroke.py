@@ -33,7 +33,8 @@ import one_stroke_scenes as truth
 
 from gallery import stills
 from shutter_addon.compute.renderer import Renderer, open_compositor
-from shutter_addon.core import recipe, scribbles
+from shutter_addon.core.model import scribbles
+from shutter_addon.core.recipes import recipe
 from shutter_addon.media import open_source
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -27,7 +27,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from quality import similarity
 
 from gallery import panning as scene
-from shutter_addon.core import recipe
+from shutter_addon.core.recipes import recipe
 from shutter_addon.media import open_source
 
 ROOT = Path(__file__).resolve().parents[1]

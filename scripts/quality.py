@@ -23,8 +23,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmark import BARS, bars, shapes
 
 from shutter_addon.compute.renderer import Renderer, open_compositor
-from shutter_addon.core import light
-from shutter_addon.core.frame_state import FrameState, Options
+from shutter_addon.core.frames import light
+from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.media import MediaError, open_source
 
 ASSETS = Path(__file__).resolve().parents[1] / "assets"

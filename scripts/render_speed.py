@@ -56,7 +56,9 @@ from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.device import NoDeviceError
 from shutter_addon.compute.gl import GLDevice
 from shutter_addon.compute.renderer import Renderer
-from shutter_addon.core import light, presets, recipe
+from shutter_addon.core.frames import light
+from shutter_addon.core.model import presets
+from shutter_addon.core.recipes import recipe
 from shutter_addon.media import MediaError, open_source
 from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.prefetch import PrefetchSource

@@ -123,7 +123,7 @@ def make_edit():
 
 
 def add_effect(edit, source):
-    recipe, presets = part("core.recipe"), part("core.presets")
+    recipe, presets = part("core.recipes.recipe"), part("core.model.presets")
     strip, effect = part("blender.editing.add_effect").add_effect(edit, source)
     bars = {"Long": "ANGLE_360", "Half": "ANGLE_180", "Ramp": "RAMP_UP"}
     strokes = {"Half": [[0.4, 0.3], [0.45, 0.6]], "Ramp": [[0.75, 0.2], [0.7, 0.7]]}

@@ -24,8 +24,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from shutter_addon.core.effect import Drawings, Region
-from shutter_addon.core.keyframes import Constant
+from shutter_addon.core.model.effect import Drawings, Region
+from shutter_addon.core.model.keyframes import Constant
 from shutter_addon.media import PrefetchSource, open_source, tracking
 from shutter_addon.media.cuts import ShotSource
 

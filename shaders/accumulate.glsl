@@ -1,7 +1,7 @@
 // Adds a frame to the running sums, or takes it away: from the layer `known` to the layer `next`.
 // The frame: the one that was sent, in light that is summed (DECODE: 0 as it is, 1 made linear, 2 encoded), `whole` for white,
 // its colours with NUMBERS in one of 0 to 2²⁴ − 1, R + 256 G + 65536 B;
-// with PLANES by the whole numbers of libswscale (core/planes.py) from samples of luma and chroma;
+// with PLANES by the whole numbers of libswscale (core/frames/planes.py) from samples of luma and chroma;
 // or with AGAIN one that the sums hold already, between the layers `before` and `after`.
 #include "light.glsl"
 #include "sums.glsl"

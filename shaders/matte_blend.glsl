@@ -1,4 +1,4 @@
-// Lays COUNT mattes over coefficients, four shutters of a pixel: core/mattes.py's `blended`.
+// Lays COUNT mattes over coefficients, four shutters of a pixel: core/model/mattes.py's `blended`.
 #include "inside.glsl"
 
 void main()

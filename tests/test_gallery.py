@@ -13,7 +13,8 @@ from OpenImageIO import ImageBuf
 from gallery import NAMES, bunny, time_map
 from gallery.item import HERE, ROOT, Shot
 from shutter_addon.compute.renderer import Renderer, open_compositor
-from shutter_addon.core import light, recipe
+from shutter_addon.core.frames import light
+from shutter_addon.core.recipes import recipe
 from shutter_addon.media import open_source
 from shutter_addon.media.matte_values import MatteValues
 

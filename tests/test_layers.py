@@ -22,9 +22,9 @@ def imported(path):
 
 BLENDER = {"bpy", "bpy_extras", "gpu", "mathutils", "bl_ui", "addon_utils"}
 FORBIDDEN = {
-    "core": BLENDER | {"moderngl", "av", "OpenImageIO", "..media", "..compute", "..blender"},
-    "media": BLENDER | {"moderngl", "..compute", "..blender"},
-    "compute": BLENDER | {"av", "OpenImageIO", "..media", "..blender"},
+    "core": BLENDER | {"moderngl", "av", "OpenImageIO", "media", "compute", "blender"},
+    "media": BLENDER | {"moderngl", "compute", "blender"},
+    "compute": BLENDER | {"av", "OpenImageIO", "media", "blender"},
 }
 
 
@@ -33,29 +33,52 @@ def test_no_leak(layer):
     files = list((PACKAGE / layer).rglob("*.py"))
     assert files
     for path in files:
-        for name in imported(path):
-            assert name not in FORBIDDEN[layer], f"{path.name} imports {name}"
-            assert not any(name.startswith(f"{f}.") for f in FORBIDDEN[layer] if f.startswith("."))
+        used = {name.split(".")[0] for name in imported(path) if name[0] != "."} | above(path, PACKAGE)
+        assert not used & FORBIDDEN[layer], f"{path.name} imports {used & FORBIDDEN[layer]}"
 
 
-# The rooms of blender/, and which others each may use. Beside them are command.py and the handlers, which use all.
+def above(path, folder):
+    """What a file imports from the top of a folder that it lies in, by its first name."""
+    up = "." * len(path.relative_to(folder).parts)
+    return {name.lstrip(".").split(".")[0] for name in imported(path) if re.match(re.escape(up) + r"\w", name)}
+
+
+# The rooms of core/ and blender/, and what of their layer each may use. Beside those of core lies what all rooms use,
+# beside those of blender command.py and the handlers, which use all rooms.
+BASICS = {"atomic_write", "messages", "stopping"}
 ROOMS = {
-    "data": set(),
-    "rendering": {"data"},
-    "editing": {"data", "rendering"},
-    "interface": {"data", "rendering", "editing"},
-    "commands": {"data", "rendering", "editing"},
+    "core": {
+        "frames": BASICS,
+        "model": {"frames", *BASICS},
+        "pixels": {"frames", "model", *BASICS},
+        "recipes": {"frames", "model", *BASICS},
+        "masks": BASICS,
+        "farm": BASICS,
+    },
+    "blender": {
+        "data": set(),
+        "rendering": {"data"},
+        "editing": {"data", "rendering"},
+        "interface": {"data", "rendering", "editing"},
+        "commands": {"data", "rendering", "editing"},
+    },
 }
 
 
-def test_rooms_use_those_below_them_alone():
-    folders = {path.name for path in (PACKAGE / "blender").iterdir() if path.is_dir() and path.name != "__pycache__"}
-    assert folders == ROOMS.keys()
-    for room, below in ROOMS.items():
-        for path in (PACKAGE / "blender" / room).rglob("*.py"):
-            up = "." * len(path.relative_to(PACKAGE / "blender").parts)
-            used = {name.lstrip(".").split(".")[0] for name in imported(path) if re.match(re.escape(up) + r"\w", name)}
+@pytest.mark.parametrize("layer", ROOMS)
+def test_rooms_use_those_below_them_alone(layer):
+    folders = {path.name for path in (PACKAGE / layer).iterdir() if path.is_dir() and path.name != "__pycache__"}
+    assert folders == ROOMS[layer].keys()
+    for room, below in ROOMS[layer].items():
+        for path in (PACKAGE / layer / room).rglob("*.py"):
+            used = above(path, PACKAGE / layer)
             assert used <= below, f"{room}/{path.name} uses {used - below}"
+
+
+def test_what_all_rooms_of_core_use_needs_none():
+    assert {path.stem for path in (PACKAGE / "core").glob("*.py")} == {"__init__", *BASICS}
+    for name in BASICS:
+        assert above(PACKAGE / "core" / f"{name}.py", PACKAGE / "core") <= BASICS
 
 
 def test_no_two_modules_have_the_same_name():
@@ -73,7 +96,7 @@ def test_they_run_without_bpy():
     code = """
 import sys
 sys.modules["bpy"] = sys.modules["gpu"] = None
-import shutter_addon.core.recipe, shutter_addon.core.compositor, shutter_addon.core.presets
+import shutter_addon.core.recipes.recipe, shutter_addon.core.pixels.compositor, shutter_addon.core.model.presets
 import shutter_addon.media, shutter_addon.compute.renderer, shutter_addon.compute.gpu
 """
     subprocess.run([sys.executable, "-c", code], check=True, cwd=PACKAGE.parent)

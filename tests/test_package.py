@@ -157,7 +157,7 @@ for path in ({str(bunny)!r}, "none.mp4"):
 
 def test_a_recipe_without_cattrs_is_one_sentence():
     code = """
-from shutter_addon.core import recipe
+from shutter_addon.core.recipes import recipe
 try:
     recipe.parse('{"version": 1, "window": 1, "shutters": [{"name": "S", "bars": [1]}]}')
 except recipe.RecipeError as error:

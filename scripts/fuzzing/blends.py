@@ -78,7 +78,7 @@ def _edit(bpy, folder, data):
     """An edit as a user makes it: an effect on an image strip, from frame 1 to 40. The names of edit and source."""
     from shutter_addon.blender.data import recipe_import, selection
     from shutter_addon.blender.editing import add_effect
-    from shutter_addon.core import recipe
+    from shutter_addon.core.recipes import recipe
 
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     edit = bpy.context.scene
@@ -263,7 +263,7 @@ def _draw(bpy, _folder):
 def _export(bpy, folder):
     from shutter_addon.blender.data import selection, validation
     from shutter_addon.blender.rendering import matte_export
-    from shutter_addon.core.recipe import RecipeError
+    from shutter_addon.core.recipes.recipe import RecipeError
     from shutter_addon.media import MediaError
 
     if found := selection.active(bpy.context):

@@ -24,7 +24,7 @@ def plausible(random, longest: int) -> dict:
     """A recipe that keeps to the format, with a window of so many frames at most."""
     from test_export import following_recipes
 
-    from shutter_addon.core import recipe
+    from shutter_addon.core.recipes import recipe
 
     return json.loads(recipe.dump(hostile.drawn(following_recipes(longest), random)))
 
@@ -42,7 +42,7 @@ def make(random, folder):
 
 
 def run(folder):
-    from shutter_addon.core import recipe
+    from shutter_addon.core.recipes import recipe
 
     with trial.only(recipe.RecipeError):
         found = recipe.load(folder / "recipe.json")

@@ -242,7 +242,7 @@ void store(int quad, int pixel, float gain)
   vec4 color = total[quad][pixel] / max(share[quad][pixel], 1e-6);
 #endif
 #if EDGES == 2
-  // Where nothing of the shutter is left, the nearest frame that there is (core/compositor.py has the 1e-3).
+  // Where nothing of the shutter is left, the nearest frame that there is (core/pixels/compositor.py has the 1e-3).
   color = share[quad][pixel] > 1e-6 ? color : nearest_light(quad, pixel, int(centre[quad][pixel] - 1e-3));
 #endif
 #if ENCODED

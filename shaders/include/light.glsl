@@ -1,4 +1,4 @@
-// The sRGB transfer; core/light.py is the reference.
+// The sRGB transfer; core/frames/light.py is the reference.
 
 // For code values in [0, 1] a polynomial within 0.03 of an 8-bit level: three powers cost more than a frame's fetch.
 vec3 to_linear(vec3 encoded)

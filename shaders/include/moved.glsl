@@ -5,7 +5,7 @@
 // per shutter, MIXED of them: turn − 1 and shift, real and imaginary parts. seen_first to seen_last: the window's frames that are there.
 // table: as for compose.glsl, a row for each frame and motion; from row `parts` on, one for each motion: 1 for its shutters.
 // SEVERAL: other passes have other frames. CONTINUED: what those before have summed is in `summed`; UNFINISHED: another
-// one follows. SHARP: as in core.compositor.seen.
+// one follows. SHARP: as in core.pixels.compositor.seen.
 int motion = 0;
 
 vec4 moved_weights(float t)

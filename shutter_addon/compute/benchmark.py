@@ -17,9 +17,11 @@ from statistics import median
 
 import numpy as np
 
-from ..core import compositor, light, presets, scribbles
-from ..core.frame_source import FrameSource
-from ..core.frame_state import FrameState, Options
+from ..core.frames import light
+from ..core.frames.frame_source import FrameSource
+from ..core.model import presets, scribbles
+from ..core.model.frame_state import FrameState, Options
+from ..core.pixels import compositor
 from .budget import MEGABYTE
 from .device import NoDeviceError
 from .renderer import Renderer
@@ -86,7 +88,8 @@ def shapes(count: int) -> tuple[scribbles.Shape, ...]:
 
 
 def reference(state: FrameState, codes: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
-    """The linear colours (P, 3) float64 of pixels: core.compositor's, a few at a time, for their weights are large.
+    """The linear colours (P, 3) float64 of pixels: core.pixels.compositor's, a few at a time, for their weights are
+    large.
 
     codes: (L, P, 4) uint8 of the window's frames; coefficients: (N, P)"""
     frames = light.premultiplied(codes / 255.0, light.to_linear)[:, None]

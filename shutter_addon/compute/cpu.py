@@ -11,9 +11,12 @@ from functools import partial
 
 import numpy as np
 
-from ..core import compositor, light, mattes, shutters, stopping
-from ..core.frame_source import FrameSource
-from ..core.frame_state import FrameState, Options
+from ..core import stopping
+from ..core.frames import light
+from ..core.frames.frame_source import FrameSource
+from ..core.model import mattes, shutters
+from ..core.model.frame_state import FrameState, Options
+from ..core.pixels import compositor
 from .diffusion import diffuse
 from .edge_diffusion import diffuse_along_edges, follows_edges
 from .resampling import around, resampled
@@ -189,7 +192,7 @@ class Solver:
 
 
 class Matting:
-    """core.mattes, with the methods of compute.matting.Matting."""
+    """core.model.mattes, with the methods of compute.matting.Matting."""
 
     def lay(self, beneath: np.ndarray, shown: tuple[mattes.Matte, ...], layers) -> np.ndarray:
         return mattes.blended(beneath, shown, [values for _, values in layers])

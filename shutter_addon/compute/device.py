@@ -33,7 +33,8 @@ class Device(Protocol):
     max_size: texels along a texture's side, at most
     max_layers: layers of a texture array, at most
     budget: what all textures on this GPU may take
-    takes_planes: whether frames that are planes (core.planes) are quickest to send as such; it has to write r32ui then
+    takes_planes: whether frames that are planes (core.frames.planes) are quickest to send as such; it has to write
+    r32ui then
     """
 
     name: str

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core import stopping
-from ..core.conductances import cell_side, conductances
+from ..core.pixels.conductances import cell_side, conductances
 from .diffusion import COLOURS, finished
 
 # Cycles where the guide's cells are pixels, at most, and the iterations of conjugate gradients in each: frames of films
@@ -37,7 +37,7 @@ def diffuse_along_edges(labels: np.ndarray, count: int, guide: np.ndarray, stren
     """Coefficients (count, H, W) float32, ≥ 0 and of sum 1, from labels (H, W): 0 free, 1 + shutter fixed. Some pixel
     has to be fixed, and some free.
 
-    guide: (h, w, 3 or more) as for core.conductances; its cells are pixels, or 2 × 2, 4 × 4, … of them
+    guide: (h, w, 3 or more) as for core.pixels.conductances; its cells are pixels, or 2 × 2, 4 × 4, … of them
     strength: 0 … 1, how much conductances follow it
     """
     side = cell_side(guide.shape[:2], labels.shape)

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..core.conductances import cell_side, resistances
+from ..core.pixels.conductances import cell_side, resistances
 from .diffusion_gpu import CHANGED, FINISH, GRID, GRIDS, LABELS, NOTHING, READ, STORED, Diffusion, tile_pass
 from .edge_diffusion import CYCLES, SWEEPS, TWICE, first_solved, is_enough
 from .passes import LOCAL_ROW, Image, Pass

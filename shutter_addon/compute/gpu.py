@@ -6,9 +6,9 @@ from functools import cache
 
 import numpy as np
 
-from ..core import compositor
-from ..core.frame_source import FrameSource
-from ..core.frame_state import FrameState, Options
+from ..core.frames.frame_source import FrameSource
+from ..core.model.frame_state import FrameState, Options
+from ..core.pixels import compositor
 from . import cpu
 from .device import Device, NoDeviceError
 from .diffusion_gpu import Diffusion
@@ -138,7 +138,7 @@ def composition_of_moved(
 
     quads: of pixels that an invocation composes; mixed: motions that are mixed for a pixel; packed: as PackedFrames are
     shortened: frames are left out
-    sharp: how frames are resampled (core.compositor.seen)
+    sharp: how frames are resampled (core.pixels.compositor.seen)
     at: whether passes over other frames come before and after; the others as for `composition`"""
     continued, unfinished = at
     levels = levels and not unfinished
@@ -412,7 +412,7 @@ class GPUCompositor:
         next picture of the kind.
 
         window: must have loaded all frames that some shutter exposes
-        index, direction: as for core.compositor.window_positions
+        index, direction: as for core.pixels.compositor.window_positions
         handle: coefficients, a texture of a solver or of `constant`; block: the pixels along a side of each texel
         """
         if state.following is not None:

@@ -1,4 +1,4 @@
-"""Guides of edge-aware diffusion: the shown frame as resistances are made of it (core.conductances).
+"""Guides of edge-aware diffusion: the shown frame as resistances are made of it (core.pixels.conductances).
 
 A guide is a frame's display values on cells of 1, 2, 4 … pixels, without its finest detail. Its differences are scaled
 to those of a picture of ROWS rows (or columns, where it is upright).
@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core import light
-from ..core.frame_source import FrameSource
+from ..core.frames import light
+from ..core.frames.frame_source import FrameSource
+from ..core.frames.planes import Planes, as_rgba
 from ..core.messages import UserError
-from ..core.planes import Planes, as_rgba
 
 # Rows of the picture whose pixels are smoothed over about one, by a Gaussian of so many pixels.
 ROWS = 240

@@ -1,4 +1,4 @@
-"""Mattes laid over coefficients on a device (core.mattes.blended)."""
+"""Mattes laid over coefficients on a device (core.model.mattes.blended)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from ..core.mattes import Matte
+from ..core.model.mattes import Matte
 from .device import Device
 from .passes import LOCAL_ROW, Image, Pass
 
@@ -45,7 +45,7 @@ class Matting:
         """Coefficients, a texture array rgba32f as of a solver, valid until the next call.
 
         beneath: coefficients, a texture of a solver or of GPUCompositor.constant
-        layers: of each matte a key, and its values (h, w) float32 (core.mattes.MatteReader.values)"""
+        layers: of each matte a key, and its values (h, w) float32 (core.model.mattes.MatteReader.values)"""
         height, width = layers[0][1].shape
         values = self._texture("values", (width, height, min(len(mattes), MOST)), "r32f")
         ends = ["even", "odd"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..core.frame_source import FrameSource
+from ..core.frames.frame_source import FrameSource
 from . import cpu
 from .budget import Budget
 from .device import Device, NoDeviceError

@@ -1,4 +1,4 @@
-"""Shares of coefficients, added up on a device: where scribbles are not quite opaque (core.scribbles.layers)."""
+"""Shares of coefficients, added up on a device: where scribbles are not quite opaque (core.model.scribbles.layers)."""
 
 from __future__ import annotations
 

@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import compositor, scribbles
-from ..core.frame_source import FrameSource
-from ..core.frame_state import FrameState
-from ..core.mattes import MatteReader
+from ..core.frames.frame_source import FrameSource
+from ..core.model import scribbles
+from ..core.model.frame_state import FrameState
+from ..core.model.mattes import MatteReader
+from ..core.pixels import compositor
 from . import guide
 from .cpu import CPUCompositor
 from .device import NoDeviceError
@@ -150,9 +151,9 @@ class Renderer:
         return shot
 
     def positions(self, index: int, direction: int, state: FrameState, shot: range) -> np.ndarray:
-        """The positions (core.compositor.window_positions) that any shutter exposes, whether it has a scribble or not.
-        Where frames of them are left out (edges "shorten"), all positions of the window that have a frame: the nearest
-        may be needed in place of those."""
+        """The positions (core.pixels.compositor.window_positions) that any shutter exposes, whether it has a scribble
+        or not. Where frames of them are left out (edges "shorten"), all positions of the window that have a frame: the
+        nearest may be needed in place of those."""
         positions = compositor.window_positions(state.options, index, direction)
         exposed = slice(*state.open_span)
         if state.options.edges != "shorten":

@@ -1,4 +1,4 @@
-"""Frames seen elsewhere than where their pixels are, with NumPy: what core.compositor.seen does, for a part."""
+"""Frames seen elsewhere than where their pixels are, with NumPy: what core.pixels.compositor.seen does, for a part."""
 
 from __future__ import annotations
 

@@ -6,9 +6,9 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from ..core import compositor
-from ..core.frame_source import FrameSource
-from ..core.frame_state import Options
+from ..core.frames.frame_source import FrameSource
+from ..core.model.frame_state import Options
+from ..core.pixels import compositor
 
 
 def summable(source: FrameSource) -> bool:
@@ -43,8 +43,8 @@ class RunningSums(ABC):
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
         """Reads the frames at these positions that are not loaded.
 
-        positions: of core.compositor.window_positions; the first and the last less than `capacity` apart
-        shot: the source frames that the window may show (core.compositor.source_frames)
+        positions: of core.pixels.compositor.window_positions; the first and the last less than `capacity` apart
+        shot: the source frames that the window may show (core.pixels.compositor.source_frames)
         """
         self.shot = shot
         first, last = int(positions.min()), int(positions.max()) + 1

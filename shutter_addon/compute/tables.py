@@ -6,8 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..core import shutters
-from ..core.frame_state import FrameState
+from ..core.model import shutters
+from ..core.model.frame_state import FrameState
 
 
 def padded(values: np.ndarray) -> np.ndarray:

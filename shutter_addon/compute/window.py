@@ -6,10 +6,11 @@ from functools import cache
 
 import numpy as np
 
-from ..core import compositor, light
-from ..core.frame_source import FrameSource
-from ..core.frame_state import Options
-from ..core.planes import Planes, chroma_step
+from ..core.frames import light
+from ..core.frames.frame_source import FrameSource
+from ..core.frames.planes import Planes, chroma_step
+from ..core.model.frame_state import Options
+from ..core.pixels import compositor
 from .budget import is_software
 from .device import Device, NoDeviceError
 from .passes import Image, Pass

@@ -1,1 +1,1 @@
-"""Shutters, quantiles, scribbles, keyframes, recipe and the reference compositor: pure Python and NumPy."""
+"""What the other layers compute with, in rooms; beside them what all rooms use. Pure Python and NumPy."""

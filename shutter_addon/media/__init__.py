@@ -1,6 +1,6 @@
 """Frames of a source: movies by PyAV, image sequences by OpenImageIO. No bpy."""
 
-from ..core.frame_source import FrameSource
+from ..core.frames.frame_source import FrameSource
 from .errors import MediaError
 from .opening import open_source
 from .prefetch import PrefetchSource

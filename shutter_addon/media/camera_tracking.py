@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core import scribbles
-from ..core.effect import Camera, Region
-from ..core.motions import Placement, Similarity
+from ..core.model import scribbles
+from ..core.model.effect import Camera, Region
+from ..core.model.motions import Placement, Similarity
 from . import registration, tracking
 from .registration import Motion, Part
 from .tracking import Footage, Tracked, TrackingError

@@ -3,7 +3,7 @@
 import numpy as np
 from OpenImageIO import FLOAT, ColorConfig, ImageBuf, ImageBufAlgo
 
-from ..core.frame_source import FrameSource
+from ..core.frames.frame_source import FrameSource
 from .errors import MediaError
 from .source import SourceWrapper
 

@@ -6,8 +6,8 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from ..core import light
-from ..core.planes import Planes, as_rgba
+from ..core.frames import light
+from ..core.frames.planes import Planes, as_rgba
 from .errors import MediaError
 from .source import SourceWrapper
 

@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core import motions, scribbles
-from ..core.effect import Camera, Region
-from ..core.motions import Placement
+from ..core.model import motions, scribbles
+from ..core.model.effect import Camera, Region
+from ..core.model.motions import Placement
 from .tracking import Tracked
 
 

@@ -12,7 +12,8 @@ from functools import cache, lru_cache, partial
 
 import numpy as np
 
-from ..core import light, stopping
+from ..core import stopping
+from ..core.frames import light
 from .errors import MediaError
 
 try:

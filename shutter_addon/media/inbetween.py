@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import stopping
-from ..core.claims import Claims
-from ..core.frame_source import FrameSource
+from ..core.farm.claims import Claims
+from ..core.frames.frame_source import FrameSource
 from . import cuts
 from .completeness import why_short
 from .errors import MediaError, NotBuiltError

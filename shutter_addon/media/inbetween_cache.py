@@ -18,8 +18,9 @@ from typing import NamedTuple
 import numpy as np
 from OpenImageIO import ImageInput, ImageOutput, ImageSpec, geterror
 
-from ..core import atomic_write, claims
-from ..core.frame_source import FrameSource
+from ..core import atomic_write
+from ..core.farm import claims
+from ..core.frames.frame_source import FrameSource
 from .completeness import is_whole_picture, why_short
 from .errors import MediaError
 from .files import check_name

@@ -6,12 +6,12 @@ from collections.abc import Hashable
 
 import numpy as np
 
-from ..core.matte_grid import block_means, feathered, fitted
-from ..core.mattes import FileFrame, Matte, MatteFile, MatteSource
+from ..core.model.mattes import FileFrame, Matte, MatteFile, MatteSource
+from ..core.pixels.matte_grid import block_means, feathered, fitted
 
 
 class MatteValues:
-    """A core.mattes.MatteReader for pictures of one size.
+    """A core.model.mattes.MatteReader for pictures of one size.
 
     step: frames of the source for each filmed one (Options.step)"""
 
@@ -22,7 +22,7 @@ class MatteValues:
 
     @classmethod
     def of(cls, source) -> MatteValues:
-        """For the pictures of a source, as core.mattes has them: a ShotSource."""
+        """For the pictures of a source, as core.model.mattes has them: a ShotSource."""
         return cls(source.width, source.height, source.step)
 
     def values(self, mattes: tuple[Matte, ...], index: int, block: int) -> list[tuple[Hashable, np.ndarray]]:

@@ -12,8 +12,8 @@ import av
 import numpy as np
 from av.video.reformatter import ColorRange
 
-from ..core.frame_source import FrameSource
-from ..core.planes import Planes, matrix
+from ..core.frames.frame_source import FrameSource
+from ..core.frames.planes import Planes, matrix
 from .channels import CHANNELS, no_channel
 from .decode import FrameReader, fraction, reason
 from .deinterlace import blur_rows, has_fields, interpolate_fields, samples_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..core.frame_source import FrameSource
+from ..core.frames.frame_source import FrameSource
 from .color import in_colorspace
 from .errors import MediaError
 from .files import check_file

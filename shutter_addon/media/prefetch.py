@@ -5,8 +5,8 @@ import threading
 import numpy as np
 
 from ..core import stopping
-from ..core.frame_source import FrameSource
-from ..core.planes import Planes, as_rgba
+from ..core.frames.frame_source import FrameSource
+from ..core.frames.planes import Planes, as_rgba
 from .errors import MediaError
 from .source import SourceWrapper
 

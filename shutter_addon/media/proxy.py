@@ -6,8 +6,8 @@ import av
 import numpy as np
 from OpenImageIO import FLOAT, ROI, ImageBuf, ImageBufAlgo
 
-from ..core.frame_source import FrameSource
-from ..core.light import to_linear
+from ..core.frames.frame_source import FrameSource
+from ..core.frames.light import to_linear
 from .errors import MediaError
 from .source import SourceWrapper
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..core.frame_source import FrameSource
+from ..core.frames.frame_source import FrameSource
 from .source import SourceWrapper
 
 DIVISORS = 1, 2, 4

@@ -11,7 +11,7 @@ from typing import get_args
 
 import numpy as np
 
-from ..core.motions import Motion, Similarity
+from ..core.model.motions import Motion, Similarity
 from .errors import MediaError
 
 try:

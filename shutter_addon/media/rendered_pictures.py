@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from OpenImageIO import ImageInput, geterror
 
-from ..core import edit_version
+from ..core.farm import edit_version
 from .files import check_name
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -17,7 +17,7 @@ _PART = 1 << 20  # bytes that are read at once
 
 class RenderedPicture(NamedTuple):
     """size: width and height in pixels; channels: how many; samples: as "uint16"
-    edit: the key of the edit's version (core.edit_version); None: the picture has none"""
+    edit: the key of the edit's version (core.farm.edit_version); None: the picture has none"""
 
     size: tuple[int, int]
     channels: int

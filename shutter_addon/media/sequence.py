@@ -11,7 +11,7 @@ from stat import S_ISREG
 import numpy as np
 from OpenImageIO import ImageInput, ImageSpec, geterror
 
-from ..core.frame_source import FrameSource
+from ..core.frames.frame_source import FrameSource
 from .channels import CHANNELS, no_channel
 from .errors import MediaError
 from .files import FOREIGN, check_file, check_index, check_name, check_size

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..core.frame_source import FrameSource
-from ..core.planes import Planes
+from ..core.frames.frame_source import FrameSource
+from ..core.frames.planes import Planes
 
 
 class _Forwarded:

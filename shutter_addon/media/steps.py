@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.frame_source import FrameSource
-from ..core.motions import Similarity
+from ..core.frames.frame_source import FrameSource
+from ..core.model.motions import Similarity
 from . import flow
 
 ROWS = 270  # of the pictures that are compared

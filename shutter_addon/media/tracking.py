@@ -14,10 +14,12 @@ from typing import Protocol
 
 import numpy as np
 
-from ..core import light, motions, scribbles, stopping
-from ..core.effect import Camera, Region
-from ..core.frame_source import FrameSource
-from ..core.motions import Placement, Similarity
+from ..core import stopping
+from ..core.frames import light
+from ..core.frames.frame_source import FrameSource
+from ..core.model import motions, scribbles
+from ..core.model.effect import Camera, Region
+from ..core.model.motions import Placement, Similarity
 from . import registration
 from .errors import MediaError
 from .registration import Match, Motion, Part

@@ -54,7 +54,7 @@ def noise_film(edit, frames, folder):
     from shutter_addon.blender.data import recipe_import
     from shutter_addon.blender.editing import add_effect
     from shutter_addon.blender.rendering import session
-    from shutter_addon.core import recipe as recipes
+    from shutter_addon.core.recipes import recipe as recipes
 
     session.forget()
     height, width = frames.shape[1:3]

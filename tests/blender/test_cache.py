@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support import recipe, request, write_frames
 
-from shutter_addon.core import recipe as recipes
+from shutter_addon.core.recipes import recipe as recipes
 
 REGION = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
 MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}

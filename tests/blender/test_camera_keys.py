@@ -16,8 +16,8 @@ from shutter_addon.blender.editing import (
     shutter_edits,
     track_region,
 )
-from shutter_addon.core import motions
-from shutter_addon.core.motions import Similarity
+from shutter_addon.core.model import motions
+from shutter_addon.core.model.motions import Similarity
 from shutter_addon.media import camera_tracking, registration, tracking
 
 SIZE = WIDTH, HEIGHT = 240, 160

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from support import noise_film, recipe, write_frames
 
-from shutter_addon.core import job_file
-from shutter_addon.core import recipe as recipes
+from shutter_addon.core.farm import job_file
+from shutter_addon.core.recipes import recipe as recipes
 from shutter_addon.media.rendered_pictures import read
 
 FRAMES, WINDOW = 8, 4

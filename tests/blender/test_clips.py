@@ -8,7 +8,7 @@ import OpenImageIO
 import pytest
 from support import picture_of, recipe, sequencer, write_frames
 
-from shutter_addon.core import recipe as recipes
+from shutter_addon.core.recipes import recipe as recipes
 
 RNG = np.random.default_rng(0)
 

@@ -5,7 +5,7 @@ import OpenImageIO
 import pytest
 from support import read_picture, recipe, write_frames
 
-from shutter_addon.core import light
+from shutter_addon.core.frames import light
 from shutter_addon.media import open_source
 
 
@@ -115,8 +115,8 @@ def test_a_keyed_delta_stays_one_sharp_frame(command, noise, tmp_path, same_pixe
 
 @pytest.mark.parametrize("interpolation", ["displacement", "value"])
 def test_random_bars_equal_the_reference(command, noise, tmp_path, same_pixels, interpolation):
-    from shutter_addon.core import compositor
-    from shutter_addon.core import recipe as recipes
+    from shutter_addon.core.pixels import compositor
+    from shutter_addon.core.recipes import recipe as recipes
 
     rng = np.random.default_rng(1)
     data = recipe(

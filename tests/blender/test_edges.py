@@ -9,8 +9,10 @@ from standin import between
 from support import picture_of, read_picture, recipe, request, state, write_frames
 
 from shutter_addon.compute.guide import Guides, guiding
-from shutter_addon.core import compositor, exact_diffusion, light, scribbles
-from shutter_addon.core import recipe as recipes
+from shutter_addon.core.frames import light
+from shutter_addon.core.model import scribbles
+from shutter_addon.core.pixels import compositor, exact_diffusion
+from shutter_addon.core.recipes import recipe as recipes
 from shutter_addon.media import MediaError, inbetween, open_source
 
 SIZE, COUNT = (128, 72), 9

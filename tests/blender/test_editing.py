@@ -245,7 +245,7 @@ def test_a_summary_in_words():
 @given(st.integers(1, 24), st.sampled_from([(1, 1), (2, 4), (3, 3), (4, 2)]), st.booleans())
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=20)
 def test_another_window_keeps_shape_and_share_of_light(effect, window, shape, closed):
-    from shutter_addon.core import shutters
+    from shutter_addon.core.model import shutters
 
     bar_edits.set_bars(effect.shutters[0], np.repeat([1.0, 0.25][: 2 - closed] + [0.0] * closed, 4))
     before = [consistency.bars(shutter) for shutter in effect.shutters]
@@ -273,7 +273,7 @@ def test_another_window_and_back_is_exact(three, window):
 
 def test_another_window_keeps_keys_at_their_frames_with_their_ease(three):
     from shutter_addon.blender.data import fcurves
-    from shutter_addon.core import shutters
+    from shutter_addon.core.model import shutters
 
     for curve in fcurves.curves_under(three.id_data, f"{three.path_from_id()}.shutters[0]"):
         curve.keyframe_points[0].interpolation = "CONSTANT"

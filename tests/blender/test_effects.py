@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import state, write_frames
 
-from shutter_addon.core import recipe as recipes
+from shutter_addon.core.recipes import recipe as recipes
 
 RNG = np.random.default_rng(0)
 EASES = ("linear", "bezier", "constant")

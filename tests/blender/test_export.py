@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support import source_time, state, write_frames
 
-from shutter_addon.core import recipe as recipes
+from shutter_addon.core.recipes import recipe as recipes
 
 FIRST, LAST = 31, 70
 ASPECT = 40 / 24

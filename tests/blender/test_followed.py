@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from support import read_picture, recipe, request, write_frames
 
-from shutter_addon.core import following as followings
-from shutter_addon.core import light
-from shutter_addon.core import recipe as recipes
+from shutter_addon.core.frames import light
+from shutter_addon.core.pixels import following as followings
+from shutter_addon.core.recipes import recipe as recipes
 
 COUNT, WIDTH, HEIGHT, WINDOW = 24, 120, 72, 6
 INSIDE = np.s_[20:-20, 20:-20]  # where no window reaches beyond the picture

@@ -14,7 +14,7 @@ import pytest
 from standin import between
 from support import read_picture, recipe, write_frames
 
-from shutter_addon.core import light
+from shutter_addon.core.frames import light
 from shutter_addon.media import open_source
 
 ROOT = Path(__file__).parents[2]

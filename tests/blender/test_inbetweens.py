@@ -10,7 +10,8 @@ from standin import between
 from support import picture_of, request, write_frames
 
 from shutter_addon.blender.data import fcurves
-from shutter_addon.core import light, shutters
+from shutter_addon.core.frames import light
+from shutter_addon.core.model import shutters
 from shutter_addon.media import inbetween, open_source
 
 FACTOR, COUNT, CUT = 4, 12, 6

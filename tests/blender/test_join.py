@@ -11,7 +11,7 @@ import OpenImageIO
 import pytest
 from support import noise_film
 
-from shutter_addon.core import job_file
+from shutter_addon.core.farm import job_file
 
 FRAMES = 8
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support import write_frames
 
-from shutter_addon.core.masks import coverage
+from shutter_addon.core.masks.mask import coverage
 
 AVERAGE = 0.5  # what a picture may differ by, in 8-bit levels: Blender cuts off fractions
 ASTRAY = 0.001  # share of pixels that may differ by more than 8 levels

@@ -9,7 +9,7 @@ from support import recipe, sequencer
 
 from shutter_addon.blender.data import annotations, fcurves, geometry, selection
 from shutter_addon.blender.editing import lifecycle, match_source
-from shutter_addon.core import recipe as recipes
+from shutter_addon.core.recipes import recipe as recipes
 
 LEVELS = 1
 STILL = recipe(4, [1, 0, 0, 0])

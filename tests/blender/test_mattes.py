@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from support import read_picture, recipe, request, sequencer, write_frames
 
-from shutter_addon.core import light
-from shutter_addon.core import recipe as recipes
+from shutter_addon.core.frames import light
+from shutter_addon.core.recipes import recipe as recipes
 from shutter_addon.media.image_writing import write_exr
 
 WIDTH, HEIGHT, COUNT = 48, 32, 12

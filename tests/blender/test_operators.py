@@ -11,8 +11,8 @@ from support import recipe, sequencer
 
 from shutter_addon.blender.data import annotations, consistency, selection
 from shutter_addon.blender.editing import bar_edits, region_edits
-from shutter_addon.core import limits
-from shutter_addon.core import recipe as recipes
+from shutter_addon.core.model import limits
+from shutter_addon.core.recipes import recipe as recipes
 
 
 @pytest.fixture
@@ -139,7 +139,7 @@ def test_shutters_come_go_and_move(bpy, effect, does):
 
 @pytest.mark.parametrize("preset", ["ANGLE_180", "GAUSSIAN", "LAST"])
 def test_preset(bpy, effect, does, preset):
-    from shutter_addon.core import presets
+    from shutter_addon.core.model import presets
 
     effect = does("preset", preset=preset)
     assert consistency.bars(effect.shutters[1]) == pytest.approx(presets.bars(preset, 8), abs=1e-6)

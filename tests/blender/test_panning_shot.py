@@ -8,7 +8,7 @@ from test_region_tracking import COUNT, SIZE, active, call, centre, drawn, keys,
 from shutter_addon.blender.data import annotations
 from shutter_addon.blender.editing import region_edits, shutter_edits
 from shutter_addon.blender.rendering import session
-from shutter_addon.core import light
+from shutter_addon.core.frames import light
 
 FRAME = 20  # on the timeline, of the source's frame 9
 

@@ -7,7 +7,7 @@ from support import write_frames
 from shutter_addon.blender.data import annotations, fcurves, selection, strips, validation
 from shutter_addon.blender.editing import add_effect, bar_edits, follow_track, region_edits, shutter_edits, track_region
 from shutter_addon.blender.editing.motion_keys import MotionKeys
-from shutter_addon.core.motions import Placement
+from shutter_addon.core.model.motions import Placement
 from shutter_addon.media import tracking
 
 SIZE = np.array([240, 160])

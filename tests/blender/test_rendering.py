@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support import read_picture, recipe, write_frames
 
-from shutter_addon.core import recipe as recipes
+from shutter_addon.core.recipes import recipe as recipes
 from shutter_addon.media.completeness import whole_pictures
 
 ROOT = Path(__file__).parents[2]

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from support import noise_film, read_picture, small_disk
 
-from shutter_addon.core import claims, job_file
+from shutter_addon.core.farm import claims, job_file
 
 ROOT = Path(__file__).parents[2]
 COUNT = 14  # frames
@@ -26,7 +26,7 @@ import bpy
 from bpy.app.handlers import persistent
 from shutter_addon import blender
 from shutter_addon.blender.command import main
-from shutter_addon.core import claims
+from shutter_addon.core.farm import claims
 
 @persistent
 def wrote(scene, *_):

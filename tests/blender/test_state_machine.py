@@ -18,7 +18,7 @@ from hypothesis.stateful import (
 )
 from support import recipe, sequencer, state, write_frames
 
-from shutter_addon.core import recipe as recipes
+from shutter_addon.core.recipes import recipe as recipes
 
 REGION = {"name": "Face", "shutter": "S1", "strokes": [[[0.1, 0.1], [0.9, 0.1]]]}
 MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}

@@ -8,7 +8,7 @@ import OpenImageIO
 import pytest
 from support import recipe
 
-from shutter_addon.core import recipe as recipes
+from shutter_addon.core.recipes import recipe as recipes
 
 
 @pytest.fixture

@@ -48,7 +48,7 @@ def effect_on(bpy, edit):
     """Puts an effect on a strip: still frames by default; gives strip and effect."""
     from shutter_addon.blender.data import recipe_import
     from shutter_addon.blender.editing import add_effect
-    from shutter_addon.core import recipe as recipes
+    from shutter_addon.core.recipes import recipe as recipes
 
     edit.render.resolution_x = edit.render.resolution_y = 32
     edit.frame_start, edit.frame_end = -100, 300

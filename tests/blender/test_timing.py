@@ -12,14 +12,14 @@ GOOD = [(0.0, 0.0), (29.0, 0.3725), (51.0, 1.0)]
 
 
 def keys_of(bpy, pairs):
-    from shutter_addon.core.retiming import RetimingKey
+    from shutter_addon.core.frames.retiming import RetimingKey
 
     return [RetimingKey(index, 0, factor) for index, factor in pairs]
 
 
 @pytest.mark.parametrize("pairs", [[], [(0.0, 0.0)], GOOD, [(0.0, 0.0), (7.2, 0.5), (7.2, 0.5), (19.6, 1.0)]])
 def test_good_keys(bpy, pairs):
-    from shutter_addon.core.retiming import are_retiming_keys
+    from shutter_addon.core.frames.retiming import are_retiming_keys
 
     assert are_retiming_keys(keys_of(bpy, pairs), [round(index) for index, _ in pairs])
 
@@ -40,13 +40,13 @@ def test_good_keys(bpy, pairs):
     ],
 )
 def test_keys_that_cannot_be(bpy, pairs):
-    from shutter_addon.core.retiming import are_retiming_keys
+    from shutter_addon.core.frames.retiming import are_retiming_keys
 
     assert not are_retiming_keys(keys_of(bpy, pairs), [0, 29, 51])
 
 
 def test_keys_out_of_order(bpy):
-    from shutter_addon.core.retiming import are_retiming_keys
+    from shutter_addon.core.frames.retiming import are_retiming_keys
 
     assert not are_retiming_keys(keys_of(bpy, [(0.0, 0.0), (30.0, 0.6), (29.0, 0.5), (51.0, 1.0)]), [0, 30, 29, 51])
 
@@ -75,7 +75,7 @@ def test_another_layout_is_said(bpy, edit, tmp_path):
 def test_a_still_of_a_million_frames_takes_no_time(bpy, edit, tmp_path):
     """Blender shows one frame of it all along; where that began is not sought frame by frame."""
     from shutter_addon.blender.data import strip_timing
-    from shutter_addon.core import retiming
+    from shutter_addon.core.frames import retiming
 
     first = write_frames(tmp_path / "in", np.zeros((1, 8, 8, 3), dtype=np.uint8))
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)

@@ -11,8 +11,8 @@ import pytest
 from support import recipe, write_frames
 
 from shutter_addon.blender import command as program
-from shutter_addon.core import motions
-from shutter_addon.core import recipe as recipes
+from shutter_addon.core.model import motions
+from shutter_addon.core.recipes import recipe as recipes
 from shutter_addon.media import camera_tracking, tracking
 
 ROOT = Path(__file__).parents[2]

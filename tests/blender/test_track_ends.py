@@ -8,7 +8,7 @@ from test_region_tracking import COUNT, SIZE, active, call, drawn, keys, new_sou
 from shutter_addon.blender.data import fcurves, recipe_export, recipe_import, snapshot
 from shutter_addon.blender.editing import track_region
 from shutter_addon.blender.rendering import session
-from shutter_addon.core import recipe
+from shutter_addon.core.recipes import recipe
 
 OTHER = texture(*SIZE[::-1]) // 4
 

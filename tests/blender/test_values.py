@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from support import picture_of, sequencer, state, write_frames
 
-from shutter_addon.core.limits import MAX_REGIONS, MAX_SHUTTERS
+from shutter_addon.core.model.limits import MAX_REGIONS, MAX_SHUTTERS
 
 NAN, INF = math.nan, math.inf
 
@@ -448,7 +448,7 @@ def rendered(scene):
 
 def exported(edit, effect):
     from shutter_addon.blender.rendering import matte_export, session
-    from shutter_addon.core.recipe import RecipeError
+    from shutter_addon.core.recipes.recipe import RecipeError
 
     with suppress(*session.FAULTS, RecipeError), TemporaryDirectory() as folder:
         matte_export.recipe_for(edit, effect, strip_of(effect), Path(folder, "r.json"))

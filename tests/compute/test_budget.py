@@ -13,8 +13,8 @@ from shutter_addon.compute.budget import Budget
 from shutter_addon.compute.device import NoDeviceError
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer
-from shutter_addon.core.frame_source import FrameSource
-from shutter_addon.core.mattes import Matte
+from shutter_addon.core.frames.frame_source import FrameSource
+from shutter_addon.core.model.mattes import Matte
 
 SIZE = 128, 72
 PIXELS = SIZE[0] * SIZE[1]

@@ -10,10 +10,12 @@ from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.device import NoDeviceError
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
-from shutter_addon.core import compositor, light, presets
-from shutter_addon.core.frame_source import FrameSource
-from shutter_addon.core.frame_state import FrameState, Options
-from shutter_addon.core.scribbles import Shape, rasterise
+from shutter_addon.core.frames import light
+from shutter_addon.core.frames.frame_source import FrameSource
+from shutter_addon.core.model import presets
+from shutter_addon.core.model.frame_state import FrameState, Options
+from shutter_addon.core.model.scribbles import Shape, rasterise
+from shutter_addon.core.pixels import compositor
 
 LEVEL = 1 / 255
 

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import splu
 from shutter_addon.compute import diffusion, diffusion_gpu
 from shutter_addon.compute.diffusion import diffuse
 from shutter_addon.compute.diffusion_gpu import Diffusion
-from shutter_addon.core.scribbles import Shape, rasterise
+from shutter_addon.core.model.scribbles import Shape, rasterise
 
 LEVEL = 1 / 255
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from shutter_addon.compute import cpu, edge_diffusion, gpu
-from shutter_addon.core import exact_diffusion
-from shutter_addon.core.scribbles import Shape, rasterise
+from shutter_addon.core.model.scribbles import Shape, rasterise
+from shutter_addon.core.pixels import exact_diffusion
 
 LEVEL = 1 / 255
 ASSETS = Path(__file__).parents[2] / "assets"

@@ -10,9 +10,10 @@ from shutter_addon.compute import guide
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
-from shutter_addon.core import compositor, exact_diffusion, light
-from shutter_addon.core.frame_state import FrameState, Options
-from shutter_addon.core.scribbles import Shape
+from shutter_addon.core.frames import light
+from shutter_addon.core.model.frame_state import FrameState, Options
+from shutter_addon.core.model.scribbles import Shape
+from shutter_addon.core.pixels import compositor, exact_diffusion
 from shutter_addon.media import MediaError
 from shutter_addon.media.cuts import ShotSource
 

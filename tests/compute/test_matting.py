@@ -9,7 +9,7 @@ from test_moved import following
 
 from shutter_addon.compute import matting
 from shutter_addon.compute.renderer import Renderer
-from shutter_addon.core.mattes import Matte
+from shutter_addon.core.model.mattes import Matte
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from test_shots import SHOTS, shots_of
 from shutter_addon.compute import window
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer
-from shutter_addon.core import light
-from shutter_addon.core.frame_state import Following
-from shutter_addon.core.scribbles import Shape
+from shutter_addon.core.frames import light
+from shutter_addon.core.model.frame_state import Following
+from shutter_addon.core.model.scribbles import Shape
 
 
 def motions(rng, count, shutters, followers, size=(37, 23)):

@@ -6,7 +6,7 @@ from test_composition import SHAPES, footage, state
 
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer
-from shutter_addon.core import shutters
+from shutter_addon.core.model import shutters
 
 POINTS = [(0.001, 0.001), (0.999, 0.001), (0.31, 0.74), (0.65, 0.22), (0.5, 0.5)]
 

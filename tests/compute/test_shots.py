@@ -8,8 +8,8 @@ import pytest
 from test_composition import Footage, check, few_pieces, state
 
 from shutter_addon.compute.renderer import Renderer, open_compositor
-from shutter_addon.core import presets
-from shutter_addon.core.frame_state import FrameState, Options
+from shutter_addon.core.model import presets
+from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.media.cuts import NEIGHBOURS, ShotSource
 
 LENGTHS = 7, 6, 9

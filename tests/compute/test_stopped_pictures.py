@@ -9,7 +9,7 @@ from test_moved import following
 from shutter_addon.compute import window
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.core import stopping
-from shutter_addon.core.scribbles import Shape
+from shutter_addon.core.model.scribbles import Shape
 
 FIRST, SECOND = 3, 21  # their windows have no frame in common
 OTHER = (*SHAPES[1:], Shape(1, "line", 0.1, (np.array([[0.2, 0.7], [0.9, 0.1]]),)))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from shutter_addon.core import chunks
+from shutter_addon.core.farm import chunks
 
 
 @pytest.mark.parametrize(("window", "step"), [(1, 1), (4, 1), (16, 1), (256, 1), (64, 8), (128, 16)])

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from shutter_addon.core import claims
-from shutter_addon.core.claims import Claims
+from shutter_addon.core.farm import claims
+from shutter_addon.core.farm.claims import Claims
 
 ROOT = Path(__file__).parents[2]
 BEAT, PATIENCE = 0.05, 0.5  # seconds
@@ -19,7 +19,7 @@ BEAT, PATIENCE = 0.05, 0.5  # seconds
 WORKER = """
 import json, sys
 from pathlib import Path
-from shutter_addon.core.claims import Claims
+from shutter_addon.core.farm.claims import Claims
 
 with Claims(Path(sys.argv[1]), patience=0.5, beat=0.05) as claims:
     print("ready", flush=True)

@@ -5,8 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shutter_addon.core import compositor, light, shutters
-from shutter_addon.core.frame_state import FrameState, Options
+from shutter_addon.core.frames import light
+from shutter_addon.core.model import shutters
+from shutter_addon.core.model.frame_state import FrameState, Options
+from shutter_addon.core.pixels import compositor
 
 
 def state(bars, **options):

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from shutter_addon.core import exact_diffusion
-from shutter_addon.core.conductances import conductances, resistances
+from shutter_addon.core.pixels import exact_diffusion
+from shutter_addon.core.pixels.conductances import conductances, resistances
 
 
 def by_hand(guide, strength):

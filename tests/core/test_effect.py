@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from shutter_addon.core import effect, keyframes, limits, mattes
-from shutter_addon.core.frame_state import Options
-from shutter_addon.core.keyframes import Bars, Constant, Keys, Samples, SourceTime
 from shutter_addon.core.messages import EffectError
+from shutter_addon.core.model import effect, keyframes, limits, mattes
+from shutter_addon.core.model.frame_state import Options
+from shutter_addon.core.model.keyframes import Bars, Constant, Keys, Samples, SourceTime
 
 FIRST, LAST = np.array([1.0, 0, 0, 0]), np.array([0, 0, 0, 1.0])
 

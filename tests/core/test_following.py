@@ -6,8 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shutter_addon.core import following, motions, recipe
-from shutter_addon.core.motions import Placement
+from shutter_addon.core.model import motions
+from shutter_addon.core.model.motions import Placement
+from shutter_addon.core.pixels import following
+from shutter_addon.core.recipes import recipe
 
 SOURCE = SimpleNamespace(count=40, width=64, height=48)
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from shutter_addon.core import frame_ranges
+from shutter_addon.core.frames import frame_ranges
 
 
 @pytest.mark.parametrize(

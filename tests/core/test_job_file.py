@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from shutter_addon.core import edit_version, job_file
-from shutter_addon.core.edit_version import EditVersion, Footage
+from shutter_addon.core.farm import edit_version, job_file
+from shutter_addon.core.farm.edit_version import EditVersion, Footage
 
 FOOTAGE = Footage("film.mp4", 1, "cd" * 32), Footage("f0001.png", 9, "ef")
 VERSION = EditVersion("ab" * 32, "0.1.0", "5.2.0", "", FOOTAGE)

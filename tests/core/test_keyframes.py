@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from shutter_addon.core import keyframes
+from shutter_addon.core.model import keyframes
 
 
 def test_span():

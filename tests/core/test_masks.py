@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shutter_addon.core import mask_filling, mask_handles
-from shutter_addon.core.masks import MaskLayer, MaskShape, MaskSpline, coverage
+from shutter_addon.core.masks import mask_filling, mask_handles
+from shutter_addon.core.masks.mask import MaskLayer, MaskShape, MaskSpline, coverage
 
 SIZES = [(96, 54), (54, 96), (61, 61)]
 RECTANGLE = ((0.25, 0.35), (0.25, 0.65), (0.75, 0.65), (0.75, 0.35))

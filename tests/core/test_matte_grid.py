@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from shutter_addon.core.matte_grid import EDGE_SIGMAS, block_means, feathered, fitted
+from shutter_addon.core.pixels.matte_grid import EDGE_SIGMAS, block_means, feathered, fitted
 
 LEVEL = 1 / 255
 SIZES = [  # of the matte, and of the picture

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shutter_addon.core import motions, scribbles
-from shutter_addon.core.motions import Placement, Similarity
+from shutter_addon.core.model import motions, scribbles
+from shutter_addon.core.model.motions import Placement, Similarity
 
 coordinate = st.floats(-0.3, 1.3)
 shapes = st.lists(st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=5), min_size=1, max_size=3)

@@ -2,8 +2,8 @@
 
 import pytest
 
-from shutter_addon.core import keyframes, presence
-from shutter_addon.core.presence import Stop
+from shutter_addon.core.model import keyframes, presence
+from shutter_addon.core.model.presence import Stop
 
 COVERED, BEHIND = Stop(50, True), Stop(9, False)
 TRACKED = range(10, 50)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from shutter_addon.core import presets, shutters
+from shutter_addon.core.model import presets, shutters
 
 
 @pytest.mark.parametrize("name", presets.PRESETS)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from shutter_addon.core import mattes
-from shutter_addon.core.mattes import FileFrames, Ramp
-from shutter_addon.core.retiming import StripTiming
+from shutter_addon.core.frames.retiming import StripTiming
+from shutter_addon.core.model import mattes
+from shutter_addon.core.model.mattes import FileFrames, Ramp
 
 WIDTH, HEIGHT = 64, 36
 

@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shutter_addon.core import limits, mattes, recipe, scribbles
-from shutter_addon.core.compositor import window_positions
-from shutter_addon.core.motions import Placement
+from shutter_addon.core.model import limits, mattes, scribbles
+from shutter_addon.core.model.motions import Placement
+from shutter_addon.core.pixels.compositor import window_positions
+from shutter_addon.core.recipes import recipe
 
 EXAMPLE = {
     "version": 1,

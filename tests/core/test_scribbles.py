@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shutter_addon.core import scribbles
-from shutter_addon.core.scribbles import Shape
+from shutter_addon.core.model import scribbles
+from shutter_addon.core.model.scribbles import Shape
 
 coordinate = st.floats(-0.3, 1.3)
 strokes = st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=6).map(np.array)

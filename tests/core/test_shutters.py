@@ -6,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from shutter_addon.core import shutters
+from shutter_addon.core.model import shutters
 
 BAR = st.one_of(st.just(0.0), st.floats(1e-3, 1.0))
 

@@ -10,7 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from shutter_addon.core import compositor, following, recipe, shutters, trails
+from shutter_addon.core.model import shutters
+from shutter_addon.core.pixels import compositor, following, trails
+from shutter_addon.core.recipes import recipe
 
 WINDOW = 24
 SOURCE = SimpleNamespace(count=60, width=160, height=100)

@@ -50,8 +50,8 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
     """How far each device is off, as {device: (picture, coefficients)}. DifferenceError: too far; what differs is left
     in the folder."""
     from shutter_addon.compute.renderer import Renderer
-    from shutter_addon.core import following
-    from shutter_addon.core import recipe as recipes
+    from shutter_addon.core.pixels import following
+    from shutter_addon.core.recipes import recipe as recipes
     from shutter_addon.media import open_source
     from shutter_addon.media.matte_values import MatteValues
 
@@ -90,7 +90,7 @@ def exact_coefficients(case: Case, source, footage, index: int) -> np.ndarray:
     """The reference's; along edges the core's own, of the guide that the product has, as that is no matter of
     precision."""
     from shutter_addon.compute.guide import Guides, guiding
-    from shutter_addon.core import exact_diffusion
+    from shutter_addon.core.pixels import exact_diffusion
 
     recipe, size = json.loads(case.recipe), (source.width, source.height)
     strength = number_at(recipe.get("edge_aware", 0), case.frame)

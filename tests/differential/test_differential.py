@@ -13,7 +13,9 @@ from compare import PICTURE, DifferenceError, can_be_a_film, check, check_films,
 from reference import DEFAULTS, picture, shown
 
 from shutter_addon.compute import cpu, resampling
-from shutter_addon.core import compositor, following, keyframes, light, mattes, scribbles, shutters, trails
+from shutter_addon.core.frames import light
+from shutter_addon.core.model import keyframes, mattes, scribbles, shutters
+from shutter_addon.core.pixels import compositor, following, trails
 from shutter_addon.media import matte_values
 
 SEEDS = range(120)

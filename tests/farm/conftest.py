@@ -35,7 +35,7 @@ def job(single, tmp_path):
 def blender_program(tmp_path_factory):
     """A program that does `blender -c shutter …` by the library. What another has claimed and left, it soon takes."""
     path = tmp_path_factory.mktemp("bin") / "blender"
-    code = "import sys; from shutter_addon.core import claims; claims.PATIENCE = 10"
+    code = "import sys; from shutter_addon.core.farm import claims; claims.PATIENCE = 10"
     code += "; from shutter_addon.__main__ import main; sys.exit(main())"
     path.write_text(f'#!/bin/sh\nshift 2\nexec {sys.executable} -c "{code}" "$@"\n')
     path.chmod(0o755)

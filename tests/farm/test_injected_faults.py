@@ -18,7 +18,7 @@ import OpenImageIO
 import pytest
 from farm_job import ROOT, Job
 
-from shutter_addon.core import edit_version
+from shutter_addon.core.farm import edit_version
 
 sys.path.insert(1, str(ROOT / "tests" / "blender"))
 
@@ -43,7 +43,7 @@ import contextlib, io, json, sys
 import bpy
 from shutter_addon import blender
 from shutter_addon.blender import command
-from shutter_addon.core import claims
+from shutter_addon.core.farm import claims
 
 claims.PATIENCE = 0.5
 blender.register()

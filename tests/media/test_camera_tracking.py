@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from test_tracking import ASSETS, HEIGHT, MIDDLE, PIXEL, SIZE, WIDTH, Film, ellipse, still, warped
 
-from shutter_addon.core import motions
-from shutter_addon.core.effect import STILL_CAMERA, Camera, Drawings, Region
-from shutter_addon.core.keyframes import Constant, Keys
-from shutter_addon.core.motions import Placement, Similarity
+from shutter_addon.core.model import motions
+from shutter_addon.core.model.effect import STILL_CAMERA, Camera, Drawings, Region
+from shutter_addon.core.model.keyframes import Constant, Keys
+from shutter_addon.core.model.motions import Placement, Similarity
 from shutter_addon.media import camera_tracking, open_source, tracking
 from shutter_addon.media.cuts import ShotSource
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from shutter_addon.core.mattes import FileFrame, FileFrames, Matte, Ramp
-from shutter_addon.core.retiming import StripTiming
+from shutter_addon.core.frames.retiming import StripTiming
+from shutter_addon.core.model.mattes import FileFrame, FileFrames, Matte, Ramp
 from shutter_addon.media.errors import MediaError
 from shutter_addon.media.matte_values import MatteValues
 

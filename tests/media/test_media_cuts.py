@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shutter_addon.core.frame_source import FrameSource
+from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.media import MediaError, open_source
 from shutter_addon.media import cuts as media_cuts
 from shutter_addon.media.cuts import NEIGHBOURS, ShotSource, is_cut, is_duplicate, signature

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shutter_addon.core import light
+from shutter_addon.core.frames import light
 from shutter_addon.media import MediaError, flow, open_source
 
 HEIGHT, WIDTH = 96, 160

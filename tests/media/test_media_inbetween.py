@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 from footage import picture, save_image, see_through
 
-from shutter_addon.core import atomic_write, claims
+from shutter_addon.core import atomic_write
+from shutter_addon.core.farm import claims
 from shutter_addon.media import MediaError, inbetween, inbetween_cache, open_source
 from shutter_addon.media.folder import Folder
 from shutter_addon.media.source import SourceWrapper

@@ -5,7 +5,7 @@ import OpenImageIO
 import pytest
 from footage import COUNT, HEIGHT, WIDTH, cut_file, damage_frame, make_movie, number, picture, rotate_movie, see_through
 
-from shutter_addon.core import light
+from shutter_addon.core.frames import light
 from shutter_addon.media import open_source
 from shutter_addon.media.opening import with_proxy
 

@@ -4,7 +4,7 @@ import numpy as np
 import OpenImageIO
 import pytest
 
-from shutter_addon.core import light
+from shutter_addon.core.frames import light
 from shutter_addon.media import open_source
 from shutter_addon.media.reduced import ReducedSource, reduced
 

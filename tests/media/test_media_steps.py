@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from shutter_addon.core.motions import Similarity
+from shutter_addon.core.model.motions import Similarity
 from shutter_addon.media import steps
 
 STILL = Similarity()

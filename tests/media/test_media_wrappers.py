@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shutter_addon.core.frame_source import FrameSource
+from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.media import MediaError, PrefetchSource, open_source
 from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.inbetween import InbetweenSource

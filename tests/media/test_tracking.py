@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 import pytest
 
-from shutter_addon.core import motions, scribbles
-from shutter_addon.core.effect import Drawings, Region
-from shutter_addon.core.frame_source import FrameSource
-from shutter_addon.core.keyframes import Constant, Keys
-from shutter_addon.core.motions import Similarity
+from shutter_addon.core.frames.frame_source import FrameSource
+from shutter_addon.core.model import motions, scribbles
+from shutter_addon.core.model.effect import Drawings, Region
+from shutter_addon.core.model.keyframes import Constant, Keys
+from shutter_addon.core.model.motions import Similarity
 from shutter_addon.media import open_source, tracking
 from shutter_addon.media.cuts import ShotSource
 
@@ -361,7 +361,7 @@ def test_what_a_retimed_strip_shows_is_tracked(subject, ground):
 
 
 def test_deep_and_linear_pictures_look_alike(subject):
-    from shutter_addon.core import light
+    from shutter_addon.core.frames import light
 
     deep = Film([subject.astype(np.uint16) * 257])
     linear = Film([light.to_linear(subject / 255).astype(np.float32)])

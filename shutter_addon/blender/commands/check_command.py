@@ -12,8 +12,9 @@ import bpy
 
 from ...compute.budget import machine_memory
 from ...compute.device import NoDeviceError
-from ...core import chunks, frame_ranges, job_file
-from ...core.edit_version import EditVersion
+from ...core.farm import chunks, job_file
+from ...core.farm.edit_version import EditVersion
+from ...core.frames import frame_ranges
 from ...core.messages import UserError, signed
 from ..data import missing_media, versions
 from ..editing import saved_edit

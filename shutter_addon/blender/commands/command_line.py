@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 from typing import get_args
 
-from ...core import recipe
 from ...core.messages import sentence, signed
+from ...core.recipes import recipe
 from ...media import open_source
 from ...media.sequence import by_number
 from ..data import inbetween_settings

@@ -1,6 +1,6 @@
 """The command `join`: rendered frames, and the sound of their edit, as a movie."""
 
-from ...core import job_file
+from ...core.farm import job_file
 from ..data import missing_media, versions
 from ..editing import saved_edit
 from ..rendering import film_join, film_output

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import bpy
 
-from ...core import atomic_write, job_file, recipe
+from ...core import atomic_write
+from ...core.farm import job_file
+from ...core.recipes import recipe
 from ...media.completeness import is_whole_blend, why_short
 from ...media.matte_files import MatteFile
 from ..data import inbetween_settings, missing_media, preferences, versions

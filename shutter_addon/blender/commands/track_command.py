@@ -4,9 +4,12 @@ import json
 import sys
 from dataclasses import replace
 
-from ...core import atomic_write, presence, recipe, region_keys, retiming
-from ...core.effect import Region
+from ...core import atomic_write
+from ...core.frames import retiming
 from ...core.messages import signed
+from ...core.model import presence
+from ...core.model.effect import Region
+from ...core.recipes import recipe, region_keys
 from ...media import PrefetchSource, camera_tracking, filmed_frames, registration, tracking
 from ...media.cuts import ShotSource
 from ..editing import new_edit

@@ -3,7 +3,7 @@
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import limits, shutters
+from ...core.model import limits, shutters
 from . import fcurves, inbetween_settings, validation
 from .annotations import layer_of
 from .selection import active_region, active_shutter

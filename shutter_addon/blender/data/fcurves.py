@@ -109,7 +109,7 @@ def set_keys(scene, path: str, index: int, keys, group: str = "") -> None:
     for point, (_, _, ease) in zip(points, keys, strict=True):
         point.interpolation = ease.upper()
         point.handle_left_type = point.handle_right_type = "FREE"
-    # Flat handles of a third of the span: eased is u²(3 − 2u), as in core.keyframes, whatever lies beside it.
+    # Flat handles of a third of the span: eased is u²(3 − 2u), as in core.model.keyframes, whatever lies beside it.
     reach = [(b[0] - a[0]) / 3 for a, b in pairwise(keys)]
     for point, before, after in zip(points, [1.0, *reach], [*reach, 1.0], strict=True):
         point.handle_left = point.co[0] - before, point.co[1]

@@ -13,8 +13,8 @@ import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import mask_handles, mask_outlines
-from ...core.masks import MaskLayer, MaskShape, MaskSpline
+from ...core.masks import mask_handles, mask_outlines
+from ...core.masks.mask import MaskLayer, MaskShape, MaskSpline
 from . import fcurves
 from .validation import EffectError
 

@@ -1,4 +1,4 @@
-"""What the mattes and ramps of an effect show, as plain data (core.mattes.Content)."""
+"""What the mattes and ramps of an effect show, as plain data (core.model.mattes.Content)."""
 
 from collections.abc import Callable
 from contextlib import closing
@@ -9,8 +9,9 @@ from typing import NamedTuple
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import keyframes, mattes, retiming
-from ...core.effect import PlacedRamp
+from ...core.frames import retiming
+from ...core.model import keyframes, mattes
+from ...core.model.effect import PlacedRamp
 from ...media import MediaError
 from ...media.files import stamp
 from ...media.matte_files import MatteFile
@@ -21,8 +22,8 @@ from .validation import EffectError
 
 def content(edit, effect, strip, region, moves, frames, time: keyframes.Channel | None) -> keyframes.Channel:
     """The channel of a matte or a ramp, sampled at timeline frames; strip: the effect strip that shows it, moves:
-    channels of the region's location, rotation and scale, time: as of core.effect.Effect. EffectError, MediaError:
-    there is none."""
+    channels of the region's location, rotation and scale, time: as of core.model.effect.Effect. EffectError,
+    MediaError: there is none."""
     if region.kind == "RAMP":
         ramp = validation.word(region, "ramp")
         if ramp != "LUMINANCE":
@@ -109,7 +110,7 @@ def shown_frame(edit, effect, strip, time: keyframes.Channel | None) -> Callable
 
 
 class _Medium(NamedTuple):
-    """A source's length and rate, for core.retiming."""
+    """A source's length and rate, for core.frames.retiming."""
 
     filmed: int
     step: int

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import bpy
 
-from ...core import frame_ranges
+from ...core.frames import frame_ranges
 from ...media import MediaError, open_source
 from ...media.files import check_file, check_sound
 from . import external_files, requirements, strips, used_data

@@ -20,8 +20,17 @@ from bpy.props import (
 )
 from bpy.types import PropertyGroup
 
-from ...core.limits import MAX_BAR, MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE, MAX_SMOOTH
-from ...core.shutters import MAX_WINDOW
+from ...core.model.limits import (
+    MAX_BAR,
+    MAX_CHANNEL,
+    MAX_DEGREES,
+    MAX_DISTANCE,
+    MAX_FRAME,
+    MAX_NAME,
+    MAX_SCALE,
+    MAX_SMOOTH,
+)
+from ...core.model.shutters import MAX_WINDOW
 from . import consistency, matte_strips, revision, selection, strips, validation
 
 # Of labels that Blender translates in another sense ("Frames" is one on the screen). Operators have a context anyway.

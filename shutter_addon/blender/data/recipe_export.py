@@ -2,7 +2,8 @@
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import baking, limits, recipe
+from ...core.model import limits
+from ...core.recipes import baking, recipe
 from . import annotations, fcurves, inbetween_settings, snapshot, strips, validation
 from .validation import EffectError
 

@@ -9,7 +9,8 @@ import numpy as np
 from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import limits, recipe
+from ...core.model import limits
+from ...core.recipes import recipe
 from ...media import MediaError
 from ...media.files import check_name
 from ...media.matte_files import MatteFile

@@ -2,8 +2,8 @@
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import frame_ranges
-from ...core.limits import MAX_FRAME
+from ...core.frames import frame_ranges
+from ...core.model.limits import MAX_FRAME
 from .strips import ENGINE, own_strips
 
 

@@ -14,17 +14,18 @@ import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import effect as model
-from ...core import following, keyframes, limits
-from ...core.frame_state import FrameState, Options
+from ...core.frames.retiming import StripTiming
 from ...core.messages import EffectError, UserError
-from ...core.retiming import StripTiming
+from ...core.model import effect as model
+from ...core.model import keyframes, limits
+from ...core.model.frame_state import FrameState, Options
+from ...core.pixels import following
 from . import annotations, geometry, inbetween_settings, matte_content, source_media, strips, validation
 from .fcurves import Curves, leading, progress
 from .strip_timing import timing_of
 
 OPTIONS = ("position", "interpolation", "light", "exposure", "edges")
-# Sentences of core/effect.py and core/retiming.py, which are looked up where they are passed on.
+# Sentences of core/model/effect.py and core/frames/retiming.py, which are looked up where they are passed on.
 _CORE = (
     n_('shutter "{name}" at frame {frame}: {fault}'),
     n_('region "{name}": a point of its strokes is nowhere near the picture'),

@@ -4,7 +4,7 @@ import ctypes
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core.retiming import RetimingKey, StripTiming, are_retiming_keys
+from ...core.frames.retiming import RetimingKey, StripTiming, are_retiming_keys
 from . import source_media
 from .validation import EffectError
 

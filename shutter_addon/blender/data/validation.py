@@ -12,8 +12,8 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core.limits import MAX_FRAME
 from ...core.messages import EffectError
+from ...core.model.limits import MAX_FRAME
 
 _PLACES = {
     "": n_('effect "{name}"'),

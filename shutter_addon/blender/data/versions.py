@@ -10,7 +10,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.edit_version import EditVersion, Footage
+from ...core.farm.edit_version import EditVersion, Footage
 from ...media import MediaError, inbetween_cache
 from ...media.files import stamp
 from . import colour_configuration, external_files, source_media, strips

@@ -5,7 +5,7 @@ import uuid
 import bpy
 from bpy.app.translations import pgettext_data as data_
 
-from ...core.limits import MAX_FRAME
+from ...core.model.limits import MAX_FRAME
 from ..data import annotations, source_media
 from ..data.strips import ENGINE, effect_of, origin
 

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core import shutters
+from ...core.model import shutters
 from ..data import fcurves, revision, snapshot
 from ..data.consistency import bars
 from ..rendering import invalidation, session

@@ -2,7 +2,7 @@
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import limits
+from ...core.model import limits
 from ..data import fcurves
 
 

@@ -6,7 +6,7 @@ original's effect, at the original's place in time. Parts of a cut strip have th
 
 import bpy
 
-from ...core.limits import MAX_FRAME
+from ...core.model.limits import MAX_FRAME
 from ..data import fcurves, strips
 from ..data.property_copy import copy_properties
 

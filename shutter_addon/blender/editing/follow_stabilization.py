@@ -1,7 +1,7 @@
 """The camera's motion from the 2D stabilization of a movie clip: what that takes back, shutters can follow.
 
-Blender's Python does not tell how it lays the picture; core/stabilization.py computes that from the clip's tracks and
-settings, as Blender does.
+Blender's Python does not tell how it lays the picture; core/model/stabilization.py computes that from the clip's
+tracks and settings, as Blender does.
 """
 
 import math
@@ -10,9 +10,10 @@ from collections.abc import Callable
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import motions, region_keys
-from ...core.motions import Similarity
-from ...core.stabilization import Settings, Stabilization, Track, laid
+from ...core.model import motions
+from ...core.model.motions import Similarity
+from ...core.model.stabilization import Settings, Stabilization, Track, laid
+from ...core.recipes import region_keys
 from ..data import annotations, fcurves, snapshot, validation
 from ..data.validation import EffectError
 from . import follow_track, motion_keys

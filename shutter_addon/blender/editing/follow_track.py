@@ -12,8 +12,8 @@ import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import motions
-from ...core.motions import Placement, Similarity
+from ...core.model import motions
+from ...core.model.motions import Placement, Similarity
 from ..data import annotations, revision, snapshot, source_media, strips, validation
 from ..data.validation import EffectError
 from ..rendering import session
@@ -225,8 +225,8 @@ def followed(
 ) -> dict[int, Placement]:
     """By frame the placement of a region or the camera, carried from the frames at which that is known.
 
-    subject: a core.effect.Region or Camera; frames: ascending; moves: by frame at which the placement is known, `start`
-    among them, the motions of the picture to other frames"""
+    subject: a core.model.effect.Region or Camera; frames: ascending; moves: by frame at which the placement is known,
+    `start` among them, the motions of the picture to other frames"""
     follower, result = _Follower(subject, frames, moves, size), {start: subject.placement(start)}
     for way in ([f for f in frames if f > start], [f for f in reversed(frames) if f < start]):
         near = result[start]

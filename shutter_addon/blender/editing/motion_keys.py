@@ -18,8 +18,8 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import presence
-from ...core.motions import Placement
+from ...core.model import presence
+from ...core.model.motions import Placement
 from ..data import fcurves, selection, validation
 from ..data.validation import EffectError
 

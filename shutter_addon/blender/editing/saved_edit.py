@@ -4,7 +4,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.edit_version import EditVersion
+from ...core.farm.edit_version import EditVersion
 from ...core.messages import UserError, sentence
 from ..data import used_data, versions
 from ..rendering import film_output

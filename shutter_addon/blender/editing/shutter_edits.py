@@ -3,7 +3,7 @@
 import numpy as np
 from bpy.app.translations import pgettext_data as data_
 
-from ...core import presets
+from ...core.model import presets
 from ..data import fcurves, property_copy, validation
 from . import bar_edits, collection_edits
 from .region_edits import remove_region

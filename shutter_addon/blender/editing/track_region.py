@@ -16,10 +16,12 @@ import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import limits, motions, presence, region_keys, stopping
-from ...core.effect import Camera, Region
-from ...core.frame_state import Options
-from ...core.keyframes import Samples
+from ...core import stopping
+from ...core.model import limits, motions, presence
+from ...core.model.effect import Camera, Region
+from ...core.model.frame_state import Options
+from ...core.model.keyframes import Samples
+from ...core.recipes import region_keys
 from ...media import camera_tracking, tracking
 from ...media.tracking import Tracked
 from ..data import annotations, inbetween_settings, selection, snapshot, strips, validation

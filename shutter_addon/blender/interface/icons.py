@@ -3,7 +3,7 @@
 import bpy.utils.previews
 import numpy as np
 
-from ...core import presets
+from ...core.model import presets
 
 _SIZE, _WINDOW = 32, 8
 _collection = None

@@ -7,8 +7,8 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy.types import Operator
 from bpy_extras.io_utils import ImportHelper
 
-from ...core.limits import MAX_CHANNEL
-from ...core.recipe import RecipeError
+from ...core.model.limits import MAX_CHANNEL
+from ...core.recipes.recipe import RecipeError
 from ...media import MediaError
 from ..data import matte_strips, recipe_import, selection, strips, validation
 from ..data.properties import RAMPS

@@ -10,7 +10,8 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 from bpy.types import Operator
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ...core import presets, recipe
+from ...core.model import presets
+from ...core.recipes import recipe
 from ..data import annotations, consistency, recipe_import, selection, strips, validation
 from ..data.properties import CONTEXT, STROKES
 from ..editing import (

@@ -14,7 +14,7 @@ from gpu_extras.batch import batch_for_shader
 
 from ...compute.passes import body
 from ...core import stopping
-from ...core.frame_state import FrameState
+from ...core.model.frame_state import FrameState
 from ...media import MediaError
 from ...media.errors import NotBuiltError
 from ..data import annotations, geometry, selection, strips

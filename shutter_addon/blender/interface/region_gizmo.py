@@ -8,7 +8,7 @@ from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Gizmo, GizmoGroup
 
-from ...core import scribbles
+from ...core.model import scribbles
 from ..data import annotations, geometry, revision, selection, snapshot, validation
 from ..editing import bar_edits, region_edits, track_region
 from ..editing.motion_keys import MotionKeys

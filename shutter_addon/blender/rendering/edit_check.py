@@ -11,10 +11,10 @@ from pathlib import Path
 import bpy
 
 from ...compute import memory_needs
-from ...core import frame_ranges
-from ...core.chunks import LEAST, chunk_size
-from ...core.mattes import FileFrame
+from ...core.farm.chunks import LEAST, chunk_size
+from ...core.frames import frame_ranges
 from ...core.messages import UserError
+from ...core.model.mattes import FileFrame
 from ...media import MediaError, cuts
 from ...media.files import check_file
 from ..data import requirements, snapshot, source_media, strips

@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core import frame_ranges
+from ...core.frames import frame_ranges
 from ...core.messages import signed
 from ...media import image_writing, rendered_pictures
 from ...media.rendered_pictures import RenderedPicture

@@ -7,7 +7,7 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from ...core.messages import EffectError
-from ...core.shutters import ShutterError
+from ...core.model.shutters import ShutterError
 from ...media import MediaError, inbetween_cache
 from ...media.inbetween import build, estimate
 from ..data import inbetween_settings, snapshot, source_media, strips

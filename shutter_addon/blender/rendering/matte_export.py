@@ -10,7 +10,9 @@ from pathlib import Path
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import atomic_write, mattes, recipe
+from ...core import atomic_write
+from ...core.model import mattes
+from ...core.recipes import recipe
 from ...media.image_writing import write_grey
 from ...media.matte_values import MatteValues
 from ...media.sequence import ImageFiles

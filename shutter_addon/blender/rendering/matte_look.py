@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core.mattes import FileFrames
 from ...core.messages import UserError
+from ...core.model.mattes import FileFrames
 from ...media.matte_files import MatteFile
 from ..data import matte_strips, revision, snapshot
 

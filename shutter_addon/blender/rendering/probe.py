@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core import compositor
+from ...core.pixels import compositor
 from . import blender_gpu
 from .session import FrameRequest
 

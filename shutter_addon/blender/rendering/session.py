@@ -19,9 +19,11 @@ from ...compute.budget import MEGABYTE, Budget
 from ...compute.device import NoDeviceError
 from ...compute.memory_needs import frame_bytes
 from ...compute.renderer import Renderer
-from ...core import following, retiming, stopping
-from ...core.frame_state import FrameState
+from ...core import stopping
+from ...core.frames import retiming
 from ...core.messages import EffectError
+from ...core.model.frame_state import FrameState
+from ...core.pixels import following
 from ...core.stopping import StoppedError, never
 from ...media import MediaError, cuts
 from ...media.cuts import ShotSource

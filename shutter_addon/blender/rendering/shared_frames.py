@@ -7,9 +7,10 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
-from ...core import edit_version, frame_ranges, job_file
-from ...core.claims import Claims
-from ...core.edit_version import EditVersion
+from ...core.farm import edit_version, job_file
+from ...core.farm.claims import Claims
+from ...core.farm.edit_version import EditVersion
+from ...core.frames import frame_ranges
 from ...core.messages import signed
 from ...media import rendered_pictures
 from ..data import versions

@@ -14,9 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import compositor, shutters
-from ...core.frame_state import FrameState
-from ...core.motions import Similarity
+from ...core.model import shutters
+from ...core.model.frame_state import FrameState
+from ...core.model.motions import Similarity
+from ...core.pixels import compositor
 from ...media import MediaError, inbetween, steps
 from ...media.cuts import ShotSource
 from ..data import inbetween_settings

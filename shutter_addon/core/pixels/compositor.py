@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import light, shutters
-from .frame_state import FrameState, Options
+from ..frames import light
+from ..model import shutters
+from ..model.frame_state import FrameState, Options
 
 # By how much of a frame the window's earlier ones are preferred, where the nearest frame is shown: of two that are as
 # near, rounding must not choose, for devices round differently.

@@ -8,8 +8,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..messages import UserError
 from . import shutters
-from .messages import UserError
 
 EASES = ("linear", "bezier", "constant")
 

@@ -14,11 +14,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from . import compositor, motions, trails
-from .effect import Camera, Effect, Shutter
-from .frame_source import FrameSource
-from .frame_state import Following, FrameState, Options
-from .motions import Placement, Similarity
+from ..frames.frame_source import FrameSource
+from ..model import motions
+from ..model.effect import Camera, Effect, Shutter
+from ..model.frame_state import Following, FrameState, Options
+from ..model.motions import Placement, Similarity
+from . import compositor, trails
 
 # Below this scale a subject is a point, and says nothing of where the others are.
 _SMALLEST = 1e-6

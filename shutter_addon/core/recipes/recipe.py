@@ -20,9 +20,10 @@ from typing import Literal, get_args, get_origin
 
 import numpy as np
 
-from . import atomic_write, effect, keyframes, limits, mattes, motions, shutters
-from .frame_state import Edges, Exposure, FrameState, Interpolation, Light, Options, Position
-from .messages import UserError, sentence
+from .. import atomic_write
+from ..messages import UserError, sentence
+from ..model import effect, keyframes, limits, mattes, motions, shutters
+from ..model.frame_state import Edges, Exposure, FrameState, Interpolation, Light, Options, Position
 
 Point = tuple[float, float]
 Stroke = list[Point]
@@ -168,7 +169,7 @@ class MatteRegion:
     channel: one of CHANNELS, or the name of a channel of an EXR
     timing: whose frames show the matte's, frame by frame: those of the source, or of the timeline
     offset: the matte's frame, from 0, that belongs to the first of these
-    blend, opacity: as of core.mattes.Matte; width: its feather
+    blend, opacity: as of core.model.mattes.Matte; width: its feather
     keys: how what it covers moves; the matte itself is not moved"""
 
     shutter: str
@@ -192,7 +193,7 @@ class MatteRegion:
 
 @dataclass(frozen=True)
 class RampRegion:
-    """A region by a ramp (core.mattes.Ramp), or by the luminance of the shown frame; its other fields are as a
+    """A region by a ramp (core.model.mattes.Ramp), or by the luminance of the shown frame; its other fields are as a
     MatteRegion's, but its keys place the ramp."""
 
     shutter: str

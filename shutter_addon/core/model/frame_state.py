@@ -23,7 +23,7 @@ class Options:
     """How a window of frames becomes a picture; the recipe's fields of the same names.
 
     window: L, its length in frames, in-between frames included
-    edge_aware: 0 to 1, how much coefficients stop at the edges of the shown frame (core.conductances)
+    edge_aware: 0 to 1, how much coefficients stop at the edges of the shown frame (core.pixels.conductances)
     step: frames for each filmed one: 1, or the factor of in-between frames
     """
 

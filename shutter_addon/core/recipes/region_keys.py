@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from . import effect, keyframes, motions, presence
-from .motions import Placement
+from ..model import effect, keyframes, motions, presence
+from ..model.motions import Placement
 from .recipe import CameraKey, Keyable, Recipe, Region, RegionKey, ValueKey
 
 _DIGITS = 6  # of what was measured: far below a pixel

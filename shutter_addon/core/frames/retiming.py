@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from .messages import EffectError
+from ..messages import EffectError
 
 # eSeqRetimingKeyFlag: the key starts a smooth transition between two speeds.
 _TRANSITION_IN = 1 << 0

@@ -12,8 +12,8 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from .frame_source import FrameSource
-from .retiming import StripTiming, source_frame
+from ..frames.frame_source import FrameSource
+from ..frames.retiming import StripTiming, source_frame
 
 Blend = Literal["over", "add"]
 RampKind = Literal["linear", "radial", "angle"]
@@ -107,7 +107,7 @@ class Ramp:
 
 
 class MaskShape(Hashable, Protocol):
-    """A mask at one frame (core.masks)."""
+    """A mask at one frame (core.masks.mask)."""
 
 
 Content = FileFrame | Ramp | MaskShape

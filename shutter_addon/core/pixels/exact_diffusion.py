@@ -10,7 +10,7 @@ from .conductances import conductances
 def solve(labels: np.ndarray, count: int, guide: np.ndarray | None = None, strength: float = 0.0) -> np.ndarray:
     """Coefficients (count, h, w) float64, of sum 1, from labels (h, w): 0 free, 1 + shutter fixed.
 
-    guide, strength: as for core.conductances; without a guide all conductances are 1
+    guide, strength: as for core.pixels.conductances; without a guide all conductances are 1
     Labels without any scribble give the first shutter everywhere.
     """
     from scipy.sparse import coo_matrix, diags

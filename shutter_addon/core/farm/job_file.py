@@ -4,9 +4,9 @@ import json
 import stat
 from pathlib import Path
 
-from . import atomic_write
+from .. import atomic_write
+from ..messages import UserError
 from .edit_version import EditVersion
-from .messages import UserError
 
 NAME = "virtual_shutter_job.json"
 _VERSION = 1  # of the file's format

@@ -13,10 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
+from ..messages import EffectError
 from . import keyframes, limits, mattes, motions, scribbles, shutters
 from .frame_state import FrameState
 from .keyframes import Bars, Channel
-from .messages import EffectError
 from .motions import Placement
 
 _CLOSED = 'shutter "{name}" at frame {frame}: {fault}'

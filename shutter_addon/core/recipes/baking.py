@@ -16,9 +16,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from . import keyframes, limits, recipe
-from .effect import Camera, Effect, MatteRegion, Region, Shutter
-from .keyframes import Channel, Samples
+from ..model import keyframes, limits
+from ..model.effect import Camera, Effect, MatteRegion, Region, Shutter
+from ..model.keyframes import Channel, Samples
+from . import recipe
 
 # Of the largest bar, of fractions of the picture, of degrees; of the larger key's value where that is above 1.
 TOLERANCE = 1e-4
