@@ -1,5 +1,5 @@
 """From an empty Video Editing file to the first tracked, rendered frame, by mouse and keyboard; every action is
-counted. Run inside Blender, by test_window.py."""
+counted. Run inside Blender, by test_tracked.py."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
 import sys

@@ -1,6 +1,6 @@
 """Blender's GPU is not current: a window was closed, and none has been drawn since. Whatever a script, a timer, a modal
 operator or a handler does then, Blender lives, and shows the same picture afterwards. Run inside Blender, by
-test_window.py. SHUTTER_FOOTAGE has the source, SHUTTER_RECIPE the effect, SHUTTER_PART which of PARTS is told: all of
+test_rendered.py. SHUTTER_FOOTAGE has the source, SHUTTER_RECIPE the effect, SHUTTER_PART which of PARTS is told: all of
 them in one Blender are too many passes for the software renderer of Vulkan."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folders)

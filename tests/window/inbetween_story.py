@@ -1,6 +1,6 @@
 """In-between frames built in a real window: progress, Esc, the rest, what the panel says, and their removal; an effect
 that is deleted, a file that is closed and an extension that is disabled meanwhile. Run inside Blender, by
-test_window.py.
+test_rendered.py.
 
 A slow blend stands in for optical flow, as OpenCV need not be there."""
 

@@ -1,5 +1,5 @@
 """Little memory on the GPU: a film as a job of the window has what the preview holds freed, and the preview has what
-the film kept freed; with the film on moderngl's device, then on Blender's. Run inside Blender, by test_window.py.
+the film kept freed; with the film on moderngl's device, then on Blender's. Run inside Blender, by test_rendered.py.
 
 SHUTTER_FOOTAGE has the first of the source's frames, SHUTTER_RECIPE the effect, SHUTTER_MEGABYTES the limit."""
 

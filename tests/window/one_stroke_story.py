@@ -1,5 +1,5 @@
 """One stroke is enough: drawn, tracked, mended where it is wrong, and rendered, by mouse. Run inside Blender, by
-test_window.py."""
+test_tracked.py."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
 import os

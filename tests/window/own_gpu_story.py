@@ -1,6 +1,6 @@
 """Films as jobs of the window on Blender's own GPU, moderngl hidden: a whole one, while a second window opens and
 closes; one that Esc ends; ten short ones; two that the window waits for; one during which the file is loaded again, and
-one more. Run inside Blender, by test_window.py.
+one more. Run inside Blender, by test_rendered.py.
 
 SHUTTER_BESIDE=1 measures in place of that: films on Blender's GPU and on moderngl's in turn, and the longest wait
 between two redraws of the window. SHUTTER_FOOTAGE has the source, SHUTTER_RECIPE the effect."""

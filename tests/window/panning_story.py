@@ -1,5 +1,5 @@
 """A panning shot of what a still camera took: one stroke, Track, Panning Shot, played, a bar dragged, rendered, by
-mouse. Run inside Blender, by test_window.py."""
+mouse. Run inside Blender, by test_tracked.py."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
 import sys

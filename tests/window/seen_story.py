@@ -1,5 +1,5 @@
 """What is seen is what is edited, after a strip was cut, and nothing of an effect stays once it is deleted: by mouse
-and keyboard. Run inside Blender, by test_window.py.
+and keyboard. Run inside Blender, by test_tracked.py.
 
 Pictures and facts go to SHUTTER_PICTURES."""
 

@@ -1,5 +1,5 @@
 """A film renders in a window of its own, which shows the frame that was made; Esc in the middle of a picture ends it
-between two passes. Run inside Blender, by test_window.py.
+between two passes. Run inside Blender, by test_rendered.py.
 
 SHUTTER_RECIPE: of a picture that takes hundreds of passes; SHUTTER_HIDDEN: a package that shall be missing."""
 

@@ -1,6 +1,6 @@
-"""A film renders as a job of the window while an editor goes on working: run inside Blender, by test_window.py.
+"""A film renders as a job of the window while an editor goes on working: run inside Blender, by test_rendered.py.
 
-Frames of each film go to a folder of its name in SHUTTER_PICTURES; what they have to be is test_window.py's.
+Frames of each film go to a folder of its name in SHUTTER_PICTURES; what they have to be is test_rendered.py's.
 SHUTTER_HIDDEN: a package that shall be missing."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folders)

@@ -56,3 +56,16 @@ def tell(story, backend, folder, **given):
     assert not result["fault"], f"{result['fault']}\nPictures: {folder}"
     assert done.returncode == 0, console[-4000:]
     return result["seen"], console
+
+
+def packages(folder):
+    """A folder of what tracking needs besides what the Blender of a distribution has."""
+    import cv2
+    import scenedetect
+
+    folder.mkdir()
+    site = Path(cv2.__file__).parents[1]
+    assert site == Path(scenedetect.__file__).parents[1]
+    for name in ("cv2", "scenedetect", "click", "platformdirs", "tqdm", *(p.name for p in site.glob("opencv*.libs"))):
+        (folder / name).symlink_to(site / name)
+    return folder

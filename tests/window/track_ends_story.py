@@ -1,5 +1,5 @@
 """A region ends where its track ends and with its shot; Tripod goes on where the camera's track is broken: by mouse.
-Run inside Blender, by test_window.py, on a film that it makes: the walkers, who are covered at the end, between two
+Run inside Blender, by test_tracked.py, on a film that it makes: the walkers, who are covered at the end, between two
 shots of another film, the second behind some grey frames."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folder)

@@ -1,0 +1,206 @@
+"""Renders from the window, and Blender's GPU beside them: each a story in a real window."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import OpenImageIO
+import pytest
+from screens import TOLERANCE, assert_alike, pixels
+from telling import ROOT, linked, needs_window, tell
+
+from shutter_addon.media.completeness import whole_pictures
+
+pytestmark = needs_window
+
+
+def test_blender_quits_after_a_render(tmp_path):
+    tell("quitting.py", "opengl", linked(tmp_path))
+
+
+def test_without_wheels(tmp_path):
+    """The preview and a render's thread are on Blender's own GPU; it says why."""
+    ((seen,), console) = tell("without_wheels.py", "opengl", linked(tmp_path))
+    (said,) = seen["said"]
+    assert "moderngl" in said
+    assert "composing on Blender's own GPU" in said
+    assert said in console
+    assert "Traceback" not in console
+
+
+def test_preview_and_film_take_turns_where_the_gpu_is_small(tmp_path):
+    """Each has room for the running sums of its window, and both have not."""
+    size, megabytes = (480, 270), 34
+    (tmp_path / "frames").mkdir()
+    for number, frame in enumerate(np.random.default_rng(1).integers(0, 256, (20, *size[::-1], 3), dtype=np.uint8)):
+        OpenImageIO.ImageBuf(frame).write(str(tmp_path / "frames" / f"{number + 1:04d}.png"))
+    line = {"shutter": "Sharp", "strokes": [[[0.2, 0.2], [0.6, 0.9]]], "width": 0.1}
+    shutters = [{"name": "Long", "bars": [1] * 16}, {"name": "Sharp", "bars": [1] + [0] * 15}]
+    path, first = tmp_path / "recipe.json", tmp_path / "frames" / "0001.png"
+    path.write_text(json.dumps({"version": 1, "window": 16, "border": True, "shutters": shutters, "regions": [line]}))
+    given = {"footage": first, "recipe": path, "megabytes": megabytes}
+    (*seen, told), console = tell("memory_story.py", "opengl", linked(tmp_path), **given)
+    assert "Traceback" not in console
+    assert f"the {megabytes // 4} MB that may be taken of the GPU are too few for 16 frames" in told["said"][-1]
+    options = ("--recipe", path, "--output", tmp_path / "expected", "--device", "opengl", "--frames", "1:4")
+    subprocess.run([sys.executable, "-m", "shutter_addon", "render", first, *options], check=True, cwd=ROOT)
+    sums = 17 * 8 * size[0] * size[1]
+    assert [found["device"] for found in seen] == ["GLDevice", "RelayedDevice"]
+    for found, folder in zip(seen, ("OPENGL", "BLENDER"), strict=True):
+        assert found["before"][0] > sums
+        assert found["before"][1] == found["job"][1] == found["after"][1] == "Sums"
+        assert found["freed"][1] is None
+        assert found["kept"][1] is None
+        assert found["most"] <= found["limit"] == megabytes << 20
+        for name in ("0001.png", "0002.png", "0003.png", "0004.png"):
+            apart = np.abs(pixels(tmp_path / folder / name) - pixels(tmp_path / "expected" / name))
+            assert apart.max() <= 1, (folder, name)
+
+
+def test_films_on_blenders_own_gpu(tmp_path):
+    """In a job of the window, moderngl hidden: as moderngl renders them without a window; ten in a row, and their
+    textures take what the first one's took."""
+    (tmp_path / "frames").mkdir()
+    for number, frame in enumerate(np.random.default_rng(1).integers(0, 256, (30, 54, 96, 3), dtype=np.uint8)):
+        OpenImageIO.ImageBuf(frame).write(str(tmp_path / "frames" / f"{number + 1:04d}.png"))
+    line = {"name": "Moved", "shutter": "Sharp", "strokes": [[[0.2, 0.2], [0.6, 0.9]]], "width": 0.1}
+    line["keys"] = [{"frame": 1}, {"frame": 30, "location": [0.3, 0.1]}]
+    shutters = [{"name": "Long", "bars": [1] * 6}, {"name": "Sharp", "bars": [0, 0, 1, 0, 0, 0]}]
+    path, first = tmp_path / "recipe.json", tmp_path / "frames" / "0001.png"
+    path.write_text(json.dumps({"version": 1, "window": 6, "border": True, "shutters": shutters, "regions": [line]}))
+    given = {"footage": first, "recipe": path}
+    seen, console = tell("own_gpu_story.py", "vulkan", linked(tmp_path), **given)
+    assert "Traceback" not in console
+    assert console.count("composing on Blender's own GPU") == 2  # of each file's first film
+    reason = "View > Render Sequencer Animation cannot use Blender's own GPU, as Render > Render Animation can"
+    assert console.count(f"and {reason}; composing with NumPy, which is slow") == 1
+    assert f"{reason}\n" in console  # where NumPy is not allowed
+    assert len(list(tmp_path.glob("refused/*"))) < 4
+    held = [found for entry in seen for found in entry.values()]
+    assert {tuple(found[:2]) for found in held} == {("RelayedDevice", held[0][1])}
+    assert len({used for *_, used in held}) == 1
+    options = ("--recipe", path, "--output", tmp_path / "expected", "--device", "opengl")
+    subprocess.run([sys.executable, "-m", "shutter_addon", "render", first, *options], check=True, cwd=ROOT)
+    assert 3 <= len(list((tmp_path / "stopped").iterdir())) < 30
+    for folder, count in (("film", 30), ("short", 12), ("waited", 4), ("after", 5)):
+        names = sorted(file.name for file in (tmp_path / folder).iterdir())
+        assert names == [f"{number:04d}.png" for number in range(1, count + 1)]
+        for name in names:
+            apart = np.abs(pixels(tmp_path / folder / name) - pixels(tmp_path / "expected" / name))
+            assert apart.max() <= 1, (folder, name)
+
+
+def test_in_between_frames_are_built_and_removed(tmp_path):
+    seen, console = tell("inbetween_story.py", "opengl", linked(tmp_path))
+    states = [(entry["shown"], entry["state"]) for entry in seen if "shown" in entry]
+    assert states == [
+        ("missing", "missing"),
+        ("partial", "partial"),
+        ("ready", "ready"),
+        ("stale", "stale"),
+        ("again", "ready"),
+        ("removed", "missing"),
+    ]
+    assert "Traceback" not in console
+
+
+def test_renders_that_end_early(tmp_path):
+    """A picture that fails ends the job, as Esc does: the movie is finished up to there, and a menu says why."""
+    seen, console = tell("failing.py", "opengl", linked(tmp_path))
+    ends = {entry["output"]: entry["ended"] for entry in seen if "output" in entry}
+    assert ends == {
+        "film.mp4": ["render_cancel"],
+        "folder": ["render_cancel"],
+        "stopped.mp4": ["render_cancel"],
+        "after.mp4": ["render_complete"],
+    }
+    assert whole_pictures(tmp_path / "film.mp4") == 14
+    assert len(list((tmp_path / "folder").iterdir())) == 14
+    assert 1 <= whole_pictures(tmp_path / "stopped.mp4") < 185
+    assert whole_pictures(tmp_path / "after.mp4") == 5
+    assert console.count("Virtual Shutter: f0015.png: no such file") == 2
+    assert "Traceback" not in console
+    (scenes,) = (entry["scenes"] for entry in seen if "scenes" in entry)
+    assert len(scenes) == 2
+    assert [entry["shown"][0] for entry in seen if "shown" in entry] == [[360, 640, 4]]
+
+
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+@pytest.mark.parametrize("part", ["first", "second", "rendered", "modal", "handler", "current"])
+def test_blender_lives_where_its_gpu_is_not_current(part, backend, tmp_path):
+    """Whatever lets go of what it holds there, by whoever; and the preview is the same afterwards."""
+    path = tmp_path / "recipe.json"
+    line = {"shutter": "Sharp", "strokes": [[[0.2, 0.2], [0.6, 0.9]]], "width": 0.1}
+    shutters = [{"name": "Long", "bars": [1] * 6}, {"name": "Sharp", "bars": [1] + [0] * 5}]
+    path.write_text(json.dumps({"version": 1, "window": 6, "border": True, "shutters": shutters, "regions": [line]}))
+    seen, console = tell("gpu_life_story.py", backend, linked(tmp_path), recipe=path, part=part)
+    assert "Traceback" not in console
+    assert {entry["lost"] for entry in seen} == {part != "current"}
+    assert ("Blender's GPU cannot be used until a window is drawn" in console) == (part == "second")
+    assert not (tmp_path / "refused.png").exists()
+    pictures = [pixels(tmp_path / f"{name}.png", (300, 54, 900, 380)) for name in ("before", "after")]
+    assert_alike(*pictures, tmp_path / "difference.png", tolerance=0)
+
+
+@pytest.mark.parametrize(("backend", "hidden"), [("opengl", ""), ("vulkan", ""), ("vulkan", "moderngl")])
+def test_esc_ends_a_render_between_two_passes(backend, hidden, tmp_path):
+    """And the render's window shows the frame that was made. What is rendered afterwards is as ever."""
+    shutters = [{"name": "Long", "bars": [1] * 8}, {"name": "Sharp", "bars": [1, *[0] * 7]}]
+    line = {"name": "Line", "shutter": "Sharp", "strokes": [[[0.4, 0.3], [0.45, 0.6]]], "width": 0.02}
+    data = {"version": 1, "window": 8, "border": True, "edge_aware": 1, "shutters": shutters, "regions": [line]}
+    path = tmp_path / "recipe.json"
+    path.write_text(json.dumps(data))
+    seen, console = tell("stopping_story.py", backend, linked(tmp_path), recipe=path, hidden=hidden)
+    assert "Traceback" not in console
+    (ended,) = seen
+    assert ended["whole"] > 300
+    assert ended["after"] <= 5
+    assert ended["finished_after"] == 0
+    screen, written = pixels(tmp_path / "render_window.png"), sorted((tmp_path / "film").iterdir())
+    assert min(apart_on_screen(screen, pixels(frame)) for frame in written) <= TOLERANCE
+    for frame in (tmp_path / "after").iterdir():
+        assert np.array_equal(pixels(frame), pixels(tmp_path / "film" / frame.name))
+
+
+def apart_on_screen(screen, frame):
+    """By how many levels the middle of a frame differs at most from where a screen shows it, pixel for pixel."""
+    import cv2
+
+    height, width = frame.shape[:2]
+    middle = frame[height // 4 : 3 * height // 4, width // 4 : 3 * width // 4].astype(np.uint8)
+    near = cv2.matchTemplate(screen.astype(np.uint8), middle, cv2.TM_SQDIFF)
+    top, left = np.unravel_index(near.argmin(), near.shape)
+    shown = screen[top : top + middle.shape[0], left : left + middle.shape[1]]
+    return np.abs(shown - middle).max()
+
+
+@pytest.mark.parametrize(("backend", "hidden"), [("opengl", "moderngl"), ("vulkan", "")])
+def test_a_film_shows_what_was_when_it_began(backend, hidden, tmp_path):
+    """200 changes while a film renders, at the end the strip deleted: no frame is another one before, and then the
+    frames are those without it. So with the source deleted, and a single picture. A film ends where the effect's scene
+    is deleted, and by undo, even while it waits for Blender's main thread. On OpenGL, and on Blender's own GPU."""
+    seen, console = tell("stress.py", backend, linked(tmp_path), hidden=hidden)
+    assert ("composing on Blender's own GPU" in console) == bool(hidden)
+    assert "Traceback" not in console
+    films = {entry["film"]: entry for entry in seen}
+    ended = {name: film["ended"] for name, film in films.items()}
+    assert ended == dict.fromkeys(("alone", "stressed", "after", "source", "picture"), "complete") | dict.fromkeys(
+        ("scene", "undone", "asking"), "cancelled"
+    )
+    assert console.count('Virtual Shutter: the scene of "Shutter" was deleted') == 1
+    pictures = {name: {p.name: pixels(p) for p in (tmp_path / name).iterdir()} for name in films}
+    alone, stressed, after = (pictures[name] for name in ("alone", "stressed", "after"))
+    assert len(alone) == len(stressed) == len(after) == 90
+    names = sorted(alone)
+    assert_same(pictures["source"], alone, names)
+    assert_same(pictures["picture"], alone, ["0020.png"])
+    assert_same(stressed, alone, names[:67])
+    assert_same(stressed, after, names[67:])
+    assert not any(np.array_equal(alone[name], after[name]) for name in names)
+
+
+def assert_same(film, expected, names):
+    """These frames are there and are the expected ones, bit for bit."""
+    different = [name for name in names if not np.array_equal(film[name], expected[name])]
+    assert not different

@@ -1,0 +1,158 @@
+"""Strokes that are tracked, and what is seen of an effect, by mouse: each a story in a real window."""
+
+import shutil
+
+import av
+import cv2
+import numpy as np
+import pytest
+from screens import assert_alike, crop, pixels
+from telling import ROOT, linked, needs_window, packages, tell
+
+from shutter_addon.media import open_source
+
+pytestmark = needs_window
+
+
+def test_one_stroke(tmp_path):
+    """Drawn inside a walker, tracked, mended, stopped by Esc: where the stroke is, the film is as sharp as its source,
+    and those who walk beside are not."""
+    footage = ROOT / "assets" / "walkers.mp4"
+    given = {"footage": shutil.copy(footage, tmp_path), "packages": packages(tmp_path / "packages")}
+    seen, console = tell("one_stroke_story.py", "opengl", linked(tmp_path), **given)
+    assert "Traceback" not in console
+    facts = {name: entry[name] for entry in seen for name in entry}
+    assert facts["edge_aware"] > 0.9
+    for name, edited in (("tracked", ["70"]), ("mended", ["70", "85"]), ("escaped", ["70", "85"])):
+        kinds = facts[name]
+        assert [frame for frame, kind in kinds.items() if kind != "GENERATED"] == edited, name
+        assert len(kinds) > 5, name
+    with open_source(footage) as source:
+        for entry in (entry for entry in seen if "rendered" in entry):
+            frame, (x, y) = entry["rendered"], entry["stroke"]
+            apart = np.abs(pixels(tmp_path / f"final_{frame:04d}.png") - source.read(frame - 1)[..., :3])
+            row, column = round((1 - y) * apart.shape[0]), round(x * apart.shape[1])
+            assert apart[row - 2 : row + 3, column - 2 : column + 3].max() <= 6, frame
+            assert apart.max() > 60, frame
+
+
+def broken_film(path):
+    """For track_ends_story.py: 30 frames of a film, 40 of the walkers, covered in the last seven, 10 of grey, and 30 of
+    the other film again, 768×576."""
+    shots = []
+    for name, first, count in (("bigbuckbunny", 0, 30), ("walkers", 50, 40), ("", 0, 10), ("bigbuckbunny", 60, 30)):
+        if not name:
+            shots += [np.full((576, 768, 3), 110, np.uint8)] * count
+            continue
+        with open_source(ROOT / "assets" / f"{name}.mp4") as source:
+            frames = [source.read(first + n)[..., :3] for n in range(count)]
+        shots += [cv2.resize(frame, (768, 576), interpolation=cv2.INTER_AREA) for frame in frames]
+    for n in range(63, 70):
+        shots[n] = shots[n].copy()
+        shots[n][:, 200:560] = 110
+    with av.open(str(path), "w") as film:
+        stream = film.add_stream("libx264", rate=25, options={"crf": "10"})
+        stream.width, stream.height, stream.pix_fmt = 768, 576, "yuv420p"
+        for frame in shots:
+            film.mux(stream.encode(av.VideoFrame.from_ndarray(frame, "rgb24")))
+        film.mux(stream.encode())
+    return path
+
+
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_what_is_tracked_ends_with_its_track(tmp_path, backend):
+    """A region counts in its shot alone, and fades where the subject is covered: elsewhere the picture is that of an
+    effect without it. A camera is tracked through all shots; between them exposures become short, and long again."""
+    given = {"footage": broken_film(tmp_path / "broken.mp4"), "packages": packages(tmp_path / "packages")}
+    seen, console = tell("track_ends_story.py", backend, linked(tmp_path), **given)
+    assert "Traceback" not in console
+    facts = {name: entry[name] for entry in seen for name in entry}
+    first, last = facts["region"][0][0], facts["region"][-1][0]
+    assert 30 <= first < 45, "behind a lamp post, or at the cut"
+    assert 62 <= last <= 66
+    assert [value for _frame, value, _kind in facts["region"]] == [0, 1, 1, 0]
+    assert {kind for *_, kind in facts["region"]} == {"GENERATED"}
+    assert facts["gaps"] == [["-inf", str(first)], [str(last), "inf"]]
+    steps = {entry["step"]: crop(tmp_path, entry) for entry in seen if "step" in entry}
+    height = next(iter(steps.values())).shape[0]
+    above = slice(height // 4, height * 3 // 4)  # the bar editor, and below notes, which come when they are known
+    for frame in (20, 50, 61, 76):
+        apart = np.abs(steps[f"there_{frame:03d}"][above] - steps[f"without_{frame:03d}"][above])
+        assert (apart.max() > 25) == (frame in (50, 61)), frame
+    assert facts["tracked"] == [1, 110]
+    assert facts["camera_gaps"] == [["71", "80"]]
+    values = {frame: value for frame, value, _kind in facts["camera"]}
+    assert (values[70], values[81]) == (0, 0)
+    assert max(values.values()) == 1
+
+
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_the_first_stroke(backend, tmp_path):
+    """From an empty file to a tracked, rendered frame in twelve actions, at most five of them in the tab. Draw and the
+    pen show the sharp frame, and a finished stroke the result: the stroke's subject is sharp, up to her edges."""
+    (tmp_path / "footage").mkdir()
+    footage = shutil.copy(ROOT / "assets" / "walkers.mp4", tmp_path / "footage")
+    given = {"footage": footage, "packages": packages(tmp_path / "packages")}
+    seen, console = tell("first_stroke_story.py", backend, linked(tmp_path), **given)
+    assert "Traceback" not in console
+    facts = {name: entry[name] for entry in seen for name in entry}
+    assert len(facts["actions"]) <= 12
+    assert sum(in_tab for _what, in_tab in facts["actions"]) <= 5
+    left, top, right, bottom = facts["box"]
+    shown = [crop(tmp_path, entry)[top:bottom, left:right] for entry in seen if "step" in entry]
+    sharp, result, pressed, tracked, plain = shown
+    for picture, name in ((sharp, "sharp"), (pressed, "pressed")):
+        assert_alike(picture, plain, tmp_path / f"{name}_difference.png")
+    for picture in (result, tracked):
+        assert (np.abs(picture - plain).max(axis=2) > 30).mean() > 0.02
+    final, (x, y) = pixels(tmp_path / "final.png"), facts["stroke"]
+    with open_source(footage) as source:
+        apart = np.abs(final - source.read(81)[..., :3])
+    row, column = round((1 - y) * apart.shape[0]), round(x * apart.shape[1])
+    assert apart[row - 2 : row + 3, column - 2 : column + 3].max() <= 6
+    assert apart.max() > 60
+
+
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_a_panning_shot(tmp_path, backend):
+    """A walker before a still camera: she is sharp, and the street, which stands still, streaks. A dragged bar shows at
+    once. On the other backend than that of a single stroke, to spare time."""
+    footage = ROOT / "assets" / "walkers.mp4"
+    given = {"footage": shutil.copy(footage, tmp_path), "packages": packages(tmp_path / "packages")}
+    seen, console = tell("panning_story.py", backend, linked(tmp_path), **given)
+    assert "Traceback" not in console
+    facts = {name: entry[name] for entry in seen for name in entry}
+    assert facts["panned"] == [["Sharp", "REGION", "Sharp", [1] * 8], ["Long", "NOTHING", "", [1] * 8]]
+    assert facts["way"] == ["LOCATION", 6]
+    steps = {entry["step"]: crop(tmp_path, entry) for entry in seen if "step" in entry}
+    height = steps["2_tracked"].shape[0]
+    tracked, panned, back, bars = (steps[name][: height * 3 // 4] for name in sorted(steps))  # above the bar editor
+    assert np.abs(tracked - panned).max() > 100
+    assert_alike(back, panned, tmp_path / "back_difference.png")
+    assert np.abs(bars - back).max() > 30
+    with open_source(footage) as source:
+        apart = np.abs(pixels(tmp_path / "final_0070.png") - source.read(69)[..., :3])
+    x, y = facts["stroke"]
+    row, column = round((1 - y) * apart.shape[0]), round(x * apart.shape[1])
+    assert apart[row - 2 : row + 3, column - 2 : column + 3].max() <= 40
+    assert apart[:60].max() > 120
+
+
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_what_is_seen_is_edited_and_nothing_of_the_deleted_stays(backend, tmp_path):
+    """A strip cut by K, its right half moved away: bars, strokes and tab are those of the half under the playhead. Then
+    both are deleted, in four ways: no stroke stays in the picture, and undo brings it back."""
+    seen, console = tell("seen_story.py", backend, linked(tmp_path))
+    assert "Traceback" not in console
+    entries = {entry["picture"]: entry for entry in seen}
+    shown = {name: pixels(tmp_path / f"{name}.png", entry["preview"]) for name, entry in entries.items()}
+    tabs = {name: pixels(tmp_path / f"{name}.png", entry["tab"]) for name, entry in entries.items()}
+    assert_alike(tabs["4_left_again"], tabs["2_left"], tmp_path / "tab_difference.png")
+    assert np.abs(tabs["3_right"] - tabs["2_left"]).max() > 50
+    assert np.abs(tabs["5_between"] - tabs["2_left"]).max() > 50
+    for name in shown:
+        if name.startswith("7_") and name != "7_scene_removed":  # whose strips Blender shows as missing
+            assert_alike(shown[name], shown["9_plain"], tmp_path / f"{name}_difference.png")
+        if name.startswith("8_"):
+            assert_alike(shown[name], shown["6_before"], tmp_path / f"{name}_difference.png", 12)
+    assert np.abs(shown["6_before"] - shown["9_plain"]).max() > 50
