@@ -42,15 +42,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from shutter_addon.compute import cpu, diffusion, diffusion_gpu, edge_diffusion, edge_diffusion_gpu, gpu, guide
 from shutter_addon.compute.benchmark import BARS, Noise, bars, levels_apart, reference, shapes
-from shutter_addon.compute.gl import GLDevice
 from shutter_addon.compute.gpu import GPUCompositor
-from shutter_addon.compute.passes import LOCAL_ROW, Image, Pass
 from shutter_addon.compute.tables import table as table_of
 from shutter_addon.compute.window import Frames
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import mattes, scribbles, shutters
 from shutter_addon.core.model.frame_state import Following, FrameState, Options
 from shutter_addon.core.pixels import compositor
+from shutter_addon.devices.gl import GLDevice
+from shutter_addon.devices.passes import LOCAL_ROW, Image, Pass
 
 HERE = Path(__file__).resolve().with_suffix("")
 METHODS = ("ours", "paper", "average", "edges", "follow")

@@ -50,15 +50,16 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from shutter_addon import blender
 from shutter_addon.blender.data import snapshot, strips
 from shutter_addon.blender.editing import new_edit
-from shutter_addon.blender.rendering import film_output, movie_feed, session
+from shutter_addon.blender.output import film_output, movie_feed
+from shutter_addon.blender.rendering import session
 from shutter_addon.blender.rendering.engine import VirtualShutterEngine
 from shutter_addon.compute.cpu import CPUCompositor
-from shutter_addon.compute.device import NoDeviceError
-from shutter_addon.compute.gl import GLDevice
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import presets
 from shutter_addon.core.recipes import recipe
+from shutter_addon.devices.device import NoDeviceError
+from shutter_addon.devices.gl import GLDevice
 from shutter_addon.media import MediaError, open_source
 from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.prefetch import PrefetchSource

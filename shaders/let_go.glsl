@@ -1,5 +1,5 @@
 // Uses as many samplers and images as any pass, so that all of them are bound anew; see
-// shutter_addon/blender/rendering/blender_gpu.py.
+// shutter_addon/blender/devices/blender_gpu.py.
 void main()
 {
   ivec3 first = ivec3(0, 0, layer);

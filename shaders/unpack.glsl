@@ -1,4 +1,4 @@
-// Fills rows of a layer, from `top` on, from the floats that were sent; see shutter_addon/blender/rendering/blender_gpu.py.
+// Fills rows of a layer, from `top` on, from the floats that were sent; see shutter_addon/blender/devices/blender_gpu.py.
 // PACKING: 0 as they are, 1 as whole numbers, 2 opaque bytes (R + 256 G + 65536 B), 3 pairs of bytes (R + 256 G,
 // B + 256 A), 4 16-bit samples.
 void main()

@@ -22,9 +22,10 @@ def imported(path):
 
 BLENDER = {"bpy", "bpy_extras", "gpu", "mathutils", "bl_ui", "addon_utils"}
 FORBIDDEN = {
-    "core": BLENDER | {"moderngl", "av", "OpenImageIO", "media", "compute", "blender"},
-    "media": BLENDER | {"moderngl", "compute", "blender"},
-    "compute": BLENDER | {"av", "OpenImageIO", "media", "blender"},
+    "core": BLENDER | {"moderngl", "av", "OpenImageIO", "media", "devices", "compute", "blender"},
+    "media": BLENDER | {"moderngl", "devices", "compute", "blender"},
+    "devices": BLENDER | {"av", "OpenImageIO", "media", "compute", "blender"},
+    "compute": BLENDER | {"av", "OpenImageIO", "moderngl", "media", "blender"},
 }
 
 
@@ -57,10 +58,12 @@ ROOMS = {
     },
     "blender": {
         "data": set(),
-        "rendering": {"data"},
-        "editing": {"data", "rendering"},
-        "interface": {"data", "rendering", "editing"},
-        "commands": {"data", "rendering", "editing"},
+        "devices": {"data"},
+        "rendering": {"data", "devices"},
+        "output": {"data", "devices", "rendering"},
+        "editing": {"data", "rendering", "output"},
+        "interface": {"data", "devices", "rendering", "output", "editing"},
+        "commands": {"data", "devices", "rendering", "output", "editing"},
     },
 }
 

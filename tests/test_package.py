@@ -168,7 +168,7 @@ except recipe.RecipeError as error:
 
 def test_without_moderngl_there_is_no_opengl():
     code = """
-from shutter_addon.compute.device import NoDeviceError
+from shutter_addon.devices.device import NoDeviceError
 from shutter_addon.compute.renderer import open_compositor
 print(open_compositor("cpu").name)
 try:

@@ -262,7 +262,7 @@ def _draw(bpy, _folder):
 
 def _export(bpy, folder):
     from shutter_addon.blender.data import selection, validation
-    from shutter_addon.blender.rendering import matte_export
+    from shutter_addon.blender.output import matte_export
     from shutter_addon.core.recipes.recipe import RecipeError
     from shutter_addon.media import MediaError
 

@@ -10,11 +10,11 @@ import traceback
 from contextlib import suppress
 from pathlib import Path
 
-from ..compute.device import NoDeviceError
 from ..core.messages import UserError, signed
+from ..devices.device import NoDeviceError
 from ..media.files import check_name
 from .commands import benchmark_command, check_command, inbetween_command, join_command, render_command, track_command
-from .rendering import film_output
+from .output import film_output
 
 BAD_INPUT = 2
 PLACES = ("output", "save", "cache", "json", "source", "edit")  # where a fault may be that says not where

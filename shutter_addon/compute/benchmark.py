@@ -22,8 +22,8 @@ from ..core.frames.frame_source import FrameSource
 from ..core.model import presets, scribbles
 from ..core.model.frame_state import FrameState, Options
 from ..core.pixels import compositor
-from .budget import MEGABYTE
-from .device import NoDeviceError
+from ..devices.budget import MEGABYTE
+from ..devices.device import NoDeviceError
 from .renderer import Renderer
 
 SIZES = (1280, 720), (1920, 1080), (3840, 2160)

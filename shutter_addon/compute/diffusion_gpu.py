@@ -20,7 +20,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from .passes import Image, Pass
+from ..devices.passes import Image, Pass
 
 # V-cycles of a solve that starts from nothing. Largest error × 255 after 1, 2, 3, 4 cycles: 3.9, 0.67, 0.66, 0.66 over
 # the scenes of the tests (median 2.1, 0.13, 0.07, 0.07), and 11, 1.6, 0.25, 0.24 over their lattices of dots. The error

@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 
 from ..core.pixels.conductances import cell_side, resistances
+from ..devices.passes import LOCAL_ROW, Image, Pass
 from .diffusion_gpu import CHANGED, FINISH, GRID, GRIDS, LABELS, NOTHING, READ, STORED, Diffusion, tile_pass
 from .edge_diffusion import CYCLES, SWEEPS, TWICE, first_solved, is_enough
-from .passes import LOCAL_ROW, Image, Pass
 
 # Where the guide's cells are larger than pixels: the iterations of conjugate gradients in each cycle, first of cycles
 # near scribbles alone, then of those everywhere. Largest error × 255 in frames of three films at 1920 × 1080: 0.6.

@@ -9,14 +9,14 @@ import numpy as np
 from ..core.frames.frame_source import FrameSource
 from ..core.model.frame_state import FrameState, Options
 from ..core.pixels import compositor
+from ..devices.device import Device, NoDeviceError
+from ..devices.passes import LOCAL_ROW, Image, Pass
 from . import cpu
-from .device import Device, NoDeviceError
 from .diffusion_gpu import Diffusion
 from .edge_diffusion import follows_edges
 from .edge_diffusion_gpu import EdgeDiffusion
 from .matting import Matting
 from .mixing import Mixing
-from .passes import LOCAL_ROW, Image, Pass
 from .tables import moved_tables, padded, table
 from .window import BLOCK, Frames, PackedFrames, Sums, WholeFrames, decoding, open_window
 

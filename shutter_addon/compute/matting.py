@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 
 from ..core.model.mattes import Matte
-from .device import Device
-from .passes import LOCAL_ROW, Image, Pass
+from ..devices.device import Device
+from ..devices.passes import LOCAL_ROW, Image, Pass
 
 # Mattes that one pass lays, whose values are on the device at once.
 MOST = 8

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..core.frames.frame_source import FrameSource
+from ..devices.budget import Budget
+from ..devices.device import Device, NoDeviceError
+from ..devices.paging import TEXEL_BYTES
 from . import cpu
-from .budget import Budget
-from .device import Device, NoDeviceError
-from .paging import TEXEL_BYTES
 from .window import beside, open_window
 
 

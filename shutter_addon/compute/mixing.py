@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from functools import cache
 
-from .device import Device
-from .passes import LOCAL_ROW, Image, Pass
+from ..devices.device import Device
+from ..devices.passes import LOCAL_ROW, Image, Pass
 
 
 @cache

@@ -12,9 +12,9 @@ from ..core.model import scribbles
 from ..core.model.frame_state import FrameState
 from ..core.model.mattes import MatteReader
 from ..core.pixels import compositor
+from ..devices.device import NoDeviceError
 from . import guide
 from .cpu import CPUCompositor
-from .device import NoDeviceError
 
 
 def open_compositor(device: str = "gpu", *memory):
@@ -31,7 +31,7 @@ def open_gl(*memory):
     """A device on an OpenGL 4.3 context of its own; memory: the arguments of GLDevice. NoDeviceError: there is none, or
     no moderngl."""
     try:
-        from .gl import GLDevice
+        from ..devices.gl import GLDevice
     except ImportError as error:  # a package without wheels, or one for another Python
         raise NoDeviceError(f"the Python package moderngl cannot be loaded ({error})") from None
     return GLDevice(*memory)

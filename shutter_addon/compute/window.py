@@ -11,9 +11,9 @@ from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Planes, chroma_step
 from ..core.model.frame_state import Options
 from ..core.pixels import compositor
-from .budget import is_software
-from .device import Device, NoDeviceError
-from .passes import Image, Pass
+from ..devices.budget import is_software
+from ..devices.device import Device, NoDeviceError
+from ..devices.passes import Image, Pass
 from .running_sums import RunningSums, summable
 
 # Bytes of a texture array, at most. Mesa's software renderer reads wrong values, without an error, from one over 2 GiB.

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from shutter_addon.blender import command as program
-from shutter_addon.blender.rendering import machine
+from shutter_addon.blender.devices import machine
 from shutter_addon.compute import benchmark, cpu
-from shutter_addon.compute.device import NoDeviceError
+from shutter_addon.devices.device import NoDeviceError
 
 TINY = "--sizes", "40x24,64x36", "--windows", "3,8"
 

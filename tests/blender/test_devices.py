@@ -6,8 +6,8 @@ import pytest
 from support import picture_of, read_picture, recipe, write_frames
 
 from shutter_addon.compute.cpu import CPUCompositor
-from shutter_addon.compute.device import NoDeviceError
 from shutter_addon.compute.gpu import GPUCompositor
+from shutter_addon.devices.device import NoDeviceError
 
 BORROWED = "composing on Blender's own GPU, "  # and its name
 
@@ -78,7 +78,8 @@ def preferred(bpy):
 def test_the_preference_chooses(effect, preferred):
     """From the next render on, if the command asks for nothing else."""
     from shutter_addon.blender.data import preferences
-    from shutter_addon.blender.rendering import devices, session
+    from shutter_addon.blender.devices import available
+    from shutter_addon.blender.rendering import session
 
     def composed_by():
         session.settle()
@@ -90,17 +91,17 @@ def test_the_preference_chooses(effect, preferred):
         assert composed_by() is found, wanted
         with session.using(session.RenderSettings(device="cpu")):
             assert composed_by() is CPUCompositor, wanted
-    assert {item[0].lower() for item in preferences.DEVICES} == set(devices.CHOICES)
+    assert {item[0].lower() for item in preferences.DEVICES} == set(available.CHOICES)
     session.forget()
 
 
 def test_what_is_lacking_is_said_of_all(bpy, monkeypatch):
-    from shutter_addon.blender.rendering import devices
+    from shutter_addon.blender.devices import available
 
-    monkeypatch.setattr(devices, "opengl", lambda: devices.OpenGL(lacking="no OpenGL 4.3: none"))
-    monkeypatch.setattr(devices, "_blender_in_background", lambda: False)
+    monkeypatch.setattr(available, "opengl", lambda: available.OpenGL(lacking="no OpenGL 4.3: none"))
+    monkeypatch.setattr(available, "_blender_in_background", lambda: False)
     both = "no OpenGL 4.3: none, and Blender's own GPU cannot be used without a window here"
-    assert devices.choose("auto") == ("cpu", f"{both}; composing with NumPy, which is slow")
+    assert available.choose("auto") == ("cpu", f"{both}; composing with NumPy, which is slow")
     for wanted, lacking in (("gpu", both), ("opengl", both.split(",")[0]), ("blender", both.split("and ")[1])):
         with pytest.raises(NoDeviceError, match=f"^{lacking}$"):
-            devices.choose(wanted)
+            available.choose(wanted)

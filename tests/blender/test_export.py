@@ -143,7 +143,7 @@ def apply(effect_on, data):
 
 
 def export(effect_on):
-    from shutter_addon.blender.rendering.matte_export import recipe_for
+    from shutter_addon.blender.output.matte_export import recipe_for
 
     return recipe_for(*effect_on, folder_of(effect_on) / "recipe.json")
 

@@ -5,7 +5,7 @@ import queue
 
 def test_a_call_that_is_made_before_anyone_looks(bpy, monkeypatch):
     """The main thread, waiting in `serve`, takes it as soon as it is there: it must look for the next all the same."""
-    from shutter_addon.blender.rendering import gpu_relay
+    from shutter_addon.blender.devices import gpu_relay
 
     class TakenAtOnce(queue.SimpleQueue):
         def put(self, call):

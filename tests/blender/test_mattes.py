@@ -119,7 +119,7 @@ def test_a_cut_of_the_effect_changes_nothing(shown, matte, tmp_path):
     """Neither with the timeline's frames nor with the footage's."""
     from shutter_addon.blender.data import recipe_import
     from shutter_addon.blender.editing import lifecycle
-    from shutter_addon.blender.rendering import matte_export
+    from shutter_addon.blender.output import matte_export
 
     regions = region(matte, timing="timeline", offset=1, opacity=0.5), region(matte, opacity=0.5, name="n")
     strip, effect, _coefficients = shown(data(*regions))
@@ -362,7 +362,7 @@ def test_copies_have_mattes_of_their_own(bpy, edit, shown, matte):
 
 def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
     from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.rendering import matte_export
+    from shutter_addon.blender.output import matte_export
 
     content = data(
         region(matte, offset=1, channel="green", opacity=0.25),
@@ -392,7 +392,7 @@ def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
 
 
 def test_a_still_strip_is_exported_as_one_picture(edit, shown, matte, tmp_path):
-    from shutter_addon.blender.rendering import matte_export
+    from shutter_addon.blender.output import matte_export
 
     strip, effect, _coefficients = shown(data(region(matte)))
     own = edit.sequence_editor.strips.new_image("still", str(matte), 4, 1)
@@ -404,7 +404,7 @@ def test_a_still_strip_is_exported_as_one_picture(edit, shown, matte, tmp_path):
 
 def test_a_single_picture_among_numbered_ones_is_exported_as_one(shown, matte, tmp_path):
     from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.rendering import matte_export
+    from shutter_addon.blender.output import matte_export
 
     strip, effect, coefficients = shown(data(region(matte)))
     effect.regions[0].image.source = "FILE"
@@ -415,7 +415,7 @@ def test_a_single_picture_among_numbered_ones_is_exported_as_one(shown, matte, t
 
 def test_an_export_spares_what_it_reads(edit, shown, matte, tmp_path):
     """A strip of the pictures that an export has written."""
-    from shutter_addon.blender.rendering import matte_export
+    from shutter_addon.blender.output import matte_export
 
     strip, effect, _coefficients = shown(data(region(matte)))
     one = effect.regions[0]
@@ -430,7 +430,7 @@ def test_an_export_spares_what_it_reads(edit, shown, matte, tmp_path):
 
 def test_an_export_through_a_linked_folder(shown, matte, tmp_path):
     from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.rendering import matte_export
+    from shutter_addon.blender.output import matte_export
 
     (tmp_path / "there" / "deep").mkdir(parents=True)
     (tmp_path / "link").symlink_to(tmp_path / "there" / "deep")
@@ -502,7 +502,7 @@ def test_a_mask_over_footage_that_is_retimed(bpy, edit, shown, mask):
 
 def test_a_mask_is_exported_as_pictures(shown, mask, tmp_path):
     from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.rendering import matte_export
+    from shutter_addon.blender.output import matte_export
 
     strip, effect, coefficients = shown(data(region(ramp="linear", opacity=0.5)))
     one = effect.regions[0]
@@ -548,7 +548,7 @@ def test_handles_of_a_ramp(bpy, edit, shown, monkeypatch):
 
 
 def test_what_panels_tell(edit, shown, matte):
-    from shutter_addon.blender.rendering import matte_look
+    from shutter_addon.blender.data import matte_look
 
     strip, effect, _coefficients = shown(data(region(matte)))
     one = effect.regions[0]
@@ -598,7 +598,7 @@ def test_weights_are_read_back(bpy, tmp_path, footage):
 @pytest.mark.parametrize(("kind", "short"), [("fast", True), ("trimmed", False), ("keyed", True), ("timeline", False)])
 def test_a_panel_tells_of_a_matte_shorter_than_what_is_shown(bpy, edit, shown, matte, kind, short):
     """A matte of 7 frames, and 6 of the film: at twice its speed, as it is, or backward by keys, from the eleventh."""
-    from shutter_addon.blender.rendering import matte_look
+    from shutter_addon.blender.data import matte_look
 
     def change(source):
         if kind == "fast":

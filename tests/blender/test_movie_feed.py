@@ -40,7 +40,7 @@ def rendered(edit, folder):
 
 def test_levels_are_those_of_the_engine(bpy, film, tmp_path, monkeypatch):
     """And what a killed render has left is removed. OCIO is as a Blender with a window has it: its own file."""
-    from shutter_addon.blender.rendering import movie_feed
+    from shutter_addon.blender.output import movie_feed
 
     monkeypatch.setenv("OCIO", str(blenders_own(bpy)))
     monkeypatch.setattr(tempfile, "tempdir", str(place := tmp_path / "temporary"))
@@ -63,7 +63,7 @@ def test_levels_are_those_of_the_engine(bpy, film, tmp_path, monkeypatch):
 
 
 def test_a_studios_colour_configuration_leaves_the_film_to_the_engine(bpy, film, tmp_path, monkeypatch):
-    from shutter_addon.blender.rendering import movie_feed
+    from shutter_addon.blender.output import movie_feed
 
     own, studio = blenders_own(bpy), tmp_path / "config.ocio"
     studio.write_text(f"# of a studio\n{own.read_text()}")
@@ -76,7 +76,7 @@ def test_a_studios_colour_configuration_leaves_the_film_to_the_engine(bpy, film,
 
 def test_a_file_that_is_gone_ends_the_film(bpy, film, tmp_path, monkeypatch, capfd):
     """Blender would show it as a picture of one colour."""
-    from shutter_addon.blender.rendering import movie_feed
+    from shutter_addon.blender.output import movie_feed
 
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
     (tmp_path / "temporary").mkdir()
@@ -97,7 +97,7 @@ def test_a_file_that_is_gone_ends_the_film(bpy, film, tmp_path, monkeypatch, cap
 @pytest.mark.parametrize("width", [7, 16, 40])
 @pytest.mark.parametrize("height", [5, 64, 65, 200])
 def test_a_file_whose_pixels_are_replaced(tmp_path, width, height):
-    from shutter_addon.blender.rendering.movie_feed import LevelsFile
+    from shutter_addon.blender.output.movie_feed import LevelsFile
 
     levels = np.random.default_rng(0).integers(0, 256, (2, height, width, 4), dtype=np.uint8)
     levels[..., 3] = 255

@@ -2,7 +2,7 @@
 
 import pytest
 
-from shutter_addon.compute.passes import body
+from shutter_addon.devices.passes import body
 
 SAMPLERS = {"FLOAT_2D_ARRAY": "sampler2DArray", "UINT_2D_ARRAY": "usampler2DArray"}
 # Beside what preview.py gives each of them, those that all have.

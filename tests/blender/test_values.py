@@ -447,7 +447,8 @@ def rendered(scene):
 
 
 def exported(edit, effect):
-    from shutter_addon.blender.rendering import matte_export, session
+    from shutter_addon.blender.output import matte_export
+    from shutter_addon.blender.rendering import session
     from shutter_addon.core.recipes.recipe import RecipeError
 
     with suppress(*session.FAULTS, RecipeError), TemporaryDirectory() as folder:

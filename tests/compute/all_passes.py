@@ -4,7 +4,7 @@ import importlib.util
 import itertools
 
 from shutter_addon.compute import diffusion_gpu, edge_diffusion_gpu, gpu, matting, mixing, window
-from shutter_addon.compute.passes import Pass
+from shutter_addon.devices.passes import Pass
 
 _WAYS = ("frames", "search", "value")
 
@@ -40,7 +40,7 @@ def _filling():
 
 def _unpacking():
     if importlib.util.find_spec("bpy"):
-        from shutter_addon.blender.rendering import blender_gpu
+        from shutter_addon.blender.devices import blender_gpu
 
         for kind, sent in blender_gpu.FORMATS.items():
             if sent is not None:

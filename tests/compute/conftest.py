@@ -10,7 +10,7 @@ def blender_device():
     import gpu
 
     gpu.init()
-    from shutter_addon.blender.rendering.blender_gpu import BlenderDevice
+    from shutter_addon.blender.devices.blender_gpu import BlenderDevice
 
     device = BlenderDevice()
     yield device
@@ -23,7 +23,7 @@ def gpu_device(request):
     if request.param == "blender":
         yield request.getfixturevalue("blender_device")
         return
-    from shutter_addon.compute.gl import GLDevice
+    from shutter_addon.devices.gl import GLDevice
 
     device = GLDevice()
     yield device

@@ -8,13 +8,14 @@ import pytest
 from test_composition import SHAPES, footage, state
 from test_moved import following
 
-from shutter_addon.compute import budget, window
-from shutter_addon.compute.budget import Budget
-from shutter_addon.compute.device import NoDeviceError
+from shutter_addon.compute import window
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.core.model.mattes import Matte
+from shutter_addon.devices import budget
+from shutter_addon.devices.budget import Budget
+from shutter_addon.devices.device import NoDeviceError
 
 SIZE = 128, 72
 PIXELS = SIZE[0] * SIZE[1]
@@ -28,11 +29,11 @@ BESIDE = 16 * 6 + 4
 def kind(request):
     """A class of devices."""
     if request.param == "moderngl":
-        from shutter_addon.compute.gl import GLDevice
+        from shutter_addon.devices.gl import GLDevice
 
         return GLDevice
     request.getfixturevalue("blender_device")
-    from shutter_addon.blender.rendering.blender_gpu import BlenderDevice
+    from shutter_addon.blender.devices.blender_gpu import BlenderDevice
 
     return BlenderDevice
 

@@ -7,7 +7,6 @@ import pytest
 
 from shutter_addon.compute import cpu, gpu, window
 from shutter_addon.compute.cpu import CPUCompositor
-from shutter_addon.compute.device import NoDeviceError
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.core.frames import light
@@ -16,6 +15,7 @@ from shutter_addon.core.model import presets
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.core.model.scribbles import Shape, rasterise
 from shutter_addon.core.pixels import compositor
+from shutter_addon.devices.device import NoDeviceError
 
 LEVEL = 1 / 255
 
@@ -508,7 +508,7 @@ def test_a_window_too_long_or_a_picture_too_high_for_tiles_has_none(monkeypatch)
 
 
 def test_a_texture_without_room_is_refused():
-    from shutter_addon.compute.gl import GLDevice
+    from shutter_addon.devices.gl import GLDevice
 
     device = GLDevice()
     with device.current():
@@ -519,7 +519,7 @@ def test_a_texture_without_room_is_refused():
 
 
 def test_a_device_too_small_for_the_window_streams_it(monkeypatch):
-    from shutter_addon.compute.gl import GLDevice
+    from shutter_addon.devices.gl import GLDevice
 
     rng = np.random.default_rng(17)
     source, moment = footage(rng), state(rng)
@@ -646,7 +646,7 @@ def test_two_effects_share_a_device(device):
 
 
 def test_no_gl_says_so(monkeypatch):
-    from shutter_addon.compute import gl
+    from shutter_addon.devices import gl
 
     def fail(self):
         raise NoDeviceError("no OpenGL 4.3: none here")

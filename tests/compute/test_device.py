@@ -5,7 +5,7 @@ import inspect
 import numpy as np
 import pytest
 
-from shutter_addon.compute.device import Device, NoDeviceError
+from shutter_addon.devices.device import Device, NoDeviceError
 
 KINDS = {
     "rgba8": np.uint8,
@@ -98,7 +98,7 @@ def test_there_are_limits(gpu_device):
 
 
 def test_moderngl_leaves_blenders_context_current(blender_device):
-    from shutter_addon.compute.gl import GLDevice
+    from shutter_addon.devices.gl import GLDevice
 
     other = GLDevice()
     frame = samples("rgba8", 4, 4)

@@ -223,7 +223,7 @@ SCENES = {
 
 @pytest.fixture(scope="module")
 def device():
-    gl = pytest.importorskip("shutter_addon.compute.gl")
+    gl = pytest.importorskip("shutter_addon.devices.gl")
     try:
         device = gl.GLDevice()
     except gl.NoDeviceError as error:

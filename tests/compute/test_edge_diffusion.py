@@ -214,7 +214,7 @@ def exact():
 
 @pytest.fixture(scope="module")
 def on_moderngl():
-    gl = pytest.importorskip("shutter_addon.compute.gl")
+    gl = pytest.importorskip("shutter_addon.devices.gl")
     try:
         device = gl.GLDevice()
     except gl.NoDeviceError as error:

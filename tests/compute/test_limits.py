@@ -6,7 +6,7 @@ import re
 import pytest
 from all_passes import PASSES
 
-from shutter_addon.compute.passes import SHADERS, body
+from shutter_addon.devices.passes import SHADERS, body
 
 # Images, samplers and uniform blocks of a pass; bytes of a block, and of all constants; invocations of a workgroup
 # along each axis, and in all.

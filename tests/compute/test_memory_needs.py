@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from shutter_addon.compute import memory_needs
-from shutter_addon.compute.budget import Budget
 from shutter_addon.compute.cpu import CPUCompositor
-from shutter_addon.compute.device import NoDeviceError
 from shutter_addon.compute.renderer import open_gl
 from shutter_addon.compute.window import beside, open_window
+from shutter_addon.devices.budget import Budget
+from shutter_addon.devices.device import NoDeviceError
 
 WINDOW, SHUTTERS = 6, 3
 

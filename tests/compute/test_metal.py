@@ -5,7 +5,7 @@ import re
 import pytest
 from all_passes import PASSES
 
-from shutter_addon.compute.passes import body
+from shutter_addon.devices.passes import body
 
 
 def completed(program) -> str:

@@ -5,7 +5,7 @@ import re
 import pytest
 from all_passes import PASSES
 
-from shutter_addon.compute.passes import SHADERS, body
+from shutter_addon.devices.passes import SHADERS, body
 
 # Of what is declared inside the sources, whatever it is: variables, parameters, functions.
 DECLARED = re.compile(r"\b(?:bool|u?int|float|[biu]?vec[234])\s+(\w+)")

@@ -58,7 +58,7 @@ def test_beside_the_picture_there_is_nothing(request_of, point):
 
 
 def test_a_texel_is_that_of_the_whole_texture(blender_device):
-    from shutter_addon.blender.rendering.blender_gpu import texel
+    from shutter_addon.blender.devices.blender_gpu import texel
 
     values = np.random.default_rng(1).random((2, 5, 7, 4), dtype=np.float32)
     texture = blender_device.texture(7, 5, 2, "rgba32f")

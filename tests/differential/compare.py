@@ -40,7 +40,7 @@ def open_devices(names) -> dict:
         import gpu
 
         gpu.init()
-        from shutter_addon.blender.rendering.blender_gpu import BlenderDevice
+        from shutter_addon.blender.devices.blender_gpu import BlenderDevice
 
         devices["blender"] = GPUCompositor(BlenderDevice())
     return devices

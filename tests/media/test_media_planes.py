@@ -6,11 +6,11 @@ import av
 import numpy as np
 import pytest
 
-from shutter_addon.compute.device import NoDeviceError
 from shutter_addon.compute.renderer import open_gl
 from shutter_addon.compute.window import Sums
 from shutter_addon.core.frames.planes import Planes
 from shutter_addon.core.model.frame_state import Options
+from shutter_addon.devices.device import NoDeviceError
 from shutter_addon.media import MediaError, PrefetchSource, movie, open_source
 from shutter_addon.media.cuts import ShotSource, signature
 

@@ -28,9 +28,9 @@ class Passes:
 
     def __init__(self):
         self.all, self.whole, self.begun = 0, [], None
-        devices = [part("blender.rendering.gpu_relay").RelayedDevice]
+        devices = [part("blender.devices.gpu_relay").RelayedDevice]
         if not os.environ.get("SHUTTER_HIDDEN"):
-            devices.append(part("compute.gl").GLDevice)
+            devices.append(part("devices.gl").GLDevice)
         for device in devices:
             device._dispatch = self._counted(device._dispatch)
         renderer = part("compute.renderer").Renderer

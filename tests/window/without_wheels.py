@@ -56,7 +56,7 @@ def rendered():
 
 def devices_named():
     """A panel makes no OpenGL context while it is drawn, and names the devices a moment later."""
-    opengl, layout = part("rendering.devices").opengl, Mock()
+    opengl, layout = part("devices.available").opengl, Mock()
     opengl.cache_clear()
     part("interface.panels")._draw_devices(layout)
     assert not layout.mock_calls

@@ -6,7 +6,8 @@ import re
 
 from ...compute import benchmark
 from ...core.messages import sentence
-from ..rendering import devices, film_output, machine
+from ..devices import available, machine
+from ..output import film_output
 from . import command_line
 
 # Pixels along a picture's side, and frames of a window, that can be measured.
@@ -15,7 +16,7 @@ MOST_PIXELS, MOST_FRAMES = 16384, 256
 
 def add(commands) -> None:
     parser = commands.add_parser("benchmark", help="measure how fast this machine composes, for a bug report")
-    parser.add_argument("--device", choices=devices.CHOICES, help="as for render")
+    parser.add_argument("--device", choices=available.CHOICES, help="as for render")
     parser.add_argument("--json", type=command_line.place, metavar="FILE.json", help="also write what was measured")
     parser.add_argument("--sizes", type=_sizes, default=benchmark.SIZES, metavar="WxH,…", help="of pictures")
     parser.add_argument("--windows", type=_windows, default=benchmark.WINDOWS, metavar="L,…", help="frames a picture")

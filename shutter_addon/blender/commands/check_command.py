@@ -10,17 +10,19 @@ from pathlib import Path
 
 import bpy
 
-from ...compute.budget import machine_memory
-from ...compute.device import NoDeviceError
 from ...core.farm import chunks, job_file
 from ...core.farm.edit_version import EditVersion
 from ...core.frames import frame_ranges
 from ...core.messages import UserError, signed
+from ...devices.budget import machine_memory
+from ...devices.device import NoDeviceError
 from ..data import missing_media, versions
+from ..devices import machine
 from ..editing import saved_edit
-from ..rendering import edit_check, film_join, film_output, machine, output_space, session, shared_frames
-from ..rendering.edit_check import EffectCheck
-from ..rendering.output_space import Need, in_units
+from ..output import edit_check, film_join, film_output, output_space, shared_frames
+from ..output.edit_check import EffectCheck
+from ..output.output_space import Need, in_units
+from ..rendering import session
 from . import command_line
 
 

@@ -12,7 +12,8 @@ from ...core.recipes import recipe
 from ...media import open_source
 from ...media.sequence import by_number
 from ..data import inbetween_settings
-from ..rendering import devices, film_output
+from ..devices import available
+from ..output import film_output
 
 FACTORS = get_args(recipe.Factor)  # 1: none
 METHODS = tuple(inbetween_settings.METHODS.values())
@@ -36,7 +37,7 @@ def add_device(parser: argparse.ArgumentParser) -> None:
     """The options that say what composes pictures."""
     parser.add_argument(
         "--device",
-        choices=devices.CHOICES,
+        choices=available.CHOICES,
         help="opengl: OpenGL 4.3; blender: Blender's own GPU; gpu: either; cpu: NumPy; auto: the first of these that"
         " works (default: as in Blender's preferences, else auto)",
     )

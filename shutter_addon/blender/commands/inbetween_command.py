@@ -5,7 +5,8 @@ from pathlib import Path
 from ...media import inbetween
 from ..data import inbetween_settings, requirements, snapshot, source_media
 from ..editing import new_edit, saved_edit
-from ..rendering import film_output, job_snapshots, session
+from ..output import film_output
+from ..rendering import job_snapshots, session
 from . import command_line
 
 

@@ -3,7 +3,7 @@
 from ...core.farm import job_file
 from ..data import missing_media, versions
 from ..editing import saved_edit
-from ..rendering import film_join, film_output
+from ..output import film_join, film_output
 from . import command_line
 
 

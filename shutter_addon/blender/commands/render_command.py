@@ -11,8 +11,10 @@ from ...core.recipes import recipe
 from ...media.completeness import is_whole_blend, why_short
 from ...media.matte_files import MatteFile
 from ..data import inbetween_settings, missing_media, preferences, versions
+from ..devices import available
 from ..editing import new_edit, saved_edit
-from ..rendering import devices, film_output, session, shared_frames
+from ..output import film_output, shared_frames
+from ..rendering import session
 from . import command_line, inbetween_command
 
 
@@ -125,7 +127,7 @@ def _render_source(arguments) -> None:
 
 def _check_device(arguments) -> None:
     """NoDeviceError: there is none as it is wanted. Called before anything is written."""
-    devices.choose(arguments.device or preferences.device())
+    available.choose(arguments.device or preferences.device())
 
 
 def _written(arguments, file_format: str, frames: tuple[int, int]) -> list[Path]:

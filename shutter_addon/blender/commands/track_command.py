@@ -13,7 +13,7 @@ from ...core.recipes import recipe, region_keys
 from ...media import PrefetchSource, camera_tracking, filmed_frames, registration, tracking
 from ...media.cuts import ShotSource
 from ..editing import new_edit
-from ..rendering import film_output
+from ..output import film_output
 from . import command_line
 
 

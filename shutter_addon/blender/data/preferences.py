@@ -40,13 +40,13 @@ class ShutterPreferences(bpy.types.AddonPreferences):
 
 
 def device() -> str:
-    """The device that renders are wanted on, one of rendering.devices.CHOICES."""
+    """The device that renders are wanted on, one of devices.available.CHOICES."""
     found = _preferences()
     return found.device.lower() if found else "auto"
 
 
 def gpu_memory() -> int:
-    """Megabytes of the GPU that textures may take; 0: as compute.budget allows."""
+    """Megabytes of the GPU that textures may take; 0: as devices.budget allows."""
     found = _preferences()
     return found.gpu_memory if found else 0
 

@@ -7,7 +7,7 @@ import bpy
 from ...core.farm.edit_version import EditVersion
 from ...core.messages import UserError, sentence
 from ..data import used_data, versions
-from ..rendering import film_output
+from ..output import film_output
 
 ENDING = ".blend"
 

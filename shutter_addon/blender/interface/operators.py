@@ -23,7 +23,7 @@ from ..editing import (
     shown_annotations,
     shutter_edits,
 )
-from ..rendering import matte_export
+from ..output import matte_export
 from ..rendering.session import FAULTS
 from . import icons, preview_areas, sharp_frame
 

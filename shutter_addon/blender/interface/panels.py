@@ -7,13 +7,14 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.types import Menu, Panel, UIList
 
-from ...compute.device import NoDeviceError
+from ...devices.device import NoDeviceError
 from ...media import cuts
 from ...media.tracking import SURE
-from ..data import annotations, selection, strips, validation
+from ..data import annotations, matte_look, selection, strips, validation
 from ..data.properties import CONTEXT
+from ..devices import available
 from ..editing import bar_edits, follow_track, match_source, track_region
-from ..rendering import devices, inbetween_build, matte_look, session, strobing
+from ..rendering import inbetween_build, session, strobing
 from ..rendering.session import FAULTS
 from . import drawing, inbetween_operators, track_operators
 
@@ -519,7 +520,7 @@ def _draw_devices(layout):
     """What composes; in a window, which alone has a preview."""
     if bpy.app.background:
         return
-    if not devices.is_known(session.wanted()):  # it is asked for beside drawing
+    if not available.is_known(session.wanted()):  # it is asked for beside drawing
         if not bpy.app.timers.is_registered(_ask_for_opengl):
             bpy.app.timers.register(_ask_for_opengl)
         return
@@ -535,7 +536,7 @@ def _draw_devices(layout):
 
 
 def _ask_for_opengl() -> None:
-    devices.opengl()
+    available.opengl()
     _redraw()
 
 

@@ -12,16 +12,17 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from bpy.types import PropertyGroup
 from gpu_extras.batch import batch_for_shader
 
-from ...compute.passes import body
 from ...core import stopping
 from ...core.model.frame_state import FrameState
+from ...devices.passes import body
 from ...media import MediaError
 from ...media.errors import NotBuiltError
 from ..data import annotations, geometry, selection, strips
 from ..data.properties import CONTEXT
+from ..devices import blender_gpu
+from ..devices.blender_gpu import Texture
 from ..editing import shown_annotations
-from ..rendering import blender_gpu, inbetween_build, invalidation, render_job, session, strobing
-from ..rendering.blender_gpu import Texture
+from ..rendering import inbetween_build, invalidation, render_job, session, strobing
 from . import drawing, inbetween_operators, note_buttons, preview_areas, previewing, sharp_frame
 from .note_buttons import Button
 from .previewing import RESULTS, Shown, shown

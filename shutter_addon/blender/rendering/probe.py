@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.pixels import compositor
-from . import blender_gpu
+from ..devices import blender_gpu
 from .session import FrameRequest
 
 

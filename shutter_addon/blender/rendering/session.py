@@ -15,8 +15,6 @@ import numpy as np
 import OpenImageIO
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...compute.budget import MEGABYTE, Budget
-from ...compute.device import NoDeviceError
 from ...compute.memory_needs import frame_bytes
 from ...compute.renderer import Renderer
 from ...core import stopping
@@ -25,6 +23,8 @@ from ...core.messages import EffectError
 from ...core.model.frame_state import FrameState
 from ...core.pixels import following
 from ...core.stopping import StoppedError, never
+from ...devices.budget import MEGABYTE, Budget
+from ...devices.device import NoDeviceError
 from ...media import MediaError, cuts
 from ...media.cuts import ShotSource
 from ...media.image_writing import write_exr
@@ -35,8 +35,9 @@ from ...media.reduced import smaller
 from ..data import preferences
 from ..data.snapshot import Snapshot, translated
 from ..data.strip_proxies import Proxy
-from . import devices, gpu_relay, render_job
-from .blender_gpu import require_context
+from ..devices import available, gpu_relay
+from ..devices.blender_gpu import require_context
+from . import render_job
 
 FAULTS = (EffectError, MediaError, NoDeviceError, MemoryError)
 
@@ -96,7 +97,7 @@ def _until(stopped, function, *arguments):
 class RenderSettings:
     """What a command sets for its render.
 
-    device: one of devices.CHOICES, in place of the user's preference
+    device: one of available.CHOICES, in place of the user's preference
     weights: folder for the coefficients of every picture, as EXR files
     inbetween: folder of in-between frames, in place of the effects' own
     gpu_memory: megabytes of the GPU that textures may take, in place of the user's preference; 0: as budget.allowed
@@ -205,7 +206,7 @@ class RenderSession:
     """A compositor, opened when it is first used, and the renderers of the effects that were shown last."""
 
     def __init__(self, choose: Callable[[], tuple[str, str | None]], ask_others: Callable[[], None]):
-        """choose: gives the device, as devices.choose; ask_others: called where the GPU has no room, has others free
+        """choose: gives the device, as available.choose; ask_others: called where the GPU has no room, has others free
         what they hold of it."""
         self._choose, self._ask_others = choose, ask_others
         self._asks = False  # others for room, in the middle of a picture
@@ -219,7 +220,7 @@ class RenderSession:
 
     @property
     def device(self) -> str:
-        """Its device, a key of devices.OPEN; it stays until all is forgotten. NoDeviceError: there is none."""
+        """Its device, a key of available.OPEN; it stays until all is forgotten. NoDeviceError: there is none."""
         if self._chosen is None:
             self._chosen = self._choose()
         return self._chosen[0]
@@ -319,7 +320,7 @@ class RenderSession:
     def _opened(self, say, stopped):
         """The compositor, opened if need be."""
         if self._compositor is None:
-            self._compositor = self._submit(devices.OPEN[self.device], memory(), self._ask).future
+            self._compositor = self._submit(available.OPEN[self.device], memory(), self._ask).future
             if message := self._chosen[1]:
                 say(message)
         try:
@@ -419,7 +420,7 @@ def settings() -> RenderSettings:
 
 
 def wanted() -> str:
-    """The device that the command asks for, else the user's preference: one of devices.CHOICES."""
+    """The device that the command asks for, else the user's preference: one of available.CHOICES."""
     return _settings.device or preferences.device()
 
 
@@ -435,7 +436,7 @@ def memory() -> Budget:
     if _budget is None:
         megabytes = _wanted_memory()
         asks = not megabytes and wanted() in ("auto", "gpu", "opengl")
-        _budget = megabytes, Budget(megabytes * MEGABYTE or (devices.opengl().memory if asks else None))
+        _budget = megabytes, Budget(megabytes * MEGABYTE or (available.opengl().memory if asks else None))
     return _budget[1]
 
 
@@ -456,17 +457,17 @@ _budget: tuple[int, Budget] | None = None  # with the megabytes that it was made
 # What the window itself shows is made on its main thread, on its GPU. Renders have a device apart and a thread for it:
 # beside Blender's own GL context another one cannot always be current (see GLDevice). In the background Blender's GPU
 # belongs to the main thread, and has none.
-_offscreen = RenderSession(lambda: devices.choose(wanted()), _ask_window)
+_offscreen = RenderSession(lambda: available.choose(wanted()), _ask_window)
 _window = RenderSession(lambda: ("blender", None), _ask_offscreen)
 # For a thread whose pictures the window waits for, where _offscreen has them made by the window.
-_waited_for = RenderSession(lambda: devices.choose(wanted(), window_waits=True), lambda: None)
+_waited_for = RenderSession(lambda: available.choose(wanted(), window_waits=True), lambda: None)
 _SESSIONS = _offscreen, _window, _waited_for
 
 
 def device_names() -> tuple[str, str]:
     """What the preview of a window is composed on, and its renders, as these call themselves. NoDeviceError: there is
     none for renders as the user wants it."""
-    return devices.name("blender"), devices.name(devices.choose(wanted())[0])
+    return available.name("blender"), available.name(available.choose(wanted())[0])
 
 
 def in_window() -> bool:

@@ -18,8 +18,9 @@ from ...core.model.mattes import FileFrame
 from ...media import MediaError, cuts
 from ...media.files import check_file
 from ..data import requirements, snapshot, source_media, strips
-from . import job_snapshots, output_space, session
-from .session import FrameRequest, RenderSession
+from ..rendering import job_snapshots, session
+from ..rendering.session import FrameRequest, RenderSession
+from . import output_space
 
 
 @dataclass

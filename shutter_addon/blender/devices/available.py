@@ -9,9 +9,9 @@ import bpy
 import gpu
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...compute.device import NoDeviceError
 from ...compute.gpu import GPUCompositor
 from ...compute.renderer import open_compositor, open_gl
+from ...devices.device import NoDeviceError
 from .blender_gpu import BlenderDevice, opens_in_background
 from .gpu_relay import RelayedDevice
 

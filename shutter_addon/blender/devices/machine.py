@@ -8,9 +8,9 @@ import gpu
 import numpy as np
 
 from ...compute.benchmark import processor
-from ...compute.budget import machine_memory
+from ...devices.budget import machine_memory
 from ..data import preferences, versions
-from . import devices
+from . import available
 from .blender_gpu import BlenderDevice
 
 BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal", "NONE": "nothing", "UNKNOWN": "unknown"}
@@ -19,9 +19,9 @@ BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal", "NONE": "n
 def open_device(wanted: str | None, *memory):
     """A compositor, and why it is a lesser one, or None. NoDeviceError: there is none as it is wanted.
 
-    wanted: one of devices.CHOICES; None: as the user prefers; memory: a Budget, in place of the device's own"""
-    kind, lesser = devices.choose(wanted or preferences.device())
-    return devices.OPEN[kind](*memory), lesser
+    wanted: one of available.CHOICES; None: as the user prefers; memory: a Budget, in place of the device's own"""
+    kind, lesser = available.choose(wanted or preferences.device())
+    return available.OPEN[kind](*memory), lesser
 
 
 def described(compositor, lesser: str | None) -> dict[str, str]:

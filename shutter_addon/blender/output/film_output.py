@@ -15,7 +15,8 @@ from ...core import atomic_write
 from ...core.messages import UserError, of_file
 from ...media.completeness import is_whole_movie, is_whole_picture, whole_pictures, why_short
 from ..data import strips
-from . import movie_feed, render_job
+from ..rendering import render_job
+from . import movie_feed
 
 INTERRUPTED = 130
 

@@ -8,7 +8,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from ...core.messages import UserError
 from ...core.model.mattes import FileFrames
 from ...media.matte_files import MatteFile
-from ..data import matte_strips, revision, snapshot
+from . import matte_strips, revision, snapshot
 
 _looks = revision.UntilChange()
 

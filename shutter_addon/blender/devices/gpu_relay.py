@@ -15,8 +15,8 @@ from contextlib import suppress
 import bpy
 import gpu
 
-from ...compute.paging import PagedDevice
-from ...compute.passes import Pass
+from ...devices.paging import PagedDevice
+from ...devices.passes import Pass
 from .blender_gpu import BlenderDevice, has_context
 
 # Seconds of the main thread that calls take at once, if none takes longer: as many as all else took, within these.
@@ -34,7 +34,7 @@ _unfinished, _batch = 0, 8  # passes that may be under way, and after how many t
 
 
 class RelayedDevice(BlenderDevice):
-    """A compute.device.Device, on any one thread but Blender's main one. What a pass raises is met later, at
+    """A devices.device.Device, on any one thread but Blender's main one. What a pass raises is met later, at
     the latest when something is made, sent or read next.
 
     Its own textures are lists of one, which the main thread empties: on Vulkan Blender crashes where another frees one.

@@ -15,7 +15,8 @@ from ...core.messages import signed
 from ...media import image_writing, rendered_pictures
 from ...media.rendered_pictures import RenderedPicture
 from ..data import requirements
-from . import film_output, render_job
+from ..rendering import render_job
+from . import film_output
 from .film_output import OutputError
 
 _AT_ONCE = 1000  # pictures of a strip: Blender copies all that it has for each that is added

@@ -18,8 +18,8 @@ import numpy as np
 
 from ...core import atomic_write
 from ..data import colour_configuration, snapshot, strips
-from . import render_job, session
-from .engine import in_words, say
+from ..rendering import render_job, session
+from ..rendering.engine import in_words, say
 
 # Rows of a tile of the file; its columns are a multiple of 16. A TIFF without tiles takes twice the time: Blender reads
 # rows upwards, for which OpenImageIO then allocates 64 MB for each picture.

@@ -17,7 +17,7 @@ from ...media.image_writing import write_grey
 from ...media.matte_values import MatteValues
 from ...media.sequence import ImageFiles
 from ..data import matte_content, matte_strips, recipe_export, snapshot, source_media, strips, validation
-from . import session
+from ..rendering import session
 
 
 def recipe_for(edit, effect, strip, path: Path) -> recipe.Recipe:

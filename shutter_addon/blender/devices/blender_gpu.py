@@ -1,4 +1,4 @@
-"""Blender's own GPU as a device: what compute/gl.py does, through the `gpu` module, on OpenGL, Vulkan and Metal.
+"""Blender's own GPU as a device: what devices/gl.py does, through the `gpu` module, on OpenGL, Vulkan and Metal.
 
 Nothing can be sent into a part of a texture from Python, and floats alone can be sent at all. So what is written goes
 into a float texture of its own, small samples several to a float as whole numbers up to 2²⁴, which floats hold
@@ -20,11 +20,11 @@ import gpu
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...compute.budget import Budget, is_software, machine_memory
-from ...compute.device import NoDeviceError
-from ...compute.paging import TEXEL_BYTES, PagedDevice
-from ...compute.passes import LOCAL_ROW, Image, Pass, body
 from ...core import stopping
+from ...devices.budget import Budget, is_software, machine_memory
+from ...devices.device import NoDeviceError
+from ...devices.paging import TEXEL_BYTES, PagedDevice
+from ...devices.passes import LOCAL_ROW, Image, Pass, body
 
 _TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
 _AS_IT_IS, _WHOLE, _OPAQUE_BYTES, _PAIRS_OF_BYTES, _SIXTEEN_BITS = range(5)
@@ -94,7 +94,7 @@ class Texture:
 
 
 class BlenderDevice(PagedDevice):
-    """A compute.device.Device, wherever Blender's GPU context is current: in draw handlers, or after gpu.init().
+    """A devices.device.Device, wherever Blender's GPU context is current: in draw handlers, or after gpu.init().
 
     What begins with _ gets and gives the gpu module's own textures; RelayedDevice has it called elsewhere."""
 
