@@ -58,15 +58,15 @@ def devices_named():
     """A panel makes no OpenGL context while it is drawn, and names the devices a moment later."""
     opengl, layout = part("devices.available").opengl, Mock()
     opengl.cache_clear()
-    part("interface.panels")._draw_devices(layout)
+    panels = part("interface.option_panels")
+    panels._draw_devices(layout)
     assert not layout.mock_calls
     assert not opengl.cache_info().currsize
     yield from until(lambda: opengl.cache_info().currsize, "OpenGL is tried", 10)
     labels = []
-    panels = part("interface.panels")
-    sentence, panels._sentence = panels._sentence, lambda _layout, words: labels.append(words.partition(": ")[0])
+    sentence, panels.sentence = panels.sentence, lambda _layout, words: labels.append(words.partition(": ")[0])
     panels._draw_devices(layout)
-    panels._sentence = sentence
+    panels.sentence = sentence
     assert labels == ["Preview", "Renders"], labels
 
 

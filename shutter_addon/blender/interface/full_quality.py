@@ -8,7 +8,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Operator
 
 from . import preview_areas, previewing
-from .operators import refused
+from .operator_bases import refused
 
 _TICK = 0.1  # seconds between two looks at whether it has ended
 

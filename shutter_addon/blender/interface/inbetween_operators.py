@@ -14,7 +14,7 @@ from ..data import inbetween_settings, selection, strips, validation
 from ..data.properties import INBETWEENS
 from ..rendering import inbetween_build, strobing
 from ..rendering.session import FAULTS
-from .operators import UNDOABLE, _OfEffect, redraw, refused
+from .operator_bases import UNDOABLE, OfEffect, redraw, refused
 
 TICK = 0.25  # seconds
 _RUNS = n_("In-between frames are being built; Esc stops that")
@@ -88,7 +88,7 @@ def smoothing_in_words(found: strobing.Strobing) -> str | None:
     return found.factor and iface_("{factor}× In-Between Frames").format(factor=found.factor)
 
 
-class _OfInbetweens(_OfEffect):
+class _OfInbetweens(OfEffect):
     """Works on files, which are not undone."""
 
     bl_options = {"REGISTER"}

@@ -13,10 +13,10 @@ from ...media import MediaError
 from ..data import matte_strips, recipe_import, selection, strips, validation
 from ..data.properties import RAMPS
 from ..editing import region_edits, time_map
-from .operators import _OfShutter, chosen_file, has_room, refused
+from .operator_bases import OfShutter, chosen_file, has_room, refused
 
 
-class _AddsRegion(_OfShutter):
+class _AddsRegion(OfShutter):
     """Adds a region to the active shutter."""
 
     @classmethod

@@ -1,18 +1,14 @@
 """Operators: what the user can do, as thin calls of plain functions."""
 
-from pathlib import Path
-
 import bpy
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 from bpy.types import Operator
-from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ...core.model import presets
-from ...core.recipes import recipe
-from ..data import annotations, consistency, recipe_import, selection, strips, validation
+from ..data import annotations, consistency, selection, strips, validation
 from ..data.properties import CONTEXT, STROKES
 from ..editing import (
     add_effect,
@@ -23,89 +19,9 @@ from ..editing import (
     shown_annotations,
     shutter_edits,
 )
-from ..output import matte_export
 from ..rendering.session import FAULTS
 from . import icons, preview_areas, sharp_frame
-
-UNDOABLE = {"REGISTER", "UNDO"}
-
-
-def refused(cls, sentence: str) -> bool:
-    """For poll(): greys the operator out, and says why."""
-    cls.poll_message_set(sentence)
-    return False
-
-
-def redraw(context) -> None:
-    """Sequencer and properties show the effect's data, of whose changes Blender does not know."""
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type in {"SEQUENCE_EDITOR", "PROPERTIES", "DOPESHEET_EDITOR", "GRAPH_EDITOR"}:
-                area.tag_redraw()
-
-
-class _OfEffect:
-    """Works on the effect that is seen, or where none is, on that of the active strip."""
-
-    bl_options = UNDOABLE
-    only_seen = False  # it does something in the picture
-
-    @classmethod
-    def poll(cls, context):
-        found = selection.active(context)
-        if found is None:
-            return refused(cls, rpt_("Select a Shutter strip or its source strip"))
-        if not found[0].is_editable:
-            return refused(cls, rpt_("The edit is linked from another file"))
-        if cls.only_seen and selection.in_picture(context) is None:
-            return refused(cls, selection.why_unseen(found[0], found[2]))
-        return cls.possible(found[1])
-
-    @classmethod
-    def possible(cls, effect):
-        return True
-
-    def execute(self, context):
-        try:
-            result = self.change(context, selection.active(context)[1])
-        except validation.EffectError as error:
-            self.report({"ERROR"}, str(error))
-            result = {"CANCELLED"}
-        redraw(context)
-        return result or {"FINISHED"}
-
-
-class _OfShutter(_OfEffect):
-    """Works on the active shutter."""
-
-    @classmethod
-    def possible(cls, effect):
-        return selection.active_shutter(effect) is not None or refused(cls, rpt_("The effect has no shutter: add one"))
-
-
-class _OfRegion(_OfEffect):
-    """Works on the active region."""
-
-    @classmethod
-    def possible(cls, effect):
-        return selection.active_region(effect) is not None or refused(cls, rpt_("The shutter has no region: draw one"))
-
-
-class _OfStrokes(_OfRegion):
-    """Works on the active region, which is one of strokes."""
-
-    @classmethod
-    def possible(cls, effect):
-        if not super().possible(effect):
-            return False
-        has_strokes = selection.active_region(effect).kind not in strips.MATTES
-        return has_strokes or refused(cls, rpt_("The region is a matte or a ramp, and has no strokes"))
-
-
-def has_room(cls, effect, collection: str, more: int = 1) -> bool:
-    """For poll(): whether the effect can have so many more of its "shutters" or "regions"."""
-    sentence = collection_edits.why_full(effect, collection, more)
-    return sentence is None or refused(cls, sentence)
+from .operator_bases import UNDOABLE, Move, OfEffect, OfRegion, OfShutter, OfStrokes, has_room, redraw, refused
 
 
 class SHUTTER_OT_add_effect(Operator):
@@ -151,7 +67,7 @@ def effect_added(operator, context) -> bool:
     return True
 
 
-class SHUTTER_OT_match_source(_OfEffect, Operator):
+class SHUTTER_OT_match_source(OfEffect, Operator):
     """Give the Shutter strip transform, crop, flip, color and range of its source (scribbles stay on the picture)"""
 
     bl_idname = "shutter.match_source"
@@ -171,7 +87,7 @@ class SHUTTER_OT_match_source(_OfEffect, Operator):
             self.report({"WARNING"}, sentence.format(neighbor=neighbor.name, strip=strip.name))
 
 
-class SHUTTER_OT_copy_modifiers(_OfEffect, Operator):
+class SHUTTER_OT_copy_modifiers(OfEffect, Operator):
     """Copy the modifiers of the source to the Shutter strip, which shows the source's file as it is"""
 
     bl_idname = "shutter.copy_modifiers"
@@ -213,7 +129,7 @@ def _choose_tab() -> float | None:
     return None
 
 
-class SHUTTER_OT_shutter_add(_OfEffect, Operator):
+class SHUTTER_OT_shutter_add(OfEffect, Operator):
     """Add a shutter that is fully open"""
 
     bl_idname = "shutter.shutter_add"
@@ -227,7 +143,7 @@ class SHUTTER_OT_shutter_add(_OfEffect, Operator):
         shutter_edits.add_shutter(effect)
 
 
-class SHUTTER_OT_shutter_duplicate(_OfShutter, Operator):
+class SHUTTER_OT_shutter_duplicate(OfShutter, Operator):
     """Add a copy of the active shutter, keyframes included"""
 
     bl_idname = "shutter.shutter_duplicate"
@@ -241,7 +157,7 @@ class SHUTTER_OT_shutter_duplicate(_OfShutter, Operator):
         shutter_edits.duplicate_shutter(effect, effect.active_shutter)
 
 
-class SHUTTER_OT_shutter_remove(_OfShutter, Operator):
+class SHUTTER_OT_shutter_remove(OfShutter, Operator):
     """Remove the active shutter and its regions"""
 
     bl_idname = "shutter.shutter_remove"
@@ -257,16 +173,7 @@ class SHUTTER_OT_shutter_remove(_OfShutter, Operator):
         shutter_edits.remove_shutter(effect, effect.active_shutter)
 
 
-class _Move:
-    direction: EnumProperty(name="Direction", items=(("UP", "Up", ""), ("DOWN", "Down", "")), options={"SKIP_SAVE"})
-
-    def target(self, places: list[int], index: int) -> int:
-        """The place after or before `index` in the list, among the places that it shows."""
-        step = places.index(index) + (1 if self.direction == "DOWN" else -1)
-        return places[min(max(step, 0), len(places) - 1)]
-
-
-class SHUTTER_OT_shutter_move(_Move, _OfShutter, Operator):
+class SHUTTER_OT_shutter_move(Move, OfShutter, Operator):
     """Move the active shutter in the list (the first one is the default, which holds where nothing is scribbled)"""
 
     bl_idname = "shutter.shutter_move"
@@ -293,7 +200,7 @@ def _presets(_self, _context):
     return _preset_items
 
 
-class SHUTTER_OT_preset(_OfShutter, Operator):
+class SHUTTER_OT_preset(OfShutter, Operator):
     """Give the active shutter the bars of a preset"""
 
     bl_idname = "shutter.preset"
@@ -306,7 +213,7 @@ class SHUTTER_OT_preset(_OfShutter, Operator):
         bar_edits.paint(effect, effect.active_shutter, weights, bar_edits.auto_key(context))
 
 
-class SHUTTER_OT_bars_key(_OfShutter, Operator):
+class SHUTTER_OT_bars_key(OfShutter, Operator):
     """Insert keyframes for all bars of the active shutter at the current frame"""
 
     bl_idname = "shutter.bars_key"
@@ -316,7 +223,7 @@ class SHUTTER_OT_bars_key(_OfShutter, Operator):
         bar_edits.key_bars(effect, effect.active_shutter)
 
 
-class SHUTTER_OT_bars_unkey(_OfShutter, Operator):
+class SHUTTER_OT_bars_unkey(OfShutter, Operator):
     """Delete the keyframes of all bars of the active shutter at the current frame"""
 
     bl_idname = "shutter.bars_unkey"
@@ -329,7 +236,7 @@ class SHUTTER_OT_bars_unkey(_OfShutter, Operator):
         return None
 
 
-class SHUTTER_OT_bar_set(_OfShutter, Operator):
+class SHUTTER_OT_bar_set(OfShutter, Operator):
     """Set the weight of a bar as a number"""
 
     bl_idname = "shutter.bar_set"
@@ -368,7 +275,7 @@ class SHUTTER_OT_bar_set(_OfShutter, Operator):
         return None
 
 
-class SHUTTER_OT_draw(_OfShutter, Operator):
+class SHUTTER_OT_draw(OfShutter, Operator):
     """Draw on the sharp frame where the active shutter holds (at another frame, this redraws the active region)"""
 
     bl_idname = "shutter.draw"
@@ -417,7 +324,7 @@ class SHUTTER_OT_draw(_OfShutter, Operator):
         sharp_frame.show(context)
 
 
-class SHUTTER_OT_erase(_OfStrokes, Operator):
+class SHUTTER_OT_erase(OfStrokes, Operator):
     """Erase strokes of the active region in the preview"""
 
     bl_idname = "shutter.erase"
@@ -460,7 +367,7 @@ def annotation_of(context):
     return next((area.spaces.active.annotation for _window, area in preview_areas.previews(context)), None)
 
 
-class SHUTTER_OT_region_take(_OfShutter, Operator):
+class SHUTTER_OT_region_take(OfShutter, Operator):
     """Make an annotation layer of the preview a region of the active shutter"""
 
     bl_idname = "shutter.region_take"
@@ -498,7 +405,7 @@ def _shutters(_self, context):
     return _shutter_items
 
 
-class SHUTTER_OT_region_assign(_OfRegion, Operator):
+class SHUTTER_OT_region_assign(OfRegion, Operator):
     """Assign the active region to another shutter"""
 
     bl_idname = "shutter.region_assign"
@@ -510,7 +417,7 @@ class SHUTTER_OT_region_assign(_OfRegion, Operator):
         region_edits.assign_region(effect, effect.active_region, effect.shutters[int(self.shutter)])
 
 
-class SHUTTER_OT_region_remove(_OfRegion, Operator):
+class SHUTTER_OT_region_remove(OfRegion, Operator):
     """Remove the active region and its strokes"""
 
     bl_idname = "shutter.region_remove"
@@ -520,7 +427,7 @@ class SHUTTER_OT_region_remove(_OfRegion, Operator):
         region_edits.remove_region(effect, effect.active_region)
 
 
-class SHUTTER_OT_region_move(_Move, _OfRegion, Operator):
+class SHUTTER_OT_region_move(Move, OfRegion, Operator):
     """Move the active region in the list (later ones lie over earlier ones)"""
 
     bl_idname = "shutter.region_move"
@@ -535,7 +442,7 @@ class SHUTTER_OT_region_move(_Move, _OfRegion, Operator):
         return None
 
 
-class SHUTTER_OT_region_key(_OfRegion, Operator):
+class SHUTTER_OT_region_key(OfRegion, Operator):
     """Insert keyframes for location, rotation and scale of the active region at the current frame"""
 
     bl_idname = "shutter.region_key"
@@ -543,57 +450,6 @@ class SHUTTER_OT_region_key(_OfRegion, Operator):
 
     def change(self, _context, effect):
         region_edits.key_region(effect, effect.active_region)
-
-
-def chosen_file(operator) -> str:
-    """The path that an operator got. RecipeError: it got none."""
-    if not operator.filepath:
-        raise recipe.RecipeError(rpt_("Choose a file"))
-    return operator.filepath
-
-
-class SHUTTER_OT_recipe_import(_OfEffect, ImportHelper, Operator):
-    """Replace the shutters, regions, keyframes and options of the effect with those of a recipe file"""
-
-    bl_idname = "shutter.recipe_import"
-    bl_label = "Import Recipe"
-    filename_ext = ".json"
-    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
-
-    def change(self, context, effect):
-        edit, _effect, strip = selection.active(context)
-        try:
-            path = Path(chosen_file(self))
-            recipe_import.apply(edit, effect, strip, recipe.load(path), path.parent)
-        except (recipe.RecipeError, *FAULTS) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return None
-
-
-class SHUTTER_OT_recipe_export(_OfEffect, ExportHelper, Operator):
-    """Save the shutters, regions, keyframes and options of the effect as a recipe file"""
-
-    bl_idname = "shutter.recipe_export"
-    bl_label = "Export Recipe"
-    bl_options = {"REGISTER"}
-    filename_ext = ".json"
-    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
-
-    def change(self, context, effect):
-        edit, _effect, strip = selection.active(context)
-        try:
-            path = chosen_file(self)
-            recipe.save(matte_export.recipe_for(edit, effect, strip, Path(path)), path)
-        except (recipe.RecipeError, *FAULTS) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        except OSError as error:
-            sentence = f"{self.filepath}: {error.strerror or error}"
-            self.report({"ERROR"}, sentence)
-            return {"CANCELLED"}
-        self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
-        return None
 
 
 classes = (
@@ -615,8 +471,6 @@ classes = (
     SHUTTER_OT_region_remove,
     SHUTTER_OT_region_move,
     SHUTTER_OT_region_key,
-    SHUTTER_OT_recipe_import,
-    SHUTTER_OT_recipe_export,
 )
 
 

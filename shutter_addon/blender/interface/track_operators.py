@@ -13,7 +13,7 @@ from ..data import selection, validation
 from ..data.properties import CONTEXT
 from ..editing import bar_edits, follow_stabilization, follow_track, panning_shot, track_region, tripod
 from ..rendering.session import FAULTS
-from .operators import _OfEffect, _OfRegion, _OfShutter, _OfStrokes, redraw, refused
+from .operator_bases import OfEffect, OfRegion, OfShutter, OfStrokes, redraw, refused
 
 # Seconds of work from one look at the window to the next, at least and at most, and between two looks at its thread.
 _TICK, _MOST, _PATIENCE = 0.05, 0.1, 0.02
@@ -177,7 +177,7 @@ class _OfCamera:
         return None
 
 
-class SHUTTER_OT_track(_Tracks, _OfStrokes, Operator):
+class SHUTTER_OT_track(_Tracks, OfStrokes, Operator):
     """Key the active region by what it covers here, up to your own keys (Esc stops and keeps the tracked frames)"""
 
     bl_idname = "shutter.track"
@@ -186,7 +186,7 @@ class SHUTTER_OT_track(_Tracks, _OfStrokes, Operator):
     direction: _DIRECTION
 
 
-class SHUTTER_OT_track_camera(_OfCamera, _Tracks, _OfEffect, Operator):
+class SHUTTER_OT_track_camera(_OfCamera, _Tracks, OfEffect, Operator):
     """Key the camera by what the regions leave free, up to your own keys (Esc stops and keeps the tracked frames)"""
 
     bl_idname = "shutter.track_camera"
@@ -195,7 +195,7 @@ class SHUTTER_OT_track_camera(_OfCamera, _Tracks, _OfEffect, Operator):
     direction: _DIRECTION
 
 
-class SHUTTER_OT_panning_shot(_Tracks, _OfStrokes, Operator):
+class SHUTTER_OT_panning_shot(_Tracks, OfStrokes, Operator):
     """Keep what the active region moves with sharp while all else streaks (tracks the region unless it has keys)"""
 
     bl_idname = "shutter.panning_shot"
@@ -210,7 +210,7 @@ class SHUTTER_OT_panning_shot(_Tracks, _OfStrokes, Operator):
         panning_shot.set_up(self._target.effect(), self._target.index, bar_edits.auto_key(context))
 
 
-class SHUTTER_OT_tripod(_OfCamera, _Tracks, _OfShutter, Operator):
+class SHUTTER_OT_tripod(_OfCamera, _Tracks, OfShutter, Operator):
     """Expose for long as if the camera had stood still (tracks the camera unless it has keys)"""
 
     bl_idname = "shutter.tripod"
@@ -252,14 +252,14 @@ class _Looks:
         return {"FINISHED"}
 
 
-class SHUTTER_OT_track_look(_Looks, _OfRegion, Operator):
+class SHUTTER_OT_track_look(_Looks, OfRegion, Operator):
     """Go to a frame that tracking is not sure of"""
 
     bl_idname = "shutter.track_look"
     bl_label = "Next Unsure Frame"
 
 
-class SHUTTER_OT_track_camera_look(_OfCamera, _Looks, _OfEffect, Operator):
+class SHUTTER_OT_track_camera_look(_OfCamera, _Looks, OfEffect, Operator):
     """Go to a frame that tracking is not sure of"""
 
     bl_idname = "shutter.track_camera_look"
@@ -278,7 +278,7 @@ class _Follows:
         return None
 
 
-class SHUTTER_OT_follow(_Follows, _OfStrokes, Operator):
+class SHUTTER_OT_follow(_Follows, OfStrokes, Operator):
     """Key the active region by a track of a movie clip, from where the region is at this frame"""
 
     bl_idname = "shutter.follow"
@@ -294,7 +294,7 @@ class SHUTTER_OT_follow(_Follows, _OfStrokes, Operator):
         return selection.active_region(effect).follow_clip is not None or refused(cls, rpt_("Choose a clip first"))
 
 
-class SHUTTER_OT_follow_update(_Follows, _OfStrokes, Operator):
+class SHUTTER_OT_follow_update(_Follows, OfStrokes, Operator):
     """Key the active region anew by what it follows, after the track has changed"""
 
     bl_idname = "shutter.follow_update"
@@ -312,7 +312,7 @@ class SHUTTER_OT_follow_update(_Follows, _OfStrokes, Operator):
         )
 
 
-class SHUTTER_OT_follow_stabilization(_Follows, _OfEffect, Operator):
+class SHUTTER_OT_follow_stabilization(_Follows, OfEffect, Operator):
     """Key the camera by the 2D stabilization of a movie clip, from where the camera is at this frame"""
 
     bl_idname = "shutter.follow_stabilization"

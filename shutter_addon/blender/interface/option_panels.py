@@ -1,0 +1,129 @@
+"""Panels of what an effect is made with: its options, devices and in-between frames."""
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
+
+from ...devices.device import NoDeviceError
+from ...media import cuts
+from ..data import selection
+from ..devices import available
+from ..rendering import inbetween_build, session
+from ..rendering.session import FAULTS
+from . import inbetween_operators
+from .panel_parts import WithEffect, sentence
+
+
+class Options(WithEffect):
+    bl_label = "Options"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        effect = selection.active(context)[1]
+        layout.use_property_split = True
+        for name in ("position", "interpolation", "light", "exposure", "edges", "stop_at_cuts", "aggregate", "border"):
+            layout.prop(effect, name)
+        package = effect.stop_at_cuts and cuts.missing_package()
+        if package:
+            text = iface_("Cuts are not found: the Python package {package} is missing").format(package=package)
+            sentence(layout, text, "ERROR")
+        layout.prop(effect, "use_source_time")
+        column = layout.column()
+        column.active = effect.use_source_time
+        column.prop(effect, "source_time")
+        if effect.use_source_time and effect.inbetween == "1":
+            sentence(column, iface_("No in-between frames: the nearest source frame is shown"), "INFO")
+        _draw_devices(layout)
+
+
+def _draw_devices(layout):
+    """What composes; in a window, which alone has a preview."""
+    if bpy.app.background:
+        return
+    if not available.is_known(session.wanted()):  # it is asked for beside drawing
+        if not bpy.app.timers.is_registered(_ask_for_opengl):
+            bpy.app.timers.register(_ask_for_opengl)
+        return
+    column = layout.column(align=True)
+    column.active = False
+    try:
+        preview, render = session.device_names()
+    except NoDeviceError as error:
+        sentence(column, str(error), "ERROR")
+        return
+    for text, device in ((iface_("Preview: {device}"), preview), (iface_("Renders: {device}"), render)):
+        sentence(column, text.format(device=device))
+
+
+def _ask_for_opengl() -> None:
+    available.opengl()
+    _redraw()
+
+
+class Inbetween(WithEffect):
+    bl_label = "In-Between Frames"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        edit, effect, strip = selection.active(context)
+        build = inbetween_build.running()
+        is_built = build is not None and build.scene == effect.scene.session_uid
+        column = layout.column()
+        column.use_property_split = True
+        column.enabled = not is_built
+        column.prop(effect, "inbetween", text="Factor")
+        column = column.column()
+        is_on = effect.inbetween != "1"
+        column.active = is_on
+        column.prop(effect, "inbetween_method")
+        column.prop(effect, "inbetween_place")
+        if is_built:
+            progress = iface_("{done} of {total}").format(done=build.done, total=build.total)
+            layout.progress(factor=build.done / max(build.total, 1), text=progress, translate=False)
+        elif is_on:
+            try:
+                _draw_look(layout, inbetween_build.look(edit, effect, strip))
+            except FAULTS as error:
+                sentence(layout, str(error), "ERROR")
+        row = layout.row(align=True)
+        row.operator("shutter.inbetween_build", text="Build")
+        row.operator("shutter.inbetween_purge", text="Remove")
+
+
+# How a state of in-between frames is called, and its icon.
+_STATES = {
+    "missing": (n_("Missing"), "ERROR"),
+    "partial": (n_("Partial: {done} of {total}"), "ERROR"),
+    "stale": (n_("Stale: the source has changed"), "ERROR"),
+    "ready": (n_("Ready"), "CHECKMARK"),
+}
+
+
+def _draw_look(layout, look) -> None:
+    words, icon = _STATES[look.state.name]
+    words = iface_(words).format(done=look.state.done, total=look.state.total)
+    column = layout.column(align=True)
+    sentence(column, words, icon)
+    if look.size:
+        size = inbetween_operators.size_in_words(look.size)
+        column.label(text=iface_("{size} on disk").format(size=size), icon="DISK_DRIVE", translate=False)
+    if look.state.name != "ready":
+        if look.estimate:
+            size = inbetween_operators.size_in_words(look.estimate)
+            column.label(text=iface_("About {size} when built").format(size=size), icon="BLANK1", translate=False)
+        elif look.estimate is None:
+            _redraw_later()
+
+
+def _redraw_later() -> None:
+    if not bpy.app.timers.is_registered(_redraw):
+        bpy.app.timers.register(_redraw, first_interval=inbetween_operators.TICK)
+
+
+def _redraw() -> None:
+    inbetween_operators.redraw_panels(bpy.context)
+
+
+TIMERS = _redraw, _ask_for_opengl

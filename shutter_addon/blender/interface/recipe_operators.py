@@ -1,0 +1,72 @@
+"""Operators that read an effect from a recipe, and write one."""
+
+from pathlib import Path
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import StringProperty
+from bpy.types import Operator
+from bpy_extras.io_utils import ExportHelper, ImportHelper
+
+from ...core.recipes import recipe
+from ..data import recipe_import, selection
+from ..output import matte_export
+from ..rendering.session import FAULTS
+from .operator_bases import OfEffect, chosen_file
+
+
+class SHUTTER_OT_recipe_import(OfEffect, ImportHelper, Operator):
+    """Replace the shutters, regions, keyframes and options of the effect with those of a recipe file"""
+
+    bl_idname = "shutter.recipe_import"
+    bl_label = "Import Recipe"
+    filename_ext = ".json"
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def change(self, context, effect):
+        edit, _effect, strip = selection.active(context)
+        try:
+            path = Path(chosen_file(self))
+            recipe_import.apply(edit, effect, strip, recipe.load(path), path.parent)
+        except (recipe.RecipeError, *FAULTS) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return None
+
+
+class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
+    """Save the shutters, regions, keyframes and options of the effect as a recipe file"""
+
+    bl_idname = "shutter.recipe_export"
+    bl_label = "Export Recipe"
+    bl_options = {"REGISTER"}
+    filename_ext = ".json"
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def change(self, context, effect):
+        edit, _effect, strip = selection.active(context)
+        try:
+            path = chosen_file(self)
+            recipe.save(matte_export.recipe_for(edit, effect, strip, Path(path)), path)
+        except (recipe.RecipeError, *FAULTS) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        except OSError as error:
+            sentence = f"{self.filepath}: {error.strerror or error}"
+            self.report({"ERROR"}, sentence)
+            return {"CANCELLED"}
+        self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
+        return None
+
+
+classes = SHUTTER_OT_recipe_import, SHUTTER_OT_recipe_export
+
+
+def register():
+    for cls in classes:
+        bpy.utils.register_class(cls)
+
+
+def unregister():
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

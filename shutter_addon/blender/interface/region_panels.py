@@ -1,0 +1,216 @@
+"""Panels of the active region and of the camera: what it covers, where it is, and how it is tracked."""
+
+import math
+
+from bpy.app.translations import pgettext_iface as iface_
+
+from ...media.tracking import SURE
+from ..data import matte_look, selection, strips, validation
+from ..data.properties import CONTEXT
+from ..editing import follow_track, track_region
+from . import track_operators
+from .panel_parts import WithEffect, draw_list, sentence
+
+
+def draw_followed_motion(layout, shutter) -> None:
+    """What of a motion is followed, and how smoothly."""
+    for name in ("follow_motion", "follow_smooth"):
+        layout.prop(shutter, name)
+
+
+class Regions(WithEffect):
+    bl_label = "Regions"
+
+    def draw(self, context):
+        layout = self.layout
+        edit, effect, strip = selection.active(context)
+        shutter = selection.active_shutter(effect)
+        own = [region for region in effect.regions if shutter and region.shutter == shutter.name]
+        draw_list(layout, effect, "region", own)
+        layout.use_property_split = True
+        layout.prop(effect, "edge_aware")
+        region = selection.active_region(effect)
+        if region is None:
+            return
+        try:
+            validation.check_region(region)
+        except validation.EffectError as error:
+            sentence(layout, str(error), "ERROR")
+        layout.prop(region, "kind")
+        if region.kind == "LINE":
+            layout.prop(region, "width")
+        elif region.kind == "RAMP":
+            layout.prop(region, "ramp")
+        elif region.kind == "MATTE":
+            _draw_matte(layout, matte_look.look(edit, effect, strip, region), region)
+        if region.kind not in strips.MATTES:
+            layout.prop(region, "opacity")
+        else:
+            _draw_blend(layout, region)
+
+
+def _draw_matte(layout, look, region) -> None:
+    """What the matte is, and what is wrong with it."""
+    layout.prop(region, "matte")
+    if region.matte == "IMAGE":
+        layout.template_ID(region, "image", open="image.open")
+        if region.image is not None:
+            layout.prop(region.image, "source")
+        layout.prop(region, "timing")
+        layout.prop(region, "offset")
+    elif region.matte == "STRIP":
+        layout.prop_search(region, "strip_name", region.id_data.sequence_editor, "strips_all", text="Strip")
+    else:
+        layout.prop(region, "mask")
+    if region.matte != "MASK":
+        layout.prop(region, "channel")
+        if region.channel == "NAMED":
+            layout.prop(region, "channel_name", text="Name")
+    for text, icon in ((look.fault, "ERROR"), (look.text, "NONE"), (look.note, "INFO")):
+        if text:
+            sentence(layout, text, icon)
+
+
+def _draw_blend(layout, region) -> None:
+    """How a matte or a ramp lies over what is beneath."""
+    for name in ("invert", "blend", "opacity", "feather"):
+        layout.prop(region, name)
+
+
+def draw_tracking(layout, index: int | None) -> None:
+    """The buttons that track a region or the camera (selection.moving)."""
+    row = layout.row(align=True)
+    track = "shutter.track_camera" if index is None else "shutter.track"
+    for direction, _name, _description, icon, _number in track_operators.DIRECTIONS:
+        button = row.operator(
+            track, text=("Track Camera" if index is None else "Track") if direction == "BOTH" else "", icon=icon
+        )
+        button.direction = direction
+
+
+def draw_tracked(layout, effect, index: int | None) -> None:
+    """How sure tracking of a region or the camera was of the current frame, and where it stopped."""
+    look = "shutter.track_camera_look" if index is None else "shutter.track_look"
+    confidence = track_region.confidence_at(effect, index, effect.id_data.frame_current)
+    if confidence is not None:
+        column = layout.column(align=True)
+        text = iface_("Confidence: {percent} %").format(percent=f"{100 * confidence:.0f}")
+        column.label(text=text, icon="CHECKMARK" if confidence >= SURE else "ERROR", translate=False)
+        column.operator(look)
+    if index is None:  # a region's gaps go from its stops on
+        _draw_camera_gaps(layout, effect)
+    for frame, reason, is_fault in track_region.stops(effect, index):
+        row = layout.row(align=True)
+        sentence(row, reason, "ERROR" if is_fault else "INFO", room=0.85)
+        place = row.row()
+        place.ui_units_x = 2.5
+        place.operator(look, text=str(frame), translate=False).frame = frame
+
+
+def _draw_camera_gaps(layout, effect) -> None:
+    """The frames at which the camera is not tracked."""
+    for gap in track_region.gaps(effect, None):
+        if math.isinf(gap.last):
+            text = iface_("Not tracked: from frame {first} on")
+        elif math.isinf(gap.first):
+            text = iface_("Not tracked: up to frame {last}")
+        else:
+            text = iface_("Not tracked: frames {first} to {last}")
+        sentence(layout, text.format(first=gap.first, last=gap.last), "INFO")
+
+
+def _active_region(context):
+    return selection.active_region(selection.active(context)[1])
+
+
+class _WithRegion(WithEffect):
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and _active_region(context) is not None
+
+
+class Transform(_WithRegion):
+    bl_label = "Transform"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        region = _active_region(context)
+        column = layout.column(align=True)
+        for name in ("location", "rotation", "scale"):
+            column.prop(region, name)
+        layout.operator("shutter.region_key", text="Insert Keyframes", icon="KEY_HLT")
+
+
+class Track(_WithRegion):
+    bl_label = "Track"
+    bl_translation_context = CONTEXT
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and _active_region(context).kind not in strips.MATTES
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        _draw_track_options(layout, _active_region(context))
+
+
+def _draw_track_options(layout, moving) -> None:
+    for name in ("motion", "track_until", "track_all_keys", "track_ends"):
+        layout.prop(moving, name)
+
+
+class Follow(_WithRegion):
+    bl_label = "Follow Track"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        region = _active_region(context)
+        layout.prop(region, "follow_clip")
+        layout.prop(region, "follow_kind")
+        if region.follow_clip is not None:
+            _draw_tracks(layout, region, region.follow_clip.tracking)
+        if follow_track.is_changed(region):
+            sentence(layout, iface_("The track has changed"), "ERROR")
+        row = layout.row(align=True)
+        row.operator("shutter.follow", icon="TRACKER")
+        row.operator("shutter.follow_update", icon="FILE_REFRESH")
+
+
+def _draw_tracks(layout, region, tracking) -> None:
+    layout.prop_search(region, "follow_object", tracking, "objects")
+    objects = tracking.objects
+    holder = objects.get(region.follow_object) if region.follow_object else objects[0]
+    if region.follow_kind != "OBJECT" and holder is not None:
+        kind = "plane_tracks" if region.follow_kind == "PLANE" else "tracks"
+        layout.prop_search(region, "follow_track", holder, kind)
+
+
+class Camera(WithEffect):
+    """Its numbers, and how they are found; the shutter that follows it has the buttons that track it."""
+
+    bl_label = "Camera"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and any(
+            shutter.follow == "CAMERA" for shutter in selection.active(context)[1].shutters
+        )
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        camera = selection.active(context)[1].camera
+        column = layout.column(align=True)
+        for name in ("location", "rotation", "scale"):
+            column.prop(camera, name)
+        layout.prop(camera, "influence")
+        _draw_track_options(layout, camera)
+        layout.prop(camera, "follow_clip")
+        layout.operator("shutter.follow_stabilization", icon="TRACKER")
