@@ -13,7 +13,7 @@ from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import scribbles
 from shutter_addon.core.model.frame_state import FrameState
-from shutter_addon.core.recipes import recipe
+from shutter_addon.core.recipes import recipe, recipe_file
 from shutter_addon.media import open_source
 from shutter_addon.media.matte_files import MatteFile
 from shutter_addon.media.matte_values import MatteValues
@@ -95,7 +95,7 @@ class Shot:
 
     @cached_property
     def effect(self) -> recipe.Recipe:
-        return recipe.load(self.recipe)
+        return recipe_file.load(self.recipe)
 
     @cached_property
     def _source(self):

@@ -27,7 +27,7 @@ from quality import similarity
 from gallery import handheld as scene
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import motions
-from shutter_addon.core.recipes import recipe
+from shutter_addon.core.recipes import recipe, recipe_file
 from shutter_addon.media import open_source
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -77,10 +77,10 @@ def encoded(picture: np.ndarray) -> np.ndarray:
 
 def tracked(footage: Path, folder: Path) -> recipe.Recipe:
     """The effect with the keys that the command writes."""
-    (folder / "held.json").write_text(recipe.dump(scene.held()), encoding="utf-8")
+    (folder / "held.json").write_text(recipe_file.dump(scene.held()), encoding="utf-8")
     options = ["--recipe", folder / "held.json", "--camera", "--frame", scene.FRAME, "--all-keys"]
     run("track", footage, *options, "--output", folder / "tracked.json")
-    return recipe.load(folder / "tracked.json")
+    return recipe_file.load(folder / "tracked.json")
 
 
 def motion(effect: recipe.Recipe, frame: int, size) -> motions.Similarity:

@@ -34,7 +34,7 @@ import one_stroke_scenes as truth
 from gallery import stills
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.core.model import scribbles
-from shutter_addon.core.recipes import recipe
+from shutter_addon.core.recipes import recipe, recipe_file
 from shutter_addon.media import open_source
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -95,14 +95,14 @@ def tracked(scene: truth.Scene, folder: Path, aggregate: int = 1) -> dict[str, r
     footage = folder / "footage" / "0001.png"
     with open_source(footage) as source:
         drawn = replace(stroked(scene, (source.width, source.height)), aggregate=aggregate)
-    (folder / "drawn.json").write_text(recipe.dump(drawn), encoding="utf-8")
+    (folder / "drawn.json").write_text(recipe_file.dump(drawn), encoding="utf-8")
     options = ["--recipe", folder / "drawn.json", "--region", NAME, "--frame", scene.start]
     found = {"drawn": drawn}
     for name, option in (("thinned", []), ("all", ["--all-keys", "--report", folder / "report.json"])):
         output = folder / f"{name}.json"
         command = [sys.executable, "-m", "shutter_addon", "track", footage, *options, "--output", output, *option]
         subprocess.run(list(map(str, command)), cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
-        found[name] = recipe.load(output)
+        found[name] = recipe_file.load(output)
     return found
 
 

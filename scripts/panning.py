@@ -27,7 +27,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from quality import similarity
 
 from gallery import panning as scene
-from shutter_addon.core.recipes import recipe
+from shutter_addon.core.recipes import recipe, recipe_file
 from shutter_addon.media import open_source
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -73,10 +73,10 @@ def measure(folder: Path, samples: int = 64) -> list[dict]:
 
 def tracked(footage: Path, folder: Path) -> recipe.Recipe:
     """The stroke's effect with the keys that the command writes."""
-    (folder / "drawn.json").write_text(recipe.dump(scene.drawn()), encoding="utf-8")
+    (folder / "drawn.json").write_text(recipe_file.dump(scene.drawn()), encoding="utf-8")
     options = ["--recipe", folder / "drawn.json", "--region", scene.NAME, "--frame", scene.FRAME]
     run("track", footage, *options, "--output", folder / "tracked.json")
-    return recipe.load(folder / "tracked.json")
+    return recipe_file.load(folder / "tracked.json")
 
 
 def unfollowing(effect: recipe.Recipe) -> recipe.Recipe:
@@ -87,7 +87,7 @@ def unfollowing(effect: recipe.Recipe) -> recipe.Recipe:
 def exposed(footage: Path, effect: recipe.Recipe, frame: int, folder: Path) -> np.ndarray:
     """The picture of an effect at a frame, by the command."""
     folder.mkdir(exist_ok=True)
-    (folder / "recipe.json").write_text(recipe.dump(effect), encoding="utf-8")
+    (folder / "recipe.json").write_text(recipe_file.dump(effect), encoding="utf-8")
     run("render", footage, "--recipe", folder / "recipe.json", "--output", folder, "--frames", frame)
     return codes(folder / f"{frame:04}.png")
 

@@ -57,7 +57,7 @@ from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import presets
-from shutter_addon.core.recipes import recipe
+from shutter_addon.core.recipes import recipe, recipe_file
 from shutter_addon.devices.device import NoDeviceError
 from shutter_addon.devices.gl import GLDevice
 from shutter_addon.media import MediaError, open_source
@@ -91,7 +91,7 @@ def effect_recipe(window: int) -> recipe.Recipe:
         "shutters": [{"name": name, "bars": presets.bars(preset, window).tolist()} for name, preset in bars.items()],
         "regions": [{"shutter": n, "kind": "line", "width": 0.02, "strokes": [points]} for n, points in lines.items()],
     }
-    return recipe.parse(json.dumps(data))
+    return recipe_file.parse(json.dumps(data))
 
 
 class ProcessorTime:

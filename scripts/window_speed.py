@@ -78,7 +78,7 @@ def add_effect(edit, source):
     add_effect, recipe_import = (
         import_module(f"{layer}.{name}") for name in ("editing.add_effect", "data.recipe_import")
     )
-    recipe = import_module(f"{layer.rpartition('.')[0]}.core.recipes.recipe")
+    recipe_file = import_module(f"{layer.rpartition('.')[0]}.core.recipes.recipe")
     presets = import_module(f"{layer.rpartition('.')[0]}.core.model.presets")
     strip, effect = add_effect.add_effect(edit, source)
     lines = {"Sharp": [[0.3, 0.2], [0.5, 0.8]], "Ramp": [[0.7, 0.2], [0.7, 0.8]]}
@@ -90,7 +90,7 @@ def add_effect(edit, source):
         "shutters": [{"name": n, "bars": presets.bars(p, WINDOW).tolist()} for n, p in bars.items()],
         "regions": [{"shutter": n, "kind": "line", "width": 0.02, "strokes": [points]} for n, points in lines.items()],
     }
-    recipe_import.apply(edit, effect, strip, recipe.parse(json.dumps(data)))
+    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
     return strip, effect
 
 

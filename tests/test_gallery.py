@@ -14,7 +14,7 @@ from gallery import NAMES, bunny, time_map
 from gallery.item import HERE, ROOT, Shot
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.core.frames import light
-from shutter_addon.core.recipes import recipe
+from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
 from shutter_addon.media.matte_values import MatteValues
 
@@ -60,7 +60,7 @@ def test_help_says_where_a_relative_folder_lies():
 @pytest.mark.parametrize("path", sorted(HERE.glob("*.json")), ids=lambda path: path.stem)
 def test_recipes_load(path):
     assert path.stem.split("-")[0] in NAMES
-    assert recipe.load(path).shutters
+    assert recipe_file.load(path).shutters
 
 
 def test_an_item_from_end_to_end(tmp_path, monkeypatch):
@@ -97,7 +97,7 @@ def angles_of_time(height, width):
 @pytest.mark.parametrize(("name", "times"), [("time_map", rows_of_time), ("time_map-angle", angles_of_time)])
 def test_time_maps_are_frames_put_together(name, times):
     """A pixel whose time is a whole frame's is that frame's to the bit, and others mix the two frames around."""
-    source, effect = open_source(time_map.footage(None)), recipe.load(HERE / f"{name}.json")
+    source, effect = open_source(time_map.footage(None)), recipe_file.load(HERE / f"{name}.json")
     height, width, shown = source.height, source.width, time_map.FRAME - 1
     renderer = Renderer(open_compositor(), source, MatteValues(width, height))
     made = light.to_encoded(renderer.picture(shown, effect.at(time_map.FRAME, width / height))[..., :3]) * 255

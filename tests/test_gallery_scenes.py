@@ -10,7 +10,7 @@ from OpenImageIO import ImageBuf
 
 from gallery import object_matte
 from gallery.item import ROOT
-from shutter_addon.core.recipes import recipe
+from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media.matte_files import MatteFile
 
 # Each in a process of its own: an empty scene would take the other tests' edits away.
@@ -67,7 +67,7 @@ def test_a_scene_is_built_and_rendered(name, tmp_path):
 def test_an_objects_matte_is_rendered_beside_it(tmp_path):
     """The recipe names its file and its channel. It covers what is red there, in part at its edges."""
     picture = ImageBuf(run(FIRST_FRAME, tmp_path / "footage", "object_matte").splitlines()[-1]).get_pixels()
-    (region,) = recipe.load(ROOT / "gallery" / "object_matte.json").regions
+    (region,) = recipe_file.load(ROOT / "gallery" / "object_matte.json").regions
     assert region.channel == f"{object_matte.NAME}.V"
     values = MatteFile(tmp_path / region.path, region.channel).open().read(0)
     assert values.shape == picture.shape[:2]

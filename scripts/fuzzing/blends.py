@@ -78,7 +78,7 @@ def _edit(bpy, folder, data):
     """An edit as a user makes it: an effect on an image strip, from frame 1 to 40. The names of edit and source."""
     from shutter_addon.blender.data import recipe_import, selection
     from shutter_addon.blender.editing import add_effect
-    from shutter_addon.core.recipes import recipe
+    from shutter_addon.core.recipes import recipe_file
 
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     edit = bpy.context.scene
@@ -89,7 +89,7 @@ def _edit(bpy, folder, data):
         source.elements.append(f"f{number:04d}.png")
     source.right_handle = 41
     strip, effect = add_effect.add_effect(edit, source)
-    recipe_import.apply(edit, effect, strip, recipe.parse(json.dumps(data)), folder)
+    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)), folder)
     selection.choose(edit, strip)
     return edit.name, source.name
 

@@ -24,9 +24,9 @@ def plausible(random, longest: int) -> dict:
     """A recipe that keeps to the format, with a window of so many frames at most."""
     from test_export import following_recipes
 
-    from shutter_addon.core.recipes import recipe
+    from shutter_addon.core.recipes import recipe_file
 
-    return json.loads(recipe.dump(hostile.drawn(following_recipes(longest), random)))
+    return json.loads(recipe_file.dump(hostile.drawn(following_recipes(longest), random)))
 
 
 def make(random, folder):
@@ -42,11 +42,11 @@ def make(random, folder):
 
 
 def run(folder):
-    from shutter_addon.core.recipes import recipe
+    from shutter_addon.core.recipes import recipe, recipe_file
 
     with trial.only(recipe.RecipeError):
-        found = recipe.load(folder / "recipe.json")
-        if recipe.parse(recipe.dump(found)) != found:
+        found = recipe_file.load(folder / "recipe.json")
+        if recipe_file.parse(recipe_file.dump(found)) != found:
             raise trial.Fault("a recipe does not come back as it was")
         render(folder, 0)
         compose(found, json.loads((folder / "plan.json").read_text()), folder)

@@ -8,7 +8,7 @@ from test_region_tracking import COUNT, SIZE, active, call, drawn, keys, new_sou
 from shutter_addon.blender.data import fcurves, recipe_export, recipe_import, snapshot
 from shutter_addon.blender.editing import track_region
 from shutter_addon.blender.rendering import session
-from shutter_addon.core.recipes import recipe
+from shutter_addon.core.recipes import recipe_file
 
 OTHER = texture(*SIZE[::-1]) // 4
 
@@ -136,7 +136,7 @@ def test_recipes_keep_it(bpy, between_cuts):
     call(bpy, "track")
     edit, effect, strip = active(bpy)
     effect.camera.influence = 0.25
-    found = recipe.parse(recipe.dump(recipe_export.recipe_of(edit, effect, strip)))
+    found = recipe_file.parse(recipe_file.dump(recipe_export.recipe_of(edit, effect, strip)))
     assert found.camera_influence == 0.25
     before = opacity(bpy, range(11, 47))
     assert [found.effect(1.5).regions[0].opacity.at(frame) for frame in range(1, 37)] == before

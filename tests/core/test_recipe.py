@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from shutter_addon.core.model import limits, mattes, scribbles
 from shutter_addon.core.model.motions import Placement
 from shutter_addon.core.pixels.compositor import window_positions
-from shutter_addon.core.recipes import recipe
+from shutter_addon.core.recipes import recipe, recipe_file
 
 EXAMPLE = {
     "version": 1,
@@ -60,8 +60,8 @@ def test_mattes_and_ramps():
     regions = [MATTE | keyed, MATTE | {"timing": "timeline", "offset": 4, "width": 0.1}, *EXAMPLE["regions"]]
     regions += [RAMP | {"keys": [{"frame": 1}, {"frame": 5, "location": [0.2, 0], "rotation": 90, "scale": 2}]}]
     regions += [RAMP | {"ramp": "luminance"}]
-    parsed = recipe.parse(json.dumps(EXAMPLE | {"regions": regions}))
-    assert recipe.parse(recipe.dump(parsed)) == parsed
+    parsed = recipe_file.parse(json.dumps(EXAMPLE | {"regions": regions}))
+    assert recipe_file.parse(recipe_file.dump(parsed)) == parsed
     moment = parsed.at(3, 1, files=lambda region: region.kind)
     assert len(moment.shapes) == 1
     of_source, of_timeline, ramp, luminance = moment.mattes
@@ -74,8 +74,8 @@ def test_mattes_and_ramps():
 
 
 def test_the_contracts_example():
-    parsed = recipe.parse(json.dumps(EXAMPLE))
-    assert recipe.parse(recipe.dump(parsed)) == parsed
+    parsed = recipe_file.parse(json.dumps(EXAMPLE))
+    assert recipe_file.parse(recipe_file.dump(parsed)) == parsed
     moment = parsed.at(1, 16 / 9)
     assert moment.bars.tolist() == [[1] * 8, [1, 0, 0, 0, 0, 0, 0, 0]]
     assert moment.shapes[0].shutter == 1
@@ -86,7 +86,7 @@ def test_the_contracts_example():
 
 
 def test_defaults():
-    small = recipe.parse('{"version": 1, "window": 2, "shutters": [{"name": "A", "bars": [1, 1]}]}')
+    small = recipe_file.parse('{"version": 1, "window": 2, "shutters": [{"name": "A", "bars": [1, 1]}]}')
     assert small.options == recipe.Options(2)
     assert small.options.aggregate == 1
     assert small.regions == []
@@ -253,7 +253,7 @@ def broken(change):
 )
 def test_one_sentence_that_names_the_place(change, sentence):
     with pytest.raises(recipe.RecipeError) as fault:
-        recipe.parse(broken(change))
+        recipe_file.parse(broken(change))
     assert str(fault.value).startswith(sentence)
     assert is_a_sentence(str(fault.value))
 
@@ -273,8 +273,8 @@ def test_what_is_followed_comes_back():
         {"frame": 1},
         {"frame": 9, "location": [0.1, -0.2], "rotation": 5, "scale": 1.25, "ease": "bezier"},
     ]
-    found = recipe.parse(json.dumps(data))
-    assert recipe.parse(recipe.dump(found)) == found
+    found = recipe_file.parse(json.dumps(data))
+    assert recipe_file.parse(recipe_file.dump(found)) == found
     effect = found.effect(1.5)
     assert effect.shutters[0].follow is effect.regions[0]
     assert effect.shutters[1].follow is effect.camera
@@ -305,7 +305,7 @@ def test_what_is_followed_comes_back():
 )
 def test_no_recipe_at_all(text, sentence):
     with pytest.raises(recipe.RecipeError) as fault:
-        recipe.parse(text)
+        recipe_file.parse(text)
     assert str(fault.value).startswith(sentence)
     assert is_a_sentence(str(fault.value))
 
@@ -313,7 +313,7 @@ def test_no_recipe_at_all(text, sentence):
 def test_lists_that_are_read_but_too_deep_to_be_shown():
     deep = "[" * 900 + "]" * 900  # the reader and the writer of JSON may go to different depths
     with pytest.raises(recipe.RecipeError, match=r"^shutters\[0\]: \[\[\["):
-        recipe.parse('{"version": 1, "window": 1, "shutters": [' + deep + "]}")
+        recipe_file.parse('{"version": 1, "window": 1, "shutters": [' + deep + "]}")
 
 
 def test_at_the_ends_of_all_ranges():
@@ -332,8 +332,8 @@ def test_at_the_ends_of_all_ranges():
         ],
         "time": [{"frame": -1048574, "value": 1048574}, {"frame": 1048574, "value": -1048574}],
     }
-    found = recipe.parse(json.dumps(ends))
-    assert recipe.parse(recipe.dump(found)) == found
+    found = recipe_file.parse(json.dumps(ends))
+    assert recipe_file.parse(recipe_file.dump(found)) == found
     assert scribbles.rasterise(found.at(-1048574, 1.5).shapes, 6, 4).all()
 
 
@@ -359,7 +359,7 @@ def places(value, path=()):
 def parsed(text):
     """The recipe, or what is wrong with it."""
     try:
-        return recipe.parse(text), None
+        return recipe_file.parse(text), None
     except recipe.RecipeError as error:
         return None, str(error)
 
@@ -387,7 +387,7 @@ def test_a_hostile_recipe_is_refused_in_a_sentence_or_soon_drawn(changes, frame)
     if fault is not None:
         assert is_a_sentence(fault)
         return
-    assert recipe.parse(recipe.dump(found)) == found
+    assert recipe_file.parse(recipe_file.dump(found)) == found
     moment = found.at(frame, 16 / 9)
     assert np.isfinite(moment.bars).all()
     assert np.isfinite(moment.gains.astype(np.float32)).all()
@@ -397,18 +397,18 @@ def test_a_hostile_recipe_is_refused_in_a_sentence_or_soon_drawn(changes, frame)
 @given(st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=63))
 def test_any_name_comes_back(name):
     found = recipe.Recipe(1, 1, [recipe.Shutter(name, bars=[1.0])])
-    assert recipe.parse(recipe.dump(found)) == found
+    assert recipe_file.parse(recipe_file.dump(found)) == found
 
 
 def test_a_name_that_looks_like_a_list_comes_back():
     found = recipe.Recipe(1, 1, [recipe.Shutter('[1,   2 ] "\\" [3,  4]', bars=[1.0])])
-    assert recipe.parse(recipe.dump(found)) == found
+    assert recipe_file.parse(recipe_file.dump(found)) == found
 
 
 def test_files(tmp_path):
-    parsed = recipe.parse(json.dumps(EXAMPLE))
-    recipe.save(parsed, tmp_path / "r.json")
-    assert recipe.load(tmp_path / "r.json") == parsed
+    parsed = recipe_file.parse(json.dumps(EXAMPLE))
+    recipe_file.save(parsed, tmp_path / "r.json")
+    assert recipe_file.load(tmp_path / "r.json") == parsed
     assert [p.name for p in tmp_path.iterdir()] == ["r.json"]
     for path, sentence in [
         (tmp_path / "none.json", "No such file"),
@@ -417,12 +417,12 @@ def test_files(tmp_path):
     ]:
         (tmp_path / "b.json").write_bytes(b"\xff\xfe\x00\x80")
         with pytest.raises(recipe.RecipeError, match=sentence):
-            recipe.load(path)
+            recipe_file.load(path)
 
 
 def test_a_file_with_a_byte_order_mark(tmp_path):
     (tmp_path / "r.json").write_text(json.dumps(EXAMPLE), encoding="utf-8-sig")
-    assert recipe.load(tmp_path / "r.json") == recipe.parse(json.dumps(EXAMPLE))
+    assert recipe_file.load(tmp_path / "r.json") == recipe_file.parse(json.dumps(EXAMPLE))
 
 
 def test_what_is_no_file(tmp_path):
@@ -441,7 +441,7 @@ def test_what_is_no_file(tmp_path):
         ("/" + "x/" * 1000, "No such file|too long"),
     ]:
         with pytest.raises(recipe.RecipeError, match=sentence) as fault:
-            recipe.load(path)
+            recipe_file.load(path)
         assert str(fault.value).startswith(str(path)[:20])
         assert is_a_sentence(str(fault.value))
 
@@ -450,12 +450,12 @@ def test_saving_touches_no_other_file(tmp_path):
     (tmp_path / "others").write_text("others'")
     for name in ("r.json", "r.json.part"):
         (tmp_path / name).symlink_to("others")
-    recipe.save(recipe.parse(json.dumps(EXAMPLE)), tmp_path / "r.json")
+    recipe_file.save(recipe_file.parse(json.dumps(EXAMPLE)), tmp_path / "r.json")
     assert (tmp_path / "others").read_text() == "others'"
-    assert recipe.load(tmp_path / "r.json") == recipe.parse(json.dumps(EXAMPLE))
+    assert recipe_file.load(tmp_path / "r.json") == recipe_file.parse(json.dumps(EXAMPLE))
     (tmp_path / "folder").mkdir()
     with pytest.raises(IsADirectoryError):
-        recipe.save(recipe.parse(json.dumps(EXAMPLE)), tmp_path / "folder")
+        recipe_file.save(recipe_file.parse(json.dumps(EXAMPLE)), tmp_path / "folder")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["folder", "others", "r.json", "r.json.part"]
 
 
@@ -486,7 +486,7 @@ def test_redrawn_strokes_follow_one_another():
 
 @given(st.floats(-5, 100))
 def test_any_frame_gives_an_instant(frame):
-    moment = recipe.parse(json.dumps(EXAMPLE)).at(frame, 1.5)
+    moment = recipe_file.parse(json.dumps(EXAMPLE)).at(frame, 1.5)
     assert np.isfinite(moment.bars).all()
     assert np.isfinite(moment.shapes[0].strokes[0]).all()
 
@@ -527,7 +527,7 @@ def test_a_still_frame_stays_where_it_is(position):
 
 
 def test_another_factor_of_in_betweens_keeps_times():
-    source = recipe.parse(
+    source = recipe_file.parse(
         json.dumps(
             {
                 "version": 1,
@@ -555,21 +555,21 @@ def test_another_factor_of_in_betweens_keeps_times():
 def test_time_between_its_keys():
     keys = [{"frame": 1, "value": 5}, {"frame": 5, "value": 9, "ease": "constant"}, {"frame": 9, "value": 1}]
     source = {"version": 1, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
-    assert recipe.parse(json.dumps(source)).time_at(3) is None
-    found = recipe.parse(json.dumps(source | {"time": keys}))
+    assert recipe_file.parse(json.dumps(source)).time_at(3) is None
+    found = recipe_file.parse(json.dumps(source | {"time": keys}))
     assert [found.time_at(frame) for frame in (-3, 2, 5, 8.9, 9, 40)] == [5, 6, 9, 9, 1, 1]
-    assert recipe.parse(recipe.dump(found)) == found
+    assert recipe_file.parse(recipe_file.dump(found)) == found
 
 
 def test_edge_aware_between_its_keys():
     source = {"version": 1, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
 
     def strengths(value, *frames):
-        found = recipe.parse(json.dumps(source | {"edge_aware": value}))
-        assert recipe.parse(recipe.dump(found)) == found
+        found = recipe_file.parse(json.dumps(source | {"edge_aware": value}))
+        assert recipe_file.parse(recipe_file.dump(found)) == found
         return [found.at(frame, 1).options.edge_aware for frame in frames]
 
-    assert recipe.parse(json.dumps(source)).at(1, 1).options.edge_aware == 0
+    assert recipe_file.parse(json.dumps(source)).at(1, 1).options.edge_aware == 0
     assert strengths(0.5, -3, 9) == [0.5, 0.5]
     keys = [{"frame": 2, "value": 0.2}, {"frame": 6, "value": 1, "ease": "constant"}, {"frame": 9, "value": 0}]
     assert strengths(keys, 1, 4, 6, 8.5, 40) == pytest.approx([0.2, 0.6, 1, 1, 0])

@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from shutter_addon.core.model import shutters
 from shutter_addon.core.pixels import compositor, following, trails
-from shutter_addon.core.recipes import recipe
+from shutter_addon.core.recipes import recipe, recipe_file
 
 WINDOW = 24
 SOURCE = SimpleNamespace(count=60, width=160, height=100)
@@ -203,5 +203,5 @@ def test_frames_change_no_bit():
 def test_a_recipe_of_it_comes_back():
     for trail in (0.25, [recipe.ValueKey(1, 0.1), recipe.ValueKey(9, 0.3, "bezier")]):
         source = accelerating(trail)
-        assert recipe.parse(recipe.dump(source)) == source
-    assert json.loads(recipe.dump(accelerating(None)))["shutters"][0].get("trail") is None
+        assert recipe_file.parse(recipe_file.dump(source)) == source
+    assert json.loads(recipe_file.dump(accelerating(None)))["shutters"][0].get("trail") is None

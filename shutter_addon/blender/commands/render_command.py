@@ -7,7 +7,7 @@ import bpy
 
 from ...core import atomic_write
 from ...core.farm import job_file
-from ...core.recipes import recipe
+from ...core.recipes import recipe, recipe_file
 from ...media.completeness import is_whole_blend, why_short
 from ...media.matte_files import MatteFile
 from ..data import inbetween_settings, missing_media, preferences, versions
@@ -154,7 +154,7 @@ def _mattes(source_recipe, folder: Path) -> list[Path]:
 
 def _recipe(arguments) -> recipe.Recipe:
     """The recipe, with the in-between frames that were asked for."""
-    found = recipe.load(arguments.recipe)
+    found = recipe_file.load(arguments.recipe)
     if arguments.inbetween is not None:
         found = recipe.with_inbetween(found, arguments.inbetween)
     return replace(found, inbetween_method=arguments.inbetween_method or found.inbetween_method)

@@ -9,7 +9,7 @@ from ...core.frames import retiming
 from ...core.messages import signed
 from ...core.model import presence
 from ...core.model.effect import Region
-from ...core.recipes import recipe, region_keys
+from ...core.recipes import recipe, recipe_file, region_keys
 from ...media import PrefetchSource, camera_tracking, filmed_frames, registration, tracking
 from ...media.cuts import ShotSource
 from ..editing import new_edit
@@ -48,7 +48,7 @@ def add(commands) -> None:
 def run(arguments) -> None:
     if arguments.camera == (arguments.region is not None):
         raise film_output.OutputError("track: either --region NAME or --camera, one of the two")
-    source_recipe = recipe.load(arguments.recipe)
+    source_recipe = recipe_file.load(arguments.recipe)
     index = None if arguments.camera else _region_index(arguments, source_recipe)
     subject = recipe.CAMERA if arguments.camera else arguments.region
     with command_line.opened(arguments.source) as medium:
@@ -159,7 +159,7 @@ def _write_track(arguments, result, tracked: dict, stops: list) -> None:
         atomic_write.clear_up(path.parent)
     with atomic_write.writing(arguments.output) as part:
         moved = recipe.moved(result, arguments.recipe.parent, arguments.output.parent)
-        part.write_text(recipe.dump(moved), encoding="utf-8")
+        part.write_text(recipe_file.dump(moved), encoding="utf-8")
         if arguments.report:
             with atomic_write.writing(arguments.report) as other:
                 other.write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -4,9 +4,15 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.model import limits, shutters
-from . import fcurves, inbetween_settings, validation
+from . import fcurves, inbetween_settings, strips, validation
 from .annotations import layer_of
 from .selection import active_region, active_shutter
+
+
+def changed(group, _context):
+    """For update callbacks: the sequencer keeps finished frames, and knows nothing of what the effect's strips depend
+    on."""
+    strips.invalidate(group.id_data)
 
 
 def choose_region(effect) -> None:

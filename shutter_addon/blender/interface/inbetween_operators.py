@@ -11,7 +11,7 @@ from bpy.types import Operator
 
 from ...core import messages
 from ..data import inbetween_settings, selection, strips, validation
-from ..data.properties import INBETWEENS
+from ..data.choices import INBETWEENS
 from ..rendering import inbetween_build, strobing
 from ..rendering.session import FAULTS
 from .operator_bases import UNDOABLE, OfEffect, redraw, refused

@@ -11,7 +11,7 @@ from ...core.model.limits import MAX_CHANNEL
 from ...core.recipes.recipe import RecipeError
 from ...media import MediaError
 from ..data import matte_strips, recipe_import, selection, strips, validation
-from ..data.properties import RAMPS
+from ..data.choices import RAMPS
 from ..editing import region_edits, time_map
 from .operator_bases import OfShutter, chosen_file, has_room, refused
 

@@ -9,7 +9,7 @@ from bpy.types import Operator
 
 from ...core.model import presets
 from ..data import annotations, consistency, selection, strips, validation
-from ..data.properties import CONTEXT, STROKES
+from ..data.choices import CONTEXT, STROKES
 from ..editing import (
     add_effect,
     bar_edits,

@@ -18,7 +18,7 @@ from ...devices.passes import body
 from ...media import MediaError
 from ...media.errors import NotBuiltError
 from ..data import annotations, geometry, selection, strips
-from ..data.properties import CONTEXT
+from ..data.choices import CONTEXT
 from ..devices import blender_gpu
 from ..devices.blender_gpu import Texture
 from ..editing import shown_annotations

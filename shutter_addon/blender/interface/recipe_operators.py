@@ -8,7 +8,7 @@ from bpy.props import StringProperty
 from bpy.types import Operator
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ...core.recipes import recipe
+from ...core.recipes import recipe, recipe_file
 from ..data import recipe_import, selection
 from ..output import matte_export
 from ..rendering.session import FAULTS
@@ -27,7 +27,7 @@ class SHUTTER_OT_recipe_import(OfEffect, ImportHelper, Operator):
         edit, _effect, strip = selection.active(context)
         try:
             path = Path(chosen_file(self))
-            recipe_import.apply(edit, effect, strip, recipe.load(path), path.parent)
+            recipe_import.apply(edit, effect, strip, recipe_file.load(path), path.parent)
         except (recipe.RecipeError, *FAULTS) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -47,7 +47,7 @@ class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
         edit, _effect, strip = selection.active(context)
         try:
             path = chosen_file(self)
-            recipe.save(matte_export.recipe_for(edit, effect, strip, Path(path)), path)
+            recipe_file.save(matte_export.recipe_for(edit, effect, strip, Path(path)), path)
         except (recipe.RecipeError, *FAULTS) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -6,7 +6,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ...media.tracking import SURE
 from ..data import matte_look, selection, strips, validation
-from ..data.properties import CONTEXT
+from ..data.choices import CONTEXT
 from ..editing import follow_track, track_region
 from . import track_operators
 from .panel_parts import WithEffect, draw_list, sentence

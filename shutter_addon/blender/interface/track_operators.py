@@ -10,7 +10,7 @@ from bpy.props import EnumProperty, IntProperty
 from bpy.types import Operator
 
 from ..data import selection, validation
-from ..data.properties import CONTEXT
+from ..data.choices import CONTEXT
 from ..editing import bar_edits, follow_stabilization, follow_track, panning_shot, track_region, tripod
 from ..rendering.session import FAULTS
 from .operator_bases import OfEffect, OfRegion, OfShutter, OfStrokes, redraw, refused

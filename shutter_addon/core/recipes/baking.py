@@ -19,7 +19,7 @@ import numpy as np
 from ..model import keyframes, limits
 from ..model.effect import Camera, Effect, MatteRegion, Region, Shutter
 from ..model.keyframes import Channel, Samples
-from . import recipe
+from . import recipe, recipe_file
 
 # Of the largest bar, of fractions of the picture, of degrees; of the larger key's value where that is above 1.
 TOLERANCE = 1e-4
@@ -61,7 +61,7 @@ def baked(effect: Effect, shown: range, inbetween_method: str, mattes=()) -> rec
         camera_influence=_number(effect.camera.influence, shown),
         **{name: value for name, value in asdict(options).items() if name not in ("step", "edge_aware")},
     )
-    return recipe.parse(recipe.dump(found))
+    return recipe_file.parse(recipe_file.dump(found))
 
 
 def _different(names: list[str]) -> list[str]:

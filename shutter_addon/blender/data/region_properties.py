@@ -1,0 +1,258 @@
+"""What a region and the camera are in Blender: properties of the edit's scene."""
+
+import math
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+from bpy.types import PropertyGroup
+
+from ...core.model.limits import (
+    MAX_CHANNEL,
+    MAX_DEGREES,
+    MAX_DISTANCE,
+    MAX_FRAME,
+    MAX_NAME,
+    MAX_SCALE,
+)
+from . import consistency, matte_strips, selection
+from .choices import (
+    BLENDS,
+    CHANNELS,
+    CONTEXT,
+    FOLLOWED,
+    KINDS,
+    MATTE_SOURCES,
+    MOTIONS,
+    RAMPS,
+    TIMINGS,
+    UNKEYED,
+)
+from .consistency import changed
+
+
+def _shortened(region, new: str, old: str, is_set) -> str:
+    """As recipes have names. Blender's own `maxlen` counts bytes, of which a character takes up to four."""
+    new = new[:MAX_NAME]
+    # Blender takes long to find an item's place among many: only where the name counts. The default name of a region
+    # that has none yet is nobody's.
+    effects = region.id_data.virtual_shutter.effects
+    if is_set and any(shutter.follow_region == old for effect in effects for shutter in effect.shutters):
+        consistency.rename_followed(selection.effect_of_item(region), old, new)
+    return new
+
+
+class TrackStop(PropertyGroup):
+    """Where tracking of a region stopped before it was to.
+
+    frame: counts from the effect's start, so that it moves with its strips"""
+
+    frame: FloatProperty(min=-2 * MAX_FRAME, max=2 * MAX_FRAME)
+    forward: BoolProperty()
+    fault: StringProperty()
+
+
+class _Tracked:
+    """What tracking has found of a region or of the camera, and how it is tracked."""
+
+    confidence: FloatProperty(
+        name="Confidence",
+        description="How sure tracking was of where it is",
+        subtype="PERCENTAGE",
+        default=100.0,
+        min=0.0,
+        max=100.0,
+    )
+    stops: CollectionProperty(type=TrackStop)
+    motion: EnumProperty(
+        name="Motion",
+        description="Which channels Track and Follow key",
+        items=MOTIONS,
+        default="SCALE",
+        options=UNKEYED,
+        translation_context=CONTEXT,
+    )
+    track_until: IntProperty(
+        name="Until",
+        description="Timeline frame at which tracking stops; 0 is the end of the strip",
+        options=UNKEYED,
+        translation_context=CONTEXT,
+    )
+    track_all_keys: BoolProperty(
+        name="All Keys",
+        description="Keep a key at every tracked frame, in place of those that the motion needs within a pixel",
+        options=UNKEYED,
+    )
+    track_ends: BoolProperty(
+        name="End with Track",
+        description="Track keys a region's opacity, or the camera's influence, so that it fades where the track ends; "
+        "a region ends with its shot",
+        default=True,
+        options=UNKEYED,
+    )
+    follow_clip: PointerProperty(
+        name="Clip",
+        description="Movie clip of the source's footage, in which something is tracked",
+        type=bpy.types.MovieClip,
+    )
+
+
+def _location(description: str):
+    return FloatVectorProperty(
+        name="Location",
+        description=description,
+        subtype="XYZ",
+        size=2,
+        min=-MAX_DISTANCE,
+        max=MAX_DISTANCE,
+        update=changed,
+    )
+
+
+def _rotation(description: str):
+    limit = math.radians(MAX_DEGREES)
+    return FloatProperty(
+        name="Rotation", description=description, subtype="ANGLE", min=-limit, max=limit, update=changed
+    )
+
+
+def _scale(description: str):
+    return FloatProperty(
+        name="Scale", description=description, default=1.0, min=-MAX_SCALE, max=MAX_SCALE, update=changed
+    )
+
+
+class ShutterRegion(_Tracked, PropertyGroup):
+    name: StringProperty(name="Name", description="Name of the region", default="Region", set_transform=_shortened)
+    shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=changed)
+    layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=changed)
+    kind: EnumProperty(
+        name="Type",
+        description="What says where the shutter holds",
+        items=KINDS,
+        update=changed,
+        options=UNKEYED,
+        translation_context=CONTEXT,
+    )
+    matte: EnumProperty(
+        name="From", description="What the matte is", items=MATTE_SOURCES, update=changed, options=UNKEYED
+    )
+    image: PointerProperty(
+        name="File",
+        description="Movie, image sequence or picture that is the matte",
+        type=bpy.types.Image,
+        update=changed,
+    )
+    strip: StringProperty(name="Strip", description="Identity of the strip that is the matte", update=changed)
+    strip_name: StringProperty(
+        name="Strip",
+        description="Strip that is the matte",
+        get=matte_strips.strip_name,
+        set=matte_strips.choose_strip,
+        options={"SKIP_SAVE"},
+    )
+    mask: PointerProperty(name="Mask", description="Mask that is the matte", type=bpy.types.Mask, update=changed)
+    channel: EnumProperty(
+        name="Channel",
+        description="What of the matte says how much of the shutter a pixel gets",
+        items=CHANNELS,
+        update=changed,
+        options=UNKEYED,
+    )
+    channel_name: StringProperty(
+        name="Channel Name", description="Name of the channel in the EXR file", maxlen=MAX_CHANNEL, update=changed
+    )
+    invert: BoolProperty(
+        name="Invert", description="The shutter gets what the matte leaves", update=changed, options=UNKEYED
+    )
+    timing: EnumProperty(
+        name="Frames Of",
+        description="What the matte's frames belong to",
+        items=TIMINGS,
+        update=changed,
+        options=UNKEYED,
+    )
+    offset: IntProperty(
+        name="Offset",
+        description="Frames by which the matte is ahead",
+        min=-MAX_FRAME,
+        max=MAX_FRAME,
+        update=changed,
+        options=UNKEYED,
+    )
+    blend: EnumProperty(
+        name="Blend",
+        description="How the matte lies over other regions",
+        items=BLENDS,
+        update=changed,
+        options=UNKEYED,
+        translation_context=CONTEXT,
+    )
+    opacity: FloatProperty(
+        name="Opacity",
+        description="How much of the region counts: at 0 the picture is as without it",
+        subtype="FACTOR",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        update=changed,
+    )
+    feather: FloatProperty(
+        name="Feather",
+        description="How wide a hard edge of the matte becomes, as a fraction of the picture's height",
+        min=0.0,
+        max=MAX_DISTANCE,
+        soft_max=0.2,
+        precision=3,
+        step=1,
+        update=changed,
+        translation_context=CONTEXT,
+    )
+    ramp: EnumProperty(name="Ramp", description="How the ramp runs", items=RAMPS, update=changed, options=UNKEYED)
+    width: FloatProperty(
+        name="Width",
+        description="Width of the lines as a fraction of the picture's height",
+        default=0.02,
+        min=0.0,
+        max=MAX_DISTANCE,
+        soft_max=0.5,
+        update=changed,
+    )
+    location: _location("Distance from where the region was drawn, as a fraction of the picture")
+    rotation: _rotation("Rotation about the region's center")
+    scale: _scale("Scale about the region's center")
+    follow_kind: EnumProperty(
+        name="Follow Track", description="What the region follows", items=FOLLOWED, default="TRACK", options=UNKEYED
+    )
+    follow_object: StringProperty(
+        name="Object", description="Tracking object that has the tracks; without one, the camera"
+    )
+    follow_track: StringProperty(name="Track", description="Name of the track or plane track that is followed")
+    # The frame, from the effect's start, at which the editor has put the region; and a digest of the markers that its
+    # keys were made from.
+    follow_frame: FloatProperty(name="Follow From", min=-2 * MAX_FRAME, max=2 * MAX_FRAME, options={"HIDDEN"})
+    follow_stamp: StringProperty(options={"HIDDEN"})
+
+
+class ShutterCamera(_Tracked, PropertyGroup):
+    name: StringProperty(name="Name", description="Name of the camera's animation channels", default="Camera")
+    influence: FloatProperty(
+        name="Influence",
+        description="How much is left of exposures that follow the camera: at 0 the shown frame alone",
+        subtype="FACTOR",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        update=changed,
+    )
+    location: _location("Where what the camera sees has moved to, as a fraction of the picture")
+    rotation: _rotation("Rotation of what the camera sees, about the picture's center")
+    scale: _scale("Scale of what the camera sees, about the picture's center")
