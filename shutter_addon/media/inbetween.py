@@ -24,7 +24,8 @@ from . import cuts
 from .completeness import why_short
 from .errors import MediaError, NotBuiltError
 from .files import check_index
-from .inbetween_cache import InbetweenCache, State, pair_line, unwritable, write_picture
+from .inbetween_cache import InbetweenCache, pair_line, unwritable, write_picture
+from .inbetween_folders import State
 from .source import SourceWrapper
 
 MEMORY = 4 << 30  # bytes of all pairs that are built at the same time, and of the frames that are read ahead

@@ -8,8 +8,6 @@ import re
 import secrets
 import stat
 import zlib
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import lru_cache, partial
 from pathlib import Path
@@ -19,7 +17,6 @@ import numpy as np
 from OpenImageIO import ImageInput, ImageOutput, ImageSpec, geterror
 
 from ..core import atomic_write
-from ..core.farm import claims
 from ..core.frames.frame_source import FrameSource
 from .completeness import is_whole_picture, why_short
 from .errors import MediaError
@@ -32,7 +29,6 @@ MAKER = "Virtual Shutter: in-between frames"
 SAMPLES = {"uint8": "uint8", "uint16": "uint16", "float16": "half", "float32": "float"}
 WHOLE = 8 << 20  # bytes; files of a source up to this size, such as uncompressed 8-bit HD pictures, are hashed whole
 BLOCKS, BLOCK = 16, 4096  # of a larger file so many blocks, of so many bytes each, are hashed
-READERS = 4  # threads that check pictures before they are removed
 
 # Bytes of files that a build makes, at most. Larger ones are another program's.
 LARGEST_MANIFEST = 1 << 16
@@ -43,21 +39,7 @@ LONGEST_LINE = 128  # bytes of a line of checks that is looked at; no build writ
 _PICTURE = re.compile(r"([0-9a-f]{64})  ([0-9]{8}\.(?:png|exr))\n?")
 _PAIR = re.compile(r"# ([0-9]{1,9}) (same|cut) [0-9a-f]{8}\n?")
 _CHECKS = re.compile(r"[0-9a-f]{8}\.sha256")
-_HALF = re.compile(r"[0-9]{8}\.(?:png|exr)|" + re.escape(MANIFEST))  # half-written files in a part folder
-_KEPT = 64  # folders of which the following is remembered
-_finished: dict[Path, tuple] = {}  # {folder: (stamp, finished pairs)}
-_sizes: dict[Path, tuple] = {}  # {folder: (stamp, bytes)}
-
-
-class State(NamedTuple):
-    """How far in-between frames are built.
-
-    name: "missing", "partial", "ready", or "stale": there are none of the source, but some of what it was before
-    done, total: finished pairs of neighbouring source frames, and all pairs"""
-
-    name: str
-    done: int
-    total: int
+HALF = re.compile(r"[0-9]{8}\.(?:png|exr)|" + re.escape(MANIFEST))  # half-written files in a part folder
 
 
 class InbetweenCache:
@@ -87,8 +69,8 @@ class InbetweenCache:
             "source": identity(source),
             "settings": {"factor": factor, "method": method},
         }
-        self.folder = Path(folder) / f"{source.path.stem[:40]}-{factor}x-{method}-{_key(made_of)}"
-        self.manifest = {**made_of, "path": _relative(source.path, folder)}
+        self.folder = Path(folder) / f"{source.path.stem[:40]}-{factor}x-{method}-{manifest_key(made_of)}"
+        self.manifest = {**made_of, "path": relative_path(source.path, folder)}
         self._spec = _spec(source.width, source.height, source.dtype, source.alpha)
         self._suffix = ".png" if source.dtype.kind == "u" else ".exr"
         self._token = secrets.token_hex(4)
@@ -98,13 +80,13 @@ class InbetweenCache:
 
     def load(self) -> None:
         """Reads `digests` and `kinds` again, if the folder has changed."""
-        stamp = _stamp(self.folder)
+        stamp = folder_stamp(self.folder)
         if stamp == self._loaded:
             return
         digests: dict[int, set[str]] = {}
         kinds: dict[int, str] = {}
         with suppress(OSError), Folder(self.folder) as folder:
-            checks = _read_checks(folder)
+            checks = read_checks(folder)
             for name, found in checks.digests.items():
                 if self._is_between(frame := int(name[:8])) and name == self._name(frame):
                     digests[frame] = found
@@ -164,7 +146,7 @@ class InbetweenCache:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             with Folder(self.folder) as folder, folder.make(CHECKS):
-                if _content_of(folder, MANIFEST) != text:
+                if content_of(folder, MANIFEST) != text:
                     with atomic_write.writing(self.folder / MANIFEST) as part:
                         part.write_bytes(text)
                 for part in atomic_write.left_behind(self.folder):
@@ -267,63 +249,9 @@ def content_digest(path: Path, whole: int = WHOLE) -> bytes:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):  # a pipe would never end
             raise MediaError(f"{path.name}: is no file")
-        return _content(path, status.st_size, status.st_mtime_ns, whole)
+        return content_hash(path, status.st_size, status.st_mtime_ns, whole)
     except OSError as error:
         raise MediaError(f"{path.name}: cannot be read ({error.strerror})") from None
-
-
-def state(source: FrameSource, folder, factor: int, method: str) -> State:
-    """How far a source's in-between frames are built, as the names of their files tell. Only a build or a read opens
-    these files.
-
-    While nothing changes it is fast: it asks for the time stamps of the source's files and of the folder alone.
-    MediaError: a file of the source is gone."""
-    cache, total = InbetweenCache(source, folder, factor, method), source.count - 1
-
-    def finished():
-        cache.load()
-        return len(cache.finished())
-
-    done = _remembered(_finished, cache.folder, finished)
-    if done or not total:
-        return State("ready" if done == total else "partial", done, total)
-    wanted = cache.manifest["path"], cache.manifest["settings"]
-    others = [manifest for name, manifest in _caches(os.path.realpath(folder)) if name != cache.folder.name]
-    stale = any((manifest["path"], manifest["settings"]) == wanted for manifest in others)
-    return State("stale" if stale else "missing", 0, total)
-
-
-def size(folder, source: FrameSource | None = None) -> int:
-    """The bytes that `purge` would free. Pictures that have changed count as well, though it does not remove them.
-
-    While nothing changes it is fast. MediaError: a file of the source is gone."""
-    folder = Path(folder)
-    return sum(_remembered(_sizes, folder / name, partial(_size, folder / name)) for name in _chosen(folder, source))
-
-
-def purge(
-    folder, source: FrameSource | None = None, left: Callable[[Path, int], None] = lambda path, count: None
-) -> int:
-    """Removes in-between frames in `folder`, of one source or of all, stale ones included. Returns the bytes freed.
-
-    It removes nothing else: pictures are read, and removed if they match their digests.
-    left: called with each cache's folder that is not empty after that, and the number of entries in it
-    MediaError: something cannot be removed, or `folder` is a link."""
-    names = _chosen(folder, source)
-    try:
-        with Folder(folder) as top:
-            return sum(_remove(top, name, left) for name in names)
-    except (FileNotFoundError, NotADirectoryError):
-        return 0
-    except OSError as error:
-        raise _irremovable(folder, error) from None
-
-
-def forget() -> None:
-    """Forgets what is remembered of sources and folders."""
-    _finished.clear()
-    _sizes.clear()
-    _content.cache_clear()
 
 
 def write_picture(path: Path, picture: np.ndarray, alpha: str) -> bool:
@@ -363,7 +291,7 @@ def pair_line(pair: int, kind: str) -> str:
     return f"# {text} {zlib.crc32(text.encode()):08x}"
 
 
-def _stamp(folder: Path) -> tuple | None:
+def folder_stamp(folder: Path) -> tuple | None:
     """A value that changes when files are made or removed in a cache's folder, or its checks change. None: there is no
     such folder."""
     try:
@@ -383,53 +311,21 @@ def stamp(folder, stem: str, factor: int, method: str) -> tuple:
 
     It asks for time stamps of caches alone, not of the sources' files."""
     caches = Path(folder).glob(f"{glob.escape(stem[:40])}-{factor}x-{method}-*")
-    return tuple((path.name, _stamp(path)) for path in sorted(caches))
+    return tuple((path.name, folder_stamp(path)) for path in sorted(caches))
 
 
-def _caches(folder) -> list[tuple[str, dict]]:
-    """(name, manifest) of every cache in `folder`."""
-    found = []
-    with suppress(OSError), Folder(folder) as top:
-        for entry in sorted(top.entries(), key=lambda entry: entry.name):
-            with suppress(OSError), top.folder(entry.name) as cache:
-                if (manifest := _manifest(cache)) is not None:
-                    found.append((entry.name, manifest))
-    return found
-
-
-def _manifest(cache: Folder) -> dict | None:
-    """A cache's manifest; None if it is not one of ours, or does not match the folder's name."""
-    with suppress(ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        manifest = json.loads(_content_of(cache, MANIFEST))
-        made_of = {key: value for key, value in manifest.items() if key != "path"}
-        named = cache.path.name.endswith(f"-{_key(made_of)}")
-        if named and made_of["maker"] == MAKER and manifest.keys() >= {"path", "source", "settings"}:
-            return manifest
-    return None
-
-
-def _key(made_of: dict) -> str:
+def manifest_key(made_of: dict) -> str:
     return hashlib.sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()[:12]
 
 
-def _content_of(cache: Folder, name: str) -> bytes | None:
+def content_of(cache: Folder, name: str) -> bytes | None:
     """A manifest's bytes; None if there is none, or it is larger than any of ours."""
     with suppress(OSError):
         return cache.read(name, LARGEST_MANIFEST)
     return None
 
 
-def _chosen(folder, source: FrameSource | None) -> list[str]:
-    """The names of the caches in `folder`: of one source, stale ones included, or of all."""
-    path, made_of = (None, None) if source is None else (_relative(source.path, folder), identity(source))
-    return [
-        name
-        for name, manifest in _caches(folder)
-        if source is None or manifest["path"] == path or manifest["source"] == made_of
-    ]
-
-
-class _Checks(NamedTuple):
+class Checks(NamedTuple):
     """What a cache's checks say.
 
     digests: {name of a picture: its digests}
@@ -443,8 +339,8 @@ class _Checks(NamedTuple):
     unreadable: list[OSError]
 
 
-def _read_checks(cache: Folder) -> _Checks:
-    checks = _Checks({}, {}, [], [])
+def read_checks(cache: Folder) -> Checks:
+    checks = Checks({}, {}, [], [])
     try:
         with cache.folder(CHECKS) as folder:
             for name in [entry.name for entry in folder.files() if entry.name.endswith(".sha256")]:
@@ -463,7 +359,7 @@ def _read_checks(cache: Folder) -> _Checks:
     return checks
 
 
-def _read_lines(file, checks: _Checks) -> bool:
+def _read_lines(file, checks: Checks) -> bool:
     """Adds the lines of a file to the checks. Returns whether all of them are of our format; the last one may be cut
     off, as on a full disk."""
     ours = others = 0
@@ -482,90 +378,16 @@ def _read_lines(file, checks: _Checks) -> bool:
     return not others
 
 
-def _pictures(cache: Folder, checks: _Checks) -> list[os.DirEntry]:
-    """The files in a cache's folder with the name of a picture that has a digest."""
-    return [
-        entry
-        for entry in cache.files()
-        if entry.name in checks.digests and entry.stat(follow_symlinks=False).st_size <= LARGEST_PICTURE
-    ]
-
-
-def _other_files(cache: Folder, checks: _Checks) -> Iterator[tuple[Folder, str]]:
-    """Our other files in a cache's folder, as (folder, name), in the order in which they are removed. The manifest is
-    last: without it, what is left would not be recognised as a cache again."""
-    yield from ((cache, entry.name) for entry in cache.files() if claims.is_claim(entry.name))
-    for entry in cache.entries():
-        if atomic_write.is_part(entry.name):
-            with suppress(OSError), cache.folder(entry.name) as part:
-                yield from ((part, file.name) for file in part.files() if _HALF.fullmatch(file.name))
-    if checks.own:
-        with cache.folder(CHECKS) as folder:
-            yield from ((folder, name) for name in checks.own)
-    yield cache, MANIFEST
-
-
-def _size(folder: Path) -> int:
-    with suppress(OSError), Folder(folder) as cache:
-        checks = _read_checks(cache)
-        if not checks.unreadable:
-            pictures = sum(entry.stat(follow_symlinks=False).st_size for entry in _pictures(cache, checks))
-            return pictures + sum(place.status(name).st_size for place, name in _other_files(cache, checks))
-    return 0
-
-
-def _remove(top: Folder, name: str, left) -> int:
-    try:
-        with top.folder(name) as cache:
-            if _manifest(cache) is None:  # another folder than a moment ago
-                return 0
-            checks = _read_checks(cache)
-            if checks.unreadable:
-                raise checks.unreadable[0]
-            with ThreadPoolExecutor(READERS) as pool:
-                names = [entry.name for entry in _pictures(cache, checks)]
-                freed = sum(pool.map(partial(_remove_picture, cache, checks), names))
-            freed += sum(place.remove(file) for place, file in _other_files(cache, checks))
-            for entry in cache.entries():
-                if entry.name == CHECKS or atomic_write.is_part(entry.name):
-                    with suppress(OSError):  # it is not empty: others' files are in it
-                        cache.remove_folder(entry.name)
-            count = len(cache.entries())
-        if count:
-            left(top.path / name, count)
-        else:
-            top.remove_folder(name)
-    except OSError as error:
-        raise _irremovable(top.path / name, error) from None
-    return freed
-
-
-def _remove_picture(cache: Folder, checks: _Checks, name: str) -> int:
-    ours = cache.digest(name, LARGEST_PICTURE) in checks.digests[name]
-    return cache.remove(name) if ours else 0
-
-
 def _remove_part(cache: Folder, name: str) -> None:
     with cache.folder(name) as part:
         for entry in part.files():
-            if _HALF.fullmatch(entry.name):
+            if HALF.fullmatch(entry.name):
                 part.remove(entry.name)
     cache.remove_folder(name)
 
 
-def _remembered(known: dict[Path, tuple], folder: Path, find: Callable[[], int]) -> int:
-    """The result of `find` for a folder, from `known` unless the folder has changed. `known` keeps _KEPT folders."""
-    now = _stamp(folder)
-    if known.get(folder, ((),))[0] != now:
-        known.pop(folder, None)
-        while len(known) >= _KEPT:
-            del known[next(iter(known))]
-        known[folder] = now, find()
-    return known[folder][1]
-
-
 @lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
-def _content(path: Path, size: int, _mtime: int, whole: int) -> bytes:
+def content_hash(path: Path, size: int, _mtime: int, whole: int) -> bytes:
     """The SHA-256 of a file's content; of a file over `whole`, that of its size and of blocks spread over it."""
     with path.open("rb") as file:
         if size <= whole:
@@ -582,16 +404,12 @@ def _sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _relative(path: Path, folder) -> str:
+def relative_path(path: Path, folder) -> str:
     """The path relative to the folder, so that it holds after both are moved together."""
     try:
         return Path(os.path.relpath(path, folder)).as_posix()
     except ValueError:  # another drive
         return path.absolute().as_posix()
-
-
-def _irremovable(folder, error: OSError) -> MediaError:
-    return MediaError(f"{folder}: cannot be removed ({error.strerror or error})")
 
 
 def unwritable(folder: Path, error: OSError) -> MediaError:

@@ -279,22 +279,22 @@ def test_a_folder_that_is_a_link_is_one_sentence_when_it_is_to_be_emptied(bpy, i
 def test_what_is_known_is_forgotten_with_the_file(bpy, inbetween_build, edit):
     from shutter_addon.blender.data import inbetween_settings
     from shutter_addon.blender.rendering import invalidation as finished
-    from shutter_addon.media import inbetween_cache
+    from shutter_addon.media import inbetween_cache, inbetween_folders
 
     bpy.ops.shutter.inbetween_build()
     look(bpy, inbetween_build)
     finished.invalidate_changed(edit)
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     known = [
-        inbetween_cache._finished,
-        inbetween_cache._sizes,
+        inbetween_folders._finished,
+        inbetween_folders._sizes,
         inbetween_build._looks,
         inbetween_build._media,
         finished._signatures,
         inbetween_settings.built._known,
     ]
     assert not any(known)
-    assert inbetween_cache._content.cache_info().currsize == 0
+    assert inbetween_cache.content_hash.cache_info().currsize == 0
 
 
 def test_footage_that_is_gone_is_one_sentence(bpy, effect, tmp_path):

@@ -17,7 +17,7 @@ import pytest
 from footage import picture, save_image
 from test_media_inbetween import COUNT, FACTOR, blend, build, footage, kept, opened, pictures, state
 
-from shutter_addon.media import MediaError, inbetween_cache, open_source
+from shutter_addon.media import MediaError, inbetween_cache, inbetween_folders, open_source
 
 
 @pytest.fixture(autouse=True)
@@ -76,8 +76,8 @@ def listed(folder):
 
 def purge(folder, *source):
     """Bytes freed, and what was left: {name of a folder: count}. Size has to have said so before."""
-    left, said = {}, inbetween_cache.size(folder, *source)
-    freed = inbetween_cache.purge(folder, *source, left=lambda path, count: left.update({path.name: count}))
+    left, said = {}, inbetween_folders.size(folder, *source)
+    freed = inbetween_folders.purge(folder, *source, left=lambda path, count: left.update({path.name: count}))
     assert said == freed
     return freed, left
 
@@ -169,9 +169,9 @@ def test_a_folder_that_is_a_link_serves_but_nothing_is_removed_behind_it(source,
     assert state(source, folder).name == "ready"
     assert len(pictures(tmp_path / "disk")) == (COUNT - 1) * (FACTOR - 1)
     before = listed(tmp_path / "disk")
-    assert inbetween_cache.size(folder, source) == 0
+    assert inbetween_folders.size(folder, source) == 0
     with pytest.raises(MediaError, match=r"virtual_shutter_inbetween: cannot be removed \(it is a link"):
-        inbetween_cache.purge(folder, source)
+        inbetween_folders.purge(folder, source)
     assert listed(tmp_path / "disk") == before
     assert purge(tmp_path / "disk")[0] > 0
 
@@ -191,7 +191,7 @@ def test_others_files_stay(source, folder, place):
     removed = built - {"00000002.png", "00000003.png"}
     size = sum((place / name).stat().st_size for name in removed)
     left = {}
-    freed = inbetween_cache.purge(folder, source, lambda path, count: left.update({path.name: count}))
+    freed = inbetween_folders.purge(folder, source, lambda path, count: left.update({path.name: count}))
     assert size < freed < size + 9999
     assert {path.name for path in place.iterdir()} == {
         *("00000099.png", "00000002.png", "12345678.exr", "notes.txt", ".00000001-0123abcd.part.png"),
@@ -199,7 +199,7 @@ def test_others_files_stay(source, folder, place):
     }
     assert {path.name for path in (place / "checks").iterdir()} == {"film.sha256", "0123abcd.sha256", "89ab.sha256"}
     assert left == {place.name: 9}
-    assert inbetween_cache.size(folder, source) == 0
+    assert inbetween_folders.size(folder, source) == 0
 
 
 def test_a_hard_link_goes_by_its_name_alone(source, folder, place, tmp_path):
@@ -300,14 +300,14 @@ def test_whatever_lies_there_is_ignored_or_refused(source, folder, place, kind, 
     else:
         assert expected.items() <= kept(folder).items()
         used(source, folder)
-    inbetween_cache.size(folder)
-    assert "cannot be removed" in (refusal(inbetween_cache.purge, folder) or "cannot be removed")
+    inbetween_folders.size(folder)
+    assert "cannot be removed" in (refusal(inbetween_folders.purge, folder) or "cannot be removed")
 
 
 def used(source, folder):
     """Asks for all that there is; pictures are right, or refused."""
     assert state(source, folder).done <= COUNT - 1
-    assert inbetween_cache.size(folder, source) >= 0
+    assert inbetween_folders.size(folder, source) >= 0
     assert inbetween_cache.stamp(folder, source.path.stem, FACTOR, "quick") is not None
     with opened(source, folder) as between:
         for index in range(between.count):
@@ -341,7 +341,7 @@ def test_another_user_s_files_are_ignored_and_stay_findable(source, folder, plac
     mode = path.stat().st_mode
     path.chmod(0)
     used(source, folder)
-    for refused in (refusal(build, source, folder), refusal(inbetween_cache.purge, folder)):
+    for refused in (refusal(build, source, folder), refusal(inbetween_folders.purge, folder)):
         assert refused is None or "Permission denied" in refused
     path.exists() and path.chmod(mode)
     assert name in ("manifest.json", "00000001.png") or listed(folder).keys() >= before.keys()
@@ -422,15 +422,15 @@ def test_a_source_that_became_a_pipe_is_one_sentence(source, folder):
 
 
 def test_what_is_known_of_folders_is_bounded_and_forgotten(source, tmp_path):
-    for number in range(2 * inbetween_cache._KEPT):
+    for number in range(2 * inbetween_folders._KEPT):
         state(source, tmp_path / f"{number}")
     build(source, tmp_path / "cache")
-    inbetween_cache.size(tmp_path / "cache")
-    assert len(inbetween_cache._finished) == inbetween_cache._KEPT
-    inbetween_cache.forget()
-    assert not inbetween_cache._finished
-    assert not inbetween_cache._sizes
-    assert inbetween_cache._content.cache_info().currsize == 0
+    inbetween_folders.size(tmp_path / "cache")
+    assert len(inbetween_folders._finished) == inbetween_folders._KEPT
+    inbetween_folders.forget()
+    assert not inbetween_folders._finished
+    assert not inbetween_folders._sizes
+    assert inbetween_cache.content_hash.cache_info().currsize == 0
 
 
 # All at once
@@ -483,11 +483,11 @@ def check(source, folder, seed):
     frames = [right(source, index) for index in range((source.count - 1) * FACTOR + 1)]
     for _ in range(2):
         state(source, folder)
-        inbetween_cache.size(folder, source)
+        inbetween_folders.size(folder, source)
         with opened(source, folder) as between:
             for index, frame in enumerate(frames):
                 with suppress(MediaError):
                     assert np.array_equal(between.read(index), frame), (seed, index)
         refused = refusal(build, source, folder)
         assert "cannot be written there" in refused if refused else state(source, folder).name == "ready", seed
-    assert "cannot be removed" in (refusal(inbetween_cache.purge, folder) or "cannot be removed"), seed
+    assert "cannot be removed" in (refusal(inbetween_folders.purge, folder) or "cannot be removed"), seed

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from ...core.messages import EffectError
 from ...core.model.shutters import ShutterError
-from ...media import MediaError, inbetween_cache
+from ...media import MediaError, inbetween_folders
 from ...media.inbetween import build, estimate
 from ..data import inbetween_settings, snapshot, source_media, strips
 from . import strobing
@@ -24,13 +24,13 @@ class Look(NamedTuple):
     size: bytes that the source's take, of all factors and methods
     estimate: bytes that they will take about; None while that is being found out, 0 if it cannot be"""
 
-    state: inbetween_cache.State
+    state: inbetween_folders.State
     size: int
     estimate: int | None
 
 
 _media: dict[tuple, tuple] = {}  # by source_media.media_key: the medium, its file not open; bytes for a factor of 2
-_looks: dict[tuple, tuple[float, inbetween_cache.State, int]] = {}  # when it was looked, and what was found
+_looks: dict[tuple, tuple[float, inbetween_folders.State, int]] = {}  # when it was looked, and what was found
 _running: "Build | None" = None
 _left: tuple[Future, ...] = ()  # of the last build: what it was in the middle of when it was stopped, it still ends
 
@@ -43,7 +43,7 @@ def look(edit, effect, strip) -> Look:
     key = spec.key, *settings
     when, *found = _looks.get(key, (0.0,))
     if not when or time.monotonic() - when > _FRESH:
-        found = inbetween_cache.state(medium, *settings), inbetween_cache.size(settings[0], medium)
+        found = inbetween_folders.state(medium, *settings), inbetween_folders.size(settings[0], medium)
         _looks[key] = time.monotonic(), *found
         _trim(_looks)
     return Look(*found, doubled.result() * (settings[1] - 1) if doubled.done() else None)
@@ -82,7 +82,7 @@ class Build:
     """In-between frames of an effect that are being built, by a thread that touches no bpy.
 
     scene: session_uid of the effect's scene; done, total: pairs of neighbouring source frames; settings: what it builds
-    future: how far it came, an inbetween_cache.State; or MediaError"""
+    future: how far it came, an inbetween_folders.State; or MediaError"""
 
     def __init__(self, edit, effect, strip, factor: int | None = None):
         """factor: builds what the strip needs with it, in place of all of the source with its own. EffectError,
@@ -106,11 +106,11 @@ class Build:
     def _update(self, done, _total):
         self.done = done
 
-    def result(self) -> inbetween_cache.State:
+    def result(self) -> inbetween_folders.State:
         """How far it came, or has come where it was stopped. MediaError: why it could not go on."""
         if self.future.done():
             return self.future.result()
-        return inbetween_cache.State("partial", self.done, self.total)
+        return inbetween_folders.State("partial", self.done, self.total)
 
     def stop(self) -> None:
         """Has it end soon, with the step that is under way; what is finished is kept."""
@@ -154,7 +154,7 @@ def purge(effect, source) -> tuple[int, list[tuple]]:
     wait(_left)
     folder, (medium, _) = inbetween_settings.folder(effect), _known(source_media.spec(source))
     left = []
-    freed = inbetween_cache.purge(folder, medium, lambda *place: left.append(place))
+    freed = inbetween_folders.purge(folder, medium, lambda *place: left.append(place))
     with suppress(OSError):  # other sources' are left there, or it never was
         folder.rmdir()
     _looks.clear()
@@ -171,4 +171,4 @@ def stop() -> None:
     wait([doubled for _medium, doubled in _media.values()])
     _media.clear()
     _looks.clear()
-    inbetween_cache.forget()
+    inbetween_folders.forget()
