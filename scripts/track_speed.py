@@ -28,6 +28,7 @@ from shutter_addon.core.model.effect import Drawings, Region
 from shutter_addon.core.model.keyframes import Constant
 from shutter_addon.media import PrefetchSource, open_source, tracking
 from shutter_addon.media.cuts import ShotSource
+from shutter_addon.media.footage import AHEAD, KEPT, Footage
 
 ROOT = Path(__file__).resolve().parents[1]
 REGIONS = {
@@ -59,26 +60,26 @@ def decode(path: Path, _kind: str) -> dict:
     """Seconds, those of all threads, and frames."""
     with PrefetchSource(open_source(path)) as source, timed(source.count) as taken:
         for index in range(source.count):
-            source.want(range(index, min(index + tracking.AHEAD, source.count)))
+            source.want(range(index, min(index + AHEAD, source.count)))
             source.read(index)
     return taken
 
 
 def track(path: Path, kind: str) -> dict:
     with ShotSource(PrefetchSource(open_source(path))) as source:
-        return _followed(tracking.Footage(source, lambda frame: frame), source, kind)
+        return _followed(Footage(source, lambda frame: frame), source, kind)
 
 
 def track_alone(path: Path, kind: str) -> dict:
     with open_source(path) as source:
-        footage = tracking.Footage(source, lambda frame: frame)
+        footage = Footage(source, lambda frame: frame)
         for index in range(source.count):
             footage.picture(index)
         return _followed(footage, source, kind)
 
 
 def _followed(footage, source, kind: str) -> dict:
-    frames = range(min(source.count, tracking.KEPT))
+    frames = range(min(source.count, KEPT))
     with timed(len(frames)) as taken:
         found = list(tracking.follow(region(kind, source.width / source.height), footage, 0, frames))
     if len(found) < len(frames) or found[-1].fault:

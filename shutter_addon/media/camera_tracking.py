@@ -15,9 +15,10 @@ import numpy as np
 from ..core.model import scribbles
 from ..core.model.effect import Camera, Region
 from ..core.model.motions import Placement, Similarity
-from . import registration, tracking
+from . import pursuit, registration, tracking
+from .footage import Footage
 from .registration import Motion, Part
-from .tracking import Footage, Tracked, TrackingError
+from .tracking import Tracked, TrackingError
 
 BARE = "what the regions leave of the picture has too few corners to follow"
 UNLIKE = "the picture is too unlike those before"
@@ -110,7 +111,7 @@ class _CameraTrack(tracking.Track):
         return part, 1.0
 
     def _pursuit(self, start: int) -> tuple[int, _Pursuit, float]:
-        worth = tracking.distinctness(self.part(start)[0], self._footage.size[0])
+        worth = pursuit.distinctness(self.part(start)[0], self._footage.size[0])
         return start, _Pursuit(lambda frame: self._part(frame)[0], self._footage, start, self._motion), worth
 
 
@@ -147,7 +148,7 @@ class _Pursuit:
         known, found = self._last[1], []
         for guess in (self._speed.after(known), known):
             match = part.find(picture, guess.after(motion.inverse()), self._motion)
-            sure = tracking.confidence(match, picture)
+            sure = pursuit.confidence(match, picture)
             found.append((match.motion.after(motion) if match else known, sure))
             if sure >= _ANEW:
                 break

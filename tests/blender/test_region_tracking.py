@@ -8,7 +8,7 @@ from shutter_addon.blender.data import annotations, fcurves, selection, strips, 
 from shutter_addon.blender.editing import add_effect, bar_edits, follow_track, region_edits, shutter_edits, track_region
 from shutter_addon.blender.editing.motion_keys import MotionKeys
 from shutter_addon.core.model.motions import Placement
-from shutter_addon.media import tracking
+from shutter_addon.media import pursuit
 
 SIZE = np.array([240, 160])
 COUNT = 20
@@ -458,7 +458,7 @@ def test_forward_from_a_covered_frame_is_never_surely_wrong(bpy, edit, tmp_path)
     track(bpy, "FORWARD")
     effect = active(bpy)[1]
     wrong = {frame for frame in range(11, 11 + COUNT) if apart(bpy, frame, frame - 11) > 2}
-    sure = {frame for frame in wrong if (track_region.confidence_at(effect, 0, frame) or 0) > tracking.SURE}
+    sure = {frame for frame in wrong if (track_region.confidence_at(effect, 0, frame) or 0) > pursuit.SURE}
     assert not sure
 
 

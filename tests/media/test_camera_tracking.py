@@ -12,8 +12,9 @@ from shutter_addon.core.model import motions
 from shutter_addon.core.model.effect import STILL_CAMERA, Camera, Drawings, Region
 from shutter_addon.core.model.keyframes import Constant, Keys
 from shutter_addon.core.model.motions import Placement, Similarity
-from shutter_addon.media import camera_tracking, open_source, tracking
+from shutter_addon.media import camera_tracking, open_source, pursuit, tracking
 from shutter_addon.media.cuts import ShotSource
+from shutter_addon.media.footage import Footage
 
 ENDS = np.array([0, WIDTH - 1, 1j * (HEIGHT - 1), WIDTH - 1 + 1j * (HEIGHT - 1)])
 CENTRE = np.array([0.5, 0.5])
@@ -65,7 +66,7 @@ def lasso(count):
 
 def tracked(source, regions=(), start=0, camera=STILL_CAMERA, **options):
     """The placements by frame, and the faults by frame."""
-    footage = tracking.Footage(source, lambda frame: frame)
+    footage = Footage(source, lambda frame: frame)
     found = list(camera_tracking.follow_camera(camera, regions, footage, start, range(source.count), **options))
     return {f.frame: f for f in found if not f.fault}, {f.frame: f.fault for f in found if f.fault}
 
@@ -82,7 +83,7 @@ def test_a_shaken_camera_is_found_behind_a_subject_that_covers_most_of_it():
     found, faults = tracked(source, [lasso(16)], start=6)
     assert (faults, found.keys()) == ({}, set(range(16)))
     assert max(error(found, truth, 6, frame) for frame in found) < 1
-    assert min(each.confidence for each in found.values()) > tracking.SURE
+    assert min(each.confidence for each in found.values()) > pursuit.SURE
     mistaken, _ = tracked(source, start=6)
     assert max(error(mistaken, truth, 6, frame) for frame in mistaken) > 10
 
@@ -110,7 +111,7 @@ def test_a_wall_that_repeats_itself_is_never_sure():
     source = Film([wall[:, 10 * n : 10 * n + WIDTH] for n in range(5)])
     found, _ = tracked(source)
     assert max(abs(found[n].placement.location[0] * WIDTH + 10 * n) for n in found) > 10
-    assert [n for n in found if found[n].confidence >= tracking.SURE] == [0]
+    assert [n for n in found if found[n].confidence >= pursuit.SURE] == [0]
 
 
 @pytest.mark.parametrize(("motion", "turned", "scaled"), [("location", 0, 0), ("rotation", 1, 0), ("scale", 1, 1)])

@@ -14,8 +14,9 @@ from shutter_addon.core.model import motions, scribbles
 from shutter_addon.core.model.effect import Drawings, Region
 from shutter_addon.core.model.keyframes import Constant, Keys
 from shutter_addon.core.model.motions import Similarity
-from shutter_addon.media import open_source, tracking
+from shutter_addon.media import open_source, pursuit, tracking
 from shutter_addon.media.cuts import ShotSource
+from shutter_addon.media.footage import Footage
 
 ASSETS = Path(__file__).parents[2] / "assets"
 SIZE = WIDTH, HEIGHT = 480, 270
@@ -116,7 +117,7 @@ def region(kind, *, drawn=None, location=(0.0, 0.0)):
 
 def followed(source, kind, start, frames=None, **options):
     """What was tracked, by frame, and the faults, by frame."""
-    footage = tracking.Footage(source, lambda frame: frame)
+    footage = Footage(source, lambda frame: frame)
     given = region(kind) if "region" not in options else options.pop("region")
     tracked, faults = {}, {}
     for found in tracking.follow(given, footage, start, frames or range(source.count), **options):
@@ -143,7 +144,7 @@ def errors(tracked, truth, kind):
 
 
 def sure(tracked):
-    return {frame for frame, each in tracked.items() if each.confidence > tracking.SURE}
+    return {frame for frame, each in tracked.items() if each.confidence > pursuit.SURE}
 
 
 def shake(t):
@@ -227,7 +228,7 @@ def test_a_subject_that_stays_covered_ends_it(subject, ground, monkeypatch):
     monkeypatch.setattr(tracking, "PATIENCE", 6)
     source, truth = film(subject, ground, lambda t: (2.0 * t,), 24, 2, covered=range(8, 24))
     tracked, faults = followed(source, "lasso", 2)
-    assert faults == {8: tracking.COVERED}
+    assert faults == {8: pursuit.COVERED}
     assert sorted(tracked) == list(range(8))
     assert max(errors(tracked, truth, "lasso").values()) <= 1
 
@@ -238,7 +239,7 @@ def test_a_gap_between_two_keys_has_a_fault_on_each_side(passing, monkeypatch):
     keys = Keys((4.0, 20.0), ((0.0, 0.0), (40 / WIDTH, -8 / HEIGHT)), ("linear",) * 2)
     given = region("lasso", location=keys)
     tracked, faults = followed(source, "lasso", 4, range(4, 24), region=given, anchors={20})
-    assert faults == {10: tracking.COVERED, 14: tracking.COVERED}
+    assert faults == {10: pursuit.COVERED, 14: pursuit.COVERED}
     assert set(tracked) == {*range(4, 10), *range(15, 21)}
 
 
@@ -254,7 +255,7 @@ def test_a_subject_that_leaves_the_picture_and_comes_back(subject, ground):
     assert {0, 5, 28, 29} <= sure(tracked)
     assert 14 not in sure(tracked)
     tracked, faults = followed(source, "line", 2, range(14))
-    assert list(faults.values()) == [tracking.LEFT]
+    assert list(faults.values()) == [pursuit.LEFT]
 
 
 def test_a_subject_without_corners_is_never_sure(subject, ground):
@@ -335,7 +336,7 @@ def test_the_order_of_reading_and_threads_change_no_bit(subject, ground, tmp_pat
     try:
         cv2.setNumThreads(1)
         cv2.setRNGSeed(5)
-        footage = tracking.Footage(source, lambda frame: frame)
+        footage = Footage(source, lambda frame: frame)
         for frame in (13, 3, 8, 0):
             footage.picture(frame)
         again = list(tracking.follow(region("lasso"), footage, 6, range(14)))
@@ -353,7 +354,7 @@ def test_backward_a_source_is_read_upwards(subject, ground):
 def test_what_a_retimed_strip_shows_is_tracked(subject, ground):
     """Reversed, every frame twice."""
     source, truth = film(subject, ground, lambda t: (3 * t, 0, t), 8, 7)
-    footage = tracking.Footage(source, lambda frame: 7 - (frame - 100) // 2)
+    footage = Footage(source, lambda frame: 7 - (frame - 100) // 2)
     tracked = {each.frame: each for each in tracking.follow(region("line"), footage, 100, range(100, 116))}
     shown = {frame: truth[7 - (frame - 100) // 2] for frame in tracked}
     assert sorted(tracked) == list(range(100, 116))
@@ -366,9 +367,7 @@ def test_deep_and_linear_pictures_look_alike(subject):
     deep = Film([subject.astype(np.uint16) * 257])
     linear = Film([light.to_linear(subject / 255).astype(np.float32)])
     linear.transfer = "linear"
-    plain, *others = (
-        tracking.Footage(each, lambda frame: frame).picture(0) for each in (Film([subject]), deep, linear)
-    )
+    plain, *others = (Footage(each, lambda frame: frame).picture(0) for each in (Film([subject]), deep, linear))
     for other in others:
         assert np.abs(plain.astype(int) - other).max() <= 1
 
@@ -395,7 +394,7 @@ def test_colours_that_are_hidden_mislead_nobody(subject, ground, kind, dtype):
         frames.append(np.dstack([colours, np.rint(255 * over)]).astype(np.uint8))
     over_black = Film([np.rint(frame[..., :3] * (frame[..., 3:] / 255)).astype(np.uint8) for frame in frames])
     given = CutOut([frame / np.float32(255) if dtype == np.float32 else frame for frame in frames])
-    pictures = [tracking.Footage(source, lambda frame: frame).picture(0) for source in (over_black, given)]
+    pictures = [Footage(source, lambda frame: frame).picture(0) for source in (over_black, given)]
     assert np.abs(np.subtract(*pictures, dtype=int)).max() <= 1
     tracked, faults = followed(given, kind, 3)
     assert not faults
@@ -419,7 +418,7 @@ def test_what_cannot_be_tracked_is_one_sentence(subject, given, start, frames, f
     flat = np.random.default_rng(0).normal(128, 2, (3, HEIGHT, WIDTH, 3)).round().astype(np.uint8)
     source = Film(list(flat) if given.pop("flat", False) else [subject] * 3)
     with pytest.raises(tracking.TrackingError) as raised:
-        tracking.follow(region("line", **given), tracking.Footage(source, lambda frame: frame), start, frames)
+        tracking.follow(region("line", **given), Footage(source, lambda frame: frame), start, frames)
     assert str(raised.value) == fault
 
 

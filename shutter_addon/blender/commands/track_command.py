@@ -12,6 +12,7 @@ from ...core.model.effect import Region
 from ...core.recipes import recipe, recipe_file, region_keys
 from ...media import PrefetchSource, camera_tracking, filmed_frames, registration, tracking
 from ...media.cuts import ShotSource
+from ...media.footage import Footage
 from ..editing import new_edit
 from ..output import film_output
 from . import command_line
@@ -97,7 +98,7 @@ def _followed(arguments, source_recipe, index: int | None, medium, frames: range
     times = {frame: _shown(source_recipe, frame, medium.count) for frame in frames}
     filmed = filmed_frames.FilmedFrames(times, arguments.frame)
     with ShotSource(PrefetchSource(medium)) as shots, film_output.progress(len(filmed.frames), "frame") as moved:
-        footage = tracking.Footage(shots, filmed.index_at)
+        footage = Footage(shots, filmed.index_at)
         what = footage, filmed.start, filmed.frames
         if index is None:
             drawn = [region for region in effect.regions if isinstance(region, Region)]

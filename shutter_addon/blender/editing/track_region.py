@@ -22,7 +22,8 @@ from ...core.model.effect import Camera, Region
 from ...core.model.frame_state import Options
 from ...core.model.keyframes import Samples
 from ...core.recipes import region_keys
-from ...media import camera_tracking, tracking
+from ...media import camera_tracking, pursuit, tracking
+from ...media.footage import Footage
 from ...media.tracking import Tracked
 from ..data import annotations, inbetween_settings, selection, snapshot, strips, validation
 from ..data.validation import EffectError
@@ -223,7 +224,7 @@ def confidence_at(effect, index: int | None, frame: float) -> float | None:
 def next_unsure(effect, index: int | None, frame: float) -> int | None:
     """The least sure timeline frame of the first stretch of unsure ones that begins after a frame, or None."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
-    unsure = (frames <= limits.MAX_FRAME) & (confidence < tracking.SURE)
+    unsure = (frames <= limits.MAX_FRAME) & (confidence < pursuit.SURE)
     begins = np.flatnonzero(unsure & ~np.append(False, unsure[:-1]) & (frames > frame))
     if not len(begins):
         return None
@@ -234,7 +235,7 @@ def next_unsure(effect, index: int | None, frame: float) -> int | None:
 def unsure_among(effect, index: int | None, frames) -> int:
     """Of how many of these timeline frames tracking was not sure."""
     known, confidence = MotionKeys(effect, index, "LOCATION").confidence()
-    return int((np.isin(known, list(frames)) & (confidence < tracking.SURE)).sum())
+    return int((np.isin(known, list(frames)) & (confidence < pursuit.SURE)).sum())
 
 
 def _region(edit, effect, strip, index: int, frames, here: Tracked) -> _Subject:
@@ -272,7 +273,7 @@ def _followed(
     """As tracking.follow, its sentences in the user's language, by a thread beside Blender (stopping.beside)."""
     with snapshot.translated():
         try:
-            footage = tracking.Footage(source, lambda frame: session.source_index(shown, frame, source)[0])
+            footage = Footage(source, lambda frame: session.source_index(shown, frame, source)[0])
             found = partial(subject.follow, footage, start, frames, motion=motion.lower(), anchors=anchors)
             with closing(stopping.beside(_each(found), patience)) as steps:
                 yield from steps

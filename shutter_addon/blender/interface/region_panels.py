@@ -4,7 +4,7 @@ import math
 
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...media.tracking import SURE
+from ...media.pursuit import SURE
 from ..data import matte_look, selection, strips, validation
 from ..data.choices import CONTEXT
 from ..editing import follow_track, track_region

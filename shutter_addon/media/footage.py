@@ -1,0 +1,90 @@
+"""What a strip shows, for tracking: grey pictures of a size that is enough for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..core import stopping
+from ..core.frames import light
+from ..core.frames.frame_source import FrameSource
+from . import registration
+
+WIDTH = 960  # pixels of the pictures that are compared, at most, along their longer side
+AHEAD = 8  # frames that the source may decode in advance
+BLOCK = 48  # frames that are read at once where tracking goes backward: movies are decoded upwards alone
+KEPT = 256  # grey pictures that are kept, of half a megabyte each
+
+
+class Footage:
+    """What a strip shows, for tracking: grey pictures of a size that is enough for it.
+
+    size: width and height of the pictures; index_at: the source's frame that is shown at a timeline frame"""
+
+    def __init__(self, source: FrameSource, index_at: Callable[[int], int]):
+        """MediaError: OpenCV is missing."""
+        registration.check()
+        self._source, self._index_at = source, index_at
+        share = min(1.0, WIDTH / max(source.width, source.height))
+        self.size = max(1, round(source.width * share)), max(1, round(source.height * share))
+        self._kept: dict[int, np.ndarray] = {}
+        self._wanted: Sequence[int] = ()
+
+    def want(self, frames: Sequence[int]) -> None:
+        """Says which timeline frames will be asked for, in this order."""
+        self._wanted = frames
+
+    def picture(self, frame: int) -> np.ndarray:
+        """The picture (H, W) uint8 at a timeline frame. MediaError: it cannot be read. Tracking may end here
+        (core.stopping)."""
+        stopping.check()
+        index = self._index_at(frame)
+        if index not in self._kept:
+            self._read(index, *self._beside(frame))
+        return self._kept[index]
+
+    def cut(self, before: int, after: int) -> bool:
+        """Whether there is a cut between what two timeline frames show."""
+        first, second = self._index_at(before), self._index_at(after)
+        return self._cut(min(first, second), max(first, second))
+
+    def _cut(self, low: int, high: int) -> bool:
+        shots = self._source.shots
+        return shots is not None and low != high and high not in shots.around(low, low, high)
+
+    def _beside(self, frame: int) -> tuple[int, list[int]]:
+        """The source's frame that is shown before a wanted frame, and those that are lacking behind it, in order."""
+        if frame not in self._wanted:
+            return self._index_at(frame), []
+        place = self._wanted.index(frame)
+        before = self._index_at(self._wanted[place - 1] if place else frame)
+        upcoming = dict.fromkeys(map(self._index_at, self._wanted[place + 1 : place + BLOCK]))
+        return before, [index for index in upcoming if index not in self._kept]
+
+    def _read(self, index: int, before: int, upcoming: list[int]) -> None:
+        """Reads a frame, and those that come next if they lie before it."""
+        backward = [i for i in upcoming if i < index]
+        block = sorted({index, *backward})
+        self._source.want([*block, *(upcoming[:AHEAD] if not backward else ())])
+        last = min(before, block[0])
+        for i in block:
+            stopping.check()
+            self._cut(last, i)  # so that frames are read upwards, and once, to find cuts
+            self._kept[i], last = self._grey(self._source.read(i)), i
+        while len(self._kept) > KEPT:
+            del self._kept[next(iter(self._kept))]
+
+    def _grey(self, frame: np.ndarray) -> np.ndarray:
+        """Over black: colours that are hidden may be anything."""
+        alpha = self._source.alpha
+        if frame.dtype != np.uint8:
+            frame, alpha = _levels(light.over_black(frame, alpha), self._source.transfer), "opaque"
+        return registration.grey(frame, self.size, alpha)
+
+
+def _levels(frame: np.ndarray, transfer: str) -> np.ndarray:
+    """Samples, of 16 bits or floats from 0 to 1, as levels of 8 bits, as they are shown."""
+    if frame.dtype == np.uint16:
+        return (frame >> 8).astype(np.uint8)
+    return np.rint(255 * (light.to_encoded(frame) if transfer == "linear" else frame)).astype(np.uint8)

@@ -1,0 +1,147 @@
+"""A part of a picture, looked for in one picture after another, and how sure that is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core.model.motions import Similarity
+from . import registration
+from .footage import Footage
+from .registration import Match, Motion, Part
+
+COVERED = "the subject is covered, or looks too different"
+LEFT = "the subject has left the picture"
+SURE = 0.5  # from here on a frame is within about a pixel of 640
+_LOST = 0.12  # below it nothing was found
+_AGAIN = 0.3  # below it nothing was found where it might be anywhere
+DOUBTFUL = 0.2  # below it, it may as well be anywhere
+_DRIFT, _LEAST = 0.95, 0.1  # what a later look is worth beside the one before it, and at least
+_SHIFTED = 0.6  # what a location is worth where rotation and scale could not be found
+_FADING = 0.6  # below it another frame is taken to compare with beside the first
+_AROUND = 0.05  # widths of the picture around its place within which it is sought at least
+_REPEATED = 0.3  # what a part is worth that looks like what is beside it
+
+
+class PartPursuit:
+    """A part of a picture, looked for in one picture after another.
+
+    reason: why it was not found in the last one"""
+
+    def __init__(self, part: Part, footage: Footage, frame: int, motion: Motion, known: Similarity | None = None):
+        """frame: the part's; known: the motion up to a frame in which the part is, but cannot be seen; the next one
+        comes after that. None: it comes after the part's."""
+        self._first, self._footage, self._motion, self.reason = part, footage, motion, COVERED
+        # the motion up to the last picture in which it was found, and its last step
+        self._known, self._speed = known or Similarity(), Similarity()
+        self._missed = 0 if known is None else 1  # for how many pictures it was not found
+        self._look = _Look(part, Similarity(), 1.0)  # how it looked later, if it is no longer like the first
+        # the last picture in which it was found, the motion, its confidence
+        self._seen = footage.picture(frame), Similarity(), 1.0
+
+    def next(self, frame: int) -> tuple[Similarity, float] | None:
+        """The motion from the first picture to a frame's, and its confidence; None: it is not there."""
+        picture, missed = self._footage.picture(frame), self._missed
+        found = None if missed else self._found(picture, self._speed.after(self._known))
+        if found is None:
+            self._look_anew()
+            found = self._found_elsewhere(picture, missed, self._look)
+        elif found[1] < DOUBTFUL:
+            found = self._found_elsewhere(picture, missed) or found
+        if found is None:
+            if not missed:
+                self.reason = LEFT if self._leaves(picture) else COVERED
+            self._missed += 1
+            return None
+        self._speed = found[0].after(self._known.inverse()) if not missed else Similarity()
+        self._known, self._seen, self._missed = found[0], (picture, *found), 0
+        return found
+
+    def _found(self, picture, guess: Similarity) -> tuple[Similarity, float] | None:
+        """As `next`, near to a guess: as it looked first or, if that is not sure, as it looked later."""
+        match = self._first.find(picture, guess, self._motion)
+        sure = confidence(match, picture)
+        if sure >= SURE:
+            self._first.learn(match)
+        if sure >= _FADING:
+            return match.motion, sure
+        later = self._by_later_look(picture, guess)
+        if later is None:
+            return (match.motion, sure) if sure >= _LOST else None
+        points = self._first.points
+        if sure < SURE and np.abs(later[0](points) - guess(points)).max() > 1:
+            # from there the first look may be near enough
+            again = self._first.find(picture, later[0], self._motion)
+            if confidence(again, picture) > sure:
+                match, sure = again, confidence(again, picture)
+        return (match.motion, sure) if sure >= min(SURE, later[1]) else later
+
+    def _by_later_look(self, picture, guess: Similarity) -> tuple[Similarity, float] | None:
+        if self._look.part is self._first:
+            self._look_anew()
+        found = self._look.find(picture, guess, self._motion)
+        if found is None or found[1] < SURE * self._look.worth:
+            self._look_anew()
+            found = self._look.find(picture, guess, self._motion) or found
+        return found
+
+    def _look_anew(self) -> None:
+        """Takes the look that it had when it was found last."""
+        picture, motion, worth = self._seen
+        if later := self._first.again(picture, motion):
+            self._look = _Look(later, motion, max(_DRIFT * worth, _LEAST))
+
+    def _found_elsewhere(self, picture, missed: int, *looks: _Look) -> tuple[Similarity, float] | None:
+        """As `_found`, of all places where it may be by now; only if it looks as it did first, or as in other looks."""
+        radius = _AROUND * picture.shape[1] * (1 + missed / 4)
+        found = []
+        for look in (_Look(self._first, Similarity(), 1.0), *looks):
+            from_there = self._known.after(look.motion.inverse())
+            for guess in (from_there, look.part.seek(picture, from_there, radius)):
+                match = guess and look.part.find(picture, guess, self._motion)
+                if (sure := confidence(match, picture)) >= _AGAIN:
+                    found.append((match.motion.after(look.motion), look.worth * sure))
+        return max(found, key=lambda each: each[1], default=None)
+
+    def _leaves(self, picture) -> bool:
+        """Whether most of the part would lie outside of the picture if it went on."""
+        places = self._speed.after(self._speed).after(self._known)(self._first.points)
+        height, width = picture.shape
+        inside = (places.real >= 0) & (places.real < width) & (places.imag >= 0) & (places.imag < height)
+        return inside.mean() < 0.5
+
+
+@dataclass(frozen=True)
+class _Look:
+    """How a part looked in some picture; motion: from the first picture to that one; worth: the confidence of that."""
+
+    part: Part
+    motion: Similarity
+    worth: float
+
+    def find(self, picture, guess: Similarity, motion: Motion) -> tuple[Similarity, float] | None:
+        """The motion from the first picture, and its confidence: by corners or, where these do not agree on the
+        motion, on the location alone."""
+        guess = guess.after(self.motion.inverse())
+        for way, share in ((motion, 1.0), ("location", _SHIFTED)):
+            match = self.part.find(picture, guess, way)
+            if (sure := confidence(match, picture)) >= _LOST:
+                return match.motion.after(self.motion), share * self.worth * sure
+        return None
+
+
+def confidence(match: Match | None, picture: np.ndarray) -> float:
+    """How sure a match is, 0 to 1: by its expected error, how many corners agree, and how like the pixels are: the more
+    alike, the fewer corners have to agree."""
+    if match is None:
+        return 0.0
+    error = match.error * 640 / max(picture.shape)
+    likeness = max(match.likeness, 0.0)
+    factors = likeness / 0.6, match.share / (0.9 - 0.6 * likeness), match.visible / 0.6
+    return float(np.prod([min(factor, 1.0) for factor in factors])) / (1 + (error / 0.7) ** 2)
+
+
+def distinctness(part: Part, width: int) -> float:
+    """How sure it is that a part is not taken for what is beside it in a picture of that width, up to 1."""
+    return float(np.clip((1 - part.rival(_AROUND * width)) / (1 - registration.ALIKE), _REPEATED, 1))
