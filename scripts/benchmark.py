@@ -40,7 +40,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from shutter_addon.compute import cpu, diffusion, diffusion_gpu, edge_diffusion, edge_diffusion_gpu, gpu, guide
+from shutter_addon.compute import (
+    composition_passes,
+    cpu,
+    diffusion,
+    diffusion_gpu,
+    edge_diffusion,
+    edge_diffusion_gpu,
+    guide,
+)
 from shutter_addon.compute.benchmark import BARS, Noise, bars, levels_apart, reference, shapes
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.tables import table as table_of
@@ -266,7 +274,7 @@ class Case:
             return None
         values, span = table_of(self.state), shutters.open_span(self.state.bars)
         rows, open_frames = len(values) - 1, np.ptp(span)
-        way = gpu.way_of(self.window, options, values, span, False)
+        way = composition_passes.way_of(self.window, options, values, span, False)
         read = {"sums": 32 * rows, "pieces": 4 * open_frames}.get(way, 8 * (open_frames + 1))
         if isinstance(self.window, Frames):
             read = 4 * open_frames

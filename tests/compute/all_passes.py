@@ -3,29 +3,45 @@
 import importlib.util
 import itertools
 
-from shutter_addon.compute import diffusion_gpu, edge_diffusion_gpu, gpu, matting, mixing, window
+from shutter_addon.compute import composition_passes, diffusion_gpu, edge_diffusion_gpu, matting, mixing, window
+from shutter_addon.compute.composition_passes import (
+    Light,
+    Moved,
+    composition,
+    composition_of_moved,
+    composition_of_sums,
+)
 from shutter_addon.devices.passes import Pass
 
 _WAYS = ("frames", "search", "value")
 
 
 def _declared():
-    for module in (diffusion_gpu, edge_diffusion_gpu, gpu):
+    for module in (diffusion_gpu, edge_diffusion_gpu, composition_passes):
         yield from (value for value in vars(module).values() if isinstance(value, Pass))
 
 
 def _composing():
+    def light(levels, encoded=False, premultiplied=True):
+        return Light(1, premultiplied, encoded, levels)
+
+    def moved(quads, packed, at=(False, False), **others):
+        given = {"shutters": 3, "mixed": 3, "shortened": packed, "sharp": True} | others
+        return Moved(quads=quads, packed=packed, continued=at[0], unfinished=at[1], **given)
+
     for way, edges in itertools.product(("pieces", *_WAYS), (1, 2)):
-        yield gpu.composition(way, 3, "frames", 1, edges, True, False, edges == 2)
+        yield composition(way, 3, "frames", edges, light(edges == 2))
     for way, stored in itertools.product(_WAYS, ("sums", "tiles")):
-        yield gpu.composition(way, 3, stored, 1, 2, True, False, stored == "sums")
+        yield composition(way, 3, stored, 2, light(stored == "sums"))
     for rows, groups, back, tiled in ((1, 1, False, True), (4, 2, True, False), (32, 4, True, True)):
-        yield gpu.composition_of_sums(rows, groups, back, tiled, True, back)
+        yield composition_of_sums(rows, groups, back, tiled, light(back, encoded=True))
     for way, packed in itertools.product(_WAYS, (True, False)):
         for at in ((True, False), (False, True)):
-            yield gpu.composition_of_moved(way, 1, 3, 3, packed, 1, packed, False, False, True, at, True)
-        quads = 1 if way == "search" else 4
-        yield gpu.composition_of_moved(way, quads, 5, 1, packed, 1, False, True, True, False, (False, False), packed)
+            yield composition_of_moved(way, moved(1, packed, at), light(True, premultiplied=False))
+        others = {"shutters": 5, "mixed": 1, "shortened": False, "sharp": False}
+        yield composition_of_moved(
+            way, moved(1 if way == "search" else 4, packed, **others), light(packed, encoded=True)
+        )
 
 
 def _filling():

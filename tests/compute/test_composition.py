@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from shutter_addon.compute import cpu, gpu, window
+from shutter_addon.compute import composition_passes, cpu, window
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
@@ -316,7 +316,7 @@ def test_long_windows_of_shutters_far_apart(device, count):
 @pytest.mark.parametrize("edges", ["hold", "shorten"])
 @pytest.mark.parametrize("stored", ["uint8", "float32"])
 def test_each_pixel_looks_up_its_pieces(gpu_device, monkeypatch, edges, stored):
-    monkeypatch.setattr(gpu, "_MOST_ITERATIONS", 0)
+    monkeypatch.setattr(composition_passes, "_MOST_ITERATIONS", 0)
     rng = np.random.default_rng(19)
     source = footage(rng, dtype=np.dtype(stored), transfer="linear" if stored == "float32" else "srgb")
     check(GPUCompositor(gpu_device), source, far_apart(rng, 5, 16, edges=edges), 15)

@@ -1,0 +1,240 @@
+"""The passes that compose: one for each way to go through a window, compiled for what is composed; and which way is
+the fastest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from ..core.model.frame_state import Options
+from ..devices.passes import LOCAL_ROW, Image, Pass
+from .window import BLOCK, Sums
+
+# Rows of pixels that one invocation of compose_sums composes.
+PAIR = 2
+
+EDGES = {"hold": 0, "mirror": 1, "shorten": 2}
+# What a picture is stored as, by whether it is levels.
+PICTURE = {False: "rgba32f", True: "rgba8"}
+_READ = Image("rgba32f", reads=True, writes=False)
+LEVELS = Pass(
+    "levels",
+    images={"picture": _READ, "levels": Image("rgba8")},
+    constants={"size": "ivec2"},
+    local_size=LOCAL_ROW,
+)
+_COEFFICIENTS = {"coefficients": _READ}
+_PLACE = {"size": "ivec2", "top": "int", "block_bits": "int"}
+_LAYERS = dict.fromkeys(("origin", "direction", "layers", "lowest", "lowest_layer"), "int")
+_OF_SUMS = {"sums": Image("rgba16ui", reads=True, writes=False)}
+_UNIT = {"held": "int", "unit": "float"}
+# Constants that only some passes use: Blender's `gpu` has no others.
+_OF_WAY = {"pieces": ("rows",), "value": ("first", "last")} | dict.fromkeys(
+    ("frames", "search"), ("rows", "first", "last")
+)
+# Rows of pixels that one invocation composes, by the pass; BLOCK for all others.
+_LINES = {"sums": PAIR, "search": 4}
+# Loop iterations of an invocation. Mesa's software renderer ends its loops after 65,535 in all, without an error.
+_MOST_ITERATIONS = 60_000
+# The numbers of pieces for which compose_sums is compiled. A table with another number is filled up with empty pieces.
+_ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
+
+
+@dataclass(frozen=True)
+class Light:
+    """How light is read, summed and stored.
+
+    decode: a number of window.decoding
+    premultiplied: whether the frames' colours are
+    encoded: whether the sums are of encoded light (Options.light)
+    levels: whether the picture is of levels, not scene-linear"""
+
+    decode: int
+    premultiplied: bool
+    encoded: bool
+    levels: bool
+
+
+@dataclass(frozen=True)
+class Moved:
+    """What is composed where shutters follow something.
+
+    quads: of pixels that an invocation composes
+    shutters: their number; mixed: motions that are mixed for a pixel
+    packed: whether the window holds PackedFrames; shortened: whether frames are left out
+    sharp: how frames are resampled (core.pixels.compositor.seen)
+    continued, unfinished: whether passes over other frames come before, and after"""
+
+    quads: int
+    shutters: int
+    mixed: int
+    packed: bool
+    shortened: bool
+    sharp: bool
+    continued: bool
+    unfinished: bool
+
+
+def _stored_as(levels: bool) -> tuple[dict, dict]:
+    """The images and constants of a pass that stores a finished picture: of levels, or scene-linear
+    (shaders/include/finish.glsl)."""
+    return {"picture": Image(PICTURE[levels])}, {} if levels else {"height": "int"}
+
+
+@cache
+def composition(way: str, groups: int, stored: str, edges: int, light: Light) -> Pass:
+    """The pass compose_<way> for a way of `way_of` other than "sums".
+
+    groups: of four shutters
+    stored: what the window holds: "frames", "sums", or sums in "tiles"
+    edges: a number of EDGES
+    """
+    summed = stored != "frames"
+    images, constants = _stored_as(light.levels)
+    return Pass(
+        f"compose_{way}",
+        samplers={} if summed else {"frames": "sampler2DArray"},
+        images=images | _COEFFICIENTS | {"table": _READ} | (_OF_SUMS if summed else {}),
+        constants=_PLACE
+        | constants
+        | _LAYERS
+        | dict.fromkeys(_OF_WAY[way], "int")
+        | ({"count": "int"} if edges == 2 or not summed else {})
+        | (_UNIT if summed else {}),
+        defines={
+            "MOVED": 0,
+            "PACKED": 0,
+            "GROUPS": groups,
+            "SUMS": int(summed),
+            "TILED": int(stored == "tiles"),
+            "EDGES": edges,
+            "DECODE": light.decode,
+            "PREMULTIPLIED": int(light.premultiplied),
+            "ENCODED": int(light.encoded),
+            "LEVELS": int(light.levels),
+        },
+        local_size=LOCAL_ROW,
+    )
+
+
+@cache
+def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, light: Light) -> Pass:
+    """The pass compose_sums for `rows` pieces. back: the source plays in reverse; groups: as for `composition`."""
+    images, constants = _stored_as(light.levels)
+    return Pass(
+        "compose_sums",
+        images=images | _COEFFICIENTS | _OF_SUMS,
+        constants=_PLACE | constants | _UNIT | {"origin": "int", "layers": "int", "first_layer": "int"},
+        defines={
+            "ROWS": rows,
+            "GROUPS": groups,
+            "BACK": int(back),
+            "TILED": int(tiled),
+            "ENCODED": int(light.encoded),
+            "LEVELS": int(light.levels),
+        },
+        blocks={"table": (1 + rows) * (2 * groups + 1)},
+        local_size=(64, 2, 1),
+    )
+
+
+@cache
+def composition_of_moved(way: str, moved: Moved, light: Light) -> Pass:
+    """The pass of a way, "frames", "search" or "value", where shutters follow something."""
+    levels = light.levels and not moved.unfinished
+    images, constants = ({"picture": Image("rgba32f")}, {}) if moved.unfinished else _stored_as(levels)
+    images |= {"table": _READ, "moves": _READ}
+    images |= {"packed_frames": Image("rgba16ui", reads=True, writes=False)} if moved.packed else {}
+    sampled = ("coefficients", *(("summed",) if moved.continued else ()), *(() if moved.packed else ("frames",)))
+    numbers = ("motions", *_OF_WAY[way], *(("seen_first", "seen_last", "parts") if moved.shortened else ()))
+    return Pass(
+        f"compose_{way}",
+        samplers=dict.fromkeys(sampled, "sampler2DArray"),
+        images=images,
+        constants=_PLACE | constants | dict.fromkeys(numbers, "int"),
+        defines={
+            "MOVED": 1,
+            "PACKED": int(moved.packed),
+            "SQUARED": int(not light.encoded),
+            "SEVERAL": int(moved.continued or moved.unfinished),
+            "QUADS": moved.quads,
+            "GROUPS": -(-moved.shutters // 4),
+            "SHUTTERS": moved.shutters,
+            "MIXED": moved.mixed,
+            "SUMS": 0,
+            "TILED": 0,
+            "EDGES": EDGES["shorten"] if moved.shortened else 0,
+            "DECODE": light.decode,
+            "PREMULTIPLIED": int(light.premultiplied),
+            "ENCODED": int(light.encoded),
+            "SHARP": int(moved.sharp),
+            "CONTINUED": int(moved.continued),
+            "UNFINISHED": int(moved.unfinished),
+            "LEVELS": int(levels),
+        },
+        local_size=LOCAL_ROW,
+    )
+
+
+def lines_of(way: str) -> int:
+    """The rows of pixels that one invocation of a way's pass composes."""
+    return _LINES.get(way, BLOCK)
+
+
+def way_of(window, options: Options, values: np.ndarray, span: tuple[int, int], shortened: bool) -> str:
+    """The fastest way to compose: the name of a pass, without compose_.
+
+    values: the table of tables.table, a row of gains and a row per piece
+    span: the first frame of the window that any shutter exposes, and the one after the last
+    shortened: whether frames of that span are left out (edges "shorten")
+
+    The bounds come from times at 1080p, for 2 to 8 shutters and windows of 16 to 64 frames. From running sums, in
+    multiples of the time of a plain average of 16 frames: "sums" 0.3 + 0.23 · pieces, "frames" 1 + 0.1 · frames. From
+    frames, in multiples of the time of the window's own plain average: "pieces" 1.5 + 1.4 · pieces / frames, "frames"
+    2.1 to 2.8.
+    """
+    if options.interpolation == "value":
+        return "value"
+    rows, frames = len(values) - 1, span[1] - span[0]
+    if isinstance(window, Sums) and not shortened and filled_rows(rows) <= 2 + 0.45 * frames:
+        return "sums"
+    if not isinstance(window, Sums) and 3 * rows < 2 * frames:
+        return "pieces"
+    return "frames" if frames_iterations(values, span) <= _MOST_ITERATIONS else "search"
+
+
+def frames_iterations(values: np.ndarray, span: tuple[int, int]) -> int:
+    """An upper bound of the loop iterations of an invocation of compose_frames, for any coefficients.
+
+    For each frame it goes through the pieces that may have begun and have not all ended. So each piece counts once for
+    every frame from that in which it may begin to that in which it and all before it have ended."""
+    groups = values.shape[1] // 2
+    start, end, apart = values[1:, :groups], values[1:, groups:-1], values[1:, -1, 1]
+    until = np.maximum.accumulate(end.max(axis=(1, 2)) + apart)
+    from_ = start.max(axis=(1, 2)) - 2 * apart  # the earliest start of a shutter, and once more the difference
+    frames = np.clip(np.ceil(until), *span) - np.clip(np.floor(from_), *span) + 1
+    return int(frames.sum()) + len(start) + span[1] - span[0]
+
+
+def moved_way(
+    options: Options, values: np.ndarray, span: tuple[int, int], motions: int, mixed: int, quads: int
+) -> tuple[str, int]:
+    """The way to compose where shutters follow something, and how many quads of pixels, `quads` at most, an invocation
+    can compose by it; arguments as for way_of and composition_of_moved.
+
+    motions: those that a frame is seen by"""
+    frames = span[1] - span[0]
+    mixing = frames * motions * (mixed if mixed > 1 else 0)
+    if options.interpolation == "value":
+        return "value", quads if frames * (1 + motions) + quads * mixing <= _MOST_ITERATIONS else 1
+    loops = frames_iterations(values, span) + frames
+    if loops + mixing > _MOST_ITERATIONS:
+        return "search", 1
+    return "frames", quads if loops + quads * mixing <= _MOST_ITERATIONS else 1
+
+
+def filled_rows(rows: int) -> float:
+    """The number of pieces that compose_sums is compiled for, if there are `rows`; infinite: there are too many."""
+    return next((filled for filled in _ROWS if filled >= rows), np.inf)
