@@ -54,7 +54,7 @@ def noise_film(edit, frames, folder):
     from shutter_addon.blender.data import recipe_import
     from shutter_addon.blender.editing import add_effect
     from shutter_addon.blender.rendering import session
-    from shutter_addon.core.recipes import recipe as recipes
+    from shutter_addon.core.recipes import recipe_file
 
     session.forget()
     height, width = frames.shape[1:3]
@@ -68,7 +68,7 @@ def noise_film(edit, frames, folder):
     strip, effect = add_effect.add_effect(edit, source)
     line = {"shutter": "S1", "kind": "line", "width": 0.1, "strokes": [[[0.2, 0.2], [0.3, 0.8]]]}
     data = recipe(4, [1, 1, 1, 1], [0, 0, 1, 0], regions=[line], border=True)
-    recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
+    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
     return source, effect, strip
 
 

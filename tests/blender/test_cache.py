@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support import recipe, request, write_frames
 
-from shutter_addon.core.recipes import recipe as recipes
+from shutter_addon.core.recipes import recipe_file
 
 REGION = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
 MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
@@ -32,7 +32,7 @@ def effect(bpy, edit, images):
     for file in sorted(images.parent.iterdir())[1:]:
         source.elements.append(file.name)
     strip, effect = add_effect.add_effect(edit, source)
-    recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(KEYED)))
+    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(KEYED)))
     bpy.context.view_layer.update()
     return effect
 

@@ -14,7 +14,7 @@ import pytest
 from support import noise_film, recipe, write_frames
 
 from shutter_addon.core.farm import job_file
-from shutter_addon.core.recipes import recipe as recipes
+from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media.rendered_pictures import read
 
 FRAMES, WINDOW = 8, 4
@@ -205,7 +205,7 @@ def _matte(tmp_path):
     write_frames(tmp_path / "matte", np.full((FRAMES, 48, 64, 3), 128, np.uint8), "m")
     region = {"shutter": "S1", "kind": "matte", "path": "matte/m0001.png"}
     data = recipe(WINDOW, np.ones(WINDOW), [1, 0, 0, 0], regions=[region])
-    recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data)), tmp_path)
+    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)), tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import OpenImageIO
 import pytest
 from support import picture_of, recipe, sequencer, write_frames
 
-from shutter_addon.core.recipes import recipe as recipes
+from shutter_addon.core.recipes import recipe_file
 
 RNG = np.random.default_rng(0)
 
@@ -66,7 +66,7 @@ def check(edit, render, source, frames, depth="8", levels=1):
 
     plain = render(edit, frames, depth)
     strip, effect = add_effect.add_effect(edit, source)
-    recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(recipe(4, [1, 0, 0, 0]))))
+    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(recipe(4, [1, 0, 0, 0]))))
     shown = render(edit, [int(frame) for frame in np.random.default_rng(0).permutation(list(frames))], depth)
     for frame in frames:
         solid = plain[frame][..., 3] > 25

@@ -12,7 +12,7 @@ from shutter_addon.compute.guide import Guides, guiding
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import scribbles
 from shutter_addon.core.pixels import compositor, exact_diffusion
-from shutter_addon.core.recipes import recipe as recipes
+from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import MediaError, inbetween, open_source
 
 SIZE, COUNT = (128, 72), 9
@@ -55,7 +55,7 @@ def test_a_render_equals_the_reference(command, film, tmp_path, same_pixels, agg
     """With keys of its strength, and so do the coefficients that are written."""
     data = effect_recipe(aggregate=aggregate, edge_aware=KEYS)
     command(film, "--output", tmp_path / "out", "--weights", tmp_path / "w", "--frames", "4:9", recipe=data)
-    found = recipes.parse((tmp_path / "recipe.json").read_text())
+    found = recipe_file.parse((tmp_path / "recipe.json").read_text())
     for frame in (4, 9):
         moment = found.at(frame, SIZE[0] / SIZE[1])
         assert moment.options.edge_aware == pytest.approx(0.2 + 0.1 * (frame - 1))
@@ -87,7 +87,7 @@ def add(bpy, edit):
             source.elements.append(f"f{number:04d}.png")
         strip, effect = add_effect.add_effect(edit, source)
         edit.render.resolution_x, edit.render.resolution_y = SIZE
-        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
+        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
         return edit, effect, strip
 
     return added

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import state, write_frames
 
-from shutter_addon.core.recipes import recipe as recipes
+from shutter_addon.core.recipes import recipe_file
 
 RNG = np.random.default_rng(0)
 EASES = ("linear", "bezier", "constant")
@@ -74,7 +74,7 @@ def effect_on(bpy, edit, tmp_path):
         for name, value in (transform or {}).items():
             setattr(source.transform, name, value)
         strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
+        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
         return lambda frame: state(edit, effect, strip, frame + 30)
 
     return make
@@ -93,7 +93,7 @@ def check(instant, expected):
 
 def test_every_ease_and_every_kind_of_key(effect_on):
     data = keyed_recipe()
-    at, source = effect_on(data), recipes.parse(json.dumps(data))
+    at, source = effect_on(data), recipe_file.parse(json.dumps(data))
     for frame in np.arange(0, 24, 0.5):
         check(at(frame), source.at(frame, 40 / 24))
 
@@ -104,7 +104,7 @@ def test_a_moved_scaled_and_turned_strip(effect_on):
     at = effect_on(
         data, {"offset_x": 30, "offset_y": -9, "scale_x": 1.5, "scale_y": 0.7, "rotation": 0.6, "origin": (0.2, 0.9)}
     )
-    check(at(8), recipes.parse(json.dumps(data)).at(8, 40 / 24))
+    check(at(8), recipe_file.parse(json.dumps(data)).at(8, 40 / 24))
 
 
 def test_a_picture_point_lies_where_blender_draws_it(bpy, edit, render, tmp_path):
@@ -130,7 +130,7 @@ def test_applying_another_recipe_leaves_nothing_of_the_first(bpy, edit, effect_o
     effect_on(keyed_recipe())
     effect = edit.virtual_shutter.effects[0]
     strip = next(s for s in edit.sequence_editor.strips if s.type == "SCENE")
-    plain = recipes.parse('{"version": 1, "window": 2, "shutters": [{"name": "A", "bars": [1, 0]}]}')
+    plain = recipe_file.parse('{"version": 1, "window": 2, "shutters": [{"name": "A", "bars": [1, 0]}]}')
     recipe_import.apply(edit, effect, strip, plain)
     check(state(edit, effect, strip, 40), plain.at(10, 40 / 24))
     from bpy_extras import anim_utils

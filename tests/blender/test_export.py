@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from support import source_time, state, write_frames
 
 from shutter_addon.core.recipes import recipe as recipes
+from shutter_addon.core.recipes import recipe_file
 
 FIRST, LAST = 31, 70
 ASPECT = 40 / 24
@@ -138,7 +139,7 @@ def effect_on(bpy, edit, tmp_path):
 def apply(effect_on, data):
     from shutter_addon.blender.data import recipe_import
 
-    source = recipes.parse(json.dumps(data)) if isinstance(data, dict) else data
+    source = recipe_file.parse(json.dumps(data)) if isinstance(data, dict) else data
     recipe_import.apply(*effect_on, source, folder_of(effect_on))
 
 
@@ -351,7 +352,7 @@ def test_a_plain_ease_stays_a_key_and_no_more(effect_on):
     found = export(effect_on)
     assert [key.frame for key in found.shutters[1].keys] == [3, 17, 30]
     assert [key.ease for key in found.regions[0].keys] == ["linear", "bezier", "linear"]
-    assert found == recipes.parse(json.dumps(BASE))
+    assert found == recipe_file.parse(json.dumps(BASE))
 
 
 def test_keys_of_the_source_time_lie_in_a_group_of_the_effect(effect_on):
@@ -498,7 +499,7 @@ def test_what_a_recipe_may_hold_at_most(effect_on):
     apply(effect_on, data)
     assert state(*effect_on, 40).bars.shape == (32, 256)
     found = export(effect_on)
-    assert found == recipes.parse(json.dumps(data))
+    assert found == recipe_file.parse(json.dumps(data))
 
 
 def test_a_key_at_every_frame_is_soon_written(effect_on):
@@ -514,5 +515,5 @@ def test_a_key_at_every_frame_is_soon_written(effect_on):
 def test_a_written_recipe_reads_the_same(effect_on, tmp_path):
     apply(effect_on, BASE)
     found = export(effect_on)
-    recipes.save(found, tmp_path / "r.json")
-    assert recipes.load(tmp_path / "r.json") == found
+    recipe_file.save(found, tmp_path / "r.json")
+    assert recipe_file.load(tmp_path / "r.json") == found

@@ -10,7 +10,7 @@ from support import read_picture, recipe, request, write_frames
 
 from shutter_addon.core.frames import light
 from shutter_addon.core.pixels import following as followings
-from shutter_addon.core.recipes import recipe as recipes
+from shutter_addon.core.recipes import recipe_file
 
 COUNT, WIDTH, HEIGHT, WINDOW = 24, 120, 72, 6
 INSIDE = np.s_[20:-20, 20:-20]  # where no window reaches beyond the picture
@@ -59,7 +59,7 @@ def shown(bpy, edit, tmp_path):
             source.elements.append(f"f{i:04d}.png")
         change(source)
         strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
+        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
         return edit, effect, strip, request(edit, effect, strip, frame)
 
     yield show
@@ -134,7 +134,7 @@ def test_the_camera_and_nothing_left_behind(shown):
     camera = [{"frame": frame, "location": place(frame - 1, velocity)} for frame in (1, COUNT)]
     edit, effect, strip, found = shown(following({}, "camera", camera=camera), velocity, 9)
     assert levels_off(found, velocity) <= 0.6
-    recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(following({}, "camera"))))
+    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(following({}, "camera"))))
     assert tuple(effect.camera.location) == (0, 0)
     assert request(edit, effect, strip, 9).state.following is None
 
@@ -195,7 +195,7 @@ def test_the_trails_length_is_keyed(shown):
 
 def core_bars(data, frame):
     source = SimpleNamespace(count=COUNT, width=WIDTH, height=HEIGHT)
-    effect = recipes.parse(json.dumps(data)).effect(WIDTH / HEIGHT)
+    effect = recipe_file.parse(json.dumps(data)).effect(WIDTH / HEIGHT)
     shown = lambda other: min(max(round(other) - 1, 0), COUNT - 1)  # noqa: E731
     return followings.followed(effect, effect.at(frame), frame, frame - 1, 1, source, shown).bars
 

@@ -9,7 +9,7 @@ from support import recipe, sequencer
 
 from shutter_addon.blender.data import annotations, fcurves, geometry, selection
 from shutter_addon.blender.editing import lifecycle, match_source
-from shutter_addon.core.recipes import recipe as recipes
+from shutter_addon.core.recipes import recipe_file
 
 LEVELS = 1
 STILL = recipe(4, [1, 0, 0, 0])
@@ -67,7 +67,7 @@ def made(bpy, edit, movie):
     def make(data=STILL):
         source = edit.sequence_editor.strips.new_movie("movie", str(movie), 1, 1)
         strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data)))
+        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
         selection.choose(edit, strip)
         bpy.context.view_layer.update()
         return strip, source

@@ -10,7 +10,7 @@ import pytest
 from support import read_picture, recipe, request, sequencer, write_frames
 
 from shutter_addon.core.frames import light
-from shutter_addon.core.recipes import recipe as recipes
+from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media.image_writing import write_exr
 
 WIDTH, HEIGHT, COUNT = 48, 32, 12
@@ -60,7 +60,7 @@ def shown(bpy, edit, footage):
             source.elements.append(f"f{i:04d}.png")
         change(source)
         strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(content)))
+        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(content)))
 
         def coefficients(frame):
             asked = request(edit, effect, strip, frame)
@@ -219,7 +219,7 @@ def test_a_file_is_moved_with_its_mattes(bpy, edit, shown, matte, footage, tmp_p
     shown(content, lambda source: setattr(source, "directory", str(first / footage.parent.name)))
     bpy.ops.wm.save_as_mainfile(filepath=str(first / "edit.blend"))
     (effect,) = edit.virtual_shutter.effects
-    recipe_import.apply(edit, effect, strips.effect_strips(edit)[0], recipes.parse(json.dumps(content)))
+    recipe_import.apply(edit, effect, strips.effect_strips(edit)[0], recipe_file.parse(json.dumps(content)))
     assert effect.regions[0].image.filepath == "//matte/m0001.png"
     bpy.ops.wm.save_mainfile()
     first.rename(tmp_path / "there")
@@ -330,7 +330,7 @@ def test_a_recipe_whose_matte_is_missing_changes_nothing(shown, matte):
     from shutter_addon.media import MediaError
 
     strip, effect, coefficients = shown(data(region(matte)))
-    gone = recipes.parse(json.dumps(data(region(matte.with_name("gone.png")))))
+    gone = recipe_file.parse(json.dumps(data(region(matte.with_name("gone.png")))))
     with pytest.raises(MediaError, match=r"gone\.png: no such file"):
         recipe_import.apply(strip.id_data, effect, strip, gone)
     assert close(coefficients(3), values(2) / 255)
@@ -374,11 +374,13 @@ def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
     own = strip_of(edit, matte, 3, 6)
     effect.regions[1].matte, effect.regions[1].strip_name = "STRIP", own.name
     (tmp_path / "out").mkdir()
-    recipes.save(matte_export.recipe_for(edit, effect, strip, tmp_path / "out" / "r.json"), tmp_path / "out" / "r.json")
-    saved = recipes.load(tmp_path / "out" / "r.json")
+    recipe_file.save(
+        matte_export.recipe_for(edit, effect, strip, tmp_path / "out" / "r.json"), tmp_path / "out" / "r.json"
+    )
+    saved = recipe_file.load(tmp_path / "out" / "r.json")
     assert saved.regions[0].path == "../matte/m0001.png"
-    assert saved.regions[0] == recipes.parse(json.dumps(content)).regions[0].__class__(
-        **{**vars(recipes.parse(json.dumps(content)).regions[0]), "path": "../matte/m0001.png"}
+    assert saved.regions[0] == recipe_file.parse(json.dumps(content)).regions[0].__class__(
+        **{**vars(recipe_file.parse(json.dumps(content)).regions[0]), "path": "../matte/m0001.png"}
     )
     assert saved.regions[1].path == "r mattes/2 strip_1/0001.png"
     before = [coefficients(frame) for frame in (1, 4, 10)]
@@ -387,8 +389,8 @@ def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
     for frame, expected in zip((1, 4, 10), before, strict=True):
         assert close(coefficients(frame), expected)
     again = tmp_path / "out" / "again.json"
-    recipes.save(matte_export.recipe_for(edit, effect, strip, again), again)
-    assert recipes.load(again) == saved
+    recipe_file.save(matte_export.recipe_for(edit, effect, strip, again), again)
+    assert recipe_file.load(again) == saved
 
 
 def test_a_still_strip_is_exported_as_one_picture(edit, shown, matte, tmp_path):
@@ -397,7 +399,7 @@ def test_a_still_strip_is_exported_as_one_picture(edit, shown, matte, tmp_path):
     strip, effect, _coefficients = shown(data(region(matte)))
     own = edit.sequence_editor.strips.new_image("still", str(matte), 4, 1)
     effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
-    recipes.save(matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json"), tmp_path / "r.json")
+    recipe_file.save(matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json"), tmp_path / "r.json")
     assert [path.name for path in (tmp_path / "r mattes" / "1 m").iterdir()] == ["0001.png"]
     assert np.abs(read_picture(tmp_path / "r mattes" / "1 m" / "0001.png")[..., 0] - values(0)).max() < 0.01
 
@@ -455,7 +457,9 @@ def test_a_path_longer_than_blenders(shown, matte, tmp_path):
     folder = tmp_path / "/".join(["d" * 200] * 6)
     shutil.copytree(matte.parent, folder)
     with pytest.raises(MediaError, match=r"m0001\.png: Blender cannot read it"):
-        recipe_import.apply(strip.id_data, effect, strip, recipes.parse(json.dumps(data(region(matte.name)))), folder)
+        recipe_import.apply(
+            strip.id_data, effect, strip, recipe_file.parse(json.dumps(data(region(matte.name)))), folder
+        )
 
 
 @pytest.fixture
@@ -726,7 +730,7 @@ def test_a_sequence_is_one_image_however_often_it_is_imported(bpy, shown, matte)
 
     strip, effect, _coefficients = shown(data(region(matte)))
     images = len(bpy.data.images)
-    recipe_import.apply(strip.id_data, effect, strip, recipes.parse(json.dumps(data(region(matte), region(matte)))))
+    recipe_import.apply(strip.id_data, effect, strip, recipe_file.parse(json.dumps(data(region(matte), region(matte)))))
     assert len(bpy.data.images) == images
 
 

@@ -12,7 +12,7 @@ from support import recipe, sequencer
 from shutter_addon.blender.data import annotations, consistency, selection
 from shutter_addon.blender.editing import bar_edits, region_edits
 from shutter_addon.core.model import limits
-from shutter_addon.core.recipes import recipe as recipes
+from shutter_addon.core.recipes import recipe_file
 
 
 @pytest.fixture
@@ -267,8 +267,8 @@ def test_a_recipe_is_imported_and_exported_the_same(bpy, effect, does, tmp_path)
     effect = does("recipe_import", filepath=str(tmp_path / "in.json"))
     assert effect.light == "ENCODED"
     assert call(bpy, "recipe_export", filepath=str(tmp_path / "out.json")) == {"FINISHED"}
-    first, second = (recipes.load(tmp_path / f"{name}.json") for name in ("in", "out"))
-    assert recipes.dump(first) == recipes.dump(second)
+    first, second = (recipe_file.load(tmp_path / f"{name}.json") for name in ("in", "out"))
+    assert recipe_file.dump(first) == recipe_file.dump(second)
     assert sorted(path.name for path in tmp_path.glob("*.json*")) == ["in.json", "out.json"]
 
 
@@ -276,7 +276,7 @@ def test_an_export_replaces_the_file(bpy, effect, tmp_path):
     path = tmp_path / "out.json"
     path.write_text("old")
     call(bpy, "recipe_export", filepath=str(path))
-    assert recipes.load(path).window == 8
+    assert recipe_file.load(path).window == 8
 
 
 def refusal(bpy, name, **settings):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support import read_picture, recipe, write_frames
 
-from shutter_addon.core.recipes import recipe as recipes
+from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media.completeness import whole_pictures
 
 ROOT = Path(__file__).parents[2]
@@ -30,7 +30,7 @@ def film(bpy, edit, tmp_path):
     for i in range(2, 7):
         source.elements.append(f"f{i:04d}.png")
     strip, effect = add_effect.add_effect(edit, source)
-    recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(recipe(2, [0, 1]))))
+    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(recipe(2, [0, 1]))))
     edit.render.resolution_x = edit.render.resolution_y = 32
     edit.frame_start, edit.frame_end = 1, 6
     edit.render.image_settings.media_type = "IMAGE"
@@ -91,7 +91,7 @@ def test_two_effects_of_a_frame_fail(bpy, film, tmp_path, capfd):
     for i in range(2, 7):
         source.elements.append(f"f{i:04d}.png")
     strip, effect = add_effect.add_effect(film, source)
-    recipe_import.apply(film, effect, strip, recipes.parse(json.dumps(recipe(2, [0, 1]))))
+    recipe_import.apply(film, effect, strip, recipe_file.parse(json.dumps(recipe(2, [0, 1]))))
     strip.blend_type = "ALPHA_OVER"
     broken(tmp_path)
     assert bpy.ops.render.render(animation=True) == {"CANCELLED"}

@@ -18,7 +18,7 @@ from hypothesis.stateful import (
 )
 from support import recipe, sequencer, state, write_frames
 
-from shutter_addon.core.recipes import recipe as recipes
+from shutter_addon.core.recipes import recipe_file
 
 REGION = {"name": "Face", "shutter": "S1", "strokes": [[[0.1, 0.1], [0.9, 0.1]]]}
 MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
@@ -125,7 +125,7 @@ class Work(RuleBasedStateMachine):
         from shutter_addon.blender.editing import add_effect
 
         strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(chosen)))
+        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(chosen)))
 
     # Undo
 

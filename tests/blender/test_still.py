@@ -8,7 +8,7 @@ import OpenImageIO
 import pytest
 from support import recipe
 
-from shutter_addon.core.recipes import recipe as recipes
+from shutter_addon.core.recipes import recipe_file
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def still_on(edit):
         edit.render.resolution_x = source.elements[0].orig_width
         edit.render.resolution_y = source.elements[0].orig_height
         strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(recipe(16, np.eye(16)[0]))))
+        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(recipe(16, np.eye(16)[0]))))
         edit.render.resolution_x, edit.render.resolution_y = (
             strip.scene.render.resolution_x,
             strip.scene.render.resolution_y,
@@ -147,7 +147,7 @@ def _compare(edit, render, tmp_path, same_pixels, name, samples, channels, corne
 
     _, effect = add_effect.add_effect(edit, source)
     strip = next(s for s in edit.sequence_editor.strips if s.type == "SCENE")
-    recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(recipe(2, [1, 0]))))
+    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(recipe(2, [1, 0]))))
     shown = render(edit, [3, 1, 2], "16")
     for frame in (1, 2, 3):
         solid = plain[frame][..., 3] > 25  # of less, straight colours are mostly rounding

@@ -48,7 +48,7 @@ def effect_on(bpy, edit):
     """Puts an effect on a strip: still frames by default; gives strip and effect."""
     from shutter_addon.blender.data import recipe_import
     from shutter_addon.blender.editing import add_effect
-    from shutter_addon.core.recipes import recipe as recipes
+    from shutter_addon.core.recipes import recipe_file
 
     edit.render.resolution_x = edit.render.resolution_y = 32
     edit.frame_start, edit.frame_end = -100, 300
@@ -57,7 +57,7 @@ def effect_on(bpy, edit):
         import json
 
         strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipes.parse(json.dumps(data or recipe(4, [1, 0, 0, 0]))))
+        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data or recipe(4, [1, 0, 0, 0]))))
         return strip, effect
 
     return add

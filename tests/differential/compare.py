@@ -51,11 +51,11 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
     in the folder."""
     from shutter_addon.compute.renderer import Renderer
     from shutter_addon.core.pixels import following
-    from shutter_addon.core.recipes import recipe as recipes
+    from shutter_addon.core.recipes import recipe_file
     from shutter_addon.media import open_source
     from shutter_addon.media.matte_values import MatteValues
 
-    recipe, parsed, found = json.loads(case.recipe), recipes.parse(case.recipe), {}
+    recipe, parsed, found = json.loads(case.recipe), recipe_file.parse(case.recipe), {}
     with tempfile.TemporaryDirectory() as files, open_source(write(case, Path(files))) as source:
         footage = case.footage(samples_of(case, source))
         index, direction = case.index, case.direction
