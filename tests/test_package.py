@@ -157,10 +157,10 @@ for path in ({str(bunny)!r}, "none.mp4"):
 
 def test_a_recipe_without_cattrs_is_one_sentence():
     code = """
-from shutter_addon.core.recipes import recipe
+from shutter_addon.core.recipes import recipe_file
 try:
-    recipe.parse('{"version": 1, "window": 1, "shutters": [{"name": "S", "bars": [1]}]}')
-except recipe.RecipeError as error:
+    recipe_file.parse('{"version": 1, "window": 1, "shutters": [{"name": "S", "bars": [1]}]}')
+except recipe_file.RecipeError as error:
     print(error)
 """
     assert "recipes need the Python package cattrs" in without(["cattrs"], code)
