@@ -51,6 +51,7 @@ from shutter_addon.compute import (
 )
 from shutter_addon.compute.benchmark import BARS, Noise, bars, levels_apart, reference, shapes
 from shutter_addon.compute.gpu import GPUCompositor
+from shutter_addon.compute.request import Coefficients, Request
 from shutter_addon.compute.tables import table as table_of
 from shutter_addon.compute.window import Frames
 from shutter_addon.core.frames import light
@@ -215,10 +216,10 @@ class Case:
     def _drawn(self, method: str):
         block = self.state.options.aggregate
         if method == "ours":
-            return self.compositor.draw(self.window, self.index, 1, self.state, self.handle, block)
+            return self.compositor.draw(self.window, Request(self.index, self.state), Coefficients(self.handle, block))
         moved = replace(self.followed.following, first=self.index)
         state = replace(self.followed, following=moved)
-        return self.compositor.draw(self.whole, self.index, 1, state, self.handle, block)
+        return self.compositor.draw(self.whole, Request(self.index, state), Coefficients(self.handle, block))
 
     def accumulate(self, method: str) -> None:
         self.index += 1

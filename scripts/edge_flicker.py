@@ -25,6 +25,7 @@ sys.path.insert(0, str(ROOT))
 
 from shutter_addon.compute import guide  # noqa: E402
 from shutter_addon.compute.renderer import Renderer, open_compositor  # noqa: E402
+from shutter_addon.compute.request import Request  # noqa: E402
 from shutter_addon.core.model.frame_state import FrameState, Options  # noqa: E402
 from shutter_addon.core.model.scribbles import Shape  # noqa: E402
 from shutter_addon.media import open_source  # noqa: E402
@@ -67,7 +68,7 @@ def changes(compositor, film: Path, first: int, stroke, args, noise: float) -> d
     with open_source(film) as source:
         frames = [source.read(index) for index in numbers]
         renderer = Renderer(compositor, Noisy(source, noise))
-        coefficients = [renderer.coefficients(index, moment)[1] for index in numbers]
+        coefficients = [renderer.coefficients(Request(index, moment))[1] for index in numbers]
     found, share = [], []
     for (before, after), (old, new) in zip(pairwise(frames), pairwise(coefficients), strict=True):
         here = still(before, after, args.aggregate)

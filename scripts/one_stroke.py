@@ -33,6 +33,7 @@ import one_stroke_scenes as truth
 
 from gallery import stills
 from shutter_addon.compute.renderer import Renderer, open_compositor
+from shutter_addon.compute.request import Request
 from shutter_addon.core.model import scribbles
 from shutter_addon.core.recipes import recipe, recipe_file
 from shutter_addon.media import open_source
@@ -174,7 +175,7 @@ class Masks:
             state = self._state("drawn" if way == "without tracking" else "thinned", frame)
             if way == "without edges":
                 state = replace(state, options=replace(state.options, edge_aware=0.0))
-            share, block = self._renderer.coefficients(frame - 1, state)[1], state.options.aggregate
+            share, block = self._renderer.coefficients(Request(frame - 1, state))[1], state.options.aggregate
             share = share.repeat(block, 0).repeat(block, 1)
             self._known[way, frame] = share[: self._source.height, : self._source.width]
         return self._known[way, frame]

@@ -23,6 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmark import BARS, bars, shapes
 
 from shutter_addon.compute.renderer import Renderer, open_compositor
+from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.media import MediaError, open_source
@@ -46,7 +47,7 @@ def similarities(compositor, film, kind: str, count: int, window: int, block: in
     moments = [FrameState(Options(window, aggregate=b), bars(kind, count, window), shapes(count)) for b in (1, block)]
     result = []
     for index in np.linspace(0, source.count - window, frames).astype(int).tolist():
-        pictures = [_codes(r.picture(index, moment)) for r, moment in zip(renderers, moments, strict=True)]
+        pictures = [_codes(r.picture(Request(index, moment))) for r, moment in zip(renderers, moments, strict=True)]
         result.append(similarity(*pictures))
     for renderer in renderers:
         renderer.close()

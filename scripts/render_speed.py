@@ -55,6 +55,7 @@ from shutter_addon.blender.rendering import session
 from shutter_addon.blender.rendering.engine import VirtualShutterEngine
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.renderer import Renderer
+from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import presets
 from shutter_addon.core.recipes import recipe, recipe_file
@@ -309,7 +310,10 @@ def _composed(edit, source, indices) -> dict[int, np.ndarray]:
     effect = strips.effect_of(edit, strip.scene)
     shown = snapshot.read(edit, effect, strip, [index + 1 for index in indices])
     renderer = Renderer(CPUCompositor(), ShotSource(source))
-    return {index: 255 * light.to_encoded(renderer.picture(index, shown.at(index + 1)))[..., :3] for index in indices}
+    return {
+        index: 255 * light.to_encoded(renderer.picture(Request(index, shown.at(index + 1))))[..., :3]
+        for index in indices
+    }
 
 
 def run(way: str, footage: Path, window: int, film: Path, *, checked: bool) -> dict:

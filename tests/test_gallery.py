@@ -13,6 +13,7 @@ from OpenImageIO import ImageBuf
 from gallery import NAMES, bunny, time_map
 from gallery.item import HERE, ROOT, Shot
 from shutter_addon.compute.renderer import Renderer, open_compositor
+from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
@@ -100,7 +101,8 @@ def test_time_maps_are_frames_put_together(name, times):
     source, effect = open_source(time_map.footage(None)), recipe_file.load(HERE / f"{name}.json")
     height, width, shown = source.height, source.width, time_map.FRAME - 1
     renderer = Renderer(open_compositor(), source, MatteValues(width, height))
-    made = light.to_encoded(renderer.picture(shown, effect.at(time_map.FRAME, width / height))[..., :3]) * 255
+    request = Request(shown, effect.at(time_map.FRAME, width / height))
+    made = light.to_encoded(renderer.picture(request)[..., :3]) * 255
     frames = np.stack([source.read(shown + k)[..., :3] for k in range(33)])
     time, (y, x) = times(height, width), np.mgrid[:height, :width]
     before = np.floor(time).astype(int)

@@ -95,8 +95,9 @@ def same_pictures(first, second):
 
 def _composed(device, source, moment, index, direction, mattes):
     from shutter_addon.compute.renderer import Renderer
+    from shutter_addon.compute.request import Request
 
-    return [Renderer(device, source, mattes).picture(index, moment, direction)]
+    return [Renderer(device, source, mattes).picture(Request(index, moment, direction))]
 
 
 def compose(found, plan: dict, folder):
@@ -105,6 +106,7 @@ def compose(found, plan: dict, folder):
     from test_composition import check, footage
 
     from shutter_addon.compute.renderer import Renderer, open_compositor
+    from shutter_addon.compute.request import Request
     from shutter_addon.media.matte_files import MatteFile
     from shutter_addon.media.matte_values import MatteValues
 
@@ -121,7 +123,7 @@ def compose(found, plan: dict, folder):
     for frame in (1, 2.5, *keys[:2]):
         moment = found.at(frame, SIZE[0] / SIZE[1], file)
         renderers = [Renderer(device, source, values) for device in devices.values()]
-        first, second = (renderer.coefficients(3, moment).astype(float) for renderer in renderers)
+        first, second = (renderer.coefficients(Request(3, moment)).astype(float) for renderer in renderers)
         if not (apart := np.abs(first - second).max()) <= 1 / 255:
             raise trial.Fault(f"coefficients are {255 * apart:.3g}/255 apart at frame {frame:g}")
         for name, device in devices.items():

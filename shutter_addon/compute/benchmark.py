@@ -25,6 +25,7 @@ from ..core.pixels import compositor
 from ..devices.budget import MEGABYTE
 from ..devices.device import NoDeviceError
 from .renderer import Renderer
+from .request import Request
 
 SIZES = (1280, 720), (1920, 1080), (3840, 2160)
 WINDOWS = 8, 16, 64
@@ -117,7 +118,7 @@ def measure(compositor, size: tuple[int, int], window: int) -> dict:
             times = []
             for index in range(PICTURES + 1):
                 start = time.perf_counter()
-                picture = compositor.read(drawn := renderer.draw(index, state))
+                picture = compositor.read(drawn := renderer.draw(Request(index, state)))
                 middle = time.perf_counter()
                 compositor.read(drawn)
                 readback = time.perf_counter() - middle
@@ -127,7 +128,7 @@ def measure(compositor, size: tuple[int, int], window: int) -> dict:
             memory = compositor.device.budget.used if hasattr(compositor, "device") else None
             rng = np.random.default_rng(window)
             y, x = rng.integers(0, source.height, COMPARED), rng.integers(0, source.width, COMPARED)
-            found, coefficients = picture[y, x, :3].copy(), renderer.coefficients(index, state)[:, y, x]
+            found, coefficients = picture[y, x, :3].copy(), renderer.coefficients(Request(index, state))[:, y, x]
         codes = np.stack([source.read(k)[y, x] for k in range(index, index + window)])
     finally:
         renderer.close()

@@ -15,10 +15,11 @@ from ..core import stopping
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.model import mattes, shutters
-from ..core.model.frame_state import FrameState, Options
+from ..core.model.frame_state import Options
 from ..core.pixels import compositor
 from .diffusion import diffuse
 from .edge_diffusion import diffuse_along_edges, follows_edges
+from .request import Coefficients, Request
 from .resampling import around, resampled
 from .running_sums import RunningSums, summable
 
@@ -251,11 +252,10 @@ class CPUCompositor:
         found[..., :3] = 255 * light.to_encoded(np.nan_to_num(drawn[..., :3]).clip(0, 1)) + np.float32(0.5)
         return found
 
-    def draw(
-        self, window, index: int, direction: int, state: FrameState, handle, block: int, *, levels: bool = False
-    ) -> np.ndarray:
+    def draw(self, window, request: Request, coefficients: Coefficients) -> np.ndarray:
         """The picture (H, W, 4), top row first: float32, or levels in uint8; arguments as for GPUCompositor.draw."""
-        source, options = window.source, state.options
+        state, index, direction = request.state, request.index, request.direction
+        source, options, (handle, block) = window.source, state.options, coefficients
         picture = np.empty((source.height, source.width, 4), dtype=np.float32)
         # Backwards in time is forwards with the shutters reversed.
         bars = state.bars[:, ::direction]
@@ -278,7 +278,7 @@ class CPUCompositor:
             pixels[..., 3] = 1
             for k, plane in enumerate(planes):
                 pixels[..., k] = plane
-        return self.over_black(picture) if levels else picture
+        return self.over_black(picture) if request.levels else picture
 
     def release(self) -> None:
         pass

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
-from ..core.model.frame_state import FrameState
 from ..core.pixels import compositor
 from ..devices.device import Device, NoDeviceError
 from . import cpu
@@ -28,6 +27,7 @@ from .edge_diffusion import follows_edges
 from .edge_diffusion_gpu import EdgeDiffusion
 from .matting import Matting
 from .mixing import Mixing
+from .request import Coefficients, Request
 from .tables import moved_tables, padded, table
 from .window import BLOCK, Frames, PackedFrames, Sums, WholeFrames, decoding, open_window
 
@@ -37,15 +37,16 @@ def _extent(window: Sums) -> dict:
     return {"layers": window.layers, "held": window.stop - window.start, "unit": 1 / window.whole}
 
 
-def _from_sums(window: Sums, state: FrameState, values: np.ndarray, origin: int, direction: int, levels: bool):
+def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int):
     """compose_sums for a table of pieces, and its arguments for Device.run but for the band's.
 
-    origin: the position of the window's first frame; direction: 1, or −1 in reverse; levels: as for `composition`"""
+    origin: the position of the window's first frame"""
+    state = request.state
     rows = filled_rows(len(values) - 1)
     filled = np.zeros((1 + rows, *values.shape[1:]), np.float32)
     filled[: len(values)] = values
-    back = direction < 0
-    light = Light(decode=0, premultiplied=False, encoded=state.options.light == "encoded", levels=levels)
+    back = request.direction < 0
+    light = Light(decode=0, premultiplied=False, encoded=state.options.light == "encoded", levels=request.levels)
     return composition_of_sums(rows, -(-len(state.bars) // 4), back, window.tiled, light), {
         "images": {},
         "blocks": {"table": filled.reshape(-1, 4)},
@@ -55,12 +56,11 @@ def _from_sums(window: Sums, state: FrameState, values: np.ndarray, origin: int,
     }
 
 
-def _from_frames(
-    way: str, window, state: FrameState, rows: int, origin: int, direction: int, shortened: bool, levels: bool
-):
+def _from_frames(way: str, window, request: Request, rows: int, origin: int, shortened: bool):
     """The pass of another way, and its arguments: as _from_sums.
 
     rows: pieces in the table; shortened: as for way_of"""
+    state, direction = request.state, request.direction
     options, source, summed = state.options, window.source, isinstance(window, Sums)
     given = {"images": {}, "textures": {}, "rows": rows, "direction": direction}
     given["first"], given["last"] = state.open_span
@@ -78,7 +78,7 @@ def _from_frames(
     # In these shaders, frame 0 is the shot's first.
     given |= {"count": len(window.shot), "origin": origin - window.shot.start, "lowest": lowest - window.shot.start}
     stored = "frames" if not summed else "tiles" if window.tiled else "sums"
-    light = Light(decode, source.alpha == "premultiplied", options.light == "encoded", levels)
+    light = Light(decode, source.alpha == "premultiplied", options.light == "encoded", request.levels)
     return composition(way, -(-len(state.bars) // 4), stored, edges, light), given
 
 
@@ -199,36 +199,35 @@ class GPUCompositor:
         return picture if drawn.kind == PICTURE[True] else picture[::-1]
 
     def over_black(self, drawn) -> np.ndarray:
-        """A scene-linear picture of `draw` as Renderer.levels has it."""
+        """A scene-linear picture of `draw` as Renderer.picture has it of levels."""
         size = drawn.size[:2]
         texture = self._texture("levels", *size, 1, "rgba8")
         self.device.run(LEVELS, size, images={"picture": drawn, "levels": texture}, size=size)
         return self.device.read(texture)[0]
 
-    def draw(self, window, index: int, direction: int, state: FrameState, handle, block: int, *, levels: bool = False):
+    def draw(self, window, request: Request, coefficients: Coefficients):
         """The picture on the device, premultiplied: a texture array rgba32f of one layer, scene-linear, bottom row
-        first; or with `levels` rgba8, display code values, top row first. It is one of the window's, valid until its
-        next picture of the kind.
+        first; or of levels rgba8, display code values, top row first. It is one of the window's, valid until its next
+        picture of the kind.
 
         window: must have loaded all frames that some shutter exposes
-        index, direction: as for core.pixels.compositor.window_positions
-        handle: coefficients, a texture of a solver or of `constant`; block: the pixels along a side of each texel
         """
+        state, index, direction, levels = request.state, request.index, request.direction, request.levels
         if state.following is not None:
-            return self._draw_moved(window, index, direction, state, handle, block, levels)
+            return self._draw_moved(window, request, coefficients)
         options, values = state.options, table(state)
         first, last = state.open_span
         origin, (low, high) = compositor.origin(options, index, direction), compositor.reach(state, index, direction)
         shortened = options.edges == "shorten" and (low < window.shot.start or high >= window.shot.stop)
         way = way_of(window, options, values, (first, last), shortened)
         if way == "sums":
-            program, given = _from_sums(window, state, values, origin, direction, levels)
+            program, given = _from_sums(window, request, values, origin)
         else:
             rows = len(values) - 1
-            program, given = _from_frames(way, window, state, rows, origin, direction, shortened, levels)
+            program, given = _from_frames(way, window, request, rows, origin, shortened)
             given["images"]["table"] = self._filled("table", values[None], "rgba32f")
         picture = window.levels() if levels else window.picture
-        given["images"] |= {"picture": picture, "coefficients": handle}
+        given["images"] |= {"picture": picture, "coefficients": coefficients.handle}
         lines = lines_of(way)
         for top, height, stored in window.bands():
             name = "sums" if isinstance(window, Sums) else "frames"
@@ -240,18 +239,20 @@ class GPUCompositor:
                 size=size,
                 top=top,
                 height=window.source.height,
-                block_bits=(block - 1).bit_length(),
+                block_bits=(coefficients.block - 1).bit_length(),
                 **given,
             )
         return picture
 
-    def _draw_moved(
-        self, window: WholeFrames, index: int, direction: int, state: FrameState, handle, block: int, levels: bool
-    ):
+    def _draw_moved(self, window: WholeFrames, request: Request, coefficients: Coefficients):
         """As `draw`, where shutters follow something: a pass for each texture array of frames, which adds what is seen
         of these to what those before have."""
-        options, (width, height) = state.options, (window.source.width, window.source.height)
-        frames = compositor.window_indices(options, index, window.shot, direction)
+        state, options, (width, height) = (
+            request.state,
+            request.state.options,
+            (window.source.width, window.source.height),
+        )
+        frames = compositor.window_indices(options, request.index, window.shot, request.direction)
         first, last = state.open_span
         values, moves = moved_tables(state, frames)
         motions, there = len(moves) // len(frames), np.flatnonzero(frames >= 0)
@@ -259,16 +260,17 @@ class GPUCompositor:
         mixed = moves.shape[1] - 1
         most = BLOCK // 4 if packed and not shortened else 1
         way, quads = moved_way(options, values[: len(values) - motions], (first, last), motions, mixed, most)
-        given = {"size": (width, height), "top": 0, "height": height, "block_bits": (block - 1).bit_length()}
+        given = {"size": (width, height), "top": 0, "height": height}
+        given["block_bits"] = (coefficients.block - 1).bit_length()
         given |= {"first": first, "last": last, "rows": len(values) - 1 - motions, "motions": motions}
         given |= {"seen_first": int(there[0]), "seen_last": int(there[-1]), "parts": len(values) - motions}
-        images = {"coefficients": handle, "table": self._filled("table", values[None], "rgba32f")}
+        images = {"coefficients": coefficients.handle, "table": self._filled("table", values[None], "rgba32f")}
         # What is left out is read in another's place: what lies in its own may be no number.
         slots = np.where(frames < 0, frames[there[0]], frames) % window.capacity
         sums = "sum", "other sum"
-        picture = window.levels() if levels else window.picture
+        picture = window.levels() if request.levels else window.picture
         alpha, decode = window.source.alpha, 0 if packed else decoding(window.transfer, options.light)
-        light = Light(decode, alpha == "premultiplied", options.light == "encoded", levels)
+        light = Light(decode, alpha == "premultiplied", options.light == "encoded", request.levels)
         for held, stack in window.stacks():
             before, after = held.start > 0, held.stop < window.capacity
             inside = (slots >= held.start) & (slots < held.stop)

@@ -14,6 +14,7 @@ import numpy as np
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Planes, as_rgba
+from ..core.memo import Memo
 from ..core.messages import UserError
 
 # Rows of the picture whose pixels are smoothed over about one, by a Gaussian of so many pixels.
@@ -54,14 +55,14 @@ class Guides:
         self._cell = cell_of(self._short)
         self._kept = frozenset()
         self._reduced: dict[int, np.ndarray] = {}
-        self._made = None
+        self._made = Memo()
 
     def keep(self, indices) -> None:
         """Says which frames may be needed from now on; all others are forgotten."""
         self._kept = frozenset(indices)
         self._reduced = {i: picture for i, picture in self._reduced.items() if i in self._kept}
         if not self._kept:
-            self._made = None
+            self._made.clear()
 
     def wants(self, index: int) -> bool:
         """Whether a frame is to be noted."""
@@ -80,19 +81,19 @@ class Guides:
         """The guide (h, w, 3) float32 of the frame that comes first in `guiding`: 0 to 1, times the rows of its cells
         over ROWS. Its cells are blocks of pixels, or larger where a large frame has no finer detail. Frames beside it
         that cannot be read are left out."""
-        key = frames, block
-        if self._made is None or self._made[0] != key:
-            for index in sorted(self.lacking(frames)):
-                try:
-                    self._reduced[index] = self._reduce(self._source.read(index))
-                except UserError:
-                    if index == frames[0]:
-                        raise
-            shown, *beside = (self._reduced[index] for index in frames if index in self._reduced)
-            made = _steadied(shown, beside) * np.float32(self._short / (max(block, self._cell) * ROWS * _WHITE))
-            made = np.ascontiguousarray(np.moveaxis(made, 0, -1))
-            self._made = key, _averaged(made, max(block // self._cell, 1))
-        return self._made[1]
+        return self._made.get((frames, block), lambda: self._guide(frames, block))
+
+    def _guide(self, frames: tuple[int, ...], block: int) -> np.ndarray:
+        for index in sorted(self.lacking(frames)):
+            try:
+                self._reduced[index] = self._reduce(self._source.read(index))
+            except UserError:
+                if index == frames[0]:
+                    raise
+        shown, *beside = (self._reduced[index] for index in frames if index in self._reduced)
+        made = _steadied(shown, beside) * np.float32(self._short / (max(block, self._cell) * ROWS * _WHITE))
+        made = np.ascontiguousarray(np.moveaxis(made, 0, -1))
+        return _averaged(made, max(block // self._cell, 1))
 
     def _reduce(self, frame: np.ndarray) -> np.ndarray:
         """A frame's display values (3, h, w) uint16 in cells, smoothed."""

@@ -1,20 +1,20 @@
-"""Renders pictures of a source: rasterise the scribbles, diffuse them, lay mattes over, load the window's frames,
-compose."""
+"""Renders pictures of a source, each a function of one request, in four stages (Renderer.draw): labels, coefficients,
+window, composition."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
-from ..core.model import scribbles
-from ..core.model.frame_state import FrameState
+from ..core.memo import Memo
 from ..core.model.mattes import MatteReader
-from ..core.pixels import compositor
 from ..devices.device import NoDeviceError
-from . import guide
+from . import guide, window_frames
 from .cpu import CPUCompositor
+from .labelling import LabelLayer, grid, labelled, sole_of
+from .request import Coefficients, Request
 
 
 def open_compositor(device: str = "gpu", *memory):
@@ -38,13 +38,9 @@ def open_gl(*memory):
 
 
 class Renderer:
-    """Pictures of one source. It keeps the window's frames, the last coefficients and the last picture.
+    """Pictures of one source. It keeps the window's frames, and the last result of each stage.
 
     mattes: what reads the mattes of its pictures; None: they have none
-
-    Windows end at cuts if Options.stop_at_cuts is set and the source knows its shots (FrameSource.shots).
-    Frames are counted as the source counts them, from 0. direction, in all methods: 1, or −1 where the source plays in
-    reverse, so that the window's next frames are those before `index`.
     """
 
     def __init__(self, compositor, source: FrameSource, mattes: MatteReader | None = None):
@@ -52,261 +48,194 @@ class Renderer:
         self._solver, self._matting, self._mixing = compositor.solver(), compositor.matting(), compositor.mixing()
         self._guides = guide.Guides(source)
         self._window = self._kind = None
-        self._labelled = self._solved = self._laid = self._drawn = None
-        self._solution = 0  # counts the solver's
+        self._labels, self._solved, self._laid, self._drawn = Memo(), Memo(), Memo(), Memo()
 
-    def picture(self, index: int, state: FrameState, direction: int = 1) -> np.ndarray:
-        """The picture (H, W, 4) float32 at source frame `index`: scene-linear, premultiplied, top row first."""
+    def picture(self, request: Request) -> np.ndarray:
+        """The picture (H, W, 4), top row first: scene-linear float32, premultiplied. Of levels: 8-bit sRGB over black,
+        its alpha full, as a movie has it where Blender's view transform is Standard."""
         with self.compositor.current():
-            return self.compositor.read(self.draw(index, state, direction))
+            if request.levels and self.source.alpha != "opaque":
+                return self.compositor.over_black(self.draw(replace(request, levels=False)))
+            return self.compositor.read(self.draw(request))
 
-    def levels(self, index: int, state: FrameState, direction: int = 1) -> np.ndarray:
-        """The picture over black in 8-bit sRGB (H, W, 4), top row first, its alpha full: as a movie has it where
-        Blender's view transform is Standard."""
+    def draw(self, request: Request):
+        """The picture on the device (GPUCompositor.draw); with NumPy, an array as of `picture`. It is valid until the
+        next picture of this renderer, and composed only if it is not the last one."""
+        if self._window is None or not self._window.is_open:
+            self._drawn.clear()
         with self.compositor.current():
-            if self.source.alpha == "opaque":
-                return self.compositor.read(self.draw(index, state, direction, levels=True))
-            return self.compositor.over_black(self.draw(index, state, direction))
+            return self._drawn.get(request.key, lambda: self._composed(request), quick=request.quick)
 
-    def draw(self, index: int, state: FrameState, direction: int = 1, *, quick: bool = False, levels: bool = False):
-        """The picture on the device (GPUCompositor.draw); with NumPy, an array as of `picture` or `levels`. It is valid
-        until the next picture of this renderer, and composed only if it is not the last one.
+    def _composed(self, request: Request):
+        labels = self.labels(request)
+        # Before coefficients are solved for: the window reads the frames that guide the diffusion.
+        window = self._loaded_window(request, labels)
+        coefficients = self._coefficients(request, labels)
+        return self.compositor.draw(window, self._exposing(request, labels), coefficients)
 
-        quick: the diffusion may start from the last coefficients, so the picture depends slightly on them.
-        levels: the picture is of 8-bit display code values, not scene-linear
-        """
-        key = index, direction, state.key, levels
-        lost = self._drawn is None or not self._window.is_open
-        if lost or self._drawn[0] != key or not (quick or self._drawn[1]):
-            self._drawn = None  # nothing that is broken off is taken for whole, here and below
-            with self.compositor.current():
-                picture = self.compositor.draw(*self._parts(index, state, direction, quick), levels=levels)
-            self._drawn = key, not quick, picture
-        return self._drawn[2]
-
-    def coefficients(self, index: int, state: FrameState, direction: int = 1) -> np.ndarray:
+    def coefficients(self, request: Request) -> np.ndarray:
         """Coefficients (N, h, w) float32 of `picture`, for each pixel, or for each block of Options.aggregate pixels a
         side."""
-        count, (width, height) = len(state.bars), self._grid(state)
+        labels, count = self.labels(request), len(request.state.bars)
         with self.compositor.current():
-            if (sole := self._sole(state)) is not None:
+            if (sole := _sole(request, labels)) is not None:
                 values = np.eye(count, dtype=np.float32)[sole]
-                return np.broadcast_to(values[:, None, None], (count, height, width))
-            return self.compositor.coefficients(self._mixture(index, state, direction), count)
+                return np.broadcast_to(values[:, None, None], (count, *labels[0].labels.shape))
+            return self.compositor.coefficients(self._mixture(request, labels), count)
 
-    def drawn_coefficients(self, index: int, state: FrameState, direction: int = 1):
-        """Coefficients of a quick `draw` on the device, a GPU: (texture array, block, number of shutters).
-
-        The texture array is rgba32f, four shutters per layer, top row first, each texel for block × block pixels; it
-        has a single texel where coefficients are the same everywhere. It is valid until the next call of any method.
-        """
-        count = len(state.bars)
+    def drawn_coefficients(self, request: Request) -> Coefficients:
+        """Coefficients on the device, of all shutters. They are valid until the next call of any method."""
+        labels = self.labels(request)
         with self.compositor.current():
-            if (sole := self._sole(state)) is not None:
-                return self.compositor.constant(np.eye(count)[sole]), self._everywhere, count
-            return self._mixture(index, state, direction, quick=True), state.options.aggregate, count
+            if (sole := _sole(request, labels)) is not None:
+                constant = self.compositor.constant(np.eye(len(request.state.bars))[sole])
+                return Coefficients(constant, self._everywhere)
+            return Coefficients(self._mixture(request, labels), request.state.options.aggregate)
 
-    def drawn_labels(self, state: FrameState):
-        """Labels on the device, a GPU: (texture array r32ui, block), top row first, each texel for block × block
-        pixels. It is valid until the next call of any method."""
+    def drawn_labels(self, request: Request) -> Coefficients:
+        """Labels of the first layer on the device, a GPU: a texture array r32ui, top row first. They are valid until
+        the next call of any method."""
         with self.compositor.current():
-            return self.compositor.labels(self.labels(state)), state.options.aggregate
+            values = self.compositor.labels(self.labels(request)[0].labels)
+            return Coefficients(values, request.state.options.aggregate)
 
-    def labels(self, state: FrameState) -> np.ndarray:
-        """Labels (h, w) uint16 of pixels, or of blocks as for `coefficients`: 0 free, 1 + shutter scribbled."""
-        return self._labelling(state)[0].labels
+    def labels(self, request: Request) -> list[LabelLayer]:
+        """Labels of the request's scribbles, of each of scribbles.layers."""
+        state, size = request.state, grid(self.source, request.state)
+        return self._labels.get((size, state.options.border, state.shapes_key), lambda: labelled(state, size))
 
-    def _sole(self, state: FrameState) -> int | None:
-        """The shutter that holds for the whole picture, if one does."""
-        return None if state.mattes else self._scribbled(state)
+    def shot(self, request: Request, *, known: bool = False) -> range:
+        """See window_frames.shot_of."""
+        return window_frames.shot_of(request, self.source, self._beside(request), known=known)
 
-    def _scribbled(self, state: FrameState) -> int | None:
-        """The shutter that the scribbles give to the whole picture, if it is one."""
-        first, *others = self._labelling(state)
-        return first.sole if all(layer.sole == first.sole for layer in others) else None
+    def needed(self, request: Request, *, known: bool = True) -> set[int]:
+        """The source frames at window_frames.positions, and those that guide the diffusion. known: as for `shot`."""
+        shot = self.shot(request, known=known)
+        return window_frames.exposed_frames(request, shot).union(self._guiding(request, shot))
 
-    def _labelling(self, state: FrameState) -> list[_Layer]:
-        """Of each of scribbles.layers."""
-        key = self._grid(state), state.options.border, state.key[-1]
-        if self._labelled is None or self._labelled[0] != key:
-            parts = scribbles.layers(state.shapes)
-            drawn = [(share, scribbles.rasterise(shapes, *key[0], border=key[1])) for share, shapes in parts]
-            self._labelled = key, [_Layer(share, labels, _sole(labels)) for share, labels in drawn]
-        return self._labelled[1]
-
-    def shot(self, index: int, direction: int, state: FrameState, *, known: bool = False) -> range:
-        """The source frames that the window may show: those of the shot around `index`. Ends of the shot that the
-        window does not reach are not looked for: the clip's ends take their place.
-
-        It reads frames in which cuts are looked for. known: it reads none, and knows only the cuts found before."""
-        if not self._stops(state):
-            return range(self.source.count)
-        low, high = self._reach(index, direction, state)
-        shot = self.source.shots.around(index, low, high, known=known)
-        last = shot.stop - 1
-        if state.options.edges == "mirror" and (last < high) != (shot.start > low):
-            # Frames mirrored at one end of the shot may lie beyond its other end.
-            low, high = (min(low, 2 * last - high), high) if last < high else (low, max(high, 2 * shot.start - low))
-            shot = self.source.shots.around(index, low, high, known=known)
-        return shot
-
-    def positions(self, index: int, direction: int, state: FrameState, shot: range) -> np.ndarray:
-        """The positions (core.pixels.compositor.window_positions) that any shutter exposes, whether it has a scribble
-        or not. Where frames of them are left out (edges "shorten"), all positions of the window that have a frame: the
-        nearest may be needed in place of those."""
-        positions = compositor.window_positions(state.options, index, direction)
-        exposed = slice(*state.open_span)
-        if state.options.edges != "shorten":
-            return positions[exposed]
-        frames = compositor.source_frames(state.options, positions, shot)
-        return positions[exposed] if (frames[exposed] >= 0).all() else positions[frames >= 0]
-
-    def needed(self, index: int, direction: int, state: FrameState, *, known: bool = True) -> set[int]:
-        """The source frames at `positions`, and those that guide the diffusion. known: as for `shot`."""
-        shown, beside = self._needed(index, direction, state, known=known)
-        return shown.union(beside)
-
-    def missing(self, index: int, direction: int, state: FrameState) -> set[int]:
+    def missing(self, request: Request) -> set[int]:
         """The source frames that `draw` would read: needed ones that are not loaded, and those in which it looks for
         cuts."""
-        held = self._window.held if self._window and self._kind == self._kind_for(state) else ()
-        shown, beside = self._needed(index, direction, state, known=True)
-        missing = shown.difference(held) | self._guides.lacking(beside)
-        if self._stops(state):
-            missing |= self.source.shots.lacking(index, *self._reach(index, direction, state))
+        held = self._window.held if self._window and self._kind == self._kind_for(request) else ()
+        shot = self.shot(request, known=True)
+        missing = window_frames.exposed_frames(request, shot).difference(held)
+        missing |= self._guides.lacking(self._guiding(request, shot))
+        if window_frames.stops_at_cuts(request, self.source):
+            reach = window_frames.reach(request, self._beside(request))
+            missing |= self.source.shots.lacking(request.index, *reach)
             missing -= self.source.shots.handed()
         return missing
 
-    def _needed(self, index: int, direction: int, state: FrameState, *, known: bool) -> tuple[set[int], tuple]:
-        """The source frames at `positions`, and those of `_guiding`."""
-        shot = self.shot(index, direction, state, known=known)
-        positions = self.positions(index, direction, state, shot)
-        shown = set(compositor.source_frames(state.options, positions, shot).tolist())
-        return shown, self._guiding(index, state, shot)
-
-    def _guiding(self, index: int, state: FrameState, shot: range) -> tuple[int, ...]:
-        """The source frames that guide the diffusion (guide.guiding), the shown one first; none where nothing does."""
-        return guide.guiding(index, state.options.step, shot) if self._is_guided(state) else ()
-
-    def _is_guided(self, state: FrameState) -> bool:
+    def _is_guided(self, request: Request) -> bool:
         """Whether coefficients depend on the shown frame."""
-        return state.options.edge_aware > 0 and self._scribbled(state) is None
+        return request.state.options.edge_aware > 0 and sole_of(self.labels(request)) is None
 
-    def _stops(self, state: FrameState) -> bool:
-        """Whether windows end at cuts."""
-        return state.options.stop_at_cuts and self.source.shots is not None
+    def _beside(self, request: Request) -> int:
+        """See window_frames."""
+        return guide.reach(request.state.options.step) if self._is_guided(request) else 0
 
-    def _reach(self, index: int, direction: int, state: FrameState) -> tuple[int, int]:
-        """The first and the last of all positions that any shutter exposes, and of `index` itself with the frames that
-        guide the diffusion."""
-        beside = guide.reach(state.options.step) if self._is_guided(state) else 0
-        low, high = compositor.reach(state, index, direction)
-        return min(low, index - beside), max(high, index + beside)
+    def _guiding(self, request: Request, shot: range) -> tuple[int, ...]:
+        """The source frames that guide the diffusion (guide.guiding), the shown one first; none where nothing does."""
+        if not self._is_guided(request):
+            return ()
+        return guide.guiding(request.index, request.state.options.step, shot)
 
     @property
     def _everywhere(self) -> int:
         """The side of a block as large as the picture, in pixels."""
         return max(self.source.width, self.source.height)
 
-    def _grid(self, state: FrameState) -> tuple[int, int]:
-        """The size (w, h) of labels and coefficients."""
-        block = state.options.aggregate
-        return -(-self.source.width // block), -(-self.source.height // block)
+    def _exposing(self, request: Request, labels: list[LabelLayer]) -> Request:
+        """The request as the window and the composition see it: of one shutter, where one holds everywhere."""
+        sole = _sole(request, labels)
+        return request if sole is None else replace(request, state=request.state.alone(sole))
 
-    def _parts(self, index: int, state: FrameState, direction: int, quick: bool):
-        """The arguments of the compositor's `draw`, with the window loaded."""
-        window = self._window_for(state)
-        self._keep_guides(index, direction, state)
-        if (sole := self._sole(state)) is None:
-            self._load(window, index, direction, state)
-            handle, block = self._mixture(index, state, direction, quick), state.options.aggregate
-        else:
-            state = state.alone(sole)
-            self._load(window, index, direction, state)
-            handle, block = self.compositor.constant(np.ones(1)), self._everywhere
-        return window, index, direction, state, handle, block
+    def _loaded_window(self, request: Request, labels: list[LabelLayer]):
+        """The window, with the frames loaded that the picture exposes."""
+        window = self._window_for(request)
+        self._keep_guides(request)
+        exposing = self._exposing(request, labels)
+        shot = self.shot(exposing)
+        window.load(window_frames.positions(exposing, shot), exposing.state.options, shot)
+        return window
 
-    def _load(self, window, index: int, direction: int, state: FrameState) -> None:
-        shot = self.shot(index, direction, state)
-        window.load(self.positions(index, direction, state, shot), state.options, shot)
-
-    def _keep_guides(self, index: int, direction: int, state: FrameState) -> None:
-        """Keeps what guides the diffusion of this picture and will guide that of the next ones, as it is read."""
-        if not state.options.edge_aware:
-            self._guides.keep(())
-        if not self._is_guided(state):  # perhaps a still frame between two pictures that are
-            return
-        step, (low, high) = state.options.step, self._reach(index, direction, state)
-        beside = guide.reach(step)
-        onwards = range(index - beside, high + 1) if direction > 0 else range(low, index + beside + 1)
-        self._guides.keep(i for i in onwards if i % step == 0 or i == index)
-
-    def _mixture(self, index: int, state: FrameState, direction: int, quick: bool = False):
-        """Coefficients on the device, with the mattes laid over what the scribbles give. They are laid again only if
-        either has changed since the last call."""
-        if not state.mattes:
-            return self._diffused(index, state, direction, quick)
-        layers = self._mattes.values(state.mattes, index, state.options.aggregate)
-        count, sole = len(state.bars), self._scribbled(state)
-        if sole is None:
-            beneath = self._diffused(index, state, direction, quick)
-        else:
-            beneath = self.compositor.constant(np.eye(count)[sole])
-        key = state.mattes, [key for key, _ in layers], count, sole, self._solution if sole is None else None
-        if self._laid is None or self._laid[0] != key:
-            self._laid = None
-            self._laid = key, self._matting.lay(beneath, state.mattes, layers)
-        return self._laid[1]
-
-    def _diffused(self, index: int, state: FrameState, direction: int, quick: bool = False):
-        """Coefficients on the device. They are solved for only if labels or what guides them changed since the last
-        call, or if the last solution was a quick one and this must not be."""
-        layers, options, count = self._labelling(state), state.options, len(state.bars)
-        frames = self._guiding(index, state, self.shot(index, direction, state)) if options.edge_aware else ()
-        key = count, frames and (frames, options.edge_aware)
-        same = self._solved and self._solved[0] == key
-        same = same and (self._solved[1] is layers or _equal(self._solved[1], layers))
-        if not same or not (quick or self._solved[2]):
-            self._keep_guides(index, direction, state)
-            guided = (self._guides.guide(frames, options.aggregate), options.edge_aware) if frames else ()
-            self._solution += 1
-            self._solved = None
-            self._solved = key, layers, not quick, self._mixed(layers, count, guided, quick)
-        return self._solved[3]
-
-    def _mixed(self, layers: list[_Layer], count: int, guided: tuple, quick: bool):
-        """The coefficients of all layers, solved for one after the other and added up. A solution that another layer
-        has begun from would depend on that one."""
-        if len(layers) == 1:
-            return self._solver.solve(layers[0].labels, count, *guided, warm=quick)
-        mixed = None
-        for share, labels, sole in layers:
-            solid = self.compositor.constant(np.eye(count)[sole]) if sole is not None else None
-            found = self._solver.solve(labels, count, *guided) if solid is None else solid
-            mixed = self._mixing.add(mixed, found, share, labels.shape)
-        return mixed
-
-    def _kind_for(self, state: FrameState) -> tuple[int, bool, int]:
+    def _kind_for(self, request: Request) -> tuple[int, bool, int]:
         """The length of the window, whether its frames are seen elsewhere than where they are, and the number of all
         shutters."""
-        sole = self._sole(state)
-        moved = (state if sole is None else state.alone(sole)).following is not None
-        return state.options.window, moved, len(state.bars)
+        moved = self._exposing(request, self.labels(request)).state.following is not None
+        return request.state.options.window, moved, len(request.state.bars)
 
-    def _window_for(self, state: FrameState):
-        kind = self._kind_for(state)
+    def _window_for(self, request: Request):
+        kind = self._kind_for(request)
         if self._window is None or self._kind != kind or not self._window.is_open:
             self.release_window()
             self._kind = kind
             self._window = self.compositor.window(guide.NotedSource(self.source, self._guides), *kind)
         return self._window
 
+    def _keep_guides(self, request: Request) -> None:
+        """Keeps what guides the diffusion of this picture and will guide that of the next ones, as it is read."""
+        if not request.state.options.edge_aware:
+            self._guides.keep(())
+        elif self._is_guided(request):  # else it is perhaps a still frame between two pictures that are
+            self._guides.keep(window_frames.guided_later(request, self._beside(request)))
+
+    def _coefficients(self, request: Request, labels: list[LabelLayer]) -> Coefficients:
+        """What the composition takes: a single 1 where one shutter holds everywhere."""
+        if _sole(request, labels) is not None:
+            return Coefficients(self.compositor.constant(np.ones(1)), self._everywhere)
+        return Coefficients(self._mixture(request, labels), request.state.options.aggregate)
+
+    def _mixture(self, request: Request, labels: list[LabelLayer]):
+        """Coefficients on the device, with the mattes laid over what the scribbles give. They are laid again only if
+        either has changed since the last call."""
+        state = request.state
+        if not state.mattes:
+            return self._diffused(request, labels)
+        values = self._mattes.values(state.mattes, request.index, state.options.aggregate)
+        count, sole = len(state.bars), sole_of(labels)
+        if sole is None:
+            beneath, below = self._diffused(request, labels), self._solved.made
+        else:
+            beneath, below = self.compositor.constant(np.eye(count)[sole]), None
+        key = state.mattes, [key for key, _ in values], count, sole, below
+        return self._laid.get(key, lambda: self._matting.lay(beneath, state.mattes, values))
+
+    def _diffused(self, request: Request, labels: list[LabelLayer]):
+        """Coefficients on the device. They are solved for only if labels or what guides them changed since the last
+        call, or if the last solution was a quick one and this must not be."""
+        options, count = request.state.options, len(request.state.bars)
+        frames = self._guiding(request, self.shot(request)) if options.edge_aware else ()
+
+        def solve():
+            self._keep_guides(request)
+            guided = (self._guides.guide(frames, options.aggregate), options.edge_aware) if frames else ()
+            return self._mixed(labels, count, guided, request.quick)
+
+        key = count, frames and (frames, options.edge_aware), [layer.key for layer in labels]
+        return self._solved.get(key, solve, quick=request.quick)
+
+    def _mixed(self, layers: list[LabelLayer], count: int, guided: tuple, quick: bool):
+        """The coefficients of all layers, solved for one after the other and added up. A solution that another layer
+        has begun from would depend on that one."""
+        if len(layers) == 1:
+            return self._solver.solve(layers[0].labels, count, *guided, warm=quick)
+        mixed = None
+        for layer in layers:
+            if layer.sole is None:
+                solved = self._solver.solve(layer.labels, count, *guided)
+            else:
+                solved = self.compositor.constant(np.eye(count)[layer.sole])
+            mixed = self._mixing.add(mixed, solved, layer.share, layer.labels.shape)
+        return mixed
+
     def release_window(self) -> None:
         """Frees the window's frames, and those that the search for cuts has read. The next picture reads them again."""
         with self.compositor.freeing():
             if self._window is not None:
                 self._window.release()
-                self._window = self._drawn = None
+                self._window = None
+                self._drawn.clear()
             self._guides.keep(())
         if self.source.shots is not None:
             self.source.shots.release()
@@ -314,8 +243,8 @@ class Renderer:
     def shortages(self) -> set[str]:
         """What was slow in the last picture, as the device has no room: "window", every picture sends the frames;
         "diffusion", NumPy diffuses."""
-        found = {"window"} if self._window is not None and self._window.sends else set()
-        return found | ({"diffusion"} if self._solver.gave_up else set())
+        window = {"window"} if self._window is not None and self._window.sends else set()
+        return window | ({"diffusion"} if self._solver.gave_up else set())
 
     def release(self) -> None:
         """Frees what the renderer has on the device. The next picture makes it again."""
@@ -324,7 +253,8 @@ class Renderer:
             self._solver.release()
             self._matting.release()
             self._mixing.release()
-        self._solved = self._laid = None
+        self._solved.clear()
+        self._laid.clear()
 
     def close(self) -> None:
         """Frees what the renderer has on the device, and closes the source."""
@@ -334,26 +264,6 @@ class Renderer:
         self.source.close()
 
 
-class _Layer(NamedTuple):
-    """Labels that count for a share of the coefficients; sole: the shutter that they give to the whole picture, if it
-    is one."""
-
-    share: float
-    labels: np.ndarray
-    sole: int | None
-
-
-def _equal(layers: list[_Layer], others: list[_Layer]) -> bool:
-    return len(layers) == len(others) and all(
-        one.share == other.share and np.array_equal(one.labels, other.labels)
-        for one, other in zip(layers, others, strict=True)
-    )
-
-
-def _sole(labels: np.ndarray) -> int | None:
-    """The shutter of all scribbles, if it is one; the first where there is no scribble. It holds everywhere."""
-    highest = int(labels.max())
-    if highest == scribbles.FREE:
-        return 0
-    lowest = int((labels - np.uint16(1)).min())  # the lowest shutter: a free pixel's 0 wraps around to 65,535
-    return lowest if lowest == highest - 1 else None
+def _sole(request: Request, labels: list[LabelLayer]) -> int | None:
+    """The shutter that holds for the whole picture, if one does."""
+    return None if request.state.mattes else sole_of(labels)

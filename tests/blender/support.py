@@ -1,5 +1,6 @@
 """Pictures and recipes for the tests of the Blender layer."""
 
+import dataclasses
 import json
 import subprocess
 from contextlib import contextmanager
@@ -100,18 +101,41 @@ def source_time(edit, effect, frame):
 
 def picture_of(scene, scene_frame, **options):
     """The picture of an effect scene, as the engine gives it to Blender."""
-    from shutter_addon.blender.rendering import job_snapshots, session
+    from shutter_addon.blender.rendering import job_snapshots, pictures
 
-    return session.picture(*job_snapshots.of(scene, scene_frame), **options)
+    return pictures.picture(*job_snapshots.of(scene, scene_frame), **options)
 
 
 def request(edit, effect, strip, frame):
-    """What is asked of the session for the picture at a timeline frame."""
+    """What is asked of the session for the picture at a timeline frame, and what it gives."""
     from shutter_addon.blender.data import snapshot
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import render_settings, session
 
-    folder = session.settings().inbetween
-    return session.here().request(snapshot.take(edit, effect, strip, (frame,), folder=folder), frame)
+    folder = render_settings.settings().inbetween
+    here = session.here()
+    return Asked(here, here.request(snapshot.take(edit, effect, strip, (frame,), folder=folder), frame))
+
+
+class Asked:
+    """A request of a session, with what is made of it."""
+
+    def __init__(self, session, request):
+        self.session, self.request, self.renderer = session, request, session.renderer(request.source)
+        self.state, self.index, self.direction = request.state, request.index, request.direction
+
+    def with_state(self, state):
+        return Asked(self.session, dataclasses.replace(self.request, state=state))
+
+    def picture(self):
+        return self.session.picture(self.request)
+
+    def coefficients(self):
+        return self.session.coefficients(self.request)
+
+    def check(self):
+        from shutter_addon.blender.rendering import decoding_ahead
+
+        decoding_ahead.check(self.renderer, self.request)
 
 
 @contextmanager

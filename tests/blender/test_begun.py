@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from support import noise_film, picture_of
 
+from shutter_addon.core.stopping import StoppedError
+
 
 @pytest.fixture
 def film(bpy, edit, tmp_path):
@@ -22,9 +24,9 @@ def composed(monkeypatch):
 
     made, picture = [], Renderer.picture
 
-    def noted(self, index, *arguments):
-        made.append(index)
-        return picture(self, index, *arguments)
+    def noted(self, request):
+        made.append(request.index)
+        return picture(self, request)
 
     monkeypatch.setattr(Renderer, "picture", noted)
     return made
@@ -113,19 +115,20 @@ def test_what_a_job_takes_away_meanwhile_is_not_missed(bpy):
 
 def test_who_is_stopped_waits_neither_for_a_device_nor_for_others_to_be_closed(film):
     """Though the session's thread waits, as for a window that does not answer."""
-    from shutter_addon.blender.rendering import job_snapshots, session
+    from shutter_addon.blender.rendering import effect_source, job_snapshots, session
 
-    scene, answer, half = film[2].scene, threading.Event(), session.Detail(2)
+    scene, answer, half = film[2].scene, threading.Event(), effect_source.Detail(2)
     waits = session._offscreen._submit(answer.wait, 10).future
     stops = iter([False])  # and then it is stopped
-    with pytest.raises(session.StoppedError):
+    with pytest.raises(StoppedError):
         picture_of(scene, 1, stopped=lambda: next(stops, True))
     assert not waits.done()
     answer.set()
-    first = session._offscreen.request(*job_snapshots.of(scene, 1), detail=session.FULL)
+    first = session._offscreen.request(*job_snapshots.of(scene, 1), detail=effect_source.FULL)
     answer.clear()
     waits = session._offscreen._submit(answer.wait, 10).future
-    assert session._offscreen.request(*job_snapshots.of(scene, 1), detail=half).renderer is not first.renderer
+    second = session._offscreen.request(*job_snapshots.of(scene, 1), detail=half)
+    assert (first.source.detail, second.source.detail) == (effect_source.FULL, half)
     assert not waits.done()
     answer.set()
     session.forget()
@@ -133,14 +136,15 @@ def test_who_is_stopped_waits_neither_for_a_device_nor_for_others_to_be_closed(f
 
 def test_who_asks_for_room_keeps_what_it_uses(film):
     """The other one may ask it in turn, while it waits for that."""
-    from shutter_addon.blender.rendering import job_snapshots, session
+    from shutter_addon.blender.rendering import effect_source, job_snapshots, session
 
     found = session.RenderSession(lambda: ("cpu", None), lambda: found.free())
-    request = found.request(*job_snapshots.of(film[2].scene, 1), detail=session.FULL)
-    found.picture(film[2].scene.session_uid, request)
-    window = request.renderer._window
+    request = found.request(*job_snapshots.of(film[2].scene, 1), detail=effect_source.FULL)
+    found.picture(request)
+    renderer = found.renderer(request.source)
+    window = renderer._window
     found._ask()
-    assert request.renderer._window is window
+    assert renderer._window is window
     found.free()
-    assert request.renderer._window is None
+    assert renderer._window is None
     found.forget()

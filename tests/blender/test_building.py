@@ -108,7 +108,7 @@ def test_built_shown_and_removed(bpy, inbetween_build, effect, tmp_path, capfd):
 def test_a_build_reopens_its_source_once_and_no_other(bpy, inbetween_build, edit, effect, flow, tmp_path, monkeypatch):
     """However often pictures are asked for meanwhile."""
     from shutter_addon.blender.data import selection, strips
-    from shutter_addon.blender.rendering import invalidation, session
+    from shutter_addon.blender.rendering import effect_source, invalidation
 
     bpy.ops.shutter.inbetween_build()
     first = selection.active(bpy.context)[2]
@@ -116,11 +116,9 @@ def test_a_build_reopens_its_source_once_and_no_other(bpy, inbetween_build, edit
     begun = selection.active(bpy.context)
     ready = edit, strips.effect_of(edit, first.scene), first
     opened, asked, go = [], threading.Semaphore(0), threading.Semaphore(0)
-    usual = session.open_source
+    usual = effect_source.SourceKey.open
     monkeypatch.setattr(
-        session,
-        "open_source",
-        lambda shown, *size, **how: opened.append(shown.timing.name) or usual(shown, *size, **how),
+        effect_source.SourceKey, "open", lambda key, **how: opened.append(key.scene) or usual(key, **how)
     )
 
     def draw():
@@ -142,7 +140,7 @@ def test_a_build_reopens_its_source_once_and_no_other(bpy, inbetween_build, edit
     inbetween_build.ended()
     assert draw()
     assert not draw()
-    assert opened[2:] == [strips.source_of(*begun).name]
+    assert opened[2:] == [begun[1].scene.session_uid]
 
 
 def test_nothing_is_left_of_an_empty_folder(bpy, effect, tmp_path):

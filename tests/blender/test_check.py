@@ -102,11 +102,11 @@ def test_the_report_for_people(noise, check, bpy, tmp_path, capsys):
 
 
 def test_the_device_and_its_memory_are_those_that_are_asked_for(noise, check, monkeypatch):
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import render_settings
 
     report = check("--device", "cpu")[2]
     assert (report["device"], report["memory"]["gpu_limit"]) == ("NumPy", None)
-    monkeypatch.setattr(session, "_budget", None)  # as in a process of its own
+    monkeypatch.setattr(render_settings, "_budget", None)  # as in a process of its own
     report = check("--gpu-memory", "123")[2]
     assert report["device"] == "NumPy" or report["memory"]["gpu_limit"] == 123 << 20
 

@@ -138,23 +138,23 @@ def test_colour_spaces(edit, render, tmp_path, clip_strip, movie, space):
 
 def test_what_is_not_supported_is_said(edit, clip_strip, movie):
     from shutter_addon.blender.editing import add_effect, shutter_edits
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import effect_source
 
     source = clip_strip(movie)
     strip, effect = add_effect.add_effect(edit, source)
     shutter_edits.start(effect)
     picture_of(strip.scene, 1)
     source.stabilize2d = True
-    with pytest.raises(session.FAULTS, match='"clip": undistorted or stabilized clips are not supported'):
+    with pytest.raises(effect_source.FAULTS, match='"clip": undistorted or stabilized clips are not supported'):
         picture_of(strip.scene, 1)
     source.stabilize2d, source.clip = False, None
-    with pytest.raises(session.FAULTS, match='"clip" has no clip'):
+    with pytest.raises(effect_source.FAULTS, match='"clip" has no clip'):
         picture_of(strip.scene, 1)
 
 
 def test_a_retimed_clip_is_refused(bpy, edit, clip_strip, movie):
     from shutter_addon.blender.editing import add_effect, shutter_edits
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import effect_source
 
     source = clip_strip(movie)
     edit.sequence_editor.active_strip, source.select, source.show_retiming_keys = source, True, True
@@ -165,5 +165,5 @@ def test_a_retimed_clip_is_refused(bpy, edit, clip_strip, movie):
     assert source.content_end - source.content_start > 30
     strip, effect = add_effect.add_effect(edit, source)
     shutter_edits.start(effect)
-    with pytest.raises(session.FAULTS, match='"clip" is not as long as its clip'):
+    with pytest.raises(effect_source.FAULTS, match='"clip" is not as long as its clip'):
         picture_of(strip.scene, 1)

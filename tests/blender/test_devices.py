@@ -79,7 +79,7 @@ def test_the_preference_chooses(effect, preferred):
     """From the next render on, if the command asks for nothing else."""
     from shutter_addon.blender.data import preferences
     from shutter_addon.blender.devices import available
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import render_settings, session
 
     def composed_by():
         session.settle()
@@ -89,7 +89,7 @@ def test_the_preference_chooses(effect, preferred):
     for wanted, found in (("CPU", CPUCompositor), ("AUTO", GPUCompositor), ("OPENGL", GPUCompositor)):
         preferred.device = wanted
         assert composed_by() is found, wanted
-        with session.using(session.RenderSettings(device="cpu")):
+        with render_settings.using(render_settings.RenderSettings(device="cpu")):
             assert composed_by() is CPUCompositor, wanted
     assert {item[0].lower() for item in preferences.DEVICES} == set(available.CHOICES)
     session.forget()

@@ -121,12 +121,15 @@ def test_reversed_and_retimed_strips_follow_the_shown_frame(add, film, same_pixe
 
 def test_in_betweens_that_it_needs_are_told_and_built(bpy, add, film, tmp_path):
     """Where the window does not show them: the shutters are open after the shown frame alone."""
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import render_settings, session
 
     data = effect_recipe(inbetween=2, time=[{"frame": 1, "value": 3.5}], edge_aware=1)
     for shutter, bars in zip(data["shutters"], ([0, 1, 0], [0, 0, 0.5]), strict=True):
         shutter["bars"] = bars
-    with session.using(session.RenderSettings(inbetween=tmp_path / "cache")), open_source(film) as source:
+    with (
+        render_settings.using(render_settings.RenderSettings(inbetween=tmp_path / "cache")),
+        open_source(film) as source,
+    ):
         edit, effect, strip = add(film, data)
         inbetween.build(source, tmp_path / "cache", 2, "quick", frames=(3, 4), between=between)
         wanted = request(edit, effect, strip, 1)
@@ -148,14 +151,14 @@ def test_in_betweens_that_it_needs_are_told_and_built(bpy, add, film, tmp_path):
 
 def test_a_draft_has_larger_blocks_where_edges_are_followed(add, film, monkeypatch):
     """Coefficients of a draft are those of the blocks; films and what has no edges to follow are never drafts."""
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.interface import previewing
 
-    monkeypatch.setattr(session, "DRAFT_ROWS", SIZE[1] // 3)
+    monkeypatch.setattr(previewing, "DRAFT_ROWS", SIZE[1] // 3)
     edit, effect, strip = add(film, effect_recipe(edge_aware=1))
     exact = request(edit, effect, strip, 3)
-    draft = exact.draft()
+    draft = previewing.draft(exact.request, exact.renderer.source)
     assert (exact.state.options.aggregate, draft.state.options.aggregate) == (1, 4)
-    assert draft.coefficients().shape[1:] == (-(-SIZE[1] // 4), -(-SIZE[0] // 4))
+    assert exact.session.coefficients(draft).shape[1:] == (-(-SIZE[1] // 4), -(-SIZE[0] // 4))
     effect.edge_aware = 0
     plain = request(edit, effect, strip, 3)
-    assert plain.draft() is plain
+    assert previewing.draft(plain.request, plain.renderer.source) is plain.request

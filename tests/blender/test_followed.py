@@ -81,7 +81,7 @@ def test_what_moves_by_keys_stays_sharp(shown, velocity, most):
     keys = {frame: place(frame - 1, velocity) for frame in (1, COUNT)}
     *_, found = shown(following(keys), velocity, 9)
     assert levels_off(found, velocity) <= most
-    assert levels_off(replace(found, state=replace(found.state, following=None)), velocity) > 30
+    assert levels_off(found.with_state(replace(found.state, following=None)), velocity) > 30
 
 
 @pytest.mark.parametrize("position", ["start", "center", "end"])
@@ -123,7 +123,7 @@ def test_the_exposure_ends_at_a_cut(shown, position):
         *_, found = shown(data, velocity, frame, film=two_shots)
         assert levels_off(found, velocity, two_shots) <= 0.6
     options = replace(found.state.options, stop_at_cuts=False, position="center")
-    assert levels_off(replace(found, state=replace(found.state, options=options)), velocity, two_shots) > 30
+    assert levels_off(found.with_state(replace(found.state, options=options)), velocity, two_shots) > 30
 
 
 def test_the_camera_and_nothing_left_behind(shown):

@@ -54,23 +54,23 @@ def test_a_limit_is_a_number_of_megabytes(bpy, capsys, given):
 
 
 def test_a_session_gives_back_what_it_took_and_settles_for_another_limit(bpy, edit, effect):
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import render_settings, session
 
     session.forget()
-    with session.using(session.RenderSettings(gpu_memory=ROOMY)):
+    with render_settings.using(render_settings.RenderSettings(gpu_memory=ROOMY)):
         session.settle()
         picture = picture_of(effect.scene, 1)
-        budget = session.memory()
+        budget = render_settings.memory()
         assert (budget.limit, budget.used > 0) == (ROOMY << 20, True)
         session._offscreen.free()
         assert np.array_equal(picture_of(effect.scene, 1), picture)
-    with session.using(session.RenderSettings(gpu_memory=SMALL)):
+    with render_settings.using(render_settings.RenderSettings(gpu_memory=SMALL)):
         session.settle()
         assert budget.used == 0
         assert np.abs(picture_of(effect.scene, 1) - picture).max() <= 2**-14
-        budget = session.memory()
+        budget = render_settings.memory()
         assert (budget.limit, budget.used > 0) == (SMALL << 20, True)
     session.forget()
     assert budget.used == 0
     session.settle()
-    assert session.memory().limit > ROOMY << 20
+    assert render_settings.memory().limit > ROOMY << 20

@@ -27,9 +27,9 @@ def cut_film():
 @pytest.fixture
 def cache(bpy, tmp_path):
     """The folder of in-between frames."""
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import render_settings
 
-    with session.using(session.RenderSettings(inbetween=tmp_path / "cache")):
+    with render_settings.using(render_settings.RenderSettings(inbetween=tmp_path / "cache")):
         yield tmp_path / "cache"
 
 

@@ -129,15 +129,16 @@ def test_a_single_frame_that_fails_is_not_written(bpy, film, tmp_path):
     assert not (tmp_path / "still.png").exists()
 
 
-@pytest.mark.parametrize("name", ["resized", "picture", "here"])
+@pytest.mark.parametrize("name", ["pictures.resized", "pictures.picture", "session.here"])
 @pytest.mark.parametrize("fault", [MemoryError(), KeyboardInterrupt(), ValueError("odd")])
 def test_no_fault_gives_a_plain_frame(bpy, film, tmp_path, capfd, monkeypatch, name, fault):
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender import rendering
 
     def fails(*_arguments):
         raise fault
 
-    monkeypatch.setattr(session, name, fails)
+    module, function = name.split(".")
+    monkeypatch.setattr(getattr(rendering, module), function, fails)
     assert bpy.ops.render.render(animation=True) == {"CANCELLED"}
     assert not (tmp_path / "out").exists()
     expected = {MemoryError: "not enough memory", KeyboardInterrupt: "was stopped", ValueError: "internal error"}
@@ -273,9 +274,9 @@ import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs are started without
 def stop(scene, *_):
     if scene.frame_current == 20 and scene.render.engine == "VIRTUAL_SHUTTER":
-        from shutter_addon.blender.rendering import session
+        from shutter_addon.blender.rendering import pictures, session
         def interrupted(*_, **__): signal.raise_signal(signal.SIGINT)
-        session.picture = interrupted
+        pictures.picture = interrupted
 """
     script = SCRIPT.replace("print(bpy.ops", f"{stop}bpy.app.handlers.render_init.append(stop)\nprint(bpy.ops")
     command = [sys.executable, "-c", script, str(tmp_path / "edit.blend")]

@@ -148,10 +148,10 @@ def test_a_part_of_a_cut_source_is_read_as_itself(bpy, found):
 def test_another_factor_is_another_source_though_nothing_is_built(found, tmp_path):
     from support import request
 
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import render_settings
 
     edit, effect, strip = found
-    with session.using(session.RenderSettings("cpu", inbetween=tmp_path / "none")):
+    with render_settings.using(render_settings.RenderSettings("cpu", inbetween=tmp_path / "none")):
         sources = []
         for factor, method in (("1", "QUICK"), ("4", "QUICK"), ("4", "GOOD"), ("1", "GOOD")):
             effect.inbetween, effect.inbetween_method = factor, method

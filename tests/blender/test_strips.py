@@ -359,22 +359,22 @@ def test_half_resolution(edit, render, effect_on, movie):
 
 
 def test_a_deleted_source_is_said(bpy, edit, effect_on, movie):
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import effect_source
 
     source = new_movie(edit, movie)
     _, effect = effect_on(source)
     edit.sequence_editor.strips.remove(source)
-    with pytest.raises(session.FAULTS, match='the source strip of "Shutter" was deleted'):
+    with pytest.raises(effect_source.FAULTS, match='the source strip of "Shutter" was deleted'):
         picture_of(effect.scene, 5)
 
 
 def test_no_shutters_and_a_closed_shutter_are_said(bpy, edit, effect_on, movie):
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import effect_source
 
     _, effect = effect_on(new_movie(edit, movie))
     effect.shutters[0].bars[0].weight = 0
-    with pytest.raises(session.FAULTS, match='shutter "S0" at frame 5: all bars are zero'):
+    with pytest.raises(effect_source.FAULTS, match='shutter "S0" at frame 5: all bars are zero'):
         picture_of(effect.scene, 5)
     effect.shutters.clear()
-    with pytest.raises(session.FAULTS, match='"Shutter" has no shutter'):
+    with pytest.raises(effect_source.FAULTS, match='"Shutter" has no shutter'):
         picture_of(effect.scene, 5)

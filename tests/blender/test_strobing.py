@@ -51,6 +51,11 @@ def add(bpy, edit, tmp_path):
     strobing.forget()
 
 
+def asked(edit, effect, strip, frame):
+    found = request(edit, effect, strip, frame)
+    return found.renderer, found.request
+
+
 def looked(edit, effect, strip):
     """What is said once all is measured, as a frame that stays is drawn again and again."""
     from shutter_addon.blender.data import snapshot
@@ -59,7 +64,7 @@ def looked(edit, effect, strip):
     for _ in range(4):
         frame = edit.frame_current
         taken = snapshot.take(edit, effect, strip, (frame,))
-        found = strobing.look(effect, strip, taken, request(edit, effect, strip, frame))
+        found = strobing.look(effect, strip, taken, *asked(edit, effect, strip, frame))
         if not strobing.is_busy():
             return found
         strobing.advance()
@@ -147,7 +152,7 @@ def test_drawing_never_waits_and_measures_once(add, monkeypatch):
     from shutter_addon.blender.data import snapshot
 
     taken = snapshot.take(edit, effect, strip, (4,))
-    assert strobing.look(effect, strip, taken, request(edit, effect, strip, 4)) is None
+    assert strobing.look(effect, strip, taken, *asked(edit, effect, strip, 4)) is None
     assert not measured
     for frame in (4, 5, 6, 4):
         edit.frame_set(frame)
@@ -235,12 +240,12 @@ def test_the_estimate_is_near_what_is_built(add, smoothed):
     edit, effect, strip = add(3, np.ones(4))
     strip.left_handle, strip.right_handle = 3, 6
     taken = snapshot.take(edit, effect, strip, range(3, 6))
-    found = request(edit, effect, strip, 4)
+    renderer, asked_for = asked(edit, effect, strip, 4)
     settings = replace_factor(effect, 4)
     with taken.source.open() as medium:
         needed = strobing.pairs(taken, medium, settings)
     assert needed == [2, 3, 4, 5, 6, 7]
-    assert strobing._count(strip, taken, found) == len(needed)
+    assert strobing._count(strip, taken, renderer.source, asked_for) == len(needed)
 
 
 def replace_factor(effect, factor):

@@ -29,9 +29,9 @@ def effect(bpy, edit, tmp_path, monkeypatch):
     """An effect of two shutters, the second keyed and drawn with; its strip active."""
     from shutter_addon.blender.data import annotations, selection
     from shutter_addon.blender.editing import add_effect, bar_edits, region_edits, shutter_edits
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import render_settings, session
 
-    monkeypatch.setattr(session, "_settings", session.RenderSettings(device="cpu"))
+    monkeypatch.setattr(render_settings, "_settings", render_settings.RenderSettings(device="cpu"))
     frames = np.random.default_rng(0).integers(0, 256, (12, 24, 40, 3), dtype=np.uint8)
     first = write_frames(tmp_path / "in", frames)
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
@@ -235,13 +235,13 @@ IMPOSSIBLE = {
 @pytest.mark.parametrize("name", IMPOSSIBLE)
 def test_one_sentence_tells_the_place(bpy, edit, effect, name):
     """From the renderer, and from wherever the effect is shown no trace."""
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import effect_source
 
     scene = effect.scene
     assert picture_of(scene, 4).shape == (24, 40, 4)
     change, sentence = IMPOSSIBLE[name]
     change(effect)
-    with pytest.raises(session.FAULTS) as raised:
+    with pytest.raises(effect_source.FAULTS) as raised:
         picture_of(scene, 4)
     assert sentence in str(raised.value)
     assert len(str(raised.value)) <= 300
@@ -267,12 +267,12 @@ def test_what_f_curves_give_stays_in_range(bpy, edit, effect):
 def test_a_strip_that_is_scaled_to_nothing(bpy, edit, effect):
     """A strip may grow from nothing: where nobody sees it, its scribbles do not matter. A recipe would lack them."""
     from shutter_addon.blender.data import recipe_export
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import effect_source
 
     strip = strip_of(effect)
     strip.transform.scale_x = 0
     assert picture_of(effect.scene, 4).shape == (24, 40, 4)
-    with pytest.raises(session.FAULTS, match='strip "Shutter" is too small to find its scribbles'):
+    with pytest.raises(effect_source.FAULTS, match='strip "Shutter" is too small to find its scribbles'):
         recipe_export.recipe_of(edit, effect, strip)
     show(bpy, edit)
 
@@ -315,7 +315,7 @@ def test_keys_stay_where_they_are_when_the_start_is_none(bpy, edit, effect, star
 def test_a_copy_has_the_same_impossible_choice(bpy, edit, effect):
     """Copies of what cannot be copied would come with every update, and never be finished."""
     from shutter_addon.blender.editing import copies
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import effect_source
 
     raw(effect, "position", 77)
     raw(effect.regions[0], "kind", 5)
@@ -324,7 +324,7 @@ def test_a_copy_has_the_same_impossible_choice(bpy, edit, effect):
         copies.adopt()
     assert len(edit.virtual_shutter.effects) == 2
     for scene in [effect.scene for effect in edit.virtual_shutter.effects]:
-        with pytest.raises(session.FAULTS, match="Position is none of its choices"):
+        with pytest.raises(effect_source.FAULTS, match="Position is none of its choices"):
             picture_of(scene, 4)
 
 
@@ -440,18 +440,18 @@ def corrupt(rng, effect):
 
 
 def rendered(scene):
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import effect_source
 
-    with suppress(session.FAULTS):
+    with suppress(effect_source.FAULTS):
         assert np.isfinite(picture_of(scene, 4)).all()
 
 
 def exported(edit, effect):
     from shutter_addon.blender.output import matte_export
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import effect_source
     from shutter_addon.core.recipes.recipe import RecipeError
 
-    with suppress(*session.FAULTS, RecipeError), TemporaryDirectory() as folder:
+    with suppress(*effect_source.FAULTS, RecipeError), TemporaryDirectory() as folder:
         matte_export.recipe_for(edit, effect, strip_of(effect), Path(folder, "r.json"))
 
 

@@ -11,6 +11,7 @@ from test_moved import following
 from shutter_addon.compute import window
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer
+from shutter_addon.compute.request import Request
 from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.core.model.mattes import Matte
 from shutter_addon.devices import budget
@@ -85,7 +86,7 @@ def rendered(device, source: FrameSource, states, mattes=None):
     """The pictures of these moments at frames 2, 3, …, and the renderer, closed."""
     compositor = GPUCompositor(device)
     renderer = Renderer(compositor, source, mattes)
-    pictures = [renderer.picture(2 + i, shown) for i, shown in enumerate(states)]
+    pictures = [renderer.picture(Request(2 + i, shown)) for i, shown in enumerate(states)]
     shortages, kind = renderer.shortages(), type(renderer._window).__name__
     renderer.close()
     free(compositor)
@@ -183,10 +184,12 @@ def test_several_effects_take_turns_and_show_the_same(limited):
     renderers = [Renderer(compositor, source) for source in sources]
     for index in range(2):
         for renderer, wanted in zip(renderers, alone, strict=True):
-            assert np.array_equal(renderer.picture(2 + index, moment()), wanted[index])
+            assert np.array_equal(renderer.picture(Request(2 + index, moment())), wanted[index])
             assert type(renderer._window) is window.Sums
     assert sum(renderer._window.is_open for renderer in renderers) == 1
-    assert np.array_equal(renderers[0].picture(3, moment()), alone[0][1])  # its last one, whose texture was freed
+    assert np.array_equal(
+        renderers[0].picture(Request(3, moment())), alone[0][1]
+    )  # its last one, whose texture was freed
     for renderer in renderers:
         renderer.close()
     free(compositor)
@@ -202,9 +205,9 @@ def test_pictures_do_not_depend_on_those_before(limited):
     compositor = GPUCompositor(device)
     renderer = Renderer(compositor, source)
     for i in (0, 1, 2, 3, 1, 0, 3, 2, 0):
-        assert np.array_equal(renderer.picture(2, shown[i]), alone[i])
+        assert np.array_equal(renderer.picture(Request(2, shown[i])), alone[i])
     renderer.release()
-    assert np.array_equal(renderer.picture(2, shown[0]), alone[0])
+    assert np.array_equal(renderer.picture(Request(2, shown[0])), alone[0])
     renderer.close()
     free(compositor)
 
@@ -215,15 +218,15 @@ def test_devices_share_a_budget(limited):
     shared = Budget(PIXELS * (SUMS + BESIDE))
     source, compositors = film(), [GPUCompositor(limited(shared, which)) for which in range(2)]
     first, second = (Renderer(compositor, source) for compositor in compositors)
-    assert np.array_equal(first.picture(2, moment()), wanted[0])
+    assert np.array_equal(first.picture(Request(2, moment())), wanted[0])
     assert shared.used > PIXELS * SUMS
     with pytest.raises(NoDeviceError, match="has no room"), compositors[1].current():
         compositors[1].device.texture(*SIZE, SUMS // 8, "rgba16ui")
     compositors[1].device.ask_others = first.release
-    assert np.array_equal(second.picture(2, moment()), wanted[0])
+    assert np.array_equal(second.picture(Request(2, moment())), wanted[0])
     assert first._window is None
     compositors[0].device.ask_others = second.release
-    assert np.array_equal(first.picture(3, moment()), wanted[1])
+    assert np.array_equal(first.picture(Request(3, moment())), wanted[1])
     for renderer, compositor in zip((first, second), compositors, strict=True):
         renderer.close()
         free(compositor)

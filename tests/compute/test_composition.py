@@ -9,6 +9,7 @@ from shutter_addon.compute import composition_passes, cpu, window
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
+from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.core.model import presets
@@ -80,8 +81,8 @@ def device(request):
 def composed(device, source, moment, index, direction=1, shot=None, mattes=None):
     """A device's picture, and the reference's with the same coefficients."""
     renderer = Renderer(device, source, mattes)
-    picture = renderer.picture(index, moment, direction)
-    c = renderer.coefficients(index, moment, direction)
+    picture = renderer.picture(Request(index, moment, direction))
+    c = renderer.coefficients(Request(index, moment, direction))
     block = moment.options.aggregate
     c = c.repeat(block, 1).repeat(block, 2)[:, : source.height, : source.width].astype(np.float64)
     c /= c.sum(axis=0)
@@ -222,7 +223,7 @@ def test_levels(device, alpha):
     source, moment = footage(rng, dtype=np.float32, transfer="linear", alpha=alpha), state(rng, window=1)
     source.frames[..., :3] -= 0.1
     renderer = Renderer(device, source)
-    picture, levels = renderer.picture(5, moment), renderer.levels(5, moment)
+    picture, levels = renderer.picture(Request(5, moment)), renderer.picture(Request(5, moment, levels=True))
     renderer.release_window()
     expected = 255 * light.to_encoded(picture[..., :3].astype(np.float64).clip(0, 1))
     assert expected.min() == 0
@@ -236,7 +237,7 @@ def test_levels(device, alpha):
 def test_levels_of_running_sums(device, few):
     rng = np.random.default_rng(32)
     renderer, moment = Renderer(device, footage(rng)), few_pieces(rng, 8) if few else state(rng)
-    picture, levels = renderer.picture(5, moment), renderer.levels(5, moment)
+    picture, levels = renderer.picture(Request(5, moment)), renderer.picture(Request(5, moment, levels=True))
     renderer.release_window()
     assert np.abs(levels - 255 * light.to_encoded(picture.astype(np.float64))).max() < 0.51
 
@@ -247,9 +248,8 @@ def test_light_without_cover_is_kept(device, dtype):
     frames = np.zeros((4, 2, 3, 4), dtype)
     frames[..., :3] = np.iinfo(dtype).max // 2 if np.dtype(dtype).kind == "u" else 0.5
     for transfer, lit in (("srgb", 0.2140), ("linear", 0.5)):
-        picture = Renderer(device, Footage(frames, transfer, "premultiplied")).picture(
-            0, FrameState(Options(4), np.ones((1, 4)))
-        )
+        asked = Request(0, FrameState(Options(4), np.ones((1, 4))))
+        picture = Renderer(device, Footage(frames, transfer, "premultiplied")).picture(asked)
         np.testing.assert_allclose(picture[..., :3], lit, atol=2e-4)
         assert (picture[..., 3] == 0).all()
 
@@ -275,10 +275,10 @@ def test_tiles(monkeypatch, tile, made, block):
 def test_sums_over_the_budget_are_not_made(monkeypatch, made):
     rng = np.random.default_rng(30)
     source, moment = footage(rng), made(rng)
-    expected = Renderer(CPUCompositor(), source).picture(2, moment)
+    expected = Renderer(CPUCompositor(), source).picture(Request(2, moment))
     monkeypatch.setattr(cpu, "SUMS_BYTES", 0)
     renderer = Renderer(CPUCompositor(), source)
-    picture = renderer.picture(2, moment)
+    picture = renderer.picture(Request(2, moment))
     assert isinstance(renderer._window, cpu.Frames)
     assert np.abs(picture - expected).max() < 2**-15
 
@@ -334,7 +334,7 @@ def test_still_frame_is_exact_to_the_bit_at_8_bits(device):
     bars = np.zeros((1, 8))
     bars[0, 2] = 0.3
     for index in (5, 0, 19):
-        picture = Renderer(device, source).picture(index, FrameState(Options(8), bars))
+        picture = Renderer(device, source).picture(Request(index, FrameState(Options(8), bars)))
         codes = np.rint(light.to_encoded(picture[..., :3].astype(np.float64)) * 255)
         assert np.array_equal(codes, source.frames[min(index + 2, 19), ..., :3])
 
@@ -345,12 +345,12 @@ def test_a_window_that_slides_reads_one_frame(device):
     renderer = Renderer(device, source)
     moment = state(rng)
     moment.bars[:, -1] = 1
-    renderer.picture(0, moment)
+    renderer.picture(Request(0, moment))
     assert source.reads == list(range(16))
-    renderer.picture(1, moment)
-    renderer.picture(1, moment)
+    renderer.picture(Request(1, moment))
+    renderer.picture(Request(1, moment))
     assert source.reads == list(range(17))
-    renderer.picture(0, moment)
+    renderer.picture(Request(0, moment))
     assert source.reads == [*range(17), 0]
 
 
@@ -359,7 +359,7 @@ def test_frames_that_no_shutter_exposes_are_not_read(device):
     source = footage(rng)
     bars = np.zeros((1, 16))
     bars[0, 5:7] = 1
-    Renderer(device, source).picture(3, FrameState(Options(16), bars))
+    Renderer(device, source).picture(Request(3, FrameState(Options(16), bars)))
     assert source.reads == [8, 9]
 
 
@@ -367,12 +367,12 @@ def test_a_picture_stays_on_the_device(gpu_device):
     rng = np.random.default_rng(18)
     source, moment = footage(rng), state(rng)
     one, other = (Renderer(GPUCompositor(gpu_device), source) for _ in range(2))
-    drawn = one.draw(3, moment)
+    drawn = one.draw(Request(3, moment))
     with gpu_device.current():
-        other.draw(4, moment)
+        other.draw(Request(4, moment))
         assert drawn.size == (source.width, source.height, 1)
         pixels = gpu_device.read(drawn)[0, ::-1]
-    assert np.array_equal(pixels, other.picture(3, moment))
+    assert np.array_equal(pixels, other.picture(Request(3, moment)))
 
 
 @pytest.mark.parametrize("shapes", [SHAPES, SHAPES[:1], ()])
@@ -381,13 +381,12 @@ def test_coefficients_stay_on_the_device(gpu_device, shapes, block):
     rng = np.random.default_rng(19)
     source, moment = footage(rng), state(rng, shapes=shapes, count=6, aggregate=block)
     renderer = Renderer(GPUCompositor(gpu_device), source)
-    texture, size, count = renderer.drawn_coefficients(0, moment)
-    assert count == 6
+    texture, size = renderer.drawn_coefficients(Request(0, moment))
     with gpu_device.current():
         layers = gpu_device.read(texture)
-    values = np.moveaxis(layers, -1, 1).reshape(-1, *layers.shape[1:3])[:count]
+    values = np.moveaxis(layers, -1, 1).reshape(-1, *layers.shape[1:3])[:6]
     y, x = np.mgrid[: source.height, : source.width]
-    expected = renderer.coefficients(0, moment)[:, y // block, x // block]
+    expected = renderer.coefficients(Request(0, moment))[:, y // block, x // block]
     assert np.array_equal(values[:, y // size, x // size], expected)
 
 
@@ -399,7 +398,7 @@ def test_labels_are_those_of_the_shapes(device):
             moment = state(rng, shapes=shapes, **options)
             size = (10, 6) if "aggregate" in options else (37, 23)
             expected = rasterise(shapes, *size, border="border" in options)
-            assert np.array_equal(renderer.labels(moment), expected)
+            assert np.array_equal(renderer.labels(Request(0, moment))[0].labels, expected)
 
 
 @pytest.mark.parametrize("options", [{}, {"border": True}, {"edge_aware": 1.0}, {"aggregate": 2}])
@@ -411,12 +410,14 @@ def test_what_is_half_there_is_halfway(device, options):
 
     def found(*opacities):
         shapes = tuple(dataclasses.replace(s, opacity=o) for s, o in zip(SHAPES, opacities, strict=True))
-        return renderer.coefficients(3, dataclasses.replace(moment, shapes=shapes))
+        return renderer.coefficients(Request(3, dataclasses.replace(moment, shapes=shapes)))
 
     both, one, none = found(1, 1, 1), found(0, 1, 1), found(0, 0, 1)
     assert np.abs(found(0.25, 1, 1) - (0.25 * both + 0.75 * one)).max() < 1e-5
     assert np.abs(found(0.25, 0.75, 1) - (0.25 * both + 0.5 * one + 0.25 * none)).max() < 1e-5
-    assert np.array_equal(found(0, 1, 1), renderer.coefficients(3, dataclasses.replace(moment, shapes=SHAPES[1:])))
+    assert np.array_equal(
+        found(0, 1, 1), renderer.coefficients(Request(3, dataclasses.replace(moment, shapes=SHAPES[1:])))
+    )
     fading = tuple(dataclasses.replace(s, opacity=0.3) for s in SHAPES[:1])
     check(device, source, dataclasses.replace(moment, shapes=fading), 3)
 
@@ -424,7 +425,7 @@ def test_what_is_half_there_is_halfway(device, options):
 def test_a_single_shape_that_goes_leaves_the_default(device):
     renderer = Renderer(device, footage(np.random.default_rng(23)))
     moment = state(np.random.default_rng(23), shapes=(dataclasses.replace(SHAPES[0], opacity=0.25),))
-    found = renderer.coefficients(3, moment)
+    found = renderer.coefficients(Request(3, moment))
     assert pytest.approx(np.tile([0.75, 0.25, 0], (37 * 23, 1))) == found.reshape(3, -1).T
 
 
@@ -435,8 +436,8 @@ def test_what_is_needed_is_what_is_read(device):
             source = footage(rng)
             moment = state(rng, edges=edges, position="center")
             renderer = Renderer(device, source)
-            needed = renderer.needed(index, direction, moment)
-            renderer.picture(index, moment, direction)
+            needed = renderer.needed(Request(index, moment, direction))
+            renderer.picture(Request(index, moment, direction))
             assert set(source.reads) == needed
 
 
@@ -447,12 +448,12 @@ def test_no_new_solve_when_nothing_moved(device, monkeypatch):
     solve = solver.solve
     monkeypatch.setattr(solver, "solve", lambda self, *a, **k: solves.append(1) or solve(self, *a, **k))
     renderer, moment = Renderer(device, footage(rng)), state(rng)
-    first = renderer.picture(0, moment)
-    assert np.array_equal(first, renderer.picture(0, moment))
-    renderer.picture(1, moment)
+    first = renderer.picture(Request(0, moment))
+    assert np.array_equal(first, renderer.picture(Request(0, moment)))
+    renderer.picture(Request(1, moment))
     assert len(solves) == 1
     moved = state(rng, shapes=SHAPES[1:])
-    renderer.picture(0, moved)
+    renderer.picture(Request(0, moved))
     assert len(solves) == 2
 
 
@@ -461,13 +462,13 @@ def test_bands_and_streaming_change_nothing(monkeypatch, resident):
     rng = np.random.default_rng(14)
     source, moment = footage(rng), state(rng)
     device = open_compositor("gpu")
-    whole = Renderer(device, source).picture(0, moment)
+    whole = Renderer(device, source).picture(Request(0, moment))
     monkeypatch.setattr(window, "BAND_BYTES", source.width * 4 * 16)
     if not resident:
         monkeypatch.setattr(window, "beside", lambda *_: 1 << 50)
     renderer = Renderer(device, source)
     for index in (3, 0):
-        picture = renderer.picture(index, moment)
+        picture = renderer.picture(Request(index, moment))
     assert np.abs(picture - whole).max() <= (0 if resident else 2**-15)  # frames instead of their sums
 
 
@@ -524,7 +525,7 @@ def test_a_device_too_small_for_the_window_streams_it(monkeypatch):
     rng = np.random.default_rng(17)
     source, moment = footage(rng), state(rng)
     device = open_compositor("gpu")
-    whole = Renderer(device, source).picture(0, moment)
+    whole = Renderer(device, source).picture(Request(0, moment))
     make = GLDevice._make
 
     def small(self, width, height, layers, kind):
@@ -534,17 +535,17 @@ def test_a_device_too_small_for_the_window_streams_it(monkeypatch):
 
     monkeypatch.setattr(GLDevice, "_make", small)
     monkeypatch.setattr(window, "BAND_BYTES", source.width * 4 * 16 * 16)
-    assert np.abs(Renderer(device, source).picture(0, moment) - whole).max() <= 2**-15
+    assert np.abs(Renderer(device, source).picture(Request(0, moment)) - whole).max() <= 2**-15
 
 
 def test_history_leaves_no_trace(device):
     rng = np.random.default_rng(15)
     source, moment = footage(rng), state(rng)
     renderer = Renderer(device, source)
-    in_order = [renderer.picture(index, moment) for index in range(6)]
+    in_order = [renderer.picture(Request(index, moment)) for index in range(6)]
     for index in (4, 1, 5, 0, 3, 2):
-        assert np.array_equal(renderer.picture(index, moment), in_order[index])
-        assert np.array_equal(Renderer(device, source).picture(index, moment), in_order[index])
+        assert np.array_equal(renderer.picture(Request(index, moment)), in_order[index])
+        assert np.array_equal(Renderer(device, source).picture(Request(index, moment)), in_order[index])
 
 
 @pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
@@ -560,7 +561,8 @@ def test_running_sums_leave_no_trace(device, edges):
         moment = few_pieces(rng, edges=edges, light=light_, position="center")
         moment.bars[:, rng.integers(4, 16) :] = 0
         fresh = Renderer(device, source)
-        assert np.array_equal(renderer.picture(index, moment, direction), fresh.picture(index, moment, direction))
+        asked = Request(index, moment, direction)
+        assert np.array_equal(renderer.picture(asked), fresh.picture(asked))
         fresh.release_window()
 
 
@@ -571,14 +573,14 @@ def test_running_sums_wrap_around(device, window):
     source.count = 1000
     source.read = lambda index: source.frames[0]
     renderer, moment = Renderer(device, source), few_pieces(np.random.default_rng(25), window)
-    renderer.draw(0, moment)
+    renderer.draw(Request(0, moment))
     for sums in getattr(renderer._window, "_sums", ()):
         sums += np.uint32(2**32 - 300 * cpu.WHITE)  # NumPy's have room for 65537 frames
     for index in range(700):
         if index % 50 == 0 or index > 690:
-            assert np.abs(renderer.picture(index, moment) - 1).max() < 1e-6
+            assert np.abs(renderer.picture(Request(index, moment)) - 1).max() < 1e-6
         else:
-            renderer.draw(index, moment)
+            renderer.draw(Request(index, moment))
 
 
 @pytest.mark.parametrize(("edges", "last"), [("hold", 20), ("mirror", 12)])
@@ -587,7 +589,7 @@ def test_frames_that_are_seen_again_are_not_read_again(device, edges, last):
     source = footage(rng)
     renderer, moment = Renderer(device, source), few_pieces(rng, edges=edges)
     for index in range(4, last):
-        renderer.picture(index, moment)
+        renderer.picture(Request(index, moment))
     assert source.reads == list(range(4, 20))
 
 
@@ -596,7 +598,7 @@ def test_a_window_that_goes_back_reads_one_frame(device):
     source = footage(rng)
     renderer, moment = Renderer(device, source), few_pieces(rng)
     for index in (3, 2, 1):
-        renderer.picture(index, moment)
+        renderer.picture(Request(index, moment))
     assert source.reads == [*range(3, 19), 2, 1]
 
 
@@ -604,7 +606,7 @@ def test_a_frame_that_cannot_be_read_spoils_no_other(device):
     rng = np.random.default_rng(28)
     source, moment = footage(rng, count=40), few_pieces(rng)
     renderer, read = Renderer(device, source), source.read
-    expected = [renderer.picture(index, moment) for index in range(8)]
+    expected = [renderer.picture(Request(index, moment)) for index in range(8)]
     renderer = Renderer(device, source)
 
     def fail(index):
@@ -615,34 +617,34 @@ def test_a_frame_that_cannot_be_read_spoils_no_other(device):
     source.read = fail
     for index in (4, 5, 6, 3):
         if index + 15 < 20:
-            assert np.array_equal(renderer.picture(index, moment), expected[index])
+            assert np.array_equal(renderer.picture(Request(index, moment)), expected[index])
         else:
             with pytest.raises(ValueError, match="broken"):
-                renderer.picture(index, moment)
+                renderer.picture(Request(index, moment))
     source.read = read
-    assert np.array_equal(renderer.picture(7, moment), expected[7])
+    assert np.array_equal(renderer.picture(Request(7, moment)), expected[7])
 
 
 def test_quick_pictures_leave_no_trace_in_others(device):
     rng = np.random.default_rng(17)
     source, moment, moved = footage(rng), state(rng), state(rng, shapes=SHAPES[1:])
     renderer = Renderer(device, source)
-    expected = Renderer(device, source).picture(0, moment)
+    expected = Renderer(device, source).picture(Request(0, moment))
     for other in (moved, moment, moved):
-        renderer.draw(0, other, quick=True)
+        renderer.draw(Request(0, other, quick=True))
     with device.current():
-        quick = device.read(renderer.draw(0, moment, quick=True))
+        quick = device.read(renderer.draw(Request(0, moment, quick=True)))
     np.testing.assert_allclose(quick, expected, atol=0.1)
-    assert np.array_equal(renderer.picture(0, moment), expected)
+    assert np.array_equal(renderer.picture(Request(0, moment)), expected)
 
 
 def test_two_effects_share_a_device(device):
     rng = np.random.default_rng(16)
     source, first, second = footage(rng), state(rng), state(rng, shapes=SHAPES[:2])
     one, other = Renderer(device, source), Renderer(device, source)
-    expected = one.picture(0, first), other.picture(0, second)
-    assert np.array_equal(one.picture(0, first), expected[0])
-    assert np.array_equal(other.picture(0, second), expected[1])
+    expected = one.picture(Request(0, first)), other.picture(Request(0, second))
+    assert np.array_equal(one.picture(Request(0, first)), expected[0])
+    assert np.array_equal(other.picture(Request(0, second)), expected[1])
 
 
 def test_no_gl_says_so(monkeypatch):

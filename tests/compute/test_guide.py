@@ -10,6 +10,7 @@ from shutter_addon.compute import guide
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
+from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.core.model.scribbles import Shape
@@ -167,14 +168,14 @@ def test_pictures_equal_the_reference(device, aggregate, dtype):
         rng, 4, SHAPES[: min(count - 1, 2)], count, border=True, edge_aware=0.7, aggregate=aggregate, position="center"
     )
     renderer = Renderer(device, source)
-    labels = renderer.labels(moment)
+    labels = renderer.labels(Request(0, moment))[0].labels
     exact = exact_diffusion.solve(labels, count, guide_of(source, 2, aggregate), 0.7)
     assert np.abs(exact - exact_diffusion.solve(labels, count)).max() > 4 * LEVEL
-    assert np.abs(renderer.coefficients(2, moment) - exact).max() <= LEVEL
+    assert np.abs(renderer.coefficients(Request(2, moment)) - exact).max() <= LEVEL
     pixels = exact.repeat(aggregate, 1).repeat(aggregate, 2)[:, :60, :90]
     indices = compositor.window_indices(moment.options, 2, range(4))
     expected = compositor.compose(moment, source.linear()[np.maximum(indices, 0)], indices >= 0, pixels)
-    apart = np.abs(light.to_encoded(renderer.picture(2, moment).astype(float)) - light.to_encoded(expected))
+    apart = np.abs(light.to_encoded(renderer.picture(Request(2, moment)).astype(float)) - light.to_encoded(expected))
     assert (apart / np.maximum(1, np.abs(expected))).max() <= LEVEL
     with device.current():
         renderer.release_window()
@@ -191,8 +192,9 @@ def test_what_was_shown_before_leaves_no_trace():
         moment = guided(rng, 6, strength, position=position, aggregate=aggregate, stop_at_cuts=bool(rng.random() < 0.8))
         direction = 1 if rng.random() > 0.3 else -1
         fresh = Renderer(device, ShotSource(film(size=(17, 9))))
-        assert np.array_equal(renderer.picture(index, moment, direction), fresh.picture(index, moment, direction))
-        assert np.array_equal(renderer.coefficients(index, moment), fresh.coefficients(index, moment))
+        asked = Request(index, moment, direction)
+        assert np.array_equal(renderer.picture(asked), fresh.picture(asked))
+        assert np.array_equal(renderer.coefficients(Request(index, moment)), fresh.coefficients(Request(index, moment)))
 
 
 def test_nothing_is_taken_from_beyond_a_cut():
@@ -205,7 +207,7 @@ def test_nothing_is_taken_from_beyond_a_cut():
         for count in (14, 7):
             source = ShotSource(Footage(frames[:count]))
             source._cuts = {k: k == 7 for k in range(1, count)}
-            found.append(Renderer(CPUCompositor(), source).coefficients(6, moment))
+            found.append(Renderer(CPUCompositor(), source).coefficients(Request(6, moment)))
         assert np.array_equal(*found)
 
 
@@ -222,10 +224,10 @@ def test_at_0_nothing_more_is_read():
     still = FrameState(Options(4), np.eye(4)[[0, 0]], SHAPES[:1])  # the frame alone, everywhere
     other = FrameState(Options(4, border=True), still.bars, SHAPES[:1])
     for moment in (still, other):
-        assert reads(moment, lambda r, m: r.picture(3, m)) == [3]
-    assert reads(other, lambda r, m: r.coefficients(3, m)) == []
+        assert reads(moment, lambda r, m: r.picture(Request(3, m))) == [3]
+    assert reads(other, lambda r, m: r.coefficients(Request(3, m))) == []
     options = Options(4, border=True, edge_aware=0.5)
-    assert sorted(reads(FrameState(options, still.bars, SHAPES[:1]), lambda r, m: r.coefficients(3, m))) == [
+    assert sorted(reads(FrameState(options, still.bars, SHAPES[:1]), lambda r, m: r.coefficients(Request(3, m)))) == [
         1,
         2,
         3,
@@ -233,7 +235,7 @@ def test_at_0_nothing_more_is_read():
         5,
     ]
     everywhere = FrameState(Options(4, edge_aware=0.5), still.bars, SHAPES[:1])  # there is one shutter alone
-    assert reads(everywhere, lambda r, m: r.picture(3, m)) == [3]
+    assert reads(everywhere, lambda r, m: r.picture(Request(3, m))) == [3]
     assert guided(rng, 4, 0.0).key != guided(np.random.default_rng(52), 4, 0.5).key
 
 
@@ -244,7 +246,7 @@ def test_frames_of_the_window_are_not_read_again():
     moment = guided(rng, 6)
     renderer = Renderer(CPUCompositor(), ShotSource(source))
     for index in range(12):
-        renderer.picture(index, moment)
+        renderer.picture(Request(index, moment))
     assert len(source.reads) == len(set(source.reads))
 
 
@@ -253,13 +255,13 @@ def test_what_is_missing_is_what_is_read(position):
     source, moment = film(), guided(np.random.default_rng(54), 4, position=position)
     renderer = Renderer(CPUCompositor(), ShotSource(source))
     for index in range(22):
-        renderer.needed(index, 1, moment, known=False)  # which finds the cuts
+        renderer.needed(Request(index, moment), known=False)  # which finds the cuts
     renderer.release_window()
     for index in (5, 9, 20):
         source.reads.clear()
-        missing = renderer.missing(index, 1, moment)
+        missing = renderer.missing(Request(index, moment))
         assert missing >= {index}
-        renderer.picture(index, moment)
+        renderer.picture(Request(index, moment))
         assert set(source.reads) == missing
         renderer.release_window()
 
@@ -270,11 +272,11 @@ def test_in_betweens_that_guide_are_needed():
     renderer = Renderer(CPUCompositor(), ShotSource(source, STEP))
     still = FrameState(Options(1, step=STEP, edge_aware=1.0), np.ones((2, 1)), SHAPES[:1])
     moment = FrameState(Options(1, border=True, step=STEP, edge_aware=1.0), np.ones((2, 1)), SHAPES[:1])
-    assert renderer.needed(42, 1, still, known=False) == {42}
-    assert renderer.needed(42, 1, moment, known=False) == {36, 40, 42, 44, 48}
+    assert renderer.needed(Request(42, still), known=False) == {42}
+    assert renderer.needed(Request(42, moment), known=False) == {36, 40, 42, 44, 48}
     first = BETWEEN[1]
-    assert renderer.needed(first + 1, 1, moment, known=False) == {28, 32, 36}
-    assert renderer.needed(first + 2, 1, moment, known=False) == {29, 28, 32, 36}
+    assert renderer.needed(Request(first + 1, moment), known=False) == {28, 32, 36}
+    assert renderer.needed(Request(first + 2, moment), known=False) == {29, 28, 32, 36}
 
 
 def test_a_frame_that_cannot_be_read_is_missed_only_where_it_is_shown():
@@ -288,6 +290,6 @@ def test_a_frame_that_cannot_be_read_is_missed_only_where_it_is_shown():
 
     source.read = fail
     renderer = Renderer(CPUCompositor(), source)
-    renderer.coefficients(2, moment)
+    renderer.coefficients(Request(2, moment))
     with pytest.raises(MediaError, match="broken"):
-        renderer.coefficients(3, moment)
+        renderer.coefficients(Request(3, moment))

@@ -9,6 +9,7 @@ from test_moved import following
 
 from shutter_addon.compute import matting
 from shutter_addon.compute.renderer import Renderer
+from shutter_addon.compute.request import Request
 from shutter_addon.core.model.mattes import Matte
 
 
@@ -73,8 +74,8 @@ def laid(c, moment, reader, index):
 def check_mattes(device, source, moment, index=2, direction=1):  # noqa: F811
     reader = Values(source)
     renderer = Renderer(device, source, reader)
-    plain = Renderer(device, source).coefficients(index, replace(moment, mattes=()), direction)
-    found = renderer.coefficients(index, moment, direction)
+    plain = Renderer(device, source).coefficients(Request(index, replace(moment, mattes=()), direction))
+    found = renderer.coefficients(Request(index, moment, direction))
     assert np.abs(found - laid(plain, moment, reader, index)).max() <= LEVEL / 100
     renderer.release_window()
     check(device, source, moment, index, direction, mattes=reader)
@@ -119,8 +120,8 @@ def test_what_changes_is_laid_anew(device):  # noqa: F811
     moments = [(2, first), (3, first), (3, fainter), (3, replace(fainter, shapes=SHAPES[1:]))]
     moments += [(3, replace(first, mattes=first.mattes[:1])), (3, replace(first, mattes=())), (2, first)]
     for index, moment in moments:
-        found = renderer.coefficients(index, moment)
-        plain = Renderer(device, source).coefficients(index, replace(moment, mattes=()))
+        found = renderer.coefficients(Request(index, moment))
+        plain = Renderer(device, source).coefficients(Request(index, replace(moment, mattes=())))
         assert np.abs(found - laid(plain, moment, reader, index)).max() <= LEVEL / 100
 
 
@@ -131,10 +132,10 @@ def test_two_renderers_at_once(device):  # noqa: F811
     readers = [Values(source, seed) for seed in (1, 2)]
     renderers = [Renderer(device, source, reader) for reader in readers]
     moments = [replace(moment, mattes=mattes(rng, 2)) for _ in renderers]
-    expected = [renderer.picture(2, moment) for renderer, moment in zip(renderers, moments, strict=True)]
+    expected = [renderer.picture(Request(2, moment)) for renderer, moment in zip(renderers, moments, strict=True)]
     for renderer, moment, picture in zip(renderers * 2, moments * 2, expected * 2, strict=True):
         renderer.release_window()
-        assert np.array_equal(renderer.picture(2, moment), picture)
+        assert np.array_equal(renderer.picture(Request(2, moment)), picture)
 
 
 def test_add_leaves_no_rest_where_mattes_add_up_to_one(device):  # noqa: F811
@@ -144,5 +145,5 @@ def test_add_leaves_no_rest_where_mattes_add_up_to_one(device):  # noqa: F811
     reader = Values(source)
     reader.known = {(k, 2): shares[..., k] for k in range(3)}
     moment = replace(state(rng, shapes=()), mattes=tuple(Matte(k, Drawn(k), "add") for k in (1, 2)))
-    found = Renderer(device, source, reader).coefficients(2, moment)
+    found = Renderer(device, source, reader).coefficients(Request(2, moment))
     assert np.abs(found - np.moveaxis(shares, -1, 0)).max() <= 1e-6

@@ -10,6 +10,7 @@ from test_shots import SHOTS, shots_of
 from shutter_addon.compute import window
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer
+from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.model.frame_state import Following
 from shutter_addon.core.model.scribbles import Shape
@@ -115,7 +116,7 @@ def test_levels(device, monkeypatch):  # noqa: F811
     for most in (window.BAND_BYTES, 7 * (source.width + window.RIM) * (source.height + window.RIM) * 8):
         monkeypatch.setattr(window, "BAND_BYTES", most)
         renderer = Renderer(device, source)
-        picture, levels = renderer.picture(5, moment), renderer.levels(5, moment)
+        picture, levels = renderer.picture(Request(5, moment)), renderer.picture(Request(5, moment, levels=True))
         renderer.release_window()
         assert np.abs(levels - 255 * light.to_encoded(picture.astype(np.float64))).max() < 0.51
 
@@ -130,8 +131,8 @@ def test_following_nothing_changes_no_bit(device):  # noqa: F811
     """Nor does what is followed by a shutter that holds nowhere, or what stands still."""
     rng = np.random.default_rng(37)
     source, moment = footage(rng), state(rng, shapes=())
-    plain = Renderer(device, source).picture(3, moment)
-    assert np.array_equal(Renderer(device, source).picture(3, following(rng, source, moment, (1, 2))), plain)
+    plain = Renderer(device, source).picture(Request(3, moment))
+    assert np.array_equal(Renderer(device, source).picture(Request(3, following(rng, source, moment, (1, 2)))), plain)
     still = Following(0, np.ones((20, 3), complex), np.zeros((20, 3), complex))
     assert still.of(slice(None)) is None
 
@@ -141,9 +142,9 @@ def test_chunks_have_the_same_bits(device):  # noqa: F811
     source = footage(rng)
     moments = [following(rng, source, state(rng)) for _ in range(4)]
     renderer = Renderer(device, source)
-    in_order = [renderer.picture(index, moment) for index, moment in enumerate(moments)]
+    in_order = [renderer.picture(Request(index, moment)) for index, moment in enumerate(moments)]
     for index in (3, 1, 0, 2):
-        assert np.array_equal(Renderer(device, source).picture(index, moments[index]), in_order[index])
+        assert np.array_equal(Renderer(device, source).picture(Request(index, moments[index])), in_order[index])
 
 
 @pytest.mark.parametrize("seed", range(41, 45))
@@ -184,5 +185,5 @@ def test_frames_that_are_left_out_are_not_read(device):  # noqa: F811
     renderer = Renderer(device, source)
     for index in (14, 18):
         moment = following(rng, source, state(rng, edges="shorten"))
-        picture = renderer.picture(index, moment)
+        picture = renderer.picture(Request(index, moment))
     assert np.isfinite(picture).all()

@@ -6,6 +6,7 @@ from test_composition import SHAPES, footage, state
 
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer
+from shutter_addon.compute.request import Request
 from shutter_addon.core.model import shutters
 
 POINTS = [(0.001, 0.001), (0.999, 0.001), (0.31, 0.74), (0.65, 0.22), (0.5, 0.5)]
@@ -13,10 +14,8 @@ POINTS = [(0.001, 0.001), (0.999, 0.001), (0.31, 0.74), (0.65, 0.22), (0.5, 0.5)
 
 @pytest.fixture
 def request_of(blender_device):
-    from shutter_addon.blender.rendering.session import FrameRequest
-
     def made(moment):
-        return FrameRequest(Renderer(GPUCompositor(blender_device), footage(np.random.default_rng(3))), 4, moment, 1)
+        return Renderer(GPUCompositor(blender_device), footage(np.random.default_rng(3))), Request(4, moment)
 
     return made
 
@@ -29,32 +28,34 @@ def test_a_point_shows_its_pixels_coefficients_and_shutter(request_of, interpola
 
     rng = np.random.default_rng(count)
     shapes = SHAPES if count > 2 else SHAPES[::2]
-    found = request_of(state(rng, count=count, shapes=shapes, interpolation=interpolation, aggregate=aggregate))
-    values = found.renderer.coefficients(found.index, found.state)
-    source = found.renderer.source
+    renderer, request = request_of(
+        state(rng, count=count, shapes=shapes, interpolation=interpolation, aggregate=aggregate)
+    )
+    values = renderer.coefficients(request)
+    source = renderer.source
     for x, y in POINTS:
         row, column = int((1 - y) * source.height) // aggregate, int(x * source.width) // aggregate
-        probed = probe.at(found, (x, y))
+        probed = probe.at(renderer, request, (x, y))
         assert np.abs(probed.coefficients - values[:, row, column]).max() < 1e-3
         assert probed.coefficients.sum() == pytest.approx(1)
         between = shutters.INTERPOLATIONS[interpolation]
-        assert probed.bars == pytest.approx(between(found.state.bars, probed.coefficients))
+        assert probed.bars == pytest.approx(between(request.state.bars, probed.coefficients))
 
 
 def test_one_shutter_is_everywhere(request_of):
     from shutter_addon.blender.rendering import probe
 
-    found = request_of(state(np.random.default_rng(0), shapes=()))
-    probed = probe.at(found, (0.7, 0.2))
+    renderer, request = request_of(state(np.random.default_rng(0), shapes=()))
+    probed = probe.at(renderer, request, (0.7, 0.2))
     assert probed.coefficients.tolist() == [1, 0, 0]
-    assert probed.bars == pytest.approx(found.state.bars[0])
+    assert probed.bars == pytest.approx(request.state.bars[0])
 
 
 @pytest.mark.parametrize("point", [(-1, -1), (1.0, 0.5), (0.5, 0.0), (0.5, 1.01)])
 def test_beside_the_picture_there_is_nothing(request_of, point):
     from shutter_addon.blender.rendering import probe
 
-    assert probe.at(request_of(state(np.random.default_rng(0))), point) is None
+    assert probe.at(*request_of(state(np.random.default_rng(0))), point) is None
 
 
 def test_a_texel_is_that_of_the_whole_texture(blender_device):

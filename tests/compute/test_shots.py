@@ -8,6 +8,7 @@ import pytest
 from test_composition import Footage, check, few_pieces, state
 
 from shutter_addon.compute.renderer import Renderer, open_compositor
+from shutter_addon.compute.request import Request
 from shutter_addon.core.model import presets
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.media.cuts import NEIGHBOURS, ShotSource
@@ -82,7 +83,7 @@ def test_off_the_whole_clip_is_seen_and_nothing_looked_at(device):
     plain, source = film(), film()
     one, other = Renderer(device, plain), Renderer(device, ShotSource(source))
     for index in (2, 3, 9, 5):
-        assert np.array_equal(one.picture(index, moment), other.picture(index, moment))
+        assert np.array_equal(one.picture(Request(index, moment)), other.picture(Request(index, moment)))
     assert source.reads == plain.reads
 
 
@@ -98,7 +99,8 @@ def test_what_was_shown_before_leaves_no_trace(device):
         moment.bars[:, rng.integers(4, 16) :] = 0
         direction = 1 if rng.random() > 0.3 else -1
         fresh = Renderer(device, ShotSource(film(size=(17, 9))))
-        assert np.array_equal(renderer.picture(index, moment, direction), fresh.picture(index, moment, direction))
+        asked = Request(index, moment, direction)
+        assert np.array_equal(renderer.picture(asked), fresh.picture(asked))
         fresh.release_window()
 
 
@@ -108,12 +110,12 @@ def test_within_a_shot_every_frame_is_decoded_once(device):
     source.frames = np.stack([np.roll(source.frames[0], k, axis=1) for k in range(22)])
     renderer, moment = Renderer(device, ShotSource(source)), few_pieces(rng, 6)
     for index in range(12):
-        renderer.picture(index, moment)
+        renderer.picture(Request(index, moment))
     assert sorted(source.reads) == list(range(max(source.reads) + 1))
     assert max(source.reads) <= 11 + 5 + NEIGHBOURS  # and those that have a say in a cut
     still = FrameState(Options(6), presets.bars("STILL", 6)[None])
     source.reads.clear()
-    Renderer(device, ShotSource(source)).picture(9, still)
+    Renderer(device, ShotSource(source)).picture(Request(9, still))
     assert source.reads == [9]
 
 
@@ -121,7 +123,7 @@ def test_around_a_cut_no_frame_is_decoded_more_than_twice(device):
     source = film()
     renderer, moment = Renderer(device, ShotSource(source)), few_pieces(np.random.default_rng(46), 5)
     for index in range(22):
-        renderer.picture(index, moment)
+        renderer.picture(Request(index, moment))
     counts = np.bincount(source.reads, minlength=22)
     assert counts.max() <= 2
     assert counts.sum() <= 22 + 2 * 4
@@ -171,12 +173,12 @@ def test_what_is_missing_is_what_is_read(device, edges):
     moment = state(rng, 5, edges=edges, position="center")
     renderer = Renderer(device, ShotSource(source))
     for index in range(22):
-        renderer.picture(index, moment)
+        renderer.picture(Request(index, moment))
     renderer.release_window()
     for index in (5, 9, 20):
         source.reads.clear()
-        missing = renderer.missing(index, 1, moment)
-        renderer.picture(index, moment)
+        missing = renderer.missing(Request(index, moment))
+        renderer.picture(Request(index, moment))
         assert set(source.reads) == missing
         renderer.release_window()
 
@@ -195,6 +197,6 @@ def test_a_frame_that_cannot_be_read_is_missed_only_where_it_is_shown(device):
     source.read = fail
     last = FrameState(Options(5), np.eye(5)[4:])
     renderer = Renderer(device, ShotSource(source))
-    renderer.picture(2, last)
+    renderer.picture(Request(2, last))
     with pytest.raises(MediaError, match="broken"):
-        renderer.picture(1, last)
+        renderer.picture(Request(1, last))

@@ -8,6 +8,7 @@ from test_moved import following
 
 from shutter_addon.compute import window
 from shutter_addon.compute.renderer import Renderer
+from shutter_addon.compute.request import Request
 from shutter_addon.core import stopping
 from shutter_addon.core.model.scribbles import Shape
 
@@ -52,21 +53,21 @@ def test_what_comes_after_is_whole(device, kind, dtype, monkeypatch):  # noqa: F
     moments = [kind(np.random.default_rng(seed), source, shapes) for seed, shapes in ((51, SHAPES), (52, OTHER))]
     values = Values(source)
     asked = list(zip((FIRST, SECOND), moments, strict=True))
-    expected = [Renderer(device, source, values).picture(*one) for one in asked]
+    expected = [Renderer(device, source, values).picture(Request(*one)) for one in asked]
     renderer = Renderer(device, source, values)
     stopped, looks = counted()
-    renderer.picture(*asked[0])
+    renderer.picture(Request(*asked[0]))
     with stopping.once(stopped):
-        renderer.picture(*asked[1])
+        renderer.picture(Request(*asked[1]))
     assert len(looks) > 2
     for most in sorted({int(share * len(looks)) for share in np.linspace(0, 1, 6, endpoint=False)} | {len(looks) - 1}):
-        renderer.picture(*asked[0])
+        renderer.picture(Request(*asked[0]))
         stopped, had = counted(most)
         with stopping.once(stopped), pytest.raises(stopping.StoppedError):
-            renderer.picture(*asked[1])
+            renderer.picture(Request(*asked[1]))
         assert len(had) == most + 1  # not another step
         for one, right in zip(asked, expected, strict=True):
-            assert np.array_equal(renderer.picture(*one), right), most
+            assert np.array_equal(renderer.picture(Request(*one)), right), most
     renderer.close()
 
 
@@ -79,11 +80,11 @@ def test_a_quick_picture_starts_from_nothing_half_made(gpu_device):
     source = footage(rng, count=12, size=(61, 47))
     before, after = (plain(np.random.default_rng(54), source, shapes) for shapes in (SHAPES, OTHER))
     renderer = Renderer(compositor, source)
-    right = renderer.coefficients(0, after)
+    right = renderer.coefficients(Request(0, after))
     for most in range(0, 60, 4):
-        renderer.coefficients(0, before)
+        renderer.coefficients(Request(0, before))
         stopped, _ = counted(most)
         with gpu_device.current(), stopping.once(stopped), pytest.raises(stopping.StoppedError):
-            renderer.drawn_coefficients(0, after)
-        assert np.abs(renderer.coefficients(0, after) - right).max() < 1e-6
+            renderer.drawn_coefficients(Request(0, after))
+        assert np.abs(renderer.coefficients(Request(0, after)) - right).max() < 1e-6
     renderer.close()

@@ -50,6 +50,7 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
     """How far each device is off, as {device: (picture, coefficients)}. DifferenceError: too far; what differs is left
     in the folder."""
     from shutter_addon.compute.renderer import Renderer
+    from shutter_addon.compute.request import Request
     from shutter_addon.core.pixels import following
     from shutter_addon.core.recipes import recipe_file
     from shutter_addon.media import open_source
@@ -69,7 +70,8 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
         exact = exact_coefficients(case, source, footage, index)
         for name, device in devices.items():
             renderer = Renderer(device, source, MatteValues(source.width, source.height))
-            made, mix = renderer.picture(index, state, direction), renderer.coefficients(index, state, direction)
+            asked = Request(index, state, direction)
+            made, mix = renderer.picture(asked), renderer.coefficients(asked)
             with device.current():
                 renderer.release_window()
             right = picture(recipe, case.frame, footage, index, direction, mix)

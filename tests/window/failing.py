@@ -82,7 +82,7 @@ def story():
         yield 0.5
     scenes = [scene.name for scene in bpy.data.scenes]
     saw(scenes=scenes)
-    pictures = sys.modules[f"{traces.NAME}.shutter_addon.blender.rendering.session"]
+    pictures = sys.modules[f"{traces.NAME}.shutter_addon.blender.rendering.pictures"]
     picture, shown = pictures.picture, []
 
     def asked(*arguments):

@@ -157,9 +157,8 @@ def kept_time():
     edit, drawn = story.edit(), []
 
     def note():
-        ((_key, renderer),) = session()._window._renderers.values()
-        (index, *_), _exact, _picture = renderer._drawn
-        drawn.append((time.perf_counter(), edit.frame_current, index))
+        ((_snapshot, _frame, request),) = session()._window._requests.values()
+        drawn.append((time.perf_counter(), edit.frame_current, request.index))
 
     kept, edit.sync_mode = edit.sync_mode, "FRAME_DROP"
     edit.frame_set(1)

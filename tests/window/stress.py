@@ -255,8 +255,8 @@ class Film:
     def story(self, steps=(), film=True):
         """steps: generator functions of a film, each while a frame waits; the other frames do not.
         film: or else the picture of the current frame alone."""
-        session, self._picture = part("rendering.session"), part("rendering.session").picture
-        session.picture = self._waiting
+        pictures, self._picture = part("rendering.pictures"), part("rendering.pictures").picture
+        pictures.picture = self._waiting
         handlers = {
             "render_pre": self._before_frame,
             "render_cancel": partial(self._end, "cancelled"),
@@ -276,7 +276,7 @@ class Film:
         yield from until(lambda: self.ended and not rendering(), "the render ends", 100)
         for name, function in handlers.items():
             getattr(bpy.app.handlers, name).remove(function)
-        session.picture = self._picture
+        pictures.picture = self._picture
         saw(film=self.name, ended=self.ended, begun=self.begun)
 
     def picture_asked(self):

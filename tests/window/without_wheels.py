@@ -87,7 +87,7 @@ def story():
     assert part("rendering.session")._window._compositor.result().device.name, "the preview is on Blender's GPU"
     assert not said, said
     effect = edit.virtual_shutter.effects[0]
-    shown = part("rendering.session").picture(*part("rendering.job_snapshots").of(effect.scene, 3))
+    shown = part("rendering.pictures").picture(*part("rendering.job_snapshots").of(effect.scene, 3))
     for strip in part("data.strips").effect_strips(edit):
         strip.invalidate_cache("RAW")
     yield from rendered()

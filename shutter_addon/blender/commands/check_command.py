@@ -22,7 +22,7 @@ from ..editing import saved_edit
 from ..output import edit_check, film_join, film_output, output_space, shared_frames
 from ..output.edit_check import EffectCheck
 from ..output.output_space import Need, in_units
-from ..rendering import session
+from ..rendering import render_settings
 from . import command_line
 
 
@@ -54,7 +54,7 @@ def run(arguments) -> None:
     edit = saved_edit.open_edit(arguments.edit)
     first, last = command_line.frames(arguments.frames, (edit.frame_start, edit.frame_end), "edit")
     frames = range(first, last + 1)
-    with session.using(session.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)):
+    with render_settings.using(render_settings.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)):
         report = _report(arguments, edit, frames, saved_edit.version(edit, arguments.edit, opened))
     command_line.tell(json.dumps(report, indent=1) if arguments.json else "\n".join(_lines(report)))
     for fault in report["faults"]:
@@ -154,7 +154,7 @@ def _on_device(
     """The name of the device that will render, what is found of the effects (edit_check.effects), and the bytes that
     textures may take of a GPU; without a device, which is a fault, nothing of the effects."""
     try:
-        compositor, lesser = machine.open_device(session.wanted(), session.memory())
+        compositor, lesser = machine.open_device(render_settings.wanted(), render_settings.memory())
     except NoDeviceError as error:
         faults.append(str(error))
         return None, [], None

@@ -6,7 +6,7 @@ from ...media import inbetween
 from ..data import inbetween_settings, requirements, snapshot, source_media
 from ..editing import new_edit, saved_edit
 from ..output import film_output
-from ..rendering import job_snapshots, session
+from ..rendering import job_snapshots, render_settings, session
 from . import command_line
 
 
@@ -68,7 +68,7 @@ def build_lacking(film) -> None:
         frames = job_snapshots.asked_frames(edit, shown, edit == film)
         if edit == film:
             frames = {frame for frame in frames if film.frame_start - 1 < frame <= film.frame_end}
-        needing = snapshot.take(edit, effect, shown[0], frames, folder=session.settings().inbetween)
+        needing = snapshot.take(edit, effect, shown[0], frames, folder=render_settings.settings().inbetween)
         with needing.source.open() as medium:
             _build(medium, *needing.inbetween, sorted(session.pairs(needing)))
 

@@ -14,7 +14,7 @@ from ..data import inbetween_settings, missing_media, preferences, versions
 from ..devices import available
 from ..editing import new_edit, saved_edit
 from ..output import film_output, shared_frames
-from ..rendering import session
+from ..rendering import render_settings
 from . import command_line, inbetween_command
 
 
@@ -77,8 +77,8 @@ def _render_edit(arguments) -> None:
     edit.frame_start, edit.frame_end = frames = command_line.frames(arguments.frames, whole, "edit")
     for fault in missing_media.faults(edit, range(frames[0], frames[1] + 1), sources=True):
         raise film_output.OutputError(fault)  # Blender would render on without it
-    settings = session.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)
-    with session.using(settings), shared_frames.of_same_footage(edit) as rendered:
+    settings = render_settings.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)
+    with render_settings.using(settings), shared_frames.of_same_footage(edit) as rendered:
         version = saved_edit.version(edit, source, opened)
         job_file.guard(output, version)
         read = [source, *versions.read_files(edit)]
@@ -115,7 +115,7 @@ def _render_source(arguments) -> None:
         _save(edit, arguments.save)
     folder = _cache(arguments) if source_recipe.inbetween > 1 else None
     weights = arguments.weights if output else None
-    with session.using(session.RenderSettings(arguments.device, weights, folder, arguments.gpu_memory)):
+    with render_settings.using(render_settings.RenderSettings(arguments.device, weights, folder, arguments.gpu_memory)):
         if folder:
             inbetween_command.build_lacking(edit)
         if output and arguments.weights:

@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from ...core.model import shutters
 from ..data import fcurves, revision, snapshot
 from ..data.consistency import bars
-from ..rendering import invalidation, session
+from ..rendering import effect_source, invalidation, session
 
 
 def summary(weights) -> str:
@@ -34,7 +34,7 @@ def open_for(edit, effect, strip, index: int) -> str | None:
         return None
     try:
         state = session.here().request(invalidation.current(edit, effect, strip, frame), frame).state
-    except session.FAULTS:  # which the live preview tells
+    except effect_source.FAULTS:  # which the live preview tells
         return None
     words = iface_("Open for {frames} of {window} frames here")
     return words.format(frames=f"{state.open_for[index]:.3g}", window=state.options.window)

@@ -16,7 +16,7 @@ from ...core.model import motions
 from ...core.model.motions import Placement, Similarity
 from ..data import annotations, revision, snapshot, source_media, strips, validation
 from ..data.validation import EffectError
-from ..rendering import session
+from ..rendering import effect_source
 from . import motion_keys
 from .motion_keys import MotionKeys
 
@@ -157,8 +157,8 @@ def clip_times(edit, effect, strip, clip) -> dict[int, float]:
     source = strips.source_of(edit, effect, strip)
     _check_footage(source, clip)
     shown, first = snapshot.take(edit, effect, strip, frames), _first_frame(source, clip)
-    with session.open_source(shown) as source:
-        return {frame: session.source_index(shown, frame, source)[0] / source.step + first for frame in frames}
+    with effect_source.open_source(shown) as source:
+        return {frame: effect_source.source_index(shown, frame, source)[0] / source.step + first for frame in frames}
 
 
 def _points_at(tracks, time: float, size) -> Points:

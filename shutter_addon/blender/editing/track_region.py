@@ -27,7 +27,7 @@ from ...media.footage import Footage
 from ...media.tracking import Tracked
 from ..data import annotations, inbetween_settings, selection, snapshot, strips, validation
 from ..data.validation import EffectError
-from ..rendering import session
+from ..rendering import effect_source
 from . import motion_keys
 from .motion_keys import MotionKeys, placement_now
 
@@ -142,7 +142,7 @@ def track(
     )
     shown, target = snapshot.take(edit, effect, strip, known), Target.of(effect, index)
     del edit, effect, strip, keys, moving  # which may not outlive the first step
-    with session.open_source(shown) as source:
+    with effect_source.open_source(shown) as source:
         try:
             for tracked in _followed(subject, shown, source, start, frames, motion, anchors, patience):
                 if tracked is None:
@@ -273,7 +273,7 @@ def _followed(
     """As tracking.follow, its sentences in the user's language, by a thread beside Blender (stopping.beside)."""
     with snapshot.translated():
         try:
-            footage = Footage(source, lambda frame: session.source_index(shown, frame, source)[0])
+            footage = Footage(source, lambda frame: effect_source.source_index(shown, frame, source)[0])
             found = partial(subject.follow, footage, start, frames, motion=motion.lower(), anchors=anchors)
             with closing(stopping.beside(_each(found), patience)) as steps:
                 yield from steps

@@ -8,7 +8,7 @@ from ...devices.device import NoDeviceError
 from ...media import cuts
 from ..data import selection
 from ..devices import available
-from ..rendering import inbetween_build, session
+from ..rendering import inbetween_build, render_settings, session
 from ..rendering.session import FAULTS
 from . import inbetween_operators
 from .panel_parts import WithEffect, sentence
@@ -41,7 +41,7 @@ def _draw_devices(layout):
     """What composes; in a window, which alone has a preview."""
     if bpy.app.background:
         return
-    if not available.is_known(session.wanted()):  # it is asked for beside drawing
+    if not available.is_known(render_settings.wanted()):  # it is asked for beside drawing
         if not bpy.app.timers.is_registered(_ask_for_opengl):
             bpy.app.timers.register(_ask_for_opengl)
         return

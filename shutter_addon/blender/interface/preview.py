@@ -12,6 +12,8 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from bpy.types import PropertyGroup
 from gpu_extras.batch import batch_for_shader
 
+from ...compute.renderer import Renderer
+from ...compute.request import Request
 from ...core import stopping
 from ...core.model.frame_state import FrameState
 from ...devices.passes import body
@@ -22,7 +24,16 @@ from ..data.choices import CONTEXT
 from ..devices import blender_gpu
 from ..devices.blender_gpu import Texture
 from ..editing import shown_annotations
-from ..rendering import inbetween_build, invalidation, render_job, session, strobing
+from ..rendering import (
+    decoding_ahead,
+    effect_source,
+    inbetween_build,
+    invalidation,
+    pictures,
+    render_job,
+    session,
+    strobing,
+)
 from . import drawing, inbetween_operators, note_buttons, preview_areas, previewing, sharp_frame
 from .note_buttons import Button
 from .previewing import RESULTS, Shown, shown
@@ -146,7 +157,7 @@ def _draw() -> None:
             quad = Quad(context.region, found.strip, annotations.picture_size(found.effect))
             _show_strokes(context, quad, found.effect, request_of(context, found))
             bpy.app.timers.register(_redraw_once)
-        except session.FAULTS as error:
+        except effect_source.FAULTS as error:
             _tell_fault(error, say)
         say.draw()
 
@@ -161,23 +172,27 @@ def _time_up(found: Shown):
     return lambda: time.monotonic() > end
 
 
-def request_of(context, found: Shown) -> session.FrameRequest:
+def request_of(context, found: Shown) -> Request:
     """What the effect strip shows at the current frame, in the previews' size, as a draft where a still result is not
-    exact anyway. One of session.FAULTS: it cannot be shown."""
+    exact anyway. One of effect_source.FAULTS: it cannot be shown."""
     return _drafted(context, found, previewing.requested(context, found, _snapshot(found)))
+
+
+def _renderer(request: Request) -> Renderer:
+    return session.here().renderer(request.source)
 
 
 def _snapshot(found: Shown):
     return invalidation.current(found.edit, found.effect, found.strip, found.edit.frame_current)
 
 
-def _drafted(context, found: Shown, request) -> session.FrameRequest:
+def _drafted(context, found: Shown, request) -> Request:
     is_result = context.window_manager.virtual_shutter.view in RESULTS and _is_rendered(found)
     is_going = previewing.is_going(context)
     if is_going and not bpy.app.timers.is_registered(_redraw_when_still):
         bpy.app.timers.register(_redraw_when_still, first_interval=_SOON)
     is_exact = previewing.whole is not None or (is_result and not is_going)
-    return request if is_exact else request.draft()
+    return request if is_exact else previewing.draft(request, _renderer(request).source)
 
 
 def _tell_unseen(context, say) -> None:
@@ -200,35 +215,37 @@ def _show(context, found: Shown, settings, say) -> None:
     exact = previewing.requested(context, found, snapshot)
     request = _drafted(context, found, exact)
     size = annotations.picture_size(found.effect)
-    quad = Quad(context.region, found.strip, size)
+    quad, renderer = Quad(context.region, found.strip, size), _renderer(request)
     if context.space_data.show_overlays:
         is_still = not context.screen.is_animation_playing
-        _tell_detail(request.renderer.source, size, request is not exact, is_still, say)
+        _tell_detail(renderer.source, size, request is not exact, is_still, say)
         if is_still and not previewing.may_be_late():  # what it measures would take from what runs
-            _tell_strobing(found, snapshot, exact, say)
+            _tell_strobing(found, snapshot, renderer, exact, say)
     has_result = settings.view in RESULTS
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
     if previewing.is_tracking():  # a stroke is seen to stay on its subject where that is sharp
         left = 1.0
     # Else the engine has composed it, and it lies there in its place among the other strips.
-    draws_result = has_result and left < 1 and (not _is_rendered(found) or previewing.is_drawn(context, found, request))
+    draws_result = (
+        has_result and left < 1 and (not _is_rendered(found) or previewing.is_drawn(context, found, renderer.source))
+    )
     if left > 0 or draws_result:
         _warn(found, say)
     if left > 0:
-        _show_source(quad, found, request, left)
+        _show_source(quad, found, renderer, request, left)
     if has_result and not draws_result:
-        _tell_missing(request, say)
+        _tell_missing(renderer, request, say)
     if draws_result:
-        request.prefetch()
-        texture = request.renderer.draw(request.index, request.state, request.direction, quick=True, levels=True)
+        decoding_ahead.prefetch(renderer, request)
+        texture = renderer.draw(replace(request, quick=True, levels=True))
         quad.draw("show_picture", {"picture": texture}, left, 1.0, opacity=found.strip.blend_alpha)
     if settings.view == "SCRIBBLES":
-        _show_scribbles(quad, found.effect, request)
+        _show_scribbles(quad, found.effect, renderer, request)
     elif settings.view == "COEFFICIENTS":
-        _show_coefficients(quad, found.effect, request)
+        _show_coefficients(quad, found.effect, renderer, request)
     else:
         _show_strokes(context, quad, found.effect, request)
-    for sentence in session.shortages(request):
+    for sentence in pictures.shortages(renderer, request):
         say(sentence)
 
 
@@ -257,10 +274,10 @@ def _tell_detail(source, size: tuple[int, int], is_draft: bool, is_still: bool, 
         say(rpt_("Preview: {what}").format(what=", ".join(less)), button)
 
 
-def _tell_strobing(found: Shown, snapshot, request, say) -> None:
+def _tell_strobing(found: Shown, snapshot, renderer, request, say) -> None:
     """Says that the exposure has too few frames, and gives the way to more."""
     told = strobing.last(found.effect)
-    known = strobing.look(found.effect, found.strip, snapshot, request)
+    known = strobing.look(found.effect, found.strip, snapshot, renderer, request)
     if known is not None and inbetween_build.running() is None:
         say(inbetween_operators.strobing_in_words(known), _smoothing(known))
     if known != told and not bpy.app.timers.is_registered(_redraw_panels):
@@ -294,10 +311,10 @@ def _tell_sharp(region) -> None:
         say.draw()
 
 
-def _tell_missing(request, say) -> None:
+def _tell_missing(renderer, request, say) -> None:
     """Says in the preview what the engine can only report."""
     try:
-        request.check()
+        decoding_ahead.check(renderer, request)
     except MediaError as error:
         _tell_fault(error, say)
 
@@ -325,7 +342,7 @@ def _show_strokes(context, quad, effect, request) -> None:
             drawing.lines(quad.on_region(points), color, closed=shape.kind == "lasso", width=2)
 
 
-def _show_source(quad, found: Shown, request, right: float) -> None:
+def _show_source(quad, found: Shown, renderer, request, right: float) -> None:
     """The source's own frame, from the left edge on: that of a shutter that is open for it alone."""
     options = replace(request.state.options, step=1)  # no in-between frames come first in reverse
     still = np.zeros((1, options.window))
@@ -333,27 +350,32 @@ def _show_source(quad, found: Shown, request, right: float) -> None:
     # The shown frame lies where it is for all that move. Without a motion, other frames would have to be read for it.
     following = request.state.following
     moving = following and following.of([following.moving()[0]])
-    plain = replace(request, state=FrameState(options, still, following=moving))
-    plain.prefetch()
-    texture = request.renderer.draw(plain.index, plain.state, plain.direction, levels=True)
+    plain = replace(request, state=FrameState(options, still, following=moving), levels=True)
+    decoding_ahead.prefetch(renderer, plain)
+    texture = renderer.draw(plain)
     quad.draw("show_picture", {"picture": texture}, 0.0, right, opacity=found.strip.blend_alpha)
 
 
-def _show_scribbles(quad, effect, request) -> None:
-    labels, block = request.renderer.drawn_labels(request.state)
+def _show_scribbles(quad, effect, renderer, request) -> None:
+    labels, block = renderer.drawn_labels(request)
     quad.draw(
-        "show_scribbles", {"labels": labels, "palette": _palette(effect)}, opacity=0.7, block=block, size=_size(request)
+        "show_scribbles",
+        {"labels": labels, "palette": _palette(effect)},
+        opacity=0.7,
+        block=block,
+        size=_size(renderer),
     )
 
 
-def _show_coefficients(quad, effect, request) -> None:
-    coefficients, block, count = request.renderer.drawn_coefficients(request.index, request.state, request.direction)
+def _show_coefficients(quad, effect, renderer, request) -> None:
+    coefficients, block = renderer.drawn_coefficients(replace(request, quick=True))
+    count = len(request.state.bars)
     textures = {"coefficients": coefficients, "palette": _palette(effect)}
-    quad.draw("show_coefficients", textures, opacity=0.75, block=block, count=count, size=_size(request))
+    quad.draw("show_coefficients", textures, opacity=0.75, block=block, count=count, size=_size(renderer))
 
 
-def _size(request) -> tuple[int, int]:
-    return request.renderer.source.width, request.renderer.source.height
+def _size(renderer) -> tuple[int, int]:
+    return renderer.source.width, renderer.source.height
 
 
 def _palette(effect) -> Texture:

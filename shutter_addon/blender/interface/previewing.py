@@ -6,15 +6,16 @@ them. Drawn by our handler, the picture stays on the GPU, and is as small as it 
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
+from ...compute.request import Request
 from ...media.reduced import DIVISORS
 from ..data import annotations, geometry, selection, strip_proxies, strips
 from ..data.snapshot import Snapshot
-from ..rendering import engine, render_job, session
+from ..rendering import effect_source, engine, render_job, session
 from . import preview_areas, sharp_frame
 
 # Operators that read the sequencer's pictures, from the window.
@@ -30,6 +31,7 @@ _PERCENT = {"PROXY_25": 25, "PROXY_50": 50, "PROXY_75": 75, "PROXY_100": 100}
 _STANDARD = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
 _STANDARD |= {"use_curve_mapping": False, "use_white_balance": False}
 _PLAIN_STRIP = {"blend_alpha": 1.0, "color_multiply": 1.0, "color_saturation": 1.0, "scene_input": "CAMERA"}
+DRAFT_ROWS = 270  # blocks along the shorter side of a draft in which shutters follow edges
 RESULTS = "RESULT", "SPLIT"  # views of the live preview that show the result
 _PLAIN_SPACE = {"display_mode": "IMAGE", "display_channel": 0, "show_overexposed": 0}
 
@@ -48,7 +50,7 @@ class Shown:
 class Whole:
     """The picture that is looked at as it will be rendered, by the effect's scene and the timeline frame.
 
-    key: of its request (FrameRequest.key), its renderer excepted; None: it was not drawn yet"""
+    key: of its request (Request.key), its source excepted; None: it was not drawn yet"""
 
     scene: int
     frame: int
@@ -58,18 +60,30 @@ class Whole:
 whole: Whole | None = None
 
 
-def requested(context, found: Shown, snapshot: Snapshot) -> session.FrameRequest:
+def requested(context, found: Shown, snapshot: Snapshot) -> Request:
     """What an effect strip shows at the current frame, in the previews' detail: in full, while it is looked at so. That
-    ends here with the frame and with a change of the effect. One of session.FAULTS: it cannot be shown."""
+    ends here with the frame and with a change of the effect. One of effect_source.FAULTS: it cannot be shown."""
     global whole
     frame, here = found.edit.frame_current, session.here()
     if whole is not None and (whole.scene, whole.frame) == (snapshot.scene, frame) and not is_going(context):
-        request = here.request(snapshot, frame, detail=session.FULL)
+        request = here.request(snapshot, frame, detail=effect_source.FULL)
         if whole.key in (None, request.key[1:]):
             whole.key = request.key[1:]
             return request
     whole = None
     return here.request(snapshot, frame, detail=detail(context, found.edit, found.effect, found.strip))
+
+
+def draft(request: Request, source) -> Request:
+    """The request as it is drawn while an editor waits: where shutters follow edges, of blocks so large that the
+    picture has no more than DRAFT_ROWS of them along its shorter side."""
+    options = request.state.options
+    if not options.edge_aware:
+        return request
+    block = options.aggregate
+    while min(source.width, source.height) > block * DRAFT_ROWS:
+        block *= 2
+    return replace(request, state=replace(request.state, options=replace(options, aggregate=block)))
 
 
 def shown(context) -> Shown | None:
@@ -81,16 +95,16 @@ def shown(context) -> Shown | None:
     return Shown(*found, above)
 
 
-def detail(context, edit, effect, strip) -> session.Detail:
+def detail(context, edit, effect, strip) -> effect_source.Detail:
     """What an effect's picture is composed in for the previews of its edit: smaller by the power of two, of
     reduced.DIVISORS, that is nearest to the largest of them, and from the proxy that Blender reads for that one."""
     spaces = {area.spaces.active: _scale(context, edit, strip, area) for area in _areas_of(context, edit)}
     spaces = {space: scale for space, scale in spaces.items() if math.isfinite(scale)}
     if not spaces:
-        return session.FULL
+        return effect_source.FULL
     space = max(spaces, key=spaces.get)
     divisor = min(DIVISORS, key=lambda number: abs(math.log2(max(spaces[space], 1e-3) * number)))
-    return session.Detail(divisor, _proxy(edit, effect, strip, space))
+    return effect_source.Detail(divisor, _proxy(edit, effect, strip, space))
 
 
 def _proxy(edit, effect, strip, space) -> strip_proxies.Proxy | None:
@@ -129,12 +143,11 @@ def _areas_of(context, edit):
             yield area
 
 
-def is_drawn(context, found: Shown, request: session.FrameRequest) -> bool:
+def is_drawn(context, found: Shown, source) -> bool:
     """Whether our draw handler shows the result, or in another view what covers it, in place of what Blender makes of
     the engine's picture: wherever both are the same, in all previews of the edit. Not a still picture of full size:
     what is drawn passes through 8 bits on its way to the screen, and lacks shades next to black."""
     edit, strip = found.edit, found.strip
-    source = request.renderer.source
     is_less = source.from_proxy or source.width < annotations.picture_size(found.effect)[0]
     return (
         context.window_manager.virtual_shutter.live
@@ -183,22 +196,22 @@ def is_read(context) -> bool:
     return bool(_READERS & render_job.operators_running()) or (tool is not None and tool.idname == _READING_TOOL)
 
 
-def _needed(snapshot: Snapshot, frame: float) -> tuple[session.Detail, bool]:
+def _needed(snapshot: Snapshot, frame: float) -> tuple[effect_source.Detail, bool]:
     """See engine.needed_by_preview."""
     context = bpy.context
     region = context.region
     if region is None or region.type != "PREVIEW" or is_read(context):
-        return session.FULL, False
+        return effect_source.FULL, False
     edit, found = selection.edit_of(context), shown(context)
     if found is None or found.effect.scene.session_uid != snapshot.scene or edit.frame_current != frame:
         if whole is not None:
-            return session.FULL, False
+            return effect_source.FULL, False
         strip = next((s for s in strips.effect_strips(edit) if s.scene.session_uid == snapshot.scene), None)
         effect = strip and strips.effect_of(edit, strip.scene)
-        return (detail(context, edit, effect, strip) if effect else session.FULL), False
+        return (detail(context, edit, effect, strip) if effect else effect_source.FULL), False
     request = requested(context, found, snapshot)
-    wanted = session.FULL if whole is not None else detail(context, edit, found.effect, found.strip)
-    return wanted, is_drawn(context, found, request)
+    wanted = effect_source.FULL if whole is not None else detail(context, edit, found.effect, found.strip)
+    return wanted, is_drawn(context, found, session.here().renderer(request.source).source)
 
 
 def register():

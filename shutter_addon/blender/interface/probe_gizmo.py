@@ -7,7 +7,7 @@ import numpy as np
 from bpy.types import Gizmo, GizmoGroup
 
 from ..data import annotations, geometry
-from ..rendering import probe, session
+from ..rendering import effect_source, probe, session
 from . import drawing, preview, previewing
 
 _WIDTH, _HEIGHT, _LINE, _PAD, _APART = 180, 64, 17, 8, 14  # in units of the interface
@@ -64,8 +64,9 @@ class SHUTTER_GT_probe(Gizmo):
         if _is_cropped(found.strip, annotations.picture_size(found.effect), at):
             return
         try:
-            probed = probe.at(preview.request_of(context, found), at)
-        except session.FAULTS:  # which the live preview tells
+            request = preview.request_of(context, found)
+            probed = probe.at(session.here().renderer(request.source), request, at)
+        except effect_source.FAULTS:  # which the live preview tells
             return
         if probed is not None:
             _draw(context.region, geometry.mapped(matrix, np.array([at]))[0], found.effect.shutters, probed)

@@ -11,6 +11,8 @@ from pathlib import Path
 import bpy
 
 from ...compute import memory_needs
+from ...compute.renderer import Renderer
+from ...compute.request import Request
 from ...core.farm.chunks import LEAST, chunk_size
 from ...core.frames import frame_ranges
 from ...core.messages import UserError
@@ -18,8 +20,8 @@ from ...core.model.mattes import FileFrame
 from ...media import MediaError, cuts
 from ...media.files import check_file
 from ..data import requirements, snapshot, source_media, strips
-from ..rendering import job_snapshots, session
-from ..rendering.session import FrameRequest, RenderSession
+from ..rendering import decoding_ahead, effect_source, job_snapshots
+from ..rendering.session import RenderSession
 from . import output_space
 
 
@@ -94,27 +96,28 @@ def _effect(looking: RenderSession, edit, effect, strip, frames: set[float], com
         taken = snapshot.take(edit, effect, strip, frames)
         found.folder = taken.inbetween.folder if taken.inbetween else None
         requests = _requests(looking, taken, found)
-    except session.FAULTS as error:
+    except effect_source.FAULTS as error:
         found.faults.append(str(error))
         return found
     if requests:
-        source = next(iter(requests.values())).renderer.source
+        renderer = looking.renderer(next(iter(requests.values())).source)
+        source = renderer.source
         found.window = max(request.state.options.window for request in requests.values())
         found.factor = source.step
-        _look_at_frames(found, source, requests, find_cuts)
+        _look_at_frames(found, renderer, requests, find_cuts)
         _look_at_mattes(found, source, requests)
-        found.needs = _needs(requests, compositor)
+        found.needs = _needs(source, requests, compositor)
         found.notes += _notes(found, requests)
     return found
 
 
-def _requests(looking: RenderSession, taken, found: EffectCheck) -> dict[float, FrameRequest]:
+def _requests(looking: RenderSession, taken, found: EffectCheck) -> dict[float, Request]:
     """What each frame asks for, where it can be shown; faults of others are noted, each at the first of its frames."""
     requests, faults = {}, {}
     for frame in sorted(taken.frames):
         try:
             requests[frame] = looking.request(taken, frame)
-        except session.FAULTS as error:
+        except effect_source.FAULTS as error:
             kind = re.sub(r"\bframe -?[\d.]+", "", str(error))
             faults.setdefault(kind, []).append(str(error))
     for sentences in faults.values():
@@ -144,10 +147,11 @@ def _look_at_footage(found: EffectCheck, effect, strip) -> bool:
     return True
 
 
-def _look_at_frames(found: EffectCheck, source, requests: dict[float, FrameRequest], find_cuts: bool) -> None:
+def _look_at_frames(found: EffectCheck, renderer: Renderer, requests: dict[float, Request], find_cuts: bool) -> None:
     """Whether the frames that windows need are there: files of image sequences, in-between frames, and of a movie the
     first and the last one."""
-    needed = {frame: _needed(request) for frame, request in requests.items()}
+    source = renderer.source
+    needed = {frame: renderer.needed(request) for frame, request in requests.items()}
     filmed = {index // source.step for indices in needed.values() for index in indices if index % source.step == 0}
     found.faults += _unreadable(source, filmed, source.step)
     if source.step == 1:
@@ -155,7 +159,7 @@ def _look_at_frames(found: EffectCheck, source, requests: dict[float, FrameReque
     lacking = [frame for frame, indices in needed.items() if not all(map(source.has, indices))]
     for frame in lacking if find_cuts else ():  # beyond a cut none is needed
         with suppress(UserError):  # a file that cannot be read has been told
-            needed[frame] = _needed(requests[frame], known=False)
+            needed[frame] = renderer.needed(requests[frame], known=False)
             source.shots.release()
     between = {index for indices in needed.values() for index in indices if index % source.step}
     found.pairs = len({index // source.step for index in between})
@@ -165,10 +169,6 @@ def _look_at_frames(found: EffectCheck, source, requests: dict[float, FrameReque
     found.lacking = {math.floor(frame) for frame in lacking if needed[frame] & gone}
     if gone and not find_cuts and any(request.state.options.stop_at_cuts for request in requests.values()):
         found.notes.append("in-between frames are counted as if there were no cuts, beyond which none are needed")
-
-
-def _needed(request: FrameRequest, *, known: bool = True) -> set[int]:
-    return request.renderer.needed(request.index, request.direction, request.state, known=known)
 
 
 def _unreadable(source, indices: set[int], step: int = 1) -> list[str]:
@@ -193,7 +193,7 @@ def _unreadable(source, indices: set[int], step: int = 1) -> list[str]:
     return found
 
 
-def _look_at_mattes(found: EffectCheck, source, requests: dict[float, FrameRequest]) -> None:
+def _look_at_mattes(found: EffectCheck, source, requests: dict[float, Request]) -> None:
     shown: dict = {}
     for request in requests.values():
         for matte in request.state.mattes:
@@ -208,7 +208,7 @@ def _look_at_mattes(found: EffectCheck, source, requests: dict[float, FrameReque
             found.faults.append(str(error))
 
 
-def _notes(found: EffectCheck, requests: dict[float, FrameRequest]) -> list[str]:
+def _notes(found: EffectCheck, requests: dict[float, Request]) -> list[str]:
     notes = []
     if (package := cuts.missing_package()) and any(each.state.options.stop_at_cuts for each in requests.values()):
         notes.append(f"no cuts are found, and exposures run across them: the Python package {package} is missing")
@@ -217,9 +217,8 @@ def _notes(found: EffectCheck, requests: dict[float, FrameRequest]) -> list[str]
     return notes
 
 
-def _needs(requests: dict[float, FrameRequest], compositor) -> memory_needs.Needs:
+def _needs(source, requests: dict[float, Request], compositor) -> memory_needs.Needs:
     """The most that one of the windows needs, decoded frames included."""
-    source = next(iter(requests.values())).renderer.source
     device, most = getattr(compositor, "device", None), memory_needs.Needs(0, 0, False)
     for window, moved, shutters in {_kind(request.state) for request in requests.values()}:
         if device is None:
@@ -228,7 +227,7 @@ def _needs(requests: dict[float, FrameRequest], compositor) -> memory_needs.Need
             needs = memory_needs.of_window(device, source, window, moved, shutters)
         most = max(most, needs)
     window = max(request.state.options.window for request in requests.values())
-    return most._replace(host=most.host + session.decoded_bytes(source, window))
+    return most._replace(host=most.host + decoding_ahead.decoded_bytes(source, window))
 
 
 def _kind(state) -> tuple[int, bool, int]:

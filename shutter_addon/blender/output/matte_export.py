@@ -17,13 +17,13 @@ from ...media.image_writing import write_grey
 from ...media.matte_values import MatteValues
 from ...media.sequence import ImageFiles
 from ..data import matte_content, matte_strips, recipe_export, snapshot, source_media, strips, validation
-from ..rendering import session
+from ..rendering import effect_source
 
 
 def recipe_for(edit, effect, strip, path: Path) -> recipe.Recipe:
     """An effect as a recipe that is to lie at a path. What it cannot point to is written into a folder beside it, "NAME
-    mattes". One of session.FAULTS: the effect cannot be rendered as it stands, or a matte cannot be read or written.
-    OSError: there can be no such folder."""
+    mattes". One of effect_source.FAULTS: the effect cannot be rendered as it stands, or a matte cannot be read or
+    written. OSError: there can be no such folder."""
     regions = strips.matte_regions(effect)
     # Once before anything is written.
     recipe_export.recipe_of(edit, effect, strip, [_ramp(region) for region in regions])
@@ -108,11 +108,11 @@ def _write_frames(edit, effect, strip, region, folder: Path) -> list:
     frames, keys = range(strip.left_handle, strip.right_handle), []
     shown = snapshot.take(edit, effect, strip, frames)
     content = snapshot.region_at(edit, effect, strip, list(effect.regions).index(region), frames).content
-    with closing(session.open_source(shown)) as source, closing(MatteValues.of(source)) as values:
+    with closing(effect_source.open_source(shown)) as source, closing(MatteValues.of(source)) as values:
         for number, frame in enumerate(frames, 1):
             with snapshot.translated():
                 matte = mattes.Matte(0, content.at(frame))
-            ((key, array),) = values.values((matte,), session.source_index(shown, frame, source)[0], 1)
+            ((key, array),) = values.values((matte,), effect_source.source_index(shown, frame, source)[0], 1)
             keys.append(key)
             write_grey(folder / _name(number), array)
     return keys

@@ -17,8 +17,9 @@ import bpy
 import numpy as np
 
 from ...core import atomic_write
+from ...core.stopping import StoppedError
 from ..data import colour_configuration, snapshot, strips
-from ..rendering import render_job, session
+from ..rendering import pictures, render_job, render_settings, session
 from ..rendering.engine import in_words, say
 
 # Rows of a tile of the file; its columns are a multiple of 16. A TIFF without tiles takes twice the time: Blender reads
@@ -51,7 +52,7 @@ def _fed(edit, picture):
     try:
         with (
             render_job.calling(bpy.app.handlers.render_pre, filled),
-            session.using(replace(session.settings(), levels=True)),
+            render_settings.using(replace(render_settings.settings(), levels=True)),
         ):
             yield
     finally:
@@ -76,11 +77,11 @@ def fill(effect_strip, picture, film: list, edit, *_) -> None:
     try:
         if not film:
             effect, frames = strips.effect_of(edit, effect_strip.scene), range(edit.frame_start, edit.frame_end + 1)
-            film.append(snapshot.take(edit, effect, effect_strip, frames, folder=session.settings().inbetween))
-        picture.write(session.picture(film[0], edit.frame_current, say, render_job.stopping))
+            film.append(snapshot.take(edit, effect, effect_strip, frames, folder=render_settings.settings().inbetween))
+        picture.write(pictures.picture(film[0], edit.frame_current, say, render_job.stopping))
         session.here().begin_next(film[0], edit.frame_current, render_job.stopping)
     except BaseException as error:  # Blender would print it, and write the picture again that was there before
-        if not isinstance(error, session.StoppedError):
+        if not isinstance(error, StoppedError):
             render_job.fail(in_words(error))
         render_job.cancel()
 

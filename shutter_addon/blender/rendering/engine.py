@@ -8,18 +8,19 @@ import bpy
 import numpy as np
 
 from ...core.messages import of_file, signed
+from ...core.stopping import StoppedError
 from ..data.snapshot import Snapshot
 from ..data.strips import ENGINE
-from . import invalidation, job_snapshots, render_job, session
+from . import device_work, effect_source, invalidation, job_snapshots, pictures, render_job, session
 
 
-def in_full(_shown: Snapshot, _frame: float) -> tuple[session.Detail, bool]:
-    return session.FULL, False
+def in_full(_shown: Snapshot, _frame: float) -> tuple[effect_source.Detail, bool]:
+    return effect_source.FULL, False
 
 
 # What a preview needs that Blender is drawing (interface/previewing.py): in how much detail, and whether the picture is
-# drawn over what the engine gives. One of session.FAULTS: there is none.
-needed_by_preview: Callable[[Snapshot, float], tuple[session.Detail, bool]] = in_full
+# drawn over what the engine gives. One of effect_source.FAULTS: there is none.
+needed_by_preview: Callable[[Snapshot, float], tuple[effect_source.Detail, bool]] = in_full
 
 
 class VirtualShutterEngine(bpy.types.RenderEngine):
@@ -36,7 +37,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             self._render(depsgraph, called_by_script=sys._getframe().f_back is not None)
         except BaseException as error:  # Blender would print it, and render the frame without the effect
             invalidation.spoil(depsgraph.scene.session_uid)
-            if not isinstance(error, session.StoppedError):
+            if not isinstance(error, StoppedError):
                 fail(self, in_words(error))
             elif not self.test_break():
                 render_job.cancel(self.test_break)
@@ -44,18 +45,18 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
     def _render(self, depsgraph, called_by_script: bool):
         scene, width, height = depsgraph.scene, self.resolution_x, self.resolution_y
         shown, frame = job_snapshots.of(scene, scene.frame_current, self._stopped)
-        detail, is_drawn = session.FULL, False
-        if session.in_window() and not (called_by_script or render_job.runs()):
+        detail, is_drawn = effect_source.FULL, False
+        if device_work.in_window() and not (called_by_script or render_job.runs()):
             detail, is_drawn = needed_by_preview(shown, frame)
-        if detail != session.FULL or is_drawn:
+        if detail != effect_source.FULL or is_drawn:
             invalidation.keep_until_drawn(scene.session_uid)
         if is_drawn:
             return  # nothing, which costs Blender the least
         last = job_snapshots.pictures.get(scene.session_uid) if render_job.in_job() else None
         if last is not None and last.shape == (height, width, 4):
             self._show(last)  # in the render's window, which would be empty until this one is made
-        picture = session.picture(shown, frame, self._say, self._stopped, detail)
-        picture = session.resized(picture, width, height, detail.divisor)
+        picture = pictures.picture(shown, frame, self._say, self._stopped, detail)
+        picture = pictures.resized(picture, width, height, detail.divisor)
         self._show(picture)
         self.update_progress(1.0)
         if render_job.in_job():
@@ -84,7 +85,7 @@ def say(message: str) -> None:
 
 
 def in_words(error: BaseException) -> str:
-    if isinstance(error, session.FAULTS):
+    if isinstance(error, effect_source.FAULTS):
         return str(error) or "not enough memory"
     if isinstance(error, KeyboardInterrupt):
         return "the render was stopped"

@@ -21,7 +21,7 @@ from ..data import (
 )
 from ..data.snapshot import Snapshot, SourceFiles
 from ..data.validation import EffectError
-from . import render_job, session
+from . import render_job, render_settings
 
 _signatures: dict[int, int] = {}  # by effect scene
 _files: dict[int, tuple[int, dict[str, SourceFiles]]] = {}  # by effect scene: the revision of the look, files by source
@@ -46,7 +46,7 @@ def current(edit, effect, strip, frame: float) -> Snapshot:
     def take():
         number, files = _files.get(scene, (None, None))
         known = files if number == revision.number() else None
-        return snapshot.take(edit, effect, strip, (frame,), folder=session.settings().inbetween, files=known)
+        return snapshot.take(edit, effect, strip, (frame,), folder=render_settings.settings().inbetween, files=known)
 
     return _current.get((scene, strip.name, frame), take)
 
@@ -210,7 +210,7 @@ def _source(effect, source, looked: dict):
     yield from _timing(source)
     yield source_media.reading(source)
     try:
-        files = snapshot.source_files(effect, source, session.settings().inbetween)
+        files = snapshot.source_files(effect, source, render_settings.settings().inbetween)
     except (MediaError, EffectError) as error:
         yield str(error)  # a file that was missing may be there again
     else:

@@ -13,10 +13,11 @@ import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core.stopping import StoppedError
 from ..data import requirements, snapshot, strips
 from ..data.snapshot import Snapshot
 from ..data.validation import EffectError
-from . import invalidation, render_job, session
+from . import effect_source, invalidation, render_job, render_settings, session
 
 _taken: dict[int, Snapshot | Exception] = {}  # by effect scene: of the job that runs
 pictures: dict[int, np.ndarray] = {}  # likewise: the last one, which the render's window shows until the next is made
@@ -33,7 +34,7 @@ def begin(film: int) -> None:
         try:
             frames = asked_frames(edit, parts, edit == scene)
             _taken[effect.scene.session_uid] = snapshot.take(edit, effect, parts[0], frames)
-        except session.FAULTS as error:
+        except effect_source.FAULTS as error:
             _taken[effect.scene.session_uid] = error
     look(film)
 
@@ -61,14 +62,14 @@ def left_out(scene) -> str | None:
 
 def of(scene, scene_frame: float, ended: Callable[[], bool] | None = None) -> tuple[Snapshot, float]:
     """The snapshot of an effect scene, and the timeline frame of its edit at which it shows one of its own frames. One
-    of session.FAULTS: there is none. ended: whether nobody waits for it any longer."""
+    of effect_source.FAULTS: there is none. ended: whether nobody waits for it any longer."""
     uid = scene.session_uid
     if render_job.in_job():
         found = _taken.get(uid)
         if found is None or (isinstance(found, Snapshot) and found.timeline_frame(scene_frame) not in found.frames):
             found = render_job.on_main_thread(lambda: _late(uid, scene_frame), ended)
         if found is None:
-            raise session.StoppedError
+            raise StoppedError
         if isinstance(found, Exception):
             raise found.with_traceback(None)
         return found, found.timeline_frame(scene_frame)
@@ -77,7 +78,7 @@ def of(scene, scene_frame: float, ended: Callable[[], bool] | None = None) -> tu
     if not bpy.app.background:
         return invalidation.current(edit, effect, strip, frame), frame
     frames = frame, frame + edit.frame_step
-    return snapshot.take(edit, effect, strip, frames, folder=session.settings().inbetween), frame
+    return snapshot.take(edit, effect, strip, frames, folder=render_settings.settings().inbetween), frame
 
 
 def _late(uid: int, scene_frame: float) -> Snapshot | Exception:
@@ -86,7 +87,7 @@ def _late(uid: int, scene_frame: float) -> Snapshot | Exception:
     try:
         edit, effect, strip = strips.find_edit(scene)
         return snapshot.take(edit, effect, strip, (strips.timeline_frame(strip, scene_frame),))
-    except session.FAULTS as error:
+    except effect_source.FAULTS as error:
         return error
 
 

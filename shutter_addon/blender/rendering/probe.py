@@ -1,12 +1,13 @@
 """What one pixel of the preview is made with: its coefficients and its shutter."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...compute.renderer import Renderer
+from ...compute.request import Request
 from ...core.pixels import compositor
 from ..devices import blender_gpu
-from .session import FrameRequest
 
 
 @dataclass(frozen=True)
@@ -17,16 +18,18 @@ class Probed:
     bars: np.ndarray
 
 
-def at(request: FrameRequest, point) -> Probed | None:
+def at(renderer: Renderer, request: Request, point) -> Probed | None:
     """What the pixel at a point is made with; None: the point lies beside the picture.
 
     point: fractions of the picture, y up. It is called where Blender's GPU draws; one texel is read, and coefficients
     are solved for only if what they depend on has changed since they were drawn."""
-    source = request.renderer.source
+    source = renderer.source
     column, row = int(np.floor(point[0] * source.width)), int(np.floor((1 - point[1]) * source.height))
     if not (0 <= column < source.width and 0 <= row < source.height):
         return None
-    texture, block, count = request.renderer.drawn_coefficients(request.index, request.state, request.direction)
-    values = np.maximum(blender_gpu.texel(texture, column // block, row // block)[:count], 0).astype(np.float64)
+    texture, block = renderer.drawn_coefficients(replace(request, quick=True))
+    values = np.maximum(blender_gpu.texel(texture, column // block, row // block)[: len(request.state.bars)], 0).astype(
+        np.float64
+    )
     coefficients = values / values.sum()
     return Probed(coefficients, compositor.mixed_shutter(request.state, coefficients))

@@ -14,6 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...compute.renderer import Renderer
+from ...compute.request import Request
 from ...core.model import shutters
 from ...core.model.frame_state import FrameState
 from ...core.model.motions import Similarity
@@ -22,7 +24,7 @@ from ...media import MediaError, inbetween, steps
 from ...media.cuts import ShotSource
 from ..data import inbetween_settings
 from ..data.snapshot import Snapshot
-from . import session
+from . import effect_source
 
 FACTORS = 2, 4, 8, 16
 _PAIRS = 4  # of neighbouring frames that are measured for a picture, at most
@@ -50,13 +52,13 @@ _job: Future | None = None
 _stopped = threading.Event()
 
 
-def look(effect, strip, snapshot: Snapshot, request: session.FrameRequest) -> Strobing | None:
+def look(effect, strip, snapshot: Snapshot, renderer: Renderer, request: Request) -> Strobing | None:
     """What is known of a picture's exposure; None: nothing, or it is smooth. What is not known is asked for."""
     global _wanted
     _wanted = None
     frame, found = effect.id_data.frame_current, None
     if steps.is_possible():
-        found = _look(effect, strip, snapshot, request)
+        found = _look(effect, strip, snapshot, renderer, request)
     _found[snapshot.scene] = frame, found
     return found
 
@@ -67,9 +69,9 @@ def last(effect) -> Strobing | None:
     return found if frame == effect.id_data.frame_current else None
 
 
-def _look(effect, strip, snapshot, request):
+def _look(effect, strip, snapshot, renderer, request):
     global _wanted
-    ways = _ways(request)
+    ways = _ways(renderer, request)
     pairs = _chosen(sorted(ways))
     if lacking := [pair for pair in pairs if (snapshot.source.key, pair) not in _moved]:
         _wanted = partial(_measure_motion, snapshot.source, lacking)
@@ -87,16 +89,16 @@ def _look(effect, strip, snapshot, request):
         _wanted = partial(_measure_cost, snapshot.source, pairs[0], key)
     if (cost := _costs.get(key)) is None:
         return Strobing(step, factor)
-    count = _count(strip, snapshot, request)
+    count = _count(strip, snapshot, renderer.source, request)
     return Strobing(step, factor, cost.seconds(count, factor), cost.bytes(count, factor))
 
 
-def _ways(request) -> dict[int, list[tuple[Similarity, Similarity]]]:
+def _ways(renderer, request) -> dict[int, list[tuple[Similarity, Similarity]]]:
     """By pairs of filmed frames, each by its first, over which a shutter stays open that is seen: where the points of
     the shown picture lie in the two, in heights of the picture, for each of these shutters."""
-    state, source = request.state, request.renderer.source
+    state, source = request.state, renderer.source
     options, count, found = state.options, state.options.step, {}
-    shot = request.renderer.shot(request.index, request.direction, state, known=True)
+    shot = renderer.shot(request, known=True)
     frames = compositor.window_indices(options, request.index, shot, request.direction)
     for i in _seen(state):
         is_open = state.bars[i] > 0
@@ -137,13 +139,13 @@ def _factor(state: FrameState, ratio: float) -> int | None:
     return next((factor for factor in possible if factor >= ratio * now), possible[-1] if possible else None)
 
 
-def _count(strip, snapshot: Snapshot, request) -> int:
+def _count(strip, snapshot: Snapshot, source, request) -> int:
     """About how many pairs the strip's pictures need, or a few more."""
-    source, options = request.renderer.source, request.state.options
+    options = request.state.options
     most = source.filmed - 1
     if snapshot.timing is None:
         return most
-    ends = (session.source_index(snapshot, at, source)[0] for at in (strip.left_handle, strip.right_handle - 1))
+    ends = (effect_source.source_index(snapshot, at, source)[0] for at in (strip.left_handle, strip.right_handle - 1))
     first, final = (index // options.step for index in ends)
     return min(abs(final - first) + -(-options.window // options.step), most)
 
@@ -160,7 +162,7 @@ def pairs(snapshot: Snapshot, medium, settings: inbetween_settings.Settings) -> 
         options, position = state.options, state.options.position
         bars = np.stack([shutters.multiplied(row, options.step, factor, position) for row in state.bars])
         options = replace(options, step=factor, window=bars.shape[1])
-        index, backward = session.source_index(snapshot, frame, source)
+        index, backward = effect_source.source_index(snapshot, frame, source)
         places = compositor.window_positions(options, index, -1 if backward else 1)
         if options.edges == "mirror":  # at a cut, on the other side of it
             places = np.arange(places.min() - options.window, places.max() + options.window + 1)

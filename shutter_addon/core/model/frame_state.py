@@ -126,12 +126,16 @@ class FrameState:
     @cached_property
     def key(self) -> tuple:
         """Hashable, and equal for states that give the same picture of the same frames."""
-        shapes = (
-            (s.shutter, s.kind, s.width, s.opacity, *(stroke.tobytes() for stroke in s.strokes)) for s in self.shapes
-        )
         bars = self.bars.shape, self.bars.tobytes()
         following = self.following and self.following.key
-        return self.options, *bars, self.reference, following, self.mattes, tuple(shapes)
+        return self.options, *bars, self.reference, following, self.mattes, self.shapes_key
+
+    @cached_property
+    def shapes_key(self) -> tuple:
+        """Hashable, and equal for equal shapes."""
+        return tuple(
+            (s.shutter, s.kind, s.width, s.opacity, *(stroke.tobytes() for stroke in s.strokes)) for s in self.shapes
+        )
 
     def alone(self, chosen: int) -> FrameState:
         """The state of a picture in which one shutter, `chosen`, is everywhere."""

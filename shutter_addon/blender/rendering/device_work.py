@@ -1,0 +1,61 @@
+"""What a session's device does: functions that are called one after the other, on a thread of their own where the
+device is not Blender's."""
+
+from __future__ import annotations
+
+import threading
+from concurrent.futures import Future, wait
+from typing import NamedTuple
+
+import bpy
+
+from ...core import stopping
+from ...core.stopping import StoppedError
+from ..devices import gpu_relay
+from ..devices.blender_gpu import require_context
+
+_PATIENCE = 0.1  # seconds between two looks at whether a picture is still wanted
+
+
+def in_window() -> bool:
+    """Whether this is the main thread of a Blender with a window."""
+    return not bpy.app.background and threading.current_thread() is threading.main_thread()
+
+
+class Work(NamedTuple):
+    """What a session's device does.
+
+    future: its result to come; ended: set, it ends before its next step; relayed: the main thread has its GPU"""
+
+    future: Future
+    ended: threading.Event
+    relayed: bool
+
+    def break_off(self) -> None:
+        self.ended.set()
+        self.future.cancel()
+
+    def result(self, stopped):
+        """As result_of. Not waited for, it is broken off."""
+        try:
+            return result_of(self.future, self.relayed, stopped)
+        except StoppedError:
+            self.break_off()
+            raise
+
+
+def result_of(future: Future, relayed: bool, stopped):
+    """The future's result. StoppedError: it is not waited for any longer. NoDeviceError: it cannot be waited for, as
+    Blender's GPU is not current."""
+    while not wait([future], 0 if in_window() else _PATIENCE).done:
+        if in_window() and not gpu_relay.serve() and relayed:
+            require_context()
+        if stopped():
+            raise StoppedError
+    return future.result()
+
+
+def broken_off(stopped, function, *arguments):
+    """What a function gives, unless it is broken off."""
+    with stopping.once(stopped):
+        return function(*arguments)

@@ -1,0 +1,79 @@
+"""What a renderer reads for an effect: its source, in-between frames included, in some detail."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...core.frames import retiming
+from ...core.messages import EffectError
+from ...devices.device import NoDeviceError
+from ...media import MediaError
+from ...media.cuts import ShotSource
+from ...media.inbetween import InbetweenSource
+from ...media.prefetch import PrefetchSource
+from ...media.reduced import smaller
+from ..data import inbetween_settings
+from ..data.snapshot import Snapshot, translated
+from ..data.source_media import SourceSpec
+from ..data.strip_proxies import Proxy
+
+FAULTS = (EffectError, MediaError, NoDeviceError, MemoryError)
+
+
+@dataclass(frozen=True)
+class Detail:
+    """In how much detail a preview is composed.
+
+    divisor: how many times smaller than the source's the picture is each way (media.open_source)
+    proxy: what frames are read from, where it fits; in-between frames and those beside them have none"""
+
+    divisor: int = 1
+    proxy: Proxy | None = None
+
+
+FULL = Detail()  # what renders are composed in
+
+
+@dataclass(frozen=True)
+class SourceKey:
+    """What a renderer reads, in plain data: equal where it reads the same frames for the same effect.
+
+    scene: session_uid of the effect's scene; spec, inbetween, built: Snapshot's source, inbetween and built"""
+
+    scene: int
+    spec: SourceSpec
+    inbetween: inbetween_settings.Settings | None
+    built: tuple
+    detail: Detail = FULL
+
+    @staticmethod
+    def of(snapshot: Snapshot, detail: Detail = FULL) -> SourceKey:
+        return SourceKey(snapshot.scene, snapshot.source, snapshot.inbetween, snapshot.built, detail)
+
+    def open(self, *, planes: bool = False) -> ShotSource:
+        """The source; planes: as of PrefetchSource. EffectError, MediaError: there is none."""
+        divisor = self.detail.divisor
+        if self.inbetween is None:
+            return ShotSource(PrefetchSource(self.spec.open(divisor, self.detail.proxy), planes=planes))
+        medium = self.spec.open()
+        try:
+            source = InbetweenSource(medium, *self.inbetween)
+            return ShotSource(PrefetchSource(smaller(source, divisor)), self.inbetween.factor)
+        except FAULTS:
+            medium.close()
+            raise
+
+
+def open_source(snapshot: Snapshot) -> ShotSource:
+    """An effect's source in full. EffectError, MediaError: there is none."""
+    return SourceKey.of(snapshot).open()
+
+
+def source_index(snapshot: Snapshot, frame: float, source: ShotSource) -> tuple[int, bool]:
+    """Which frame of an effect's source is shown at a timeline frame, in-between frames counted, and whether the source
+    runs backward there. EffectError: it cannot be known."""
+    if snapshot.effect.time is not None:
+        time, backward = snapshot.effect.time.at(frame)
+        return retiming.nearest(time - 1, source.step, source.count), backward
+    with translated():
+        return retiming.source_frame(snapshot.timing, frame, source), snapshot.timing.use_reverse_frames

@@ -1,0 +1,92 @@
+"""The picture of an effect strip at a timeline frame, as the engine gives it to Blender."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import OpenImageIO
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...compute.renderer import Renderer
+from ...compute.request import Request
+from ...core.stopping import StoppedError, never
+from ...devices.budget import MEGABYTE
+from ...media import cuts
+from ...media.image_writing import write_exr
+from ..data.snapshot import Snapshot
+from . import render_job, render_settings, session
+from .effect_source import FULL, Detail
+
+_said: set[str] = set()  # what is said once
+
+
+def picture(
+    snapshot: Snapshot, frame: float, say: Callable[[str], None] = print, stopped=never, detail: Detail = FULL
+) -> np.ndarray:
+    """The picture (H, W, 4) of an effect strip at a timeline frame, top row first: scene-linear float32, premultiplied,
+    or levels, if the settings ask for them. One of FAULTS: there is none, in one sentence. say: called with a sentence
+    when the device is a lesser one, or cuts cannot be found. stopped: asked whether the picture is not wanted any
+    longer; StoppedError: it is not.
+    """
+    if stopped():
+        raise StoppedError
+    if render_job.window_waits():  # for a film of which Blender does not say that it begins
+        session.settle_waited_for()
+    here = session.here()
+    request = here.request(snapshot, frame, say, detail, stopped)
+    if request.state.options.stop_at_cuts:
+        _say_of_cuts(say)
+    if (weights := render_settings.settings().weights) is not None:
+        names = [shutter.name for shutter in snapshot.effect.shutters]
+        place = weights / f"{round(frame - snapshot.first + 1):04d}.exr"
+        write_exr(place, np.moveaxis(here.coefficients(request, stopped), 0, -1), names)
+    result = here.picture(request, stopped)
+    for sentence in shortages(here.renderer(request.source), request):
+        _say_once(sentence, say)
+    return result
+
+
+def _say_once(sentence: str, say) -> None:
+    if sentence not in _said:
+        _said.add(sentence)
+        say(sentence)
+
+
+def _say_of_cuts(say) -> None:
+    if package := cuts.missing_package():
+        sentence = f"Stop at Cuts finds none, and exposures run across them: the Python package {package} is missing"
+        _say_once(sentence, say)
+
+
+def shortages(renderer: Renderer, request: Request) -> list[str]:
+    """Sentences about what is slow in pictures as requested, for the GPU has no room."""
+    if not (found := renderer.shortages()):
+        return []
+    source = renderer.source
+    words = {"width": source.width, "height": source.height, "frames": request.state.options.window}
+    words["limit"] = render_settings.memory().limit // MEGABYTE
+    sentences = {
+        "window": rpt_(
+            "the {limit} MB that may be taken of the GPU are too few for {frames} frames of {width}×{height}: all are"
+            " sent for every picture, which is slow"
+        ),
+        "diffusion": rpt_(
+            "the {limit} MB that may be taken of the GPU are too few to diffuse {width}×{height}: NumPy does it, which"
+            " is slow"
+        ),
+    }
+    return [sentences[name].format(**words) for name in sorted(found)]
+
+
+def resized(picture: np.ndarray, width: int, height: int, divisor: int = 1) -> np.ndarray:
+    """The picture at the size that Blender asks for: the scene's own, or what a resolution below 100 % makes of it; of
+    one that was composed `divisor` times smaller the pixels are repeated."""
+    if divisor > 1:
+        picture = picture.repeat(divisor, axis=0).repeat(divisor, axis=1)[:height, :width]
+    if picture.shape[:2] == (height, width):
+        return picture
+    small = OpenImageIO.ImageBufAlgo.resize(
+        OpenImageIO.ImageBuf(np.ascontiguousarray(picture)), roi=OpenImageIO.ROI(0, width, 0, height)
+    )
+    return small.get_pixels(OpenImageIO.FLOAT).reshape(height, width, 4)

@@ -1,0 +1,68 @@
+"""Which source frames a picture is made of: those of its window, within its shot, and those that guide its diffusion.
+
+beside, in all functions: how far the frames that guide the diffusion lie from the shown one (guide.reach), 0 where none
+do.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core.frames.frame_source import FrameSource
+from ..core.pixels import compositor
+from .request import Request
+
+
+def stops_at_cuts(request: Request, source: FrameSource) -> bool:
+    """Whether the window ends at cuts: if Options.stop_at_cuts is set and the source knows its shots."""
+    return request.state.options.stop_at_cuts and source.shots is not None
+
+
+def reach(request: Request, beside: int) -> tuple[int, int]:
+    """The first and the last of all positions that any shutter exposes, and of the shown frame itself with the frames
+    that guide the diffusion."""
+    low, high = compositor.reach(request.state, request.index, request.direction)
+    return min(low, request.index - beside), max(high, request.index + beside)
+
+
+def shot_of(request: Request, source: FrameSource, beside: int, *, known: bool = False) -> range:
+    """The source frames that the window may show: those of the shot around the shown one. Ends of the shot that the
+    window does not reach are not looked for: the clip's ends take their place.
+
+    It reads frames in which cuts are looked for. known: it reads none, and knows only the cuts found before."""
+    if not stops_at_cuts(request, source):
+        return range(source.count)
+    index, (low, high) = request.index, reach(request, beside)
+    shot = source.shots.around(index, low, high, known=known)
+    last = shot.stop - 1
+    if request.state.options.edges == "mirror" and (last < high) != (shot.start > low):
+        # Frames mirrored at one end of the shot may lie beyond its other end.
+        low, high = (min(low, 2 * last - high), high) if last < high else (low, max(high, 2 * shot.start - low))
+        shot = source.shots.around(index, low, high, known=known)
+    return shot
+
+
+def positions(request: Request, shot: range) -> np.ndarray:
+    """The positions (core.pixels.compositor.window_positions) that any shutter exposes, whether it has a scribble or
+    not. Where frames of them are left out (edges "shorten"), all positions of the window that have a frame: the nearest
+    may be needed in place of those."""
+    state = request.state
+    within = compositor.window_positions(state.options, request.index, request.direction)
+    exposed = slice(*state.open_span)
+    if state.options.edges != "shorten":
+        return within[exposed]
+    frames = compositor.source_frames(state.options, within, shot)
+    return within[exposed] if (frames[exposed] >= 0).all() else within[frames >= 0]
+
+
+def exposed_frames(request: Request, shot: range) -> set[int]:
+    """The source frames at `positions`."""
+    return set(compositor.source_frames(request.state.options, positions(request, shot), shot).tolist())
+
+
+def guided_later(request: Request, beside: int) -> list[int]:
+    """The source frames that guide the diffusion of this picture, and will guide that of the next ones, of those that
+    this one reads."""
+    index, step, (low, high) = request.index, request.state.options.step, reach(request, beside)
+    onwards = range(index - beside, high + 1) if request.direction > 0 else range(low, index + beside + 1)
+    return [i for i in onwards if i % step == 0 or i == index]
