@@ -51,7 +51,7 @@ from shutter_addon import blender
 from shutter_addon.blender.data import snapshot, strips
 from shutter_addon.blender.editing import new_edit
 from shutter_addon.blender.output import film_output, movie_feed
-from shutter_addon.blender.rendering import session
+from shutter_addon.blender.rendering import sessions
 from shutter_addon.blender.rendering.engine import VirtualShutterEngine
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.renderer import Renderer
@@ -319,7 +319,7 @@ def _composed(edit, source, indices) -> dict[int, np.ndarray]:
 def run(way: str, footage: Path, window: int, film: Path, *, checked: bool) -> dict:
     """Renders a film once: seconds of the clock and of the processor, whole and by part, and its error, if checked."""
     edit = make_edit(way, footage, window, film)
-    session.forget()
+    sessions.forget()
     start, before = time.perf_counter(), os.times()
     if way == "tmix":
         subprocess.run(tmix_command(edit, footage, window, film), check=True)

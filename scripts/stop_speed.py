@@ -196,7 +196,7 @@ def build():
 
 def device_queue():
     """What comes last of what the render's device has to do; None: it has done it."""
-    session = part("blender.rendering.session")._offscreen
+    session = part("blender.rendering.sessions").OFFSCREEN
     return session._executor and session._executor.submit(lambda: None)
 
 

@@ -231,10 +231,10 @@ class _Layout:
 
 def _to_its_end(task, *arguments) -> None:
     """Does a task, and waits for the threads that it has begun."""
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import sessions
 
     task(*arguments)
-    session.forget()
+    sessions.forget()
     for thread in threading.enumerate():
         if thread is not threading.main_thread():
             thread.join(trial.PATIENCE)

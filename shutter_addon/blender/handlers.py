@@ -10,7 +10,7 @@ from bpy.app.handlers import persistent
 from .data import inbetween_settings, revision, source_media, strips, versions
 from .editing import copies, lifecycle, shown_annotations, track_region, undelete
 from .interface import inbetween_operators, preview_areas, sharp_frame
-from .rendering import invalidation, job_snapshots, render_job, session
+from .rendering import invalidation, job_snapshots, render_job, sessions
 
 
 @persistent
@@ -18,7 +18,7 @@ def _before_load(*_):
     sharp_frame.give_back(bpy.context)
     inbetween_operators.stop()
     track_region.data_replaced()
-    session.forget()
+    sessions.forget()
     invalidation.forget()
     inbetween_settings.built.forget()
     source_media.forget()
@@ -28,7 +28,7 @@ def _before_load(*_):
 @persistent
 def _after_load(*_):
     sharp_frame.listen()
-    session.drop_removed()  # what a render job took up while the file was loaded
+    sessions.drop_removed()  # what a render job took up while the file was loaded
     copies.adopt()
     lifecycle.mend()
     lifecycle.take_over()
@@ -68,7 +68,7 @@ def _after_undo(*_):
     revision.changed()
     track_region.data_replaced()
     _drop_frames()
-    session.drop_removed()
+    sessions.drop_removed()
     sharp_frame.give_back(bpy.context)
     shown_annotations.follow()
 
@@ -89,7 +89,7 @@ def _before_render(scene, *_):
 def _prepare(film: int, in_job: bool) -> bool:
     """On the main thread, whatever thread renders. True: it has been done."""
     revision.changed()  # a script may have, since Blender last told
-    session.settle()
+    sessions.settle()
     invalidation.drop_spoilt()
     invalidation.drop_lesser()
     source_media.look_again()
@@ -157,7 +157,7 @@ def unregister():
         getattr(bpy.app.handlers, name).remove(function)
     if bpy.app.timers.is_registered(_drop_frames):
         bpy.app.timers.unregister(_drop_frames)
-    session.forget()
+    sessions.forget()
     source_media.forget()
     lifecycle.forget()
     undelete.forget()

@@ -54,10 +54,10 @@ def noise_film(edit, frames, folder):
     """Frames (n, H, W, C) as the edit's source, under an effect of two shutters: source, effect and strip."""
     from shutter_addon.blender.data import recipe_import
     from shutter_addon.blender.editing import add_effect
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import sessions
     from shutter_addon.core.recipes import recipe_file
 
-    session.forget()
+    sessions.forget()
     height, width = frames.shape[1:3]
     source = edit.sequence_editor.strips.new_image("images", str(write_frames(folder / "in", frames[:1])), 1, 1)
     write_frames(folder / "in", frames)
@@ -99,32 +99,33 @@ def source_time(edit, effect, frame):
     return snapshot.read(*strips.find_edit(effect.scene), (frame,)).time.at(frame)
 
 
-def picture_of(scene, scene_frame, **options):
+def picture_of(scene, scene_frame, say=print, stopped=lambda: False):
     """The picture of an effect scene, as the engine gives it to Blender."""
-    from shutter_addon.blender.rendering import job_snapshots, pictures
+    from shutter_addon.blender.rendering import job_snapshots, pictures, render_context
 
-    return pictures.picture(*job_snapshots.of(scene, scene_frame), **options)
+    return pictures.picture(render_context.of_engine(say, stopped), *job_snapshots.of(scene, scene_frame))
 
 
 def request(edit, effect, strip, frame):
     """What is asked of the session for the picture at a timeline frame, and what it gives."""
     from shutter_addon.blender.data import snapshot
-    from shutter_addon.blender.rendering import render_settings, session
+    from shutter_addon.blender.rendering import render_context, render_settings
 
     folder = render_settings.settings().inbetween
-    here = session.here()
-    return Asked(here, here.request(snapshot.take(edit, effect, strip, (frame,), folder=folder), frame))
+    context = render_context.of_drawing()
+    return Asked(context, context.request(snapshot.take(edit, effect, strip, (frame,), folder=folder), frame))
 
 
 class Asked:
-    """A request of a session, with what is made of it."""
+    """A request in a context, with what is made of it."""
 
-    def __init__(self, session, request):
-        self.session, self.request, self.renderer = session, request, session.renderer(request.source)
+    def __init__(self, context, request):
+        self.context, self.session = context, context.session
+        self.request, self.renderer = request, context.renderer(request)
         self.state, self.index, self.direction = request.state, request.index, request.direction
 
     def with_state(self, state):
-        return Asked(self.session, dataclasses.replace(self.request, state=state))
+        return Asked(self.context, dataclasses.replace(self.request, state=state))
 
     def picture(self):
         return self.session.picture(self.request)

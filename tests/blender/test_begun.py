@@ -39,11 +39,11 @@ def test_each_picture_of_a_film_is_made_once(film, render, composed):
 
 
 def test_nothing_is_begun_for_single_pictures(film, render, composed):
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import sessions
 
     edit, *_ = film
     render(edit, [5, 2, 9])
-    session.forget()  # which waits for what was begun
+    sessions.forget()  # which waits for what was begun
     assert composed == [4, 1, 8]
 
 
@@ -70,14 +70,14 @@ def replace(edit, source, effect, strip):
 @pytest.mark.parametrize("change", [weigh, move, slip, widen, replace])
 def test_a_change_leaves_no_trace(film, render, change):
     """Frame 4 is begun when 2 and 3 are rendered; what is shown after a change is what a fresh start shows."""
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import sessions
 
     edit = film[0]
     before = render(edit, [2, 3, 4], "16")[4]
     render(edit, [2, 3], "16")
     change(*film)
     shown = render(edit, [4], "16")[4]
-    session.forget()
+    sessions.forget()
     # Blender keeps the frame that it made last, whatever its settings: another one comes first.
     assert np.array_equal(shown, render(edit, [9, 4], "16")[4])
     assert change is replace or not np.array_equal(shown, before)
@@ -115,31 +115,35 @@ def test_what_a_job_takes_away_meanwhile_is_not_missed(bpy):
 
 def test_who_is_stopped_waits_neither_for_a_device_nor_for_others_to_be_closed(film):
     """Though the session's thread waits, as for a window that does not answer."""
-    from shutter_addon.blender.rendering import effect_source, job_snapshots, session
+    from shutter_addon.blender.rendering import effect_source, job_snapshots, render_context, sessions
 
     scene, answer, half = film[2].scene, threading.Event(), effect_source.Detail(2)
-    waits = session._offscreen._submit(answer.wait, 10).future
+    waits = sessions.OFFSCREEN._submit(answer.wait, 10).future
     stops = iter([False])  # and then it is stopped
     with pytest.raises(StoppedError):
         picture_of(scene, 1, stopped=lambda: next(stops, True))
     assert not waits.done()
     answer.set()
-    first = session._offscreen.request(*job_snapshots.of(scene, 1), detail=effect_source.FULL)
+    context = render_context.of_render()
+    first = context.request(*job_snapshots.of(scene, 1), effect_source.FULL)
     answer.clear()
-    waits = session._offscreen._submit(answer.wait, 10).future
-    second = session._offscreen.request(*job_snapshots.of(scene, 1), detail=half)
+    waits = sessions.OFFSCREEN._submit(answer.wait, 10).future
+    second = context.request(*job_snapshots.of(scene, 1), half)
     assert (first.source.detail, second.source.detail) == (effect_source.FULL, half)
     assert not waits.done()
     answer.set()
-    session.forget()
+    sessions.forget()
 
 
 def test_who_asks_for_room_keeps_what_it_uses(film):
     """The other one may ask it in turn, while it waits for that."""
     from shutter_addon.blender.rendering import effect_source, job_snapshots, session
+    from shutter_addon.blender.rendering.render_context import RenderContext
+    from shutter_addon.blender.rendering.render_settings import RenderSettings
 
     found = session.RenderSession(lambda: ("cpu", None), lambda: found.free())
-    request = found.request(*job_snapshots.of(film[2].scene, 1), detail=effect_source.FULL)
+    context = RenderContext(found, RenderSettings())
+    request = context.request(*job_snapshots.of(film[2].scene, 1), effect_source.FULL)
     found.picture(request)
     renderer = found.renderer(request.source)
     window = renderer._window

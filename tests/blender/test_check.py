@@ -280,8 +280,8 @@ def test_a_fault_of_the_system_that_names_no_file(noise, check, monkeypatch, tmp
 
 def test_beyond_a_cut_no_in_between_frame_is_needed(edit, check, tmp_path):
     """As the build sees it, too."""
+    from shutter_addon.blender.commands.inbetween_command import needed_pairs
     from shutter_addon.blender.data import snapshot
-    from shutter_addon.blender.rendering import session
 
     rng = np.random.default_rng(3)
     shots = [rng.integers(0, 256, (6, 8, 3), dtype=np.uint8).repeat(8, 0).repeat(8, 1) for _ in range(2)]
@@ -291,7 +291,7 @@ def test_beyond_a_cut_no_in_between_frame_is_needed(edit, check, tmp_path):
     assert report["effects"][0]["missing"] == [[4, 6]]
     assert report["build"].endswith("--frames 4:6")
     assert report["notes"] == []
-    assert session.pairs(snapshot.take(*now(), range(4, 7))) == {3, 4, 5}
+    assert needed_pairs(snapshot.take(*now(), range(4, 7))) == {3, 4, 5}
     later = check("--frames", "4:6", "--inbetweens-later")[2]  # no cuts are looked for
     assert later["effects"][0]["missing"] == [[4, 9]]
     assert "as if there were no cuts" in later["notes"][0]

@@ -79,12 +79,12 @@ def test_the_preference_chooses(effect, preferred):
     """From the next render on, if the command asks for nothing else."""
     from shutter_addon.blender.data import preferences
     from shutter_addon.blender.devices import available
-    from shutter_addon.blender.rendering import render_settings, session
+    from shutter_addon.blender.rendering import render_context, render_settings, sessions
 
     def composed_by():
-        session.settle()
+        sessions.settle()
         picture_of(effect.scene, 1)
-        return type(session.here()._compositor.result())
+        return type(render_context.of_render().session._compositor.result())
 
     for wanted, found in (("CPU", CPUCompositor), ("AUTO", GPUCompositor), ("OPENGL", GPUCompositor)):
         preferred.device = wanted
@@ -92,7 +92,7 @@ def test_the_preference_chooses(effect, preferred):
         with render_settings.using(render_settings.RenderSettings(device="cpu")):
             assert composed_by() is CPUCompositor, wanted
     assert {item[0].lower() for item in preferences.DEVICES} == set(available.CHOICES)
-    session.forget()
+    sessions.forget()
 
 
 def test_what_is_lacking_is_said_of_all(bpy, monkeypatch):

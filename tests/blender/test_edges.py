@@ -121,7 +121,8 @@ def test_reversed_and_retimed_strips_follow_the_shown_frame(add, film, same_pixe
 
 def test_in_betweens_that_it_needs_are_told_and_built(bpy, add, film, tmp_path):
     """Where the window does not show them: the shutters are open after the shown frame alone."""
-    from shutter_addon.blender.rendering import render_settings, session
+    from shutter_addon.blender.commands.inbetween_command import needed_pairs
+    from shutter_addon.blender.rendering import render_settings, sessions
 
     data = effect_recipe(inbetween=2, time=[{"frame": 1, "value": 3.5}], edge_aware=1)
     for shutter, bars in zip(data["shutters"], ([0, 1, 0], [0, 0, 0.5]), strict=True):
@@ -143,9 +144,9 @@ def test_in_betweens_that_it_needs_are_told_and_built(bpy, add, film, tmp_path):
         effect.edge_aware = 1
         from shutter_addon.blender.data import snapshot
 
-        assert session.pairs(snapshot.take(edit, effect, strip, (1,), folder=tmp_path / "cache")) == {2, 3}
+        assert needed_pairs(snapshot.take(edit, effect, strip, (1,), folder=tmp_path / "cache")) == {2, 3}
         inbetween.build(source, tmp_path / "cache", 2, "quick", frames=(2, 2), between=between)
-        session.forget()
+        sessions.forget()
         request(edit, effect, strip, 1).picture()
 
 

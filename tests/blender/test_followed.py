@@ -50,7 +50,7 @@ def shown(bpy, edit, tmp_path):
     happens to the source strip first."""
     from shutter_addon.blender.data import recipe_import
     from shutter_addon.blender.editing import add_effect
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import sessions
 
     def show(data, velocity, frame, change=lambda source: None, film=codes):
         first = write_frames(tmp_path / "in", [film(index, velocity) for index in range(COUNT)])
@@ -63,7 +63,7 @@ def shown(bpy, edit, tmp_path):
         return edit, effect, strip, request(edit, effect, strip, frame)
 
     yield show
-    session.forget()
+    sessions.forget()
 
 
 def levels_off(request, velocity, film=codes):

@@ -54,23 +54,23 @@ def test_a_limit_is_a_number_of_megabytes(bpy, capsys, given):
 
 
 def test_a_session_gives_back_what_it_took_and_settles_for_another_limit(bpy, edit, effect):
-    from shutter_addon.blender.rendering import render_settings, session
+    from shutter_addon.blender.rendering import render_settings, sessions
 
-    session.forget()
+    sessions.forget()
     with render_settings.using(render_settings.RenderSettings(gpu_memory=ROOMY)):
-        session.settle()
+        sessions.settle()
         picture = picture_of(effect.scene, 1)
         budget = render_settings.memory()
         assert (budget.limit, budget.used > 0) == (ROOMY << 20, True)
-        session._offscreen.free()
+        sessions.OFFSCREEN.free()
         assert np.array_equal(picture_of(effect.scene, 1), picture)
     with render_settings.using(render_settings.RenderSettings(gpu_memory=SMALL)):
-        session.settle()
+        sessions.settle()
         assert budget.used == 0
         assert np.abs(picture_of(effect.scene, 1) - picture).max() <= 2**-14
         budget = render_settings.memory()
         assert (budget.limit, budget.used > 0) == (SMALL << 20, True)
-    session.forget()
+    sessions.forget()
     assert budget.used == 0
-    session.settle()
+    sessions.settle()
     assert render_settings.memory().limit > ROOMY << 20

@@ -52,7 +52,7 @@ def shown(bpy, edit, footage):
     shutter (H, W), as the pictures at a timeline frame show them."""
     from shutter_addon.blender.data import recipe_import
     from shutter_addon.blender.editing import add_effect
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import sessions
 
     def show(content, change=lambda source: None):
         source = edit.sequence_editor.strips.new_image("images", str(footage), 1, 1)
@@ -70,7 +70,7 @@ def shown(bpy, edit, footage):
         return strip, effect, coefficients
 
     yield show
-    session.forget()
+    sessions.forget()
 
 
 def doubled(bpy, edit, source):

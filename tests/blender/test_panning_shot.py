@@ -7,7 +7,7 @@ from test_region_tracking import COUNT, SIZE, active, call, centre, drawn, keys,
 
 from shutter_addon.blender.data import annotations
 from shutter_addon.blender.editing import region_edits, shutter_edits
-from shutter_addon.blender.rendering import session
+from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.frames import light
 
 FRAME = 20  # on the timeline, of the source's frame 9
@@ -21,7 +21,7 @@ def frames(tmp_path_factory):
 @pytest.fixture
 def region(bpy, edit, frames):
     yield drawn(edit, new_source(edit, frames))
-    session.forget()
+    sessions.forget()
 
 
 def everything(bpy):

@@ -21,9 +21,9 @@ def film(bpy, edit, tmp_path):
     """Six frames under an effect that shows them a frame late, to be rendered as pictures; the edit."""
     from shutter_addon.blender.data import recipe_import
     from shutter_addon.blender.editing import add_effect
-    from shutter_addon.blender.rendering import render_job, session
+    from shutter_addon.blender.rendering import render_job, sessions
 
-    session.forget()
+    sessions.forget()
     frames = np.random.default_rng(0).integers(0, 256, (6, 32, 32, 3), dtype=np.uint8)
     first = write_frames(tmp_path / "in", frames)
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
@@ -65,7 +65,7 @@ def effect_scene(edit):
 
 
 def test_a_python_that_uses_blender_lives_on(bpy, film, tmp_path, capfd):
-    from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering import sessions
 
     mend = broken(tmp_path)
     for _ in range(2):  # the sequencer keeps what it showed in the failed picture's place
@@ -76,7 +76,7 @@ def test_a_python_that_uses_blender_lives_on(bpy, film, tmp_path, capfd):
         assert "Traceback" not in said
     assert len(bpy.data.scenes) == 2
     mend()
-    session.forget()
+    sessions.forget()
     assert bpy.ops.render.render(animation=True) == {"FINISHED"}
     assert len(names(tmp_path / "out")) == 6
     expected = read_picture(tmp_path / "in" / "f0004.png")
@@ -129,7 +129,7 @@ def test_a_single_frame_that_fails_is_not_written(bpy, film, tmp_path):
     assert not (tmp_path / "still.png").exists()
 
 
-@pytest.mark.parametrize("name", ["pictures.resized", "pictures.picture", "session.here"])
+@pytest.mark.parametrize("name", ["pictures.resized", "pictures.picture", "render_context.of_engine"])
 @pytest.mark.parametrize("fault", [MemoryError(), KeyboardInterrupt(), ValueError("odd")])
 def test_no_fault_gives_a_plain_frame(bpy, film, tmp_path, capfd, monkeypatch, name, fault):
     from shutter_addon.blender import rendering
@@ -274,7 +274,7 @@ import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs are started without
 def stop(scene, *_):
     if scene.frame_current == 20 and scene.render.engine == "VIRTUAL_SHUTTER":
-        from shutter_addon.blender.rendering import pictures, session
+        from shutter_addon.blender.rendering import pictures, session, sessions
         def interrupted(*_, **__): signal.raise_signal(signal.SIGINT)
         pictures.picture = interrupted
 """

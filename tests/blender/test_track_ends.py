@@ -7,7 +7,7 @@ from test_region_tracking import COUNT, SIZE, active, call, drawn, keys, new_sou
 
 from shutter_addon.blender.data import fcurves, recipe_export, recipe_import, snapshot
 from shutter_addon.blender.editing import track_region
-from shutter_addon.blender.rendering import session
+from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.recipes import recipe_file
 
 OTHER = texture(*SIZE[::-1]) // 4
@@ -25,7 +25,7 @@ def between_cuts(bpy, edit, tmp_path):
     region = drawn(edit, new_source(edit, write_frames(tmp_path / "cuts", shots)), at=None)
     edit.frame_set(19)
     yield region
-    session.forget()
+    sessions.forget()
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def covered(bpy, edit, tmp_path):
     frames = [picture(min(i, COUNT - 1), range(COUNT - 1, 60)) for i in range(60)]
     region = drawn(edit, new_source(edit, write_frames(tmp_path / "covered", frames)))
     yield region
-    session.forget()
+    sessions.forget()
 
 
 def opacity(bpy, frames):

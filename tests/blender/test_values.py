@@ -25,13 +25,12 @@ def _no_exception(capfd):
 
 
 @pytest.fixture
-def effect(bpy, edit, tmp_path, monkeypatch):
+def effect(bpy, edit, tmp_path):
     """An effect of two shutters, the second keyed and drawn with; its strip active."""
     from shutter_addon.blender.data import annotations, selection
     from shutter_addon.blender.editing import add_effect, bar_edits, region_edits, shutter_edits
-    from shutter_addon.blender.rendering import render_settings, session
+    from shutter_addon.blender.rendering import render_settings, sessions
 
-    monkeypatch.setattr(render_settings, "_settings", render_settings.RenderSettings(device="cpu"))
     frames = np.random.default_rng(0).integers(0, 256, (12, 24, 40, 3), dtype=np.uint8)
     first = write_frames(tmp_path / "in", frames)
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
@@ -50,8 +49,9 @@ def effect(bpy, edit, tmp_path, monkeypatch):
     edit.keyframe_insert(f"{effect.path_from_id()}.source_time")
     selection.choose(edit, strip)
     edit.frame_set(4)
-    yield effect
-    session.forget()
+    with render_settings.using(render_settings.RenderSettings(device="cpu")):
+        yield effect
+    sessions.forget()
 
 
 def draw(layer, points):

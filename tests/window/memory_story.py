@@ -22,8 +22,12 @@ MEGABYTES = int(os.environ["SHUTTER_MEGABYTES"])
 rendering = partial(bpy.app.is_job_running, "RENDER")
 
 
-def session():
-    return sys.modules[f"{traces.NAME}.shutter_addon.blender.rendering.session"]
+def part(name):
+    return sys.modules[f"{traces.NAME}.shutter_addon.blender.rendering.{name}"]
+
+
+def sessions():
+    return part("sessions")
 
 
 def held(which):
@@ -40,7 +44,7 @@ def shown():
     frame = edit().frame_current % FRAMES + 1
     edit().frame_set(frame)
     area_of("SEQUENCE_EDITOR", "PREVIEW").tag_redraw()
-    window = session()._window
+    window = sessions().WINDOW
     yield from until(lambda: window._renderers and held(window)[1], "the preview is composed", 60)
     yield 1.0
 
@@ -60,29 +64,29 @@ def story():
     edit().frame_start, edit().frame_end = 1, FRAMES
     preferences = bpy.context.preferences.addons[traces.NAME].preferences
     preferences.gpu_memory = MEGABYTES
-    session().settle()
-    part = session()
+    sessions().settle()
+    window, offscreen = sessions().WINDOW, sessions().OFFSCREEN
     for device in ("OPENGL", "BLENDER"):
         preferences.device = device
         yield from shown()
-        before = held(part._window)
+        before = held(window)
         edit().render.filepath = f"{OUT / device}/"
         with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], scene=edit()):
             bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
-        budget, most, found = part.memory(), 0, {}
+        budget, most, found = part("render_settings").memory(), 0, {}
         while rendering():
             most = max(most, budget.used)
             with suppress(ValueError, RuntimeError):  # the film's thread takes its renderer out for a moment
-                if part._offscreen._renderers and held(part._offscreen)[1]:  # what is drawn after it has that freed
-                    found |= {"job": held(part._offscreen), "freed": held(part._window)}
+                if offscreen._renderers and held(offscreen)[1]:  # what is drawn after it has that freed
+                    found |= {"job": held(offscreen), "freed": held(window)}
             yield 0.05
-        kind = type(part._offscreen._compositor.result().device).__name__
+        kind = type(offscreen._compositor.result().device).__name__
         found |= {"device": kind, "limit": budget.limit, "before": before}
         yield from shown()
         most = max(most, budget.used)
-        saw(**found, after=held(part._window), kept=held(part._offscreen), most=most)
+        saw(**found, after=held(window), kept=held(offscreen), most=most)
     preferences.gpu_memory = MEGABYTES // 4
-    session().settle()
+    sessions().settle()
     yield from told_in_the_preview()
 
 

@@ -53,7 +53,7 @@ def written(folder):
 
 def held():
     """The job's device, and what its textures take."""
-    device = part("rendering.session")._offscreen._compositor.result().device
+    device = part("rendering.sessions").OFFSCREEN._compositor.result().device
     return type(device).__name__, device.name, sum(texture.bytes for texture in device._held)
 
 

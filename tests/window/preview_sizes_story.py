@@ -19,8 +19,8 @@ FRAME = 50
 _part = "bl_ext.user_default.virtual_shutter.shutter_addon.blender.{}".format
 
 
-def session():
-    return sys.modules[_part("rendering.session")]
+def sessions():
+    return sys.modules[_part("rendering.sessions")]
 
 
 def space():
@@ -29,7 +29,7 @@ def space():
 
 def composed():
     """The sizes of what the window's session holds, and whether that is read from a proxy."""
-    sources = [renderer.source for _key, renderer in session()._window._renderers.values()]
+    sources = [renderer.source for _key, renderer in sessions().WINDOW._renderers.values()]
     return [[source.width, source.height] + ["proxy"] * source.from_proxy for source in sources]
 
 
@@ -157,7 +157,7 @@ def kept_time():
     edit, drawn = story.edit(), []
 
     def note():
-        ((_snapshot, _frame, request),) = session()._window._requests.values()
+        ((_snapshot, _frame, request),) = sessions().WINDOW._requests.values()
         drawn.append((time.perf_counter(), edit.frame_current, request.index))
 
     kept, edit.sync_mode = edit.sync_mode, "FRAME_DROP"

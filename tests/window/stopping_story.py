@@ -81,7 +81,7 @@ def story():
     key("Escape")
     yield from until(lambda: not rendering(), "Esc ends the render", 60, wait=TICK)
     ended = passes.all
-    last = part("blender.rendering.session")._offscreen._submit(lambda: None)
+    last = part("blender.rendering.sessions").OFFSCREEN._submit(lambda: None)
     done = getattr(last, "future", last).done
     yield from until(done, "the render's device is free", 60, wait=TICK)
     saw(after=passes.all - ended, whole=passes.whole[0], finished_after=len(passes.whole) - whole)

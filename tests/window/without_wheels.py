@@ -84,10 +84,11 @@ def story():
     engine._say = lambda self, message: (said.append(message), say(self, message))
     edit.frame_set(3)
     yield 1.0
-    assert part("rendering.session")._window._compositor.result().device.name, "the preview is on Blender's GPU"
+    assert part("rendering.sessions").WINDOW._compositor.result().device.name, "the preview is on Blender's GPU"
     assert not said, said
     effect = edit.virtual_shutter.effects[0]
-    shown = part("rendering.pictures").picture(*part("rendering.job_snapshots").of(effect.scene, 3))
+    context = part("rendering.render_context").of_drawing()
+    shown = part("rendering.pictures").picture(context, *part("rendering.job_snapshots").of(effect.scene, 3))
     for strip in part("data.strips").effect_strips(edit):
         strip.invalidate_cache("RAW")
     yield from rendered()

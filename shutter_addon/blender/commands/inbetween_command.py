@@ -6,7 +6,7 @@ from ...media import inbetween
 from ..data import inbetween_settings, requirements, snapshot, source_media
 from ..editing import new_edit, saved_edit
 from ..output import film_output
-from ..rendering import job_snapshots, render_settings, session
+from ..rendering import job_snapshots, render_context, render_settings
 from . import command_line
 
 
@@ -70,7 +70,19 @@ def build_lacking(film) -> None:
             frames = {frame for frame in frames if film.frame_start - 1 < frame <= film.frame_end}
         needing = snapshot.take(edit, effect, shown[0], frames, folder=render_settings.settings().inbetween)
         with needing.source.open() as medium:
-            _build(medium, *needing.inbetween, sorted(session.pairs(needing)))
+            _build(medium, *needing.inbetween, sorted(needed_pairs(needing)))
+
+
+def needed_pairs(shown: snapshot.Snapshot) -> set[int]:
+    """The pairs of neighbouring source frames whose in-betweens are needed to show an effect strip at the snapshot's
+    frames, each by its first. It reads what it must to find cuts. One of FAULTS: they cannot be shown."""
+    context, factor, found = render_context.of_render(), shown.inbetween.factor, set()
+    for frame in sorted(shown.frames):
+        request = context.request(shown, frame)
+        renderer = context.renderer(request)
+        found |= {index // factor for index in renderer.needed(request, known=False) if index % factor}
+        renderer.source.release()  # what it read is not shown here
+    return found
 
 
 def _build(medium, folder: Path, factor: int, method: str, pairs) -> None:

@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from ...core.model import shutters
 from ..data import fcurves, revision, snapshot
 from ..data.consistency import bars
-from ..rendering import effect_source, invalidation, session
+from ..rendering import effect_source, invalidation, render_context
 
 
 def summary(weights) -> str:
@@ -33,7 +33,7 @@ def open_for(edit, effect, strip, index: int) -> str | None:
     if not (has_length and is_shown):
         return None
     try:
-        state = session.here().request(invalidation.current(edit, effect, strip, frame), frame).state
+        state = render_context.of_drawing().request(invalidation.current(edit, effect, strip, frame), frame).state
     except effect_source.FAULTS:  # which the live preview tells
         return None
     words = iface_("Open for {frames} of {window} frames here")

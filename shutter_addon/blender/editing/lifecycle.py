@@ -5,7 +5,7 @@ import uuid
 import bpy
 
 from ..data import annotations, fcurves, requirements, strips
-from ..rendering import invalidation, render_job, session
+from ..rendering import invalidation, render_job, sessions
 from . import copies, match_source, shown_annotations, undelete
 from .add_effect import add_camera
 
@@ -170,7 +170,7 @@ def _remove_scenes(updated) -> None:
 def _remove(scene) -> None:
     camera, annotation = scene.camera, scene.annotation
     bpy.data.scenes.remove(scene)
-    session.drop_removed()
+    sessions.drop_removed()
     invalidation.drop_removed()
     if camera is not None and camera.type == "CAMERA" and camera.library is None and not camera.users:
         data = camera.data

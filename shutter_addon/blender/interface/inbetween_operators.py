@@ -13,7 +13,7 @@ from ...core import messages
 from ..data import inbetween_settings, selection, strips, validation
 from ..data.choices import INBETWEENS
 from ..rendering import inbetween_build, strobing
-from ..rendering.session import FAULTS
+from ..rendering.effect_source import FAULTS
 from .operator_bases import UNDOABLE, OfEffect, redraw, refused
 
 TICK = 0.25  # seconds

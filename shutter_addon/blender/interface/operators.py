@@ -19,7 +19,7 @@ from ..editing import (
     shown_annotations,
     shutter_edits,
 )
-from ..rendering.session import FAULTS
+from ..rendering.effect_source import FAULTS
 from . import icons, preview_areas, sharp_frame
 from .operator_bases import UNDOABLE, Move, OfEffect, OfRegion, OfShutter, OfStrokes, has_room, redraw, refused
 

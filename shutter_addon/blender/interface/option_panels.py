@@ -8,8 +8,8 @@ from ...devices.device import NoDeviceError
 from ...media import cuts
 from ..data import selection
 from ..devices import available
-from ..rendering import inbetween_build, render_settings, session
-from ..rendering.session import FAULTS
+from ..rendering import inbetween_build, render_settings, sessions
+from ..rendering.effect_source import FAULTS
 from . import inbetween_operators
 from .panel_parts import WithEffect, sentence
 
@@ -48,7 +48,7 @@ def _draw_devices(layout):
     column = layout.column(align=True)
     column.active = False
     try:
-        preview, render = session.device_names()
+        preview, render = sessions.device_names()
     except NoDeviceError as error:
         sentence(column, str(error), "ERROR")
         return

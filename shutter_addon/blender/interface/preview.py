@@ -12,7 +12,6 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from bpy.types import PropertyGroup
 from gpu_extras.batch import batch_for_shader
 
-from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core import stopping
 from ...core.model.frame_state import FrameState
@@ -30,10 +29,11 @@ from ..rendering import (
     inbetween_build,
     invalidation,
     pictures,
+    render_context,
     render_job,
-    session,
     strobing,
 )
+from ..rendering.render_context import RenderContext
 from . import drawing, inbetween_operators, note_buttons, preview_areas, previewing, sharp_frame
 from .note_buttons import Button
 from .previewing import RESULTS, Shown, shown
@@ -147,15 +147,16 @@ def _draw() -> None:
         previewing.whole = None
         _tell_unseen(context, say)
         return
+    render = render_context.of_drawing()
     with drawing.pixel_space(context.region):
         try:
             with stopping.once(_time_up(found) if previewing.may_be_late() else stopping.never):
-                _show(context, found, settings, say)
+                _show(context, render, found, settings, say)
             _slice = None, _SLICE
         except stopping.StoppedError:
             say(rpt_("Composing…"))
             quad = Quad(context.region, found.strip, annotations.picture_size(found.effect))
-            _show_strokes(context, quad, found.effect, request_of(context, found))
+            _show_strokes(context, quad, found.effect, request_of(context, render, found))
             bpy.app.timers.register(_redraw_once)
         except effect_source.FAULTS as error:
             _tell_fault(error, say)
@@ -172,27 +173,23 @@ def _time_up(found: Shown):
     return lambda: time.monotonic() > end
 
 
-def request_of(context, found: Shown) -> Request:
+def request_of(context, render: RenderContext, found: Shown) -> Request:
     """What the effect strip shows at the current frame, in the previews' size, as a draft where a still result is not
     exact anyway. One of effect_source.FAULTS: it cannot be shown."""
-    return _drafted(context, found, previewing.requested(context, found, _snapshot(found)))
-
-
-def _renderer(request: Request) -> Renderer:
-    return session.here().renderer(request.source)
+    return _drafted(context, render, found, previewing.requested(context, render, found, _snapshot(found)))
 
 
 def _snapshot(found: Shown):
     return invalidation.current(found.edit, found.effect, found.strip, found.edit.frame_current)
 
 
-def _drafted(context, found: Shown, request) -> Request:
+def _drafted(context, render: RenderContext, found: Shown, request) -> Request:
     is_result = context.window_manager.virtual_shutter.view in RESULTS and _is_rendered(found)
     is_going = previewing.is_going(context)
     if is_going and not bpy.app.timers.is_registered(_redraw_when_still):
         bpy.app.timers.register(_redraw_when_still, first_interval=_SOON)
     is_exact = previewing.whole is not None or (is_result and not is_going)
-    return request if is_exact else previewing.draft(request, _renderer(request).source)
+    return request if is_exact else previewing.draft(request, render.renderer(request).source)
 
 
 def _tell_unseen(context, say) -> None:
@@ -210,12 +207,12 @@ def _is_rendered(found: Shown) -> bool:
     return found.edit.render.sequencer_gl_preview == "RENDERED"
 
 
-def _show(context, found: Shown, settings, say) -> None:
+def _show(context, render: RenderContext, found: Shown, settings, say) -> None:
     snapshot = _snapshot(found)
-    exact = previewing.requested(context, found, snapshot)
-    request = _drafted(context, found, exact)
+    exact = previewing.requested(context, render, found, snapshot)
+    request = _drafted(context, render, found, exact)
     size = annotations.picture_size(found.effect)
-    quad, renderer = Quad(context.region, found.strip, size), _renderer(request)
+    quad, renderer = Quad(context.region, found.strip, size), render.renderer(request)
     if context.space_data.show_overlays:
         is_still = not context.screen.is_animation_playing
         _tell_detail(renderer.source, size, request is not exact, is_still, say)

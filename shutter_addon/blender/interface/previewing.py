@@ -15,7 +15,8 @@ from ...compute.request import Request
 from ...media.reduced import DIVISORS
 from ..data import annotations, geometry, selection, strip_proxies, strips
 from ..data.snapshot import Snapshot
-from ..rendering import effect_source, engine, render_job, session
+from ..rendering import effect_source, engine, render_context, render_job
+from ..rendering.render_context import RenderContext
 from . import preview_areas, sharp_frame
 
 # Operators that read the sequencer's pictures, from the window.
@@ -60,18 +61,18 @@ class Whole:
 whole: Whole | None = None
 
 
-def requested(context, found: Shown, snapshot: Snapshot) -> Request:
+def requested(context, render: RenderContext, found: Shown, snapshot: Snapshot) -> Request:
     """What an effect strip shows at the current frame, in the previews' detail: in full, while it is looked at so. That
     ends here with the frame and with a change of the effect. One of effect_source.FAULTS: it cannot be shown."""
     global whole
-    frame, here = found.edit.frame_current, session.here()
+    frame = found.edit.frame_current
     if whole is not None and (whole.scene, whole.frame) == (snapshot.scene, frame) and not is_going(context):
-        request = here.request(snapshot, frame, detail=effect_source.FULL)
+        request = render.request(snapshot, frame, effect_source.FULL)
         if whole.key in (None, request.key[1:]):
             whole.key = request.key[1:]
             return request
     whole = None
-    return here.request(snapshot, frame, detail=detail(context, found.edit, found.effect, found.strip))
+    return render.request(snapshot, frame, detail(context, found.edit, found.effect, found.strip))
 
 
 def draft(request: Request, source) -> Request:
@@ -209,9 +210,10 @@ def _needed(snapshot: Snapshot, frame: float) -> tuple[effect_source.Detail, boo
         strip = next((s for s in strips.effect_strips(edit) if s.scene.session_uid == snapshot.scene), None)
         effect = strip and strips.effect_of(edit, strip.scene)
         return (detail(context, edit, effect, strip) if effect else effect_source.FULL), False
-    request = requested(context, found, snapshot)
+    render = render_context.of_drawing()
+    request = requested(context, render, found, snapshot)
     wanted = effect_source.FULL if whole is not None else detail(context, edit, found.effect, found.strip)
-    return wanted, is_drawn(context, found, session.here().renderer(request.source).source)
+    return wanted, is_drawn(context, found, render.renderer(request).source)
 
 
 def register():

@@ -7,7 +7,7 @@ import numpy as np
 from bpy.types import Gizmo, GizmoGroup
 
 from ..data import annotations, geometry
-from ..rendering import effect_source, probe, session
+from ..rendering import effect_source, probe, render_context
 from . import drawing, preview, previewing
 
 _WIDTH, _HEIGHT, _LINE, _PAD, _APART = 180, 64, 17, 8, 14  # in units of the interface
@@ -64,8 +64,9 @@ class SHUTTER_GT_probe(Gizmo):
         if _is_cropped(found.strip, annotations.picture_size(found.effect), at):
             return
         try:
-            request = preview.request_of(context, found)
-            probed = probe.at(session.here().renderer(request.source), request, at)
+            render = render_context.of_drawing()
+            request = preview.request_of(context, render, found)
+            probed = probe.at(render.renderer(request), request, at)
         except effect_source.FAULTS:  # which the live preview tells
             return
         if probed is not None:

@@ -11,7 +11,7 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 from ...core.recipes import recipe, recipe_file
 from ..data import recipe_import, selection
 from ..output import matte_export
-from ..rendering.session import FAULTS
+from ..rendering.effect_source import FAULTS
 from .operator_bases import OfEffect, chosen_file
 
 

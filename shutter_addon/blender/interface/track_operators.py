@@ -12,7 +12,7 @@ from bpy.types import Operator
 from ..data import selection, validation
 from ..data.choices import CONTEXT
 from ..editing import bar_edits, follow_stabilization, follow_track, panning_shot, track_region, tripod
-from ..rendering.session import FAULTS
+from ..rendering.effect_source import FAULTS
 from .operator_bases import OfEffect, OfRegion, OfShutter, OfStrokes, redraw, refused
 
 # Seconds of work from one look at the window to the next, at least and at most, and between two looks at its thread.

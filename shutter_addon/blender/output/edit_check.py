@@ -21,6 +21,8 @@ from ...media import MediaError, cuts
 from ...media.files import check_file
 from ..data import requirements, snapshot, source_media, strips
 from ..rendering import decoding_ahead, effect_source, job_snapshots
+from ..rendering.render_context import RenderContext
+from ..rendering.render_settings import RenderSettings
 from ..rendering.session import RenderSession
 from . import output_space
 
@@ -113,10 +115,10 @@ def _effect(looking: RenderSession, edit, effect, strip, frames: set[float], com
 
 def _requests(looking: RenderSession, taken, found: EffectCheck) -> dict[float, Request]:
     """What each frame asks for, where it can be shown; faults of others are noted, each at the first of its frames."""
-    requests, faults = {}, {}
+    requests, faults, context = {}, {}, RenderContext(looking, RenderSettings())
     for frame in sorted(taken.frames):
         try:
-            requests[frame] = looking.request(taken, frame)
+            requests[frame] = looking.request(taken, frame, context)
         except effect_source.FAULTS as error:
             kind = re.sub(r"\bframe -?[\d.]+", "", str(error))
             faults.setdefault(kind, []).append(str(error))

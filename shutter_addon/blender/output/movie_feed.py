@@ -9,7 +9,6 @@ import os
 import struct
 import tempfile
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -19,7 +18,7 @@ import numpy as np
 from ...core import atomic_write
 from ...core.stopping import StoppedError
 from ..data import colour_configuration, snapshot, strips
-from ..rendering import pictures, render_job, render_settings, session
+from ..rendering import pictures, render_context, render_job, render_settings
 from ..rendering.engine import in_words, say
 
 # Rows of a tile of the file; its columns are a multiple of 16. A TIFF without tiles takes twice the time: Blender reads
@@ -50,10 +49,7 @@ def _fed(edit, picture):
     strip = _above(effect_strip, picture.path)
     filled = partial(fill, effect_strip, picture, [])
     try:
-        with (
-            render_job.calling(bpy.app.handlers.render_pre, filled),
-            render_settings.using(replace(render_settings.settings(), levels=True)),
-        ):
+        with render_job.calling(bpy.app.handlers.render_pre, filled):
             yield
     finally:
         edit.sequence_editor.strips.remove(strip)
@@ -78,8 +74,9 @@ def fill(effect_strip, picture, film: list, edit, *_) -> None:
         if not film:
             effect, frames = strips.effect_of(edit, effect_strip.scene), range(edit.frame_start, edit.frame_end + 1)
             film.append(snapshot.take(edit, effect, effect_strip, frames, folder=render_settings.settings().inbetween))
-        picture.write(pictures.picture(film[0], edit.frame_current, say, render_job.stopping))
-        session.here().begin_next(film[0], edit.frame_current, render_job.stopping)
+        context = render_context.of_render(say, render_job.stopping, levels=True)
+        picture.write(pictures.picture(context, film[0], edit.frame_current))
+        context.session.begin_next(film[0], edit.frame_current, context)
     except BaseException as error:  # Blender would print it, and write the picture again that was there before
         if not isinstance(error, StoppedError):
             render_job.fail(in_words(error))

@@ -11,7 +11,7 @@ from ...core.messages import of_file, signed
 from ...core.stopping import StoppedError
 from ..data.snapshot import Snapshot
 from ..data.strips import ENGINE
-from . import device_work, effect_source, invalidation, job_snapshots, pictures, render_job, session
+from . import device_work, effect_source, invalidation, job_snapshots, pictures, render_context, render_job
 
 
 def in_full(_shown: Snapshot, _frame: float) -> tuple[effect_source.Detail, bool]:
@@ -55,13 +55,14 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         last = job_snapshots.pictures.get(scene.session_uid) if render_job.in_job() else None
         if last is not None and last.shape == (height, width, 4):
             self._show(last)  # in the render's window, which would be empty until this one is made
-        picture = pictures.picture(shown, frame, self._say, self._stopped, detail)
+        context = render_context.of_engine(self._say, self._stopped)
+        picture = pictures.picture(context, shown, frame, detail)
         picture = pictures.resized(picture, width, height, detail.divisor)
         self._show(picture)
         self.update_progress(1.0)
         if render_job.in_job():
             job_snapshots.pictures[scene.session_uid] = picture
-        session.here().begin_next(shown, frame, self._stopped)
+        context.session.begin_next(shown, frame, context)
 
     def _show(self, picture: np.ndarray) -> None:
         # A result of a single pixel has Blender make room for the whole picture. One of all would be copied there.

@@ -17,7 +17,7 @@ from ...core.stopping import StoppedError
 from ..data import requirements, snapshot, strips
 from ..data.snapshot import Snapshot
 from ..data.validation import EffectError
-from . import effect_source, invalidation, render_job, render_settings, session
+from . import effect_source, invalidation, render_job, render_settings, sessions
 
 _taken: dict[int, Snapshot | Exception] = {}  # by effect scene: of the job that runs
 pictures: dict[int, np.ndarray] = {}  # likewise: the last one, which the render's window shows until the next is made
@@ -44,7 +44,7 @@ def end() -> None:
     _taken.clear()
     _left_out.clear()
     pictures.clear()
-    session.end_job()
+    sessions.end_job()
 
 
 def look(film: int) -> None:

@@ -2,49 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import OpenImageIO
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
-from ...core.stopping import StoppedError, never
+from ...core.stopping import StoppedError
 from ...devices.budget import MEGABYTE
 from ...media import cuts
 from ...media.image_writing import write_exr
 from ..data.snapshot import Snapshot
-from . import render_job, render_settings, session
+from . import render_settings
 from .effect_source import FULL, Detail
+from .render_context import RenderContext
 
 _said: set[str] = set()  # what is said once
 
 
-def picture(
-    snapshot: Snapshot, frame: float, say: Callable[[str], None] = print, stopped=never, detail: Detail = FULL
-) -> np.ndarray:
+def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: Detail = FULL) -> np.ndarray:
     """The picture (H, W, 4) of an effect strip at a timeline frame, top row first: scene-linear float32, premultiplied,
-    or levels, if the settings ask for them. One of FAULTS: there is none, in one sentence. say: called with a sentence
-    when the device is a lesser one, or cuts cannot be found. stopped: asked whether the picture is not wanted any
-    longer; StoppedError: it is not.
-    """
-    if stopped():
+    or levels, if the context asks for them. One of FAULTS: there is none, in one sentence. StoppedError: it is not
+    wanted any longer."""
+    if context.stopped():
         raise StoppedError
-    if render_job.window_waits():  # for a film of which Blender does not say that it begins
-        session.settle_waited_for()
-    here = session.here()
-    request = here.request(snapshot, frame, say, detail, stopped)
+    session, request = context.session, context.request(snapshot, frame, detail)
     if request.state.options.stop_at_cuts:
-        _say_of_cuts(say)
-    if (weights := render_settings.settings().weights) is not None:
+        _say_of_cuts(context.say)
+    if (weights := context.settings.weights) is not None:
         names = [shutter.name for shutter in snapshot.effect.shutters]
         place = weights / f"{round(frame - snapshot.first + 1):04d}.exr"
-        write_exr(place, np.moveaxis(here.coefficients(request, stopped), 0, -1), names)
-    result = here.picture(request, stopped)
-    for sentence in shortages(here.renderer(request.source), request):
-        _say_once(sentence, say)
-    return result
+        write_exr(place, np.moveaxis(session.coefficients(request, context.stopped), 0, -1), names)
+    made = session.picture(request, context.stopped)
+    for sentence in shortages(context.renderer(request), request):
+        _say_once(sentence, context.say)
+    return made
 
 
 def _say_once(sentence: str, say) -> None:

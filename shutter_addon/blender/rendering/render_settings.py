@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,44 +19,41 @@ class RenderSettings:
     device: one of available.CHOICES, in place of the user's preference
     weights: folder for the coefficients of every picture, as EXR files
     inbetween: folder of in-between frames, in place of the effects' own
-    gpu_memory: megabytes of the GPU that textures may take, in place of the user's preference; 0: as budget.allowed
-    levels: pictures are those of Renderer.levels"""
+    gpu_memory: megabytes of the GPU that textures may take, in place of the user's preference; 0: as budget.allowed"""
 
     device: str | None = None
     weights: Path | None = None
     inbetween: Path | None = None
     gpu_memory: int | None = None
-    levels: bool = False
 
 
-_settings = RenderSettings()
+_settings: ContextVar[RenderSettings] = ContextVar("settings", default=RenderSettings())  # noqa: B039
 _budget: tuple[int, Budget] | None = None  # with the megabytes that it was made for
 
 
 @contextmanager
 def using(settings: RenderSettings):
-    """Inside, renders have these settings."""
-    global _settings
-    before, _settings = _settings, settings
+    """Inside, on this thread, renders have these settings."""
+    token = _settings.set(settings)
     try:
         yield
     finally:
-        _settings = before
+        _settings.reset(token)
 
 
 def settings() -> RenderSettings:
-    """Those of the render that runs."""
-    return _settings
+    """Those of the render that runs on this thread; of a job of the window none are set."""
+    return _settings.get()
 
 
 def wanted() -> str:
     """The device that the command asks for, else the user's preference: one of available.CHOICES."""
-    return _settings.device or preferences.device()
+    return settings().device or preferences.device()
 
 
 def _wanted_memory() -> int:
     """The megabytes that the command sets, else the user's preference; 0: as many as are allowed."""
-    return preferences.gpu_memory() if _settings.gpu_memory is None else _settings.gpu_memory
+    return preferences.gpu_memory() if settings().gpu_memory is None else settings().gpu_memory
 
 
 def memory() -> Budget:

@@ -1,4 +1,4 @@
-"""Render sessions: a device, and the renderers of the effects that were shown last, whose frames they keep."""
+"""A render session: a device, and the renderers of the effects that were shown last, whose frames it keeps."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-import bpy
 import numpy as np
 
 from ...compute.renderer import Renderer
@@ -19,14 +19,16 @@ from ...core.stopping import never
 from ...devices.device import NoDeviceError
 from ...media.matte_values import MatteValues
 from ..data.snapshot import Snapshot, translated
-from ..devices import available, gpu_relay
-from . import decoding_ahead, render_job, render_settings
-from .device_work import Work, broken_off, in_window, result_of
+from ..devices import available
+from . import decoding_ahead, render_settings
+from .device_work import Work, broken_off, result_of
 from .effect_source import FAULTS, FULL, Detail, SourceKey, source_index
+
+if TYPE_CHECKING:
+    from .render_context import RenderContext
 
 # Renderers whose frames are kept: more effects than these in one frame decode their windows again for every frame.
 _KEPT = 4
-_ANSWER = 5.0  # seconds that a job waits for the window to free memory
 
 
 class RenderSession:
@@ -75,18 +77,18 @@ class RenderSession:
         return Work(done, ended, False)
 
     def request(
-        self, snapshot: Snapshot, frame: float, say=print, detail: Detail | None = None, stopped=never
+        self, snapshot: Snapshot, frame: float, context: RenderContext, detail: Detail | None = None
     ) -> Request:
-        """What an effect strip shows at a timeline frame; say: called with a sentence when the device is a lesser one.
-        One of FAULTS: it cannot be shown. StoppedError: the device is not waited for any longer.
+        """What an effect strip shows at a timeline frame. One of FAULTS: it cannot be shown. StoppedError: the device
+        is not waited for any longer.
 
         detail: None: as it was the last time, for who asks for no picture"""
         known = self._renderers.get(snapshot.scene)
         key = SourceKey.of(snapshot, detail or (known[0].detail if known else FULL))
-        source = self.renderer(key, say, stopped).source
-        known = self._requests.get(snapshot.scene)
-        if known is not None and known[0] is snapshot and known[1] == frame and known[2].source == key:
-            return known[2]
+        source = self.renderer(key, context.say, context.stopped).source
+        known, at, last = self._requests.get(snapshot.scene, (None, None, None))
+        if known is snapshot and at == frame and (last.source, last.levels) == (key, context.levels):
+            return last
         state = _in_blocks(snapshot.state(frame), key.detail.divisor)
         index, backward = source_index(snapshot, frame, source)
         direction = -1 if backward else 1
@@ -100,7 +102,7 @@ class RenderSession:
                 source,
                 lambda other: source_index(snapshot, other, source)[0],
             )
-        request = Request(index, state, direction, key, levels=render_settings.settings().levels)
+        request = Request(index, state, direction, key, levels=context.levels)
         self._requests[snapshot.scene] = snapshot, frame, request
         return request
 
@@ -115,7 +117,7 @@ class RenderSession:
     def _begin(self, request: Request, stopped=never) -> Work:
         return self._submit(decoding_ahead.picture, self.renderer(request.source), request, stopped=stopped)
 
-    def begin_next(self, snapshot: Snapshot, frame: float, stopped=never) -> None:
+    def begin_next(self, snapshot: Snapshot, frame: float, context: RenderContext) -> None:
         """Begins the picture after the one at that timeline frame, where a film is rendered: if the last two were
         neighbours.
 
@@ -126,7 +128,7 @@ class RenderSession:
         step, last = snapshot.film
         if frame - before == step and frame + step <= last and frame + step in snapshot.frames:
             with suppress(*FAULTS):  # it is met again when the picture is asked for
-                request = self.request(snapshot, frame + step, detail=FULL, stopped=stopped)
+                request = self.request(snapshot, frame + step, context, FULL)
                 self._begun[snapshot.scene] = request.key, self._begin(request)
 
     def coefficients(self, request: Request, stopped=never) -> np.ndarray:
@@ -228,88 +230,6 @@ class RenderSession:
         except NoDeviceError:
             pass  # met again when a picture is asked for
         self.forget()
-
-
-def _ask_window() -> None:
-    """Has the window free what it shows, for a job: it is not drawn meanwhile, and makes it again."""
-    if render_job.in_job():
-        gpu_relay.ask(_window.free, _ANSWER)
-
-
-def _ask_offscreen() -> None:
-    """Has renders free what they keep for the next one, unless one runs."""
-    if not render_job.runs():
-        _offscreen.free()
-
-
-# What the window itself shows is made on its main thread, on its GPU. Renders have a device apart and a thread for it:
-# beside Blender's own GL context another one cannot always be current (see GLDevice). In the background Blender's GPU
-# belongs to the main thread, and has none.
-_offscreen = RenderSession(lambda: available.choose(render_settings.wanted()), _ask_window)
-_window = RenderSession(lambda: ("blender", None), _ask_offscreen)
-# For a thread whose pictures the window waits for, where _offscreen has them made by the window.
-_waited_for = RenderSession(lambda: available.choose(render_settings.wanted(), window_waits=True), lambda: None)
-_SESSIONS = _offscreen, _window, _waited_for
-
-
-def device_names() -> tuple[str, str]:
-    """What the preview of a window is composed on, and its renders, as these call themselves. NoDeviceError: there is
-    none for renders as the user wants it."""
-    return available.name("blender"), available.name(available.choose(render_settings.wanted())[0])
-
-
-def here() -> RenderSession:
-    """The session of whoever calls: the window's own for what its main thread draws, else one for renders, a script's
-    on the main thread among them: there Blender's GPU need not be current. NoDeviceError: these have none."""
-    if in_window() and not render_job.ends_films():
-        return _window
-    return _waited_for if render_job.window_waits() and _offscreen.device == "relayed" else _offscreen
-
-
-def settle_waited_for() -> None:
-    """As `settle`, for a film of which Blender does not say that it begins; on the thread that makes its pictures."""
-    _waited_for.settle()
-
-
-def settle() -> None:
-    """Before a render, on the main thread: its device and its memory are what the user wants now."""
-    if render_settings.forget_memory_if_changed():
-        forget()
-    _waited_for.forget()  # its frames take the machine's own memory
-    _offscreen.settle()
-
-
-def pairs(snapshot: Snapshot) -> set[int]:
-    """The pairs of neighbouring source frames whose in-betweens are needed to show an effect strip at the snapshot's
-    frames, each by its first. It reads what it must to find cuts. One of FAULTS: they cannot be shown."""
-    factor, found = snapshot.inbetween.factor, set()
-    for frame in sorted(snapshot.frames):
-        request = here().request(snapshot, frame)
-        renderer = here().renderer(request.source)
-        found |= {index // factor for index in renderer.needed(request, known=False) if index % factor}
-        renderer.source.release()  # what it read is not shown here
-    return found
-
-
-def end_job() -> None:
-    """Lets go of what a job of the window has begun, and of its snapshots. A script's next still may go on from the
-    one before."""
-    if render_job.in_job():
-        _offscreen.rest()
-    _offscreen.forget_requests()
-
-
-def drop_removed() -> None:
-    """Closes the sources of effect scenes that are gone, and frees their frames."""
-    scenes = {scene.session_uid for scene in bpy.data.scenes}
-    for session in _SESSIONS:
-        session.keep(scenes)
-
-
-def forget(*_) -> None:
-    """Closes all sources and frees the devices: when a file is loaded, and when the extension goes."""
-    for session in _SESSIONS:
-        session.forget()
 
 
 def _in_blocks(state: FrameState, divisor: int) -> FrameState:

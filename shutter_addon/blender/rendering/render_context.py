@@ -1,0 +1,59 @@
+"""For whom pictures are made: built once at each door (the engine, what is drawn, a command, the movie feed), and
+passed down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ...compute.renderer import Renderer
+from ...compute.request import Request
+from ...core.stopping import never
+from ..data.snapshot import Snapshot
+from . import render_job, render_settings, sessions
+from .device_work import in_window
+from .effect_source import Detail
+from .render_settings import RenderSettings
+from .session import RenderSession
+
+
+@dataclass(frozen=True)
+class RenderContext:
+    """What pictures are made with, whatever they show.
+
+    session: whose device makes them
+    settings: what a command has set for them
+    say: called with a sentence when the device is a lesser one, or something cannot be done
+    stopped: whether they are not wanted any longer
+    levels: they are of 8-bit display code values (Request.levels)"""
+
+    session: RenderSession
+    settings: RenderSettings
+    say: Callable[[str], None] = print
+    stopped: Callable[[], bool] = never
+    levels: bool = False
+
+    def request(self, snapshot: Snapshot, frame: float, detail: Detail | None = None) -> Request:
+        """See RenderSession.request."""
+        return self.session.request(snapshot, frame, self, detail)
+
+    def renderer(self, request: Request) -> Renderer:
+        """See RenderSession.renderer."""
+        return self.session.renderer(request.source, self.say, self.stopped)
+
+
+def of_drawing() -> RenderContext:
+    """For what is drawn on the main thread; without a window, what draws there is a script."""
+    return RenderContext(sessions.WINDOW, render_settings.settings()) if in_window() else of_render()
+
+
+def of_engine(say, stopped) -> RenderContext:
+    """For the engine: a preview where Blender draws, else a render."""
+    if in_window() and not render_job.ends_films():
+        return RenderContext(sessions.WINDOW, render_settings.settings(), say, stopped)
+    return of_render(say, stopped)
+
+
+def of_render(say=print, stopped=never, *, levels: bool = False) -> RenderContext:
+    """For a render: on a device apart from the window's, which need not be current. NoDeviceError: there is none."""
+    return RenderContext(sessions.of_render(), render_settings.settings(), say, stopped, levels)

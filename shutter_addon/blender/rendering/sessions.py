@@ -1,0 +1,76 @@
+"""The sessions that there are: the window's, that of renders, and that of renders for which the window waits."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..devices import available, gpu_relay
+from . import render_job, render_settings
+from .session import RenderSession
+
+_ANSWER = 5.0  # seconds that a job waits for the window to free memory
+
+
+def _ask_window() -> None:
+    """Has the window free what it shows, for a job: it is not drawn meanwhile, and makes it again."""
+    if render_job.in_job():
+        gpu_relay.ask(WINDOW.free, _ANSWER)
+
+
+def _ask_offscreen() -> None:
+    """Has renders free what they keep for the next one, unless one runs."""
+    if not render_job.runs():
+        OFFSCREEN.free()
+
+
+# What the window itself shows is made on its main thread, on its GPU. Renders have a device apart and a thread for it:
+# beside Blender's own GL context another one cannot always be current (see GLDevice). In the background Blender's GPU
+# belongs to the main thread, and has none.
+OFFSCREEN = RenderSession(lambda: available.choose(render_settings.wanted()), _ask_window)
+WINDOW = RenderSession(lambda: ("blender", None), _ask_offscreen)
+# For a thread whose pictures the window waits for, where OFFSCREEN has them made by the window.
+WAITED_FOR = RenderSession(lambda: available.choose(render_settings.wanted(), window_waits=True), lambda: None)
+SESSIONS = OFFSCREEN, WINDOW, WAITED_FOR
+
+
+def device_names() -> tuple[str, str]:
+    """What the preview of a window is composed on, and its renders, as these call themselves. NoDeviceError: there is
+    none for renders as the user wants it."""
+    return available.name("blender"), available.name(available.choose(render_settings.wanted())[0])
+
+
+def of_render() -> RenderSession:
+    """That of the render which runs on this thread."""
+    if not render_job.window_waits():
+        return OFFSCREEN
+    WAITED_FOR.settle()  # for a film of which Blender does not say that it begins
+    return WAITED_FOR if OFFSCREEN.device == "relayed" else OFFSCREEN
+
+
+def settle() -> None:
+    """Before a render, on the main thread: its device and its memory are what the user wants now."""
+    if render_settings.forget_memory_if_changed():
+        forget()
+    WAITED_FOR.forget()  # its frames take the machine's own memory
+    OFFSCREEN.settle()
+
+
+def end_job() -> None:
+    """Lets go of what a job of the window has begun, and of its snapshots. A script's next still may go on from the
+    one before."""
+    if render_job.in_job():
+        OFFSCREEN.rest()
+    OFFSCREEN.forget_requests()
+
+
+def drop_removed() -> None:
+    """Closes the sources of effect scenes that are gone, and frees their frames."""
+    scenes = {scene.session_uid for scene in bpy.data.scenes}
+    for session in SESSIONS:
+        session.keep(scenes)
+
+
+def forget(*_) -> None:
+    """Closes all sources and frees the devices: when a file is loaded, and when the extension goes."""
+    for session in SESSIONS:
+        session.forget()
