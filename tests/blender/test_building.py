@@ -191,7 +191,7 @@ def test_a_build_ends_at_once_where_a_pair_takes_long(bpy, inbetween_build, effe
 
 
 def test_a_second_build_is_refused_and_nothing_is_removed_meanwhile(bpy, inbetween_build, effect, monkeypatch):
-    monkeypatch.setattr(inbetween_build, "_running", SimpleNamespace(scene=0))
+    monkeypatch.setattr(inbetween_build._builds, "running", SimpleNamespace(scene=0))
     for operator in ("inbetween_build", "inbetween_purge"):
         with pytest.raises(RuntimeError, match="In-between frames are being built; Esc stops that"):
             getattr(bpy.ops.shutter, operator)()

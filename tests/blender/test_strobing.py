@@ -68,7 +68,7 @@ def looked(edit, effect, strip):
         if not strobing.is_busy():
             return found
         strobing.advance()
-        strobing._job.result()
+        strobing._measuring.job.result()
         assert strobing.advance() or not strobing.is_busy()
     raise AssertionError("it is never done")
 

@@ -6,18 +6,28 @@ It tells nobody of strokes and of files on disk: previews look for them when the
 
 from collections.abc import Callable, Hashable
 
-_number = 0
+
+class Revision:
+    """number: grows with every change"""
+
+    def __init__(self):
+        self.number = 0
+
+    def changed(self) -> None:
+        self.number += 1
+
+
+_data = Revision()
 
 
 def number() -> int:
     """Grows with every change; equal numbers: nothing has changed but the current frame."""
-    return _number
+    return _data.number
 
 
 def changed() -> None:
     """Something has changed, or may have."""
-    global _number
-    _number += 1
+    _data.changed()
 
 
 class UntilChange:

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
+from dataclasses import dataclass
 
 import bpy
 import gpu
@@ -28,9 +29,21 @@ _REST = 1.0  # seconds without a call, after which the main thread looks for non
 
 _calls: queue.SimpleQueue[tuple] = queue.SimpleQueue()
 _lock = threading.Lock()
-_looks, _looks_until = False, 0.0  # whether the main thread looks for calls, and until when at least
-_looked = 0.0  # when it looked last
-_unfinished, _batch = 0, 8  # passes that may be under way, and after how many they are waited for
+
+
+@dataclass
+class _MainThread:
+    """looks: whether the main thread looks for calls; until: until when at least; looked: when it looked last
+    unfinished: passes that may be under way; batch: after how many they are waited for"""
+
+    looks: bool = False
+    until: float = 0.0
+    looked: float = 0.0
+    unfinished: int = 0
+    batch: int = 8
+
+
+_main = _MainThread()
 
 
 class RelayedDevice(BlenderDevice):
@@ -120,41 +133,37 @@ def serve(seconds: float = _LEAST) -> bool:
 
 def _finish_some() -> None:
     """Waits for passes, after so many that it takes a moment: whatever is drawn or read waits for all before it."""
-    global _unfinished, _batch
-    _unfinished += 1
-    if _unfinished >= _batch:
+    _main.unfinished += 1
+    if _main.unfinished >= _main.batch:
         start = time.monotonic()
         gpu.types.GPUTexture((1, 1)).read()
         quick = _MOMENT / max(time.monotonic() - start, 1e-4)
-        _unfinished, _batch = 0, max(1, int(_batch * min(max(quick, 0.5), 2.0)))
+        _main.unfinished, _main.batch = 0, max(1, int(_main.batch * min(max(quick, 0.5), 2.0)))
 
 
 def _called(function) -> Future:
     """The function, called on the main thread after all calls before."""
-    global _looks
     done = Future()
     _calls.put((done, function))
     _keep_looking()
     with _lock:
-        if not _looks:
-            _looks = True
+        if not _main.looks:
+            _main.looks = True
             bpy.app.timers.register(_look, persistent=True)
     return done
 
 
 def _keep_looking() -> None:
-    global _looks_until
-    _looks_until = time.monotonic() + _REST
+    _main.until = time.monotonic() + _REST
 
 
 def _look() -> float | None:
     """A timer."""
-    global _looks, _looked
-    serve(min(max(time.monotonic() - _looked, _LEAST), _MOST))
-    _looked = time.monotonic()
+    serve(min(max(time.monotonic() - _main.looked, _LEAST), _MOST))
+    _main.looked = time.monotonic()
     with _lock:
-        _looks = not _calls.empty() or time.monotonic() < _looks_until
-        return 0.0 if _looks else None
+        _main.looks = not _calls.empty() or time.monotonic() < _main.until
+        return 0.0 if _main.looks else None
 
 
 def _redraw() -> None:

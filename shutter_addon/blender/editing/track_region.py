@@ -25,7 +25,7 @@ from ...core.recipes import region_keys
 from ...media import camera_tracking, pursuit, tracking
 from ...media.footage import Footage
 from ...media.tracking import Tracked
-from ..data import annotations, inbetween_settings, selection, snapshot, strips, validation
+from ..data import annotations, inbetween_settings, revision, selection, snapshot, strips, validation
 from ..data.validation import EffectError
 from ..rendering import effect_source
 from . import motion_keys
@@ -46,13 +46,12 @@ _FAULTS = (
     n_("the picture is too unlike those before, and it goes on from here"),
 )
 
-_replacements = 0  # how often Blender's data has been replaced, by undo or by another file
+_replaced = revision.Revision()  # Blender's data, by undo or by another file
 
 
 def data_replaced() -> None:
     """Ends all tracking, without another key: what it has found belongs to data that is gone."""
-    global _replacements
-    _replacements += 1
+    _replaced.changed()
 
 
 class Target(NamedTuple):
@@ -80,7 +79,7 @@ class Target(NamedTuple):
     @staticmethod
     def _known(effect, index: int | None) -> tuple:
         layer = None if index is None else effect.regions[index].layer
-        return _replacements, effect.id_data.session_uid, effect.start, layer
+        return _replaced.number, effect.id_data.session_uid, effect.start, layer
 
 
 class _Subject(NamedTuple):

@@ -39,12 +39,12 @@ class SHUTTER_OT_full_quality(Operator):
         return _shown(context) is not None or refused(cls, rpt_("No preview shows a Shutter strip"))
 
     def execute(self, context):
-        if previewing.whole is not None:
-            previewing.whole = None
+        if previewing.looking.whole is not None:
+            previewing.looking.whole = None
             _end()
         else:
             window, area, found = _shown(context)
-            previewing.whole = previewing.Whole(found.effect.scene.session_uid, found.edit.frame_current)
+            previewing.looking.whole = previewing.Whole(found.effect.scene.session_uid, found.edit.frame_current)
             found.strip.invalidate_cache("RAW")
             _begin(window, area)
         return {"FINISHED"}
@@ -73,7 +73,7 @@ def _begin(window, area) -> None:
 def _end_when_over() -> float | None:
     if _before is None:
         return None
-    if previewing.whole is None:
+    if previewing.looking.whole is None:
         _end()
         return None
     return _TICK
@@ -120,7 +120,7 @@ def _centre(window, area, centre) -> None:
 def forget() -> None:
     """Ends it, and leaves the view as it is."""
     global _before
-    _before = previewing.whole = None
+    _before = previewing.looking.whole = None
 
 
 classes = (SHUTTER_OT_full_quality,)

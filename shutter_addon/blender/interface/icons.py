@@ -6,12 +6,13 @@ import numpy as np
 from ...core.model import presets
 
 _SIZE, _WINDOW = 32, 8
-_collection = None
+_collections: dict = {}  # of Blender's icons, by name
 
 
 def of(preset: str) -> int:
     """The icon of a preset; 0, which is none, in the background."""
-    return _collection[preset].icon_id if _collection and preset in _collection else 0
+    icons = _collections.get("presets", {})
+    return icons[preset].icon_id if preset in icons else 0
 
 
 def _drawn(bars) -> np.ndarray:
@@ -25,16 +26,13 @@ def _drawn(bars) -> np.ndarray:
 
 
 def register():
-    global _collection
-    _collection = bpy.utils.previews.new()
+    icons = _collections["presets"] = bpy.utils.previews.new()
     for name in presets.PRESETS:
-        icon = _collection.new(name)
+        icon = icons.new(name)
         icon.icon_size = icon.image_size = (_SIZE, _SIZE)
         pixels = _drawn(presets.bars(name, _WINDOW)).ravel()
         icon.icon_pixels_float = icon.image_pixels_float = pixels
 
 
 def unregister():
-    global _collection
-    bpy.utils.previews.remove(_collection)
-    _collection = None
+    bpy.utils.previews.remove(_collections.pop("presets"))

@@ -1,7 +1,7 @@
 """The live preview: what is drawn over the sequencer's picture, composed on Blender's GPU: views, and scribbles."""
 
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import bpy
 import gpu
@@ -10,15 +10,13 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty
 from bpy.types import PropertyGroup
-from gpu_extras.batch import batch_for_shader
 
 from ...compute.request import Request
 from ...core import stopping
 from ...core.model.frame_state import FrameState
-from ...devices.passes import body
 from ...media import MediaError
 from ...media.errors import NotBuiltError
-from ..data import annotations, geometry, selection, strips
+from ..data import annotations, selection, strips
 from ..data.choices import CONTEXT
 from ..devices import blender_gpu
 from ..devices.blender_gpu import Texture
@@ -34,8 +32,9 @@ from ..rendering import (
     strobing,
 )
 from ..rendering.render_context import RenderContext
-from . import drawing, inbetween_operators, note_buttons, preview_areas, previewing, sharp_frame
+from . import drawing, inbetween_operators, note_buttons, preview_areas, preview_quad, previewing, sharp_frame
 from .note_buttons import Button
+from .preview_quad import Quad
 from .previewing import RESULTS, Shown, shown
 
 VIEWS = (
@@ -75,7 +74,17 @@ _NAVIGATION = 56  # units at the right of a preview, where Blender's own buttons
 _STILL = 0.4  # seconds after which a frame that is shown stays
 _SOON = 0.1  # seconds
 _SLICE = 0.2  # seconds
-_slice = None, _SLICE  # what was composed last in slices, and for how many seconds it might be
+
+
+@dataclass
+class _Slice:
+    """What was composed last in slices, its effect's scene and frame, and for how many seconds it might be."""
+
+    shown: tuple[int, int] | None = None
+    seconds: float = _SLICE
+
+
+_last = _Slice()
 
 
 class ShutterPreview(PropertyGroup):
@@ -119,7 +128,6 @@ class ShutterPreview(PropertyGroup):
 
 def _draw() -> None:
     """The draw handler of the previews."""
-    global _slice
     context = bpy.context
     settings = context.window_manager.virtual_shutter
     blender_gpu.free_unused()
@@ -144,7 +152,7 @@ def _draw() -> None:
     say = _Notes(context.region)
     found = shown(context)
     if found is None:
-        previewing.whole = None
+        previewing.looking.whole = None
         _tell_unseen(context, say)
         return
     render = render_context.of_drawing()
@@ -152,7 +160,7 @@ def _draw() -> None:
         try:
             with stopping.once(_time_up(found) if previewing.may_be_late() else stopping.never):
                 _show(context, render, found, settings, say)
-            _slice = None, _SLICE
+            _last.shown, _last.seconds = None, _SLICE
         except stopping.StoppedError:
             say(rpt_("Composing…"))
             quad = Quad(context.region, found.strip, annotations.picture_size(found.effect))
@@ -166,10 +174,9 @@ def _draw() -> None:
 def _time_up(found: Shown):
     """What says whether a picture has been composed for so long that Blender has to look at its keys: it goes on when
     it is drawn again. Each time, it has half as long again, so that it comes to an end."""
-    global _slice
     shown = found.effect.scene.session_uid, found.edit.frame_current
-    seconds = 1.5 * _slice[1] if _slice[0] == shown else _SLICE
-    _slice, end = (shown, seconds), time.monotonic() + seconds
+    _last.seconds = 1.5 * _last.seconds if _last.shown == shown else _SLICE
+    _last.shown, end = shown, time.monotonic() + _last.seconds
     return lambda: time.monotonic() > end
 
 
@@ -188,7 +195,7 @@ def _drafted(context, render: RenderContext, found: Shown, request) -> Request:
     is_going = previewing.is_going(context)
     if is_going and not bpy.app.timers.is_registered(_redraw_when_still):
         bpy.app.timers.register(_redraw_when_still, first_interval=_SOON)
-    is_exact = previewing.whole is not None or (is_result and not is_going)
+    is_exact = previewing.looking.whole is not None or (is_result and not is_going)
     return request if is_exact else previewing.draft(request, render.renderer(request).source)
 
 
@@ -256,7 +263,7 @@ def _warn(found: Shown, say) -> None:
 
 def _tell_detail(source, size: tuple[int, int], is_draft: bool, is_still: bool, say) -> None:
     """Says in what the picture is less than a render's; size: of that. And gives the way to see that one, and back."""
-    if previewing.whole is not None:
+    if previewing.looking.whole is not None:
         say(rpt_("Full quality, as it will be rendered"), Button("shutter.full_quality", iface_("Back")))
         return
     less = []
@@ -384,71 +391,6 @@ def _palette(effect) -> Texture:
     return Texture(gpu.types.GPUTexture(size, layers=1, format="RGBA32F", data=data), (*size, 1), "rgba32f")
 
 
-class Quad:
-    """Where a strip's picture lies in a preview's region, its crop considered."""
-
-    def __init__(self, region, strip, size):
-        self._matrix = geometry.picture_to_region(strip, size, region)
-        crop, (width, height) = strip.crop, size
-        self._low = np.array([crop.min_x / width, crop.min_y / height])
-        self._high = 1 - np.array([crop.max_x / width, crop.max_y / height])
-
-    def on_region(self, points) -> np.ndarray:
-        """Points (n, 2) of the strip's picture, in fractions, in pixels of the region."""
-        return geometry.mapped(self._matrix, np.asarray(points, dtype=np.float64))
-
-    def draw(self, name: str, textures: dict, left: float = 0.0, right: float = 1.0, **constants) -> None:
-        """Draws from `left` to `right`, in fractions of the picture's width, through a shader of shaders/."""
-        low, high = np.maximum(self._low, (left, 0)), np.minimum(self._high, (right, 1))
-        if (low >= high).any():
-            return
-        corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
-        shader = _shader(name)
-        shader.bind()
-        for sampler, texture in textures.items():
-            shader.uniform_sampler(sampler, texture.gpu)
-        for constant, value in constants.items():
-            (shader.uniform_float if isinstance(value, float) else shader.uniform_int)(constant, value)
-        where = {"corner": self.on_region(corners).tolist(), "place": corners}
-        gpu.state.blend_set("ALPHA_PREMULT")
-        batch_for_shader(shader, "TRI_FAN", where).draw(shader)
-        gpu.state.blend_set("NONE")
-
-
-_SAMPLERS = {
-    "show_picture": {"picture": "FLOAT_2D_ARRAY"},
-    "show_coefficients": {"coefficients": "FLOAT_2D_ARRAY", "palette": "FLOAT_2D_ARRAY"},
-    "show_scribbles": {"labels": "UINT_2D_ARRAY", "palette": "FLOAT_2D_ARRAY"},
-}
-_CONSTANTS = {
-    "show_picture": {"opacity": "FLOAT"},
-    "show_coefficients": {"opacity": "FLOAT", "size": "IVEC2", "block": "INT", "count": "INT"},
-    "show_scribbles": {"opacity": "FLOAT", "size": "IVEC2", "block": "INT"},
-}
-_shaders: dict = {}
-
-
-def _shader(name: str):
-    if name not in _shaders:
-        between = gpu.types.GPUStageInterfaceInfo("show_interface")
-        between.smooth("VEC2", "at")
-        info = gpu.types.GPUShaderCreateInfo()
-        info.push_constant("MAT4", "ModelViewProjectionMatrix")
-        info.push_constant("BOOL", "srgbTarget")  # set by Blender: what is drawn into encodes by itself
-        for constant, kind in _CONSTANTS[name].items():
-            info.push_constant(kind, constant)
-        for slot, (sampler, kind) in enumerate(_SAMPLERS[name].items()):
-            info.sampler(slot, kind, sampler)
-        info.vertex_in(0, "VEC2", "corner")
-        info.vertex_in(1, "VEC2", "place")
-        info.vertex_out(between)
-        info.fragment_out(0, "VEC4", "shown")
-        info.vertex_source(body("show_quad"))
-        info.fragment_source(body(name))
-        _shaders[name] = gpu.shader.create_from_info(info)
-    return _shaders[name]
-
-
 class _Notes:
     """Sentences at the upper left of a region, each with a button or none."""
 
@@ -495,8 +437,7 @@ def unregister():
     for timer in (_redraw_once, _redraw_when_still, _follow_once, _redraw_panels, _measure):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
-    blender_gpu.free(*_shaders.values())
-    _shaders.clear()
+    preview_quad.free()
     del bpy.types.WindowManager.virtual_shutter
     for cls in reversed(classes):
         bpy.utils.unregister_class(cls)

@@ -26,7 +26,6 @@ _TRACKING = {"SHUTTER_OT_track", "SHUTTER_OT_track_camera", "SHUTTER_OT_panning_
 _BUILDING = {"SHUTTER_OT_inbetween_build", "SHUTTER_OT_smooth_streaks"}
 _GOING = {"ANIM_OT_change_frame"} | _TRACKING | _BUILDING
 _MOMENT = 0.3  # seconds
-_late_until = 0.0
 _READING_TOOL = "builtin.sample"  # reads once before it is one of those that run
 _PERCENT = {"PROXY_25": 25, "PROXY_50": 50, "PROXY_75": 75, "PROXY_100": 100}
 _STANDARD = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
@@ -58,20 +57,34 @@ class Whole:
     key: tuple | None = None
 
 
-whole: Whole | None = None
+@dataclass
+class _Looking:
+    """How previews are looked at.
+
+    whole: the picture that is looked at as it will be rendered; late_until: the time until which pictures may be late
+    """
+
+    whole: Whole | None = None
+    late_until: float = 0.0
+
+
+looking = _Looking()
 
 
 def requested(context, render: RenderContext, found: Shown, snapshot: Snapshot) -> Request:
     """What an effect strip shows at the current frame, in the previews' detail: in full, while it is looked at so. That
     ends here with the frame and with a change of the effect. One of effect_source.FAULTS: it cannot be shown."""
-    global whole
     frame = found.edit.frame_current
-    if whole is not None and (whole.scene, whole.frame) == (snapshot.scene, frame) and not is_going(context):
+    if (
+        (whole := looking.whole) is not None
+        and (whole.scene, whole.frame) == (snapshot.scene, frame)
+        and not is_going(context)
+    ):
         request = render.request(snapshot, frame, effect_source.FULL)
         if whole.key in (None, request.key[1:]):
             whole.key = request.key[1:]
             return request
-    whole = None
+    looking.whole = None
     return render.request(snapshot, frame, detail(context, found.edit, found.effect, found.strip))
 
 
@@ -181,10 +194,9 @@ def is_tracking() -> bool:
 def may_be_late() -> bool:
     """Whether the playhead is dragged, something is tracked or in-between frames are built, or was a moment ago: keys
     count for more than pictures."""
-    global _late_until
     if _GOING & render_job.operators_running():
-        _late_until = time.monotonic() + _MOMENT
-    return time.monotonic() < _late_until
+        looking.late_until = time.monotonic() + _MOMENT
+    return time.monotonic() < looking.late_until
 
 
 def _has(item, values: dict) -> bool:
@@ -205,14 +217,14 @@ def _needed(snapshot: Snapshot, frame: float) -> tuple[effect_source.Detail, boo
         return effect_source.FULL, False
     edit, found = selection.edit_of(context), shown(context)
     if found is None or found.effect.scene.session_uid != snapshot.scene or edit.frame_current != frame:
-        if whole is not None:
+        if looking.whole is not None:
             return effect_source.FULL, False
         strip = next((s for s in strips.effect_strips(edit) if s.scene.session_uid == snapshot.scene), None)
         effect = strip and strips.effect_of(edit, strip.scene)
         return (detail(context, edit, effect, strip) if effect else effect_source.FULL), False
     render = render_context.of_drawing()
     request = requested(context, render, found, snapshot)
-    wanted = effect_source.FULL if whole is not None else detail(context, edit, found.effect, found.strip)
+    wanted = effect_source.FULL if looking.whole is not None else detail(context, edit, found.effect, found.strip)
     return wanted, is_drawn(context, found, render.renderer(request).source)
 
 

@@ -4,6 +4,8 @@ From *Draw* on until a stroke is finished, and again for as long as the pen is d
 the stroke. It is a setting of the previews, which files keep: before one is saved, the result is given back.
 """
 
+from dataclasses import dataclass
+
 import bpy
 
 from ..data import selection, strips
@@ -12,47 +14,52 @@ from . import preview_areas
 PEN = "GPENCIL_OT_annotate"
 _TOOLS = "builtin.annotate"  # how the tools' names begin
 
-_channel = 0  # that the previews show; 0: they show the result
-_is_down = False  # the pen, when a preview was drawn last
+
+@dataclass
+class _Pen:
+    """channel: that the previews show, 0: they show the result; is_down: when a preview was drawn last"""
+
+    channel: int = 0
+    is_down: bool = False
+
+
+_pen = _Pen()
 
 
 def show(context) -> None:
     """Shows the source of the active effect, if that is beside it and not muted, where the pen draws for the effect."""
-    global _channel
     found = selection.active(context)
     source = found and strips.nearest_source(found[0], found[1], found[2])
     if source is None or source.mute or source.parent_meta() != found[2].parent_meta():
         return
     give_back(context)
-    _channel = source.channel
+    _pen.channel = source.channel
     for _window, area in preview_areas.previews(context):
         space = area.spaces.active
         if not space.display_channel and space.annotation == found[1].scene.annotation:
-            space.display_channel = _channel
+            space.display_channel = _pen.channel
 
 
 def give_back(context) -> None:
     """The previews show the result again."""
-    global _channel
-    for _window, area in preview_areas.previews(context) if _channel else ():
-        if area.spaces.active.display_channel == _channel:
+    for _window, area in preview_areas.previews(context) if _pen.channel else ():
+        if area.spaces.active.display_channel == _pen.channel:
             area.spaces.active.display_channel = 0
-    _channel = 0
+    _pen.channel = 0
 
 
 def follow_pen(context) -> None:
     """For what draws a preview, which may change nothing: what the pen asks for comes right after."""
-    global _is_down
-    was_down, _is_down = _is_down, any(op.bl_idname == PEN for op in context.window.modal_operators)
-    if _is_down and not _channel:
+    was_down, _pen.is_down = _pen.is_down, any(op.bl_idname == PEN for op in context.window.modal_operators)
+    if _pen.is_down and not _pen.channel:
         _soon(_show)
-    elif _channel and was_down and not _is_down:
+    elif _pen.channel and was_down and not _pen.is_down:
         _soon(_give_back)
 
 
 def is_shown(space) -> bool:
     """Whether a preview shows the sharp frame for the pen."""
-    return bool(_channel) and space.display_channel == _channel
+    return bool(_pen.channel) and space.display_channel == _pen.channel
 
 
 def _tool_chosen() -> None:
@@ -63,12 +70,12 @@ def _tool_chosen() -> None:
 
 
 def _show() -> None:
-    if _is_down:
+    if _pen.is_down:
         show(bpy.context)
 
 
 def _give_back() -> None:
-    if not _is_down:
+    if not _pen.is_down:
         give_back(bpy.context)
 
 

@@ -4,6 +4,7 @@ import threading
 import time
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from ...core.messages import EffectError
@@ -31,8 +32,18 @@ class Look(NamedTuple):
 
 _media: dict[tuple, tuple] = {}  # by source_media.media_key: the medium, its file not open; bytes for a factor of 2
 _looks: dict[tuple, tuple[float, inbetween_folders.State, int]] = {}  # when it was looked, and what was found
-_running: "Build | None" = None
-_left: tuple[Future, ...] = ()  # of the last build: what it was in the middle of when it was stopped, it still ends
+
+
+@dataclass
+class _Builds:
+    """running: the build that runs; left: of the last one, what it was in the middle of when it was stopped, which it
+    still ends"""
+
+    running: "Build | None" = None
+    left: tuple[Future, ...] = ()
+
+
+_builds = _Builds()
 
 
 def look(edit, effect, strip) -> Look:
@@ -95,7 +106,7 @@ class Build:
         self.scene = effect.scene.session_uid
         self.done, self.total = 0, medium.count - 1 if pairs is None else len(pairs)
         self._stopped = threading.Event()
-        self.future = _in_thread(self._build, _left, medium, pairs)
+        self.future = _in_thread(self._build, _builds.left, medium, pairs)
 
     def _build(self, before, medium, pairs):
         wait(before)
@@ -129,21 +140,19 @@ def _needed(edit, effect, strip, medium, settings) -> list[int]:
 
 def running() -> Build | None:
     """The build that runs: one at a time, as it uses the whole machine."""
-    return _running
+    return _builds.running
 
 
 def start(edit, effect, strip, factor: int | None = None) -> Build:
     """Begins a build; factor: as of Build. EffectError, MediaError: it cannot begin."""
-    global _running
-    _running = Build(edit, effect, strip, factor)
+    _builds.running = Build(edit, effect, strip, factor)
     inbetween_settings.built.hold()
-    return _running
+    return _builds.running
 
 
 def ended() -> None:
     """What the build that was stopped, or has run to its end, has built counts from now on."""
-    global _running, _left
-    _left, _running = (_running.future,), None
+    _builds.left, _builds.running = (_builds.running.future,), None
     inbetween_settings.built.release()
     _looks.clear()
 
@@ -151,7 +160,7 @@ def ended() -> None:
 def purge(effect, source) -> tuple[int, list[tuple]]:
     """Removes the in-between frames of an effect's source strip, of every factor and method; the bytes that they took,
     and the folders where other files stay, with their number. EffectError, MediaError, OSError: it cannot be done."""
-    wait(_left)
+    wait(_builds.left)
     folder, (medium, _) = inbetween_settings.folder(effect), _known(source_media.spec(source))
     left = []
     freed = inbetween_folders.purge(folder, medium, lambda *place: left.append(place))
@@ -164,10 +173,10 @@ def purge(effect, source) -> tuple[int, list[tuple]]:
 def stop() -> None:
     """Ends the build that runs, if any, and forgets what is known: when a file is loaded, and when the extension
     goes."""
-    if _running is not None:
-        _running.stop()
+    if _builds.running is not None:
+        _builds.running.stop()
         ended()
-    wait(_left)
+    wait(_builds.left)
     wait([doubled for _medium, doubled in _media.values()])
     _media.clear()
     _looks.clear()

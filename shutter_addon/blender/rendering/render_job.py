@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 
 import bpy
 
@@ -26,61 +27,71 @@ def _to_stderr(text: str) -> None:
         print(signed(text), file=sys.stderr, flush=True)
 
 
-_tell = _to_stderr  # what is done with the sentence that ends a render in the background
-failure: str | None = None  # that sentence, of the render that runs or ran last
-_stopping = False
-_cancelling = False
+@dataclass
+class _Job:
+    """The render that runs, or ran last.
+
+    film: session_uid of the scene whose render runs, None: none does; neither of those that its Scene strips show, nor
+    of what a preview shows
+    begun: whether its first frame has; stopping: whether it is to end with the frame that is made
+    failure: the sentence that ends it; tell: what is done with that in the background
+    cancelling: whether the small render runs whose error ends it
+    waited_for: whether the window waits for every picture that its thread makes, see in_job"""
+
+    film: int | None = None
+    begun: bool = False
+    stopping: bool = False
+    failure: str | None = None
+    tell: Callable[[str], None] = _to_stderr
+    cancelling: bool = False
+    waited_for: bool = False
+
+
+_job = _Job()
 _spent: list[tuple[str, str]] = []  # names of the scenes and cameras of small renders, see _cancel
-_film: int | None = None  # session_uid of the scene whose render runs; neither of those that its Scene strips show, nor
-# of what a preview shows
-_begun = False
-_waited_for = False  # whether the window waits for every picture that the job's thread makes, see in_job
 
 
 def begin(scene) -> bool:
     """A render begins. True: that of a film or a picture; not of a scene in one, nor of a preview."""
-    global _film, _begun, failure, _stopping, _waited_for
     is_effect = scene.render.engine == ENGINE
-    if _film is not None and (_begun or is_effect):
+    if _job.film is not None and (_job.begun or is_effect):
         return False
     # Render Sequencer Animation says of no film that it begins, only of each effect in it.
-    _waited_for = is_effect and _beside_main_thread() and "RENDER_OT_opengl" in operators_running()
+    _job.waited_for = is_effect and _beside_main_thread() and "RENDER_OT_opengl" in operators_running()
     if is_effect and not (bpy.app.background or _beside_main_thread()):
         return False  # a preview
-    _film, _begun, failure, _stopping = scene.session_uid, False, None, False
+    _job.film, _job.begun, _job.failure, _job.stopping = scene.session_uid, False, None, False
     return True
 
 
 def runs() -> bool:
     """Whether a film, or a single picture of it, is rendered."""
-    return _film is not None
+    return _job.film is not None
 
 
 def film() -> int | None:
     """session_uid of the scene whose render runs."""
-    return _film
+    return _job.film
 
 
 def is_film(scene) -> bool:
     """Whether this scene's frames are what is rendered; called before each of them."""
-    global _begun
-    if scene.session_uid != _film:
+    if scene.session_uid != _job.film:
         return False
-    _begun = True
+    _job.begun = True
     return True
 
 
 def end(scene, alone: bool) -> None:
     """A render has ended. alone: no Python waits for it, Blender itself renders, and would go on or end with exit code
     1."""
-    global _film
-    if scene.session_uid == _film:
-        _film = None
+    if scene.session_uid == _job.film:
+        _job.film = None
         if bpy.app.background:
             _remove_spent()
         else:  # what Blender keeps belongs to its main thread
             bpy.app.timers.register(lambda: _PATIENCE if bpy.app.is_job_running("RENDER") else _remove_spent())
-        if failure is not None and alone and bpy.app.background:
+        if _job.failure is not None and alone and bpy.app.background:
             leave(BAD_INPUT)
 
 
@@ -89,7 +100,7 @@ def ends_films() -> bool:
     it is a preview, on the main thread."""
     if bpy.app.background or _beside_main_thread():
         return True
-    return _film is not None and not bpy.app.is_job_running("RENDER")
+    return _job.film is not None and not bpy.app.is_job_running("RENDER")
 
 
 def in_job() -> bool:
@@ -97,12 +108,12 @@ def in_job() -> bool:
 
     It does not in View ▸ Render Sequencer Animation: its main thread waits while a picture is made. So the job's thread
     may read Blender's data by itself, and must not wait for the main thread."""
-    return _beside_main_thread() and not _waited_for
+    return _beside_main_thread() and not _job.waited_for
 
 
 def window_waits() -> bool:
     """Whether this is a thread for which the window waits, see in_job."""
-    return _beside_main_thread() and _waited_for
+    return _beside_main_thread() and _job.waited_for
 
 
 def _beside_main_thread() -> bool:
@@ -118,12 +129,11 @@ def operators_running() -> set[str]:
 @contextmanager
 def telling(to: Callable[[str], None]):
     """Inside, the sentence that ends a render in the background goes there in place of stderr."""
-    global _tell
-    before, _tell = _tell, to
+    before, _job.tell = _job.tell, to
     try:
         yield
     finally:
-        _tell = before
+        _job.tell = before
 
 
 @contextmanager
@@ -173,21 +183,24 @@ def soon(function: Callable[[], None]) -> None:
 
 def stop() -> None:
     """Has the render end with the frame that is made, as at Ctrl-C."""
-    global _stopping
-    _stopping = True
+    _job.stopping = True
 
 
 def stopping() -> bool:
     """Whether the film that this picture or frame belongs to was stopped, or has failed."""
-    return _film is not None and ends_films() and (_stopping or failure is not None)
+    return _job.film is not None and ends_films() and (_job.stopping or _job.failure is not None)
 
 
 def fail(text: str) -> None:
     """Says why the render that runs has to end; only the first sentence counts."""
-    global failure
-    if failure is None:
-        failure = text
-        _tell(text)
+    if _job.failure is None:
+        _job.failure = text
+        _job.tell(text)
+
+
+def failure() -> str | None:
+    """The sentence that ended the render which runs or ran last; None: none had to."""
+    return _job.failure
 
 
 def cancel(ended=None) -> None:
@@ -211,10 +224,9 @@ def _cancel_and_show() -> None:
 def _cancel() -> None:
     """An engine's error that reaches an operator is all that breaks Blender's renders from Python. Errors from within
     the sequencer reach none; those of a small render beside it do."""
-    global _cancelling
-    if _cancelling:
+    if _job.cancelling:
         return
-    _cancelling = True
+    _job.cancelling = True
     scene = bpy.data.scenes.new("Cancelled")
     camera = bpy.data.objects.new("Cancelled", None)
     _spent.append((scene.name, camera.name))
@@ -226,7 +238,7 @@ def _cancel() -> None:
         with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]), suppress(RuntimeError):
             bpy.ops.render.render(scene=scene.name)
     finally:
-        _cancelling = False
+        _job.cancelling = False
 
 
 def _remove_spent() -> None:
@@ -240,13 +252,13 @@ def _remove_spent() -> None:
 
 def cancelling() -> bool:
     """Whether the small render runs whose error ends the other one."""
-    return _cancelling
+    return _job.cancelling
 
 
 def _show() -> None:
     """Says in the window what failed: reports of an engine within the sequencer reach nobody."""
-    if failure is not None:
-        text = sentence(failure)
+    if _job.failure is not None:
+        text = sentence(_job.failure)
         with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
             bpy.context.window_manager.popup_menu(
                 lambda menu, _context: menu.layout.label(text=text), title="Virtual Shutter", icon="ERROR"

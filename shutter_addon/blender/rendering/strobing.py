@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -47,15 +47,23 @@ class Strobing(NamedTuple):
 _moved: dict[tuple, steps.Moved | None] = {}  # by a source's key and a pair
 _costs: dict[tuple, inbetween.Cost | None] = {}  # by a source's key and a method
 _found: dict[int, tuple[float, Strobing | None]] = {}  # by scene: the timeline frame that was looked at last
-_wanted: Callable[[], None] | None = None
-_job: Future | None = None
+
+
+@dataclass
+class _Measuring:
+    """wanted: what was asked for last; job: what is measured"""
+
+    wanted: Callable[[], None] | None = None
+    job: Future | None = None
+
+
+_measuring = _Measuring()
 _stopped = threading.Event()
 
 
 def look(effect, strip, snapshot: Snapshot, renderer: Renderer, request: Request) -> Strobing | None:
     """What is known of a picture's exposure; None: nothing, or it is smooth. What is not known is asked for."""
-    global _wanted
-    _wanted = None
+    _measuring.wanted = None
     frame, found = effect.id_data.frame_current, None
     if steps.is_possible():
         found = _look(effect, strip, snapshot, renderer, request)
@@ -70,11 +78,10 @@ def last(effect) -> Strobing | None:
 
 
 def _look(effect, strip, snapshot, renderer, request):
-    global _wanted
     ways = _ways(renderer, request)
     pairs = _chosen(sorted(ways))
     if lacking := [pair for pair in pairs if (snapshot.source.key, pair) not in _moved]:
-        _wanted = partial(_measure_motion, snapshot.source, lacking)
+        _measuring.wanted = partial(_measure_motion, snapshot.source, lacking)
         return None
     known = [(found, way) for pair in pairs for way in ways[pair] if (found := _moved[snapshot.source.key, pair])]
     height = effect.scene.render.resolution_y
@@ -86,7 +93,7 @@ def _look(effect, strip, snapshot, renderer, request):
         return Strobing(step, None)
     key = snapshot.source.key, inbetween_settings.method(effect)
     if key not in _costs:
-        _wanted = partial(_measure_cost, snapshot.source, pairs[0], key)
+        _measuring.wanted = partial(_measure_cost, snapshot.source, pairs[0], key)
     if (cost := _costs.get(key)) is None:
         return Strobing(step, factor)
     count = _count(strip, snapshot, renderer.source, request)
@@ -175,30 +182,28 @@ def pairs(snapshot: Snapshot, medium, settings: inbetween_settings.Settings) -> 
 
 def is_busy() -> bool:
     """Whether something is measured, or asked for."""
-    return _job is not None or _wanted is not None
+    return _measuring.job is not None or _measuring.wanted is not None
 
 
 def advance() -> bool:
     """Begins to measure what was asked for last; True: something was measured meanwhile."""
-    global _job, _wanted
-    if _job is not None and not _job.done():
+    if _measuring.job is not None and not _measuring.job.done():
         return False
-    ended, _job = _job is not None, None
-    if _wanted is not None:
+    ended, _measuring.job = _measuring.job is not None, None
+    if _measuring.wanted is not None:
         pool = ThreadPoolExecutor(1, "Virtual Shutter")
         _stopped.clear()
-        _job, _wanted = pool.submit(_wanted), None
+        _measuring.job, _measuring.wanted = pool.submit(_measuring.wanted), None
         pool.shutdown(wait=False)
     return ended
 
 
 def forget() -> None:
     """Ends what is measured, and forgets what was: when a file is loaded, and when the extension goes."""
-    global _job, _wanted
     _stopped.set()
-    if _job is not None:
-        wait([_job])
-    _job = _wanted = None
+    if _measuring.job is not None:
+        wait([_measuring.job])
+    _measuring.job = _measuring.wanted = None
     for known in (_moved, _costs, _found):
         known.clear()
 

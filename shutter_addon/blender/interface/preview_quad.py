@@ -1,0 +1,80 @@
+"""Where a strip's picture lies in a preview, and what draws there: shaders/show_*.glsl."""
+
+import gpu
+import numpy as np
+from gpu_extras.batch import batch_for_shader
+
+from ...devices.passes import body
+from ..data import geometry
+from ..devices import blender_gpu
+
+
+class Quad:
+    """Where a strip's picture lies in a preview's region, its crop considered."""
+
+    def __init__(self, region, strip, size):
+        self._matrix = geometry.picture_to_region(strip, size, region)
+        crop, (width, height) = strip.crop, size
+        self._low = np.array([crop.min_x / width, crop.min_y / height])
+        self._high = 1 - np.array([crop.max_x / width, crop.max_y / height])
+
+    def on_region(self, points) -> np.ndarray:
+        """Points (n, 2) of the strip's picture, in fractions, in pixels of the region."""
+        return geometry.mapped(self._matrix, np.asarray(points, dtype=np.float64))
+
+    def draw(self, name: str, textures: dict, left: float = 0.0, right: float = 1.0, **constants) -> None:
+        """Draws from `left` to `right`, in fractions of the picture's width, through a shader of shaders/."""
+        low, high = np.maximum(self._low, (left, 0)), np.minimum(self._high, (right, 1))
+        if (low >= high).any():
+            return
+        corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
+        shader = _shader(name)
+        shader.bind()
+        for sampler, texture in textures.items():
+            shader.uniform_sampler(sampler, texture.gpu)
+        for constant, value in constants.items():
+            (shader.uniform_float if isinstance(value, float) else shader.uniform_int)(constant, value)
+        where = {"corner": self.on_region(corners).tolist(), "place": corners}
+        gpu.state.blend_set("ALPHA_PREMULT")
+        batch_for_shader(shader, "TRI_FAN", where).draw(shader)
+        gpu.state.blend_set("NONE")
+
+
+SAMPLERS = {
+    "show_picture": {"picture": "FLOAT_2D_ARRAY"},
+    "show_coefficients": {"coefficients": "FLOAT_2D_ARRAY", "palette": "FLOAT_2D_ARRAY"},
+    "show_scribbles": {"labels": "UINT_2D_ARRAY", "palette": "FLOAT_2D_ARRAY"},
+}
+CONSTANTS = {
+    "show_picture": {"opacity": "FLOAT"},
+    "show_coefficients": {"opacity": "FLOAT", "size": "IVEC2", "block": "INT", "count": "INT"},
+    "show_scribbles": {"opacity": "FLOAT", "size": "IVEC2", "block": "INT"},
+}
+_shaders: dict = {}
+
+
+def _shader(name: str):
+    if name not in _shaders:
+        between = gpu.types.GPUStageInterfaceInfo("show_interface")
+        between.smooth("VEC2", "at")
+        info = gpu.types.GPUShaderCreateInfo()
+        info.push_constant("MAT4", "ModelViewProjectionMatrix")
+        info.push_constant("BOOL", "srgbTarget")  # set by Blender: what is drawn into encodes by itself
+        for constant, kind in CONSTANTS[name].items():
+            info.push_constant(kind, constant)
+        for slot, (sampler, kind) in enumerate(SAMPLERS[name].items()):
+            info.sampler(slot, kind, sampler)
+        info.vertex_in(0, "VEC2", "corner")
+        info.vertex_in(1, "VEC2", "place")
+        info.vertex_out(between)
+        info.fragment_out(0, "VEC4", "shown")
+        info.vertex_source(body("show_quad"))
+        info.fragment_source(body(name))
+        _shaders[name] = gpu.shader.create_from_info(info)
+    return _shaders[name]
+
+
+def free() -> None:
+    """Frees the shaders."""
+    blender_gpu.free(*_shaders.values())
+    _shaders.clear()
