@@ -8,7 +8,7 @@ from ..core.frames.frame_source import FrameSource
 from ..devices.budget import Budget
 from ..devices.device import Device, NoDeviceError
 from ..devices.paging import TEXEL_BYTES
-from . import cpu
+from . import cpu_window
 from .window import beside, open_window
 
 
@@ -61,7 +61,7 @@ def of_window(device: Device, source: FrameSource, capacity: int, moved: bool, s
 
 def of_numpy_window(source: FrameSource, capacity: int, moved: bool) -> Needs:
     """What a window needs with NumPy."""
-    if cpu.Sums.fit(source, capacity) and not moved:
+    if cpu_window.TiledSums.fit(source, capacity) and not moved:
         return Needs(0, 12 * source.width * source.height * (capacity + 1), False)
     return Needs(0, capacity * frame_bytes(source), False)
 

@@ -197,7 +197,7 @@ def core_bars(data, frame):
     source = SimpleNamespace(count=COUNT, width=WIDTH, height=HEIGHT)
     effect = recipe_file.parse(json.dumps(data)).effect(WIDTH / HEIGHT)
     shown = lambda other: min(max(round(other) - 1, 0), COUNT - 1)  # noqa: E731
-    return followings.followed(effect, effect.at(frame), frame, frame - 1, 1, source, shown).bars
+    return followings.followed(effect, effect.at(frame), followings.Shown(frame, frame - 1), source, shown).bars
 
 
 def test_the_command_follows(command, tmp_path):

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from shutter_addon.compute import composition_passes, cpu, window
+from shutter_addon.compute import composition_passes, cpu_window, window
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
@@ -266,7 +266,7 @@ def test_aggregation(device, block):
 @pytest.mark.parametrize("block", [1, 2, 4])
 def test_tiles(monkeypatch, tile, made, block):
     rng = np.random.default_rng(29)
-    monkeypatch.setattr(cpu, "TILE", tile)
+    monkeypatch.setattr(cpu_window, "TILE", tile)
     for options in ({}, {"edges": "shorten"}, {"interpolation": "value"}):
         check(CPUCompositor(), footage(rng), made(rng, aggregate=block, exposure="weighted", **options), 12)
 
@@ -276,10 +276,10 @@ def test_sums_over_the_budget_are_not_made(monkeypatch, made):
     rng = np.random.default_rng(30)
     source, moment = footage(rng), made(rng)
     expected = Renderer(CPUCompositor(), source).picture(Request(2, moment))
-    monkeypatch.setattr(cpu, "SUMS_BYTES", 0)
+    monkeypatch.setattr(cpu_window, "SUMS_BYTES", 0)
     renderer = Renderer(CPUCompositor(), source)
     picture = renderer.picture(Request(2, moment))
-    assert isinstance(renderer._window, cpu.Frames)
+    assert isinstance(renderer._window, cpu_window.TiledFrames)
     assert np.abs(picture - expected).max() < 2**-15
 
 
@@ -575,7 +575,7 @@ def test_running_sums_wrap_around(device, window):
     renderer, moment = Renderer(device, source), few_pieces(np.random.default_rng(25), window)
     renderer.draw(Request(0, moment))
     for sums in getattr(renderer._window, "_sums", ()):
-        sums += np.uint32(2**32 - 300 * cpu.WHITE)  # NumPy's have room for 65537 frames
+        sums += np.uint32(2**32 - 300 * cpu_window.WHITE)  # NumPy's have room for 65537 frames
     for index in range(700):
         if index % 50 == 0 or index > 690:
             assert np.abs(renderer.picture(Request(index, moment)) - 1).max() < 1e-6

@@ -24,7 +24,7 @@ def state_of(source, frame, index, direction=1, shown=None):
     effect = source.effect(SOURCE.width / SOURCE.height)
     state = effect.at(frame)
     shown = shown or (lambda other: index + round(other - frame))
-    return following.followed(effect, state, frame, index, direction, SOURCE, shown)
+    return following.followed(effect, state, following.Shown(frame, index, direction), SOURCE, shown)
 
 
 def followed(*arguments, **given):

@@ -126,7 +126,7 @@ def followed(source, frame, direction=1):
     effect = source.effect(SOURCE.width / SOURCE.height)
     index = frame - 1 if direction > 0 else SOURCE.count - frame
     shown = lambda other: index + direction * round(other - frame)  # noqa: E731
-    return following.followed(effect, effect.at(frame), frame, index, direction, SOURCE, shown), index
+    return following.followed(effect, effect.at(frame), following.Shown(frame, index, direction), SOURCE, shown), index
 
 
 def streak(source, frame):
@@ -191,7 +191,9 @@ def test_in_between_frames_count_as_the_parts_of_one():
     plain, _ = followed(accelerating(0.2), 40)
     source = replace(accelerating(0.2, bars=(1.0,) * 4 * WINDOW), inbetween=4)
     effect, fine = source.effect(1.6), SimpleNamespace(count=4 * SOURCE.count, width=160, height=100)
-    state = following.followed(effect, effect.at(40), 40, 156, 1, fine, lambda other: 4 * round(other - 1))
+    state = following.followed(
+        effect, effect.at(40), following.Shown(40, 156), fine, lambda other: 4 * round(other - 1)
+    )
     assert open_frames(state.bars[0]) == pytest.approx(4 * open_frames(plain.bars[0]), rel=0.03)
 
 

@@ -66,7 +66,9 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
                 raise DifferenceError(f"{told(case)}: another source time")
         shows = showing(recipe, case.frame, index, direction, source.count)
         effect = parsed.effect(source.width / source.height, partial(matte_file, Path(files), source))
-        state = following.followed(effect, effect.at(case.frame), case.frame, index, direction, source, shows)
+        state = following.followed(
+            effect, effect.at(case.frame), following.Shown(case.frame, index, direction), source, shows
+        )
         exact = exact_coefficients(case, source, footage, index)
         for name, device in devices.items():
             renderer = Renderer(device, source, MatteValues(source.width, source.height))

@@ -20,10 +20,11 @@ from . import inbetween_settings, mask_reading, matte_strips, source_media, stri
 from .validation import EffectError
 
 
-def content(edit, effect, strip, region, moves, frames, time: keyframes.Channel | None) -> keyframes.Channel:
+def content(effect, strip, region, moves, frames, time: keyframes.Channel | None) -> keyframes.Channel:
     """The channel of a matte or a ramp, sampled at timeline frames; strip: the effect strip that shows it, moves:
     channels of the region's location, rotation and scale, time: as of core.model.effect.Effect. EffectError,
     MediaError: there is none."""
+    edit = effect.id_data
     if region.kind == "RAMP":
         ramp = validation.word(region, "ramp")
         if ramp != "LUMINANCE":

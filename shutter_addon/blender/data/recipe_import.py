@@ -49,12 +49,11 @@ def apply(edit, effect, strip, source: recipe.Recipe, folder: Path = Path()) -> 
     for i, shutter in enumerate(source.shutters):
         _add_shutter(edit, effect, f"{path}.shutters[{i}]", shutter, first)
     colors = {shutter.name: shutter.color for shutter in source.shutters}
-    for i, region in enumerate(source.regions):
-        where = f"{path}.regions[{i}]"
+    for region in source.regions:
         if isinstance(region, recipe.Region):
-            _add_region(edit, effect, strip, where, region, colors[region.shutter], first)
+            _add_region(edit, effect, strip, region, colors[region.shutter], first)
         else:
-            _add_matte(edit, effect, strip, where, region, images, first)
+            _add_matte(edit, effect, strip, region, images, first)
 
 
 def _set_number(edit, owner, path: str, name: str, value: recipe.Keyable, first: float, **curve) -> None:
@@ -149,18 +148,17 @@ def _add_shutter(edit, effect, path: str, source: recipe.Shutter, first: float) 
             fcurves.set_keys(edit, f"{path}.bars[{k}].weight", 0, keys)
 
 
-def _add_region(edit, effect, strip, path: str, source: recipe.Region, color, first: float) -> None:
+def _add_region(edit, effect, strip, source: recipe.Region, color, first: float) -> None:
     region = effect.regions.add()
     region.name, region.shutter, region.width = source.name, source.shutter, source.width
     region.kind = source.kind.upper()
     region.layer = _draw(effect, strip, source, color, first)
+    path = region.path_from_id()
     _set_number(edit, region, path, "opacity", source.opacity, first)
     _set_moves(edit, region, path, source.keys, first)
 
 
-def _add_matte(
-    edit, effect, strip, path: str, source: recipe.MatteRegion | recipe.RampRegion, images: dict, first: float
-) -> None:
+def _add_matte(edit, effect, strip, source: recipe.MatteRegion | recipe.RampRegion, images: dict, first: float) -> None:
     region = effect.regions.add()
     region.name, region.shutter, region.kind = source.name, source.shutter, source.kind.upper()
     region.invert, region.blend = source.invert, source.blend.upper()
@@ -174,6 +172,7 @@ def _add_matte(
         is_named = source.channel not in recipe.CHANNELS
         region.channel = "NAMED" if is_named else source.channel.upper()
         region.channel_name = source.channel if is_named else ""
+    path = region.path_from_id()
     _set_number(edit, region, path, "opacity", source.opacity, first)
     _set_number(edit, region, path, "feather", source.width, first)
     _set_moves(edit, region, path, source.keys, first)

@@ -5,8 +5,9 @@ change when the edit does. Channels are sampled at the frames that are asked for
 Blender itself. Drivers, NLA strips and further layers of an action do not count (docs/manual.md).
 """
 
+from collections.abc import Iterable
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -115,19 +116,10 @@ def read(edit, effect, strip, frames, *, thorough: bool = False) -> model.Effect
     names = [shutter.name for shutter in effect.shutters]
     followed = {shutter.follow_region for shutter in effect.shutters if shutter.follow == "REGION"}
     around = _around(effect, frames)
-    placement = _placement(curves, effect, strip, around)
-    time = _source_time(curves, path, effect, around) if effect.use_source_time else None
+    sampling = _Sampling.of(curves, effect, strip, around)
     regions = tuple(
         _any_region(
-            curves,
-            f"{path}.regions[{i}]",
-            effect,
-            strip,
-            region,
-            names.index(region.shutter),
-            placement,
-            around if region.name in followed else frames,
-            time,
+            sampling if region.name in followed else replace(sampling, frames=frames), i, names.index(region.shutter)
         )
         for i, region in enumerate(effect.regions)
         if region.shutter in names
@@ -135,20 +127,12 @@ def read(edit, effect, strip, frames, *, thorough: bool = False) -> model.Effect
     camera = _camera(curves, effect, around)
     return model.Effect(
         tuple(
-            _shutter(
-                curves,
-                f"{path}.shutters[{i}]",
-                shutter,
-                options,
-                frames,
-                thorough,
-                _followed(shutter, regions, camera),
-            )
+            replace(_shutter(curves, effect, i, options, frames, thorough), follow=_followed(shutter, regions, camera))
             for i, shutter in enumerate(effect.shutters)
         ),
         regions,
         options,
-        time,
+        sampling.time,
         _channel(curves, effect, path, "edge_aware", frames),
         camera,
     )
@@ -180,9 +164,9 @@ def _followed(shutter, regions, camera: model.Camera) -> model.Region | model.Ca
 def bars_at(edit, effect, index: int, frame: float) -> np.ndarray:
     """Bars (L,) of a shutter at a timeline frame, whether or not a picture can be made of them. EffectError: they are
     not as many as the window is long, or one cannot be."""
-    curves, path, frames = Curves(edit), effect.path_from_id(), (frame,)
-    options = _options(curves, path, effect, frames)
-    shutter = _shutter(curves, f"{path}.shutters[{index}]", effect.shutters[index], options, frames)
+    curves, frames = Curves(edit), (frame,)
+    options = _options(curves, effect.path_from_id(), effect, frames)
+    shutter = _shutter(curves, effect, index, options, frames)
     return shutter.bars.at(frame, options.at(frame).interpolation)
 
 
@@ -198,10 +182,7 @@ def strokes_at(edit, effect, strip, index: int, frame: float) -> list[np.ndarray
 def region_at(edit, effect, strip, index: int, frames) -> model.Region | model.MatteRegion:
     """A region as plain data, its channels sampled at timeline frames. What is wrong at one frame is told at that
     frame."""
-    curves, path = Curves(edit), f"{effect.path_from_id()}.regions[{index}]"
-    placement = _placement(curves, effect, strip, frames)
-    time = _source_time(curves, effect.path_from_id(), effect, frames) if effect.use_source_time else None
-    return _any_region(curves, path, effect, strip, effect.regions[index], 0, placement, frames, time)
+    return _any_region(_Sampling.of(Curves(edit), effect, strip, frames), index, 0)
 
 
 def last_shown(edit, effect, strip) -> float:
@@ -302,16 +283,19 @@ def _options_at(effect, curves: dict, frame: float) -> Options:
 
 
 def _shutter(
-    curves: Curves, path: str, shutter, options: keyframes.Channel, frames, thorough=False, follow=None
+    curves: Curves, effect, index: int, options: keyframes.Channel, frames, thorough: bool = False
 ) -> model.Shutter:
+    """A shutter, but for what it follows."""
+    path, shutter = f"{effect.path_from_id()}.shutters[{index}]", effect.shutters[index]
     bars = _tried(_bars, curves, path, shutter, options, frames, thorough)
     if isinstance(bars, EffectError):
         bars = keyframes.Bars(keyframes.Constant(bars))
-    is_trail = follow is not None and validation.word(shutter, "length") == "MOTION"
+    follows = validation.word(shutter, "follow") != "NOTHING"
+    is_trail = follows and validation.word(shutter, "length") == "MOTION"
     trail = _channel(curves, shutter, path, "trail", frames) if is_trail else None
     motion = validation.word(shutter, "follow_motion").lower()
     smooth = validation.number(shutter, "follow_smooth")
-    return model.Shutter(shutter.name, tuple(shutter.color), bars, follow, trail, motion, smooth)
+    return model.Shutter(shutter.name, tuple(shutter.color), bars, None, trail, motion, smooth)
 
 
 def _bars(curves: Curves, path: str, shutter, options: keyframes.Channel, frames, thorough: bool) -> keyframes.Bars:
@@ -372,13 +356,34 @@ def check_bar_count(shutter, window: int) -> None:
         raise EffectError(sentence.format(place=validation.place(shutter), count=len(shutter.bars), window=window))
 
 
-def _any_region(
-    curves: Curves, path: str, effect, strip, region, shutter: int, placement, frames, time
-) -> model.Region | model.MatteRegion:
+@dataclass(frozen=True)
+class _Sampling:
+    """What the regions of an effect are read from.
+
+    frames: the timeline frames at which channels are sampled
+    placement: of the strip's picture (_placement); time: of the source, None where its strip says that"""
+
+    curves: Curves
+    effect: object
+    strip: object
+    frames: Iterable[float]
+    placement: keyframes.Channel
+    time: keyframes.Channel | None
+
+    @staticmethod
+    def of(curves: Curves, effect, strip, frames) -> "_Sampling":
+        time = _source_time(curves, effect.path_from_id(), effect, frames) if effect.use_source_time else None
+        return _Sampling(curves, effect, strip, frames, _placement(curves, effect, strip, frames), time)
+
+
+def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region | model.MatteRegion:
+    """The region of that index; shutter: the index of its shutter."""
+    effect, curves, frames = sampling.effect, sampling.curves, sampling.frames
+    region, path = effect.regions[index], f"{effect.path_from_id()}.regions[{index}]"
     if region.kind not in strips.MATTES:
-        return _region(curves, path, effect, region, shutter, placement, frames)
+        return _region(sampling, path, region, shutter)
     moves = _moves(curves, region, path, frames)
-    content = _tried(matte_content.content, effect.id_data, effect, strip, region, moves, frames, time)
+    content = _tried(matte_content.content, effect, sampling.strip, region, moves, frames, sampling.time)
     blend = _tried(validation.word, region, "blend")
     if faults := [found for found in (content, blend) if isinstance(found, UserError)]:
         content, blend = keyframes.Constant(faults[0]), "OVER"
@@ -387,13 +392,14 @@ def _any_region(
     return model.MatteRegion(region.name, shutter, *numbers, *moves)
 
 
-def _region(curves: Curves, path: str, effect, region, shutter: int, placement, frames) -> model.Region:
+def _region(sampling: _Sampling, path: str, region, shutter: int) -> model.Region:
+    curves, frames = sampling.curves, sampling.frames
     return model.Region(
         region.name,
         shutter,
         keyframes.Constant(_tried(lambda: validation.word(region, "kind").lower())),
         _channel(curves, region, path, "width", frames),
-        _drawings(curves, path, effect, region, placement, frames),
+        _drawings(curves, path, sampling.effect, region, sampling.placement, frames),
         *_moves(curves, region, path, frames),
         _channel(curves, region, path, "opacity", frames),
     )

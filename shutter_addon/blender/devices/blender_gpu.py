@@ -151,7 +151,7 @@ class BlenderDevice(PagedDevice):
         for top in range(0, height, rows):
             strip = array[top : top + rows]
             sent = (width, len(strip)), sent_format, _buffer("FLOAT", _packed(strip, packing))
-            self._send(texture.gpu, unpacking(texture.kind, packing), *sent, top, layer)
+            self._send(texture.gpu, unpacking(texture.kind, packing), sent, top, layer)
 
     def send(self, texture: Texture, frame: np.ndarray) -> Texture:
         """See Device. Numbers are what is sent anyway."""
@@ -161,8 +161,9 @@ class BlenderDevice(PagedDevice):
         data = _buffer("FLOAT", _packed(frame, _OPAQUE_BYTES))
         return Texture(_of_numbers((width, height), "R32F", data), (width, height, 1), "r32f")
 
-    def _send(self, stored: gpu.types.GPUTexture, program: Pass, size: tuple[int, int], kind: str, data, top, layer):
-        textures = {"sent": _of_numbers(size, kind, data)}
+    def _send(self, stored: gpu.types.GPUTexture, program: Pass, sent: tuple, top: int, layer: int):
+        """sent: arguments of _of_numbers, first the size"""
+        textures, size = {"sent": _of_numbers(*sent)}, sent[0]
         constants = {"size": size, "top": top, "layer": layer}
         BlenderDevice._dispatch(self, program, program.groups(size), textures, {"stored": stored}, {}, constants)
 

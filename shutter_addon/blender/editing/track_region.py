@@ -143,7 +143,9 @@ def track(
     del edit, effect, strip, keys, moving  # which may not outlive the first step
     with effect_source.open_source(shown) as source:
         try:
-            for tracked in _followed(subject, shown, source, start, frames, motion, anchors, patience):
+            footage = Footage(source, lambda frame: effect_source.source_index(shown, frame, source)[0])
+            follow = partial(subject.follow, footage, start, frames, motion=motion.lower(), anchors=anchors)
+            for tracked in _followed(follow, patience):
                 if tracked is None:
                     yield None
                 elif tracked.fault:
@@ -266,15 +268,12 @@ def _standing(moving: Region | Camera, here: Tracked) -> Region | Camera:
     )
 
 
-def _followed(
-    subject: _Subject, shown, source, start: int, frames: range, motion: str, anchors, patience
-) -> Iterator[Tracked | None]:
-    """As tracking.follow, its sentences in the user's language, by a thread beside Blender (stopping.beside)."""
+def _followed(follow: Callable, patience: float | None) -> Iterator[Tracked | None]:
+    """What `follow` gives, a function as tracking.follow, found by a thread beside Blender (stopping.beside); its
+    sentences are in the user's language."""
     with snapshot.translated():
         try:
-            footage = Footage(source, lambda frame: effect_source.source_index(shown, frame, source)[0])
-            found = partial(subject.follow, footage, start, frames, motion=motion.lower(), anchors=anchors)
-            with closing(stopping.beside(_each(found), patience)) as steps:
+            with closing(stopping.beside(_each(follow), patience)) as steps:
                 yield from steps
         except tracking.TrackingError as error:
             raise EffectError(rpt_(str(error))) from None

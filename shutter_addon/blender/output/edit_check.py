@@ -72,7 +72,7 @@ def effects(edit, frames: range, compositor, *, find_cuts: bool) -> list[EffectC
     # It asks no device, which would have to wait for its first picture: states and windows are known without.
     looking = RenderSession(lambda: ("cpu", None), lambda: None)
     try:
-        return [_effect(looking, *shown, compositor, find_cuts) for shown in _shown_effects(edit, frames)]
+        return [_effect(looking, shown, compositor, find_cuts) for shown in _shown_effects(edit, frames)]
     finally:
         looking.forget()
 
@@ -90,7 +90,9 @@ def _shown_effects(film, frames: range) -> Iterator[tuple]:
             yield edit, effect, parts[0], found
 
 
-def _effect(looking: RenderSession, edit, effect, strip, frames: set[float], compositor, find_cuts) -> EffectCheck:
+def _effect(looking: RenderSession, shown: tuple, compositor, find_cuts: bool) -> EffectCheck:
+    """shown: of _shown_effects"""
+    edit, effect, strip, frames = shown
     found = EffectCheck(edit, strip.name, frames, len(effect.shutters))
     if not _look_at_footage(found, effect, strip):
         return found

@@ -93,14 +93,9 @@ class RenderSession:
         index, backward = source_index(snapshot, frame, source)
         direction = -1 if backward else 1
         with translated():
+            shown = following.Shown(frame, index, direction)
             state = following.followed(
-                snapshot.effect,
-                state,
-                frame,
-                index,
-                direction,
-                source,
-                lambda other: source_index(snapshot, other, source)[0],
+                snapshot.effect, state, shown, source, lambda other: source_index(snapshot, other, source)[0]
             )
         request = Request(index, state, direction, key, levels=context.levels)
         self._requests[snapshot.scene] = snapshot, frame, request

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -65,24 +66,26 @@ class _Followed:
         return self._own[frame]
 
 
+class Shown(NamedTuple):
+    """A timeline frame, and the source frame that is shown there, as for compositor.window_positions."""
+
+    frame: float
+    source_frame: int
+    direction: int = 1
+
+
 def followed(
-    effect: Effect,
-    state: FrameState,
-    frame: float,
-    index: int,
-    direction: int,
-    source: FrameSource,
-    shown: Callable[[float], int],
+    effect: Effect, state: FrameState, at: Shown, source: FrameSource, shown: Callable[[float], int]
 ) -> FrameState:
     """The effect's state at a timeline frame, with what its shutters follow, and with the bars of those whose trail has
     a length.
 
-    index, direction: the source frame that is shown there, as for compositor.window_positions
     shown: the source frame that is shown at a timeline frame a whole number of frames away, at most `reach`
     EffectError: what is followed lies nowhere"""
     subjects = [shutter.follow for shutter in effect.shutters]
     if not any(subjects):
         return state
+    frame, index, direction = at
     frames = _seen(state.options, index, direction, source.count)
     times = _times(shown, frame, index, frames, reach(state.options.window))
     turns = np.ones((len(frames), len(subjects)), np.complex128)
@@ -97,16 +100,17 @@ def followed(
         turns[:, followers] = np.array([motion.turn for motion in found])[:, None]
         shifts[:, followers] = np.array([motion.shift for motion in found])[:, None]
     following = Following(frames.start, turns, shifts)
-    bars, open_for = _with_trails(effect, state, following, frame, index, direction, source)
+    bars, open_for = _with_trails(effect, state, following, at, source)
     return replace(state, bars=bars, following=following.of(slice(None)), open_for=open_for)
 
 
 def _with_trails(
-    effect: Effect, state: FrameState, following: Following, frame: float, index: int, direction: int, source
+    effect: Effect, state: FrameState, following: Following, at: Shown, source
 ) -> tuple[np.ndarray, dict[int, float]]:
     """The state's bars (N, L), those of shutters whose trail has a length open for it, and FrameState.open_for;
     arguments as of `followed`."""
     bars, open_for, size = state.bars.copy(), {}, (source.width, source.height)
+    frame, index, direction = at
     positions = compositor.window_positions(state.options, index, direction)
     shown_at = float(np.abs(positions - index).argmin()) + 0.5
     seen = compositor.source_frames(state.options, positions, range(source.count))
