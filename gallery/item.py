@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from shutter_addon.compute.renderer import Renderer, open_compositor
+from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import scribbles
 from shutter_addon.core.model.frame_state import FrameState
@@ -70,7 +71,7 @@ class Shot:
 
     def everywhere(self, frame: int, shutter: str) -> np.ndarray:
         """The picture if one shutter held everywhere, as in a camera."""
-        picture = self._renderer.picture(frame - 1, self._at(frame).alone(self._index(shutter)))
+        picture = self._renderer.picture(Request(frame - 1, self._at(frame).alone(self._index(shutter))))
         return np.clip(light.to_encoded(picture[..., :3]), 0, 1)
 
     def scribbles(self, frame: int, dim: float = 0.6) -> np.ndarray:
@@ -84,7 +85,7 @@ class Shot:
     def coefficients(self, frame: int) -> np.ndarray:
         """How much of each shutter a pixel gets, in the shutters' colours."""
         moment = self._at(frame)
-        mixed = np.tensordot(self._renderer.coefficients(frame - 1, moment), self._colors, axes=(0, 0))
+        mixed = np.tensordot(self._renderer.coefficients(Request(frame - 1, moment)), self._colors, axes=(0, 0))
         block = moment.options.aggregate
         return mixed.repeat(block, 0).repeat(block, 1)[: self._source.height, : self._source.width]
 
