@@ -92,12 +92,12 @@ class Renderer:
                 return Coefficients(constant, self._everywhere)
             return Coefficients(self._mixture(request, labels), request.state.options.aggregate)
 
-    def drawn_labels(self, request: Request) -> Coefficients:
-        """Labels of the first layer on the device, a GPU: a texture array r32ui, top row first. They are valid until
-        the next call of any method."""
+    def drawn_labels(self, request: Request) -> tuple[object, int]:
+        """Labels of the first layer on the device, a GPU: (texture array r32ui, block), top row first, each texel for
+        block × block pixels. They are valid until the next call of any method."""
         with self.compositor.current():
-            values = self.compositor.labels(self.labels(request)[0].labels)
-            return Coefficients(values, request.state.options.aggregate)
+            labels = self.compositor.labels(self.labels(request)[0].labels)
+            return labels, request.state.options.aggregate
 
     def labels(self, request: Request) -> list[LabelLayer]:
         """Labels of the request's scribbles, of each of scribbles.layers."""

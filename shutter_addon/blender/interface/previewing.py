@@ -224,8 +224,7 @@ def _needed(snapshot: Snapshot, frame: float) -> tuple[effect_source.Detail, boo
         return (detail(context, edit, effect, strip) if effect else effect_source.FULL), False
     render = render_context.of_drawing()
     request = requested(context, render, found, snapshot)
-    wanted = effect_source.FULL if looking.whole is not None else detail(context, edit, found.effect, found.strip)
-    return wanted, is_drawn(context, found, render.renderer(request).source)
+    return request.source.detail, is_drawn(context, found, render.renderer(request).source)
 
 
 def register():

@@ -27,6 +27,7 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
     if context.stopped():
         raise StoppedError
     session, request = context.session, context.request(snapshot, frame, detail)
+    renderer = context.renderer(request)  # meanwhile the window may close it: it would be opened again
     if request.state.options.stop_at_cuts:
         _say_of_cuts(context.say)
     if (weights := context.settings.weights) is not None:
@@ -34,7 +35,7 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
         place = weights / f"{round(frame - snapshot.first + 1):04d}.exr"
         write_exr(place, np.moveaxis(session.coefficients(request, context.stopped), 0, -1), names)
     made = session.picture(request, context.stopped)
-    for sentence in shortages(context.renderer(request), request):
+    for sentence in shortages(renderer, request):
         _say_once(sentence, context.say)
     return made
 
