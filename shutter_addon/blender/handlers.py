@@ -1,15 +1,15 @@
 """What happens by itself: effects follow their strips, an old file's sources are closed, and a render that cannot show
 an effect ends."""
 
-import sys
+import inspect
 from functools import partial
 
 import bpy
 from bpy.app.handlers import persistent
 
-from .data import inbetween_settings, revision, source_media, strips, versions
+from .data import inbetween_settings, preview_areas, revision, source_media, strips, versions
 from .editing import copies, lifecycle, shown_annotations, track_region, undelete
-from .interface import inbetween_operators, preview_areas, sharp_frame
+from .interface import inbetween_operators, sharp_frame
 from .rendering import invalidation, job_snapshots, render_job, sessions
 
 
@@ -119,7 +119,7 @@ def _after_render(scene, *_):
     if render_job.is_film(scene):
         invalidation.drop_spoilt_later()
         job_snapshots.end()
-    render_job.end(scene, alone=sys._getframe().f_back is None)
+    render_job.end(scene, alone=not render_job.script_waits(inspect.currentframe()))
     source_media.rest(render_job.runs())
 
 

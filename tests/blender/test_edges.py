@@ -152,14 +152,14 @@ def test_in_betweens_that_it_needs_are_told_and_built(bpy, add, film, tmp_path):
 
 def test_a_draft_has_larger_blocks_where_edges_are_followed(add, film, monkeypatch):
     """Coefficients of a draft are those of the blocks; films and what has no edges to follow are never drafts."""
-    from shutter_addon.blender.interface import previewing
+    from shutter_addon.blender.rendering import previews
 
-    monkeypatch.setattr(previewing, "DRAFT_ROWS", SIZE[1] // 3)
+    monkeypatch.setattr(previews, "DRAFT_ROWS", SIZE[1] // 3)
     edit, effect, strip = add(film, effect_recipe(edge_aware=1))
     exact = request(edit, effect, strip, 3)
-    draft = previewing.draft(exact.request, exact.renderer.source)
+    draft = previews.draft(exact.request, exact.renderer.source)
     assert (exact.state.options.aggregate, draft.state.options.aggregate) == (1, 4)
     assert exact.session.coefficients(draft).shape[1:] == (-(-SIZE[1] // 4), -(-SIZE[0] // 4))
     effect.edge_aware = 0
     plain = request(edit, effect, strip, 3)
-    assert previewing.draft(plain.request, plain.renderer.source) is plain.request
+    assert previews.draft(plain.request, plain.renderer.source) is plain.request

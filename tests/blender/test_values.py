@@ -477,11 +477,10 @@ def show(bpy, edit):
         inbetween_operators,
         operators,
         panels,
-        previewing,
         region_gizmo,
         split_gizmo,
     )
-    from shutter_addon.blender.rendering import invalidation
+    from shutter_addon.blender.rendering import invalidation, previews
 
     lifecycle.update()
     invalidation.invalidate_changed(edit)
@@ -490,7 +489,7 @@ def show(bpy, edit):
         region = next(region for region in area.regions if region.type == "PREVIEW")
         with bpy.context.temp_override(region=region):
             context = bpy.context
-            previewing.shown(context)
+            previews.shown(context)
             bar_editor.bar_under(context, 30, 30)
             region_gizmo.place(context)
             for cls in (*operators.classes, *inbetween_operators.classes, *bar_editor.classes, *region_gizmo.classes):

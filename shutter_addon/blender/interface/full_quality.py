@@ -7,7 +7,8 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Operator
 
-from . import preview_areas, previewing
+from ..data import preview_areas
+from ..rendering import previews
 from .operator_bases import refused
 
 _TICK = 0.1  # seconds between two looks at whether it has ended
@@ -39,23 +40,23 @@ class SHUTTER_OT_full_quality(Operator):
         return _shown(context) is not None or refused(cls, rpt_("No preview shows a Shutter strip"))
 
     def execute(self, context):
-        if previewing.looking.whole is not None:
-            previewing.looking.whole = None
+        if previews.looking.whole is not None:
+            previews.looking.whole = None
             _end()
         else:
             window, area, found = _shown(context)
-            previewing.looking.whole = previewing.Whole(found.effect.scene.session_uid, found.edit.frame_current)
+            previews.looking.whole = previews.Whole(found.effect.scene.session_uid, found.edit.frame_current)
             found.strip.invalidate_cache("RAW")
             _begin(window, area)
         return {"FINISHED"}
 
 
 def _shown(context):
-    """Window, area and previewing.Shown of the preview that is looked at: the context's own, else another; or None."""
+    """Window, area and previews.Shown of the preview that is looked at: the context's own, else another; or None."""
     areas = sorted(preview_areas.previews(context), key=lambda pair: pair[1] != context.area)
     for window, area in areas:
         with context.temp_override(window=window, area=area, region=preview_areas.preview_region(area)):
-            if (found := previewing.shown(bpy.context)) is not None:
+            if (found := previews.shown(bpy.context)) is not None:
                 return window, area, found
     return None
 
@@ -73,7 +74,7 @@ def _begin(window, area) -> None:
 def _end_when_over() -> float | None:
     if _before is None:
         return None
-    if previewing.looking.whole is None:
+    if previews.looking.whole is None:
         _end()
         return None
     return _TICK
@@ -120,7 +121,7 @@ def _centre(window, area, centre) -> None:
 def forget() -> None:
     """Ends it, and leaves the view as it is."""
     global _before
-    _before = previewing.looking.whole = None
+    _before = previews.looking.whole = None
 
 
 classes = (SHUTTER_OT_full_quality,)

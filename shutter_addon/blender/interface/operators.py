@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 from bpy.types import Operator
 
 from ...core.model import presets
-from ..data import annotations, consistency, selection, strips, validation
+from ..data import annotations, consistency, preview_areas, selection, strips, validation
 from ..data.choices import CONTEXT, STROKES
 from ..editing import (
     add_effect,
@@ -20,7 +20,7 @@ from ..editing import (
     shutter_edits,
 )
 from ..rendering.effect_source import FAULTS
-from . import icons, preview_areas, sharp_frame
+from . import icons, sharp_frame
 from .operator_bases import UNDOABLE, Move, OfEffect, OfRegion, OfShutter, OfStrokes, has_room, redraw, refused
 
 

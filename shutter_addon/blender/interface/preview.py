@@ -16,7 +16,7 @@ from ...core import stopping
 from ...core.model.frame_state import FrameState
 from ...media import MediaError
 from ...media.errors import NotBuiltError
-from ..data import annotations, selection, strips
+from ..data import annotations, preview_areas, selection, strips
 from ..data.choices import CONTEXT
 from ..devices import blender_gpu
 from ..devices.blender_gpu import Texture
@@ -27,15 +27,16 @@ from ..rendering import (
     inbetween_build,
     invalidation,
     pictures,
+    previews,
     render_context,
     render_job,
     strobing,
 )
+from ..rendering.previews import RESULTS, Decision, Shown, shown
 from ..rendering.render_context import RenderContext
-from . import drawing, inbetween_operators, note_buttons, preview_areas, preview_quad, previewing, sharp_frame
+from . import drawing, inbetween_operators, note_buttons, preview_quad, sharp_frame
 from .note_buttons import Button
 from .preview_quad import Quad
-from .previewing import RESULTS, Shown, shown
 
 VIEWS = (
     ("RESULT", "Result", "The finished picture"),
@@ -61,7 +62,7 @@ def _redraw_once() -> None:
 
 def _redraw_when_still() -> float | None:
     """Blender does not draw again where the playhead is let go, or tracking ends."""
-    if previewing.is_going(bpy.context):
+    if previews.is_going(bpy.context):
         return _SOON
     return _redraw_once()
 
@@ -130,6 +131,7 @@ def _draw() -> None:
     """The draw handler of the previews."""
     context = bpy.context
     settings = context.window_manager.virtual_shutter
+    decision = previews.take_decision()
     blender_gpu.free_unused()
     note_buttons.clear(context.region)
     if bpy.app.is_job_running("RENDER") or render_job.ends_films():
@@ -152,14 +154,14 @@ def _draw() -> None:
     say = _Notes(context.region)
     found = shown(context)
     if found is None:
-        previewing.looking.whole = None
+        previews.looking.whole = None
         _tell_unseen(context, say)
         return
     render = render_context.of_drawing()
     with drawing.pixel_space(context.region):
         try:
-            with stopping.once(_time_up(found) if previewing.may_be_late() else stopping.never):
-                _show(context, render, found, settings, say)
+            with stopping.once(_time_up(found) if previews.may_be_late() else stopping.never):
+                _show(context, render, found, decision, say)
             _last.shown, _last.seconds = None, _SLICE
         except stopping.StoppedError:
             say(rpt_("Composing…"))
@@ -183,7 +185,7 @@ def _time_up(found: Shown):
 def request_of(context, render: RenderContext, found: Shown) -> Request:
     """What the effect strip shows at the current frame, in the previews' size, as a draft where a still result is not
     exact anyway. One of effect_source.FAULTS: it cannot be shown."""
-    return _drafted(context, render, found, previewing.requested(context, render, found, _snapshot(found)))
+    return _drafted(context, render, found, previews.requested(context, render, found, _snapshot(found)))
 
 
 def _snapshot(found: Shown):
@@ -192,11 +194,11 @@ def _snapshot(found: Shown):
 
 def _drafted(context, render: RenderContext, found: Shown, request) -> Request:
     is_result = context.window_manager.virtual_shutter.view in RESULTS and _is_rendered(found)
-    is_going = previewing.is_going(context)
+    is_going = previews.is_going(context)
     if is_going and not bpy.app.timers.is_registered(_redraw_when_still):
         bpy.app.timers.register(_redraw_when_still, first_interval=_SOON)
-    is_exact = previewing.looking.whole is not None or (is_result and not is_going)
-    return request if is_exact else previewing.draft(request, render.renderer(request).source)
+    is_exact = previews.looking.whole is not None or (is_result and not is_going)
+    return request if is_exact else previews.draft(request, render.renderer(request).source)
 
 
 def _tell_unseen(context, say) -> None:
@@ -214,25 +216,26 @@ def _is_rendered(found: Shown) -> bool:
     return found.edit.render.sequencer_gl_preview == "RENDERED"
 
 
-def _show(context, render: RenderContext, found: Shown, settings, say) -> None:
-    snapshot = _snapshot(found)
-    exact = previewing.requested(context, render, found, snapshot)
+def _show(context, render: RenderContext, found: Shown, decision: Decision | None, say) -> None:
+    """decision: what the engine was asked for; it holds unless something has changed since."""
+    settings, snapshot = context.window_manager.virtual_shutter, _snapshot(found)
+    if decision is None or decision.snapshot is not snapshot:
+        decision = previews.decide(context, found, snapshot)
+    exact = decision.request
     request = _drafted(context, render, found, exact)
     size = annotations.picture_size(found.effect)
     quad, renderer = Quad(context.region, found.strip, size), render.renderer(request)
     if context.space_data.show_overlays:
         is_still = not context.screen.is_animation_playing
         _tell_detail(renderer.source, size, request is not exact, is_still, say)
-        if is_still and not previewing.may_be_late():  # what it measures would take from what runs
+        if is_still and not previews.may_be_late():  # what it measures would take from what runs
             _tell_strobing(found, snapshot, renderer, exact, say)
     has_result = settings.view in RESULTS
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
-    if previewing.is_tracking():  # a stroke is seen to stay on its subject where that is sharp
+    if previews.is_tracking():  # a stroke is seen to stay on its subject where that is sharp
         left = 1.0
     # Else the engine has composed it, and it lies there in its place among the other strips.
-    draws_result = (
-        has_result and left < 1 and (not _is_rendered(found) or previewing.is_drawn(context, found, renderer.source))
-    )
+    draws_result = has_result and left < 1 and (not _is_rendered(found) or decision.is_drawn)
     if left > 0 or draws_result:
         _warn(found, say)
     if left > 0:
@@ -263,7 +266,7 @@ def _warn(found: Shown, say) -> None:
 
 def _tell_detail(source, size: tuple[int, int], is_draft: bool, is_still: bool, say) -> None:
     """Says in what the picture is less than a render's; size: of that. And gives the way to see that one, and back."""
-    if previewing.looking.whole is not None:
+    if previews.looking.whole is not None:
         say(rpt_("Full quality, as it will be rendered"), Button("shutter.full_quality", iface_("Back")))
         return
     less = []

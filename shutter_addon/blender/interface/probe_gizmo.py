@@ -7,8 +7,8 @@ import numpy as np
 from bpy.types import Gizmo, GizmoGroup
 
 from ..data import annotations, geometry
-from ..rendering import effect_source, probe, render_context
-from . import drawing, preview, previewing
+from ..rendering import effect_source, previews, probe, render_context
+from . import drawing, preview
 
 _WIDTH, _HEIGHT, _LINE, _PAD, _APART = 180, 64, 17, 8, 14  # in units of the interface
 _BACK = (0.08, 0.08, 0.08, 0.85)
@@ -58,7 +58,7 @@ class SHUTTER_GT_probe(Gizmo):
     bl_idname = "SHUTTER_GT_probe"
 
     def draw(self, context):
-        found, at = previewing.shown(context), tuple(context.window_manager.virtual_shutter.probe_at)
+        found, at = previews.shown(context), tuple(context.window_manager.virtual_shutter.probe_at)
         if found is None or (matrix := _to_region(context, found)) is None:
             return
         if _is_cropped(found.strip, annotations.picture_size(found.effect), at):
@@ -74,7 +74,7 @@ class SHUTTER_GT_probe(Gizmo):
 
     def test_select(self, context, location):
         """Blender asks whenever the pointer moves: nothing else tells of it without taking events from others."""
-        found = previewing.shown(context)
+        found = previews.shown(context)
         if found is not None and (matrix := _to_region(context, found)) is not None:
             centre = np.array([location], dtype=np.float64) + 0.5
             context.window_manager.virtual_shutter.probe_at = geometry.mapped(np.linalg.inv(matrix), centre)[0]
@@ -118,7 +118,7 @@ class SHUTTER_GGT_probe(GizmoGroup):
         settings = context.window_manager.virtual_shutter
         if not (settings.live and settings.probe) or bpy.app.is_job_running("RENDER"):
             return False
-        return previewing.shown(context) is not None
+        return previews.shown(context) is not None
 
     def setup(self, _context):
         self.gizmos.new(SHUTTER_GT_probe.bl_idname)

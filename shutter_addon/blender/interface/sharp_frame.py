@@ -8,10 +8,9 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..data import selection, strips
-from . import preview_areas
+from ..data import preview_areas, selection, strips
+from ..rendering.previews import PEN
 
-PEN = "GPENCIL_OT_annotate"
 _TOOLS = "builtin.annotate"  # how the tools' names begin
 
 

@@ -5,7 +5,8 @@ import numpy as np
 from bpy.types import Gizmo, GizmoGroup
 
 from ..data import annotations, geometry
-from . import drawing, previewing
+from ..rendering import previews
+from . import drawing
 
 _REACH = 8  # of the pointer, in units of the interface
 _COLOR = (1.0, 1.0, 1.0, 0.9)
@@ -14,7 +15,7 @@ _COLOR = (1.0, 1.0, 1.0, 0.9)
 def _to_region(context) -> np.ndarray | None:
     """Matrix from fractions of the shown picture to the region's pixels; None where no split is shown, or seen."""
     settings = context.window_manager.virtual_shutter
-    if not settings.live or settings.view != "SPLIT" or (found := previewing.shown(context)) is None:
+    if not settings.live or settings.view != "SPLIT" or (found := previews.shown(context)) is None:
         return None
     matrix = geometry.picture_to_region(found.strip, annotations.picture_size(found.effect), context.region)
     return matrix if geometry.is_invertible(matrix) else None
@@ -75,7 +76,7 @@ class SHUTTER_GGT_split(GizmoGroup):
     @classmethod
     def poll(cls, context):
         settings = context.window_manager.virtual_shutter
-        return settings.live and settings.view == "SPLIT" and previewing.shown(context) is not None
+        return settings.live and settings.view == "SPLIT" and previews.shown(context) is not None
 
     def setup(self, _context):
         self.gizmos.new(SHUTTER_GT_split.bl_idname)

@@ -1,26 +1,16 @@
 """The render engine of effect scenes: Blender's sequencer calls it for every frame it needs of an effect strip."""
 
+import inspect
 import sys
 import traceback
-from collections.abc import Callable
 
 import bpy
 import numpy as np
 
 from ...core.messages import of_file, signed
 from ...core.stopping import StoppedError
-from ..data.snapshot import Snapshot
 from ..data.strips import ENGINE
-from . import device_work, effect_source, invalidation, job_snapshots, pictures, render_context, render_job
-
-
-def in_full(_shown: Snapshot, _frame: float) -> tuple[effect_source.Detail, bool]:
-    return effect_source.FULL, False
-
-
-# What a preview needs that Blender is drawing (interface/previewing.py): in how much detail, and whether the picture is
-# drawn over what the engine gives. One of effect_source.FAULTS: there is none.
-needed_by_preview: Callable[[Snapshot, float], tuple[effect_source.Detail, bool]] = in_full
+from . import device_work, effect_source, invalidation, job_snapshots, pictures, previews, render_context, render_job
 
 
 class VirtualShutterEngine(bpy.types.RenderEngine):
@@ -33,8 +23,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             self.report({"ERROR"}, self.bl_label)  # whatever it says, it ends the other render
             return
         try:
-            # A script's frame lies below where it renders, even by an operator that does not say so, as render.opengl.
-            self._render(depsgraph, called_by_script=sys._getframe().f_back is not None)
+            self._render(depsgraph, called_by_script=render_job.script_waits(inspect.currentframe()))
         except BaseException as error:  # Blender would print it, and render the frame without the effect
             invalidation.spoil(depsgraph.scene.session_uid)
             if not isinstance(error, StoppedError):
@@ -47,7 +36,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         shown, frame = job_snapshots.of(scene, scene.frame_current, self._stopped)
         detail, is_drawn = effect_source.FULL, False
         if device_work.in_window() and not (called_by_script or render_job.runs()):
-            detail, is_drawn = needed_by_preview(shown, frame)
+            detail, is_drawn = previews.for_engine(bpy.context, shown, frame)
         if detail != effect_source.FULL or is_drawn:
             invalidation.keep_until_drawn(scene.session_uid)
         if is_drawn:

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from types import FrameType
 
 import bpy
 
@@ -101,6 +102,12 @@ def ends_films() -> bool:
     if bpy.app.background or _beside_main_thread():
         return True
     return _job.film is not None and not bpy.app.is_job_running("RENDER")
+
+
+def script_waits(door: FrameType | None) -> bool:
+    """Whether a script waits for what Blender does now. door: the frame (inspect.currentframe) of the function of ours
+    that Blender has called. Blender tells nobody of scripts that render, not even of `render.opengl`."""
+    return door is not None and door.f_back is not None
 
 
 def in_job() -> bool:

@@ -1,4 +1,4 @@
-"""What previews need of an effect's picture: its detail, and whether our draw handler shows it or Blender.
+"""What previews show of an effect: in which detail, and whether our draw handler shows it or Blender.
 
 Blender asks the engine for a Scene strip's full size whatever a preview's, takes its floats, converts, blends and sends
 them. Drawn by our handler, the picture stays on the GPU, and is as small as it is shown.
@@ -8,16 +8,14 @@ import math
 import time
 from dataclasses import dataclass, replace
 
-import bpy
 import numpy as np
 
 from ...compute.request import Request
 from ...media.reduced import DIVISORS
-from ..data import annotations, geometry, selection, strip_proxies, strips
+from ..data import annotations, geometry, preview_areas, selection, strip_proxies, strips
 from ..data.snapshot import Snapshot
-from ..rendering import effect_source, engine, render_context, render_job
-from ..rendering.render_context import RenderContext
-from . import preview_areas, sharp_frame
+from . import effect_source, render_context, render_job
+from .render_context import RenderContext
 
 # Operators that read the sequencer's pictures, from the window.
 _READERS = {"RENDER_OT_opengl", "SEQUENCER_OT_sample"}
@@ -25,6 +23,7 @@ _READERS = {"RENDER_OT_opengl", "SEQUENCER_OT_sample"}
 _TRACKING = {"SHUTTER_OT_track", "SHUTTER_OT_track_camera", "SHUTTER_OT_panning_shot", "SHUTTER_OT_tripod"}
 _BUILDING = {"SHUTTER_OT_inbetween_build", "SHUTTER_OT_smooth_streaks"}
 _GOING = {"ANIM_OT_change_frame"} | _TRACKING | _BUILDING
+PEN = "GPENCIL_OT_annotate"
 _MOMENT = 0.3  # seconds
 _READING_TOOL = "builtin.sample"  # reads once before it is one of those that run
 _PERCENT = {"PROXY_25": 25, "PROXY_50": 50, "PROXY_75": 75, "PROXY_100": 100}
@@ -57,15 +56,29 @@ class Whole:
     key: tuple | None = None
 
 
+@dataclass(frozen=True)
+class Decision:
+    """What a preview shows of an effect as it is drawn once.
+
+    snapshot: of the effect; request: its picture in the previews' detail
+    is_drawn: whether our draw handler shows the result"""
+
+    snapshot: Snapshot
+    request: Request
+    is_drawn: bool
+
+
 @dataclass
 class _Looking:
     """How previews are looked at.
 
     whole: the picture that is looked at as it will be rendered; late_until: the time until which pictures may be late
+    decision: the engine's, for the draw handler, which Blender calls after it
     """
 
     whole: Whole | None = None
     late_until: float = 0.0
+    decision: Decision | None = None
 
 
 looking = _Looking()
@@ -176,7 +189,7 @@ def is_drawn(context, found: Shown, source) -> bool:
         and not edit.render.use_multiview
         and not edit.sequence_editor.show_overlay_frame
         and all(_has(area.spaces.active, _PLAIN_SPACE) for area in _areas_of(context, edit))
-        and sharp_frame.PEN not in render_job.operators_running()
+        and PEN not in render_job.operators_running()
     )
 
 
@@ -209,27 +222,31 @@ def is_read(context) -> bool:
     return bool(_READERS & render_job.operators_running()) or (tool is not None and tool.idname == _READING_TOOL)
 
 
-def _needed(snapshot: Snapshot, frame: float) -> tuple[effect_source.Detail, bool]:
-    """See engine.needed_by_preview."""
-    context = bpy.context
-    region = context.region
+def decide(context, shown: Shown, snapshot: Snapshot) -> Decision:
+    """What this preview shows of the effect under the playhead. One of effect_source.FAULTS: it cannot be shown."""
+    render = render_context.of_drawing()
+    request = requested(context, render, shown, snapshot)
+    return Decision(snapshot, request, is_drawn(context, shown, render.renderer(request).source))
+
+
+def for_engine(context, snapshot: Snapshot, frame: float) -> tuple[effect_source.Detail, bool]:
+    """What the engine is asked for while Blender draws a preview: the detail, and whether our draw handler shows the
+    picture of it in place of Blender. One of effect_source.FAULTS: there is none."""
+    region, looking.decision = context.region, None
     if region is None or region.type != "PREVIEW" or is_read(context):
         return effect_source.FULL, False
-    edit, found = selection.edit_of(context), shown(context)
-    if found is None or found.effect.scene.session_uid != snapshot.scene or edit.frame_current != frame:
-        if looking.whole is not None:
-            return effect_source.FULL, False
-        strip = next((s for s in strips.effect_strips(edit) if s.scene.session_uid == snapshot.scene), None)
-        effect = strip and strips.effect_of(edit, strip.scene)
-        return (detail(context, edit, effect, strip) if effect else effect_source.FULL), False
-    render = render_context.of_drawing()
-    request = requested(context, render, found, snapshot)
-    return request.source.detail, is_drawn(context, found, render.renderer(request).source)
+    edit, seen = selection.edit_of(context), shown(context)
+    if seen is not None and seen.effect.scene.session_uid == snapshot.scene and edit.frame_current == frame:
+        decision = looking.decision = decide(context, seen, snapshot)
+        return decision.request.source.detail, decision.is_drawn
+    strip = next((s for s in strips.effect_strips(edit) if s.scene.session_uid == snapshot.scene), None)
+    effect = strip and strips.effect_of(edit, strip.scene)
+    if effect is None or looking.whole is not None:
+        return effect_source.FULL, False
+    return detail(context, edit, effect, strip), False
 
 
-def register():
-    engine.needed_by_preview = _needed
-
-
-def unregister():
-    engine.needed_by_preview = engine.in_full
+def take_decision() -> Decision | None:
+    """What the engine was asked for while Blender draws this preview; None: Blender had the picture already."""
+    decision, looking.decision = looking.decision, None
+    return decision
