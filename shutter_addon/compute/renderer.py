@@ -11,7 +11,7 @@ from ..core.frames.frame_source import FrameSource
 from ..core.memo import Memo
 from ..core.model.mattes import MatteReader
 from ..devices.device import NoDeviceError
-from . import guide, window_frames
+from . import decoding_ahead, guide, window_frames
 from .cpu import CPUCompositor
 from .labelling import LabelLayer, grid, labelled, sole_of
 from .request import Coefficients, Request
@@ -67,15 +67,19 @@ class Renderer:
             return self._drawn.get(request.key, lambda: self._composed(request), quick=request.quick)
 
     def _composed(self, request: Request):
+        wanted_later = self._want(request)
         labels = self.labels(request)
         # Before coefficients are solved for: the window reads the frames that guide the diffusion.
         window = self._loaded_window(request, labels)
         coefficients = self._coefficients(request, labels)
-        return self.compositor.draw(window, self._exposing(request, labels), coefficients)
+        drawn = self.compositor.draw(window, self._exposing(request, labels), coefficients)
+        self.source.want(wanted_later)
+        return drawn
 
     def coefficients(self, request: Request) -> np.ndarray:
         """Coefficients (N, h, w) float32 of `picture`, for each pixel, or for each block of Options.aggregate pixels a
         side."""
+        self._want(request)  # the picture will read them as well
         labels, count = self.labels(request), len(request.state.bars)
         with self.compositor.current():
             if (sole := _sole(request, labels)) is not None:
@@ -118,13 +122,22 @@ class Renderer:
         cuts."""
         held = self._window.held if self._window and self._kind == self._kind_for(request) else ()
         shot = self.shot(request, known=True)
+        unread, handed = window_frames.looked_for_cuts(request, self.source, self._beside(request))
         missing = window_frames.exposed_frames(request, shot).difference(held)
         missing |= self._guides.lacking(self._guiding(request, shot))
-        if window_frames.stops_at_cuts(request, self.source):
-            reach = window_frames.reach(request, self._beside(request))
-            missing |= self.source.shots.lacking(request.index, *reach)
-            missing -= self.source.shots.handed()
-        return missing
+        return (missing | unread) - handed
+
+    def check(self, request: Request) -> None:
+        """MediaError: an in-between frame that the picture needs is missing. No frame is read."""
+        if self.source.step > 1:
+            for index in sorted(self.needed(request)):
+                self.source.check(index)
+
+    def _want(self, request: Request) -> list[int]:
+        """See decoding_ahead.want."""
+        return decoding_ahead.want(
+            self.source, request.index, request.direction, lambda index: self.missing(replace(request, index=index))
+        )
 
     def _is_guided(self, request: Request) -> bool:
         """Whether coefficients depend on the shown frame."""

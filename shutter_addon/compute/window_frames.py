@@ -30,9 +30,9 @@ def shot_of(request: Request, source: FrameSource, beside: int, *, known: bool =
     window does not reach are not looked for: the clip's ends take their place.
 
     It reads frames in which cuts are looked for. known: it reads none, and knows only the cuts found before."""
+    index, (low, high) = request.index, reach(request, beside)
     if not stops_at_cuts(request, source):
         return range(source.count)
-    index, (low, high) = request.index, reach(request, beside)
     shot = source.shots.around(index, low, high, known=known)
     last = shot.stop - 1
     if request.state.options.edges == "mirror" and (last < high) != (shot.start > low):
@@ -40,6 +40,13 @@ def shot_of(request: Request, source: FrameSource, beside: int, *, known: bool =
         low, high = (min(low, 2 * last - high), high) if last < high else (low, max(high, 2 * shot.start - low))
         shot = source.shots.around(index, low, high, known=known)
     return shot
+
+
+def looked_for_cuts(request: Request, source: FrameSource, beside: int) -> tuple[set[int], set[int]]:
+    """The source frames in which `shot_of` will look for cuts, and those in which it has, which wait to be read."""
+    if not stops_at_cuts(request, source):
+        return set(), set()
+    return source.shots.lacking(request.index, *reach(request, beside)), source.shots.handed()
 
 
 def positions(request: Request, shot: range) -> np.ndarray:

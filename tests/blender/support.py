@@ -134,9 +134,7 @@ class Asked:
         return self.session.coefficients(self.request)
 
     def check(self):
-        from shutter_addon.blender.rendering import decoding_ahead
-
-        decoding_ahead.check(self.renderer, self.request)
+        self.renderer.check(self.request)
 
 
 @contextmanager

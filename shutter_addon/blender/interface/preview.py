@@ -22,7 +22,6 @@ from ..devices import blender_gpu
 from ..devices.blender_gpu import Texture
 from ..editing import shown_annotations
 from ..rendering import (
-    decoding_ahead,
     effect_source,
     inbetween_build,
     invalidation,
@@ -243,7 +242,6 @@ def _show(context, render: RenderContext, found: Shown, decision: Decision | Non
     if has_result and not draws_result:
         _tell_missing(renderer, request, say)
     if draws_result:
-        decoding_ahead.prefetch(renderer, request)
         texture = renderer.draw(replace(request, quick=True, levels=True))
         quad.draw("show_picture", {"picture": texture}, left, 1.0, opacity=found.strip.blend_alpha)
     if settings.view == "SCRIBBLES":
@@ -321,7 +319,7 @@ def _tell_sharp(region) -> None:
 def _tell_missing(renderer, request, say) -> None:
     """Says in the preview what the engine can only report."""
     try:
-        decoding_ahead.check(renderer, request)
+        renderer.check(request)
     except MediaError as error:
         _tell_fault(error, say)
 
@@ -358,7 +356,6 @@ def _show_source(quad, found: Shown, renderer, request, right: float) -> None:
     following = request.state.following
     moving = following and following.of([following.moving()[0]])
     plain = replace(request, state=FrameState(options, still, following=moving), levels=True)
-    decoding_ahead.prefetch(renderer, plain)
     texture = renderer.draw(plain)
     quad.draw("show_picture", {"picture": texture}, 0.0, right, opacity=found.strip.blend_alpha)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import bpy
 
-from ...compute import memory_needs
+from ...compute import decoding_ahead, memory_needs
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core.farm.chunks import LEAST, chunk_size
@@ -20,7 +20,7 @@ from ...core.model.mattes import FileFrame
 from ...media import MediaError, cuts
 from ...media.files import check_file
 from ..data import requirements, snapshot, source_media, strips
-from ..rendering import decoding_ahead, effect_source, job_snapshots
+from ..rendering import effect_source, job_snapshots
 from ..rendering.render_context import RenderContext
 from ..rendering.render_settings import RenderSettings
 from ..rendering.session import RenderSession

@@ -73,12 +73,13 @@ def of(scene, scene_frame: float, ended: Callable[[], bool] | None = None) -> tu
         if isinstance(found, Exception):
             raise found.with_traceback(None)
         return found, found.timeline_frame(scene_frame)
+    folder = render_settings.settings().inbetween
     edit, effect, strip = strips.find_edit(scene)
     frame = strips.timeline_frame(strip, scene_frame)
     if not bpy.app.background:
         return invalidation.current(edit, effect, strip, frame), frame
     frames = frame, frame + edit.frame_step
-    return snapshot.take(edit, effect, strip, frames, folder=render_settings.settings().inbetween), frame
+    return snapshot.take(edit, effect, strip, frames, folder=folder), frame
 
 
 def _late(uid: int, scene_frame: float) -> Snapshot | Exception:

@@ -20,7 +20,7 @@ from ...devices.device import NoDeviceError
 from ...media.matte_values import MatteValues
 from ..data.snapshot import Snapshot, translated
 from ..devices import available
-from . import decoding_ahead, render_settings
+from . import render_settings
 from .device_work import Work, broken_off, result_of
 from .effect_source import FAULTS, FULL, Detail, SourceKey, source_index
 
@@ -110,7 +110,7 @@ class RenderSession:
         return (begun or self._begin(request, stopped)).result(stopped)
 
     def _begin(self, request: Request, stopped=never) -> Work:
-        return self._submit(decoding_ahead.picture, self.renderer(request.source), request, stopped=stopped)
+        return self._submit(self.renderer(request.source).picture, request, stopped=stopped)
 
     def begin_next(self, snapshot: Snapshot, frame: float, context: RenderContext) -> None:
         """Begins the picture after the one at that timeline frame, where a film is rendered: if the last two were
@@ -127,8 +127,8 @@ class RenderSession:
                 self._begun[snapshot.scene] = request.key, self._begin(request)
 
     def coefficients(self, request: Request, stopped=never) -> np.ndarray:
-        """As Renderer.coefficients; frames are decoded as for `picture`, which will read them as well."""
-        return self.run(decoding_ahead.coefficients, self.renderer(request.source), request, stopped=stopped)
+        """See Renderer.coefficients."""
+        return self.run(self.renderer(request.source).coefficients, request, stopped=stopped)
 
     def renderer(self, key: SourceKey, say=print, stopped=never) -> Renderer:
         """The renderer that reads what the key says: the only one that its effect has. One of FAULTS: there is none."""

@@ -48,6 +48,7 @@ class FrameSource(Protocol):
     options: what the samples depend on besides the files, {name: plain value}
     has_audio: whether the file has sound
     left_out: a sentence for the user about files beside the sequence that do not belong to it; "" if there are none
+    step: every step-th frame was filmed, from the first on
     shots: what knows where its shots end; None: it is one shot
     from_proxy: whether frames are read from a proxy, as far as it has them
     """
@@ -63,6 +64,7 @@ class FrameSource(Protocol):
     options: dict
     has_audio: bool = False
     left_out: str = ""
+    step: int = 1
     shots: ShotFinder | None = None
     from_proxy: bool = False
 
