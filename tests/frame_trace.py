@@ -1,8 +1,8 @@
 """The way of a frame through the extension: its stops, which are the functions that make it, in the order in which they
 are first called; and how often it comes back to a room that it had left.
 
-A room is a folder of the extension, as docs/developers.md lists them. `core` and `devices` are libraries, which call
-nobody back: what they do belongs to whoever calls, and is no stop."""
+A room is a folder of the extension, as docs/developers.md lists them. `core` and both `devices` are libraries, which
+call nobody back: what they do belongs to whoever calls, and is no stop."""
 
 import sys
 import threading
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 _TOOL = 4  # of sys.monitoring's, one for nobody in particular
-_LIBRARIES = "core", "devices"
+_LIBRARIES = "core/", "devices/", "blender/devices/"
 _AHEAD = "Virtual Shutter"  # the thread that decodes frames ahead, whenever it comes to them
 
 

@@ -7,7 +7,8 @@ from functools import partial
 import bpy
 from bpy.app.handlers import persistent
 
-from .data import inbetween_settings, preview_areas, revision, source_media, strips, versions
+from ..core import revision
+from .data import inbetween_settings, preview_areas, source_media, strips, versions
 from .editing import copies, lifecycle, shown_annotations, track_region, undelete
 from .interface import inbetween_operators, sharp_frame
 from .rendering import invalidation, job_snapshots, render_job, sessions
@@ -116,9 +117,10 @@ def _before_frame(scene, *_):
 
 @persistent
 def _after_render(scene, *_):
-    if render_job.is_film(scene):
-        invalidation.drop_spoilt_later()
-        job_snapshots.end()
+    if not render_job.is_film(scene):
+        return  # of an effect, for a film or a preview
+    invalidation.drop_spoilt_later()
+    job_snapshots.end()
     render_job.end(scene, alone=not render_job.script_waits(inspect.currentframe()))
     source_media.rest(render_job.runs())
 

@@ -41,6 +41,8 @@ class Renderer:
     """Pictures of one source. It keeps the window's frames, and the last result of each stage.
 
     mattes: what reads the mattes of its pictures; None: they have none
+    shortages: what was slow in the last picture, as the device has no room: "window", every picture sends the frames;
+    "diffusion", NumPy diffuses
     """
 
     def __init__(self, compositor, source: FrameSource, mattes: MatteReader | None = None):
@@ -48,6 +50,7 @@ class Renderer:
         self._solver, self._matting, self._mixing = compositor.solver(), compositor.matting(), compositor.mixing()
         self._guides = guide.Guides(source)
         self._window = self._kind = None
+        self.shortages: set[str] = set()
         self._labels, self._solved, self._laid, self._drawn = Memo(), Memo(), Memo(), Memo()
 
     def picture(self, request: Request) -> np.ndarray:
@@ -121,8 +124,8 @@ class Renderer:
         """The source frames that `draw` would read: needed ones that are not loaded, and those in which it looks for
         cuts."""
         held = self._window.held if self._window and self._kind == self._kind_for(request) else ()
-        shot = self.shot(request, known=True)
         unread, handed = window_frames.looked_for_cuts(request, self.source, self._beside(request))
+        shot = self.shot(request, known=True)
         missing = window_frames.exposed_frames(request, shot).difference(held)
         missing |= self._guides.lacking(self._guiding(request, shot))
         return (missing | unread) - handed
@@ -170,6 +173,7 @@ class Renderer:
         exposing = self._exposing(request, labels)
         shot = self.shot(exposing)
         window.load(window_frames.positions(exposing, shot), exposing.state.options, shot)
+        self._note_shortage("window", window.sends)
         return window
 
     def _kind_for(self, request: Request) -> tuple[int, bool, int]:
@@ -223,7 +227,9 @@ class Renderer:
         def solve():
             self._keep_guides(request)
             guided = (self._guides.guide(frames, options.aggregate), options.edge_aware) if frames else ()
-            return self._mixed(labels, count, guided, request.quick)
+            mixed = self._mixed(labels, count, guided, request.quick)
+            self._note_shortage("diffusion", self._solver.gave_up)
+            return mixed
 
         key = count, frames and (frames, options.edge_aware), [layer.key for layer in labels]
         return self._solved.get(key, solve, quick=request.quick)
@@ -248,16 +254,14 @@ class Renderer:
             if self._window is not None:
                 self._window.release()
                 self._window = None
+                self._note_shortage("window", False)
                 self._drawn.clear()
             self._guides.keep(())
         if self.source.shots is not None:
             self.source.shots.release()
 
-    def shortages(self) -> set[str]:
-        """What was slow in the last picture, as the device has no room: "window", every picture sends the frames;
-        "diffusion", NumPy diffuses."""
-        window = {"window"} if self._window is not None and self._window.sends else set()
-        return window | ({"diffusion"} if self._solver.gave_up else set())
+    def _note_shortage(self, what: str, is_short: bool) -> None:
+        (self.shortages.add if is_short else self.shortages.discard)(what)
 
     def release(self) -> None:
         """Frees what the renderer has on the device. The next picture makes it again."""

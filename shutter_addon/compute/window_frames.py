@@ -44,9 +44,10 @@ def shot_of(request: Request, source: FrameSource, beside: int, *, known: bool =
 
 def looked_for_cuts(request: Request, source: FrameSource, beside: int) -> tuple[set[int], set[int]]:
     """The source frames in which `shot_of` will look for cuts, and those in which it has, which wait to be read."""
+    low, high = reach(request, beside)
     if not stops_at_cuts(request, source):
         return set(), set()
-    return source.shots.lacking(request.index, *reach(request, beside)), source.shots.handed()
+    return source.shots.lacking(request.index, low, high), source.shots.handed()
 
 
 def positions(request: Request, shot: range) -> np.ndarray:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from contextlib import contextmanager
 
 LONGEST = 300  # characters of a sentence, as users see it
 
@@ -22,6 +24,21 @@ class EffectError(UserError, RuntimeError):
     def __init__(self, template: str, **words):
         super().__init__(template.format(**words) if words else template)
         self.template, self.words = template, words
+
+
+@contextmanager
+def translated(translate: Callable[[str], str]):
+    """Context in which the sentences of EffectErrors are passed on in the user's language. translate: a template into
+    it."""
+    try:
+        yield
+    except EffectError as error:
+        if not error.words:
+            raise
+        words = dict(error.words)
+        if fault := words.get("fault"):
+            words["fault"] = translate(fault)
+        raise EffectError(translate(error.template).format(**words)) from None
 
 
 def sentence(text: object, longest: int = LONGEST) -> str:

@@ -86,9 +86,12 @@ def sequencer(bpy):
 
 def state(edit, effect, strip, frame):
     """The effect at a timeline frame, as its pictures are made with it."""
-    from shutter_addon.blender.data import snapshot
+    from bpy.app.translations import pgettext_rpt
 
-    with snapshot.translated():
+    from shutter_addon.blender.data import snapshot
+    from shutter_addon.core.messages import translated
+
+    with translated(pgettext_rpt):
         return snapshot.read(edit, effect, strip, (frame,)).at(frame)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support import state, write_frames
 
+from shutter_addon.core.model.scribbles import mapped
 from shutter_addon.core.recipes import recipe_file
 
 RNG = np.random.default_rng(0)
@@ -120,7 +121,7 @@ def test_a_picture_point_lies_where_blender_draws_it(bpy, edit, render, tmp_path
     shown = render(edit, [1])[1][..., 0]
     y, x = (np.indices(shown.shape).reshape(2, -1) * shown.ravel()).sum(axis=1) / shown.sum() + 0.5
     matrix = geometry.picture_to_image(strip, (60, 40))
-    expected = geometry.mapped(matrix, np.array([[42 / 60, 1 - 12 / 40]]))[0]
+    expected = mapped(matrix, np.array([[42 / 60, 1 - 12 / 40]]))[0]
     assert (x - 50, 40 - y) == pytest.approx(tuple(expected), abs=0.6)
 
 

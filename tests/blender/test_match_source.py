@@ -9,6 +9,7 @@ from support import recipe, sequencer
 
 from shutter_addon.blender.data import annotations, fcurves, geometry, selection
 from shutter_addon.blender.editing import lifecycle, match_source
+from shutter_addon.core.model.scribbles import mapped
 from shutter_addon.core.recipes import recipe_file
 
 LEVELS = 1
@@ -216,7 +217,7 @@ def test_scribbles_stay_on_the_picture(bpy, edit, made, change):
 def on_picture(effect, strip) -> np.ndarray:
     """The strokes' points, as fractions of the strip's picture."""
     to_image = geometry.picture_to_image(strip, annotations.picture_size(effect))
-    return geometry.mapped(np.linalg.inv(to_image), np.array(strokes(effect))[:, :2])
+    return mapped(np.linalg.inv(to_image), np.array(strokes(effect))[:, :2])
 
 
 def test_keys_of_the_transform_are_copied(bpy, edit, made, shown):

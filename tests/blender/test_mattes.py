@@ -663,8 +663,8 @@ def test_cut_and_pasted_effects_have_their_mattes(bpy, edit, shown, matte, mask)
 
 
 def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, triangle):
-    from shutter_addon.blender.data import revision
     from shutter_addon.blender.rendering import invalidation
+    from shutter_addon.core import revision
 
     layer = triangle.layers[0]
     point = layer.splines[0].points[0]

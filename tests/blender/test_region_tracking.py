@@ -712,7 +712,7 @@ def test_a_changed_track_is_followed_anew(bpy, edit, region, clip, does):
 
 
 def test_it_says_that_the_track_has_changed(bpy, edit, region, clip):
-    from shutter_addon.blender.data import revision
+    from shutter_addon.core import revision
 
     set_up(region, clip, "TRACK", "middle")
     call(bpy, "follow")

@@ -39,7 +39,7 @@ def found(bpy, edit, tmp_path):
 
 
 def states(snapshot) -> list:
-    return [snapshot.state(frame).key for frame in FRAMES]
+    return [snapshot.effect.at(frame).key for frame in FRAMES]
 
 
 def test_it_holds_no_blender_data_and_does_not_change(found):
@@ -66,7 +66,7 @@ def test_many_frames_are_those_of_each(found):
 
     for interpolation in ("DISPLACEMENT", "VALUE"):
         found[1].interpolation = interpolation
-        single = [snapshot.take(*found, (frame,)).state(frame).key for frame in FRAMES]
+        single = [snapshot.take(*found, (frame,)).effect.at(frame).key for frame in FRAMES]
         assert states(snapshot.take(*found, FRAMES)) == single
 
 
@@ -79,9 +79,9 @@ def test_what_is_wrong_at_one_frame_is_told_there(found):
     for i in range(4):  # closes at frame 9 alone
         fcurves.set_keys(edit, f"{path}[{i}].weight", 0, [(8, 1, "linear"), (9, 0, "linear"), (10, 1, "linear")])
     taken = snapshot.take(*found, FRAMES)
-    assert taken.state(8).bars[0].tolist() == taken.state(10).bars[0].tolist() == [1] * 4
+    assert taken.effect.at(8).bars[0].tolist() == taken.effect.at(10).bars[0].tolist() == [1] * 4
     with pytest.raises(EffectError, match='shutter "Long" at frame 9: all bars are zero'):
-        taken.state(9)
+        taken.effect.at(9)
 
 
 def test_scribbles_follow_a_keyed_transform(found):
@@ -94,7 +94,7 @@ def test_scribbles_follow_a_keyed_transform(found):
         strip.transform.keyframe_insert("offset_x", frame=frame)
     moving = snapshot.take(*found, FRAMES)
     for frame, pixels in ((1, 0), (12, 10), (24, 10)):
-        apart = still.state(frame).shapes[0].strokes[0] - moving.state(frame).shapes[0].strokes[0]
+        apart = still.effect.at(frame).shapes[0].strokes[0] - moving.effect.at(frame).shapes[0].strokes[0]
         assert apart[:, 0] * 40 == pytest.approx([pixels] * 2, abs=1e-4)
 
 

@@ -470,7 +470,7 @@ class Layout:
 
 def show(bpy, edit):
     """Calls what Blender calls where an effect is shown: handlers, polls, panels, gizmos."""
-    from shutter_addon.blender.data import selection
+    from shutter_addon.blender.data import preview_areas, selection
     from shutter_addon.blender.editing import lifecycle
     from shutter_addon.blender.interface import (
         bar_editor,
@@ -480,7 +480,7 @@ def show(bpy, edit):
         region_gizmo,
         split_gizmo,
     )
-    from shutter_addon.blender.rendering import invalidation, previews
+    from shutter_addon.blender.rendering import invalidation
 
     lifecycle.update()
     invalidation.invalidate_changed(edit)
@@ -489,7 +489,7 @@ def show(bpy, edit):
         region = next(region for region in area.regions if region.type == "PREVIEW")
         with bpy.context.temp_override(region=region):
             context = bpy.context
-            previews.shown(context)
+            preview_areas.shown(context)
             bar_editor.bar_under(context, 30, 30)
             region_gizmo.place(context)
             for cls in (*operators.classes, *inbetween_operators.classes, *bar_editor.classes, *region_gizmo.classes):

@@ -87,7 +87,7 @@ def rendered(device, source: FrameSource, states, mattes=None):
     compositor = GPUCompositor(device)
     renderer = Renderer(compositor, source, mattes)
     pictures = [renderer.picture(Request(2 + i, shown)) for i, shown in enumerate(states)]
-    shortages, kind = renderer.shortages(), type(renderer._window).__name__
+    shortages, kind = set(renderer.shortages), type(renderer._window).__name__
     renderer.close()
     free(compositor)
     return np.array(pictures), kind, shortages

@@ -35,7 +35,8 @@ def on_preview(*points):
     """Pixels of the preview's region, of points in fractions of the picture."""
     geometry, annotations = part("blender.data.geometry"), part("blender.data.annotations")
     size = annotations.picture_size(story.effect())
-    return geometry.mapped(geometry.picture_to_region(effect_strip(), size, story.preview()), points).tolist()
+    matrix = geometry.picture_to_region(effect_strip(), size, story.preview())
+    return part("core.model.scribbles").mapped(matrix, points).tolist()
 
 
 def channel():

@@ -32,11 +32,6 @@ def is_invertible(matrix: np.ndarray) -> bool:
         return bool(np.isfinite(matrix).all() and np.isfinite(1 / np.linalg.det(matrix)))
 
 
-def mapped(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Points (n, 2) through a matrix (3, 3)."""
-    return points @ matrix[:2, :2].T + matrix[:2, 2]
-
-
 def picture_to_region(strip, size, region) -> np.ndarray:
     """Matrix (3, 3) from fractions of the strip's picture to pixels of a preview's region."""
     # view_to_region rounds to whole pixels, region_to_view does not; and its last pixel is what is drawn at the edge.

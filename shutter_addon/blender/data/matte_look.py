@@ -4,11 +4,13 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core.messages import UserError
+from ...core import revision
+from ...core.messages import UserError, translated
 from ...core.model.mattes import FileFrames
 from ...media.matte_files import MatteFile
-from . import matte_strips, revision, snapshot
+from . import matte_strips, snapshot
 
 _looks = revision.UntilChange()
 
@@ -31,7 +33,7 @@ def look(edit, effect, strip, region) -> Look:
 def _look(edit, effect, strip, index: int) -> Look:
     frame, region = strip.left_handle, effect.regions[index]
     try:
-        with snapshot.translated():
+        with translated(rpt_):
             content = snapshot.region_at(edit, effect, strip, index, (frame,)).content
             shown = content.at(frame)
     except UserError as error:

@@ -1,4 +1,40 @@
-"""Blender's areas that show a preview."""
+"""Blender's areas that show a preview, and what they show of an effect: read of Blender's data here alone."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import geometry, selection, strip_proxies, strips
+
+_PERCENT = {"PROXY_25": 25, "PROXY_50": 50, "PROXY_75": 75, "PROXY_100": 100}
+_STANDARD = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
+_STANDARD |= {"use_curve_mapping": False, "use_white_balance": False}
+_PLAIN_STRIP = {"blend_alpha": 1.0, "color_multiply": 1.0, "color_saturation": 1.0, "scene_input": "CAMERA"}
+_PLAIN_SPACE = {"display_mode": "IMAGE", "display_channel": 0, "show_overexposed": 0}
+
+
+@dataclass(frozen=True)
+class Shown:
+    """The effect strip that a preview shows."""
+
+    edit: object
+    effect: object
+    strip: object
+    strips_above: bool
+
+
+@dataclass(frozen=True)
+class Look:
+    """How an effect's picture is looked at in all previews of its edit.
+
+    scale: how wide or high a pixel of the source is in the largest of them; None: there is none
+    proxy: what Blender reads of the source for that one; None: the footage itself
+    is_plain: whether they show the strip's picture as it is, so that it may be drawn in their place"""
+
+    scale: float | None
+    proxy: strip_proxies.Proxy | None
+    is_plain: bool
 
 
 def previews(context):
@@ -18,3 +54,77 @@ def redraw(context) -> None:
 def preview_region(area):
     """The region of a sequencer's area that shows the picture."""
     return next(region for region in area.regions if region.type == "PREVIEW")
+
+
+def shown(context) -> Shown | None:
+    """The effect strip under the playhead that the preview shows, as selection.seen has it."""
+    edit, space = selection.edit_of(context), context.space_data
+    if space.display_mode != "IMAGE" or space.display_channel or (seen := selection.seen(edit)) is None:
+        return None
+    above = any(other.channel > seen[2].channel for other in selection.visible(edit))
+    return Shown(*seen, above)
+
+
+def look(context, edit, effect, strip) -> Look:
+    """How an effect's picture is looked at."""
+    areas = list(_areas_of(context, edit))
+    scales = {area.spaces.active: _scale(context, edit, strip, area) for area in areas}
+    scales = {space: scale for space, scale in scales.items() if math.isfinite(scale)}
+    is_plain = _is_plain(edit, strip) and all(_has(area.spaces.active, _PLAIN_SPACE) for area in areas)
+    if not scales:
+        return Look(None, None, is_plain)
+    space = max(scales, key=scales.get)
+    return Look(scales[space], _proxy(edit, effect, strip, space), is_plain)
+
+
+def _is_plain(edit, strip) -> bool:
+    """Whether the edit shows a strip's picture as it is."""
+    return (
+        strip.blend_type in ("REPLACE", "ALPHA_OVER")
+        and _has(strip, _PLAIN_STRIP)
+        and all(modifier.mute for modifier in strip.modifiers)
+        and edit.display_settings.display_device == "sRGB"
+        and _has(edit.view_settings, _STANDARD)
+        and not edit.render.use_multiview
+        and not edit.sequence_editor.show_overlay_frame
+    )
+
+
+def _has(item, values: dict) -> bool:
+    return all(getattr(item, name) == value for name, value in values.items())
+
+
+def _proxy(edit, effect, strip, space) -> strip_proxies.Proxy | None:
+    """What Blender reads of an effect's source in a preview; None: the footage itself."""
+    source, percent = strips.nearest_source(edit, effect, strip), _PERCENT.get(space.proxy_render_size)
+    if source is None or percent is None or not space.use_proxies:
+        return None
+    return strip_proxies.proxy_of(edit, source, percent)
+
+
+def _scale(context, edit, strip, area) -> float:
+    """How wide or high a pixel of the source is in a preview: in its picture, which is as small as Blender's menu has
+    it; and on the screen, where our handler draws."""
+    space = area.spaces.active
+    percent = _PERCENT.get(space.proxy_render_size, edit.render.resolution_percentage)
+    size = strip.scene.render.resolution_x, strip.scene.render.resolution_y
+    scale = percent / 100 * _pixel(geometry.picture_to_image(strip, size), size)
+    if not context.window_manager.virtual_shutter.live:
+        return percent / 100
+    region = preview_region(area)
+    if space.display_mode != "IMAGE" or min(region.width, region.height) < 2:
+        return scale
+    return min(scale, _pixel(geometry.picture_to_region(strip, size, region), size))
+
+
+def _pixel(matrix, size) -> float:
+    """The larger side of a picture's pixel after a matrix (3, 3) from fractions of the picture."""
+    return float(np.max(np.hypot(*matrix[:2, :2]) / size))
+
+
+def _areas_of(context, edit):
+    """The areas in which an edit's preview is drawn."""
+    for window, area in previews(context):
+        shows = getattr(window.workspace, "sequencer_scene", None) or window.scene
+        if shows == edit and area.spaces.active.proxy_render_size != "NONE":
+            yield area

@@ -19,6 +19,7 @@ from bpy.props import (
 )
 from bpy.types import PropertyGroup
 
+from ...core import revision
 from ...core.model.limits import (
     MAX_BAR,
     MAX_DISTANCE,
@@ -26,7 +27,7 @@ from ...core.model.limits import (
     MAX_SMOOTH,
 )
 from ...core.model.shutters import MAX_WINDOW
-from . import consistency, revision, selection, validation
+from . import consistency, selection, validation
 from .choices import (
     AGGREGATES,
     CONTEXT,

@@ -2,6 +2,7 @@
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core.messages import translated
 from ...core.model import limits
 from ...core.recipes import baking, recipe
 from . import annotations, fcurves, inbetween_settings, snapshot, strips, validation
@@ -25,7 +26,7 @@ def recipe_of(edit, effect, strip, mattes=()) -> recipe.Recipe:
     if effect.regions and annotations.image_to_picture(strip, annotations.picture_size(effect)) is None:
         sentence = rpt_('strip "{strip}" is too small to find its scribbles')
         raise EffectError(sentence.format(strip=strip.name))
-    with snapshot.translated():
+    with translated(rpt_):
         found = snapshot.read(edit, effect, strip, sorted({*shown, *_keyed(edit, effect)}), thorough=True)
         return baking.baked(found, shown, inbetween_settings.method(effect), mattes)
 

@@ -10,6 +10,7 @@ from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.model import limits
+from ...core.model.scribbles import mapped
 from ...core.recipes import recipe
 from ...media import MediaError
 from ...media.files import check_name
@@ -207,6 +208,6 @@ def _draw(effect, strip, source: recipe.Region, color, first: float) -> str:
             stroke.display_mode = "2DSPACE"
             stroke.points.add(len(points))
             image = np.zeros((len(points), 3), dtype=np.float32)
-            image[:, :2] = geometry.mapped(to_image, np.asarray(points))
+            image[:, :2] = mapped(to_image, np.asarray(points))
             stroke.points.foreach_set("co", image.ravel())
     return layer.info

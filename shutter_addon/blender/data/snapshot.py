@@ -6,7 +6,6 @@ Blender itself. Drivers, NLA strips and further layers of an action do not count
 """
 
 from collections.abc import Iterable
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -16,10 +15,10 @@ from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.frames.retiming import StripTiming
-from ...core.messages import EffectError, UserError
+from ...core.messages import EffectError, UserError, translated
 from ...core.model import effect as model
 from ...core.model import keyframes, limits
-from ...core.model.frame_state import FrameState, Options
+from ...core.model.frame_state import Options
 from ...core.pixels import following
 from . import annotations, geometry, inbetween_settings, matte_content, source_media, strips, validation
 from .fcurves import Curves, leading, progress
@@ -59,11 +58,6 @@ class Snapshot:
     def timeline_frame(self, scene_frame: float) -> float:
         """The timeline frame at which the effect's scene is at one of its own."""
         return self.origin + scene_frame
-
-    def state(self, frame: float) -> FrameState:
-        """The effect at a timeline frame. EffectError: no picture can be made of it."""
-        with translated():
-            return self.effect.at(frame)
 
 
 class SourceFiles(NamedTuple):
@@ -175,7 +169,7 @@ def strokes_at(edit, effect, strip, index: int, frame: float) -> list[np.ndarray
     lie nowhere."""
     if effect.regions[index].kind in strips.MATTES:
         return []
-    with translated():
+    with translated(rpt_):
         return region_at(edit, effect, strip, index, (frame,)).unmoved(frame)
 
 
@@ -199,20 +193,6 @@ def last_shown(edit, effect, strip) -> float:
 def camera_at(edit, effect, frames) -> model.Camera:
     """The camera as plain data, its channels sampled at timeline frames; as region_at."""
     return _camera(Curves(edit), effect, frames)
-
-
-@contextmanager
-def translated():
-    """Context in which sentences of core are passed on in the user's language."""
-    try:
-        yield
-    except EffectError as error:
-        if not error.words:
-            raise
-        words = dict(error.words)
-        if fault := words.get("fault"):
-            words["fault"] = rpt_(fault)
-        raise EffectError(rpt_(error.template).format(**words)) from None
 
 
 def check_counts(effect) -> None:

@@ -5,7 +5,7 @@ import math
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from . import revision
+from ...core import revision
 from .validation import EffectError
 
 ENGINE = "VIRTUAL_SHUTTER"

@@ -12,9 +12,11 @@ import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core import revision
+from ...core.messages import translated
 from ...core.model import motions
 from ...core.model.motions import Placement, Similarity
-from ..data import annotations, revision, snapshot, source_media, strips, validation
+from ..data import annotations, snapshot, source_media, strips, validation
 from ..data.validation import EffectError
 from ..rendering import effect_source
 from . import motion_keys
@@ -143,7 +145,7 @@ def _points(edit, effect, strip, index: int, start: int) -> dict[int, Points]:
         sentence = rpt_('"{track}" of clip "{clip}" has no marker at frame {frame}')
         name = region.follow_object if region.follow_kind == "OBJECT" else region.follow_track
         raise EffectError(sentence.format(track=name, clip=region.follow_clip.name, frame=start))
-    with snapshot.translated():
+    with translated(rpt_):
         shape = snapshot.region_at(edit, effect, strip, index, found)
         if not all(shape.unmoved(frame) for frame in found):
             raise EffectError(rpt_('region "{name}" has no strokes').format(name=region.name))

@@ -15,8 +15,10 @@ import mathutils
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 
+from ...core import revision
+from ...core.model.scribbles import mapped
 from ...media import MediaError
-from ..data import annotations, fcurves, geometry, revision, source_media, strips
+from ..data import annotations, fcurves, geometry, source_media, strips
 from . import add_effect
 
 # What a strip looks like: what it is called, and the names of the strip's properties and groups.
@@ -270,7 +272,7 @@ def _move(drawing, change: np.ndarray) -> None:
     for stroke in drawing.strokes:
         points = np.empty((len(stroke.points), 3), np.float32)
         stroke.points.foreach_get("co", points.ravel())
-        points[:, :2] = geometry.mapped(change, points[:, :2].astype(np.float64))
+        points[:, :2] = mapped(change, points[:, :2].astype(np.float64))
         stroke.points.foreach_set("co", points.ravel())
 
 

@@ -16,7 +16,8 @@ import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import stopping
+from ...core import revision, stopping
+from ...core.messages import translated
 from ...core.model import limits, motions, presence
 from ...core.model.effect import Camera, Region
 from ...core.model.frame_state import Options
@@ -25,7 +26,7 @@ from ...core.recipes import region_keys
 from ...media import camera_tracking, pursuit, tracking
 from ...media.footage import Footage
 from ...media.tracking import Tracked
-from ..data import annotations, inbetween_settings, revision, selection, snapshot, strips, validation
+from ..data import annotations, inbetween_settings, selection, snapshot, strips, validation
 from ..data.validation import EffectError
 from ..rendering import effect_source
 from . import motion_keys
@@ -271,7 +272,7 @@ def _standing(moving: Region | Camera, here: Tracked) -> Region | Camera:
 def _followed(follow: Callable, patience: float | None) -> Iterator[Tracked | None]:
     """What `follow` gives, a function as tracking.follow, found by a thread beside Blender (stopping.beside); its
     sentences are in the user's language."""
-    with snapshot.translated():
+    with translated(rpt_):
         try:
             with closing(stopping.beside(_each(follow), patience)) as steps:
                 yield from steps

@@ -52,11 +52,11 @@ class SHUTTER_OT_full_quality(Operator):
 
 
 def _shown(context):
-    """Window, area and previews.Shown of the preview that is looked at: the context's own, else another; or None."""
+    """Window and area of the preview that is looked at, the context's own or another, and what it shows; or None."""
     areas = sorted(preview_areas.previews(context), key=lambda pair: pair[1] != context.area)
     for window, area in areas:
         with context.temp_override(window=window, area=area, region=preview_areas.preview_region(area)):
-            if (found := previews.shown(bpy.context)) is not None:
+            if (found := preview_areas.shown(bpy.context)) is not None:
                 return window, area, found
     return None
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import bpy
 from bpy.types import Gizmo, GizmoGroup
 
-from ..rendering import previews
+from ..data import preview_areas
 from . import drawing
 
 HEIGHT = 19  # in units of the interface
@@ -74,7 +74,7 @@ class SHUTTER_GGT_note_buttons(GizmoGroup):
 
     @classmethod
     def poll(cls, context):
-        return context.window_manager.virtual_shutter.live and previews.shown(context) is not None
+        return context.window_manager.virtual_shutter.live and preview_areas.shown(context) is not None
 
     def setup(self, _context):
         for operator in OPERATORS:

@@ -1,7 +1,6 @@
 """The live preview: what is drawn over the sequencer's picture, composed on Blender's GPU: views, and scribbles."""
 
-import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import bpy
 import gpu
@@ -11,13 +10,13 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty
 from bpy.types import PropertyGroup
 
-from ...compute.request import Request
 from ...core import stopping
 from ...core.model.frame_state import FrameState
 from ...media import MediaError
 from ...media.errors import NotBuiltError
 from ..data import annotations, preview_areas, selection, strips
 from ..data.choices import CONTEXT
+from ..data.preview_areas import Shown
 from ..devices import blender_gpu
 from ..devices.blender_gpu import Texture
 from ..editing import shown_annotations
@@ -27,12 +26,10 @@ from ..rendering import (
     invalidation,
     pictures,
     previews,
-    render_context,
     render_job,
     strobing,
 )
-from ..rendering.previews import RESULTS, Decision, Shown, shown
-from ..rendering.render_context import RenderContext
+from ..rendering.previews import Decision, Drawing
 from . import drawing, inbetween_operators, note_buttons, preview_quad, sharp_frame
 from .note_buttons import Button
 from .preview_quad import Quad
@@ -73,18 +70,6 @@ def _follow_once() -> None:
 _NAVIGATION = 56  # units at the right of a preview, where Blender's own buttons lie
 _STILL = 0.4  # seconds after which a frame that is shown stays
 _SOON = 0.1  # seconds
-_SLICE = 0.2  # seconds
-
-
-@dataclass
-class _Slice:
-    """What was composed last in slices, its effect's scene and frame, and for how many seconds it might be."""
-
-    shown: tuple[int, int] | None = None
-    seconds: float = _SLICE
-
-
-_last = _Slice()
 
 
 class ShutterPreview(PropertyGroup):
@@ -129,75 +114,54 @@ class ShutterPreview(PropertyGroup):
 def _draw() -> None:
     """The draw handler of the previews."""
     context = bpy.context
-    settings = context.window_manager.virtual_shutter
-    decision = previews.take_decision()
     blender_gpu.free_unused()
     note_buttons.clear(context.region)
+    decision = previews.take_decision()
     if bpy.app.is_job_running("RENDER") or render_job.ends_films():
         return
-    sharp_frame.follow_pen(context)
     invalidation.drop_lesser()
     # Blender tells nobody of strokes that are drawn or erased, but it draws the preview again.
     edit = selection.edit_of(context)
     if edit is not None and edit.library is None and invalidation.invalidate_changed(edit):
         bpy.app.timers.register(_redraw_once)  # what is tagged while it is drawn is not drawn again
+    sharp_frame.follow_pen(context)
     if sharp_frame.is_shown(context.space_data):
         _tell_sharp(context.region)
     # A stroke that is being drawn would lie below our picture: Blender's own shows the same.
-    if any(op.bl_idname == sharp_frame.PEN for op in context.window.modal_operators):
+    if any(op.bl_idname == previews.PEN for op in context.window.modal_operators):
         return
     if shown_annotations.is_other(context.space_data, selection.seen(edit)):
         bpy.app.timers.register(_follow_once)  # nothing may be changed while it is drawn
-    if not settings.live:
+    if not context.window_manager.virtual_shutter.live:
         return
     say = _Notes(context.region)
-    found = shown(context)
-    if found is None:
+    shown = preview_areas.shown(context)
+    if shown is None:
         previews.looking.whole = None
         _tell_unseen(context, say)
         return
-    render = render_context.of_drawing()
     with drawing.pixel_space(context.region):
-        try:
-            with stopping.once(_time_up(found) if previews.may_be_late() else stopping.never):
-                _show(context, render, found, decision, say)
-            _last.shown, _last.seconds = None, _SLICE
-        except stopping.StoppedError:
-            say(rpt_("Composing…"))
-            quad = Quad(context.region, found.strip, annotations.picture_size(found.effect))
-            _show_strokes(context, quad, found.effect, request_of(context, render, found))
-            bpy.app.timers.register(_redraw_once)
-        except effect_source.FAULTS as error:
-            _tell_fault(error, say)
+        _show(context, shown, decision, say)
         say.draw()
 
 
-def _time_up(found: Shown):
-    """What says whether a picture has been composed for so long that Blender has to look at its keys: it goes on when
-    it is drawn again. Each time, it has half as long again, so that it comes to an end."""
-    shown = found.effect.scene.session_uid, found.edit.frame_current
-    _last.seconds = 1.5 * _last.seconds if _last.shown == shown else _SLICE
-    _last.shown, end = shown, time.monotonic() + _last.seconds
-    return lambda: time.monotonic() > end
-
-
-def request_of(context, render: RenderContext, found: Shown) -> Request:
-    """What the effect strip shows at the current frame, in the previews' size, as a draft where a still result is not
-    exact anyway. One of effect_source.FAULTS: it cannot be shown."""
-    return _drafted(context, render, found, previews.requested(context, render, found, _snapshot(found)))
-
-
-def _snapshot(found: Shown):
-    return invalidation.current(found.edit, found.effect, found.strip, found.edit.frame_current)
-
-
-def _drafted(context, render: RenderContext, found: Shown, request) -> Request:
-    is_result = context.window_manager.virtual_shutter.view in RESULTS and _is_rendered(found)
-    is_going = previews.is_going(context)
-    if is_going and not bpy.app.timers.is_registered(_redraw_when_still):
-        bpy.app.timers.register(_redraw_when_still, first_interval=_SOON)
-    is_exact = previews.looking.whole is not None or (is_result and not is_going)
-    return request if is_exact else previews.draft(request, render.renderer(request).source)
+def _show(context, shown: Shown, decision: Decision | None, say) -> None:
+    """Shows the effect, or says why not. decision: what the engine was asked for."""
+    try:
+        wanted = previews.for_drawing(context, shown, decision)
+        if previews.is_going(context) and not bpy.app.timers.is_registered(_redraw_when_still):
+            bpy.app.timers.register(_redraw_when_still, first_interval=_SOON)
+        quad = Quad(context.region, shown.strip, annotations.picture_size(shown.effect))
+        try:
+            with stopping.once(wanted.stopped):
+                _show_picture(context, quad, shown, wanted, say)
+            previews.was_drawn()
+        except stopping.StoppedError:
+            say(rpt_("Composing…"))
+            _show_strokes(context, quad, shown.effect, wanted.request)
+            bpy.app.timers.register(_redraw_once)
+    except effect_source.FAULTS as error:
+        _tell_fault(error, say)
 
 
 def _tell_unseen(context, say) -> None:
@@ -210,60 +174,43 @@ def _tell_unseen(context, say) -> None:
         say.draw()
 
 
-def _is_rendered(found: Shown) -> bool:
-    """Whether the sequencer renders its previews."""
-    return found.edit.render.sequencer_gl_preview == "RENDERED"
-
-
-def _show(context, render: RenderContext, found: Shown, decision: Decision | None, say) -> None:
-    """decision: what the engine was asked for; it holds unless something has changed since."""
-    settings, snapshot = context.window_manager.virtual_shutter, _snapshot(found)
-    if decision is None or decision.snapshot is not snapshot:
-        decision = previews.decide(context, found, snapshot)
-    exact = decision.request
-    request = _drafted(context, render, found, exact)
-    size = annotations.picture_size(found.effect)
-    quad, renderer = Quad(context.region, found.strip, size), render.renderer(request)
+def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> None:
+    settings, renderer, request = context.window_manager.virtual_shutter, wanted.renderer, wanted.request
     if context.space_data.show_overlays:
         is_still = not context.screen.is_animation_playing
-        _tell_detail(renderer.source, size, request is not exact, is_still, say)
+        _tell_detail(wanted, annotations.picture_size(shown.effect), is_still, say)
         if is_still and not previews.may_be_late():  # what it measures would take from what runs
-            _tell_strobing(found, snapshot, renderer, exact, say)
-    has_result = settings.view in RESULTS
-    left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
-    if previews.is_tracking():  # a stroke is seen to stay on its subject where that is sharp
-        left = 1.0
-    # Else the engine has composed it, and it lies there in its place among the other strips.
-    draws_result = has_result and left < 1 and (not _is_rendered(found) or decision.is_drawn)
-    if left > 0 or draws_result:
-        _warn(found, say)
-    if left > 0:
-        _show_source(quad, found, renderer, request, left)
-    if has_result and not draws_result:
+            _tell_strobing(shown, wanted, say)
+    if wanted.left > 0 or wanted.draws_result:
+        _warn(shown, say)
+    if wanted.left > 0:
+        _show_source(quad, shown, renderer, request, wanted.left)
+    if wanted.has_result and not wanted.draws_result:
         _tell_missing(renderer, request, say)
-    if draws_result:
+    if wanted.draws_result:
         texture = renderer.draw(replace(request, quick=True, levels=True))
-        quad.draw("show_picture", {"picture": texture}, left, 1.0, opacity=found.strip.blend_alpha)
+        quad.draw("show_picture", {"picture": texture}, wanted.left, 1.0, opacity=shown.strip.blend_alpha)
     if settings.view == "SCRIBBLES":
-        _show_scribbles(quad, found.effect, renderer, request)
+        _show_scribbles(quad, shown.effect, renderer, request)
     elif settings.view == "COEFFICIENTS":
-        _show_coefficients(quad, found.effect, renderer, request)
+        _show_coefficients(quad, shown.effect, renderer, request)
     else:
-        _show_strokes(context, quad, found.effect, request)
+        _show_strokes(context, quad, shown.effect, request)
     for sentence in pictures.shortages(renderer, request):
         say(sentence)
 
 
-def _warn(found: Shown, say) -> None:
+def _warn(shown: Shown, say) -> None:
     """Says what a picture that is drawn over the sequencer's cannot show."""
-    if found.strips_above:
+    if shown.strips_above:
         say(rpt_("The strips above are hidden in this view"))
-    if found.edit.view_settings.view_transform != "Standard":
+    if shown.edit.view_settings.view_transform != "Standard":
         say(rpt_("This view has the view transform Standard"))
 
 
-def _tell_detail(source, size: tuple[int, int], is_draft: bool, is_still: bool, say) -> None:
+def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say) -> None:
     """Says in what the picture is less than a render's; size: of that. And gives the way to see that one, and back."""
+    source = wanted.renderer.source
     if previews.looking.whole is not None:
         say(rpt_("Full quality, as it will be rendered"), Button("shutter.full_quality", iface_("Back")))
         return
@@ -272,17 +219,17 @@ def _tell_detail(source, size: tuple[int, int], is_draft: bool, is_still: bool, 
         less.append(rpt_("{scale} of the size").format(scale=f"1/{round(size[0] / source.width)}"))
     if source.from_proxy:
         less.append(rpt_("from a proxy"))
-    if is_draft:
+    if wanted.is_draft:
         less.append(rpt_("a draft of the edges"))
     if less:
         button = Button("shutter.full_quality", iface_("Full Quality")) if is_still else None
         say(rpt_("Preview: {what}").format(what=", ".join(less)), button)
 
 
-def _tell_strobing(found: Shown, snapshot, renderer, request, say) -> None:
+def _tell_strobing(shown: Shown, wanted: Drawing, say) -> None:
     """Says that the exposure has too few frames, and gives the way to more."""
-    told = strobing.last(found.effect)
-    known = strobing.look(found.effect, found.strip, snapshot, renderer, request)
+    told = strobing.last(shown.effect)
+    known = strobing.look(shown.effect, shown.strip, wanted.decision.snapshot, wanted.renderer, wanted.decision.request)
     if known is not None and inbetween_build.running() is None:
         say(inbetween_operators.strobing_in_words(known), _smoothing(known))
     if known != told and not bpy.app.timers.is_registered(_redraw_panels):
@@ -297,9 +244,9 @@ def _redraw_panels() -> None:
     inbetween_operators.redraw_panels(bpy.context)
 
 
-def _smoothing(found: strobing.Strobing) -> Button | None:
-    label = inbetween_operators.smoothing_in_words(found)
-    return label and Button("shutter.smooth_streaks", label, {"factor": str(found.factor)})
+def _smoothing(known: strobing.Strobing) -> Button | None:
+    label = inbetween_operators.smoothing_in_words(known)
+    return label and Button("shutter.smooth_streaks", label, {"factor": str(known.factor)})
 
 
 def _measure() -> float | None:
@@ -347,7 +294,7 @@ def _show_strokes(context, quad, effect, request) -> None:
             drawing.lines(quad.on_region(points), color, closed=shape.kind == "lasso", width=2)
 
 
-def _show_source(quad, found: Shown, renderer, request, right: float) -> None:
+def _show_source(quad, shown: Shown, renderer, request, right: float) -> None:
     """The source's own frame, from the left edge on: that of a shutter that is open for it alone."""
     options = replace(request.state.options, step=1)  # no in-between frames come first in reverse
     still = np.zeros((1, options.window))
@@ -357,7 +304,7 @@ def _show_source(quad, found: Shown, renderer, request, right: float) -> None:
     moving = following and following.of([following.moving()[0]])
     plain = replace(request, state=FrameState(options, still, following=moving), levels=True)
     texture = renderer.draw(plain)
-    quad.draw("show_picture", {"picture": texture}, 0.0, right, opacity=found.strip.blend_alpha)
+    quad.draw("show_picture", {"picture": texture}, 0.0, right, opacity=shown.strip.blend_alpha)
 
 
 def _show_scribbles(quad, effect, renderer, request) -> None:

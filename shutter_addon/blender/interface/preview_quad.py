@@ -4,6 +4,7 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
+from ...core.model.scribbles import mapped
 from ...devices.passes import body
 from ..data import geometry
 from ..devices import blender_gpu
@@ -20,7 +21,7 @@ class Quad:
 
     def on_region(self, points) -> np.ndarray:
         """Points (n, 2) of the strip's picture, in fractions, in pixels of the region."""
-        return geometry.mapped(self._matrix, np.asarray(points, dtype=np.float64))
+        return mapped(self._matrix, np.asarray(points, dtype=np.float64))
 
     def draw(self, name: str, textures: dict, left: float = 0.0, right: float = 1.0, **constants) -> None:
         """Draws from `left` to `right`, in fractions of the picture's width, through a shader of shaders/."""

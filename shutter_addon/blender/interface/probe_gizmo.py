@@ -6,9 +6,10 @@ import bpy
 import numpy as np
 from bpy.types import Gizmo, GizmoGroup
 
-from ..data import annotations, geometry
+from ...core.model.scribbles import mapped
+from ..data import annotations, geometry, preview_areas
 from ..rendering import effect_source, previews, probe, render_context
-from . import drawing, preview
+from . import drawing
 
 _WIDTH, _HEIGHT, _LINE, _PAD, _APART = 180, 64, 17, 8, 14  # in units of the interface
 _BACK = (0.08, 0.08, 0.08, 0.85)
@@ -58,26 +59,26 @@ class SHUTTER_GT_probe(Gizmo):
     bl_idname = "SHUTTER_GT_probe"
 
     def draw(self, context):
-        found, at = previews.shown(context), tuple(context.window_manager.virtual_shutter.probe_at)
+        found, at = preview_areas.shown(context), tuple(context.window_manager.virtual_shutter.probe_at)
         if found is None or (matrix := _to_region(context, found)) is None:
             return
         if _is_cropped(found.strip, annotations.picture_size(found.effect), at):
             return
         try:
             render = render_context.of_drawing()
-            request = preview.request_of(context, render, found)
+            request = previews.request_of(context, found)
             probed = probe.at(render.renderer(request), request, at)
         except effect_source.FAULTS:  # which the live preview tells
             return
         if probed is not None:
-            _draw(context.region, geometry.mapped(matrix, np.array([at]))[0], found.effect.shutters, probed)
+            _draw(context.region, mapped(matrix, np.array([at]))[0], found.effect.shutters, probed)
 
     def test_select(self, context, location):
         """Blender asks whenever the pointer moves: nothing else tells of it without taking events from others."""
-        found = previews.shown(context)
+        found = preview_areas.shown(context)
         if found is not None and (matrix := _to_region(context, found)) is not None:
             centre = np.array([location], dtype=np.float64) + 0.5
-            context.window_manager.virtual_shutter.probe_at = geometry.mapped(np.linalg.inv(matrix), centre)[0]
+            context.window_manager.virtual_shutter.probe_at = mapped(np.linalg.inv(matrix), centre)[0]
         return -1
 
 
@@ -118,7 +119,7 @@ class SHUTTER_GGT_probe(GizmoGroup):
         settings = context.window_manager.virtual_shutter
         if not (settings.live and settings.probe) or bpy.app.is_job_running("RENDER"):
             return False
-        return previews.shown(context) is not None
+        return preview_areas.shown(context) is not None
 
     def setup(self, _context):
         self.gizmos.new(SHUTTER_GT_probe.bl_idname)

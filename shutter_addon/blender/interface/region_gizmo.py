@@ -8,8 +8,10 @@ from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Gizmo, GizmoGroup
 
+from ...core import revision
 from ...core.model import scribbles
-from ..data import annotations, geometry, revision, selection, snapshot, validation
+from ...core.model.scribbles import mapped
+from ..data import annotations, geometry, selection, snapshot, validation
 from ..editing import bar_edits, region_edits, track_region
 from ..editing.motion_keys import MotionKeys
 from . import drawing, gizmo_keymaps
@@ -34,7 +36,7 @@ class Place:
 
     def on_picture(self, point) -> np.ndarray:
         """A point of the region, in fractions of the picture."""
-        return geometry.mapped(np.linalg.inv(self.to_region), np.array([point], dtype=np.float64))[0]
+        return mapped(np.linalg.inv(self.to_region), np.array([point], dtype=np.float64))[0]
 
 
 _strokes = revision.UntilChange()
@@ -78,7 +80,7 @@ def place(context) -> Place | None:
         width / height,
     )
     to_region = geometry.picture_to_region(strip, (width, height), context.region)
-    ends = geometry.mapped(to_region, np.stack([middle + np.array(region.location), moved]))
+    ends = mapped(to_region, np.stack([middle + np.array(region.location), moved]))
     return Place(*ends, to_region, width / height)
 
 
@@ -89,7 +91,7 @@ def outline(context, where: Place) -> list[np.ndarray]:
     region = selection.active_region(effect)
     numbers = region.location, np.degrees(region.rotation), region.scale
     moved = scribbles.transform(_strokes_now(edit, effect, strip), *numbers, where.aspect)
-    return [geometry.mapped(where.to_region, points) for points in moved]
+    return [mapped(where.to_region, points) for points in moved]
 
 
 class SHUTTER_GT_region(Gizmo):

@@ -4,8 +4,8 @@ import bpy
 import numpy as np
 from bpy.types import Gizmo, GizmoGroup
 
-from ..data import annotations, geometry
-from ..rendering import previews
+from ...core.model.scribbles import mapped
+from ..data import annotations, geometry, preview_areas
 from . import drawing
 
 _REACH = 8  # of the pointer, in units of the interface
@@ -15,7 +15,7 @@ _COLOR = (1.0, 1.0, 1.0, 0.9)
 def _to_region(context) -> np.ndarray | None:
     """Matrix from fractions of the shown picture to the region's pixels; None where no split is shown, or seen."""
     settings = context.window_manager.virtual_shutter
-    if not settings.live or settings.view != "SPLIT" or (found := previews.shown(context)) is None:
+    if not settings.live or settings.view != "SPLIT" or (found := preview_areas.shown(context)) is None:
         return None
     matrix = geometry.picture_to_region(found.strip, annotations.picture_size(found.effect), context.region)
     return matrix if geometry.is_invertible(matrix) else None
@@ -23,7 +23,7 @@ def _to_region(context) -> np.ndarray | None:
 
 def _line(context, matrix) -> np.ndarray:
     at = context.window_manager.virtual_shutter.split
-    return geometry.mapped(matrix, np.array([(at, 0.0), (at, 1.0)]))
+    return mapped(matrix, np.array([(at, 0.0), (at, 1.0)]))
 
 
 class SHUTTER_GT_split(Gizmo):
@@ -58,7 +58,7 @@ class SHUTTER_GT_split(Gizmo):
     def modal(self, context, event, _tweak):
         if (matrix := _to_region(context)) is not None:
             point = np.array([(event.mouse_region_x, event.mouse_region_y)], dtype=np.float64)
-            context.window_manager.virtual_shutter.split = geometry.mapped(np.linalg.inv(matrix), point)[0, 0]
+            context.window_manager.virtual_shutter.split = mapped(np.linalg.inv(matrix), point)[0, 0]
         return {"RUNNING_MODAL"}
 
     def exit(self, context, cancel):
@@ -76,7 +76,7 @@ class SHUTTER_GGT_split(GizmoGroup):
     @classmethod
     def poll(cls, context):
         settings = context.window_manager.virtual_shutter
-        return settings.live and settings.view == "SPLIT" and previews.shown(context) is not None
+        return settings.live and settings.view == "SPLIT" and preview_areas.shown(context) is not None
 
     def setup(self, _context):
         self.gizmos.new(SHUTTER_GT_split.bl_idname)

@@ -11,6 +11,7 @@ from pathlib import Path
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core import atomic_write
+from ...core.messages import translated
 from ...core.model import mattes
 from ...core.recipes import recipe
 from ...media.image_writing import write_grey
@@ -110,7 +111,7 @@ def _write_frames(edit, effect, strip, region, folder: Path) -> list:
     content = snapshot.region_at(edit, effect, strip, list(effect.regions).index(region), frames).content
     with closing(effect_source.open_source(shown)) as source, closing(MatteValues.of(source)) as values:
         for number, frame in enumerate(frames, 1):
-            with snapshot.translated():
+            with translated(rpt_):
                 matte = mattes.Matte(0, content.at(frame))
             ((key, array),) = values.values((matte,), effect_source.source_index(shown, frame, source)[0], 1)
             keys.append(key)

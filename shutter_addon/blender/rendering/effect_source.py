@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from bpy.app.translations import pgettext_rpt as rpt_
+
 from ...core.frames import retiming
-from ...core.messages import EffectError
+from ...core.messages import EffectError, translated
 from ...devices.device import NoDeviceError
 from ...media import MediaError
 from ...media.cuts import ShotSource
@@ -13,7 +15,7 @@ from ...media.inbetween import InbetweenSource
 from ...media.prefetch import PrefetchSource
 from ...media.reduced import smaller
 from ..data import inbetween_settings
-from ..data.snapshot import Snapshot, translated
+from ..data.snapshot import Snapshot
 from ..data.source_media import SourceSpec
 from ..data.strip_proxies import Proxy
 
@@ -75,5 +77,5 @@ def source_index(snapshot: Snapshot, frame: float, source: ShotSource) -> tuple[
     if snapshot.effect.time is not None:
         time, backward = snapshot.effect.time.at(frame)
         return retiming.nearest(time - 1, source.step, source.count), backward
-    with translated():
+    with translated(rpt_):
         return retiming.source_frame(snapshot.timing, frame, source), snapshot.timing.use_reverse_frames

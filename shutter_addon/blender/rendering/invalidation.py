@@ -7,6 +7,7 @@ strokes and the source are compared with what they were, as no callback tells of
 import bpy
 import numpy as np
 
+from ...core import revision
 from ...media import MediaError
 from ..data import (
     fcurves,
@@ -14,7 +15,6 @@ from ..data import (
     mask_reading,
     matte_content,
     matte_strips,
-    revision,
     snapshot,
     source_media,
     strips,

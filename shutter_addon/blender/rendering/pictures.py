@@ -54,7 +54,7 @@ def _say_of_cuts(say) -> None:
 
 def shortages(renderer: Renderer, request: Request) -> list[str]:
     """Sentences about what is slow in pictures as requested, for the GPU has no room."""
-    if not (found := renderer.shortages()):
+    if not renderer.shortages:
         return []
     source = renderer.source
     words = {"width": source.width, "height": source.height, "frames": request.state.options.window}
@@ -69,7 +69,7 @@ def shortages(renderer: Renderer, request: Request) -> list[str]:
             " is slow"
         ),
     }
-    return [sentences[name].format(**words) for name in sorted(found)]
+    return [sentences[name].format(**words) for name in sorted(renderer.shortages)]
 
 
 def resized(picture: np.ndarray, width: int, height: int, divisor: int = 1) -> np.ndarray:

@@ -1,20 +1,26 @@
 """What previews show of an effect: in which detail, and whether our draw handler shows it or Blender.
 
+It is decided once for each time that a preview is drawn: for the engine, if Blender asks it for the picture, and then
+for the draw handler.
+
 Blender asks the engine for a Scene strip's full size whatever a preview's, takes its floats, converts, blends and sends
 them. Drawn by our handler, the picture stays on the GPU, and is as small as it is shown.
 """
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import numpy as np
-
+from ...compute.renderer import Renderer
 from ...compute.request import Request
+from ...core.frames.frame_source import FrameSource
+from ...core.stopping import never
 from ...media.reduced import DIVISORS
-from ..data import annotations, geometry, preview_areas, selection, strip_proxies, strips
+from ..data import annotations, preview_areas, selection, strips
+from ..data.preview_areas import Look, Shown
 from ..data.snapshot import Snapshot
-from . import effect_source, render_context, render_job
+from . import effect_source, invalidation, render_context, render_job
 from .render_context import RenderContext
 
 # Operators that read the sequencer's pictures, from the window.
@@ -25,24 +31,10 @@ _BUILDING = {"SHUTTER_OT_inbetween_build", "SHUTTER_OT_smooth_streaks"}
 _GOING = {"ANIM_OT_change_frame"} | _TRACKING | _BUILDING
 PEN = "GPENCIL_OT_annotate"
 _MOMENT = 0.3  # seconds
+_SLICE = 0.2  # seconds
 _READING_TOOL = "builtin.sample"  # reads once before it is one of those that run
-_PERCENT = {"PROXY_25": 25, "PROXY_50": 50, "PROXY_75": 75, "PROXY_100": 100}
-_STANDARD = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
-_STANDARD |= {"use_curve_mapping": False, "use_white_balance": False}
-_PLAIN_STRIP = {"blend_alpha": 1.0, "color_multiply": 1.0, "color_saturation": 1.0, "scene_input": "CAMERA"}
 DRAFT_ROWS = 270  # blocks along the shorter side of a draft in which shutters follow edges
 RESULTS = "RESULT", "SPLIT"  # views of the live preview that show the result
-_PLAIN_SPACE = {"display_mode": "IMAGE", "display_channel": 0, "show_overexposed": 0}
-
-
-@dataclass(frozen=True)
-class Shown:
-    """The effect strip that a preview shows."""
-
-    edit: object
-    effect: object
-    strip: object
-    strips_above: bool
 
 
 @dataclass
@@ -61,11 +53,33 @@ class Decision:
     """What a preview shows of an effect as it is drawn once.
 
     snapshot: of the effect; request: its picture in the previews' detail
-    is_drawn: whether our draw handler shows the result"""
+    is_drawn: whether our draw handler shows the result in place of Blender"""
 
     snapshot: Snapshot
     request: Request
     is_drawn: bool
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """What our draw handler draws of a decision.
+
+    request: the picture, as a draft where a still result is not exact anyway; renderer: of it
+    left: where the source ends and the result begins, as a fraction of the picture's width; 0: there is no source
+    has_result: whether the result is shown at all; draws_result: by our handler
+    stopped: says that it takes too long, and Blender has to look at its keys"""
+
+    decision: Decision
+    request: Request
+    renderer: Renderer
+    left: float
+    has_result: bool
+    draws_result: bool
+    stopped: Callable[[], bool]
+
+    @property
+    def is_draft(self) -> bool:
+        return self.request is not self.decision.request
 
 
 @dataclass
@@ -74,20 +88,93 @@ class _Looking:
 
     whole: the picture that is looked at as it will be rendered; late_until: the time until which pictures may be late
     decision: the engine's, for the draw handler, which Blender calls after it
+    slice_of: what was composed in slices of time last, by its effect's scene and frame; slice: how long that may take
     """
 
     whole: Whole | None = None
     late_until: float = 0.0
     decision: Decision | None = None
+    slice_of: tuple[int, int] | None = None
+    slice: float = _SLICE
 
 
 looking = _Looking()
 
 
-def requested(context, render: RenderContext, found: Shown, snapshot: Snapshot) -> Request:
-    """What an effect strip shows at the current frame, in the previews' detail: in full, while it is looked at so. That
-    ends here with the frame and with a change of the effect. One of effect_source.FAULTS: it cannot be shown."""
-    frame = found.edit.frame_current
+def for_engine(context, snapshot: Snapshot, frame: float) -> tuple[effect_source.Detail, bool]:
+    """What the engine is asked for while Blender draws a preview: the detail, and whether our draw handler shows the
+    picture of it in place of Blender. One of effect_source.FAULTS: there is none."""
+    region, looking.decision = context.region, None
+    if region is None or region.type != "PREVIEW" or is_read(context):
+        return effect_source.FULL, False
+    edit, seen = selection.edit_of(context), preview_areas.shown(context)
+    if seen is not None and seen.effect.scene.session_uid == snapshot.scene and edit.frame_current == frame:
+        look = preview_areas.look(context, edit, seen.effect, seen.strip)
+        looking.decision = _decide(context, seen, look, snapshot)
+        return looking.decision.request.source.detail, looking.decision.is_drawn
+    strip = next((s for s in strips.effect_strips(edit) if s.scene.session_uid == snapshot.scene), None)
+    effect = strip and strips.effect_of(edit, strip.scene)
+    if effect is None or looking.whole is not None:
+        return effect_source.FULL, False
+    return _detail(preview_areas.look(context, edit, effect, strip)), False
+
+
+def take_decision() -> Decision | None:
+    """What the engine was asked for while Blender draws this preview; None: Blender had the picture already."""
+    decision, looking.decision = looking.decision, None
+    return decision
+
+
+def for_drawing(context, shown: Shown, decision: Decision | None) -> Drawing:
+    """What our draw handler draws. decision: the engine's; it holds unless something has changed since. One of
+    effect_source.FAULTS: the effect cannot be shown."""
+    settings, snapshot = context.window_manager.virtual_shutter, _snapshot(shown)
+    if decision is None or decision.snapshot is not snapshot:
+        decision = _decide(context, shown, _look(context, shown), snapshot)
+    stopped = _time_up(shown) if may_be_late() else never
+    request = _drafted(context, shown, decision.request)
+    has_result = settings.view in RESULTS
+    left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
+    if is_tracking():  # a stroke is seen to stay on its subject where that is sharp
+        left = 1.0
+    # Else the engine has composed it, and it lies there in its place among the other strips.
+    draws_result = has_result and left < 1 and (decision.is_drawn or not _is_rendered(shown))
+    renderer = render_context.of_drawing().renderer(request)
+    return Drawing(
+        decision=decision,
+        request=request,
+        renderer=renderer,
+        left=left,
+        has_result=has_result,
+        draws_result=draws_result,
+        stopped=stopped,
+    )
+
+
+def request_of(context, shown: Shown) -> Request:
+    """What our draw handler draws of the effect strip at the current frame. One of effect_source.FAULTS: it cannot be
+    shown."""
+    return _drafted(context, shown, _decide(context, shown, _look(context, shown), _snapshot(shown)).request)
+
+
+def _look(context, shown: Shown) -> Look:
+    return preview_areas.look(context, shown.edit, shown.effect, shown.strip)
+
+
+def _decide(context, shown: Shown, look: Look, snapshot: Snapshot) -> Decision:
+    render = render_context.of_drawing()
+    request = _requested(context, render, shown, snapshot, look)
+    return Decision(snapshot, request, _is_drawn(context, shown, look, render.renderer(request).source))
+
+
+def _snapshot(shown: Shown) -> Snapshot:
+    return invalidation.current(shown.edit, shown.effect, shown.strip, shown.edit.frame_current)
+
+
+def _requested(context, render: RenderContext, shown: Shown, snapshot: Snapshot, look: Look) -> Request:
+    """The picture in the previews' detail: in full, while it is looked at so. That ends here with the frame and with a
+    change of the effect."""
+    frame = shown.edit.frame_current
     if (
         (whole := looking.whole) is not None
         and (whole.scene, whole.frame) == (snapshot.scene, frame)
@@ -98,10 +185,42 @@ def requested(context, render: RenderContext, found: Shown, snapshot: Snapshot) 
             whole.key = request.key[1:]
             return request
     looking.whole = None
-    return render.request(snapshot, frame, detail(context, found.edit, found.effect, found.strip))
+    return render.request(snapshot, frame, _detail(look))
 
 
-def draft(request: Request, source) -> Request:
+def _detail(look: Look) -> effect_source.Detail:
+    """What a picture is composed in for the previews of its edit: smaller by the power of two, of reduced.DIVISORS,
+    that is nearest to the largest of them, and from the proxy that Blender reads for that one."""
+    if look.scale is None:
+        return effect_source.FULL
+    divisor = min(DIVISORS, key=lambda number: abs(math.log2(max(look.scale, 1e-3) * number)))
+    return effect_source.Detail(divisor, look.proxy)
+
+
+def _is_drawn(context, shown: Shown, look: Look, source: FrameSource) -> bool:
+    """Whether our draw handler shows the result, or in another view what covers it, in place of what Blender makes of
+    the engine's picture: wherever both are the same, in all previews of the edit. Not a still picture of full size:
+    what is drawn passes through 8 bits on its way to the screen, and lacks shades next to black."""
+    settings = context.window_manager.virtual_shutter
+    is_less = source.from_proxy or source.width < annotations.picture_size(shown.effect)[0]
+    return (
+        settings.live
+        and (is_less or is_going(context) or settings.view not in RESULTS)
+        and not shown.strips_above
+        and source.alpha == "opaque"
+        and look.is_plain
+        and PEN not in render_job.operators_running()
+    )
+
+
+def _drafted(context, shown: Shown, request: Request) -> Request:
+    is_result = context.window_manager.virtual_shutter.view in RESULTS and _is_rendered(shown)
+    if looking.whole is not None or (is_result and not is_going(context)):
+        return request
+    return draft(request, render_context.of_drawing().renderer(request).source)
+
+
+def draft(request: Request, source: FrameSource) -> Request:
     """The request as it is drawn while an editor waits: where shutters follow edges, of blocks so large that the
     picture has no more than DRAFT_ROWS of them along its shorter side."""
     options = request.state.options
@@ -113,84 +232,23 @@ def draft(request: Request, source) -> Request:
     return replace(request, state=replace(request.state, options=replace(options, aggregate=block)))
 
 
-def shown(context) -> Shown | None:
-    """The effect strip under the playhead that the preview shows, as selection.seen has it."""
-    edit, space = selection.edit_of(context), context.space_data
-    if space.display_mode != "IMAGE" or space.display_channel or (found := selection.seen(edit)) is None:
-        return None
-    above = any(other.channel > found[2].channel for other in selection.visible(edit))
-    return Shown(*found, above)
+def _is_rendered(shown: Shown) -> bool:
+    """Whether the sequencer renders its previews."""
+    return shown.edit.render.sequencer_gl_preview == "RENDERED"
 
 
-def detail(context, edit, effect, strip) -> effect_source.Detail:
-    """What an effect's picture is composed in for the previews of its edit: smaller by the power of two, of
-    reduced.DIVISORS, that is nearest to the largest of them, and from the proxy that Blender reads for that one."""
-    spaces = {area.spaces.active: _scale(context, edit, strip, area) for area in _areas_of(context, edit)}
-    spaces = {space: scale for space, scale in spaces.items() if math.isfinite(scale)}
-    if not spaces:
-        return effect_source.FULL
-    space = max(spaces, key=spaces.get)
-    divisor = min(DIVISORS, key=lambda number: abs(math.log2(max(spaces[space], 1e-3) * number)))
-    return effect_source.Detail(divisor, _proxy(edit, effect, strip, space))
+def _time_up(shown: Shown) -> Callable[[], bool]:
+    """What says whether a picture has been composed for so long that Blender has to look at its keys: it goes on when
+    it is drawn again. Each time, it has half as long again, so that it comes to an end."""
+    frame = shown.effect.scene.session_uid, shown.edit.frame_current
+    looking.slice = 1.5 * looking.slice if looking.slice_of == frame else _SLICE
+    looking.slice_of, end = frame, time.monotonic() + looking.slice
+    return lambda: time.monotonic() > end
 
 
-def _proxy(edit, effect, strip, space) -> strip_proxies.Proxy | None:
-    """What Blender reads of an effect's source in a preview; None: the footage itself."""
-    source, percent = strips.nearest_source(edit, effect, strip), _PERCENT.get(space.proxy_render_size)
-    if source is None or percent is None or not space.use_proxies:
-        return None
-    return strip_proxies.proxy_of(edit, source, percent)
-
-
-def _scale(context, edit, strip, area) -> float:
-    """How wide or high a pixel of the source is in a preview: in its picture, which is as small as Blender's menu has
-    it; and on the screen, where our handler draws."""
-    space = area.spaces.active
-    percent = _PERCENT.get(space.proxy_render_size, edit.render.resolution_percentage)
-    size = strip.scene.render.resolution_x, strip.scene.render.resolution_y
-    scale = percent / 100 * _pixel(geometry.picture_to_image(strip, size), size)
-    if not context.window_manager.virtual_shutter.live:
-        return percent / 100
-    region = preview_areas.preview_region(area)
-    if space.display_mode != "IMAGE" or min(region.width, region.height) < 2:
-        return scale
-    return min(scale, _pixel(geometry.picture_to_region(strip, size, region), size))
-
-
-def _pixel(matrix, size) -> float:
-    """The larger side of a picture's pixel after a matrix (3, 3) from fractions of the picture."""
-    return float(np.max(np.hypot(*matrix[:2, :2]) / size))
-
-
-def _areas_of(context, edit):
-    """The areas in which an edit's preview is drawn."""
-    for window, area in preview_areas.previews(context):
-        shows = getattr(window.workspace, "sequencer_scene", None) or window.scene
-        if shows == edit and area.spaces.active.proxy_render_size != "NONE":
-            yield area
-
-
-def is_drawn(context, found: Shown, source) -> bool:
-    """Whether our draw handler shows the result, or in another view what covers it, in place of what Blender makes of
-    the engine's picture: wherever both are the same, in all previews of the edit. Not a still picture of full size:
-    what is drawn passes through 8 bits on its way to the screen, and lacks shades next to black."""
-    edit, strip = found.edit, found.strip
-    is_less = source.from_proxy or source.width < annotations.picture_size(found.effect)[0]
-    return (
-        context.window_manager.virtual_shutter.live
-        and (is_less or is_going(context) or context.window_manager.virtual_shutter.view not in RESULTS)
-        and not found.strips_above
-        and source.alpha == "opaque"
-        and strip.blend_type in ("REPLACE", "ALPHA_OVER")
-        and _has(strip, _PLAIN_STRIP)
-        and all(modifier.mute for modifier in strip.modifiers)
-        and edit.display_settings.display_device == "sRGB"
-        and _has(edit.view_settings, _STANDARD)
-        and not edit.render.use_multiview
-        and not edit.sequence_editor.show_overlay_frame
-        and all(_has(area.spaces.active, _PLAIN_SPACE) for area in _areas_of(context, edit))
-        and PEN not in render_job.operators_running()
-    )
+def was_drawn() -> None:
+    """A picture is there, however many times it took."""
+    looking.slice_of, looking.slice = None, _SLICE
 
 
 def is_going(context) -> bool:
@@ -212,41 +270,7 @@ def may_be_late() -> bool:
     return time.monotonic() < looking.late_until
 
 
-def _has(item, values: dict) -> bool:
-    return all(getattr(item, name) == value for name, value in values.items())
-
-
 def is_read(context) -> bool:
     """Whether somebody reads the sequencer's picture from the window, for whom it has to be whole."""
     tool = context.workspace and context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     return bool(_READERS & render_job.operators_running()) or (tool is not None and tool.idname == _READING_TOOL)
-
-
-def decide(context, shown: Shown, snapshot: Snapshot) -> Decision:
-    """What this preview shows of the effect under the playhead. One of effect_source.FAULTS: it cannot be shown."""
-    render = render_context.of_drawing()
-    request = requested(context, render, shown, snapshot)
-    return Decision(snapshot, request, is_drawn(context, shown, render.renderer(request).source))
-
-
-def for_engine(context, snapshot: Snapshot, frame: float) -> tuple[effect_source.Detail, bool]:
-    """What the engine is asked for while Blender draws a preview: the detail, and whether our draw handler shows the
-    picture of it in place of Blender. One of effect_source.FAULTS: there is none."""
-    region, looking.decision = context.region, None
-    if region is None or region.type != "PREVIEW" or is_read(context):
-        return effect_source.FULL, False
-    edit, seen = selection.edit_of(context), shown(context)
-    if seen is not None and seen.effect.scene.session_uid == snapshot.scene and edit.frame_current == frame:
-        decision = looking.decision = decide(context, seen, snapshot)
-        return decision.request.source.detail, decision.is_drawn
-    strip = next((s for s in strips.effect_strips(edit) if s.scene.session_uid == snapshot.scene), None)
-    effect = strip and strips.effect_of(edit, strip.scene)
-    if effect is None or looking.whole is not None:
-        return effect_source.FULL, False
-    return detail(context, edit, effect, strip), False
-
-
-def take_decision() -> Decision | None:
-    """What the engine was asked for while Blender draws this preview; None: Blender had the picture already."""
-    decision, looking.decision = looking.decision, None
-    return decision

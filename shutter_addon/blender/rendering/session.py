@@ -10,15 +10,17 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
+from ...core.messages import translated
 from ...core.model.frame_state import FrameState
 from ...core.pixels import following
 from ...core.stopping import never
 from ...devices.device import NoDeviceError
 from ...media.matte_values import MatteValues
-from ..data.snapshot import Snapshot, translated
+from ..data.snapshot import Snapshot
 from ..devices import available
 from . import render_settings
 from .device_work import Work, broken_off, result_of
@@ -89,10 +91,10 @@ class RenderSession:
         known, at, last = self._requests.get(snapshot.scene, (None, None, None))
         if known is snapshot and at == frame and (last.source, last.levels) == (key, context.levels):
             return last
-        state = _in_blocks(snapshot.state(frame), key.detail.divisor)
-        index, backward = source_index(snapshot, frame, source)
-        direction = -1 if backward else 1
-        with translated():
+        with translated(rpt_):
+            state = _in_blocks(snapshot.effect.at(frame), key.detail.divisor)
+            index, backward = source_index(snapshot, frame, source)
+            direction = -1 if backward else 1
             shown = following.Shown(frame, index, direction)
             state = following.followed(
                 snapshot.effect, state, shown, source, lambda other: source_index(snapshot, other, source)[0]

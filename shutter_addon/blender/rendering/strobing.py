@@ -13,9 +13,11 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
+from ...core.messages import translated
 from ...core.model import shutters
 from ...core.model.frame_state import FrameState
 from ...core.model.motions import Similarity
@@ -165,7 +167,8 @@ def pairs(snapshot: Snapshot, medium, settings: inbetween_settings.Settings) -> 
     source = ShotSource(inbetween.InbetweenSource(medium, *settings), factor)
     has_trails = any(shutter.trail for shutter in snapshot.effect.shutters)
     for frame in snapshot.frames:
-        state = snapshot.state(frame)
+        with translated(rpt_):
+            state = snapshot.effect.at(frame)
         options, position = state.options, state.options.position
         bars = np.stack([shutters.multiplied(row, options.step, factor, position) for row in state.bars])
         options = replace(options, step=factor, window=bars.shape[1])

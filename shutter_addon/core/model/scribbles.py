@@ -73,6 +73,11 @@ def between_strokes(first, second, u: float, aspect: float = 1.0) -> list[np.nda
     return result
 
 
+def mapped(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Points (n, 2) through a matrix (3, 3)."""
+    return points @ matrix[:2, :2].T + matrix[:2, 2]
+
+
 def transform(strokes, location, rotation: float, scale: float, aspect: float) -> tuple[np.ndarray, ...]:
     """Strokes scaled, turned by `rotation` degrees counter-clockwise about the centre of their common bounding
     box, and moved by `location` (fractions). `aspect` is the picture's width over its height: circles stay round.

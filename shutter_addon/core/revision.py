@@ -1,4 +1,4 @@
-"""A number that grows with every change that Blender tells of, and values that are kept until it does.
+"""A number that grows with every change of the edit that Blender tells of, and values that are kept until it does.
 
 Blender tells of properties (their update callbacks), of what its depsgraph sees (keys, strips), of undo and of files.
 It tells nobody of strokes and of files on disk: previews look for them when they are drawn (rendering/invalidation.py).
