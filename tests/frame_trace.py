@@ -2,7 +2,7 @@
 are first called; and how often it comes back to a room that it had left.
 
 A room is a folder of the extension, as docs/developers.md lists them. `core` and both `devices` are libraries, which
-call nobody back: what they do belongs to whoever calls, and is no stop."""
+call nobody back: what they do belongs to whoever calls, and no frame comes back to them."""
 
 import sys
 import threading
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 _TOOL = 4  # of sys.monitoring's, one for nobody in particular
-_LIBRARIES = "core/", "devices/", "blender/devices/"
+_LIBRARIES = "core", "devices", "blender/devices"
 _AHEAD = "Virtual Shutter"  # the thread that decodes frames ahead, whenever it comes to them
 
 
@@ -59,7 +59,7 @@ def traced(package: Path, first: str, last: str):
     def started(code, _offset):
         path, name = below(code), code.co_qualname
         is_named = not name.endswith((">", "__"))  # unlike lambdas, and what reads an attribute
-        if path is None or not is_named or path.startswith(_LIBRARIES):
+        if path is None or not is_named:
             return sys.monitoring.DISABLE
         if has_ended.is_set() or threading.current_thread().name == _AHEAD or not (stops or name == first):
             return None
@@ -85,6 +85,7 @@ def returns(stops: list[Stop]) -> list[Stop]:
     """The stops at which a frame comes back to a room that it had left: it was there before, and nothing there waits
     for it."""
     seen, back = set(), []
+    stops = [stop for stop in stops if stop.room not in _LIBRARIES]
     for before, stop in pairwise([stops[0], *stops]):
         if stop.room != before.room and stop.room in seen and stop.room not in stop.within:
             back.append(stop)

@@ -12,9 +12,6 @@ from ..core.model.motions import Similarity
 from . import flow
 
 ROWS = 270  # of the pictures that are compared
-# Copies that lie so far apart, in heights of the picture, look like a streak: 3 pixels of 1080; at 4, lines show in
-# sharp lettering. Edges of footage are some 2 pixels wide, however small it is.
-SMOOTH, SMOOTH_PIXELS = 3 / 1080, 2.0
 # The share of the picture that moves at least so far, of all whose motion is known: what is smaller is not looked at.
 SHARE = 0.01
 _THERE_AND_BACK = 0.2, 0.5  # of a vector, and pixels beside that, by which the way back may miss where it started
@@ -31,11 +28,6 @@ class Moved(NamedTuple):
 def is_possible() -> bool:
     """Whether OpenCV is there."""
     return getattr(flow, "cv2", None) is not None
-
-
-def smooth(height: int) -> float:
-    """Up to how many pixels from frame to frame a streak looks smooth, in a picture of that height."""
-    return max(SMOOTH * height, SMOOTH_PIXELS)
 
 
 def moved(source: FrameSource, index: int) -> Moved | None:

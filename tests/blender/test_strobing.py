@@ -64,7 +64,7 @@ def looked(edit, effect, strip):
     for _ in range(4):
         frame = edit.frame_current
         taken = snapshot.take(edit, effect, strip, (frame,))
-        found = strobing.look(effect, strip, taken, *asked(edit, effect, strip, frame))
+        found = strobing.look(effect, strip, taken, *asked(edit, effect, strip, frame)).known
         if not strobing.is_busy():
             return found
         strobing.advance()
@@ -152,7 +152,7 @@ def test_drawing_never_waits_and_measures_once(add, monkeypatch):
     from shutter_addon.blender.data import snapshot
 
     taken = snapshot.take(edit, effect, strip, (4,))
-    assert strobing.look(effect, strip, taken, *asked(edit, effect, strip, 4)) is None
+    assert strobing.look(effect, strip, taken, *asked(edit, effect, strip, 4)).known is None
     assert not measured
     for frame in (4, 5, 6, 4):
         edit.frame_set(frame)

@@ -32,6 +32,7 @@ def frames():
     yield from story.opened()
     yield from story.movie_added()
     yield from sizes.effect_added()
+    sizes.space().show_overlays = True
     with driver.override("PREVIEW"):
         bpy.ops.screen.animation_play()
     yield 1.0

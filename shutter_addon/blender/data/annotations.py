@@ -46,6 +46,12 @@ def layer_of(effect, region):
     return annotation.layers.get(region.layer) if annotation else None
 
 
+def is_hidden(effect, region) -> bool:
+    """Whether the user has hidden a region's lines."""
+    layer = layer_of(effect, region)
+    return layer is not None and layer.annotation_hide
+
+
 def annotation(effect):
     """What the effect's scribbles are drawn on; made where somebody has removed it."""
     if effect.scene.annotation is None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import geometry, selection, strip_proxies, strips
+from . import annotations, geometry, selection, strip_proxies, strips
 
 _PERCENT = {"PROXY_25": 25, "PROXY_50": 50, "PROXY_75": 75, "PROXY_100": 100}
 _STANDARD = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
@@ -16,12 +16,15 @@ _PLAIN_SPACE = {"display_mode": "IMAGE", "display_channel": 0, "show_overexposed
 
 @dataclass(frozen=True)
 class Shown:
-    """The effect strip that a preview shows."""
+    """The effect strip that a preview shows.
+
+    strips_above: whether others hide it; hides_strokes: by region that is drawn, whether its lines are hidden"""
 
     edit: object
     effect: object
     strip: object
     strips_above: bool
+    hides_strokes: tuple[bool, ...]
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,9 @@ def shown(context) -> Shown | None:
     if space.display_mode != "IMAGE" or space.display_channel or (seen := selection.seen(edit)) is None:
         return None
     above = any(other.channel > seen[2].channel for other in selection.visible(edit))
-    return Shown(*seen, above)
+    return Shown(
+        *seen, above, tuple(annotations.is_hidden(seen[1], region) for region in strips.drawn_regions(seen[1]))
+    )
 
 
 def look(context, edit, effect, strip) -> Look:

@@ -14,7 +14,7 @@ from ...core import stopping
 from ...core.model.frame_state import FrameState
 from ...media import MediaError
 from ...media.errors import NotBuiltError
-from ..data import annotations, preview_areas, selection, strips
+from ..data import annotations, preview_areas, selection
 from ..data.choices import CONTEXT
 from ..data.preview_areas import Shown
 from ..devices import blender_gpu
@@ -158,7 +158,7 @@ def _show(context, shown: Shown, decision: Decision | None, say) -> None:
             previews.was_drawn()
         except stopping.StoppedError:
             say(rpt_("Composing…"))
-            _show_strokes(context, quad, shown.effect, wanted.request)
+            _show_strokes(context, quad, shown, wanted.request)
             bpy.app.timers.register(_redraw_once)
     except effect_source.FAULTS as error:
         _tell_fault(error, say)
@@ -176,11 +176,10 @@ def _tell_unseen(context, say) -> None:
 
 def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> None:
     settings, renderer, request = context.window_manager.virtual_shutter, wanted.renderer, wanted.request
+    is_still = not context.screen.is_animation_playing
     if context.space_data.show_overlays:
-        is_still = not context.screen.is_animation_playing
         _tell_detail(wanted, annotations.picture_size(shown.effect), is_still, say)
-        if is_still and not previews.may_be_late():  # what it measures would take from what runs
-            _tell_strobing(shown, wanted, say)
+    after_detail = say.count
     if wanted.left > 0 or wanted.draws_result:
         _warn(shown, say)
     if wanted.left > 0:
@@ -195,9 +194,14 @@ def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> No
     elif settings.view == "COEFFICIENTS":
         _show_coefficients(quad, shown.effect, renderer, request)
     else:
-        _show_strokes(context, quad, shown.effect, request)
+        _show_strokes(context, quad, shown, request)
     for sentence in pictures.shortages(renderer, request):
         say(sentence)
+    # What it measures would take from what runs.
+    if context.space_data.show_overlays and is_still and not previews.may_be_late():
+        decision = wanted.decision
+        looked = strobing.look(shown.effect, shown.strip, decision.snapshot, renderer, decision.request)
+        _tell_strobing(looked, after_detail, say)
 
 
 def _warn(shown: Shown, say) -> None:
@@ -219,22 +223,20 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say) ->
         less.append(rpt_("{scale} of the size").format(scale=f"1/{round(size[0] / source.width)}"))
     if source.from_proxy:
         less.append(rpt_("from a proxy"))
-    if wanted.is_draft:
+    if wanted.request is not wanted.decision.request:
         less.append(rpt_("a draft of the edges"))
     if less:
         button = Button("shutter.full_quality", iface_("Full Quality")) if is_still else None
         say(rpt_("Preview: {what}").format(what=", ".join(less)), button)
 
 
-def _tell_strobing(shown: Shown, wanted: Drawing, say) -> None:
-    """Says that the exposure has too few frames, and gives the way to more."""
-    told = strobing.last(shown.effect)
-    known = strobing.look(shown.effect, shown.strip, wanted.decision.snapshot, wanted.renderer, wanted.decision.request)
-    if known is not None and inbetween_build.running() is None:
-        say(inbetween_operators.strobing_in_words(known), _smoothing(known))
-    if known != told and not bpy.app.timers.is_registered(_redraw_panels):
+def _tell_strobing(looked: strobing.Looked, place: int, say) -> None:
+    """Says, in that place among what is said, that the exposure has too few frames, and gives the way to more."""
+    if looked.known is not None and inbetween_build.running() is None:
+        say(inbetween_operators.strobing_in_words(looked.known), _smoothing(looked.known), place)
+    if looked.is_new and not bpy.app.timers.is_registered(_redraw_panels):
         bpy.app.timers.register(_redraw_panels)  # which may have been drawn before
-    if strobing.is_busy():
+    if looked.is_busy:
         if bpy.app.timers.is_registered(_measure):
             bpy.app.timers.unregister(_measure)
         bpy.app.timers.register(_measure, first_interval=_STILL)  # once a frame stays
@@ -280,16 +282,15 @@ def _tell_fault(error: Exception, say) -> None:
         say(rpt_("Shutter: {fault}").format(fault=error))
 
 
-def _show_strokes(context, quad, effect, request) -> None:
+def _show_strokes(context, quad, shown: Shown, request) -> None:
     """The scribbles where they are by now; Blender's own annotations show where they were drawn."""
     space = context.space_data
     if not (space.show_overlays and space.preview_overlay.show_annotation):
         return
-    for region, shape in zip(strips.drawn_regions(effect), request.state.shapes, strict=True):
-        layer = annotations.layer_of(effect, region)
-        if layer is not None and layer.annotation_hide:
+    for is_hidden, shape in zip(shown.hides_strokes, request.state.shapes, strict=True):
+        if is_hidden:
             continue
-        color = (*effect.shutters[shape.shutter].color, shape.opacity)
+        color = (*shown.effect.shutters[shape.shutter].color, shape.opacity)
         for points in shape.strokes:
             drawing.lines(quad.on_region(points), color, closed=shape.kind == "lasso", width=2)
 
@@ -344,8 +345,13 @@ class _Notes:
     def __init__(self, region):
         self._region, self._lines = region, []
 
-    def __call__(self, sentence: str, button: Button | None = None):
-        self._lines.append((sentence, button))
+    @property
+    def count(self) -> int:
+        return len(self._lines)
+
+    def __call__(self, sentence: str, button: Button | None = None, place: int | None = None):
+        """Says a sentence after all others, or in a place among them."""
+        self._lines.insert(self.count if place is None else place, (sentence, button))
 
     def draw(self):
         unit = drawing.ui_scale()

@@ -33,10 +33,14 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
 
     def _render(self, depsgraph, called_by_script: bool):
         scene, width, height = depsgraph.scene, self.resolution_x, self.resolution_y
-        shown, frame = job_snapshots.of(scene, scene.frame_current, self._stopped)
-        detail, is_drawn = effect_source.FULL, False
+        asked = None
         if device_work.in_window() and not (called_by_script or render_job.runs()):
-            detail, is_drawn = previews.for_engine(bpy.context, shown, frame)
+            asked = previews.for_engine(bpy.context, scene)
+        if asked is None:
+            shown, frame = job_snapshots.of(scene, scene.frame_current, self._stopped)
+            detail, is_drawn = effect_source.FULL, False
+        else:
+            shown, frame, detail, is_drawn = asked
         if detail != effect_source.FULL or is_drawn:
             invalidation.keep_until_drawn(scene.session_uid)
         if is_drawn:

@@ -11,6 +11,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
@@ -60,6 +61,17 @@ class Decision:
     is_drawn: bool
 
 
+class Asked(NamedTuple):
+    """What the engine is asked for: the picture of an effect at a timeline frame, in a detail.
+
+    is_drawn: our draw handler shows it, and the engine need not"""
+
+    snapshot: Snapshot
+    frame: float
+    detail: effect_source.Detail
+    is_drawn: bool
+
+
 @dataclass(frozen=True)
 class Drawing:
     """What our draw handler draws of a decision.
@@ -76,10 +88,6 @@ class Drawing:
     has_result: bool
     draws_result: bool
     stopped: Callable[[], bool]
-
-    @property
-    def is_draft(self) -> bool:
-        return self.request is not self.decision.request
 
 
 @dataclass
@@ -101,22 +109,23 @@ class _Looking:
 looking = _Looking()
 
 
-def for_engine(context, snapshot: Snapshot, frame: float) -> tuple[effect_source.Detail, bool]:
-    """What the engine is asked for while Blender draws a preview: the detail, and whether our draw handler shows the
-    picture of it in place of Blender. One of effect_source.FAULTS: there is none."""
+def for_engine(context, effect_scene) -> Asked | None:
+    """What the engine is asked for while Blender draws a preview; None: somebody else asks. One of
+    effect_source.FAULTS: the effect cannot be shown."""
     region, looking.decision = context.region, None
     if region is None or region.type != "PREVIEW" or is_read(context):
-        return effect_source.FULL, False
+        return None
     edit, seen = selection.edit_of(context), preview_areas.shown(context)
-    if seen is not None and seen.effect.scene.session_uid == snapshot.scene and edit.frame_current == frame:
-        look = preview_areas.look(context, edit, seen.effect, seen.strip)
+    owner, effect, strip = strips.find_edit(effect_scene)
+    frame = strips.timeline_frame(strip, effect_scene.frame_current)
+    is_seen = seen is not None and seen.effect == effect and edit.frame_current == frame
+    look = preview_areas.look(context, edit, effect, seen.strip if is_seen else strip) if owner == edit else None
+    snapshot = invalidation.current(owner, effect, strip, frame)
+    if is_seen:
         looking.decision = _decide(context, seen, look, snapshot)
-        return looking.decision.request.source.detail, looking.decision.is_drawn
-    strip = next((s for s in strips.effect_strips(edit) if s.scene.session_uid == snapshot.scene), None)
-    effect = strip and strips.effect_of(edit, strip.scene)
-    if effect is None or looking.whole is not None:
-        return effect_source.FULL, False
-    return _detail(preview_areas.look(context, edit, effect, strip)), False
+        return Asked(snapshot, frame, looking.decision.request.source.detail, looking.decision.is_drawn)
+    in_full = look is None or looking.whole is not None
+    return Asked(snapshot, frame, effect_source.FULL if in_full else _detail(look), False)
 
 
 def take_decision() -> Decision | None:

@@ -29,6 +29,9 @@ from ..data.snapshot import Snapshot
 from . import effect_source
 
 FACTORS = 2, 4, 8, 16
+# Copies that lie so far apart, in heights of the picture, look like a streak: 3 pixels of 1080; at 4, lines show in
+# sharp lettering. Edges of footage are some 2 pixels wide, however small it is.
+_SMOOTH, _SMOOTH_PIXELS = 3 / 1080, 2.0
 _PAIRS = 4  # of neighbouring frames that are measured for a picture, at most
 _KEPT = 64  # pairs whose motion is kept, of half a megabyte each
 
@@ -63,14 +66,21 @@ _measuring = _Measuring()
 _stopped = threading.Event()
 
 
-def look(effect, strip, snapshot: Snapshot, renderer: Renderer, request: Request) -> Strobing | None:
-    """What is known of a picture's exposure; None: nothing, or it is smooth. What is not known is asked for."""
-    _measuring.wanted = None
-    frame, found = effect.id_data.frame_current, None
-    if steps.is_possible():
-        found = _look(effect, strip, snapshot, renderer, request)
+class Looked(NamedTuple):
+    """known: of a picture's exposure, None: nothing, or it is smooth; is_new: whether the last look saw another;
+    is_busy: whether something is measured, or asked for"""
+
+    known: Strobing | None
+    is_new: bool
+    is_busy: bool
+
+
+def look(effect, strip, snapshot: Snapshot, renderer: Renderer, request: Request) -> Looked:
+    """Looks at a picture's exposure. What is not known is asked for."""
+    _measuring.wanted, before = None, last(effect)
+    frame, found = effect.id_data.frame_current, _look(effect, strip, snapshot, renderer, request)
     _found[snapshot.scene] = frame, found
-    return found
+    return Looked(known=found, is_new=found != before, is_busy=is_busy())
 
 
 def last(effect) -> Strobing | None:
@@ -88,9 +98,9 @@ def _look(effect, strip, snapshot, renderer, request):
     known = [(found, way) for pair in pairs for way in ways[pair] if (found := _moved[snapshot.source.key, pair])]
     height = effect.scene.render.resolution_y
     step = max((steps.step(found, *way) for found, way in known), default=0.0) * height / request.state.options.step
-    if step <= steps.smooth(height):
+    if step <= _smooth(height):
         return None
-    factor = _factor(request.state, step / steps.smooth(height))
+    factor = _factor(request.state, step / _smooth(height))
     if factor is None:
         return Strobing(step, None)
     key = snapshot.source.key, inbetween_settings.method(effect)
@@ -100,6 +110,11 @@ def _look(effect, strip, snapshot, renderer, request):
         return Strobing(step, factor)
     count = _count(strip, snapshot, renderer.source, request)
     return Strobing(step, factor, cost.seconds(count, factor), cost.bytes(count, factor))
+
+
+def _smooth(height: int) -> float:
+    """Up to how many pixels from frame to frame a streak looks smooth, in a picture of that height."""
+    return max(_SMOOTH * height, _SMOOTH_PIXELS)
 
 
 def _ways(renderer, request) -> dict[int, list[tuple[Similarity, Similarity]]]:
@@ -214,6 +229,8 @@ def forget() -> None:
 def _measure_motion(spec, lacking: list[int]) -> None:
     for pair in lacking:
         _moved[spec.key, pair] = None  # what cannot be read is not tried again
+    if not steps.is_possible():
+        return
     with suppress(MediaError, OSError), spec.open() as medium:
         for pair in lacking:
             if not _stopped.is_set():
