@@ -155,7 +155,6 @@ def _show(context, shown: Shown, decision: Decision | None, say) -> None:
         try:
             with stopping.once(wanted.stopped):
                 _show_picture(context, quad, shown, wanted, say)
-            previews.was_drawn()
         except stopping.StoppedError:
             say(rpt_("Composing…"))
             _show_strokes(context, quad, shown, wanted.request)
@@ -195,6 +194,7 @@ def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> No
         _show_coefficients(quad, shown.effect, renderer, request)
     else:
         _show_strokes(context, quad, shown, request)
+    previews.was_drawn()
     for sentence in pictures.shortages(renderer, request):
         say(sentence)
     # What it measures would take from what runs.
