@@ -25,7 +25,7 @@ def stops(seconds):
 
 def note(name, traced):
     back = frame_trace.returns(traced)
-    driver.saw(frame=name, stops=[[stop.room, stop.path, stop.function, stop in back] for stop in traced])
+    driver.saw(frame=name, stops=[[stop.path, stop.function, stop in back] for stop in traced])
 
 
 def frames():

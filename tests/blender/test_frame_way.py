@@ -1,0 +1,56 @@
+"""The way of a rendered frame: the page that tells it, its picture, and how often it comes back to a room."""
+
+import importlib
+import json
+import sys
+from pathlib import Path
+
+import frame_trace
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(1, str(ROOT / "scripts"))
+frame_way = importlib.import_module("frame_way")
+
+RECIPE = {
+    "version": 1,
+    "window": 8,
+    "border": True,
+    "shutters": [{"name": "Long", "bars": [1] * 8}, {"name": "Sharp", "bars": [1] + [0] * 7}],
+    "regions": [{"shutter": "Sharp", "kind": "line", "width": 0.02, "strokes": [[[0.3, 0.2], [0.5, 0.8]]]}],
+}
+
+
+def ways(bpy, footage, frames, tmp_path):
+    """The stops of each of these frames, rendered one after the other."""
+    import shutter_addon
+    from shutter_addon.blender.editing import new_edit
+    from shutter_addon.blender.rendering import sessions
+    from shutter_addon.core.recipes import recipe_file
+    from shutter_addon.media import open_source
+
+    sessions.forget()
+    with open_source(footage) as medium:
+        scene = new_edit.make_edit(footage, medium, recipe_file.parse(json.dumps(RECIPE)), tmp_path)
+    scene.render.image_settings.file_format = "PNG"
+    door = "VirtualShutterEngine.render"
+    for frame in frames:
+        scene.frame_set(frame)
+        scene.render.filepath = str(tmp_path / f"{frame}.png")
+        with frame_trace.traced(Path(shutter_addon.__file__).parent, door, door) as stops:
+            bpy.ops.render.render(write_still=True, scene=scene.name)
+        yield stops
+
+
+def test_a_rendered_frame_goes_the_way_of_the_page(bpy, tmp_path):
+    footage = ROOT / "assets" / "bigbuckbunny.mp4"
+    first, second = ways(bpy, footage, (30, 31), tmp_path)
+    told = [(stop.path, stop.function) for stop in frame_way.ways()["rendered_frame"]]
+    made = [(stop.path, stop.function) for stop in first]
+    assert [stop for stop in made if stop in told] == told
+    back = frame_trace.returns(second)
+    assert len(back) <= 6, [stop[:2] for stop in back]
+
+
+def test_the_pictures_are_drawn_from_the_page():
+    for name, stops in frame_way.ways().items():
+        assert (ROOT / "docs" / f"{name}.svg").read_text(encoding="utf-8") == frame_way.drawn(stops)
