@@ -51,7 +51,7 @@ MEASURED = (
 class Noise(FrameSource):
     """A clip of random frames, every one another cut of the same noise."""
 
-    transfer, alpha, dtype, count = "srgb", "opaque", np.uint8, 100_000
+    transfer, alpha, dtype, count = "srgb", "opaque", np.dtype(np.uint8), 100_000
 
     def __init__(self, width: int, height: int):
         self.width, self.height = width, height
