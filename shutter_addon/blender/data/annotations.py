@@ -32,12 +32,12 @@ def image_to_picture(strip, size, **moved) -> np.ndarray | None:
 
 def strokes_of(drawing) -> list[np.ndarray]:
     """The strokes (n, 2) float64 of an annotation's frame, in the sequencer's image space; empty ones left out."""
-    found = []
+    strokes = []
     for stroke in drawing.strokes:
         flat = np.empty(len(stroke.points) * 3, dtype=np.float32)
         stroke.points.foreach_get("co", flat)
-        found.append(flat.reshape(-1, 3)[:, :2].astype(np.float64))
-    return [points for points in found if len(points)]
+        strokes.append(flat.reshape(-1, 3)[:, :2].astype(np.float64))
+    return [points for points in strokes if len(points)]
 
 
 def layer_of(effect, region):

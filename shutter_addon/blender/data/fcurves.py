@@ -40,18 +40,18 @@ class Curves:
     def of(self, owner, path: str, name: str) -> list:
         """The F-curves of a property, or of a vector's components; path: the owner's, from the scene."""
         length = getattr(owner.bl_rna.properties[name], "array_length", 0)
-        found = (self.find(f"{path}.{name}", index) for index in range(max(length, 1)))
-        return [curve for curve in found if curve is not None]
+        all_curves = (self.find(f"{path}.{name}", index) for index in range(max(length, 1)))
+        return [curve for curve in all_curves if curve is not None]
 
     def keys(self, curves: list) -> tuple[tuple[float, str], ...]:
         """Frames with a key on any of these curves, ascending, and the recipe's words for their eases: of the first
         curve that has a key there."""
-        found: dict[float, str] = {}
+        eases: dict[float, str] = {}
         for curve in curves:
             frames = self._frames[curve].tolist()
-            if not found.keys() >= set(frames):
-                found = dict(zip(frames, _eases(curve), strict=True)) | found
-        return tuple(sorted(found.items()))
+            if not eases.keys() >= set(frames):
+                eases = dict(zip(frames, _eases(curve), strict=True)) | eases
+        return tuple(sorted(eases.items()))
 
     def value(self, owner, path: str, name: str, frame: float):
         """A float property, or a float vector as a list, at a frame; path: the owner's, from the scene. EffectError:
@@ -91,7 +91,7 @@ def key_frames(curves) -> list[float]:
 def leading(curves, start: float, end: float):
     """Of F-curves, the one that changes most between two frames, and its values at them: its easing is that of all."""
     ends = [(curve, curve.evaluate(start), curve.evaluate(end)) for curve in curves]
-    return max(ends, key=lambda found: abs(found[2] - found[1]))
+    return max(ends, key=lambda end: abs(end[2] - end[1]))
 
 
 def progress(curve, first: float, last: float, frame: float) -> float:
@@ -175,13 +175,13 @@ def reindex(scene, path: str, places: dict[int, int | None]) -> None:
     """
     item = re.compile(re.escape(path) + r"\[(\d+)\]")
     for curve in curves_under(scene, f"{path}["):
-        found = item.match(curve.data_path)
-        index = int(found[1])
+        match = item.match(curve.data_path)
+        index = int(match[1])
         place = places.get(index, index)
         if place is None:
             _channelbag(scene).fcurves.remove(curve)
         elif place != index:
-            curve.data_path = f"{path}[{place}]{curve.data_path[found.end() :]}"
+            curve.data_path = f"{path}[{place}]{curve.data_path[match.end() :]}"
 
 
 def curves_under(scene, path: str) -> list:

@@ -139,9 +139,9 @@ def _standing_points(spline) -> tuple[np.ndarray, np.ndarray]:
 
 def _numbers(spline, name: str, kind, size: int = 1) -> np.ndarray:
     """A property of all points of a spline: (n,), or (n, size)."""
-    found = np.empty(len(spline.points) * size, kind)
-    spline.points.foreach_get(name, found)
-    return found if size == 1 else found.reshape(-1, size)
+    numbers = np.empty(len(spline.points) * size, kind)
+    spline.points.foreach_get(name, numbers)
+    return numbers if size == 1 else numbers.reshape(-1, size)
 
 
 def _checked(mask, numbers) -> np.ndarray:

@@ -22,7 +22,7 @@ from .validation import EffectError
 
 def content(effect, strip, region, moves, frames, time: keyframes.Channel | None) -> keyframes.Channel:
     """The channel of a matte or a ramp, sampled at timeline frames; strip: the effect strip that shows it, moves:
-    channels of the region's location, rotation and scale, time: as of core.model.effect.Effect. EffectError,
+    channels of the region's location, rotation and scale, time: see core.model.effect.Effect. EffectError,
     MediaError: there is none."""
     edit = effect.id_data
     if region.kind == "RAMP":
@@ -98,7 +98,7 @@ def _mask_shapes(edit, effect, strip, region, frames, time) -> keyframes.Channel
 
 def shown_frame(edit, effect, strip, time: keyframes.Channel | None) -> Callable[[float], float]:
     """What gives the source's frame that an effect strip shows at a timeline frame: filmed ones counted from 0, those
-    between them in parts. time: as of `content`. EffectError, MediaError: it cannot be known."""
+    between them in parts. time: see `content`. EffectError, MediaError: it cannot be known."""
     source = strips.source_of(edit, effect, strip)
     medium, timing = _Medium.of(source, inbetween_settings.factor(effect)), strip_timing.timing_of(source)
 

@@ -39,14 +39,14 @@ def _is_part(other, strip) -> bool:
 def strips_of(region) -> list:
     """The movie, image and clip strips that have the identity of a region's matte: several, where it was cut or copied.
     EffectError: there is none."""
-    found = _with_identity(region)
-    if not found:
+    matching = _with_identity(region)
+    if not matching:
         words = rpt_("{place}: its matte strip was deleted") if region.strip else rpt_("{place}: it has no matte strip")
         raise EffectError(words.format(place=validation.place(region)))
-    shown = [strip for strip in found if strip.type in strips.SOURCES]
+    shown = [strip for strip in matching if strip.type in strips.SOURCES]
     if not shown:
         sentence = rpt_('{place}: its matte strip "{strip}" is not a movie, image or clip strip')
-        raise EffectError(sentence.format(place=validation.place(region), strip=found[0].name))
+        raise EffectError(sentence.format(place=validation.place(region), strip=matching[0].name))
     return shown
 
 

@@ -16,12 +16,12 @@ def faults(edit, frames: range, *, sources: bool) -> list[str]:
     a whole; files of mattes are not looked for.
 
     sources: those of effects, too, as far as the sources are shown themselves"""
-    found = _of_strips(edit, frames, strips.SOURCES, sources=sources)
+    sentences = _of_strips(edit, frames, strips.SOURCES, sources=sources)
     used, data = used_data.used(edit, frames) - _clips(edit), bpy.data
     for items in (data.images, data.volumes, data.cache_files, data.movieclips, data.fonts):
-        found += [_words(item, fault) for item in items if item in used for fault in _of_item(item)]
-    found += [_words(library, fault) for library in data.libraries for fault in _of_item(library)]
-    return list(dict.fromkeys(found))
+        sentences += [_words(item, fault) for item in items if item in used for fault in _of_item(item)]
+    sentences += [_words(library, fault) for library in data.libraries for fault in _of_item(library)]
+    return list(dict.fromkeys(sentences))
 
 
 def sound_faults(edit, frames: range) -> list[str]:
@@ -40,14 +40,14 @@ def _words(item, fault: str) -> str:
 
 
 def _of_strips(edit, frames: range, kinds: tuple[str, ...], *, sources: bool) -> list[str]:
-    found = []
+    sentences = []
     for shown, wanted in requirements.edits_at(edit, frames):
         others = () if sources else strips.shown_sources(shown)
         for strip in shown.sequence_editor.strips_all:
             at = frame_ranges.common(requirements.shown_frames(shown, strip), wanted)
             if at and strip.type in kinds and strip.name not in others:
-                found += [f'strip "{strip.name}": {fault}' for fault in _of_strip(strip, at)]
-    return found
+                sentences += [f'strip "{strip.name}": {fault}' for fault in _of_strip(strip, at)]
+    return sentences
 
 
 def _of_strip(strip, frames: range) -> Iterator[str]:

@@ -41,14 +41,14 @@ class ShutterPreferences(bpy.types.AddonPreferences):
 
 def device() -> str:
     """The device that renders are wanted on, one of devices.available.CHOICES."""
-    found = _preferences()
-    return found.device.lower() if found else "auto"
+    preferences = _preferences()
+    return preferences.device.lower() if preferences else "auto"
 
 
 def gpu_memory() -> int:
     """Megabytes of the GPU that textures may take; 0: as devices.budget allows."""
-    found = _preferences()
-    return found.gpu_memory if found else 0
+    preferences = _preferences()
+    return preferences.gpu_memory if preferences else 0
 
 
 def _preferences() -> ShutterPreferences | None:

@@ -11,7 +11,7 @@ from .validation import EffectError
 
 def recipe_of(edit, effect, strip, mattes=()) -> recipe.Recipe:
     """The effect as a recipe, whose frame 1 is the strip's first; left out is what baking.baked leaves out, and regions
-    without a shutter. mattes: as of baking.baked. EffectError: it cannot be rendered as it stands."""
+    without a shutter. mattes: see baking.baked. EffectError: it cannot be rendered as it stands."""
     snapshot.check_counts(effect)
     shown = range(strip.left_handle, strip.right_handle)
     if not -limits.MAX_FRAME <= shown.start <= shown.stop <= limits.MAX_FRAME:
@@ -27,15 +27,15 @@ def recipe_of(edit, effect, strip, mattes=()) -> recipe.Recipe:
         sentence = rpt_('strip "{strip}" is too small to find its scribbles')
         raise EffectError(sentence.format(strip=strip.name))
     with translated(rpt_):
-        found = snapshot.read(edit, effect, strip, sorted({*shown, *_keyed(edit, effect)}), thorough=True)
-        return baking.baked(found, shown, inbetween_settings.method(effect), mattes)
+        plain = snapshot.read(edit, effect, strip, sorted({*shown, *_keyed(edit, effect)}), thorough=True)
+        return baking.baked(plain, shown, inbetween_settings.method(effect), mattes)
 
 
 def _keyed(edit, effect) -> set[float]:
     """The timeline frames of the effect's keys and drawings."""
-    found = set(fcurves.key_frames(fcurves.curves_under(edit, effect.path_from_id() + ".")))
+    frames = set(fcurves.key_frames(fcurves.curves_under(edit, effect.path_from_id() + ".")))
     layers = (annotations.layer_of(effect, region) for region in effect.regions)
-    return found.union(float(drawing.frame_number) for layer in layers if layer for drawing in layer.frames)
+    return frames.union(float(drawing.frame_number) for layer in layers if layer for drawing in layer.frames)
 
 
 def _check_name(item) -> None:

@@ -9,8 +9,8 @@ from .strips import ENGINE, own_strips
 
 def left_out(edit) -> list[tuple[range, str]]:
     """The timeline frames that the sequencer leaves an effect out of, and why."""
-    found = ((shown_frames(edit, strip), why) for strip in own_strips(edit) if (why := _why(strip)) is not None)
-    return [(frames, why) for frames, why in found if frames]
+    reasons = ((shown_frames(edit, strip), why) for strip in own_strips(edit) if (why := _why(strip)) is not None)
+    return [(frames, why) for frames, why in reasons if frames]
 
 
 def _why(strip) -> str | None:
@@ -47,16 +47,16 @@ def camera(strip):
 def edits_at(film, frames: range) -> list[tuple]:
     """What a film shows at some of its frames: (edit, frames) of itself, and of every edit in its Scene strips, which
     counts as a whole."""
-    found = {film: frames}
+    shown = {film: frames}
     new = [film]
     while new:
         edit = new.pop()
         for strip in edit.sequence_editor.strips_all if edit.sequence_editor else ():
-            is_new = strip.type == "SCENE" and strip.scene and strip.scene not in found
-            if is_new and is_shown(edit, strip, found[edit]):
-                found[strip.scene] = range(-MAX_FRAME, MAX_FRAME + 1)
+            is_new = strip.type == "SCENE" and strip.scene and strip.scene not in shown
+            if is_new and is_shown(edit, strip, shown[edit]):
+                shown[strip.scene] = range(-MAX_FRAME, MAX_FRAME + 1)
                 new.append(strip.scene)
-    return [(edit, at) for edit, at in found.items() if edit.sequence_editor]
+    return [(edit, at) for edit, at in shown.items() if edit.sequence_editor]
 
 
 def is_shown(edit, strip, frames: range) -> bool:

@@ -27,8 +27,8 @@ def active(context):
     effects = _effects_of(edit, strip)
     if strip is not None and not effects:
         return None
-    if (found := seen(edit)) is not None or not effects:
-        return found
+    if (shown := seen(edit)) is not None or not effects:
+        return shown
     others = [other for other in effect_strips(edit) if effect_of(edit, other.scene) in effects]
     nearest = min(others, key=lambda o: (o != strip, abs(o.left_handle - strip.left_handle)), default=None)
     return (edit, effect_of(edit, nearest.scene), nearest) if nearest else None
@@ -36,8 +36,8 @@ def active(context):
 
 def in_picture(context):
     """What is active, where it is seen; else None: nothing in the picture belongs to it."""
-    found = active(context)
-    return found if found and seen(found[0]) else None
+    shown = active(context)
+    return shown if shown and seen(shown[0]) else None
 
 
 def seen(edit):

@@ -80,11 +80,11 @@ def source_files(effect, source, folder: Path | None = None) -> SourceFiles:
 def take(
     edit, effect, strip, frames, *, folder: Path | None = None, files: dict[str, SourceFiles] | None = None
 ) -> Snapshot:
-    """The snapshot of an effect strip at timeline frames; folder: as for source_files; files: what that has
-    found, by source strip.
+    """The snapshot of an effect strip at timeline frames; folder: see source_files; files: what that
+    returned, by source strip.
     EffectError, MediaError: there is no source, or no picture at any frame."""
     source = strips.source_of(edit, effect, strip)
-    found = (files or {}).get(source.name) or source_files(effect, source, folder)
+    stamps = (files or {}).get(source.name) or source_files(effect, source, folder)
     return Snapshot(
         effect.scene.session_uid,
         strips.timeline_frame(strip, 0),
@@ -92,10 +92,10 @@ def take(
         (edit.frame_step, edit.frame_end),
         frozenset(frames),
         read(edit, effect, strip, frames),
-        source_media.spec(source, found.key),
+        source_media.spec(source, stamps.key),
         None if effect.use_source_time else timing_of(source),
         inbetween_settings.settings(effect, folder) if inbetween_settings.factor(effect) > 1 else None,
-        found.built,
+        stamps.built,
     )
 
 
@@ -148,11 +148,11 @@ def _followed(shutter, regions, camera: model.Camera) -> model.Region | model.Ca
         return None
     if wish == "CAMERA":
         return camera
-    found = next((region for region in regions if region.name == shutter.follow_region), None)
-    if found is None:
+    followed = next((region for region in regions if region.name == shutter.follow_region), None)
+    if followed is None:
         sentence = rpt_('{place}: there is no region "{region}" to follow')
         raise EffectError(sentence.format(place=validation.place(shutter), region=shutter.follow_region))
-    return found
+    return followed
 
 
 def bars_at(edit, effect, index: int, frame: float) -> np.ndarray:
@@ -180,7 +180,7 @@ def region_at(edit, effect, strip, index: int, frames) -> model.Region | model.M
 
 
 def last_shown(edit, effect, strip) -> float:
-    """The last of the source's frames that an effect strip shows, as of matte_content.shown_frame; where keys say which
+    """The last of the source's frames that an effect strip shows (see matte_content.shown_frame); where keys say which
     these are, of a hundred frames of the strip. EffectError, MediaError: it cannot be known."""
     first, last = strip.left_handle, strip.right_handle - 1
     frames, time = (first, last), None
@@ -232,12 +232,12 @@ def _channel(curves: Curves, owner, path: str, name: str, frames, change=lambda 
 
 def _options(curves: Curves, path: str, effect, frames) -> keyframes.Channel:
     names = (*OPTIONS, "aggregate", "border", "stop_at_cuts")
-    found = {name: _tried(curves.find, f"{path}.{name}") for name in names}
-    if error := next((error for error in found.values() if isinstance(error, EffectError)), None):
+    option_curves = {name: _tried(curves.find, f"{path}.{name}") for name in names}
+    if error := next((error for error in option_curves.values() if isinstance(error, EffectError)), None):
         return keyframes.Constant(error)
-    if not any(found.values()):
-        return keyframes.Constant(_tried(_options_at, effect, found, 0.0))
-    return keyframes.Samples({frame: _tried(_options_at, effect, found, frame) for frame in frames})
+    if not any(option_curves.values()):
+        return keyframes.Constant(_tried(_options_at, effect, option_curves, 0.0))
+    return keyframes.Samples({frame: _tried(_options_at, effect, option_curves, frame) for frame in frames})
 
 
 def _options_at(effect, curves: dict, frame: float) -> Options:
@@ -365,7 +365,7 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
     moves = _moves(curves, region, path, frames)
     content = _tried(matte_content.content, effect, sampling.strip, region, moves, frames, sampling.time)
     blend = _tried(validation.word, region, "blend")
-    if faults := [found for found in (content, blend) if isinstance(found, UserError)]:
+    if faults := [value for value in (content, blend) if isinstance(value, UserError)]:
         content, blend = keyframes.Constant(faults[0]), "OVER"
     opacity, feather = (_channel(curves, region, path, name, frames) for name in ("opacity", "feather"))
     numbers = content, blend.lower(), region.invert, opacity, feather

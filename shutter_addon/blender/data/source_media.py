@@ -87,9 +87,9 @@ def between(place: tuple, count: int, path) -> int:
     changed = False
     for index in range(look.next, look.next + max(look.due, min(_AT_ONCE, count))):
         file = path(index % count)
-        found, known = (file, stamp(file)), look.known[index % count]
-        if found != known and (known is None or found[1] is not None or found[0] != known[0]):
-            look.known[index % count], changed = found, True
+        current, known = (file, stamp(file)), look.known[index % count]
+        if current != known and (known is None or current[1] is not None or current[0] != known[0]):
+            look.known[index % count], changed = current, True
     look.next, look.due, look.when = (index + 1) % count, 0, time.monotonic()
     if changed:
         look.key = hash(tuple(look.known))

@@ -26,13 +26,13 @@ def effect_strips(edit) -> list:
 
 def shown_edits(edit) -> list:
     """The edit, and those that its Scene strips show."""
-    found, new = [], [edit]
+    shown, new = [], [edit]
     while new:
         scene = new.pop()
-        if scene is not None and scene not in found and scene.sequence_editor:
-            found.append(scene)
+        if scene is not None and scene not in shown and scene.sequence_editor:
+            shown.append(scene)
             new += [strip.scene for strip in scene.sequence_editor.strips_all if strip.type == "SCENE"]
-    return found
+    return shown
 
 
 def own_strips(edit) -> list:

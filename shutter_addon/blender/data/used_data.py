@@ -15,13 +15,13 @@ def used(edit, frames: range) -> set[bpy.types.ID]:
     for item, users in bpy.data.user_map().items():
         for user in users:
             uses.setdefault(user, []).append(item)
-    found = set()
+    items = set()
     new = [item for each, at in shown for item in _named(each, at)]
     while new:
-        if (item := new.pop()) not in found:
-            found.add(item)
+        if (item := new.pop()) not in items:
+            items.add(item)
             new += uses.get(item, ())
-    return found.union(each for each, _ in shown)
+    return items.union(each for each, _ in shown)
 
 
 def _named(edit, frames: range) -> Iterator[bpy.types.ID]:

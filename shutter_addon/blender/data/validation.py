@@ -29,8 +29,8 @@ def place(group) -> str:
     if path.endswith(".camera"):
         words = _PLACES["camera"]
         return rpt_(words).format(name=group.id_data.path_resolve(path.removesuffix(".camera")).name)
-    found = re.match(r".*?effects\[\d+\](?:\.(shutters|regions)\[\d+\])?", path)
-    words = rpt_(_PLACES[found[1] or ""]).format(name=group.id_data.path_resolve(found[0]).name)
+    match = re.match(r".*?effects\[\d+\](?:\.(shutters|regions)\[\d+\])?", path)
+    words = rpt_(_PLACES[match[1] or ""]).format(name=group.id_data.path_resolve(match[0]).name)
     bar = re.search(r"\.bars\[(\d+)\]$", path)
     return rpt_("{shutter}, bar {number}").format(shutter=words, number=int(bar[1]) + 1) if bar else words
 
@@ -56,11 +56,11 @@ def curved(group, name: str, curve, frame: float) -> float:
     return number(group, name, min(max(curve.evaluate(frame), prop.hard_min), prop.hard_max))
 
 
-def check(items, name: str, found: np.ndarray) -> None:
+def check(items, name: str, numbers: np.ndarray) -> None:
     """EffectError: one of the numbers (n,) of as many items of a collection is outside of the property's range."""
     prop = items[0].bl_rna.properties[name]
-    for i in np.flatnonzero(~((found >= prop.hard_min) & (found <= prop.hard_max))):
-        number(items[int(i)], name, float(found[i]))
+    for i in np.flatnonzero(~((numbers >= prop.hard_min) & (numbers <= prop.hard_max))):
+        number(items[int(i)], name, float(numbers[i]))
 
 
 def check_region(region) -> None:

@@ -226,10 +226,10 @@ def texel(texture: Texture, x: int, y: int) -> np.ndarray:
     """The numbers (4 · layers,) float32 of all layers of an rgba32f texture at a texel; nothing else is read."""
     layers = texture.size[2]
     values = np.empty((layers, 4), np.float32)
-    for layer, found in enumerate(values):
+    for layer, pixel in enumerate(values):
         framebuffer = gpu.types.GPUFrameBuffer(color_slots={"texture": texture.gpu, "layer": layer})
         with framebuffer.bind():
-            framebuffer.read_color(x, y, 1, 1, 4, 0, "FLOAT", data=_buffer("FLOAT", found))
+            framebuffer.read_color(x, y, 1, 1, 4, 0, "FLOAT", data=_buffer("FLOAT", pixel))
     return values.reshape(-1)
 
 
@@ -270,9 +270,9 @@ def unpacking(kind: str, packing: int) -> Pass:
 def _exchanged(texture: Texture) -> tuple:
     """The entry of FORMATS. TypeError: Blender neither sends nor reads such a texture; asked to read one, it leaves
     the memory as it was, without an error."""
-    if (found := FORMATS[texture.kind]) is None:
+    if (entry := FORMATS[texture.kind]) is None:
         raise TypeError(f"{texture.kind}: such a texture is written and read by passes alone on Blender's GPU")
-    return found
+    return entry
 
 
 def _of_numbers(size: tuple[int, int], kind: str, data: gpu.types.Buffer) -> gpu.types.GPUTexture:
