@@ -81,41 +81,41 @@ def _shown_effects(film, frames: range) -> Iterator[tuple]:
     """(edit, effect, strip, frames) of every effect that is shown at one of the film's frames."""
     wanted = dict(requirements.edits_at(film, frames))
     for edit, effect, parts in job_snapshots.shown_effects(film):
-        found: set[float] = set()
+        shown: set[float] = set()
         for part in parts if edit in wanted else ():
             start = strips.timeline_frame(part, 0)  # a strip may begin between frames
             at = frame_ranges.common(requirements.shown_frames(edit, part), wanted[edit])
-            found |= {start + math.floor(frame - start) for frame in at}
-        if found:
-            yield edit, effect, parts[0], found
+            shown |= {start + math.floor(frame - start) for frame in at}
+        if shown:
+            yield edit, effect, parts[0], shown
 
 
 def _effect(looking: RenderSession, shown: tuple, compositor, find_cuts: bool) -> EffectCheck:
     """shown: of _shown_effects"""
     edit, effect, strip, frames = shown
-    found = EffectCheck(edit, strip.name, frames, len(effect.shutters))
-    if not _look_at_footage(found, effect, strip):
-        return found
+    check = EffectCheck(edit, strip.name, frames, len(effect.shutters))
+    if not _look_at_footage(check, effect, strip):
+        return check
     try:
         taken = snapshot.take(edit, effect, strip, frames)
-        found.folder = taken.inbetween.folder if taken.inbetween else None
-        requests = _requests(looking, taken, found)
+        check.folder = taken.inbetween.folder if taken.inbetween else None
+        requests = _requests(looking, taken, check)
     except effect_source.FAULTS as error:
-        found.faults.append(str(error))
-        return found
+        check.faults.append(str(error))
+        return check
     if requests:
         renderer = looking.renderer(next(iter(requests.values())).source)
         source = renderer.source
-        found.window = max(request.state.options.window for request in requests.values())
-        found.factor = source.step
-        _look_at_frames(found, renderer, requests, find_cuts)
-        _look_at_mattes(found, source, requests)
-        found.needs = _needs(source, requests, compositor)
-        found.notes += _notes(found, requests)
-    return found
+        check.window = max(request.state.options.window for request in requests.values())
+        check.factor = source.step
+        _look_at_frames(check, renderer, requests, find_cuts)
+        _look_at_mattes(check, source, requests)
+        check.needs = _needs(source, requests, compositor)
+        check.notes += _notes(check, requests)
+    return check
 
 
-def _requests(looking: RenderSession, taken, found: EffectCheck) -> dict[float, Request]:
+def _requests(looking: RenderSession, taken, check: EffectCheck) -> dict[float, Request]:
     """What each frame asks for, where it can be shown; faults of others are noted, each at the first of its frames."""
     requests, faults, context = {}, {}, RenderContext(looking, RenderSettings())
     for frame in sorted(taken.frames):
@@ -126,38 +126,38 @@ def _requests(looking: RenderSession, taken, found: EffectCheck) -> dict[float, 
             faults.setdefault(kind, []).append(str(error))
     for sentences in faults.values():
         more = f" (and at {len(sentences) - 1} more frames)" if len(sentences) > 1 else ""
-        found.faults.append(sentences[0] + more)
+        check.faults.append(sentences[0] + more)
     return requests
 
 
-def _look_at_footage(found: EffectCheck, effect, strip) -> bool:
+def _look_at_footage(check: EffectCheck, effect, strip) -> bool:
     """Whether the footage can be opened; and whether it is what it was when the edit was saved: the effect's scene has
     the size of it."""
     try:
-        source = strips.source_of(found.edit, effect, strip)
+        source = strips.source_of(check.edit, effect, strip)
         medium = source_media.open_media(source)
     except UserError as error:
-        found.faults.append(str(error))
+        check.faults.append(str(error))
         return False
     medium.close()
-    found.source, found.size = os.path.normpath(medium.path), (medium.width, medium.height)
+    check.source, check.size = os.path.normpath(medium.path), (medium.width, medium.height)
     saved = effect.scene.render.resolution_x, effect.scene.render.resolution_y
-    if saved != found.size:
-        words = "{}×{}, but was {}×{} when the edit was saved".format(*found.size, *saved)
-        found.faults.append(f"{medium.path.name}: is {words}")
+    if saved != check.size:
+        words = "{}×{}, but was {}×{} when the edit was saved".format(*check.size, *saved)
+        check.faults.append(f"{medium.path.name}: is {words}")
     if medium.count < source.content_duration:
         words = f"{medium.count} frames, fewer than the {source.content_duration} of strip"
-        found.faults.append(f'{medium.path.name}: has {words} "{source.name}"')
+        check.faults.append(f'{medium.path.name}: has {words} "{source.name}"')
     return True
 
 
-def _look_at_frames(found: EffectCheck, renderer: Renderer, requests: dict[float, Request], find_cuts: bool) -> None:
+def _look_at_frames(check: EffectCheck, renderer: Renderer, requests: dict[float, Request], find_cuts: bool) -> None:
     """Whether the frames that windows need are there: files of image sequences, in-between frames, and of a movie the
     first and the last one."""
     source = renderer.source
     needed = {frame: renderer.needed(request) for frame, request in requests.items()}
     filmed = {index // source.step for indices in needed.values() for index in indices if index % source.step == 0}
-    found.faults += _unreadable(source, filmed, source.step)
+    check.faults += _unreadable(source, filmed, source.step)
     if source.step == 1:
         return
     lacking = [frame for frame, indices in needed.items() if not all(map(source.has, indices))]
@@ -166,13 +166,13 @@ def _look_at_frames(found: EffectCheck, renderer: Renderer, requests: dict[float
             needed[frame] = renderer.needed(requests[frame], known=False)
             source.shots.release()
     between = {index for indices in needed.values() for index in indices if index % source.step}
-    found.pairs = len({index // source.step for index in between})
+    check.pairs = len({index // source.step for index in between})
     gone = {index for index in between if not source.has(index)}
-    found.missing = {index // source.step + 1 for index in gone}
-    found.bytes = len(gone) * output_space.picture(*found.size, source.dtype.itemsize)
-    found.lacking = {math.floor(frame) for frame in lacking if needed[frame] & gone}
+    check.missing = {index // source.step + 1 for index in gone}
+    check.bytes = len(gone) * output_space.picture(*check.size, source.dtype.itemsize)
+    check.lacking = {math.floor(frame) for frame in lacking if needed[frame] & gone}
     if gone and not find_cuts and any(request.state.options.stop_at_cuts for request in requests.values()):
-        found.notes.append("in-between frames are counted as if there were no cuts, beyond which none are needed")
+        check.notes.append("in-between frames are counted as if there were no cuts, beyond which none are needed")
 
 
 def _unreadable(source, indices: set[int], step: int = 1) -> list[str]:
@@ -188,16 +188,16 @@ def _unreadable(source, indices: set[int], step: int = 1) -> list[str]:
     if missing:
         more = f" (and {len(missing) - 1} more files)" if len(missing) > 1 else ""
         return [missing[0] + more]
-    found = []
+    faults = []
     for index in dict.fromkeys((min(indices), max(indices))) if indices else ():
         try:
             source.read(index * step)
         except UserError as error:
-            found.append(str(error))
-    return found
+            faults.append(str(error))
+    return faults
 
 
-def _look_at_mattes(found: EffectCheck, source, requests: dict[float, Request]) -> None:
+def _look_at_mattes(check: EffectCheck, source, requests: dict[float, Request]) -> None:
     shown: dict = {}
     for request in requests.values():
         for matte in request.state.mattes:
@@ -207,16 +207,16 @@ def _look_at_mattes(found: EffectCheck, source, requests: dict[float, Request]) 
         try:
             with file.open() as medium:
                 indices = {content.index(medium, index) for content, index in contents.items()}
-                found.faults += _unreadable(medium, {min(max(index, 0), medium.count - 1) for index in indices})
+                check.faults += _unreadable(medium, {min(max(index, 0), medium.count - 1) for index in indices})
         except UserError as error:
-            found.faults.append(str(error))
+            check.faults.append(str(error))
 
 
-def _notes(found: EffectCheck, requests: dict[float, Request]) -> list[str]:
+def _notes(check: EffectCheck, requests: dict[float, Request]) -> list[str]:
     notes = []
     if (package := cuts.missing_package()) and any(each.state.options.stop_at_cuts for each in requests.values()):
         notes.append(f"no cuts are found, and exposures run across them: the Python package {package} is missing")
-    if found.needs.sends:
+    if check.needs.sends:
         notes.append("the GPU has no room for all frames of an exposure: every picture sends them anew, which is slow")
     return notes
 
@@ -241,5 +241,5 @@ def _kind(state) -> tuple[int, bool, int]:
 
 def left_out(edit, frames: range) -> list[str]:
     """Why the sequencer leaves effects out of some of these frames."""
-    found = [why for shown, why in requirements.left_out(edit) if frame_ranges.common(shown, frames)]
-    return list(dict.fromkeys(found))
+    reasons = [why for shown, why in requirements.left_out(edit) if frame_ranges.common(shown, frames)]
+    return list(dict.fromkeys(reasons))

@@ -107,12 +107,12 @@ def _picture_at(frame: int, edit, paths: list[Path]) -> Path:
 
 def _pictures(folder: Path, frames: range) -> list[Path]:
     """The picture of each frame. OutputError: some are missing, or are there twice."""
-    found = _numbered(folder)
-    if not found:
+    pictures = _numbered(folder)
+    if not pictures:
         raise OutputError(f"{folder}: there are no frames, such as 0001.png or 0001.exr")
-    if missing := [frame for frame in frames if frame not in found]:
+    if missing := [frame for frame in frames if frame not in pictures]:
         raise OutputError(f"{folder}: {_are(missing)} missing")
-    return [found[frame] for frame in frames]
+    return [pictures[frame] for frame in frames]
 
 
 def _numbered(folder: Path) -> dict[int, Path]:
@@ -122,13 +122,13 @@ def _numbered(folder: Path) -> dict[int, Path]:
         files = sorted(path for path in folder.iterdir() if path.suffix[1:] in film_output.FORMATS)
     except OSError as error:
         raise OutputError(film_output.in_words(error, folder)) from None
-    found: dict[int, Path] = {}
+    pictures: dict[int, Path] = {}
     for path in files:
         if re.fullmatch(r"\d{1,9}", path.stem):
-            if (frame := int(path.stem)) in found:
-                raise OutputError(f"{folder}: {found[frame].name} and {path.name} are the same frame")
-            found[frame] = path
-    return found
+            if (frame := int(path.stem)) in pictures:
+                raise OutputError(f"{folder}: {pictures[frame].name} and {path.name} are the same frame")
+            pictures[frame] = path
+    return pictures
 
 
 def _are(frames: list[int]) -> str:

@@ -92,7 +92,7 @@ def check_folder(path: Path, file_format: str | None) -> None:
 def spare(written, read) -> None:
     """OutputError: a file that would be written is one that is read, whatever link leads to it, or is written twice."""
     taken = {os.path.realpath(path): path for path in read}
-    taken |= {found: path for path in read if (found := _identity(path)) is not None}
+    taken |= {identity: path for path in read if (identity := _identity(path)) is not None}
     places = set()
     for path in written:
         place = os.path.realpath(path)
@@ -154,8 +154,8 @@ def set_place(render, path: Path) -> None:
 
 def _has_sound(edit) -> bool:
     """Whether an edit has sound strips, or one that it shows."""
-    found = [strip for shown in strips.shown_edits(edit) for strip in shown.sequence_editor.strips_all]
-    return any(strip.type == "SOUND" for strip in found)
+    shown_strips = [strip for shown in strips.shown_edits(edit) for strip in shown.sequence_editor.strips_all]
+    return any(strip.type == "SOUND" for strip in shown_strips)
 
 
 def set_pictures(edit, file_format: str, note: str) -> None:
@@ -200,7 +200,7 @@ def write(edit, output: Path, moved: Callable[[], None], move: Callable[[Path, P
     writes into a folder beside the output, and what is finished moves out of it.
 
     moved: called after each frame; move: moves a picture to its place, or raises an error
-    OutputError, InterruptedRenderError: as of `film`."""
+    OutputError, InterruptedRenderError: see `film`."""
     kept = edit.render.filepath
     faults: list[str] = []
     with atomic_write.part_folder(output.parent if is_movie(output) else output) as part:

@@ -25,7 +25,7 @@ def picture(width: int, height: int, sample: int) -> int:
 
 def faults(needs: list[Need]) -> list[str]:
     """A sentence for each folder that cannot be written to, and for each disk that has not the room."""
-    found = [fault for folder in dict.fromkeys(need.folder for need in needs) for fault in _unwritable(folder)]
+    sentences = [fault for folder in dict.fromkeys(need.folder for need in needs) for fault in _unwritable(folder)]
     disks: dict[int, list[Need]] = {}
     for need in needs:
         disks.setdefault(os.stat(_existing(need.folder)).st_dev, []).append(need)
@@ -33,8 +33,8 @@ def faults(needs: list[Need]) -> list[str]:
         size, left = sum(need.size for need in disk), free(disk[0].folder)
         if size > left:
             what = " and ".join(dict.fromkeys(need.what for need in disk if need.size))
-            found.append(f"{disk[0].folder}: {what} may take {in_units(size)}, {in_units(left)} are free")
-    return found
+            sentences.append(f"{disk[0].folder}: {what} may take {in_units(size)}, {in_units(left)} are free")
+    return sentences
 
 
 def free(folder: Path) -> int:

@@ -64,7 +64,7 @@ def render(
     rendered: gets each picture with its stamp, as it is written
     resume: leaves frames alone that are finished, and those to others that these are rendering, until they are
     finished or given up
-    OutputError, InterruptedRenderError: as of film_output.film, or the folder is for another version by now; OSError:
+    OutputError, InterruptedRenderError: see film_output.film, or the folder is for another version by now; OSError:
     the folder cannot be written to"""
     if resume:
         check_resumable(edit)
@@ -149,8 +149,8 @@ def _is_finished(size: tuple[int, int], samples: str, key: str, rejected: dict[P
     stamp = rendered_pictures.stamp(picture) if picture.is_file() else None  # a pipe would never open
     if stamp is None or rejected.get(picture) == stamp:
         return False
-    found = rendered_pictures.read(picture, key)
-    if found is not None and (found.size, found.samples) == (size, samples):
+    rendered = rendered_pictures.read(picture, key)
+    if rendered is not None and (rendered.size, rendered.samples) == (size, samples):
         return True
     rejected[picture] = stamp
     return False
