@@ -54,8 +54,8 @@ def _shifted(clip, size) -> Callable[[float], Similarity]:
     """The motion of the picture from where stabilization lays it to where the clip has it, at a time in the clip's
     frames. EffectError: the clip is not stabilized."""
     settings = clip.tracking.stabilization
-    found = _stabilization(clip, size[0] / size[1])
-    if not settings.use_2d_stabilization or not found.frames:
+    stabilization = _stabilization(clip, size[0] / size[1])
+    if not settings.use_2d_stabilization or not stabilization.frames:
         raise EffectError(rpt_('clip "{clip}" has no 2D stabilization').format(clip=clip.name))
     value = _values(clip)
 
@@ -64,7 +64,7 @@ def _shifted(clip, size) -> Callable[[float], Similarity]:
         influence = [value(settings, f"influence_{name}", frame) for name in ("location", "rotation", "scale")]
         target = complex(x * size[0] / size[1], y)
         angle, scale = value(settings, "target_rotation", frame), value(settings, "target_scale", frame)
-        return _in_pixels(laid(found.at(frame), Settings(*influence, target, angle, scale)), size).inverse()
+        return _in_pixels(laid(stabilization.at(frame), Settings(*influence, target, angle, scale)), size).inverse()
 
     def between(time: float) -> Similarity:
         first, second, share = at(math.floor(time)), at(math.ceil(time)), time - math.floor(time)

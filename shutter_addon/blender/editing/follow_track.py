@@ -79,11 +79,11 @@ _stamps = revision.UntilChange()
 def stamp(region) -> str:
     """Changes with the markers that a region follows; empty where there are none."""
     try:
-        found = _markers(region)
+        markers = _markers(region)
     except EffectError:
         return ""
     digest = hashlib.sha256()
-    for name, frames, places in found:
+    for name, frames, places in markers:
         digest.update(b"".join((name.encode(errors="surrogateescape"), frames.tobytes(), places.tobytes())))
     return digest.hexdigest()
 
@@ -139,17 +139,17 @@ def _points(edit, effect, strip, index: int, start: int) -> dict[int, Points]:
     validation.word(region, "motion")
     tracks, size = _markers(region), annotations.picture_size(effect)
     times = clip_times(edit, effect, strip, region.follow_clip)
-    found = {frame: _points_at(tracks, time, size) for frame, time in times.items()}
-    found = {frame: points for frame, points in found.items() if points}
-    if start not in found:
+    by_frame = {frame: _points_at(tracks, time, size) for frame, time in times.items()}
+    by_frame = {frame: points for frame, points in by_frame.items() if points}
+    if start not in by_frame:
         sentence = rpt_('"{track}" of clip "{clip}" has no marker at frame {frame}')
         name = region.follow_object if region.follow_kind == "OBJECT" else region.follow_track
         raise EffectError(sentence.format(track=name, clip=region.follow_clip.name, frame=start))
     with translated(rpt_):
-        shape = snapshot.region_at(edit, effect, strip, index, found)
-        if not all(shape.unmoved(frame) for frame in found):
+        shape = snapshot.region_at(edit, effect, strip, index, by_frame)
+        if not all(shape.unmoved(frame) for frame in by_frame):
             raise EffectError(rpt_('region "{name}" has no strokes').format(name=region.name))
-    return found
+    return by_frame
 
 
 def clip_times(edit, effect, strip, clip) -> dict[int, float]:
@@ -165,8 +165,8 @@ def clip_times(edit, effect, strip, clip) -> dict[int, float]:
 
 def _points_at(tracks, time: float, size) -> Points:
     """Of the markers (see _markers) those that there are at a time in the clip's frames."""
-    found = {name: _place_at(frames, places, time) for name, frames, places in tracks}
-    return {name: motions.pixel(place, size) for name, place in found.items() if place is not None}
+    at_time = {name: _place_at(frames, places, time) for name, frames, places in tracks}
+    return {name: motions.pixel(place, size) for name, place in at_time.items() if place is not None}
 
 
 def _check_footage(source, clip) -> None:
@@ -198,7 +198,7 @@ def _place_at(frames: np.ndarray, places: np.ndarray, time: float) -> np.ndarray
 
 
 class _Follower:
-    """Carries a region or the camera along what it follows; arguments as of `followed`."""
+    """Carries a region or the camera along what it follows; arguments: see `followed`."""
 
     def __init__(self, subject, frames: list[int], moves: dict[int, dict[int, Similarity]], size):
         self._subject, self._known, self._moves, self._size = subject, sorted(moves), moves, size
@@ -233,15 +233,15 @@ def followed(
     for way in ([f for f in frames if f > start], [f for f in reversed(frames) if f < start]):
         near = result[start]
         for frame in way:
-            found = follower.at(frame, near)
-            if found is not None:
-                near = result[frame] = found
+            placement = follower.at(frame, near)
+            if placement is not None:
+                near = result[frame] = placement
     return dict(sorted(result.items()))
 
 
 def _motions(points: dict[int, Points], origin: int) -> dict[int, Similarity]:
     """By frame the motion from the points of one frame; where too few of these are left, by way of the frame before."""
-    found = {origin: Similarity()}
+    by_frame = {origin: Similarity()}
     enough = min(2, len(points[origin]))
     frames = sorted(points)
     for way in ([f for f in frames if f > origin], [f for f in reversed(frames) if f < origin]):
@@ -251,10 +251,10 @@ def _motions(points: dict[int, Points], origin: int) -> dict[int, Similarity]:
                 shared = sorted(points[base].keys() & points[frame].keys())
                 if len(shared) >= enough:
                     ends = ([points[end][name] for name in shared] for end in (base, frame))
-                    found[frame] = _similarity(*ends).after(found[base])
+                    by_frame[frame] = _similarity(*ends).after(by_frame[base])
                     before = frame
                     break
-    return found
+    return by_frame
 
 
 def _similarity(before: list[complex], after: list[complex]) -> Similarity:

@@ -79,8 +79,8 @@ def leave_to_user() -> None:
 
 
 def _unmarked() -> list:
-    found = [each for each in bpy.data.annotations if each.library is None and not each.virtual_shutter_made]
-    return [each for each in found if each.name.startswith(_OLDER_NAMES)]
+    own = [each for each in bpy.data.annotations if each.library is None and not each.virtual_shutter_made]
+    return [each for each in own if each.name.startswith(_OLDER_NAMES)]
 
 
 def follow_sources() -> None:

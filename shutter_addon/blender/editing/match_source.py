@@ -55,8 +55,8 @@ def _follow_rate(edit, render) -> None:
 
 
 def _follow_size(effect) -> None:
-    found = parts(effect)
-    size = next((size for _part, source in found if (size := _size(source)) is not None), None)
+    pairs = parts(effect)
+    size = next((size for _part, source in pairs if (size := _size(source)) is not None), None)
     if size is not None and size != annotations.picture_size(effect):
         with _scribbles_kept(effect):
             effect.scene.render.resolution_x, effect.scene.render.resolution_y = size
@@ -101,18 +101,18 @@ def shown(effect) -> Shown | None:
 
 
 def _compare(effect) -> Shown | None:
-    if not (found := parts(effect)):
+    if not (pairs := parts(effect)):
         return None
-    lacks = any(missing_modifiers(part, source) for part, source in found)
-    return Shown(differences(effect), lacks, any(effects_on(effect.id_data, source) for _part, source in found))
+    lacks = any(missing_modifiers(part, source) for part, source in pairs)
+    return Shown(differences(effect), lacks, any(effects_on(effect.id_data, source) for _part, source in pairs))
 
 
 def differences(effect) -> list[str]:
     """What match would change, in words to be translated."""
-    found = parts(effect)
-    looks = [(_looks(part), _looks(source)) for part, source in found]
+    pairs = parts(effect)
+    looks = [(_looks(part), _looks(source)) for part, source in pairs]
     words = [word for word in _LOOK if any(part[word] != source[word] for part, source in looks)]
-    if any((goal.left, goal.right) != _range(goal.part) for goal in _goals(effect, found)):
+    if any((goal.left, goal.right) != _range(goal.part) for goal in _goals(effect, pairs)):
         words.append(_RANGE)
     return words
 
@@ -120,15 +120,15 @@ def differences(effect) -> list[str]:
 def match(effect) -> list[tuple]:
     """Gives the effect's strips the look and the range of their sources. Returns the strips that cannot have the whole
     range, each with the neighbour in its channel that is in the way."""
-    edit, found = effect.id_data, parts(effect)
+    edit, pairs = effect.id_data, parts(effect)
     with _scribbles_kept(effect):
-        for part, source in found:
+        for part, source in pairs:
             add_effect.copy_look(source, part)
             for name in (name for names in _LOOK.values() for name in names):
                 old, new = f"{source.path_from_id()}.{name}", f"{part.path_from_id()}.{name}"
                 fcurves.remove_curves(edit, new)
                 fcurves.copy_curves(edit, old, edit, new)
-    goals = _goals(effect, found)
+    goals = _goals(effect, pairs)
     _slip(edit, goals)
     for goal in goals:
         goal.part.right_handle = max(goal.part.right_handle, goal.right)  # or the left one could not pass it
@@ -179,13 +179,13 @@ class _Goal:
     neighbor: object = None
 
 
-def _goals(effect, found) -> list[_Goal]:
+def _goals(effect, pairs) -> list[_Goal]:
     """An edge where another part of the effect goes on with the same source stays where it is."""
-    own = {part.name: _below(effect, part, source) for part, source in found}
+    own = {part.name: _below(effect, part, source) for part, source in pairs}
     goals = []
-    for part, source in found:
+    for part, source in pairs:
         names = {s.name for s in own[part.name]}
-        beside = [other for other, _source in found if any(s.name in names for s in own[other.name])]
+        beside = [other for other, _source in pairs if any(s.name in names for s in own[other.name])]
         left, right = min(s.left_handle for s in own[part.name]), max(s.right_handle for s in own[part.name])
         left = part.left_handle if any(p.left_handle < part.left_handle for p in beside) else left
         right = part.right_handle if any(p.right_handle > part.right_handle for p in beside) else right
@@ -245,8 +245,8 @@ def _scribbles_kept(effect):
     part that shows it, or the nearest to it."""
     layers = {region.layer: annotations.layer_of(effect, region) for region in effect.regions}
     drawings = [drawing for layer in layers.values() if layer for drawing in layer.frames]
-    found = [part for part, _source in parts(effect)]
-    shown = [min(found, key=lambda part: _apart(part, drawing.frame_number)) for drawing in drawings]
+    own_parts = [part for part, _source in parts(effect)]
+    shown = [min(own_parts, key=lambda part: _apart(part, drawing.frame_number)) for drawing in drawings]
     before = [_place(effect, part, drawing.frame_number) for part, drawing in zip(shown, drawings, strict=True)]
     yield
     for part, drawing, old in zip(shown, drawings, before, strict=True):

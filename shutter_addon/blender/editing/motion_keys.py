@@ -41,7 +41,7 @@ _COUNTS = {"LOCATION": 2, "ROTATION": 3, "SCALE": 4}
 
 @dataclass(frozen=True)
 class MotionKeys:
-    """The keys of a region, or of the camera (index as for selection.moving), for a motion (properties.MOTIONS); frames
+    """The keys of a region, or of the camera (index: see selection.moving), for a motion (properties.MOTIONS); frames
     are timeline frames of the edit."""
 
     effect: bpy.types.PropertyGroup
@@ -52,8 +52,8 @@ class MotionKeys:
         """The whole frames, among these, at which the editor has set a key."""
         curves = (self._curve(name, component) for name, component in _COMPONENTS[: _COUNTS[self.motion]])
         keys = map(_read, filter(None, curves))
-        found = {frame for all_frames, made in keys for frame in all_frames[~made].tolist()}
-        return sorted(int(frame) for frame in found if frame in frames)
+        keyed = {frame for all_frames, made in keys for frame in all_frames[~made].tolist()}
+        return sorted(int(frame) for frame in keyed if frame in frames)
 
     def are_made(self) -> bool:
         """Whether any key of the location was made."""
@@ -73,8 +73,8 @@ class MotionKeys:
     def channels(self) -> list[str]:
         """The channels that the motion has, and those that have keys already."""
         count = _COUNTS[self.motion]
-        found = (name for k, (name, component) in enumerate(_COMPONENTS) if k < count or self._curve(name, component))
-        return list(dict.fromkeys(found))
+        names = (name for k, (name, component) in enumerate(_COMPONENTS) if k < count or self._curve(name, component))
+        return list(dict.fromkeys(names))
 
     def hold(self, first: int, last: int) -> None:
         """Keys what was tracked right before and after these frames where tracking has left it: it stays, whatever
@@ -224,13 +224,13 @@ def _values(placement: Placement) -> tuple[float, ...]:
     return *placement.location, np.radians(placement.rotation), placement.scale
 
 
-def _replace(curve, values: dict[int, float], found: Iterable[int]) -> None:
-    """Makes keys of these values by frame, in place of those that were made at the frames that were found."""
+def _replace(curve, values: dict[int, float], tracked: Iterable[int]) -> None:
+    """Makes keys of these values by frame, in place of those that were made at the frames that were tracked."""
     points, (frames, made) = curve.keyframe_points, _read(curve)
-    within = np.isin(frames, list(found))
+    within = np.isin(frames, list(tracked))
     edited = within & ~made
     if values:
-        for i in np.flatnonzero(edited & (frames < max(found))).tolist():
+        for i in np.flatnonzero(edited & (frames < max(tracked))).tolist():
             points[i].interpolation = "LINEAR"
     for i in np.flatnonzero(within & made)[::-1].tolist():
         points.remove(points[i], fast=True)

@@ -1,4 +1,4 @@
-"""A panning shot, as of a camera that pans with its subject: that is sharp, and all that stands still streaks."""
+"""A panning shot, like a camera's that pans with its subject: that is sharp, and all that stands still streaks."""
 
 from bpy.app.translations import pgettext_rpt as rpt_
 

@@ -53,10 +53,10 @@ def version(edit, path: Path, opened: tuple[int, int] | None) -> EditVersion:
 
     opened: the file's stamp before (versions.stamp). SavedEditError: it was saved over since, so that its key would be
     that of another edit; OSError: it is gone"""
-    found = versions.of_edit(edit)
+    current = versions.of_edit(edit)
     if versions.stamp(path) != opened:
         raise SavedEditError(f"{path}: was saved over while it was opened; start again")
-    return found
+    return current
 
 
 def _scripts(edit) -> list[tuple]:

@@ -15,15 +15,15 @@ _emptied: set[int] = set()  # addresses of spaces whose annotation was an effect
 def follow() -> None:
     """Previews that are shown, and have an effect's scribbles, get those of the effect that is seen."""
     for window in bpy.data.window_managers[0].windows:
-        found = selection.seen(window.workspace.sequencer_scene or window.scene)
+        seen = selection.seen(window.workspace.sequencer_scene or window.scene)
         for area in window.screen.areas:
-            if area.type == "SEQUENCE_EDITOR" and is_other(area.spaces.active, found):
-                give(area.spaces.active, found[1].scene.annotation if found else None)
+            if area.type == "SEQUENCE_EDITOR" and is_other(area.spaces.active, seen):
+                give(area.spaces.active, seen[1].scene.annotation if seen else None)
 
 
-def is_other(space, found) -> bool:
+def is_other(space, seen) -> bool:
     """Whether a preview has to get another annotation, for what selection.seen has found in its edit."""
-    wanted = found[1].scene.annotation if found else None
+    wanted = seen[1].scene.annotation if seen else None
     if space.annotation is None:
         return wanted is not None and space.as_pointer() in _emptied
     return space.annotation != wanted and is_own(space.annotation)

@@ -1,6 +1,6 @@
 """A region, or the camera, that is tracked through what its strip shows, from where it is at the current frame on.
 
-What is tracked has an index as for selection.moving. A key comes with every frame that is tracked, so that the preview
+What is tracked has an index (see selection.moving). A key comes with every frame that is tracked, so that the preview
 can go along; at the end they are thinned to those that the motion needs within a pixel of the picture.
 """
 
@@ -135,7 +135,7 @@ def track(
     anchors = [frame for frame in keys.edited(range(strip.left_handle, strip.right_handle)) if frame != start]
     here, known = Tracked(start, placement_now(moving), 1.0), sorted({*frames, *anchors})
     subject = (_camera if index is None else _region)(edit, effect, strip, index, known, here)
-    found, stops = {start: here}, []
+    tracked, stops = {start: here}, []
     reach = (
         max((a for a in anchors if frames[0] <= a < start), default=frames[0]),
         min((a for a in anchors if start < a <= frames[-1]), default=frames[-1]),
@@ -146,32 +146,32 @@ def track(
         try:
             footage = Footage(source, lambda frame: effect_source.source_index(shown, frame, source)[0])
             follow = partial(subject.follow, footage, start, frames, motion=motion.lower(), anchors=anchors)
-            for tracked in _followed(follow, patience):
-                if tracked is None:
+            for step in _followed(follow, patience):
+                if step is None:
                     yield None
-                elif tracked.fault:
-                    stops.append(tracked)
-                elif tracked.frame != start:
+                elif step.fault:
+                    stops.append(step)
+                elif step.frame != start:
                     if (effect := target.effect()) is None:
                         return
                     keys = MotionKeys(effect, index, motion)
-                    if len(found) == 1:
+                    if len(tracked) == 1:
                         keys.begin(start)
-                    found[tracked.frame] = tracked
-                    beside = found.get(tracked.frame + (-1 if tracked.frame > start else 1), tracked)
-                    _write(keys, [beside, tracked], [beside, tracked])
-                    yield tracked.frame
+                    tracked[step.frame] = step
+                    beside = tracked.get(step.frame + (-1 if step.frame > start else 1), step)
+                    _write(keys, [beside, step], [beside, step])
+                    yield step.frame
         finally:
-            if len(found) > 1 and (effect := target.effect()) is not None:
+            if len(tracked) > 1 and (effect := target.effect()) is not None:
                 keys = MotionKeys(effect, index, motion)
-                ends = {frame for run in motion_keys.runs(found) for frame in run}
-                kept = found if all_keys else _thinned(effect, subject, found, {start, *anchors, *ends})
-                _write(keys, [found[frame] for frame in kept], found.values())
-                _mark(effect, index, found, stops, reach)
+                ends = {frame for run in motion_keys.runs(tracked) for frame in run}
+                kept = tracked if all_keys else _thinned(effect, subject, tracked, {start, *anchors, *ends})
+                _write(keys, [tracked[frame] for frame in kept], tracked.values())
+                _mark(effect, index, tracked, stops, reach)
                 key_ends(effect, index)
                 if index is not None:
                     effect.regions[index].follow_stamp = ""  # what it followed would undo this
-    if len(found) == 1:
+    if len(tracked) == 1:
         raise EffectError(rpt_(stops[0].fault))
 
 
@@ -202,13 +202,13 @@ def _track(effect, index: int | None) -> tuple[list[int], list[presence.Stop]]:
 
 def key_ends(effect, index: int | None) -> None:
     """Keys how much it counts by where its track ends, or takes such keys back."""
-    keys, (seen, stops), found = MotionKeys(effect, index, "SCALE"), _track(effect, index), []
+    keys, (seen, stops), fades = MotionKeys(effect, index, "SCALE"), _track(effect, index), []
     if selection.moving(effect, index).track_ends and seen:
         if index is None:
-            found = presence.keys(seen, stops, (), _reach(effect), beside=1)
+            fades = presence.keys(seen, stops, (), _reach(effect), beside=1)
         else:
-            found = presence.keys(seen, stops, keys.edited(range(min(seen), max(seen) + 1)))
-    keys.fade(motion_keys.ENDS[index is None], found)
+            fades = presence.keys(seen, stops, keys.edited(range(min(seen), max(seen) + 1)))
+    keys.fade(motion_keys.ENDS[index is None], fades)
 
 
 def _reach(effect) -> int:
@@ -280,27 +280,27 @@ def _followed(follow: Callable, patience: float | None) -> Iterator[Tracked | No
             raise EffectError(rpt_(str(error))) from None
 
 
-def _each(found: Callable[[], Iterator[Tracked]]) -> Iterator[Tracked]:
-    yield from found()
+def _each(follow: Callable[[], Iterator[Tracked]]) -> Iterator[Tracked]:
+    yield from follow()
 
 
-def _thinned(effect, subject: _Subject, found: dict[int, Tracked], kept: set[int]) -> list[int]:
-    placements, size = {frame: each.placement for frame, each in found.items()}, annotations.picture_size(effect)
+def _thinned(effect, subject: _Subject, tracked: dict[int, Tracked], kept: set[int]) -> list[int]:
+    placements, size = {frame: each.placement for frame, each in tracked.items()}, annotations.picture_size(effect)
     return motions.thinned(placements, subject.points(), size, kept, subject.tolerance)
 
 
-def _write(keys: MotionKeys, kept: Iterable[Tracked], found: Iterable[Tracked]) -> None:
-    keys.write({t.frame: t.placement for t in kept}, {t.frame: t.confidence for t in found})
+def _write(keys: MotionKeys, kept: Iterable[Tracked], tracked: Iterable[Tracked]) -> None:
+    keys.write({t.frame: t.placement for t in kept}, {t.frame: t.confidence for t in tracked})
 
 
-def _mark(effect, index: int | None, found: dict[int, Tracked], stops: list[Tracked], reach: tuple[int, int]) -> None:
+def _mark(effect, index: int | None, tracked: dict[int, Tracked], stops: list[Tracked], reach: tuple[int, int]) -> None:
     """Notes where tracking stopped, in place of what was noted of frames that it came through, and of those behind a
     stop up to where it was to go.
 
     reach: the first and the last frame that it was to track"""
-    moving, start = selection.moving(effect, index), next(iter(found))
+    moving, start = selection.moving(effect, index), next(iter(tracked))
     ways = {stop.frame > start for stop in stops}
-    first, last = reach[0] if False in ways else min(found), reach[1] if True in ways else max(found)
+    first, last = reach[0] if False in ways else min(tracked), reach[1] if True in ways else max(tracked)
     for i in reversed(range(len(moving.stops))):
         if first <= effect.start + moving.stops[i].frame <= last:
             moving.stops.remove(i)

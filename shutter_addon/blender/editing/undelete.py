@@ -85,8 +85,8 @@ def _fill(struct, plain: dict) -> None:
         elif isinstance(value, dict):
             _fill(getattr(struct, name), value)
         elif (prop := struct.bl_rna.properties[name]).type == "POINTER":
-            found = getattr(bpy.data, _POINTED[prop.fixed_type.identifier])
-            setattr(struct, name, next((each for each in found if each.session_uid == value), None))
+            items = getattr(bpy.data, _POINTED[prop.fixed_type.identifier])
+            setattr(struct, name, next((each for each in items if each.session_uid == value), None))
         elif not struct.is_property_readonly(name):
             property_copy.store(struct, name, value)
 
