@@ -34,8 +34,8 @@ def run(arguments) -> None:
         with film_output.whole(arguments.json) as part, film_output.progress(steps, "row") as moved:
             rows, plays = benchmark.run(compositor, arguments.sizes, arguments.windows, arguments.seconds, moved)
             if part:
-                found = {"machine": described, "rows": rows, "plays": plays}
-                part.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+                report = {"machine": described, "rows": rows, "plays": plays}
+                part.write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     finally:
         compositor.release()
     lines = "\n".join(f"- {heading}: {value}" for heading, value in described.items())
@@ -43,18 +43,18 @@ def run(arguments) -> None:
 
 
 def _sizes(text: str) -> list[tuple[int, int]]:
-    found = [re.fullmatch(r"(\d{1,5})x(\d{1,5})", part) for part in text.split(",")]
-    sizes = [(int(match[1]), int(match[2])) for match in found if match]
-    if len(sizes) < len(found) or not all(1 <= n <= MOST_PIXELS for size in sizes for n in size):
+    matches = [re.fullmatch(r"(\d{1,5})x(\d{1,5})", part) for part in text.split(",")]
+    sizes = [(int(match[1]), int(match[2])) for match in matches if match]
+    if len(sizes) < len(matches) or not all(1 <= n <= MOST_PIXELS for size in sizes for n in size):
         raise argparse.ArgumentTypeError(f'"{sentence(text, 40)}" is not WxH,… with 1 to {MOST_PIXELS} pixels a side')
     return sizes
 
 
 def _windows(text: str) -> list[int]:
-    found = [int(part) if re.fullmatch(r"\d{1,4}", part) else 0 for part in text.split(",")]
-    if not all(2 <= window <= MOST_FRAMES for window in found):
+    windows = [int(part) if re.fullmatch(r"\d{1,4}", part) else 0 for part in text.split(",")]
+    if not all(2 <= window <= MOST_FRAMES for window in windows):
         raise argparse.ArgumentTypeError(f'"{sentence(text, 40)}" is not L,… with 2 to {MOST_FRAMES} frames')
-    return found
+    return windows
 
 
 def _seconds(text: str) -> float:

@@ -66,22 +66,22 @@ def run(arguments) -> None:
 def _report(arguments, edit, frames: range, version: EditVersion) -> dict:
     """What is found, as JSON has it (docs/command.md)."""
     faults, notes = [*_version_faults(edit), *_setting_faults(arguments, edit, frames)], []
-    device, found, limit = _on_device(edit, frames, faults, notes, find_cuts=not arguments.inbetweens_later)
-    build = _builds(arguments.edit, edit, frames, found)
-    for each in found:
-        faults += [f'"{each.name}": {fault}' for fault in each.faults]
-        notes += [f'"{each.name}": {note}' for note in each.notes]
-        if each.missing and not arguments.inbetweens_later:
-            words = f"in-between frames of source {frame_ranges.in_words(each.missing)} are missing"
-            faults.append(f'"{each.name}": {words}; build them: {build}')
+    device, checks, limit = _on_device(edit, frames, faults, notes, find_cuts=not arguments.inbetweens_later)
+    build = _builds(arguments.edit, edit, frames, checks)
+    for check in checks:
+        faults += [f'"{check.name}": {fault}' for fault in check.faults]
+        notes += [f'"{check.name}": {note}' for note in check.notes]
+        if check.missing and not arguments.inbetweens_later:
+            words = f"in-between frames of source {frame_ranges.in_words(check.missing)} are missing"
+            faults.append(f'"{check.name}": {words}; build them: {build}')
     faults += edit_check.left_out(edit, frames)
     faults += missing_media.faults(edit, frames, sources=False)  # of these the effects' own say more
     faults += missing_media.sound_faults(edit, frames)
-    memory = _memory(found, limit)
+    memory = _memory(checks, limit)
     if memory["host"] > (machine_memory() or memory["host"]):
         words = f"{in_units(memory['host'])} of memory, the machine has {in_units(machine_memory())}"
         faults.append(f"a frame needs {words}")
-    disk = _disk(arguments, edit, frames, found, faults)
+    disk = _disk(arguments, edit, frames, checks, faults)
     report = {
         "edit": str(arguments.edit),
         "key": version.key,
@@ -90,11 +90,11 @@ def _report(arguments, edit, frames: range, version: EditVersion) -> dict:
         "extension": {"here": version.extension, "saved": edit.virtual_shutter.version or None},
         "blender": {"here": version.blender, "saved": _file_version()},
         "device": device,
-        "effects": [_effect(each) for each in found],
+        "effects": [_effect(each) for each in checks],
         "build": build,
         "memory": memory,
         "disk": disk,
-        "chunk": min(len(frames), max([each.chunk for each in found], default=chunks.LEAST)),
+        "chunk": min(len(frames), max([each.chunk for each in checks], default=chunks.LEAST)),
         "notes": notes,
         "faults": faults,
     }
@@ -107,12 +107,12 @@ def _report(arguments, edit, frames: range, version: EditVersion) -> dict:
 
 def _version_faults(edit) -> list[str]:
     """Whether something newer than what is here has saved the file."""
-    found, saved = [], edit.virtual_shutter.version
-    if _numbers(saved) > _numbers(versions.extension()):
-        found.append(f"the edit was saved by version {saved} of the extension, this machine has {versions.extension()}")
+    faults, saved, here = [], edit.virtual_shutter.version, versions.extension()
+    if _numbers(saved) > _numbers(here):
+        faults.append(f"the edit was saved by version {saved} of the extension, this machine has {here}")
     if bpy.data.version > bpy.app.version_file:
-        found.append(f"the edit was saved by Blender {_file_version()}, this machine has {bpy.app.version_string}")
-    return found
+        faults.append(f"the edit was saved by Blender {_file_version()}, this machine has {bpy.app.version_string}")
+    return faults
 
 
 def _file_version() -> str:
@@ -127,14 +127,14 @@ def _numbers(version: str) -> list[int]:
 def _setting_faults(arguments, edit, frames: range) -> list[str]:
     """Whether what the edit's output is can be written, and lie where it is wanted."""
     read = [arguments.edit, *versions.read_files(edit)]
-    found = _fault(shared_frames.check_resumable, edit) if arguments.resume else []
+    faults = _fault(shared_frames.check_resumable, edit) if arguments.resume else []
     if arguments.output:
         ends = frames[0], frames[-1]
-        found += _fault(shared_frames.check, arguments.output, arguments.format, ends, read)
+        faults += _fault(shared_frames.check, arguments.output, arguments.format, ends, read)
     if arguments.movie:
-        return found + _fault(film_join.check, arguments.movie, [*read, *versions.sounds()])
+        return faults + _fault(film_join.check, arguments.movie, [*read, *versions.sounds()])
     is_movie = edit.render.image_settings.media_type == "VIDEO"
-    return found + _fault(film_output.check, Path("film.mp4" if is_movie else "frames"), None, film_output.size(edit))
+    return faults + _fault(film_output.check, Path("film.mp4" if is_movie else "frames"), None, film_output.size(edit))
 
 
 def _fault(check, *arguments) -> list[str]:
@@ -166,16 +166,16 @@ def _on_device(
         compositor.release()
 
 
-def _memory(found: list[EffectCheck], limit: int | None) -> dict:
+def _memory(checks: list[EffectCheck], limit: int | None) -> dict:
     """Bytes that a frame needs at most, where several effects are shown in it of all of them."""
-    shown = [each for each in found if each.needs]
+    shown = [each for each in checks if each.needs]
     frames = set().union(*(each.frames for each in shown))
     gpu = max((sum(each.needs.gpu for each in shown if frame in each.frames) for frame in frames), default=0)
     host = max((sum(each.needs.host for each in shown if frame in each.frames) for frame in frames), default=0)
     return {"gpu": min(gpu, limit or gpu), "gpu_limit": limit, "host": host}
 
 
-def _disk(arguments, edit, frames: range, found: list[EffectCheck], faults: list[str]) -> dict:
+def _disk(arguments, edit, frames: range, checks: list[EffectCheck], faults: list[str]) -> dict:
     """Bytes that the frames and the in-between frames that are missing take at most, as noise does, which is not
     compressed: no frame is rendered for this. Those that are there already are not counted."""
     file_format, needs = arguments.format or "png", []
@@ -186,13 +186,13 @@ def _disk(arguments, edit, frames: range, found: list[EffectCheck], faults: list
         needs.append(Need(output, left * frame, f"{left} frames"))
     if arguments.movie:
         needs.append(Need(arguments.movie.parent, 0, "the movie"))
-    needs += [Need(each.folder, each.bytes, "in-between frames") for each in found if each.missing]
+    needs += [Need(each.folder, each.bytes, "in-between frames") for each in checks if each.missing]
     faults += output_space.faults(needs)
     return {
         "format": file_format,
         "frame": frame,
         "all": len(frames) * frame,
-        "inbetweens": sum(each.bytes for each in found),
+        "inbetweens": sum(each.bytes for each in checks),
         "free": output_space.free(output) if output else None,
     }
 
@@ -202,25 +202,25 @@ def _write_job(folder: Path, job: EditVersion) -> None:
     job_file.write(folder, job)
 
 
-def _effect(found: EffectCheck) -> dict:
+def _effect(check: EffectCheck) -> dict:
     return {
-        "strip": found.name,
-        "source": found.source,
-        "size": list(found.size),
-        "window": found.window,
-        "shutters": found.shutters,
-        "inbetween": found.factor,
-        "pairs": found.pairs,
-        "missing": [list(run) for run in frame_ranges.runs(found.missing)],
+        "strip": check.name,
+        "source": check.source,
+        "size": list(check.size),
+        "window": check.window,
+        "shutters": check.shutters,
+        "inbetween": check.factor,
+        "pairs": check.pairs,
+        "missing": [list(run) for run in frame_ranges.runs(check.missing)],
     }
 
 
-def _builds(file: Path, edit, frames: range, found: list[EffectCheck]) -> str | None:
+def _builds(file: Path, edit, frames: range, checks: list[EffectCheck]) -> str | None:
     """The command that builds the in-between frames that are missing; None: none is."""
-    if not any(each.missing for each in found):
+    if not any(each.missing for each in checks):
         return None
     # Of an edit in this one all are built, whatever frames are asked for.
-    lacking = set().union(*(each.lacking for each in found if each.edit == edit)) or frames
+    lacking = set().union(*(each.lacking for each in checks if each.edit == edit)) or frames
     program = "python -m shutter_addon" if bpy.app.module else "blender -c shutter"
     quoted = subprocess.list2cmdline([file]) if os.name == "nt" else shlex.quote(str(file))
     return f"{program} inbetween {quoted} --frames {min(lacking)}:{max(lacking)}"

@@ -76,13 +76,13 @@ def build_lacking(film) -> None:
 def needed_pairs(shown: snapshot.Snapshot) -> set[int]:
     """The pairs of neighbouring source frames whose in-betweens are needed to show an effect strip at the snapshot's
     frames, each by its first. It reads what it must to find cuts. One of FAULTS: they cannot be shown."""
-    context, factor, found = render_context.of_render(), shown.inbetween.factor, set()
+    context, factor, pairs = render_context.of_render(), shown.inbetween.factor, set()
     for frame in sorted(shown.frames):
         request = context.request(shown, frame)
         renderer = context.renderer(request)
-        found |= {index // factor for index in renderer.needed(request, known=False) if index % factor}
+        pairs |= {index // factor for index in renderer.needed(request, known=False) if index % factor}
         renderer.source.release()  # what it read is not shown here
-    return found
+    return pairs
 
 
 def _build(medium, folder: Path, factor: int, method: str, pairs) -> None:

@@ -132,32 +132,32 @@ def _check_device(arguments) -> None:
 
 def _written(arguments, file_format: str, frames: tuple[int, int]) -> list[Path]:
     """All files that a render writes, but for in-between frames."""
-    found = [arguments.save] if arguments.save else []
+    files = [arguments.save] if arguments.save else []
     if arguments.output and film_output.is_movie(arguments.output):
-        found.append(arguments.output)
+        files.append(arguments.output)
     elif arguments.output:
-        found += film_output.pictures_of(arguments.output, file_format, frames)
+        files += film_output.pictures_of(arguments.output, file_format, frames)
         if arguments.weights:
-            found += film_output.pictures_of(arguments.weights, "exr", frames)
-    return found
+            files += film_output.pictures_of(arguments.weights, "exr", frames)
+    return files
 
 
 def _mattes(source_recipe, folder: Path) -> list[Path]:
     """The files of a recipe's mattes; folder: where the recipe lies. MediaError: there are none."""
-    found = []
+    files = []
     for region in source_recipe.regions:
         if isinstance(region, recipe.MatteRegion):
             with MatteFile(folder / region.path, region.channel).open() as matte:
-                found += matte.files
-    return found
+                files += matte.files
+    return files
 
 
 def _recipe(arguments) -> recipe.Recipe:
     """The recipe, with the in-between frames that were asked for."""
-    found = recipe_file.load(arguments.recipe)
+    source_recipe = recipe_file.load(arguments.recipe)
     if arguments.inbetween is not None:
-        found = recipe.with_inbetween(found, arguments.inbetween)
-    return replace(found, inbetween_method=arguments.inbetween_method or found.inbetween_method)
+        source_recipe = recipe.with_inbetween(source_recipe, arguments.inbetween)
+    return replace(source_recipe, inbetween_method=arguments.inbetween_method or source_recipe.inbetween_method)
 
 
 def _cache(arguments) -> Path:
@@ -196,7 +196,7 @@ def _is_whole(path: Path, scene: str) -> bool:
     if not is_whole_blend(path):
         return False
     try:
-        with bpy.data.libraries.load(str(path)) as (found, _):
-            return scene in found.scenes
+        with bpy.data.libraries.load(str(path)) as (data_from, _):
+            return scene in data_from.scenes
     except OSError:
         return False

@@ -65,7 +65,7 @@ def run(arguments) -> None:
         except tracking.TrackingError as error:
             raise tracking.TrackingError(f"{subject}: {error}") from None
         size = medium.width, medium.height
-    placements = {frame: found.placement for frame, found in tracked.items()}
+    placements = {frame: step.placement for frame, step in tracked.items()}
     with_keys = _keyed(source_recipe, index, placements, {arguments.frame}, size, thin=not arguments.all_keys)
     if not arguments.hold:
         with_keys = _ended(with_keys, index, tracked, stops, arguments.frame, range(first, last + 1))
@@ -110,15 +110,15 @@ def _followed(arguments, source_recipe, index: int | None, medium, frames: range
         for step in steps:
             tracked.append(step)
             moved()
-    found = list(filmed.on_timeline(subject, tracked, footage.size))
-    stops = [each for each in found if each.fault]
-    if len(found) - len(stops) < 2:
+    shown = list(filmed.on_timeline(subject, tracked, footage.size))
+    stops = [each for each in shown if each.fault]
+    if len(shown) - len(stops) < 2:
         raise tracking.TrackingError(stops[0].fault if stops else tracking.ALONE)
-    return {each.frame: each for each in found if not each.fault}, stops
+    return {each.frame: each for each in shown if not each.fault}, stops
 
 
 def _keyed(source_recipe, index: int | None, *placements, thin: bool) -> recipe.Recipe:
-    """The recipe with placements as keys of a region, or of the camera; arguments as of region_keys."""
+    """The recipe with placements as keys of a region, or of the camera; arguments: see region_keys."""
     if index is None:
         return region_keys.with_camera(source_recipe, *placements, thin=thin)
     regions = list(source_recipe.regions)
@@ -128,7 +128,7 @@ def _keyed(source_recipe, index: int | None, *placements, thin: bool) -> recipe.
 
 def _ended(source_recipe, index: int | None, tracked: dict, stops: list, start: int, frames: range) -> recipe.Recipe:
     """The recipe whose region, or camera, counts only where it was tracked."""
-    seen = [frame for frame, found in tracked.items() if found.confidence > 0]
+    seen = [frame for frame, step in tracked.items() if step.confidence > 0]
     ends = [presence.Stop(stop.frame, stop.frame > start, stop.fault == tracking.SHOT_ENDS) for stop in stops]
     if index is None:
         keys = presence.keys(seen, ends, (), max(source_recipe.options.reach, presence.FADE), beside=1)
