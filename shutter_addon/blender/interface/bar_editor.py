@@ -75,10 +75,10 @@ def painted(values, place: Layout, start, end, snap: bool) -> np.ndarray:
 
 def bar_under(context, x: float, y: float) -> int | None:
     """The bar of the active shutter at a point of the preview's region, or None."""
-    found = selection.in_picture(context)
-    if found is None or context.region is None or context.region.type != "PREVIEW":
+    seen = selection.in_picture(context)
+    if seen is None or context.region is None or context.region.type != "PREVIEW":
         return None
-    if (shown := _shown(found[1])) is None:
+    if (shown := _shown(seen[1])) is None:
         return None
     place = _layout(context, shown.bars)
     return place.bar_at(x) if place.contains(x, y) else None
@@ -108,13 +108,13 @@ class SHUTTER_GT_bars(Gizmo):
         self.use_grab_cursor = False
 
     def draw(self, context):
-        if (found := selection.in_picture(context)) is None:
+        if (seen := selection.in_picture(context)) is None:
             return
-        effect = found[1]
+        effect = seen[1]
         if (shown := _shown(effect)) is None:
             return
         shutter = selection.active_shutter(effect)
-        words = bar_edits.open_for(*found, effect.active_shutter) or bar_edits.summary(shown.bars)
+        words = bar_edits.open_for(*seen, effect.active_shutter) or bar_edits.summary(shown.bars)
         _draw(_layout(context, shown.bars), shutter.color, f"{shutter.name}   {words}", *shown)
 
     def test_select(self, context, location):
@@ -198,8 +198,8 @@ class SHUTTER_GGT_bars(GizmoGroup):
 
     @classmethod
     def poll(cls, context):
-        found = selection.in_picture(context)
-        return found is not None and selection.active_shutter(found[1]) is not None and found[0].is_editable
+        seen = selection.in_picture(context)
+        return seen is not None and selection.active_shutter(seen[1]) is not None and seen[0].is_editable
 
     @classmethod
     def setup_keymap(cls, keyconfig):

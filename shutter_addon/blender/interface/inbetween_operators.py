@@ -72,20 +72,20 @@ def time_in_words(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds >= 60 else f"{max(seconds, 1):.0f} s"
 
 
-def strobing_in_words(found: strobing.Strobing) -> str:
+def strobing_in_words(exposure: strobing.Strobing) -> str:
     """That an exposure has too few frames, and what it takes to have more."""
-    sentence = rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{found.step:.0f}")
-    if found.seconds is None:
+    sentence = rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{exposure.step:.0f}")
+    if exposure.seconds is None:
         return sentence
-    size, time = size_in_words(found.size), time_in_words(found.seconds)
+    size, time = size_in_words(exposure.size), time_in_words(exposure.seconds)
     return rpt_("{sentence}. In-between frames take about {time}, {size}").format(
         sentence=sentence, time=time, size=size
     )
 
 
-def smoothing_in_words(found: strobing.Strobing) -> str | None:
+def smoothing_in_words(exposure: strobing.Strobing) -> str | None:
     """What helps against that; None: nothing does."""
-    return found.factor and iface_("{factor}× In-Between Frames").format(factor=found.factor)
+    return exposure.factor and iface_("{factor}× In-Between Frames").format(factor=exposure.factor)
 
 
 class _OfInbetweens(OfEffect):

@@ -56,8 +56,8 @@ _strip_items = []
 
 def _strips(_self, context):
     edit = selection.edit_of(context)
-    found = edit.sequence_editor.strips_all if edit and edit.sequence_editor else ()
-    _strip_items[:] = [(strip.name, strip.name, "") for strip in found if strip.type in strips.SOURCES]
+    all_strips = edit.sequence_editor.strips_all if edit and edit.sequence_editor else ()
+    _strip_items[:] = [(strip.name, strip.name, "") for strip in all_strips if strip.type in strips.SOURCES]
     return _strip_items
 
 

@@ -46,9 +46,9 @@ class SHUTTER_GT_note_button(Gizmo):
     bl_idname = "SHUTTER_GT_note_button"
 
     def draw(self, context):
-        if (found := _placed.get((context.region.as_pointer(), self.operator))) is None:
+        if (placed := _placed.get((context.region.as_pointer(), self.operator))) is None:
             return
-        (left, bottom, right, top), button = found
+        (left, bottom, right, top), button = placed
         look = context.preferences.themes[0].user_interface.wcol_tool
         unit = drawing.ui_scale()
         with drawing.pixel_space(context.region):
@@ -59,9 +59,9 @@ class SHUTTER_GT_note_button(Gizmo):
             drawing.text(left + _PAD * unit, bottom + 6 * unit, button.label, color=(*color, 1.0))
 
     def test_select(self, context, location):
-        if (found := _placed.get((context.region.as_pointer(), self.operator))) is None:
+        if (placed := _placed.get((context.region.as_pointer(), self.operator))) is None:
             return -1
-        (left, bottom, right, top), _button = found
+        (left, bottom, right, top), _button = placed
         return 0 if left <= location[0] <= right and bottom <= location[1] <= top else -1
 
 
@@ -84,8 +84,8 @@ class SHUTTER_GGT_note_buttons(GizmoGroup):
 
     def draw_prepare(self, context):
         for gizmo in self.gizmos:
-            found = _placed.get((context.region.as_pointer(), gizmo.operator))
-            for name, value in (found[1].values if found else {}).items():
+            placed = _placed.get((context.region.as_pointer(), gizmo.operator))
+            for name, value in (placed[1].values if placed else {}).items():
                 setattr(gizmo.target_set_operator(gizmo.operator), name, value)
 
 

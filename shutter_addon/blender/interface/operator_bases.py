@@ -34,14 +34,14 @@ class OfEffect:
 
     @classmethod
     def poll(cls, context):
-        found = selection.active(context)
-        if found is None:
+        active = selection.active(context)
+        if active is None:
             return refused(cls, rpt_("Select a Shutter strip or its source strip"))
-        if not found[0].is_editable:
+        if not active[0].is_editable:
             return refused(cls, rpt_("The edit is linked from another file"))
         if cls.only_seen and selection.in_picture(context) is None:
-            return refused(cls, selection.why_unseen(found[0], found[2]))
-        return cls.possible(found[1])
+            return refused(cls, selection.why_unseen(active[0], active[2]))
+        return cls.possible(active[1])
 
     @classmethod
     def possible(cls, effect):

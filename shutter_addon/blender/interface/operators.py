@@ -342,22 +342,22 @@ def drawing_tool(context, effect, region, tool: str) -> bool:
         region_edits.new_layer(effect, region)
     consistency.aim_pen(effect)
     annotation = effect.scene.annotation
-    found = False
+    has_preview = False
     for window, area in preview_areas.previews(context):
         shown_annotations.give(area.spaces.active, annotation)
         area.spaces.active.preview_overlay.show_annotation = True
         with context.temp_override(window=window, area=area, region=preview_areas.preview_region(area)):
             bpy.ops.wm.tool_set_by_id(name=tool, space_type="SEQUENCE_EDITOR")
-        found = True
-    return found
+        has_preview = True
+    return has_preview
 
 
 _layer_items = []
 
 
 def _layers(_self, context):
-    found = selection.active(context)
-    layers = region_edits.free_layers(found[1], annotation_of(context)) if found else []
+    active = selection.active(context)
+    layers = region_edits.free_layers(active[1], annotation_of(context)) if active else []
     _layer_items[:] = [(layer.info, layer.info, "") for layer in layers]
     return _layer_items
 
@@ -399,8 +399,8 @@ _shutter_items = []
 
 
 def _shutters(_self, context):
-    found = selection.active(context)
-    shutters = found[1].shutters if found else []
+    active = selection.active(context)
+    shutters = active[1].shutters if active else []
     _shutter_items[:] = [(str(i), shutter.name, "") for i, shutter in enumerate(shutters)]
     return _shutter_items
 

@@ -97,14 +97,14 @@ class _Shutters:
 
     def draw(self, context):
         layout = self.layout
-        found = selection.active(context)
-        if found is None:
+        active = selection.active(context)
+        if active is None:
             layout.operator("shutter.draw", icon="GREASEPENCIL")
             layout.operator("shutter.add_effect", icon="ADD")
             return
-        effect = found[1]
+        effect = active[1]
         if selection.in_picture(context) is None:
-            sentence(layout, selection.why_unseen(found[0], found[2]), "INFO")
+            sentence(layout, selection.why_unseen(active[0], active[2]), "INFO")
         _draw_live(layout, context)
         draw_list(layout, effect, "shutter", effect.shutters, "SHUTTER_MT_shutters")
         _draw_tools(layout, effect)
@@ -122,7 +122,7 @@ class _Shutters:
             draw_tracked(layout, effect, effect.active_region)
         if shutter.follow == "CAMERA":
             draw_tracked(layout, effect, None)
-        _draw_bars(layout, found)
+        _draw_bars(layout, active)
 
 
 def _draw_tools(layout, effect) -> None:
@@ -143,9 +143,9 @@ def _draw_tools(layout, effect) -> None:
         row.operator_menu_enum("shutter.region_assign", "shutter", text=region.shutter, translate=False)
 
 
-def _draw_bars(layout, found) -> None:
+def _draw_bars(layout, active) -> None:
     """What the active shutter's bars come to."""
-    effect = found[1]
+    effect = active[1]
     try:
         bars = bar_edits.shown(effect, effect.active_shutter).bars
     except validation.EffectError as error:
@@ -153,7 +153,7 @@ def _draw_bars(layout, found) -> None:
         return
     is_open = bars.any()
     sentence(layout, bar_edits.summary(bars), "NONE" if is_open else "ERROR", is_quiet=is_open)
-    if words := bar_edits.open_for(*found, effect.active_shutter):
+    if words := bar_edits.open_for(*active, effect.active_shutter):
         sentence(layout, words, is_quiet=True)
 
 
@@ -189,12 +189,12 @@ def _draw_source(layout, effect):
 
 def _draw_strobing(layout, effect) -> None:
     """That the exposure that the preview shows has too few frames, and the button that helps."""
-    if (found := strobing.last(effect)) is None or inbetween_build.running() is not None:
+    if (exposure := strobing.last(effect)) is None or inbetween_build.running() is not None:
         return
     column = layout.column(align=True)
-    sentence(column, inbetween_operators.strobing_in_words(found), "INFO")
-    if (words := inbetween_operators.smoothing_in_words(found)) is not None:
-        column.operator("shutter.smooth_streaks", text=words, translate=False).factor = str(found.factor)
+    sentence(column, inbetween_operators.strobing_in_words(exposure), "INFO")
+    if (words := inbetween_operators.smoothing_in_words(exposure)) is not None:
+        column.operator("shutter.smooth_streaks", text=words, translate=False).factor = str(exposure.factor)
 
 
 class _Move(WithEffect):

@@ -42,9 +42,9 @@ def layout(point, size, count: int, unit: float) -> Layout:
     return Layout((left, top - height, left + width, top), bars, lines)
 
 
-def _to_region(context, found) -> np.ndarray | None:
+def _to_region(context, shown) -> np.ndarray | None:
     """Matrix from fractions of the shown picture to the region's pixels; None: nothing is seen of it."""
-    matrix = geometry.picture_to_region(found.strip, annotations.picture_size(found.effect), context.region)
+    matrix = geometry.picture_to_region(shown.strip, annotations.picture_size(shown.effect), context.region)
     return matrix if geometry.is_invertible(matrix) else None
 
 
@@ -59,24 +59,24 @@ class SHUTTER_GT_probe(Gizmo):
     bl_idname = "SHUTTER_GT_probe"
 
     def draw(self, context):
-        found, at = preview_areas.shown(context), tuple(context.window_manager.virtual_shutter.probe_at)
-        if found is None or (matrix := _to_region(context, found)) is None:
+        shown, at = preview_areas.shown(context), tuple(context.window_manager.virtual_shutter.probe_at)
+        if shown is None or (matrix := _to_region(context, shown)) is None:
             return
-        if _is_cropped(found.strip, annotations.picture_size(found.effect), at):
+        if _is_cropped(shown.strip, annotations.picture_size(shown.effect), at):
             return
         try:
             render = render_context.of_drawing()
-            request = previews.request_of(context, found)
+            request = previews.request_of(context, shown)
             probed = probe.at(render.renderer(request), request, at)
         except effect_source.FAULTS:  # which the live preview tells
             return
         if probed is not None:
-            _draw(context.region, mapped(matrix, np.array([at]))[0], found.effect.shutters, probed)
+            _draw(context.region, mapped(matrix, np.array([at]))[0], shown.effect.shutters, probed)
 
     def test_select(self, context, location):
         """Blender asks whenever the pointer moves: nothing else tells of it without taking events from others."""
-        found = preview_areas.shown(context)
-        if found is not None and (matrix := _to_region(context, found)) is not None:
+        shown = preview_areas.shown(context)
+        if shown is not None and (matrix := _to_region(context, shown)) is not None:
             centre = np.array([location], dtype=np.float64) + 0.5
             context.window_manager.virtual_shutter.probe_at = mapped(np.linalg.inv(matrix), centre)[0]
         return -1

@@ -54,11 +54,11 @@ def _strokes_now(edit, effect, strip) -> list[np.ndarray]:
 
 def place(context) -> Place | None:
     """The place of the active region's handles, or None where none is seen, or nothing of it is drawn."""
-    found = selection.in_picture(context)
-    region = selection.active_region(found[1]) if found else None
+    seen = selection.in_picture(context)
+    region = selection.active_region(seen[1]) if seen else None
     if region is None:
         return None
-    edit, effect, strip = found
+    edit, effect, strip = seen
     try:
         strokes = _strokes_now(edit, effect, strip)
         validation.check_region(region)
@@ -197,11 +197,11 @@ class SHUTTER_GGT_region(GizmoGroup):
 
     @classmethod
     def poll(cls, context):
-        settings, found = context.window_manager.virtual_shutter, selection.in_picture(context)
+        settings, seen = context.window_manager.virtual_shutter, selection.in_picture(context)
         # A handle under the pointer would take it from the probe, and a stroke from the pen.
         if (settings.live and settings.probe) or _is_drawing(context):
             return False
-        return found is not None and found[0].is_editable and selection.active_region(found[1]) is not None
+        return seen is not None and seen[0].is_editable and selection.active_region(seen[1]) is not None
 
     @classmethod
     def setup_keymap(cls, keyconfig):

@@ -15,9 +15,9 @@ _COLOR = (1.0, 1.0, 1.0, 0.9)
 def _to_region(context) -> np.ndarray | None:
     """Matrix from fractions of the shown picture to the region's pixels; None where no split is shown, or seen."""
     settings = context.window_manager.virtual_shutter
-    if not settings.live or settings.view != "SPLIT" or (found := preview_areas.shown(context)) is None:
+    if not settings.live or settings.view != "SPLIT" or (shown := preview_areas.shown(context)) is None:
         return None
-    matrix = geometry.picture_to_region(found.strip, annotations.picture_size(found.effect), context.region)
+    matrix = geometry.picture_to_region(shown.strip, annotations.picture_size(shown.effect), context.region)
     return matrix if geometry.is_invertible(matrix) else None
 
 

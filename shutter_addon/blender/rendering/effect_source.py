@@ -53,7 +53,7 @@ class SourceKey:
         return SourceKey(snapshot.scene, snapshot.source, snapshot.inbetween, snapshot.built, detail)
 
     def open(self, *, planes: bool = False) -> ShotSource:
-        """The source; planes: as of PrefetchSource. EffectError, MediaError: there is none."""
+        """The source; planes: see PrefetchSource. EffectError, MediaError: there is none."""
         divisor = self.detail.divisor
         if self.inbetween is None:
             return ShotSource(PrefetchSource(self.spec.open(divisor, self.detail.proxy), planes=planes))

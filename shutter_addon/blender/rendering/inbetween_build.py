@@ -52,12 +52,12 @@ def look(edit, effect, strip) -> Look:
     settings = inbetween_settings.settings(effect)
     medium, doubled = _known(spec := source_media.spec(source))
     key = spec.key, *settings
-    when, *found = _looks.get(key, (0.0,))
+    when, *facts = _looks.get(key, (0.0,))
     if not when or time.monotonic() - when > _FRESH:
-        found = inbetween_folders.state(medium, *settings), inbetween_folders.size(settings[0], medium)
-        _looks[key] = time.monotonic(), *found
+        facts = inbetween_folders.state(medium, *settings), inbetween_folders.size(settings[0], medium)
+        _looks[key] = time.monotonic(), *facts
         _trim(_looks)
-    return Look(*found, doubled.result() * (settings[1] - 1) if doubled.done() else None)
+    return Look(*facts, doubled.result() * (settings[1] - 1) if doubled.done() else None)
 
 
 def _known(spec: source_media.SourceSpec) -> tuple:
@@ -144,7 +144,7 @@ def running() -> Build | None:
 
 
 def start(edit, effect, strip, factor: int | None = None) -> Build:
-    """Begins a build; factor: as of Build. EffectError, MediaError: it cannot begin."""
+    """Begins a build; factor: see Build. EffectError, MediaError: it cannot begin."""
     _builds.running = Build(edit, effect, strip, factor)
     inbetween_settings.built.hold()
     return _builds.running

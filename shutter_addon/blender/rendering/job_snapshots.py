@@ -56,8 +56,8 @@ def look(film: int) -> None:
 
 def left_out(scene) -> str | None:
     """Why the sequencer leaves an effect out of a film's current frame; None: it does not."""
-    found = _left_out if render_job.in_job() else requirements.left_out(scene)
-    return next((why for frames, why in found if scene.frame_current in frames), None)
+    reasons = _left_out if render_job.in_job() else requirements.left_out(scene)
+    return next((why for frames, why in reasons if scene.frame_current in frames), None)
 
 
 def of(scene, scene_frame: float, ended: Callable[[], bool] | None = None) -> tuple[Snapshot, float]:
@@ -65,14 +65,14 @@ def of(scene, scene_frame: float, ended: Callable[[], bool] | None = None) -> tu
     of effect_source.FAULTS: there is none. ended: whether nobody waits for it any longer."""
     uid = scene.session_uid
     if render_job.in_job():
-        found = _taken.get(uid)
-        if found is None or (isinstance(found, Snapshot) and found.timeline_frame(scene_frame) not in found.frames):
-            found = render_job.on_main_thread(lambda: _late(uid, scene_frame), ended)
-        if found is None:
+        taken = _taken.get(uid)
+        if taken is None or (isinstance(taken, Snapshot) and taken.timeline_frame(scene_frame) not in taken.frames):
+            taken = render_job.on_main_thread(lambda: _late(uid, scene_frame), ended)
+        if taken is None:
             raise StoppedError
-        if isinstance(found, Exception):
-            raise found.with_traceback(None)
-        return found, found.timeline_frame(scene_frame)
+        if isinstance(taken, Exception):
+            raise taken.with_traceback(None)
+        return taken, taken.timeline_frame(scene_frame)
     folder = render_settings.settings().inbetween
     edit, effect, strip = strips.find_edit(scene)
     frame = strips.timeline_frame(strip, scene_frame)
@@ -110,11 +110,11 @@ def asked_frames(edit, parts, is_film: bool) -> set[float]:
     """The timeline frames at which the parts of an effect may be asked for: those of the film, or in another edit,
     which strips show, all."""
     first, last = edit.frame_start, edit.frame_end
-    found = set()
+    asked = set()
     for strip in parts:
         low, high = strip.left_handle, strip.right_handle
         if is_film:
             low, high = max(low, min(first, edit.frame_current)), min(high, max(last, edit.frame_current) + 1)
         start = strips.timeline_frame(strip, 0)  # a strip may begin between frames
-        found |= {start + number for number in range(math.floor(low - start) - 1, math.ceil(high - start) + 2)}
-    return found
+        asked |= {start + number for number in range(math.floor(low - start) - 1, math.ceil(high - start) + 2)}
+    return asked

@@ -159,22 +159,22 @@ def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None):
     for long. Once it is called, its end is waited for."""
     if not in_job():
         return function()
-    chance, done, deadline, found = threading.Lock(), threading.Event(), time.monotonic() + _LONG, []
+    chance, done, deadline, results = threading.Lock(), threading.Event(), time.monotonic() + _LONG, []
     ended = ended or (lambda: time.monotonic() > deadline)
 
     def call():
         if chance.acquire(blocking=False):
             try:
-                found.append((True, function()))
+                results.append((True, function()))
             except Exception as error:
-                found.append((False, error))
+                results.append((False, error))
             done.set()
 
     bpy.app.timers.register(call)
     while not done.wait(_PATIENCE):
         if ended() and chance.acquire(blocking=False):
             return None
-    good, value = found[0]
+    good, value = results[0]
     if not good:
         raise value
     return value
@@ -253,8 +253,8 @@ def _remove_spent() -> None:
     rendered with what Blender frees along with them, and crash."""
     while _spent:
         scene, camera = _spent.pop()
-        found = (bpy.data.scenes.get(scene), bpy.data.objects.get(camera))
-        bpy.data.batch_remove([item for item in found if item is not None])
+        items = (bpy.data.scenes.get(scene), bpy.data.objects.get(camera))
+        bpy.data.batch_remove([item for item in items if item is not None])
 
 
 def cancelling() -> bool:

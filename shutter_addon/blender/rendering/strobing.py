@@ -51,7 +51,7 @@ class Strobing(NamedTuple):
 
 _moved: dict[tuple, steps.Moved | None] = {}  # by a source's key and a pair
 _costs: dict[tuple, inbetween.Cost | None] = {}  # by a source's key and a method
-_found: dict[int, tuple[float, Strobing | None]] = {}  # by scene: the timeline frame that was looked at last
+_last_looks: dict[int, tuple[float, Strobing | None]] = {}  # by scene: the timeline frame that was looked at last
 
 
 @dataclass
@@ -78,15 +78,15 @@ class Looked(NamedTuple):
 def look(effect, strip, snapshot: Snapshot, renderer: Renderer, request: Request) -> Looked:
     """Looks at a picture's exposure. What is not known is asked for."""
     _measuring.wanted, before = None, last(effect)
-    frame, found = effect.id_data.frame_current, _look(effect, strip, snapshot, renderer, request)
-    _found[snapshot.scene] = frame, found
-    return Looked(known=found, is_new=found != before, is_busy=is_busy())
+    frame, known = effect.id_data.frame_current, _look(effect, strip, snapshot, renderer, request)
+    _last_looks[snapshot.scene] = frame, known
+    return Looked(known=known, is_new=known != before, is_busy=is_busy())
 
 
 def last(effect) -> Strobing | None:
     """What the last look has found, if it was at the effect's current frame."""
-    frame, found = _found.get(effect.scene.session_uid, (None, None))
-    return found if frame == effect.id_data.frame_current else None
+    frame, known = _last_looks.get(effect.scene.session_uid, (None, None))
+    return known if frame == effect.id_data.frame_current else None
 
 
 def _look(effect, strip, snapshot, renderer, request):
@@ -95,9 +95,9 @@ def _look(effect, strip, snapshot, renderer, request):
     if lacking := [pair for pair in pairs if (snapshot.source.key, pair) not in _moved]:
         _measuring.wanted = partial(_measure_motion, snapshot.source, lacking)
         return None
-    known = [(found, way) for pair in pairs for way in ways[pair] if (found := _moved[snapshot.source.key, pair])]
+    known = [(motion, way) for pair in pairs for way in ways[pair] if (motion := _moved[snapshot.source.key, pair])]
     height = effect.scene.render.resolution_y
-    step = max((steps.step(found, *way) for found, way in known), default=0.0) * height / request.state.options.step
+    step = max((steps.step(motion, *way) for motion, way in known), default=0.0) * height / request.state.options.step
     if step <= _smooth(height):
         return None
     factor = _factor(request.state, step / _smooth(height))
@@ -121,7 +121,7 @@ def _ways(renderer, request) -> dict[int, list[tuple[Similarity, Similarity]]]:
     """By pairs of filmed frames, each by its first, over which a shutter stays open that is seen: where the points of
     the shown picture lie in the two, in heights of the picture, for each of these shutters."""
     state, source = request.state, renderer.source
-    options, count, found = state.options, state.options.step, {}
+    options, count, ways = state.options, state.options.step, {}
     shot = renderer.shot(request, known=True)
     frames = compositor.window_indices(options, request.index, shot, request.direction)
     for i in _seen(state):
@@ -129,8 +129,8 @@ def _ways(renderer, request) -> dict[int, list[tuple[Similarity, Similarity]]]:
         both = is_open[1:] & is_open[:-1] & (frames[1:] != frames[:-1]) & (frames[1:] >= 0) & (frames[:-1] >= 0)
         for pair in set((np.minimum(frames[1:], frames[:-1])[both] // count).tolist()):
             ends = pair * count, (pair + 1) * count
-            found.setdefault(pair, []).append(tuple(_way(state, i, end, source.height) for end in ends))
-    return found
+            ways.setdefault(pair, []).append(tuple(_way(state, i, end, source.height) for end in ends))
+    return ways
 
 
 def _seen(state: FrameState) -> set[int]:
@@ -178,7 +178,7 @@ def pairs(snapshot: Snapshot, medium, settings: inbetween_settings.Settings) -> 
     """The pairs of filmed frames, each by its first, ascending, whose in-between frames an effect strip needs with
     these settings, in place of its own, at the snapshot's frames: those across cuts as well, which take no time.
     EffectError, MediaError: that cannot be known."""
-    factor, found = settings.factor, set()
+    factor, needed = settings.factor, set()
     source = ShotSource(inbetween.InbetweenSource(medium, *settings), factor)
     has_trails = any(shutter.trail for shutter in snapshot.effect.shutters)
     for frame in snapshot.frames:
@@ -194,8 +194,8 @@ def pairs(snapshot: Snapshot, medium, settings: inbetween_settings.Settings) -> 
         elif options.edges == "hold" and not has_trails:
             places = places[slice(*shutters.open_span(bars))]
         shown = compositor.source_frames(options, np.append(places, index), range(source.count))
-        found.update((shown[(shown >= 0) & (shown % factor > 0)] // factor).tolist())
-    return sorted(found)
+        needed.update((shown[(shown >= 0) & (shown % factor > 0)] // factor).tolist())
+    return sorted(needed)
 
 
 def is_busy() -> bool:
@@ -222,7 +222,7 @@ def forget() -> None:
     if _measuring.job is not None:
         wait([_measuring.job])
     _measuring.job = _measuring.wanted = None
-    for known in (_moved, _costs, _found):
+    for known in (_moved, _costs, _last_looks):
         known.clear()
 
 
