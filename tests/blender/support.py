@@ -99,7 +99,7 @@ def source_time(edit, effect, frame):
     """Source frame, and whether it runs backward."""
     from shutter_addon.blender.data import snapshot, strips
 
-    return snapshot.read(*strips.find_edit(effect.scene), (frame,)).time.at(frame)
+    return snapshot.read(*strips.find_effect(effect.scene), (frame,)).time.at(frame)
 
 
 def picture_of(scene, scene_frame, say=print, stopped=lambda: False):

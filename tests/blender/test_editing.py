@@ -61,7 +61,7 @@ def picture_bars(effect, index, frame):
     """What a picture at a frame is made with."""
     from shutter_addon.blender.data import strips
 
-    edit, _, strip = strips.find_edit(effect.scene)
+    edit, _, strip = strips.find_effect(effect.scene)
     return state(edit, effect, strip, frame).bars[index]
 
 
@@ -526,7 +526,7 @@ def test_keyed_options_hold_from_their_key_on(effect):
         effect.stop_at_cuts = not border
         for name in ("border", "edges", "aggregate", "stop_at_cuts"):
             effect.keyframe_insert(name, frame=frame)
-    *_, strip = strips.find_edit(effect.scene)
+    *_, strip = strips.find_effect(effect.scene)
     frames = (1, 19, 20, 40)
     read = snapshot.read(edit, effect, strip, frames)
     found = [read.options.at(frame) for frame in frames]

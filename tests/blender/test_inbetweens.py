@@ -148,7 +148,7 @@ def test_what_is_missing_is_said_and_what_is_built_is_shown(cache, film, add, ed
     picture = partial(picture_of, effect.scene, 2)
     picture()
     inbetween_folders.purge(cache)
-    for way in (picture, request(*strips.find_edit(effect.scene), 2).check):
+    for way in (picture, request(*strips.find_effect(effect.scene), 2).check):
         with pytest.raises(MediaError, match=r"in-between frames of frame 2 are missing"):
             way()
     with open_source(first) as source:

@@ -51,11 +51,11 @@ def add(commands) -> None:
 
 def run(arguments) -> None:
     opened = versions.stamp(arguments.edit)
-    edit = saved_edit.open_edit(arguments.edit)
-    first, last = command_line.frames(arguments.frames, (edit.frame_start, edit.frame_end), "edit")
+    scene = saved_edit.open_edit(arguments.edit)
+    first, last = command_line.frames(arguments.frames, (scene.frame_start, scene.frame_end), "edit")
     frames = range(first, last + 1)
     with render_settings.using(render_settings.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)):
-        report = _report(arguments, edit, frames, saved_edit.version(edit, arguments.edit, opened))
+        report = _report(arguments, scene, frames, saved_edit.version(scene, arguments.edit, opened))
     command_line.tell(json.dumps(report, indent=1) if arguments.json else "\n".join(_lines(report)))
     for fault in report["faults"]:
         print(signed(fault), file=sys.stderr)
@@ -63,31 +63,31 @@ def run(arguments) -> None:
         sys.exit(2)
 
 
-def _report(arguments, edit, frames: range, version: EditVersion) -> dict:
+def _report(arguments, scene, frames: range, version: EditVersion) -> dict:
     """What is found, as JSON has it (docs/command.md)."""
-    faults, notes = [*_version_faults(edit), *_setting_faults(arguments, edit, frames)], []
-    device, checks, limit = _on_device(edit, frames, faults, notes, find_cuts=not arguments.inbetweens_later)
-    build = _builds(arguments.edit, edit, frames, checks)
+    faults, notes = [*_version_faults(scene), *_setting_faults(arguments, scene, frames)], []
+    device, checks, limit = _on_device(scene, frames, faults, notes, find_cuts=not arguments.inbetweens_later)
+    build = _builds(arguments.edit, scene, frames, checks)
     for check in checks:
         faults += [f'"{check.name}": {fault}' for fault in check.faults]
         notes += [f'"{check.name}": {note}' for note in check.notes]
         if check.missing and not arguments.inbetweens_later:
             words = f"in-between frames of source {frame_ranges.in_words(check.missing)} are missing"
             faults.append(f'"{check.name}": {words}; build them: {build}')
-    faults += edit_check.left_out(edit, frames)
-    faults += missing_media.faults(edit, frames, sources=False)  # of these the effects' own say more
-    faults += missing_media.sound_faults(edit, frames)
+    faults += edit_check.left_out(scene, frames)
+    faults += missing_media.faults(scene, frames, sources=False)  # of these the effects' own say more
+    faults += missing_media.sound_faults(scene, frames)
     memory = _memory(checks, limit)
     if memory["host"] > (machine_memory() or memory["host"]):
         words = f"{in_units(memory['host'])} of memory, the machine has {in_units(machine_memory())}"
         faults.append(f"a frame needs {words}")
-    disk = _disk(arguments, edit, frames, checks, faults)
+    disk = _disk(arguments, scene, frames, checks, faults)
     report = {
         "edit": str(arguments.edit),
         "key": version.key,
         "frames": [frames[0], frames[-1]],
-        "size": list(film_output.size(edit)),
-        "extension": {"here": version.extension, "saved": edit.virtual_shutter.version or None},
+        "size": list(film_output.size(scene)),
+        "extension": {"here": version.extension, "saved": scene.virtual_shutter.version or None},
         "blender": {"here": version.blender, "saved": _file_version()},
         "device": device,
         "effects": [_effect(each) for each in checks],
@@ -98,16 +98,16 @@ def _report(arguments, edit, frames: range, version: EditVersion) -> dict:
         "notes": notes,
         "faults": faults,
     }
-    if arguments.movie and film_output.is_movie(arguments.movie):  # last: it changes the edit
-        faults += _fault(film_join.rehearse, edit, arguments.movie, arguments.format or "png", frames)
+    if arguments.movie and film_output.is_movie(arguments.movie):  # last: it changes the scene
+        faults += _fault(film_join.rehearse, scene, arguments.movie, arguments.format or "png", frames)
     if arguments.output and not faults:
         faults += _fault(_write_job, arguments.output, version)
     return report
 
 
-def _version_faults(edit) -> list[str]:
+def _version_faults(scene) -> list[str]:
     """Whether something newer than what is here has saved the file."""
-    faults, saved, here = [], edit.virtual_shutter.version, versions.extension()
+    faults, saved, here = [], scene.virtual_shutter.version, versions.extension()
     if _numbers(saved) > _numbers(here):
         faults.append(f"the edit was saved by version {saved} of the extension, this machine has {here}")
     if bpy.data.version > bpy.app.version_file:
@@ -124,17 +124,17 @@ def _numbers(version: str) -> list[int]:
     return [int(number) for number in re.findall(r"\d+", version)]
 
 
-def _setting_faults(arguments, edit, frames: range) -> list[str]:
+def _setting_faults(arguments, scene, frames: range) -> list[str]:
     """Whether what the edit's output is can be written, and lie where it is wanted."""
-    read = [arguments.edit, *versions.read_files(edit)]
-    faults = _fault(shared_frames.check_resumable, edit) if arguments.resume else []
+    read = [arguments.edit, *versions.read_files(scene)]
+    faults = _fault(shared_frames.check_resumable, scene) if arguments.resume else []
     if arguments.output:
         ends = frames[0], frames[-1]
         faults += _fault(shared_frames.check, arguments.output, arguments.format, ends, read)
     if arguments.movie:
         return faults + _fault(film_join.check, arguments.movie, [*read, *versions.sounds()])
-    is_movie = edit.render.image_settings.media_type == "VIDEO"
-    return faults + _fault(film_output.check, Path("film.mp4" if is_movie else "frames"), None, film_output.size(edit))
+    is_movie = scene.render.image_settings.media_type == "VIDEO"
+    return faults + _fault(film_output.check, Path("film.mp4" if is_movie else "frames"), None, film_output.size(scene))
 
 
 def _fault(check, *arguments) -> list[str]:
@@ -149,7 +149,7 @@ def _fault(check, *arguments) -> list[str]:
 
 
 def _on_device(
-    edit, frames: range, faults: list[str], notes: list[str], *, find_cuts: bool
+    scene, frames: range, faults: list[str], notes: list[str], *, find_cuts: bool
 ) -> tuple[str | None, list[EffectCheck], int | None]:
     """The name of the device that will render, what is found of the effects (edit_check.effects), and the bytes that
     textures may take of a GPU; without a device, which is a fault, nothing of the effects."""
@@ -161,7 +161,7 @@ def _on_device(
     notes += [lesser] if lesser else []
     try:
         limit = compositor.device.budget.limit if hasattr(compositor, "device") else None
-        return compositor.name, edit_check.effects(edit, frames, compositor, find_cuts=find_cuts), limit
+        return compositor.name, edit_check.effects(scene, frames, compositor, find_cuts=find_cuts), limit
     finally:
         compositor.release()
 
@@ -175,11 +175,11 @@ def _memory(checks: list[EffectCheck], limit: int | None) -> dict:
     return {"gpu": min(gpu, limit or gpu), "gpu_limit": limit, "host": host}
 
 
-def _disk(arguments, edit, frames: range, checks: list[EffectCheck], faults: list[str]) -> dict:
+def _disk(arguments, scene, frames: range, checks: list[EffectCheck], faults: list[str]) -> dict:
     """Bytes that the frames and the in-between frames that are missing take at most, as noise does, which is not
     compressed: no frame is rendered for this. Those that are there already are not counted."""
     file_format, needs = arguments.format or "png", []
-    frame = output_space.picture(*film_output.size(edit), film_output.FORMATS[file_format].bits // 8)
+    frame = output_space.picture(*film_output.size(scene), film_output.FORMATS[file_format].bits // 8)
     if output := arguments.output:
         pictures = film_output.pictures_of(output, file_format, (frames[0], frames[-1]))
         left = sum(not path.exists() for path in pictures)
@@ -215,12 +215,12 @@ def _effect(check: EffectCheck) -> dict:
     }
 
 
-def _builds(file: Path, edit, frames: range, checks: list[EffectCheck]) -> str | None:
+def _builds(file: Path, scene, frames: range, checks: list[EffectCheck]) -> str | None:
     """The command that builds the in-between frames that are missing; None: none is."""
     if not any(each.missing for each in checks):
         return None
-    # Of an edit in this one all are built, whatever frames are asked for.
-    lacking = set().union(*(each.lacking for each in checks if each.edit == edit)) or frames
+    # Of a scene in this one all are built, whatever frames are asked for.
+    lacking = set().union(*(each.lacking for each in checks if each.scene == scene)) or frames
     program = "python -m shutter_addon" if bpy.app.module else "blender -c shutter"
     quoted = subprocess.list2cmdline([file]) if os.name == "nt" else shlex.quote(str(file))
     return f"{program} inbetween {quoted} --frames {min(lacking)}:{max(lacking)}"

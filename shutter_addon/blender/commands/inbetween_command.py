@@ -37,10 +37,10 @@ def _build_edit(arguments) -> None:
     for name in ("factor", "method", "cache"):
         if getattr(arguments, name) is not None:
             raise film_output.OutputError(f"--{name}: is for a source; a saved edit says it itself")
-    edit = saved_edit.open_edit(arguments.source)
-    whole = edit.frame_start, edit.frame_end
-    edit.frame_start, edit.frame_end = command_line.frames(arguments.frames, whole, "edit")
-    build_lacking(edit)
+    scene = saved_edit.open_edit(arguments.source)
+    whole = scene.frame_start, scene.frame_end
+    scene.frame_start, scene.frame_end = command_line.frames(arguments.frames, whole, "edit")
+    build_lacking(scene)
 
 
 def _build_source(arguments) -> None:
@@ -61,14 +61,14 @@ def build_lacking(film) -> None:
     """Builds the in-between frames that a film's frames need, of all effects that it shows, where they are looked
     for."""
     film.frame_set(film.frame_start)
-    for edit, effect, parts in job_snapshots.shown_effects(film):
-        shown = [strip for strip in parts if requirements.shown_frames(edit, strip)]
+    for scene, effect, parts in job_snapshots.shown_effects(film):
+        shown = [strip for strip in parts if requirements.shown_frames(scene, strip)]
         if not shown or inbetween_settings.factor(effect) == 1:
             continue
-        frames = job_snapshots.asked_frames(edit, shown, edit == film)
-        if edit == film:
+        frames = job_snapshots.asked_frames(scene, shown, scene == film)
+        if scene == film:
             frames = {frame for frame in frames if film.frame_start - 1 < frame <= film.frame_end}
-        needing = snapshot.take(edit, effect, shown[0], frames, folder=render_settings.settings().inbetween)
+        needing = snapshot.take(scene, effect, shown[0], frames, folder=render_settings.settings().inbetween)
         with needing.source.open() as medium:
             _build(medium, *needing.inbetween, sorted(needed_pairs(needing)))
 

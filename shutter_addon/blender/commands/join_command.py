@@ -22,13 +22,13 @@ def add(commands) -> None:
 
 def run(arguments) -> None:
     opened = versions.stamp(arguments.edit)
-    edit = saved_edit.open_edit(arguments.edit)
-    whole = edit.frame_start, edit.frame_end
+    scene = saved_edit.open_edit(arguments.edit)
+    whole = scene.frame_start, scene.frame_end
     frames = command_line.frames(arguments.frames, whole, "edit")
-    film_join.check(arguments.output, [arguments.edit, *versions.read_files(edit), *versions.sounds()])
-    for fault in missing_media.sound_faults(edit, range(frames[0], frames[1] + 1)):
+    film_join.check(arguments.output, [arguments.edit, *versions.read_files(scene), *versions.sounds()])
+    for fault in missing_media.sound_faults(scene, range(frames[0], frames[1] + 1)):
         raise film_output.OutputError(fault)  # Blender would make a silent film
     film_join.say_what_is_left_out(arguments.folder, whole)
-    version = saved_edit.version(edit, arguments.edit, opened)
+    version = saved_edit.version(scene, arguments.edit, opened)
     job_file.guard(arguments.folder, version)
-    film_join.join(edit, arguments.folder, arguments.output, frames, version.key)
+    film_join.join(scene, arguments.folder, arguments.output, frames, version.key)

@@ -72,19 +72,19 @@ def _render_edit(arguments) -> None:
     if output is None:
         raise film_output.OutputError("nothing to do: give --output")
     opened = versions.stamp(source)
-    edit = saved_edit.open_edit(source)
-    whole = edit.frame_start, edit.frame_end
-    edit.frame_start, edit.frame_end = frames = command_line.frames(arguments.frames, whole, "edit")
-    for fault in missing_media.faults(edit, range(frames[0], frames[1] + 1), sources=True):
+    scene = saved_edit.open_edit(source)
+    whole = scene.frame_start, scene.frame_end
+    scene.frame_start, scene.frame_end = frames = command_line.frames(arguments.frames, whole, "edit")
+    for fault in missing_media.faults(scene, range(frames[0], frames[1] + 1), sources=True):
         raise film_output.OutputError(fault)  # Blender would render on without it
     settings = render_settings.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)
-    with render_settings.using(settings), shared_frames.of_same_footage(edit) as rendered:
-        version = saved_edit.version(edit, source, opened)
+    with render_settings.using(settings), shared_frames.of_same_footage(scene) as rendered:
+        version = saved_edit.version(scene, source, opened)
         job_file.guard(output, version)
-        read = [source, *versions.read_files(edit)]
+        read = [source, *versions.read_files(scene)]
         shared_frames.check(output, arguments.format, frames, read)
         _check_device(arguments)
-        shared_frames.render(edit, output, file_format, version, rendered, resume=arguments.resume)
+        shared_frames.render(scene, output, file_format, version, rendered, resume=arguments.resume)
 
 
 def _render_source(arguments) -> None:
@@ -106,23 +106,23 @@ def _render_source(arguments) -> None:
         frames = command_line.frames(arguments.frames, (1, new_edit.length(medium, source_recipe)))
         read = path, *command_line.files(medium), arguments.recipe, *_mattes(source_recipe, arguments.recipe.parent)
         film_output.spare(_written(arguments, file_format, frames), read)
-        edit = new_edit.make_edit(path, medium, source_recipe, arguments.recipe.parent)
-    edit.frame_start, edit.frame_end = frames
+        scene = new_edit.make_edit(path, medium, source_recipe, arguments.recipe.parent)
+    scene.frame_start, scene.frame_end = frames
     if output:
         _check_device(arguments)
-        film_output.set_output(edit, output, file_format, alpha=medium.alpha != "opaque")
+        film_output.set_output(scene, output, file_format, alpha=medium.alpha != "opaque")
     if arguments.save:
-        _save(edit, arguments.save)
+        _save(scene, arguments.save)
     folder = _cache(arguments) if source_recipe.inbetween > 1 else None
     weights = arguments.weights if output else None
     with render_settings.using(render_settings.RenderSettings(arguments.device, weights, folder, arguments.gpu_memory)):
         if folder:
-            inbetween_command.build_lacking(edit)
+            inbetween_command.build_lacking(scene)
         if output and arguments.weights:
             arguments.weights.mkdir(parents=True, exist_ok=True)
             atomic_write.clear_up(arguments.weights)
         if output:
-            film_output.film(edit, output)
+            film_output.film(scene, output)
 
 
 def _check_device(arguments) -> None:
@@ -165,26 +165,26 @@ def _cache(arguments) -> Path:
     return arguments.cache or (arguments.save or arguments.output).parent / inbetween_settings.FOLDER
 
 
-def _save(edit, path: Path) -> None:
+def _save(scene, path: Path) -> None:
     """Saves the edit, its paths relative to the file: it may be opened on another machine. OutputError: it cannot be
     saved whole; what stood there stays."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         atomic_write.clear_up(path.parent)
-        _save_whole(edit, path)
+        _save_whole(scene, path)
     except OSError as error:
         raise film_output.OutputError(f"{path}: {error.strerror or error}") from None
 
 
-def _save_whole(edit, path: Path) -> None:
+def _save_whole(scene, path: Path) -> None:
     with atomic_write.part_folder(path.parent) as folder:
         part = folder / "edit.blend"
         try:
-            with film_output.quiet(), new_edit.paths_relative(edit, path.parent):
+            with film_output.quiet(), new_edit.paths_relative(scene, path.parent):
                 bpy.ops.wm.save_as_mainfile(filepath=str(part), compress=True, copy=True, relative_remap=False)
         except RuntimeError as error:
             raise film_output.OutputError(f"{path}: {film_output.message(error)}") from None
-        if not _is_whole(part, edit.name):
+        if not _is_whole(part, scene.name):
             raise film_output.OutputError(f"{path}: could not be saved whole; {why_short(folder)}")
         if path.is_file() and bpy.context.preferences.filepaths.save_version:
             path.replace(f"{path}1")  # as Blender itself keeps what stood there

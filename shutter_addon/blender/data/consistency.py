@@ -117,18 +117,18 @@ def fit_factor(effect) -> None:
 def _change_bars(effect, index: int, change) -> None:
     """Gives a shutter other bars, and as many, at all its keys: those that `change` makes of the old ones."""
     shutter = effect.shutters[index]
-    edit, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
-    curves = fcurves.Curves(edit)
+    scene, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
+    curves = fcurves.Curves(scene)
     old = bars(shutter)
     keyed = {k: curve for k in range(len(old)) if (curve := curves.find(f"{path}[{k}].weight"))}
     words = curves.keys(list(keyed.values()))
     keys = [(frame, change(_bars_keyed(old, keyed, frame)), ease) for frame, ease in words]
-    fcurves.remove_curves(edit, f"{path}[")
+    fcurves.remove_curves(scene, f"{path}[")
     shutter.bars.clear()
     for k, weight in enumerate(change(old)):
         shutter.bars.add().weight = weight
         if keys:
-            fcurves.set_keys(edit, f"{path}[{k}].weight", 0, [(frame, bar[k], ease) for frame, bar, ease in keys])
+            fcurves.set_keys(scene, f"{path}[{k}].weight", 0, [(frame, bar[k], ease) for frame, bar, ease in keys])
 
 
 def _bars_keyed(old, keyed, frame: float) -> np.ndarray:

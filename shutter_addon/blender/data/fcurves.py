@@ -1,6 +1,6 @@
-"""F-curves of the edit's Scene: values at any frame, whatever frame Blender itself is at.
+"""F-curves of a scene: values at any frame, whatever frame Blender itself is at.
 
-The engine is called with the effect scene's depsgraph, which knows nothing of the edit's animation.
+The engine is called with the effect scene's depsgraph, which knows nothing of other scenes' animation.
 """
 
 import re

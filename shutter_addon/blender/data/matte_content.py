@@ -24,17 +24,17 @@ def content(effect, strip, region, moves, frames, time: keyframes.Channel | None
     """The channel of a matte or a ramp, sampled at timeline frames; strip: the effect strip that shows it, moves:
     channels of the region's location, rotation and scale, time: see core.model.effect.Effect. EffectError,
     MediaError: there is none."""
-    edit = effect.id_data
+    scene = effect.id_data
     if region.kind == "RAMP":
         ramp = validation.word(region, "ramp")
         if ramp != "LUMINANCE":
             return PlacedRamp(ramp.lower(), *moves)
-        return mattes.FileFrames(_of_strip(strips.source_of(edit, effect, strip), "luminance"))
+        return mattes.FileFrames(_of_strip(strips.source_of(scene, effect, strip), "luminance"))
     matte = validation.word(region, "matte")
     if matte == "STRIP":
         return _strip_frames(strip, region, frames)
     if matte == "MASK":
-        return _mask_shapes(edit, effect, strip, region, frames, time)
+        return _mask_shapes(scene, effect, strip, region, frames, time)
     first = strips.origin(strip) if validation.word(region, "timing") == "TIMELINE" else None
     return mattes.FileFrames(image_file(region), validation.number(region, "offset"), first)
 
@@ -81,14 +81,14 @@ def _listed(path: Path, _stamp) -> list[Path]:
         return []
 
 
-def _mask_shapes(edit, effect, strip, region, frames, time) -> keyframes.Channel:
+def _mask_shapes(scene, effect, strip, region, frames, time) -> keyframes.Channel:
     """A mask's shapes at the source's frames, of which the first is the mask's start, as a Mask strip on it has it."""
     mask = region.mask
     if mask is None:
         raise EffectError(rpt_("{place}: it has no mask").format(place=validation.place(region)))
     if not mask_reading.moves(mask):
         return keyframes.Constant(_tried(mask_reading.mask_at, mask, mask.frame_start))
-    filmed = shown_frame(edit, effect, strip, time)
+    filmed = shown_frame(scene, effect, strip, time)
 
     def shape(frame):
         return mask_reading.mask_at(mask, mask.frame_start + filmed(frame))
@@ -96,10 +96,10 @@ def _mask_shapes(edit, effect, strip, region, frames, time) -> keyframes.Channel
     return keyframes.Samples({frame: _tried(shape, frame) for frame in frames})
 
 
-def shown_frame(edit, effect, strip, time: keyframes.Channel | None) -> Callable[[float], float]:
+def shown_frame(scene, effect, strip, time: keyframes.Channel | None) -> Callable[[float], float]:
     """What gives the source's frame that an effect strip shows at a timeline frame: filmed ones counted from 0, those
     between them in parts. time: see `content`. EffectError, MediaError: it cannot be known."""
-    source = strips.source_of(edit, effect, strip)
+    source = strips.source_of(scene, effect, strip)
     medium, timing = _Medium.of(source, inbetween_settings.factor(effect)), strip_timing.timing_of(source)
 
     def shown(frame):

@@ -24,17 +24,17 @@ class Look(NamedTuple):
     note: str = ""
 
 
-def look(edit, effect, strip, region) -> Look:
+def look(scene, effect, strip, region) -> Look:
     """The look at a region that is a matte, taken once until something changes."""
     index = list(effect.regions).index(region)
-    return _looks.get((effect.scene.session_uid, index, strip.name), lambda: _look(edit, effect, strip, index))
+    return _looks.get((effect.scene.session_uid, index, strip.name), lambda: _look(scene, effect, strip, index))
 
 
-def _look(edit, effect, strip, index: int) -> Look:
+def _look(scene, effect, strip, index: int) -> Look:
     frame, region = strip.left_handle, effect.regions[index]
     try:
         with translated(rpt_):
-            content = snapshot.region_at(edit, effect, strip, index, (frame,)).content
+            content = snapshot.region_at(scene, effect, strip, index, (frame,)).content
             shown = content.at(frame)
     except UserError as error:
         return Look(fault=str(error))
@@ -48,10 +48,10 @@ def _look(edit, effect, strip, index: int) -> Look:
     text = iface_("{width} × {height}, {count} frames").format(width=width, height=height, count=count)
     if count == 1:
         text = iface_("{width} × {height}, one picture").format(width=width, height=height)
-    return Look(text, note=_note(edit, effect, strip, region, content, count))
+    return Look(text, note=_note(scene, effect, strip, region, content, count))
 
 
-def _note(edit, effect, strip, region, content, count: int) -> str:
+def _note(scene, effect, strip, region, content, count: int) -> str:
     """That a matte is shorter than what it is for."""
     if region.matte == "STRIP":
         ends = max(part.right_handle for part in matte_strips.parts_for(region, strip))
@@ -62,7 +62,7 @@ def _note(edit, effect, strip, region, content, count: int) -> str:
         last = strip.right_handle - 1 - content.first
     else:
         try:
-            last = snapshot.last_shown(edit, effect, strip)
+            last = snapshot.last_shown(scene, effect, strip)
         except UserError:  # which the live preview tells
             return ""
     if content.offset + last < count:

@@ -1,4 +1,4 @@
-"""Strips of the edit that are mattes: found by an identity, so that they may be renamed and cut."""
+"""Strips of the scene that are mattes: found by an identity, so that they may be renamed and cut."""
 
 import uuid
 

@@ -10,28 +10,28 @@ from ...media.files import check_file, check_sound
 from . import external_files, requirements, strips, used_data
 
 
-def faults(edit, frames: range, *, sources: bool) -> list[str]:
+def faults(scene, frames: range, *, sources: bool) -> list[str]:
     """A sentence for each file that the pictures of these frames need and that cannot be had: of movie, image and clip
     strips, of images, volumes, caches and fonts that what is shown uses, and of libraries. Edits that it shows count as
     a whole; files of mattes are not looked for.
 
     sources: those of effects, too, as far as the sources are shown themselves"""
-    sentences = _of_strips(edit, frames, strips.SOURCES, sources=sources)
-    used, data = used_data.used(edit, frames) - _clips(edit), bpy.data
+    sentences = _of_strips(scene, frames, strips.SOURCES, sources=sources)
+    used, data = used_data.used(scene, frames) - _clips(scene), bpy.data
     for items in (data.images, data.volumes, data.cache_files, data.movieclips, data.fonts):
         sentences += [_words(item, fault) for item in items if item in used for fault in _of_item(item)]
     sentences += [_words(library, fault) for library in data.libraries for fault in _of_item(library)]
     return list(dict.fromkeys(sentences))
 
 
-def sound_faults(edit, frames: range) -> list[str]:
+def sound_faults(scene, frames: range) -> list[str]:
     """As `faults`, of sound strips."""
-    return _of_strips(edit, frames, ("SOUND",), sources=False)
+    return _of_strips(scene, frames, ("SOUND",), sources=False)
 
 
-def _clips(edit) -> set:
+def _clips(scene) -> set:
     """Those of the strips, which are looked at as such."""
-    shown = (strip for each in strips.shown_edits(edit) for strip in each.sequence_editor.strips_all)
+    shown = (strip for each in strips.shown_scenes(scene) for strip in each.sequence_editor.strips_all)
     return {strip.clip for strip in shown if strip.type == "MOVIECLIP"}
 
 
@@ -39,9 +39,9 @@ def _words(item, fault: str) -> str:
     return f'{item.bl_rna.name.lower()} "{item.name}": {fault}'
 
 
-def _of_strips(edit, frames: range, kinds: tuple[str, ...], *, sources: bool) -> list[str]:
+def _of_strips(scene, frames: range, kinds: tuple[str, ...], *, sources: bool) -> list[str]:
     sentences = []
-    for shown, wanted in requirements.edits_at(edit, frames):
+    for shown, wanted in requirements.scenes_at(scene, frames):
         others = () if sources else strips.shown_sources(shown)
         for strip in shown.sequence_editor.strips_all:
             at = frame_ranges.common(requirements.shown_frames(shown, strip), wanted)

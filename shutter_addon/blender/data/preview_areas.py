@@ -61,7 +61,7 @@ def preview_region(area):
 
 def shown(context) -> Shown | None:
     """The effect strip under the playhead that the preview shows, as selection.seen has it."""
-    edit, space = selection.edit_of(context), context.space_data
+    edit, space = selection.scene_of(context), context.space_data
     if space.display_mode != "IMAGE" or space.display_channel or (seen := selection.seen(edit)) is None:
         return None
     above = any(other.channel > seen[2].channel for other in selection.visible(edit))

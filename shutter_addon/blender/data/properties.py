@@ -1,7 +1,7 @@
-"""The effect's data: on the edit's Scene, where it can be keyed (properties nested on a strip cannot).
+"""The effect's data: on the scene that has its strips, where it can be keyed (properties nested on a strip cannot).
 
 `scene.virtual_shutter.effects[i]` belongs to the effect scene it points to; the Scene strips that show that scene
-are the effect's strips. Frames are timeline frames of the edit, as everywhere in Blender.
+are the effect's strips. Frames are timeline frames, as everywhere in Blender.
 """
 
 import sys
@@ -276,7 +276,7 @@ class ShutterEffect(PropertyGroup):
 
 
 class ShutterScene(PropertyGroup):
-    """Of an edit: its effects, and the version of the extension that saved it. Of an effect's scene: an identity, by
+    """Of a scene: its effects, and the version of the extension that saved it. Of an effect scene: an identity, by
     which a copy is known."""
 
     effects: CollectionProperty(type=ShutterEffect)

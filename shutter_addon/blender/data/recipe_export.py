@@ -9,7 +9,7 @@ from . import annotations, fcurves, inbetween_settings, snapshot, strips, valida
 from .validation import EffectError
 
 
-def recipe_of(edit, effect, strip, mattes=()) -> recipe.Recipe:
+def recipe_of(scene, effect, strip, mattes=()) -> recipe.Recipe:
     """The effect as a recipe, whose frame 1 is the strip's first; left out is what baking.baked leaves out, and regions
     without a shutter. mattes: see baking.baked. EffectError: it cannot be rendered as it stands."""
     snapshot.check_counts(effect)
@@ -27,13 +27,13 @@ def recipe_of(edit, effect, strip, mattes=()) -> recipe.Recipe:
         sentence = rpt_('strip "{strip}" is too small to find its scribbles')
         raise EffectError(sentence.format(strip=strip.name))
     with translated(rpt_):
-        plain = snapshot.read(edit, effect, strip, sorted({*shown, *_keyed(edit, effect)}), thorough=True)
+        plain = snapshot.read(scene, effect, strip, sorted({*shown, *_keyed(scene, effect)}), thorough=True)
         return baking.baked(plain, shown, inbetween_settings.method(effect), mattes)
 
 
-def _keyed(edit, effect) -> set[float]:
+def _keyed(scene, effect) -> set[float]:
     """The timeline frames of the effect's keys and drawings."""
-    frames = set(fcurves.key_frames(fcurves.curves_under(edit, effect.path_from_id() + ".")))
+    frames = set(fcurves.key_frames(fcurves.curves_under(scene, effect.path_from_id() + ".")))
     layers = (annotations.layer_of(effect, region) for region in effect.regions)
     return frames.union(float(drawing.frame_number) for layer in layers if layer for drawing in layer.frames)
 

@@ -22,7 +22,7 @@ from .snapshot import OPTIONS
 from .validation import EffectError
 
 
-def apply(edit, effect, strip, source: recipe.Recipe, folder: Path = Path()) -> None:
+def apply(scene, effect, strip, source: recipe.Recipe, folder: Path = Path()) -> None:
     """Replaces the effect's data and keys by a recipe, whose frame 1 is the strip's first; folder: where it lies, which
     its mattes' paths begin at. EffectError: its keys cannot lie there; MediaError: it has no such mattes; nothing has
     changed."""
@@ -30,7 +30,7 @@ def apply(edit, effect, strip, source: recipe.Recipe, folder: Path = Path()) -> 
     _check_keys(source, first)
     mattes = [region for region in source.regions if isinstance(region, recipe.MatteRegion)]
     images = {region.path: matte_image(folder / region.path, region.channel) for region in mattes}
-    clear(edit, effect)
+    clear(scene, effect)
     # Bars per frame before the factor, which else would change the window.
     effect.bars_per_frame, effect.inbetween = source.inbetween, str(source.inbetween)
     effect.inbetween_method = source.inbetween_method.upper()
@@ -42,29 +42,29 @@ def apply(edit, effect, strip, source: recipe.Recipe, folder: Path = Path()) -> 
     path = effect.path_from_id()
     effect.use_source_time = bool(source.time)
     if source.time:
-        _set_number(edit, effect, path, "source_time", source.time, first, group=effect.name)
-    _set_number(edit, effect, path, "edge_aware", source.edge_aware, first, group=effect.name)
-    _set_moves(edit, effect.camera, f"{path}.camera", source.camera, first, group=effect.camera.name)
+        _set_number(scene, effect, path, "source_time", source.time, first, group=effect.name)
+    _set_number(scene, effect, path, "edge_aware", source.edge_aware, first, group=effect.name)
+    _set_moves(scene, effect.camera, f"{path}.camera", source.camera, first, group=effect.camera.name)
     influence = source.camera_influence
-    _set_number(edit, effect.camera, f"{path}.camera", "influence", influence, first, group=effect.camera.name)
+    _set_number(scene, effect.camera, f"{path}.camera", "influence", influence, first, group=effect.camera.name)
     for i, shutter in enumerate(source.shutters):
-        _add_shutter(edit, effect, f"{path}.shutters[{i}]", shutter, first)
+        _add_shutter(scene, effect, f"{path}.shutters[{i}]", shutter, first)
     colors = {shutter.name: shutter.color for shutter in source.shutters}
     for region in source.regions:
         if isinstance(region, recipe.Region):
-            _add_region(edit, effect, strip, region, colors[region.shutter], first)
+            _add_region(scene, effect, strip, region, colors[region.shutter], first)
         else:
-            _add_matte(edit, effect, strip, region, images, first)
+            _add_matte(scene, effect, strip, region, images, first)
 
 
-def _set_number(edit, owner, path: str, name: str, value: recipe.Keyable, first: float, **curve) -> None:
+def _set_number(scene, owner, path: str, name: str, value: recipe.Keyable, first: float, **curve) -> None:
     """A number of a property group, or its keys."""
     if not isinstance(value, list):
         setattr(owner, name, value)
         return
     setattr(owner, name, value[0].value)
     keys = [(key.frame + first, key.value, key.ease) for key in value]
-    fcurves.set_keys(edit, f"{path}.{name}", 0, keys, **curve)
+    fcurves.set_keys(scene, f"{path}.{name}", 0, keys, **curve)
 
 
 def matte_image(path: str | Path, channel: str = "luminance"):
@@ -119,9 +119,9 @@ def _check_keys(source: recipe.Recipe, first: float) -> None:
             raise EffectError(sentence.format(frame=f"{keys[wrong[0]].frame:.10g}"))
 
 
-def clear(edit, effect) -> None:
+def clear(scene, effect) -> None:
     """Removes the effect's shutters, regions, scribbles and keys."""
-    fcurves.remove_curves(edit, effect.path_from_id() + ".")
+    fcurves.remove_curves(scene, effect.path_from_id() + ".")
     effect.shutters.clear()
     effect.regions.clear()
     effect.camera.stops.clear()
@@ -131,7 +131,7 @@ def clear(edit, effect) -> None:
             effect.scene.annotation.layers.remove(layer)
 
 
-def _add_shutter(edit, effect, path: str, source: recipe.Shutter, first: float) -> None:
+def _add_shutter(scene, effect, path: str, source: recipe.Shutter, first: float) -> None:
     shutter = effect.shutters.add()
     shutter.name, shutter.color = source.name, source.color
     if source.follow is not None:
@@ -140,26 +140,26 @@ def _add_shutter(edit, effect, path: str, source: recipe.Shutter, first: float) 
     shutter.follow_motion, shutter.follow_smooth = source.follow_motion.upper(), source.follow_smooth
     if source.trail is not None:
         shutter.length = "MOTION"
-        _set_number(edit, shutter, path, "trail", source.trail, first)
+        _set_number(scene, shutter, path, "trail", source.trail, first)
     for weight in source.bars if source.bars is not None else source.keys[0].bars:
         shutter.bars.add().weight = weight
     if source.keys:
         for k in range(len(shutter.bars)):
             keys = [(key.frame + first, key.bars[k], key.ease) for key in source.keys]
-            fcurves.set_keys(edit, f"{path}.bars[{k}].weight", 0, keys)
+            fcurves.set_keys(scene, f"{path}.bars[{k}].weight", 0, keys)
 
 
-def _add_region(edit, effect, strip, source: recipe.Region, color, first: float) -> None:
+def _add_region(scene, effect, strip, source: recipe.Region, color, first: float) -> None:
     region = effect.regions.add()
     region.name, region.shutter, region.width = source.name, source.shutter, source.width
     region.kind = source.kind.upper()
     region.layer = _draw(effect, strip, source, color, first)
     path = region.path_from_id()
-    _set_number(edit, region, path, "opacity", source.opacity, first)
-    _set_moves(edit, region, path, source.keys, first)
+    _set_number(scene, region, path, "opacity", source.opacity, first)
+    _set_moves(scene, region, path, source.keys, first)
 
 
-def _add_matte(edit, effect, strip, source: recipe.MatteRegion | recipe.RampRegion, images: dict, first: float) -> None:
+def _add_matte(scene, effect, strip, source: recipe.MatteRegion | recipe.RampRegion, images, first: float) -> None:
     region = effect.regions.add()
     region.name, region.shutter, region.kind = source.name, source.shutter, source.kind.upper()
     region.invert, region.blend = source.invert, source.blend.upper()
@@ -174,12 +174,12 @@ def _add_matte(edit, effect, strip, source: recipe.MatteRegion | recipe.RampRegi
         region.channel = "NAMED" if is_named else source.channel.upper()
         region.channel_name = source.channel if is_named else ""
     path = region.path_from_id()
-    _set_number(edit, region, path, "opacity", source.opacity, first)
-    _set_number(edit, region, path, "feather", source.width, first)
-    _set_moves(edit, region, path, source.keys, first)
+    _set_number(scene, region, path, "opacity", source.opacity, first)
+    _set_number(scene, region, path, "feather", source.width, first)
+    _set_moves(scene, region, path, source.keys, first)
 
 
-def _set_moves(edit, moving, path: str, keys: list, first: float, **curve) -> None:
+def _set_moves(scene, moving, path: str, keys: list, first: float, **curve) -> None:
     """Location, rotation and scale of a region or of the camera, and their keys."""
     start = keys[0] if keys else recipe.CameraKey(0)
     moving.location, moving.rotation, moving.scale = start.location, np.radians(start.rotation), start.scale
@@ -193,7 +193,7 @@ def _set_moves(edit, moving, path: str, keys: list, first: float, **curve) -> No
     }
     for (name, index), value in channels.items():
         numbers = [(key.frame + first, value(key), key.ease) for key in keys]
-        fcurves.set_keys(edit, f"{path}.{name}", index, numbers, **curve)
+        fcurves.set_keys(scene, f"{path}.{name}", index, numbers, **curve)
 
 
 def _draw(effect, strip, source: recipe.Region, color, first: float) -> str:

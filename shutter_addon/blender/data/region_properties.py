@@ -1,4 +1,4 @@
-"""What a region and the camera are in Blender: properties of the edit's scene."""
+"""What a region and the camera are in Blender: properties of the scene."""
 
 import math
 

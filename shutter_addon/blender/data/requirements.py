@@ -7,9 +7,9 @@ from ...core.model.limits import MAX_FRAME
 from .strips import ENGINE, own_strips
 
 
-def left_out(edit) -> list[tuple[range, str]]:
+def left_out(scene) -> list[tuple[range, str]]:
     """The timeline frames that the sequencer leaves an effect out of, and why."""
-    reasons = ((shown_frames(edit, strip), why) for strip in own_strips(edit) if (why := _why(strip)) is not None)
+    reasons = ((shown_frames(scene, strip), why) for strip in own_strips(scene) if (why := _why(strip)) is not None)
     return [(frames, why) for frames, why in reasons if frames]
 
 
@@ -44,32 +44,32 @@ def camera(strip):
     return strip.scene_camera or strip.scene.camera or next(bound, None)
 
 
-def edits_at(film, frames: range) -> list[tuple]:
-    """What a film shows at some of its frames: (edit, frames) of itself, and of every edit in its Scene strips, which
+def scenes_at(film, frames: range) -> list[tuple]:
+    """What a film shows at some of its frames: (scene, frames) of itself, and of every scene in its Scene strips, which
     counts as a whole."""
     shown = {film: frames}
     new = [film]
     while new:
-        edit = new.pop()
-        for strip in edit.sequence_editor.strips_all if edit.sequence_editor else ():
+        scene = new.pop()
+        for strip in scene.sequence_editor.strips_all if scene.sequence_editor else ():
             is_new = strip.type == "SCENE" and strip.scene and strip.scene not in shown
-            if is_new and is_shown(edit, strip, shown[edit]):
+            if is_new and is_shown(scene, strip, shown[scene]):
                 shown[strip.scene] = range(-MAX_FRAME, MAX_FRAME + 1)
                 new.append(strip.scene)
-    return [(edit, at) for edit, at in shown.items() if edit.sequence_editor]
+    return [(scene, at) for scene, at in shown.items() if scene.sequence_editor]
 
 
-def is_shown(edit, strip, frames: range) -> bool:
+def is_shown(scene, strip, frames: range) -> bool:
     """Whether a strip is shown at one of these timeline frames."""
-    return bool(frame_ranges.common(shown_frames(edit, strip), frames))
+    return bool(frame_ranges.common(shown_frames(scene, strip), frames))
 
 
-def shown_frames(edit, strip) -> range:
+def shown_frames(scene, strip) -> range:
     """The timeline frames at which a strip is shown: neither muted, nor in a meta strip that is not."""
     first, last = strip.left_handle, strip.right_handle
     while strip is not None:
         outer = strip.parent_meta()
-        if strip.mute or (outer or edit.sequence_editor).channels[strip.channel].mute:
+        if strip.mute or (outer or scene.sequence_editor).channels[strip.channel].mute:
             return range(0)
         first, last = max(first, strip.left_handle), min(last, strip.right_handle)
         strip = outer

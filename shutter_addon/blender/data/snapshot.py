@@ -1,7 +1,7 @@
 """An effect strip as plain data: the one place that reads what an effect is from Blender's data.
 
 On Blender's main thread alone. What comes of it holds no Blender data, so that threads may read it, and it does not
-change when the edit does. Channels are sampled at the frames that are asked for: Blender's F-curves are evaluated by
+change when the scene does. Channels are sampled at the frames that are asked for: Blender's F-curves are evaluated by
 Blender itself. Drivers, NLA strips and further layers of an action do not count (docs/manual.md).
 """
 
@@ -36,13 +36,13 @@ _CORE = (
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """All that the pictures of an effect strip depend on; frames are timeline frames of its edit.
+    """All that the pictures of an effect strip depend on; frames are timeline frames.
 
     scene: session_uid of the effect's scene, whose frame 0 is shown at the timeline frame `origin`
     effect: its channels are sampled at `frames`
     source: what is read, and `timing`, when; None: the effect's own source time says that
     inbetween: its in-between frames, None: it has none; built: the stamp of those there are
-    first: the strip's first timeline frame; film: from frame to frame of the edit's film, and its last frame"""
+    first: the strip's first timeline frame; film: from frame to frame of the scene's film, and its last frame"""
 
     scene: int
     origin: float
@@ -78,20 +78,20 @@ def source_files(effect, source, folder: Path | None = None) -> SourceFiles:
 
 
 def take(
-    edit, effect, strip, frames, *, folder: Path | None = None, files: dict[str, SourceFiles] | None = None
+    scene, effect, strip, frames, *, folder: Path | None = None, files: dict[str, SourceFiles] | None = None
 ) -> Snapshot:
     """The snapshot of an effect strip at timeline frames; folder: see source_files; files: what that
     returned, by source strip.
     EffectError, MediaError: there is no source, or no picture at any frame."""
-    source = strips.source_of(edit, effect, strip)
+    source = strips.source_of(scene, effect, strip)
     stamps = (files or {}).get(source.name) or source_files(effect, source, folder)
     return Snapshot(
         effect.scene.session_uid,
         strips.timeline_frame(strip, 0),
         strip.left_handle,
-        (edit.frame_step, edit.frame_end),
+        (scene.frame_step, scene.frame_end),
         frozenset(frames),
-        read(edit, effect, strip, frames),
+        read(scene, effect, strip, frames),
         source_media.spec(source, stamps.key),
         None if effect.use_source_time else timing_of(source),
         inbetween_settings.settings(effect, folder) if inbetween_settings.factor(effect) > 1 else None,
@@ -99,13 +99,13 @@ def take(
     )
 
 
-def read(edit, effect, strip, frames, *, thorough: bool = False) -> model.Effect:
+def read(scene, effect, strip, frames, *, thorough: bool = False) -> model.Effect:
     """An effect, its channels sampled at timeline frames; strip: the effect strip that shows it. EffectError: it has no
     shutter, or more of anything than an effect has. What is wrong at one frame is told at that frame.
 
     thorough: bars are sampled both ways at every frame, displaced or not"""
     check_counts(effect)
-    curves, path = Curves(edit), effect.path_from_id()
+    curves, path = Curves(scene), effect.path_from_id()
     options = _options(curves, path, effect, frames)
     names = [shutter.name for shutter in effect.shutters]
     followed = {shutter.follow_region for shutter in effect.shutters if shutter.follow == "REGION"}
@@ -155,44 +155,44 @@ def _followed(shutter, regions, camera: model.Camera) -> model.Region | model.Ca
     return followed
 
 
-def bars_at(edit, effect, index: int, frame: float) -> np.ndarray:
+def bars_at(scene, effect, index: int, frame: float) -> np.ndarray:
     """Bars (L,) of a shutter at a timeline frame, whether or not a picture can be made of them. EffectError: they are
     not as many as the window is long, or one cannot be."""
-    curves, frames = Curves(edit), (frame,)
+    curves, frames = Curves(scene), (frame,)
     options = _options(curves, effect.path_from_id(), effect, frames)
     shutter = _shutter(curves, effect, index, options, frames)
     return shutter.bars.at(frame, options.at(frame).interpolation)
 
 
-def strokes_at(edit, effect, strip, index: int, frame: float) -> list[np.ndarray]:
+def strokes_at(scene, effect, strip, index: int, frame: float) -> list[np.ndarray]:
     """A region's strokes (n, 2) on the picture at a timeline frame, not moved yet; a matte has none. EffectError: they
     lie nowhere."""
     if effect.regions[index].kind in strips.MATTES:
         return []
     with translated(rpt_):
-        return region_at(edit, effect, strip, index, (frame,)).unmoved(frame)
+        return region_at(scene, effect, strip, index, (frame,)).unmoved(frame)
 
 
-def region_at(edit, effect, strip, index: int, frames) -> model.Region | model.MatteRegion:
+def region_at(scene, effect, strip, index: int, frames) -> model.Region | model.MatteRegion:
     """A region as plain data, its channels sampled at timeline frames. What is wrong at one frame is told at that
     frame."""
-    return _any_region(_Sampling.of(Curves(edit), effect, strip, frames), index, 0)
+    return _any_region(_Sampling.of(Curves(scene), effect, strip, frames), index, 0)
 
 
-def last_shown(edit, effect, strip) -> float:
+def last_shown(scene, effect, strip) -> float:
     """The last of the source's frames that an effect strip shows (see matte_content.shown_frame); where keys say which
     these are, of a hundred frames of the strip. EffectError, MediaError: it cannot be known."""
     first, last = strip.left_handle, strip.right_handle - 1
     frames, time = (first, last), None
     if effect.use_source_time:
         frames = *range(first, last, max(1, (last - first) // 100)), last
-        time = _source_time(Curves(edit), effect.path_from_id(), effect, frames)
-    return max(map(matte_content.shown_frame(edit, effect, strip, time), frames))
+        time = _source_time(Curves(scene), effect.path_from_id(), effect, frames)
+    return max(map(matte_content.shown_frame(scene, effect, strip, time), frames))
 
 
-def camera_at(edit, effect, frames) -> model.Camera:
+def camera_at(scene, effect, frames) -> model.Camera:
     """The camera as plain data, its channels sampled at timeline frames; as region_at."""
-    return _camera(Curves(edit), effect, frames)
+    return _camera(Curves(scene), effect, frames)
 
 
 def check_counts(effect) -> None:

@@ -32,7 +32,7 @@ class _Look:
 
 
 _specs: dict[tuple, "SourceSpec"] = {}  # by media_key
-_looks: dict[tuple, _Look] = {}  # by edit and strip, or by image
+_looks: dict[tuple, _Look] = {}  # by scene and strip, or by image
 _resting = False  # while a film is rendered, all its files have been asked before it
 
 

@@ -20,20 +20,20 @@ class Proxy:
     stamp: tuple
 
 
-def proxy_of(edit, strip, percent: int) -> Proxy | None:
+def proxy_of(scene, strip, percent: int) -> Proxy | None:
     """What Blender reads of a strip in previews of that size, in percent; None: the footage itself."""
     if strip.type not in ("MOVIE", "IMAGE") or not strip.use_proxy or not getattr(strip.proxy, f"build_{percent}"):
         return None
-    by_strip = edit.sequence_editor.proxy_storage == "PER_STRIP"
+    by_strip = scene.sequence_editor.proxy_storage == "PER_STRIP"
     if by_strip and strip.proxy.use_proxy_custom_file:
         return _proxy(_absolute(strip.proxy.filepath))
     if strip.type == "MOVIE":
         movie = _absolute(strip.filepath, strip.id_data.library)
         stream = f"_st{strip.stream_index}" if strip.stream_index else ""
-        return _proxy(_folder(edit, strip, movie.parent) / movie.name / f"proxy_{percent}{stream}.avi")
-    if edit.sequencer_colorspace_settings.name != "sRGB":  # what Blender keeps its pictures in
+        return _proxy(_folder(scene, strip, movie.parent) / movie.name / f"proxy_{percent}{stream}.avi")
+    if scene.sequencer_colorspace_settings.name != "sRGB":  # what Blender keeps its pictures in
         return None
-    folder = _folder(edit, strip, _absolute(strip.directory, strip.id_data.library)) / "images" / str(percent)
+    folder = _folder(scene, strip, _absolute(strip.directory, strip.id_data.library)) / "images" / str(percent)
     ends = strip.elements[0], strip.elements[-1]
     return _proxy(folder, *(of_image(folder, element.filename) for element in ends))
 
@@ -43,10 +43,10 @@ def of_image(folder: Path, image) -> Path:
     return folder / f"{Path(image).name}_proxy.jpg"
 
 
-def _folder(edit, strip, beside: Path) -> Path:
+def _folder(scene, strip, beside: Path) -> Path:
     """Where the strip's proxies lie; beside: the folder of its footage."""
-    if edit.sequence_editor.proxy_storage == "PROJECT":
-        return _absolute(edit.sequence_editor.proxy_dir or "//BL_proxy")
+    if scene.sequence_editor.proxy_storage == "PROJECT":
+        return _absolute(scene.sequence_editor.proxy_dir or "//BL_proxy")
     if strip.proxy.use_proxy_custom_directory:
         return _absolute(strip.proxy.directory)
     return beside / "BL_proxy"

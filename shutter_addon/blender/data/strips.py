@@ -13,33 +13,33 @@ SOURCES = ("MOVIE", "IMAGE", "MOVIECLIP")
 MATTES = ("MATTE", "RAMP")  # kinds of regions that have no strokes
 
 
-def effect_strips(edit) -> list:
-    """The edit's effect strips, those inside meta strips too."""
-    if edit.sequence_editor is None:
+def effect_strips(scene) -> list:
+    """The scene's effect strips, those inside meta strips too."""
+    if scene.sequence_editor is None:
         return []
     return [
         strip
-        for strip in edit.sequence_editor.strips_all
+        for strip in scene.sequence_editor.strips_all
         if strip.type == "SCENE" and strip.scene and strip.scene.render.engine == ENGINE
     ]
 
 
-def shown_edits(edit) -> list:
-    """The edit, and those that its Scene strips show."""
-    shown, new = [], [edit]
+def shown_scenes(scene) -> list:
+    """The scene, and those that its Scene strips show."""
+    shown, new = [], [scene]
     while new:
-        scene = new.pop()
-        if scene is not None and scene not in shown and scene.sequence_editor:
-            shown.append(scene)
-            new += [strip.scene for strip in scene.sequence_editor.strips_all if strip.type == "SCENE"]
+        other = new.pop()
+        if other is not None and other not in shown and other.sequence_editor:
+            shown.append(other)
+            new += [strip.scene for strip in other.sequence_editor.strips_all if strip.type == "SCENE"]
     return shown
 
 
-def own_strips(edit) -> list:
+def own_strips(scene) -> list:
     """The strips that were made for effects, those too whose scene has another engine or is gone."""
-    if edit.sequence_editor is None:
+    if scene.sequence_editor is None:
         return []
-    return [strip for strip in edit.sequence_editor.strips_all if strip.type == "SCENE" and _is_own(strip)]
+    return [strip for strip in scene.sequence_editor.strips_all if strip.type == "SCENE" and _is_own(strip)]
 
 
 def _is_own(strip) -> bool:
@@ -49,19 +49,19 @@ def _is_own(strip) -> bool:
     return scene.render.engine == ENGINE or scene.virtual_shutter.identity == identity != ""
 
 
-def effect_of(edit, scene):
-    """The edit's effect that an effect scene shows, or None."""
-    return next((effect for effect in edit.virtual_shutter.effects if effect.scene == scene), None)
+def effect_of(scene, effect_scene):
+    """The scene's effect that an effect scene shows, or None."""
+    return next((effect for effect in scene.virtual_shutter.effects if effect.scene == effect_scene), None)
 
 
-def find_edit(scene):
-    """Edit, effect and one of its strips for an effect scene. EffectError: nothing uses it any more."""
-    for edit in bpy.data.scenes:
-        if (effect := effect_of(edit, scene)) is not None:
-            for strip in effect_strips(edit):
-                if strip.scene == scene:
-                    return edit, effect, strip
-    raise EffectError(rpt_('scene "{scene}" belongs to no Shutter strip').format(scene=scene.name))
+def find_effect(effect_scene):
+    """Scene, effect and one of its strips for an effect scene. EffectError: nothing uses it any more."""
+    for scene in bpy.data.scenes:
+        if (effect := effect_of(scene, effect_scene)) is not None:
+            for strip in effect_strips(scene):
+                if strip.scene == effect_scene:
+                    return scene, effect, strip
+    raise EffectError(rpt_('scene "{scene}" belongs to no Shutter strip').format(scene=effect_scene.name))
 
 
 def origin(strip) -> float:
@@ -79,45 +79,45 @@ def timeline_frame(strip, scene_frame: float) -> float:
     return origin(strip) + scene_frame - strip.scene.frame_start
 
 
-def source_of(edit, effect, strip):
+def source_of(scene, effect, strip):
     """The effect's source strip: of those with its identity (parts of a cut strip, copies) the nearest in time, then
     the nearest below. EffectError: there is none any more, or none that has frames."""
-    if (source := nearest_source(edit, effect, strip)) is None:
-        if others := _with_identity(edit, effect.source):
+    if (source := nearest_source(scene, effect, strip)) is None:
+        if others := _with_identity(scene, effect.source):
             sentence = rpt_('the source of "{strip}", "{source}", is not a movie, image or clip strip')
             raise EffectError(sentence.format(strip=strip.name, source=others[0].name))
         raise EffectError(rpt_('the source strip of "{strip}" was deleted').format(strip=strip.name))
     return source
 
 
-def shown_sources(edit) -> set[str]:
-    """Names of the strips that are sources of the edit's effect strips."""
-    pairs = [(effect, strip) for strip in effect_strips(edit) if (effect := effect_of(edit, strip.scene))]
-    sources = [nearest_source(edit, effect, strip) for effect, strip in pairs]
+def shown_sources(scene) -> set[str]:
+    """Names of the strips that are sources of the scene's effect strips."""
+    pairs = [(effect, strip) for strip in effect_strips(scene) if (effect := effect_of(scene, strip.scene))]
+    sources = [nearest_source(scene, effect, strip) for effect, strip in pairs]
     return {source.name for source in sources if source is not None}
 
 
-def nearest_source(edit, effect, strip):
+def nearest_source(scene, effect, strip):
     """What source_of finds, or None."""
 
     def distance(other):
         apart = max(other.left_handle - strip.right_handle + 1, strip.left_handle - other.right_handle + 1, 0)
         return apart, other.channel > strip.channel, abs(strip.channel - other.channel)
 
-    candidates = [other for other in _with_identity(edit, effect.source) if other.type in SOURCES]
+    candidates = [other for other in _with_identity(scene, effect.source) if other.type in SOURCES]
     return min(candidates, key=distance, default=None)
 
 
-def _with_identity(edit, identity: str) -> list:
-    """The edit's strips that an effect with this source is for, whatever they are."""
-    return [strip for strip in edit.sequence_editor.strips_all if strip.virtual_shutter_source == identity != ""]
+def _with_identity(scene, identity: str) -> list:
+    """The scene's strips that an effect with this source is for, whatever they are."""
+    return [strip for strip in scene.sequence_editor.strips_all if strip.virtual_shutter_source == identity != ""]
 
 
-def invalidate(edit, scene=None) -> None:
-    """Drops the finished frames of an edit's effect strips; of those that show one scene, if given."""
+def invalidate(scene, effect_scene=None) -> None:
+    """Drops the finished frames of a scene's effect strips; of those that show one effect scene, if given."""
     revision.changed()
-    for strip in effect_strips(edit):
-        if scene is None or strip.scene == scene:
+    for strip in effect_strips(scene):
+        if effect_scene is None or strip.scene == effect_scene:
             strip.invalidate_cache("RAW")  # and with them all that was composed of them
 
 

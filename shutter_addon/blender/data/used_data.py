@@ -7,10 +7,10 @@ import bpy
 from . import requirements
 
 
-def used(edit, frames: range) -> set[bpy.types.ID]:
-    """The edit, those in its Scene strips, what the strips name that are shown at these frames, and whatever that uses
-    in turn. What edits hold beside their strips is in no picture."""
-    shown = requirements.edits_at(edit, frames)
+def used(scene, frames: range) -> set[bpy.types.ID]:
+    """The scene, those in its Scene strips, what the strips name that are shown at these frames, and whatever that uses
+    in turn. What scenes hold beside their strips is in no picture."""
+    shown = requirements.scenes_at(scene, frames)
     uses: dict = {}
     for item, users in bpy.data.user_map().items():
         for user in users:
@@ -24,9 +24,9 @@ def used(edit, frames: range) -> set[bpy.types.ID]:
     return items.union(each for each, _ in shown)
 
 
-def _named(edit, frames: range) -> Iterator[bpy.types.ID]:
-    for strip in edit.sequence_editor.strips_all:
-        if not requirements.is_shown(edit, strip, frames):
+def _named(scene, frames: range) -> Iterator[bpy.types.ID]:
+    for strip in scene.sequence_editor.strips_all:
+        if not requirements.is_shown(scene, strip, frames):
             continue
         for owner in (strip, *strip.modifiers):
             for setting in owner.bl_rna.properties:

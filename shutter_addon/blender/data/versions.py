@@ -30,17 +30,17 @@ def blender() -> str:
     return ".".join(map(str, bpy.app.version))
 
 
-def of_edit(edit) -> EditVersion:
+def of_edit(scene) -> EditVersion:
     """The version of an edit, as it is in the .blend file that is open. OSError: the file is gone."""
     with open(bpy.data.filepath, "rb") as file:
         blend = hashlib.file_digest(file, "sha256").hexdigest()
-    footage = tuple(map(_footage, _footage_files(edit)))
+    footage = tuple(map(_footage, _footage_files(scene)))
     return EditVersion(blend, extension(), blender(), colour_configuration.name(), footage)
 
 
-def read_files(edit) -> list[Path]:
+def read_files(scene) -> list[Path]:
     """All files that the edit's pictures are made of, beside the .blend file."""
-    return [path for files in _footage_files(edit) for path in files]
+    return [path for files in _footage_files(scene) for path in files]
 
 
 def sounds() -> list[Path]:
@@ -48,15 +48,15 @@ def sounds() -> list[Path]:
     return [path for sound in bpy.data.sounds for path in external_files.named(sound)]
 
 
-def stamps(edit) -> dict[Path, tuple[int, int] | None]:
+def stamps(scene) -> dict[Path, tuple[int, int] | None]:
     """The stamp of each of `read_files`."""
-    return {path: stamp(path) for path in read_files(edit)}
+    return {path: stamp(path) for path in read_files(scene)}
 
 
-def _footage_files(edit):
+def _footage_files(scene):
     """What the edit's pictures are made of beside the .blend file, as lists of files: of its strips, of those of the
     edits that it shows, and of all other data; without sound."""
-    for shown in strips.shown_edits(edit):
+    for shown in strips.shown_scenes(scene):
         for strip in shown.sequence_editor.strips_all:
             if strip.type in strips.SOURCES and (files := _files_of(strip)):
                 yield files

@@ -15,7 +15,7 @@ _COLOR = "COLOR_06"
 _LOOK = ("use_flip_x", "use_flip_y", "color_multiply", "color_saturation", "multiply_alpha")
 
 
-def add_effect(edit, source):
+def add_effect(scene, source):
     """Puts a new effect on a movie, image or clip strip: its strip above the source, same range, transform and crop.
 
     Returns strip and effect; the effect has no shutter yet. MediaError: the source cannot be read."""
@@ -24,40 +24,40 @@ def add_effect(edit, source):
     if not source.virtual_shutter_source:
         source.virtual_shutter_source = uuid.uuid4().hex
     name = data_("Shutter {source}").format(source=source.name)
-    scene = new_scene(edit, uuid.uuid4().hex, name, (medium.width, medium.height))
-    level = (source.parent_meta() or edit.sequence_editor).strips
+    effect_scene = new_effect_scene(scene, uuid.uuid4().hex, name, (medium.width, medium.height))
+    level = (source.parent_meta() or scene.sequence_editor).strips
     taken = {s.channel for s in level if _overlap(s, source)}
     channel = next(c for c in range(source.channel + 1, source.channel + len(taken) + 2) if c not in taken)
-    strip = level.new_scene(data_("Shutter"), scene, channel, int(source.content_start))
+    strip = level.new_scene(data_("Shutter"), effect_scene, channel, int(source.content_start))
     strip.left_handle, strip.right_handle = source.left_handle, source.right_handle
     strip.blend_type = source.blend_type
     copy_look(source, strip)
     # Through a transparent picture the plain source would show. An opaque one stays: mute the effect to see it.
     if medium.alpha != "opaque" and not source.mute:
         source.mute = source.virtual_shutter_muted = True
-    effect = edit.virtual_shutter.effects.add()
+    effect = scene.virtual_shutter.effects.add()
     effect.name, effect.scene, effect.source, effect.start = (
         strip.name,
-        scene,
+        effect_scene,
         source.virtual_shutter_source,
         origin(strip),
     )
-    strip.virtual_shutter_effect = scene.virtual_shutter.identity
-    edit.render.sequencer_gl_preview = "RENDERED"  # or the preview shows the effect's empty scene
+    strip.virtual_shutter_effect = effect_scene.virtual_shutter.identity
+    scene.render.sequencer_gl_preview = "RENDERED"  # or the preview shows the effect's empty scene
     strip.color_tag = _COLOR
-    connect(edit, [strip, source, *source.connections])
-    return strip, effect_of(edit, scene)  # again: an operator's update may move the collection's items in memory
+    connect(scene, [strip, source, *source.connections])
+    return strip, effect_of(scene, effect_scene)  # again: an operator's update may move the collection's items
 
 
-def connect(edit, connected) -> None:
+def connect(scene, connected) -> None:
     """Connects strips, so that they are selected and moved together; each leaves the strips it was connected to."""
-    selected = [strip for strip in edit.sequence_editor.strips_all if strip.select]
+    selected = [strip for strip in scene.sequence_editor.strips_all if strip.select]
     for strip in selected:
         strip.select = False
     for strip in connected:
         strip.select = True
     # Blender has an operator only, which takes the selection; this override is all it asks for.
-    with bpy.context.temp_override(sequencer_scene=edit):
+    with bpy.context.temp_override(sequencer_scene=scene):
         bpy.ops.sequencer.connect(toggle=False)
     for strip in connected:
         strip.select = strip in selected
@@ -78,21 +78,21 @@ def copy_look(source, strip) -> None:
         setattr(strip, name, getattr(source, name))
 
 
-def new_scene(edit, identity: str, name: str, size):
-    """A scene for an effect of the edit, with a camera and an empty annotation."""
-    scene = bpy.data.scenes.new(name)
-    scene.virtual_shutter.identity = identity
-    scene.render.engine = ENGINE
-    scene.render.resolution_x, scene.render.resolution_y = size
-    scene.render.resolution_percentage = 100
+def new_effect_scene(scene, identity: str, name: str, size):
+    """An effect scene for an effect of the scene, with a camera and an empty annotation."""
+    effect_scene = bpy.data.scenes.new(name)
+    effect_scene.virtual_shutter.identity = identity
+    effect_scene.render.engine = ENGINE
+    effect_scene.render.resolution_x, effect_scene.render.resolution_y = size
+    effect_scene.render.resolution_percentage = 100
     # Past its scene's end a Scene strip shows the last frame. Source and strip may be made longer, by hand, by speed or
     # by keys of the source time.
-    scene.frame_start, scene.frame_end = 1, MAX_FRAME
-    # A Scene strip plays at its scene's rate; at the edit's it shows one frame per timeline frame.
-    scene.render.fps, scene.render.fps_base = edit.render.fps, edit.render.fps_base
-    add_camera(scene)
-    annotations.new_annotation(scene, name)
-    return scene
+    effect_scene.frame_start, effect_scene.frame_end = 1, MAX_FRAME
+    # A Scene strip plays at its own scene's rate; at that of the timeline it shows one frame per timeline frame.
+    effect_scene.render.fps, effect_scene.render.fps_base = scene.render.fps, scene.render.fps_base
+    add_camera(effect_scene)
+    annotations.new_annotation(effect_scene, name)
+    return effect_scene
 
 
 def add_camera(scene) -> None:

@@ -24,17 +24,17 @@ def summary(weights) -> str:
     return iface_("Angle {angle}°, light of {frames} frames").format(angle=angle, frames=frames)
 
 
-def open_for(edit, effect, strip, index: int) -> str | None:
+def open_for(scene, effect, strip, index: int) -> str | None:
     """For how many frames a shutter is open at the current frame whose trail has a length, in words; None: its bars say
     that, or there is no picture. For what is drawn: worked out once, with all that the live preview shows, until
     something changes."""
-    shutter, frame = effect.shutters[index], edit.frame_current
+    shutter, frame = effect.shutters[index], scene.frame_current
     has_length = shutter.follow != "NOTHING" and shutter.length == "MOTION"
     is_shown = strip.left_handle <= frame < strip.right_handle and not bpy.app.is_job_running("RENDER")
     if not (has_length and is_shown):
         return None
     try:
-        state = render_context.of_drawing().request(invalidation.current(edit, effect, strip, frame), frame).state
+        state = render_context.of_drawing().request(invalidation.current(scene, effect, strip, frame), frame).state
     except effect_source.FAULTS:  # which the live preview tells
         return None
     words = iface_("Open for {frames} of {window} frames here")
@@ -71,24 +71,24 @@ def key_bars(effect, index: int) -> None:
     path, group = f"{effect.path_from_id()}.shutters[{index}].bars", effect.shutters[index].name
     # Between keys the bars stand where their F-curves are, a cross-fade: the picture is made with others.
     set_bars(effect.shutters[index], bars_now(effect, index))
-    edit = effect.id_data
+    scene = effect.id_data
     for k in range(len(effect.shutters[index].bars)):
         # Without a frame Blender takes that of the window's scene, which may be another one.
-        edit.keyframe_insert(f"{path}[{k}].weight", group=group, frame=edit.frame_current)
+        scene.keyframe_insert(f"{path}[{k}].weight", group=group, frame=scene.frame_current)
 
 
 def unkey_bars(effect, index: int) -> bool:
     """Deletes the keys of a shutter's bars at the current frame; whether there were any."""
-    edit, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
-    curves = fcurves.Curves(edit)
+    scene, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
+    curves = fcurves.Curves(scene)
     keyed = [k for k in range(len(effect.shutters[index].bars)) if curves.find(f"{path}[{k}].weight")]
-    deleted = [_deleted(edit, f"{path}[{k}].weight") for k in keyed]
+    deleted = [_deleted(scene, f"{path}[{k}].weight") for k in keyed]
     return any(deleted)
 
 
-def _deleted(edit, path: str) -> bool:
+def _deleted(scene, path: str) -> bool:
     try:
-        return edit.keyframe_delete(path, frame=edit.frame_current)
+        return scene.keyframe_delete(path, frame=scene.frame_current)
     except RuntimeError:  # no key at this frame
         return False
 
@@ -106,8 +106,8 @@ _shown = revision.UntilChange()
 
 def shown(effect, index: int) -> BarsShown:
     """What bars_now and key_state say, for what is drawn: worked out once until something changes."""
-    edit = effect.id_data
-    key = effect.scene.session_uid, index, edit.frame_current_final
+    scene = effect.id_data
+    key = effect.scene.session_uid, index, scene.frame_current_final
 
     def read():
         states = key_state(effect, index)
@@ -118,18 +118,18 @@ def shown(effect, index: int) -> BarsShown:
 
 def key_state(effect, index: int) -> list[str]:
     """See BarsShown.states."""
-    edit, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
-    curves = fcurves.Curves(edit)
+    scene, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
+    curves = fcurves.Curves(scene)
     return [
-        _state(curves.find(f"{path}[{k}].weight"), bar.weight, edit)
+        _state(curves.find(f"{path}[{k}].weight"), bar.weight, scene)
         for k, bar in enumerate(effect.shutters[index].bars)
     ]
 
 
-def _state(curve, value: float, edit) -> str:
+def _state(curve, value: float, scene) -> str:
     if curve is None:
         return ""
-    frame = edit.frame_current_final
+    frame = scene.frame_current_final
     if abs(max(curve.evaluate(frame), 0.0) - value) > 1e-4:  # no bar is below 0, a curve may be
         return "changed"
     return "keyed" if any(abs(key.co[0] - frame) < 1e-3 for key in curve.keyframe_points) else "animated"

@@ -14,70 +14,70 @@ from ..data.property_copy import copy_properties
 def adopt() -> None:
     """Gives every effect strip that is a copy a scene, an effect and keys of its own; keys follow moved strips."""
     taken = set()
-    for edit in [scene for scene in bpy.data.scenes if scene.library is None]:  # linked ones cannot be changed
-        for scene, parts in _groups(edit).items():
-            effect = strips.effect_of(edit, scene)
-            if effect is None:  # Blender copied the scene with its strip, or the strip is pasted from another edit
-                if (original := _original(edit, scene)) is not None:
+    for scene in [scene for scene in bpy.data.scenes if scene.library is None]:  # linked ones cannot be changed
+        for effect_scene, parts in _groups(scene).items():
+            effect = strips.effect_of(scene, effect_scene)
+            if effect is None:  # Blender copied the scene with its strip, or the strip is pasted from another scene
+                if (original := _original(scene, effect_scene)) is not None:
                     for origin, same in parts.items():
-                        own = _copied(scene) if strips.effect_of(original[0], scene) else scene
-                        _duplicate(*original, edit, same, origin, own)
+                        own = _copied(effect_scene) if strips.effect_of(original[0], effect_scene) else effect_scene
+                        _duplicate(*original, scene, same, origin, own)
                         taken.add(own)
             else:
-                if scene in taken:  # the edit is a copy, its effects' data copied with it
-                    effect.scene = _copied(scene)
+                if effect_scene in taken:  # the scene is a copy, its effects' data copied with it
+                    effect.scene = _copied(effect_scene)
                     for strip in (strip for same in parts.values() for strip in same):
                         strip.scene = effect.scene
-                _settle(edit, effect, parts)
-                taken.add(scene)
+                _settle(scene, effect, parts)
+                taken.add(effect_scene)
 
 
-def _groups(edit) -> dict:
+def _groups(scene) -> dict:
     """Effect strips by scene, then by origin."""
     groups: dict = {}
-    for strip in strips.effect_strips(edit):
+    for strip in strips.effect_strips(scene):
         groups.setdefault(strip.scene, {}).setdefault(strips.origin(strip), []).append(strip)
     return groups
 
 
-def _original(edit, scene):
-    """Edit and path of the effect that a copied scene was made for; its own edit's first."""
-    for other in sorted(bpy.data.scenes, key=lambda other: other != edit):
+def _original(scene, effect_scene):
+    """Scene and path of the effect that a copied effect scene was made for; those of its own scene first."""
+    for other in sorted(bpy.data.scenes, key=lambda other: other != scene):
         for effect in other.virtual_shutter.effects:
-            if effect.scene and effect.scene.virtual_shutter.identity == scene.virtual_shutter.identity:
+            if effect.scene and effect.scene.virtual_shutter.identity == effect_scene.virtual_shutter.identity:
                 return other, effect.path_from_id()
     return None
 
 
-def _settle(edit, effect, parts: dict) -> None:
+def _settle(scene, effect, parts: dict) -> None:
     """Moves the effect's keys to its strips, and gives strips of other origins a copy of it."""
-    path, scene = effect.path_from_id(), effect.scene
+    path, effect_scene = effect.path_from_id(), effect.scene
     start = effect.start if effect.start in parts else min(parts)
     if not abs(effect.start) <= 2 * MAX_FRAME:  # no frame: its keys are where they are
         effect.start = start
     if start != effect.start:
-        _move(edit, effect, path, start - effect.start)
-    for origin in sorted(parts.keys() - {start}):
-        _duplicate(edit, path, edit, parts[origin], origin, _copied(scene))  # no effect is where it was after that
+        _move(scene, effect, path, start - effect.start)
+    for origin in sorted(parts.keys() - {start}):  # after the first no effect is where it was
+        _duplicate(scene, path, scene, parts[origin], origin, _copied(effect_scene))
 
 
-def _duplicate(old_edit, path: str, edit, parts, origin: float, scene) -> None:
+def _duplicate(old_scene, path: str, scene, parts, origin: float, effect_scene) -> None:
     """A copy of the effect at `path`, for these strips and their scene."""
-    new = edit.virtual_shutter.effects.add()
-    old = old_edit.path_resolve(path)  # adding to a collection moves its items in memory
+    new = scene.virtual_shutter.effects.add()
+    old = old_scene.path_resolve(path)  # adding to a collection moves its items in memory
     copy_properties(old, new)
-    new.scene = scene
-    if scene.annotation is not None and scene.annotation == old.scene.annotation:
-        scene.annotation = scene.annotation.copy()
+    new.scene = effect_scene
+    if effect_scene.annotation is not None and effect_scene.annotation == old.scene.annotation:
+        effect_scene.annotation = effect_scene.annotation.copy()
     for strip in parts:
-        strip.scene = scene
+        strip.scene = effect_scene
     new_path = new.path_from_id()
-    fcurves.copy_curves(old_edit, path + ".", edit, new_path + ".")
-    _move(edit, new, new_path, origin - old.start)
+    fcurves.copy_curves(old_scene, path + ".", scene, new_path + ".")
+    _move(scene, new, new_path, origin - old.start)
 
 
-def _move(edit, effect, path: str, frames: float) -> None:
-    fcurves.move_curves(edit, path + ".", frames)
+def _move(scene, effect, path: str, frames: float) -> None:
+    fcurves.move_curves(scene, path + ".", frames)
     for layer in effect.scene.annotation.layers if effect.scene.annotation else ():
         for drawing in layer.frames:
             drawing.frame_number += round(frames)

@@ -20,15 +20,15 @@ from . import follow_track, motion_keys
 from .motion_keys import MotionKeys
 
 
-def follow(edit, effect, strip) -> None:
+def follow(scene, effect, strip) -> None:
     """Keys the camera by the stabilization of its clip, from where it is now, at the current frame. EffectError,
     MediaError: there is nothing to follow, and nothing has changed."""
-    camera, start, size = effect.camera, edit.frame_current, annotations.picture_size(effect)
+    camera, start, size = effect.camera, scene.frame_current, annotations.picture_size(effect)
     validation.check_placement(camera)
     motion_keys.check_curves(effect, None)
     if camera.follow_clip is None:
         raise EffectError(rpt_("Choose a clip first"))
-    times = follow_track.clip_times(edit, effect, strip, camera.follow_clip)
+    times = follow_track.clip_times(scene, effect, strip, camera.follow_clip)
     if start not in times:
         raise EffectError(rpt_("the current frame is outside of the Shutter strip"))
     shifted = _shifted(camera.follow_clip, size)
@@ -38,7 +38,7 @@ def follow(edit, effect, strip) -> None:
     frames = sorted(times)
     known = {start, *keys.edited(range(frames[0], frames[-1] + 1))}
     moves = {origin: {frame: seen[frame].after(seen[origin].inverse()) for frame in frames} for origin in known}
-    placements = follow_track.followed(snapshot.camera_at(edit, effect, frames), frames, moves, start, size)
+    placements = follow_track.followed(snapshot.camera_at(scene, effect, frames), frames, moves, start, size)
     kept = motions.thinned(placements, region_keys.CORNERS, size, known, region_keys.STEADY)
     keys.write({frame: placements[frame] for frame in kept}, dict.fromkeys(frames, 1.0))
     camera.stops.clear()

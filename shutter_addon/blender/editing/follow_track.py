@@ -25,20 +25,20 @@ from .motion_keys import MotionKeys
 Points = dict[str, complex]  # where markers are in the picture, in pixels as motions.Similarity counts them
 
 
-def follow(edit, effect, strip, index: int) -> None:
+def follow(scene, effect, strip, index: int) -> None:
     """Keys a region by what it is set to follow, from where it is now, at the current frame. EffectError, MediaError:
     it cannot be followed, and nothing has changed."""
-    start = edit.frame_current
-    points = _points(edit, effect, strip, index, start)
+    start = scene.frame_current
+    points = _points(scene, effect, strip, index, start)
     _keys(effect, index).begin(start)
     effect.regions[index].follow_frame = start - effect.start
-    _key(edit, effect, strip, index, points)
+    _key(scene, effect, strip, index, points)
 
 
-def update(edit, effect, strip, index: int) -> None:
+def update(scene, effect, strip, index: int) -> None:
     """Keys a region anew by what it follows, from where it is at the frame at which it began to. EffectError,
     MediaError: it cannot be followed, and nothing has changed."""
-    _key(edit, effect, strip, index, _points(edit, effect, strip, index, _start(effect, index)))
+    _key(scene, effect, strip, index, _points(scene, effect, strip, index, _start(effect, index)))
 
 
 def _start(effect, index: int) -> int:
@@ -50,11 +50,11 @@ def _keys(effect, index: int) -> MotionKeys:
     return MotionKeys(effect, index, "LOCATION" if region.follow_kind == "TRACK" else region.motion)
 
 
-def _key(edit, effect, strip, index: int, points: dict[int, Points]) -> None:
+def _key(scene, effect, strip, index: int, points: dict[int, Points]) -> None:
     region, start, size = effect.regions[index], _start(effect, index), annotations.picture_size(effect)
     keys = _keys(effect, index)
     known = sorted({start, *(frame for frame in keys.edited(range(min(points), max(points) + 1)) if frame in points)})
-    shape = snapshot.region_at(edit, effect, strip, index, points)
+    shape = snapshot.region_at(scene, effect, strip, index, points)
     moves = {frame: _motions(points, frame) for frame in known}
     placements = followed(shape, sorted(points), moves, start, size)
     kept = motions.thinned(placements, motions.offsets(shape.unmoved(start)), size, known)
@@ -130,7 +130,7 @@ def marker_frames(markers) -> tuple[np.ndarray, np.ndarray]:
     return frames, ~muted
 
 
-def _points(edit, effect, strip, index: int, start: int) -> dict[int, Points]:
+def _points(scene, effect, strip, index: int, start: int) -> dict[int, Points]:
     """By timeline frame of the strip the points that a region follows, as the strip shows them. EffectError,
     MediaError: there is nothing that it can follow from the frame `start` on."""
     region = effect.regions[index]
@@ -138,7 +138,7 @@ def _points(edit, effect, strip, index: int, start: int) -> dict[int, Points]:
     motion_keys.check_curves(effect, index)
     validation.word(region, "motion")
     tracks, size = _markers(region), annotations.picture_size(effect)
-    times = clip_times(edit, effect, strip, region.follow_clip)
+    times = clip_times(scene, effect, strip, region.follow_clip)
     by_frame = {frame: _points_at(tracks, time, size) for frame, time in times.items()}
     by_frame = {frame: points for frame, points in by_frame.items() if points}
     if start not in by_frame:
@@ -146,19 +146,19 @@ def _points(edit, effect, strip, index: int, start: int) -> dict[int, Points]:
         name = region.follow_object if region.follow_kind == "OBJECT" else region.follow_track
         raise EffectError(sentence.format(track=name, clip=region.follow_clip.name, frame=start))
     with translated(rpt_):
-        shape = snapshot.region_at(edit, effect, strip, index, by_frame)
+        shape = snapshot.region_at(scene, effect, strip, index, by_frame)
         if not all(shape.unmoved(frame) for frame in by_frame):
             raise EffectError(rpt_('region "{name}" has no strokes').format(name=region.name))
     return by_frame
 
 
-def clip_times(edit, effect, strip, clip) -> dict[int, float]:
+def clip_times(scene, effect, strip, clip) -> dict[int, float]:
     """By timeline frame of the strip what it shows, in the clip's frames: in-between frames lie between two of them.
     EffectError, MediaError: the strip does not show the clip's footage."""
     frames = range(strip.left_handle, strip.right_handle)
-    source = strips.source_of(edit, effect, strip)
+    source = strips.source_of(scene, effect, strip)
     _check_footage(source, clip)
-    shown, first = snapshot.take(edit, effect, strip, frames), _first_frame(source, clip)
+    shown, first = snapshot.take(scene, effect, strip, frames), _first_frame(source, clip)
     with effect_source.open_source(shown) as source:
         return {frame: effect_source.source_index(shown, frame, source)[0] / source.step + first for frame in frames}
 

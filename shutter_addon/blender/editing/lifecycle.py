@@ -16,34 +16,34 @@ _layer_names: dict[int, list[str]] = {}  # by session_uid of an annotation, as t
 
 
 def update(updated=None) -> None:
-    """Brings the effects of all edits in line with their strips. A second call changes nothing.
+    """Brings the effects of all scenes in line with their strips. A second call changes nothing.
 
     updated: the scene whose depsgraph is being updated, which must not go now."""
     if bpy.app.is_job_running("RENDER"):
         return
-    edits = _edits()
-    for edit in edits:
-        _reconnect(edit)
+    scenes = _local_scenes()
+    for scene in scenes:
+        _reconnect(scene)
     mend()
-    _separate_actions(edits)
+    _separate_actions(scenes)
     copies.adopt()
-    for edit in edits:
-        _remove_effects(edit)
-        _unmute_sources(edit)
-    _follow_layers(edits)
+    for scene in scenes:
+        _remove_effects(scene)
+        _unmute_sources(scene)
+    _follow_layers(scenes)
     _remove_scenes(updated)
     _identify()
     _remove_left()
     if not render_job.runs():  # a film keeps its size
         follow_sources()
-    for edit in _edits():
-        invalidation.invalidate_changed(edit)
+    for scene in _local_scenes():
+        invalidation.invalidate_changed(scene)
 
 
 def mend() -> None:
     """Undoes what would leave effects out of the picture: their camera deleted, another engine, and the like."""
-    for edit in _edits():
-        for strip in strips.own_strips(edit):
+    for scene in _local_scenes():
+        for strip in strips.own_strips(scene):
             if strip.scene is not None and strip.scene.library is None:
                 _mend(strip)
 
@@ -84,9 +84,9 @@ def _unmarked() -> list:
 
 
 def follow_sources() -> None:
-    """Gives the scene of each effect its edit's rate and its source's size."""
-    for edit in _edits():
-        match_source.follow(edit)
+    """Gives each effect scene the rate of the scene whose effect it shows, and its source's size."""
+    for scene in _local_scenes():
+        match_source.follow(scene)
 
 
 def forget() -> None:
@@ -96,17 +96,17 @@ def forget() -> None:
     shown_annotations.forget()
 
 
-def _edits() -> list:
+def _local_scenes() -> list:
     return [scene for scene in bpy.data.scenes if scene.library is None]  # linked ones cannot be changed
 
 
-def _reconnect(edit) -> None:
+def _reconnect(scene) -> None:
     """Gives pasted effect strips their scene again: Blender's clipboard holds strips, but not the scenes they show."""
-    for strip in edit.sequence_editor.strips_all if edit.sequence_editor else ():
+    for strip in scene.sequence_editor.strips_all if scene.sequence_editor else ():
         if strip.type == "SCENE" and strip.scene is None and strip.virtual_shutter_effect:
-            scene = _scene_of(strip.virtual_shutter_effect) or undelete.restore(edit, strip.virtual_shutter_effect)
-            if scene is not None:
-                strip.scene = scene
+            restored = _scene_of(strip.virtual_shutter_effect) or undelete.restore(scene, strip.virtual_shutter_effect)
+            if restored is not None:
+                strip.scene = restored
 
 
 def _scene_of(identity: str):
@@ -122,36 +122,36 @@ def _effect_scenes() -> list:
     ]
 
 
-def _separate_actions(edits) -> None:
-    """A copied edit gets keys of its own: Blender lets both share an action."""
+def _separate_actions(scenes) -> None:
+    """A copied scene gets keys of its own: Blender lets both share an action."""
     taken = set()
-    for edit in edits:
-        animation_data = edit.animation_data
-        if not (edit.virtual_shutter.effects and animation_data and animation_data.action):
+    for scene in scenes:
+        animation_data = scene.animation_data
+        if not (scene.virtual_shutter.effects and animation_data and animation_data.action):
             continue
         if (key := (animation_data.action, animation_data.action_slot_handle)) in taken:
             animation_data.action = animation_data.action.copy()
         taken.add(key)
 
 
-def _remove_effects(edit) -> None:
-    """Removes the edit's effects that none of its strips shows any more."""
-    shown = {strip.scene for strip in strips.effect_strips(edit)}
-    effects = edit.virtual_shutter.effects
+def _remove_effects(scene) -> None:
+    """Removes the scene's effects that none of its strips shows any more."""
+    shown = {strip.scene for strip in strips.effect_strips(scene)}
+    effects = scene.virtual_shutter.effects
     stay = [effect.scene in shown for effect in effects]
     if all(stay):
         return
     places = {i: sum(stay[:i]) if stays else None for i, stays in enumerate(stay)}
     for i in reversed([i for i, stays in enumerate(stay) if not stays]):
-        undelete.keep(edit, effects[i])
+        undelete.keep(scene, effects[i])
         effects.remove(i)
-    fcurves.reindex(edit, EFFECTS, places)
+    fcurves.reindex(scene, EFFECTS, places)
 
 
-def _unmute_sources(edit) -> None:
+def _unmute_sources(scene) -> None:
     """Sources that an effect muted show again once no effect strip shows them."""
-    muted = [s for s in edit.sequence_editor.strips_all if s.virtual_shutter_muted] if edit.sequence_editor else []
-    shown = strips.shown_sources(edit) if muted else ()
+    muted = [s for s in scene.sequence_editor.strips_all if s.virtual_shutter_muted] if scene.sequence_editor else []
+    shown = strips.shown_sources(scene) if muted else ()
     for source in muted:
         if source.name not in shown:
             source.mute = source.virtual_shutter_muted = False
@@ -159,12 +159,12 @@ def _unmute_sources(edit) -> None:
 
 def _remove_scenes(updated) -> None:
     """Removes effect scenes that no strip and no window shows, with what was made for them."""
-    shown = {strip.scene for edit in bpy.data.scenes for strip in strips.effect_strips(edit)}
+    shown = {strip.scene for scene in bpy.data.scenes for strip in strips.effect_strips(scene)}
     windows = [window for manager in bpy.data.window_managers for window in manager.windows]
     shown.update(scene for window in windows for scene in (window.scene, window.workspace.sequencer_scene))
-    for scene in _effect_scenes():
-        if scene not in shown and scene != updated:
-            _remove(scene)
+    for effect_scene in _effect_scenes():
+        if effect_scene not in shown and effect_scene != updated:
+            _remove(effect_scene)
 
 
 def _remove(scene) -> None:
@@ -215,13 +215,13 @@ def _left(collection, used) -> list:
 def _identify() -> None:
     """Every effect scene has an identity of its own, and its strips carry it."""
     taken = set()
-    for scene in _effect_scenes():
-        if scene.virtual_shutter.identity in taken:
-            scene.virtual_shutter.identity = uuid.uuid4().hex
-        taken.add(scene.virtual_shutter.identity)
-        _claim(scene.annotation, scene.virtual_shutter.identity)
-    for edit in _edits():
-        for strip in strips.effect_strips(edit):
+    for effect_scene in _effect_scenes():
+        if effect_scene.virtual_shutter.identity in taken:
+            effect_scene.virtual_shutter.identity = uuid.uuid4().hex
+        taken.add(effect_scene.virtual_shutter.identity)
+        _claim(effect_scene.annotation, effect_scene.virtual_shutter.identity)
+    for scene in _local_scenes():
+        for strip in strips.effect_strips(scene):
             if strip.virtual_shutter_effect != strip.scene.virtual_shutter.identity:
                 strip.virtual_shutter_effect = strip.scene.virtual_shutter.identity
 
@@ -232,11 +232,11 @@ def _claim(made, identity: str) -> None:
         made.virtual_shutter_made = identity
 
 
-def _follow_layers(edits) -> None:
+def _follow_layers(scenes) -> None:
     """Regions keep their layer when it is renamed: one name among the same number of layers is another."""
     known = dict(_layer_names)
     _layer_names.clear()  # of annotations that are gone
-    for effect in [effect for edit in edits for effect in edit.virtual_shutter.effects]:
+    for effect in [effect for scene in scenes for effect in scene.virtual_shutter.effects]:
         annotation = effect.scene.annotation
         if annotation is None:
             continue

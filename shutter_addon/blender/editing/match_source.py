@@ -39,19 +39,19 @@ def forget() -> None:
     _sizes.clear()
 
 
-def follow(edit) -> None:
-    """Gives the scenes of the edit's effects the edit's rate and the size of their sources. A second call changes
+def follow(scene) -> None:
+    """Gives the effect scenes of a scene's effects its rate and the size of their sources. A second call changes
     nothing."""
-    for effect in edit.virtual_shutter.effects:
+    for effect in scene.virtual_shutter.effects:
         if effect.scene is not None and effect.scene.library is None:
-            _follow_rate(edit, effect.scene.render)
+            _follow_rate(scene, effect.scene.render)
             _follow_size(effect)
 
 
-def _follow_rate(edit, render) -> None:
+def _follow_rate(scene, render) -> None:
     for name in ("fps", "fps_base"):
-        if getattr(render, name) != getattr(edit.render, name):
-            setattr(render, name, getattr(edit.render, name))
+        if getattr(render, name) != getattr(scene.render, name):
+            setattr(render, name, getattr(scene.render, name))
 
 
 def _follow_size(effect) -> None:
@@ -80,9 +80,9 @@ def _size(source) -> tuple[int, int] | None:
 
 def parts(effect) -> list[tuple]:
     """The strips of an effect, one, or the parts of one that was cut; each with its source."""
-    edit = effect.id_data
-    own = [strip for strip in strips.effect_strips(edit) if strip.scene == effect.scene]
-    pairs = [(strip, strips.nearest_source(edit, effect, strip)) for strip in own]
+    scene = effect.id_data
+    own = [strip for strip in strips.effect_strips(scene) if strip.scene == effect.scene]
+    pairs = [(strip, strips.nearest_source(scene, effect, strip)) for strip in own]
     return [(strip, source) for strip, source in pairs if source is not None]
 
 
@@ -120,16 +120,16 @@ def differences(effect) -> list[str]:
 def match(effect) -> list[tuple]:
     """Gives the effect's strips the look and the range of their sources. Returns the strips that cannot have the whole
     range, each with the neighbour in its channel that is in the way."""
-    edit, pairs = effect.id_data, parts(effect)
+    scene, pairs = effect.id_data, parts(effect)
     with _scribbles_kept(effect):
         for part, source in pairs:
             add_effect.copy_look(source, part)
             for name in (name for names in _LOOK.values() for name in names):
                 old, new = f"{source.path_from_id()}.{name}", f"{part.path_from_id()}.{name}"
-                fcurves.remove_curves(edit, new)
-                fcurves.copy_curves(edit, old, edit, new)
+                fcurves.remove_curves(scene, new)
+                fcurves.copy_curves(scene, old, scene, new)
     goals = _goals(effect, pairs)
-    _slip(edit, goals)
+    _slip(scene, goals)
     for goal in goals:
         goal.part.right_handle = max(goal.part.right_handle, goal.right)  # or the left one could not pass it
         goal.part.left_handle, goal.part.right_handle = goal.left, goal.right
@@ -215,7 +215,7 @@ def _with_room(goal: _Goal) -> _Goal:
     return replace(goal, left=left, right=right, neighbor=first or last)
 
 
-def _slip(edit, goals: list[_Goal]) -> None:
+def _slip(scene, goals: list[_Goal]) -> None:
     """Has the effect's content, and with it its keys, go along with a source that has moved as a whole, or that begins
     before it: an effect shows nothing but its first frame there."""
     for goal in goals:
@@ -223,15 +223,15 @@ def _slip(edit, goals: list[_Goal]) -> None:
         moved = frames == goal.left - part.left_handle == goal.right - part.right_handle
         if frames and (moved or (frames < 0 and goal.left < part.content_start)):
             # Blender has an operator only, which takes the selection.
-            with _selected(edit, [goal.part for goal in goals]), bpy.context.temp_override(sequencer_scene=edit):
+            with _selected(scene, [goal.part for goal in goals]), bpy.context.temp_override(sequencer_scene=scene):
                 bpy.ops.sequencer.slip(offset=frames, ignore_connections=True)
             return
 
 
 @contextmanager
-def _selected(edit, chosen):
+def _selected(scene, chosen):
     """These strips are the selected ones meanwhile."""
-    before = [(strip, strip.select) for strip in edit.sequence_editor.strips_all]
+    before = [(strip, strip.select) for strip in scene.sequence_editor.strips_all]
     for strip, _is_selected in before:
         strip.select = strip in chosen
     yield
@@ -289,24 +289,24 @@ def missing_modifiers(part, source) -> list:
 
 def copy_modifiers(effect) -> None:
     """Gives the effect's strips the modifiers of their sources that they lack, keys included."""
-    edit = effect.id_data
+    scene = effect.id_data
     for part, source in parts(effect):
         lacking, count = missing_modifiers(part, source), len(part.modifiers)
         if not lacking:
             continue
-        active, edit.sequence_editor.active_strip = edit.sequence_editor.active_strip, source
+        active, scene.sequence_editor.active_strip = scene.sequence_editor.active_strip, source
         # Blender has an operator only, which takes all modifiers of the active strip.
-        with _selected(edit, [part]), bpy.context.temp_override(sequencer_scene=edit):
+        with _selected(scene, [part]), bpy.context.temp_override(sequencer_scene=scene):
             bpy.ops.sequencer.strip_modifier_copy(type="APPEND")
-        edit.sequence_editor.active_strip = active
+        scene.sequence_editor.active_strip = active
         for old, new in list(zip(source.modifiers, part.modifiers[count:], strict=True)):
             if old in lacking:
-                fcurves.copy_curves(edit, f"{old.path_from_id()}.", edit, f"{new.path_from_id()}.")
+                fcurves.copy_curves(scene, f"{old.path_from_id()}.", scene, f"{new.path_from_id()}.")
             else:
                 part.modifiers.remove(new)
 
 
-def effects_on(edit, source) -> list:
+def effects_on(scene, source) -> list:
     """The effect strips of Blender's that have a source as input: what they make of it, the engine does not see."""
     inputs = ("input_1", "input_2")
-    return [s for s in edit.sequence_editor.strips_all if any(getattr(s, name, None) == source for name in inputs)]
+    return [s for s in scene.sequence_editor.strips_all if any(getattr(s, name, None) == source for name in inputs)]

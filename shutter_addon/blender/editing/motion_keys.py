@@ -42,7 +42,7 @@ _COUNTS = {"LOCATION": 2, "ROTATION": 3, "SCALE": 4}
 @dataclass(frozen=True)
 class MotionKeys:
     """The keys of a region, or of the camera (index: see selection.moving), for a motion (properties.MOTIONS); frames
-    are timeline frames of the edit."""
+    are timeline frames."""
 
     effect: bpy.types.PropertyGroup
     index: int | None
@@ -86,7 +86,7 @@ class MotionKeys:
                 _insert(curve, frame, value)
 
     def begin(self, frame: int) -> None:
-        """Makes the edit's current frame, at which it begins, the editor's; what was tracked beside it stays there.
+        """Makes the scene's current frame, at which it begins, the editor's; what was tracked beside it stays there.
         EffectError: as check_curves says."""
         self.hold(frame, frame)
         insert(self.effect, self.index, self.channels())
@@ -138,10 +138,10 @@ class MotionKeys:
 
     def _curve(self, name: str, component: int = 0, *, new: bool = False):
         moving = selection.moving(self.effect, self.index)
-        edit, path = self.effect.id_data, f"{moving.path_from_id()}.{name}"
+        scene, path = self.effect.id_data, f"{moving.path_from_id()}.{name}"
         if new:
-            return fcurves.ensure_curve(edit, path, component, moving.name)
-        return fcurves.find_curve(edit, path, component)
+            return fcurves.ensure_curve(scene, path, component, moving.name)
+        return fcurves.find_curve(scene, path, component)
 
 
 def placement_now(moving) -> Placement:
@@ -162,22 +162,22 @@ def check_curves(effect, index: int | None) -> None:
 
 
 def insert(effect, index: int | None, channels=CHANNELS, *, keep_tracked: bool = False) -> None:
-    """Keys channels of a region or of the camera at the edit's current frame; where tracking has made a key, it is the
+    """Keys channels of a region or of the camera at the scene's current frame; where tracking has made a key, it is the
     editor's from now on, and sure. EffectError: as check_curves says.
 
     keep_tracked: whether the keys keep what was tracked there, for the next MotionKeys.hold"""
     check_curves(effect, index)
-    edit, moving = effect.id_data, selection.moving(effect, index)
-    path, frame = moving.path_from_id(), edit.frame_current
+    scene, moving = effect.id_data, selection.moving(effect, index)
+    path, frame = moving.path_from_id(), scene.frame_current
     for name in channels:
-        tracked = [_tracked_value(curve, frame) for curve in fcurves.curves_under(edit, f"{path}.{name}")]
+        tracked = [_tracked_value(curve, frame) for curve in fcurves.curves_under(scene, f"{path}.{name}")]
         # Without a frame Blender takes that of the window's scene, which may be another one.
-        edit.keyframe_insert(f"{path}.{name}", group=moving.name, frame=frame)
-        curves = fcurves.curves_under(edit, f"{path}.{name}")
+        scene.keyframe_insert(f"{path}.{name}", group=moving.name, frame=frame)
+        curves = fcurves.curves_under(scene, f"{path}.{name}")
         for curve, value in zip_longest(curves, tracked, fillvalue=NOTHING_KEPT):
             for key in _keys_at(curve, frame):
                 key.type, key.back = "KEYFRAME", value if keep_tracked else NOTHING_KEPT
-    for curve in fcurves.curves_under(edit, f"{path}.confidence"):
+    for curve in fcurves.curves_under(scene, f"{path}.confidence"):
         for key in _keys_at(curve, frame):
             key.back = key.co[1] = 100
         curve.update()

@@ -17,21 +17,21 @@ def make_edit(path: Path, medium, source_recipe, folder: Path):
     """An edit of one source strip (an opened medium's) under one effect strip; its scene. folder: of the recipe.
     MediaError: the recipe has mattes that cannot be read."""
     source = make_source(path, medium)
-    edit = source.id_data
-    strip, effect = add_effect.add_effect(edit, source)
-    recipe_import.apply(edit, effect, strip, source_recipe, folder)
+    scene = source.id_data
+    strip, effect = add_effect.add_effect(scene, source)
+    recipe_import.apply(scene, effect, strip, source_recipe, folder)
     strip.right_handle = length(medium, source_recipe) + 1
-    edit.frame_start, edit.frame_end = strip.left_handle, strip.right_handle - 1
-    edit.frame_current = edit.frame_start
-    return edit
+    scene.frame_start, scene.frame_end = strip.left_handle, strip.right_handle - 1
+    scene.frame_current = scene.frame_start
+    return scene
 
 
 def make_source(path: Path, medium):
     """A source strip (an opened medium's), alone in an edit that fits it."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    edit = bpy.context.scene
-    edit.name = "Edit"
-    render = edit.render
+    scene = bpy.context.scene
+    scene.name = "Edit"
+    render = scene.render
     if medium.fps:
         render.fps = max(1, round(medium.fps))
         render.fps_base = render.fps / float(medium.fps)
@@ -39,8 +39,8 @@ def make_source(path: Path, medium):
     render.resolution_percentage = 100
     # Dither would add noise to a still frame; Standard shows code values as the source has them.
     render.dither_intensity = 0
-    edit.view_settings.view_transform = "Standard"
-    editor = edit.sequence_editor_create()
+    scene.view_settings.view_transform = "Standard"
+    editor = scene.sequence_editor_create()
     # Of a file that is gone Blender would make a picture of the size that its element has: none where Python has added
     # it, but what lay in memory there.
     editor.show_missing_media = False
@@ -65,10 +65,10 @@ def _add_source(editor, path: Path, medium):
 
 
 @contextmanager
-def paths_relative(edit, folder: Path):
+def paths_relative(scene, folder: Path):
     """Inside, the edit's paths are relative to the folder that it is saved in, as far as there is such a path."""
-    owners = [(edit.render, "filepath")]
-    for strip in edit.sequence_editor.strips_all:
+    owners = [(scene.render, "filepath")]
+    for strip in scene.sequence_editor.strips_all:
         if strip.type in _PATHS:
             owners.append((strip.sound if strip.type == "SOUND" else strip, _PATHS[strip.type]))
     owners += [(image, "filepath") for image in bpy.data.images]  # mattes

@@ -10,12 +10,12 @@ from .motion_keys import MotionKeys
 SMOOTHNESS = 6  # frames before and after each: half a second in all
 
 
-def is_ready(edit, effect, strip, index: int) -> bool:
+def is_ready(scene, effect, strip, index: int) -> bool:
     """Whether a region has keys of motion, and those that were tracked reach the current frame; without, it has to be
     tracked first. EffectError: it has keys, and no strokes that could be followed."""
-    if not MotionKeys(effect, index, "SCALE").reach(edit.frame_current):
+    if not MotionKeys(effect, index, "SCALE").reach(scene.frame_current):
         return False
-    if not snapshot.strokes_at(edit, effect, strip, index, edit.frame_current):
+    if not snapshot.strokes_at(scene, effect, strip, index, scene.frame_current):
         raise EffectError(rpt_("the region has no strokes to follow"))
     return True
 

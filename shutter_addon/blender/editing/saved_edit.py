@@ -32,44 +32,44 @@ def open_edit(path: Path):
             bpy.ops.wm.open_mainfile(filepath=str(path), use_scripts=False)
     except RuntimeError as error:
         raise SavedEditError(f"{path}: {film_output.message(error)}") from None
-    edit = bpy.context.scene
-    if not _has_strips(edit):
-        others = [scene.name for scene in bpy.data.scenes if _has_strips(scene)]
+    scene = bpy.context.scene
+    if not _has_strips(scene):
+        others = [other.name for other in bpy.data.scenes if _has_strips(other)]
         where = f'; make "{others[0]}" the active one, and save the file' if others else ""
-        raise SavedEditError(f'{path}: its active scene, "{edit.name}", has no strips{where}')
+        raise SavedEditError(f'{path}: its active scene, "{scene.name}", has no strips{where}')
     for setting, wanted in (("use_sequencer", True), ("use_multiview", False)):
-        if getattr(edit.render, setting) != wanted:
-            name, turn = edit.render.bl_rna.properties[setting].name, "on" if wanted else "off"
-            raise SavedEditError(f'{path}: turn "{name}" {turn} in the scene "{edit.name}", and save the file')
-    for owner, driver in _scripts(edit):
+        if getattr(scene.render, setting) != wanted:
+            name, turn = scene.render.bl_rna.properties[setting].name, "on" if wanted else "off"
+            raise SavedEditError(f'{path}: turn "{name}" {turn} in the scene "{scene.name}", and save the file')
+    for owner, driver in _scripts(scene):
         words = f'a driver of the {owner.bl_rna.name.lower()} "{owner.name}" needs scripts, which are not run'
         words += f" ({sentence(driver.expression, 40)}); bake it to keyframes, and save the file"
         raise SavedEditError(f"{path}: {words}")
-    return edit
+    return scene
 
 
-def version(edit, path: Path, opened: tuple[int, int] | None) -> EditVersion:
+def version(scene, path: Path, opened: tuple[int, int] | None) -> EditVersion:
     """The version of an edit that was opened from a file.
 
     opened: the file's stamp before (versions.stamp). SavedEditError: it was saved over since, so that its key would be
     that of another edit; OSError: it is gone"""
-    current = versions.of_edit(edit)
+    current = versions.of_edit(scene)
     if versions.stamp(path) != opened:
         raise SavedEditError(f"{path}: was saved over while it was opened; start again")
     return current
 
 
-def _scripts(edit) -> list[tuple]:
+def _scripts(scene) -> list[tuple]:
     """(owner, driver) of each driver that Blender does not evaluate because it could do anything, of all that the
     edit's pictures are made of."""
-    used = used_data.used(edit, range(edit.frame_start, edit.frame_end + 1))
+    used = used_data.used(scene, range(scene.frame_start, scene.frame_end + 1))
     drivers = [(item, curve.driver) for item in used for curve in _driven(item)]
     scripted = ((owner, driver) for owner, driver in drivers if driver.type == "SCRIPTED")
     complex_ones = [(owner, driver) for owner, driver in scripted if not driver.is_simple_expression]
     if complex_ones:  # only once they are evaluated it is known of them
         with film_output.quiet():
-            for scene in used.intersection(bpy.data.scenes):
-                for layer in scene.view_layers:
+            for other in used.intersection(bpy.data.scenes):
+                for layer in other.view_layers:
                     layer.update()
     return [(owner, driver) for owner, driver in complex_ones if not driver.is_valid]
 

@@ -47,13 +47,13 @@ def add_shutter(effect, name: str = "", bars=None):
 
 def duplicate_shutter(effect, index: int):
     """A copy of a shutter, with its keys, behind it; regions stay with the original."""
-    edit, path = effect.id_data, f"{effect.path_from_id()}.shutters"
+    scene, path = effect.id_data, f"{effect.path_from_id()}.shutters"
     effect.shutters.add()
     last = len(effect.shutters) - 1
     old, new = effect.shutters[index], effect.shutters[last]
     property_copy.copy_properties(old, new)
     new.color = COLORS[last % len(COLORS)]
-    fcurves.copy_curves(edit, f"{path}[{index}].", edit, f"{path}[{last}].")
+    fcurves.copy_curves(scene, f"{path}[{index}].", scene, f"{path}[{last}].")
     move_shutter(effect, last, index + 1)
     effect.active_shutter = index + 1
     return effect.shutters[index + 1]

@@ -92,11 +92,11 @@ class _Subject(NamedTuple):
     tolerance: float = 1.0
 
 
-def frames_to_track(edit, strip, direction: str, until: int = 0) -> range:
+def frames_to_track(scene, strip, direction: str, until: int = 0) -> range:
     """The timeline frames from the current one FORWARD, BACKWARD or in BOTH directions: as far as the strip goes, and
     not beyond the frame `until`, unless that is 0. EffectError: the current one is none of the strip's, or `until` does
     not lie in that direction."""
-    current, first, last = edit.frame_current, strip.left_handle, strip.right_handle - 1
+    current, first, last = scene.frame_current, strip.left_handle, strip.right_handle - 1
     if not first <= current <= last:
         raise EffectError(rpt_("the current frame is outside of the Shutter strip"))
     if until and (until == current or direction == ("BACKWARD" if until > current else "FORWARD")):
@@ -110,7 +110,7 @@ def frames_to_track(edit, strip, direction: str, until: int = 0) -> range:
 
 
 def track(
-    edit,
+    scene,
     effect,
     strip,
     index: int | None,
@@ -130,18 +130,18 @@ def track(
     moving = selection.moving(effect, index)
     (validation.check_placement if index is None else validation.check_region)(moving)
     motion_keys.check_curves(effect, index)
-    start, keys = edit.frame_current, MotionKeys(effect, index, motion)
+    start, keys = scene.frame_current, MotionKeys(effect, index, motion)
     # Those beyond the frames that are tracked tell how the subject looks as well.
     anchors = [frame for frame in keys.edited(range(strip.left_handle, strip.right_handle)) if frame != start]
     here, known = Tracked(start, placement_now(moving), 1.0), sorted({*frames, *anchors})
-    subject = (_camera if index is None else _region)(edit, effect, strip, index, known, here)
+    subject = (_camera if index is None else _region)(scene, effect, strip, index, known, here)
     tracked, stops = {start: here}, []
     reach = (
         max((a for a in anchors if frames[0] <= a < start), default=frames[0]),
         min((a for a in anchors if start < a <= frames[-1]), default=frames[-1]),
     )
-    shown, target = snapshot.take(edit, effect, strip, known), Target.of(effect, index)
-    del edit, effect, strip, keys, moving  # which may not outlive the first step
+    shown, target = snapshot.take(scene, effect, strip, known), Target.of(effect, index)
+    del scene, effect, strip, keys, moving  # which may not outlive the first step
     with effect_source.open_source(shown) as source:
         try:
             footage = Footage(source, lambda frame: effect_source.source_index(shown, frame, source)[0])
@@ -240,16 +240,16 @@ def unsure_among(effect, index: int | None, frames) -> int:
     return int((np.isin(known, list(frames)) & (confidence < pursuit.SURE)).sum())
 
 
-def _region(edit, effect, strip, index: int, frames, here: Tracked) -> _Subject:
-    shape = _standing(snapshot.region_at(edit, effect, strip, index, frames), here)
+def _region(scene, effect, strip, index: int, frames, here: Tracked) -> _Subject:
+    shape = _standing(snapshot.region_at(scene, effect, strip, index, frames), here)
     return _Subject(partial(tracking.follow, shape), lambda: motions.offsets(shape.unmoved(here.frame)))
 
 
-def _camera(edit, effect, strip, _index, frames, here: Tracked) -> _Subject:
+def _camera(scene, effect, strip, _index, frames, here: Tracked) -> _Subject:
     """The camera, and all regions, which are left out."""
-    camera = _standing(snapshot.camera_at(edit, effect, frames), here)
+    camera = _standing(snapshot.camera_at(scene, effect, frames), here)
     drawn = [i for i, region in enumerate(effect.regions) if region.kind not in strips.MATTES]
-    regions = [snapshot.region_at(edit, effect, strip, i, frames) for i in drawn]
+    regions = [snapshot.region_at(scene, effect, strip, i, frames) for i in drawn]
     follow = partial(camera_tracking.follow_camera, camera, regions)
     return _Subject(follow, lambda: region_keys.CORNERS, region_keys.STEADY)
 

@@ -14,20 +14,20 @@ _POINTED = {"MovieClip": "movieclips", "Image": "images", "Mask": "masks"}
 _effects: dict = {}
 
 
-def keep(edit, effect) -> None:
+def keep(scene, effect) -> None:
     """Keeps an effect that is about to be removed, under its scene's identity: properties, F-curves, annotations."""
-    scene, path = effect.scene, effect.path_from_id()
-    if scene is None or not scene.virtual_shutter.identity:
+    effect_scene, path = effect.scene, effect.path_from_id()
+    if effect_scene is None or not effect_scene.virtual_shutter.identity:
         return
-    curves = [_plain(curve) for curve in fcurves.curves_under(edit, path + ".")]
+    curves = [_plain(curve) for curve in fcurves.curves_under(scene, path + ".")]
     for curve in curves:
         curve["data_path"] = curve["data_path"].removeprefix(path)
-    _effects.pop(scene.virtual_shutter.identity, None)  # the newest are the last
-    _effects[scene.virtual_shutter.identity] = {
-        "scene": (scene.name, (scene.render.resolution_x, scene.render.resolution_y)),
+    _effects.pop(effect_scene.virtual_shutter.identity, None)  # the newest are the last
+    _effects[effect_scene.virtual_shutter.identity] = {
+        "scene": (effect_scene.name, (effect_scene.render.resolution_x, effect_scene.render.resolution_y)),
         "effect": _plain(effect),
         "curves": curves,
-        "layers": [_plain(layer) for layer in scene.annotation.layers] if scene.annotation else [],
+        "layers": [_plain(layer) for layer in effect_scene.annotation.layers] if effect_scene.annotation else [],
     }
     while len(_effects) > _MOST:
         del _effects[next(iter(_effects))]
@@ -38,25 +38,25 @@ def forget() -> None:
     _effects.clear()
 
 
-def restore(edit, identity: str):
-    """Makes a kept effect again in an edit. Returns its scene, or None where none was kept under this identity."""
+def restore(scene, identity: str):
+    """Makes a kept effect again in a scene. Returns the effect scene; None: none was kept under this identity."""
     if (data := _effects.get(identity)) is None:
         return None
     for made in (*bpy.data.annotations, *bpy.data.cameras):
         if made.virtual_shutter_made == identity and made.library is None:
             made.virtual_shutter_made = annotations.GONE  # of the scene before, which somebody removed
-    scene = add_effect.new_scene(edit, identity, *data["scene"])
-    effect = edit.virtual_shutter.effects.add()
+    effect_scene = add_effect.new_effect_scene(scene, identity, *data["scene"])
+    effect = scene.virtual_shutter.effects.add()
     _fill(effect, data["effect"])
-    effect.scene = scene
+    effect.scene = effect_scene
     for plain in data["curves"]:
         path = effect.path_from_id() + plain["data_path"]
-        curve = fcurves.new_curve(edit, path, plain["array_index"])
+        curve = fcurves.new_curve(scene, path, plain["array_index"])
         _fill(curve, plain | {"data_path": path})
         curve.update()
     for plain in data["layers"]:
-        _fill(scene.annotation.layers.new(plain["info"], set_active=False), plain)
-    return scene
+        _fill(effect_scene.annotation.layers.new(plain["info"], set_active=False), plain)
+    return effect_scene
 
 
 def _plain(struct) -> dict:

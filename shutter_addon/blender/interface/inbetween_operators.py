@@ -206,7 +206,7 @@ class SHUTTER_OT_smooth_streaks(_Building, Operator):
     def _built(self):
         """The factor is set now, so that the picture never lacks frames, and nothing is left of a build that was
         stopped."""
-        effects = (effect for edit in bpy.data.scenes for effect in edit.virtual_shutter.effects)
+        effects = (effect for scene in bpy.data.scenes for effect in scene.virtual_shutter.effects)
         effect = next((each for each in effects if each.scene and each.scene.session_uid == self._build.scene), None)
         if effect is None:
             return {"CANCELLED"}
@@ -232,9 +232,9 @@ class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
         )
 
     def change(self, context, effect):
-        edit, effect, strip = selection.active(context)
+        scene, effect, strip = selection.active(context)
         try:
-            freed, left = inbetween_build.purge(effect, strips.source_of(edit, effect, strip))
+            freed, left = inbetween_build.purge(effect, strips.source_of(scene, effect, strip))
         except FAULTS as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -55,8 +55,8 @@ _strip_items = []
 
 
 def _strips(_self, context):
-    edit = selection.edit_of(context)
-    all_strips = edit.sequence_editor.strips_all if edit and edit.sequence_editor else ()
+    scene = selection.scene_of(context)
+    all_strips = scene.sequence_editor.strips_all if scene and scene.sequence_editor else ()
     _strip_items[:] = [(strip.name, strip.name, "") for strip in all_strips if strip.type in strips.SOURCES]
     return _strip_items
 

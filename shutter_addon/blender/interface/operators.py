@@ -41,10 +41,10 @@ class SHUTTER_OT_add_effect(Operator):
 
 def takes_effect(cls, context) -> bool:
     """For poll(): whether the active strip can be given an effect."""
-    edit, source = selection.edit_of(context), selection.active_strip(context)
-    if edit is None or source is None:
+    scene, source = selection.scene_of(context), selection.active_strip(context)
+    if scene is None or source is None:
         return refused(cls, rpt_("Select a movie, image or clip strip"))
-    if not edit.is_editable:
+    if not scene.is_editable:
         return refused(cls, rpt_("The edit is linked from another file"))
     if source.type not in strips.SOURCES:
         return refused(cls, rpt_("The active strip is not a movie, image or clip strip"))
@@ -53,14 +53,14 @@ def takes_effect(cls, context) -> bool:
 
 def effect_added(operator, context) -> bool:
     """Gives the active strip an effect, and shows it; the operator says why it cannot be."""
-    edit, source = selection.edit_of(context), selection.active_strip(context)
+    scene, source = selection.scene_of(context), selection.active_strip(context)
     try:
-        strip, effect = add_effect.add_effect(edit, source)
+        strip, effect = add_effect.add_effect(scene, source)
     except FAULTS as error:
         operator.report({"ERROR"}, str(error))
         return False
     shutter_edits.start(effect)
-    selection.choose(edit, strip)
+    selection.choose(scene, strip)
     if not bpy.app.background:
         show_panel(context)
     redraw(context)

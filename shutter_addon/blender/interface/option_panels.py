@@ -67,7 +67,7 @@ class Inbetween(WithEffect):
 
     def draw(self, context):
         layout = self.layout
-        edit, effect, strip = selection.active(context)
+        scene, effect, strip = selection.active(context)
         build = inbetween_build.running()
         is_built = build is not None and build.scene == effect.scene.session_uid
         column = layout.column()
@@ -84,7 +84,7 @@ class Inbetween(WithEffect):
             layout.progress(factor=build.done / max(build.total, 1), text=progress, translate=False)
         elif is_on:
             try:
-                _draw_look(layout, inbetween_build.look(edit, effect, strip))
+                _draw_look(layout, inbetween_build.look(scene, effect, strip))
             except FAULTS as error:
                 sentence(layout, str(error), "ERROR")
         row = layout.row(align=True)

@@ -121,7 +121,7 @@ def _draw() -> None:
         return
     invalidation.drop_lesser()
     # Blender tells nobody of strokes that are drawn or erased, but it draws the preview again.
-    edit = selection.edit_of(context)
+    edit = selection.scene_of(context)
     if edit is not None and edit.library is None and invalidation.invalidate_changed(edit):
         bpy.app.timers.register(_redraw_once)  # what is tagged while it is drawn is not drawn again
     sharp_frame.follow_pen(context)

@@ -24,10 +24,10 @@ class SHUTTER_OT_recipe_import(OfEffect, ImportHelper, Operator):
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def change(self, context, effect):
-        edit, _effect, strip = selection.active(context)
+        scene, _effect, strip = selection.active(context)
         try:
             path = Path(chosen_file(self))
-            recipe_import.apply(edit, effect, strip, recipe_file.load(path), path.parent)
+            recipe_import.apply(scene, effect, strip, recipe_file.load(path), path.parent)
         except (recipe.RecipeError, *FAULTS) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -44,10 +44,10 @@ class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def change(self, context, effect):
-        edit, _effect, strip = selection.active(context)
+        scene, _effect, strip = selection.active(context)
         try:
             path = chosen_file(self)
-            recipe_file.save(matte_export.recipe_for(edit, effect, strip, Path(path)), path)
+            recipe_file.save(matte_export.recipe_for(scene, effect, strip, Path(path)), path)
         except (recipe.RecipeError, *FAULTS) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

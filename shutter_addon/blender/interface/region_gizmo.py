@@ -42,14 +42,14 @@ class Place:
 _strokes = revision.UntilChange()
 
 
-def _strokes_now(edit, effect, strip) -> list[np.ndarray]:
+def _strokes_now(scene, effect, strip) -> list[np.ndarray]:
     """The active region's strokes, or the line of a ramp, not moved yet: read once until something changes."""
-    index, frame = effect.active_region, edit.frame_current_final
+    index, frame = effect.active_region, scene.frame_current_final
     region = effect.regions[index]
     if region.kind == "RAMP":
         return [_RAMP] if region.ramp != "LUMINANCE" else []
     key = effect.scene.session_uid, strip.name, index, frame
-    return _strokes.get(key, lambda: snapshot.strokes_at(edit, effect, strip, index, frame))
+    return _strokes.get(key, lambda: snapshot.strokes_at(scene, effect, strip, index, frame))
 
 
 def place(context) -> Place | None:
@@ -58,9 +58,9 @@ def place(context) -> Place | None:
     region = selection.active_region(seen[1]) if seen else None
     if region is None:
         return None
-    edit, effect, strip = seen
+    scene, effect, strip = seen
     try:
-        strokes = _strokes_now(edit, effect, strip)
+        strokes = _strokes_now(scene, effect, strip)
         validation.check_region(region)
     except validation.EffectError:  # panels and the live preview tell it
         return None
@@ -87,10 +87,10 @@ def place(context) -> Place | None:
 def outline(context, where: Place) -> list[np.ndarray]:
     """The active region's strokes (n, 2) where its properties have it, keyed or not, in pixels of the preview's
     region."""
-    edit, effect, strip = selection.active(context)
+    scene, effect, strip = selection.active(context)
     region = selection.active_region(effect)
     numbers = region.location, np.degrees(region.rotation), region.scale
-    moved = scribbles.transform(_strokes_now(edit, effect, strip), *numbers, where.aspect)
+    moved = scribbles.transform(_strokes_now(scene, effect, strip), *numbers, where.aspect)
     return [mapped(where.to_region, points) for points in moved]
 
 

@@ -23,7 +23,7 @@ class Regions(WithEffect):
 
     def draw(self, context):
         layout = self.layout
-        edit, effect, strip = selection.active(context)
+        scene, effect, strip = selection.active(context)
         shutter = selection.active_shutter(effect)
         own = [region for region in effect.regions if shutter and region.shutter == shutter.name]
         draw_list(layout, effect, "region", own)
@@ -42,7 +42,7 @@ class Regions(WithEffect):
         elif region.kind == "RAMP":
             layout.prop(region, "ramp")
         elif region.kind == "MATTE":
-            _draw_matte(layout, matte_look.look(edit, effect, strip, region), region)
+            _draw_matte(layout, matte_look.look(scene, effect, strip, region), region)
         if region.kind not in strips.MATTES:
             layout.prop(region, "opacity")
         else:

@@ -45,7 +45,7 @@ class _Tracks:
     def index(self, effect) -> int | None:
         return effect.active_region
 
-    def is_ready(self, edit, effect, strip) -> bool:
+    def is_ready(self, scene, effect, strip) -> bool:
         """Whether nothing has to be tracked. EffectError: what comes after tracking cannot be done."""
         return False
 
@@ -114,18 +114,18 @@ class _Tracks:
         context.workspace.status_text_set(None)
 
     def _begin(self, context, patience: float | None):
-        edit, effect, strip = selection.active(context)
+        scene, effect, strip = selection.active(context)
         index = self.index(effect)
         moving = selection.moving(effect, index)
-        self._target, self._start, self._done = track_region.Target.of(effect, index), edit.frame_current, set()
-        if self.is_ready(edit, effect, strip):
+        self._target, self._start, self._done = track_region.Target.of(effect, index), scene.frame_current, set()
+        if self.is_ready(scene, effect, strip):
             self._steps = iter(())
             return
-        self._frames = track_region.frames_to_track(edit, strip, self.direction, moving.track_until)
+        self._frames = track_region.frames_to_track(scene, strip, self.direction, moving.track_until)
         motion, all_keys = validation.word(moving, "motion"), moving.track_all_keys
         self._frame = self._start
         self._steps = track_region.track(
-            edit, effect, strip, index, self._frames, motion, all_keys=all_keys, patience=patience
+            scene, effect, strip, index, self._frames, motion, all_keys=all_keys, patience=patience
         )
 
     def _go_on(self, seconds: float) -> bool:
@@ -203,8 +203,8 @@ class SHUTTER_OT_panning_shot(_Tracks, OfStrokes, Operator):
 
     direction = "BOTH"
 
-    def is_ready(self, edit, effect, strip):
-        return panning_shot.is_ready(edit, effect, strip, effect.active_region)
+    def is_ready(self, scene, effect, strip):
+        return panning_shot.is_ready(scene, effect, strip, effect.active_region)
 
     def ended(self, context):
         panning_shot.set_up(self._target.effect(), self._target.index, bar_edits.auto_key(context))
@@ -240,15 +240,15 @@ class _Looks:
         return effect.active_region
 
     def change(self, _context, effect):
-        edit = effect.id_data
+        scene = effect.id_data
         if self.properties.is_property_set("frame"):
-            edit.frame_set(self.frame)
+            scene.frame_set(self.frame)
             return {"FINISHED"}
-        frame = track_region.next_unsure(effect, self.index(effect), edit.frame_current)
+        frame = track_region.next_unsure(effect, self.index(effect), scene.frame_current)
         if frame is None:
             self.report({"INFO"}, "No other stretch of unsure frames lies ahead")
             return {"CANCELLED"}
-        edit.frame_set(frame)
+        scene.frame_set(frame)
         return {"FINISHED"}
 
 
@@ -284,8 +284,8 @@ class SHUTTER_OT_follow(_Follows, OfStrokes, Operator):
     bl_idname = "shutter.follow"
     bl_label = "Follow Track"
 
-    def key(self, edit, effect, strip):
-        follow_track.follow(edit, effect, strip, effect.active_region)
+    def key(self, scene, effect, strip):
+        follow_track.follow(scene, effect, strip, effect.active_region)
 
     @classmethod
     def possible(cls, effect):
@@ -300,8 +300,8 @@ class SHUTTER_OT_follow_update(_Follows, OfStrokes, Operator):
     bl_idname = "shutter.follow_update"
     bl_label = "Update"
 
-    def key(self, edit, effect, strip):
-        follow_track.update(edit, effect, strip, effect.active_region)
+    def key(self, scene, effect, strip):
+        follow_track.update(scene, effect, strip, effect.active_region)
 
     @classmethod
     def possible(cls, effect):

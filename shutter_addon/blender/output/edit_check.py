@@ -31,16 +31,16 @@ from . import output_space
 class EffectCheck:
     """What was found of an effect, of the frames that its strips show.
 
-    edit: its scene; name: of its strip; source: the footage's first file, "": it cannot be read
+    scene: that its strip is in; name: of that strip; source: the footage's first file, "": it cannot be read
     size: of its pictures, width and height in pixels; window: frames of the longest; shutters: how many
     factor: of its in-between frames, 1: none; pairs: how many pairs of source frames the frames need in-betweens of
     missing: those of them that are not built, each by its first source frame, from 1 on
-    lacking: the timeline frames of its edit that need these
+    lacking: the timeline frames that need these
     folder: of its in-between frames, None: it has none; bytes: what those that are missing take at most
     needs: memory for a frame, None: its frames cannot be asked for
     faults, notes: sentences; notes are of what can be rendered, but otherwise than one may think"""
 
-    edit: bpy.types.Scene
+    scene: bpy.types.Scene
     name: str
     frames: set[float]
     shutters: int
@@ -62,8 +62,8 @@ class EffectCheck:
         return chunk_size(self.window, self.factor) if self.window else LEAST
 
 
-def effects(edit, frames: range, compositor, *, find_cuts: bool) -> list[EffectCheck]:
-    """Looks at the effects that the edit's frames show, those of edits in it included.
+def effects(scene, frames: range, compositor, *, find_cuts: bool) -> list[EffectCheck]:
+    """Looks at the effects that the scene's frames show, those of scenes in it included.
 
     compositor: of the device that will render. Files are opened, and of each the first and the last frame that is
     needed are read.
@@ -72,32 +72,32 @@ def effects(edit, frames: range, compositor, *, find_cuts: bool) -> list[EffectC
     # It asks no device, which would have to wait for its first picture: states and windows are known without.
     looking = RenderSession(lambda: ("cpu", None), lambda: None)
     try:
-        return [_effect(looking, shown, compositor, find_cuts) for shown in _shown_effects(edit, frames)]
+        return [_effect(looking, shown, compositor, find_cuts) for shown in _shown_effects(scene, frames)]
     finally:
         looking.forget()
 
 
 def _shown_effects(film, frames: range) -> Iterator[tuple]:
-    """(edit, effect, strip, frames) of every effect that is shown at one of the film's frames."""
-    wanted = dict(requirements.edits_at(film, frames))
-    for edit, effect, parts in job_snapshots.shown_effects(film):
+    """(scene, effect, strip, frames) of every effect that is shown at one of the film's frames."""
+    wanted = dict(requirements.scenes_at(film, frames))
+    for scene, effect, parts in job_snapshots.shown_effects(film):
         shown: set[float] = set()
-        for part in parts if edit in wanted else ():
+        for part in parts if scene in wanted else ():
             start = strips.timeline_frame(part, 0)  # a strip may begin between frames
-            at = frame_ranges.common(requirements.shown_frames(edit, part), wanted[edit])
+            at = frame_ranges.common(requirements.shown_frames(scene, part), wanted[scene])
             shown |= {start + math.floor(frame - start) for frame in at}
         if shown:
-            yield edit, effect, parts[0], shown
+            yield scene, effect, parts[0], shown
 
 
 def _effect(looking: RenderSession, shown: tuple, compositor, find_cuts: bool) -> EffectCheck:
     """shown: of _shown_effects"""
-    edit, effect, strip, frames = shown
-    check = EffectCheck(edit, strip.name, frames, len(effect.shutters))
+    scene, effect, strip, frames = shown
+    check = EffectCheck(scene, strip.name, frames, len(effect.shutters))
     if not _look_at_footage(check, effect, strip):
         return check
     try:
-        taken = snapshot.take(edit, effect, strip, frames)
+        taken = snapshot.take(scene, effect, strip, frames)
         check.folder = taken.inbetween.folder if taken.inbetween else None
         requests = _requests(looking, taken, check)
     except effect_source.FAULTS as error:
@@ -134,7 +134,7 @@ def _look_at_footage(check: EffectCheck, effect, strip) -> bool:
     """Whether the footage can be opened; and whether it is what it was when the edit was saved: the effect's scene has
     the size of it."""
     try:
-        source = strips.source_of(check.edit, effect, strip)
+        source = strips.source_of(check.scene, effect, strip)
         medium = source_media.open_media(source)
     except UserError as error:
         check.faults.append(str(error))
@@ -239,7 +239,7 @@ def _kind(state) -> tuple[int, bool, int]:
     return state.options.window, state.following is not None, len(state.bars)
 
 
-def left_out(edit, frames: range) -> list[str]:
+def left_out(scene, frames: range) -> list[str]:
     """Why the sequencer leaves effects out of some of these frames."""
-    reasons = [why for shown, why in requirements.left_out(edit) if frame_ranges.common(shown, frames)]
+    reasons = [why for shown, why in requirements.left_out(scene) if frame_ranges.common(shown, frames)]
     return list(dict.fromkeys(reasons))

@@ -32,26 +32,26 @@ def check(output: Path, read: list[Path]) -> None:
     film_output.spare([output], read)
 
 
-def rehearse(edit, output: Path, file_format: str, frames: range) -> None:
-    """Joins one black picture to a movie that is thrown away; `edit` is changed, and not to be used again.
+def rehearse(scene, output: Path, file_format: str, frames: range) -> None:
+    """Joins one black picture to a movie that is thrown away; `scene` is changed, and not to be used again.
 
     OutputError, MediaError, OSError: these frames, of such a format, could not be joined to that movie."""
-    film_output.check(output, None, film_output.size(edit))
-    _refuse_gaps(edit, file_format, frames)
+    film_output.check(output, None, film_output.size(scene))
+    _refuse_gaps(scene, file_format, frames)
     with tempfile.TemporaryDirectory() as place:
         folder, trial = Path(place), Path(place, f"movie{output.suffix}")
-        _write_black(folder / f"{frames[0]:04d}.{file_format}", film_output.size(edit))
+        _write_black(folder / f"{frames[0]:04d}.{file_format}", film_output.size(scene))
         try:
-            join(edit, folder, trial, (frames[0], frames[0]), "", progress=lambda *_: nullcontext(lambda: None))
+            join(scene, folder, trial, (frames[0], frames[0]), "", progress=lambda *_: nullcontext(lambda: None))
         except OutputError as error:
             raise type(error)(str(error).replace(str(trial), str(output))) from None
 
 
-def _refuse_gaps(edit, file_format: str, frames: range) -> None:
+def _refuse_gaps(scene, file_format: str, frames: range) -> None:
     """OutputError: frames at which no strip is shown are transparent, and would be refused for it."""
-    if file_format == "png" and edit.render.image_settings.color_mode == "RGBA" and _changes_transparency(edit):
-        strips = [strip for strip in edit.sequence_editor.strips_all if strip.type not in ("SOUND", "META")]
-        shown = set().union(*(requirements.shown_frames(edit, strip) for strip in strips))
+    if file_format == "png" and scene.render.image_settings.color_mode == "RGBA" and _changes_transparency(scene):
+        strips = [strip for strip in scene.sequence_editor.strips_all if strip.type not in ("SOUND", "META")]
+        shown = set().union(*(requirements.shown_frames(scene, strip) for strip in strips))
         if gaps := [frame for frame in frames if frame not in shown]:
             words = f"{_are(gaps)} transparent, as no strip is shown, which a film shows otherwise under this view"
             raise OutputError(f"{words}; render EXR, or without transparency")
@@ -65,34 +65,34 @@ def _write_black(path: Path, size: tuple[int, int]) -> None:
         image_writing.write_grey(path, np.zeros((height, width), np.float32))
 
 
-def join(edit, folder: Path, output: Path, frames: tuple[int, int], key: str, progress=film_output.progress) -> None:
-    """Makes a movie of the rendered frames, first and last, in a folder; `edit` is changed, and not to be used again.
+def join(scene, folder: Path, output: Path, frames: tuple[int, int], key: str, progress=film_output.progress) -> None:
+    """Makes a movie of the rendered frames, first and last, in a folder; `scene` is changed, and not to be used again.
 
     key: that of the edit; progress: as film_output.progress. OutputError, MediaError: frames are missing, broken,
     unlike each other or of another edit, or the movie cannot be written, which is there whole or not at all.
     InterruptedRenderError: by Ctrl-C or TERM."""
-    edit.frame_start, edit.frame_end = frames
-    paths = _pictures(folder, range(frames[0], frames[1] + 1, edit.frame_step))
-    size = film_output.size(edit)
+    scene.frame_start, scene.frame_end = frames
+    paths = _pictures(folder, range(frames[0], frames[1] + 1, scene.frame_step))
+    size = film_output.size(scene)
     film_output.check(output, None, size)
     with progress(len(paths), "picture") as looked:
         first = _common(paths, looked, size, key)
-    _refuse_transparency(edit, paths, first)
-    _lay_over(edit, paths, first)
-    _set_output(edit, output, size)
+    _refuse_transparency(scene, paths, first)
+    _lay_over(scene, paths, first)
+    _set_output(scene, output, size)
     film_output.prepare(output.parent)
-    with progress(len(paths), "frame") as moved, _ended_by_gaps(edit, paths):
-        film_output.write(edit, output, moved)
+    with progress(len(paths), "frame") as moved, _ended_by_gaps(scene, paths):
+        film_output.write(scene, output, moved)
 
 
 @contextmanager
-def _ended_by_gaps(edit, paths: list[Path]):
+def _ended_by_gaps(scene, paths: list[Path]):
     """Inside, the film ends before a frame whose picture is gone by then: Blender would show a colour in its place."""
 
-    def look(scene, *_):
-        if not render_job.is_film(scene):
+    def look(rendered, *_):
+        if not render_job.is_film(rendered):
             return
-        path = _picture_at(scene.frame_current, edit, paths)
+        path = _picture_at(rendered.frame_current, scene, paths)
         if not path.is_file():
             render_job.fail(f"{path}: no such file")
             render_job.cancel()
@@ -101,8 +101,8 @@ def _ended_by_gaps(edit, paths: list[Path]):
         yield
 
 
-def _picture_at(frame: int, edit, paths: list[Path]) -> Path:
-    return paths[(frame - edit.frame_start) // edit.frame_step]
+def _picture_at(frame: int, scene, paths: list[Path]) -> Path:
+    return paths[(frame - scene.frame_start) // scene.frame_step]
 
 
 def _pictures(folder: Path, frames: range) -> list[Path]:
@@ -186,39 +186,39 @@ def _by(size: tuple[int, int]) -> str:
     return "{}×{}".format(*size)
 
 
-def _refuse_transparency(edit, paths: list[Path], first: RenderedPicture) -> None:
+def _refuse_transparency(scene, paths: list[Path], first: RenderedPicture) -> None:
     """OutputError: PNG files of which Blender's own film would show other colours. It applies the view to what lies
     over black, where they have it applied to the colours that shine through."""
-    if paths[0].suffix == ".png" and first.channels in (2, 4) and _changes_transparency(edit):
+    if paths[0].suffix == ".png" and first.channels in (2, 4) and _changes_transparency(scene):
         for path in paths:
             if rendered_pictures.is_transparent(path):
                 words = "is transparent, which a film shows otherwise under this view"
                 raise OutputError(f"{path}: {words}; render EXR, or without transparency")
 
 
-def _changes_transparency(edit) -> bool:
-    return _shown(edit).view_settings.view_transform != "Standard"
+def _changes_transparency(scene) -> bool:
+    return _shown(scene).view_settings.view_transform != "Standard"
 
 
-def _shown(edit):
+def _shown(scene):
     """What has the display and the view that the edit's output has."""
-    settings = edit.render.image_settings
-    return settings if settings.color_management == "OVERRIDE" else edit
+    settings = scene.render.image_settings
+    return settings if settings.color_management == "OVERRIDE" else scene
 
 
-def _lay_over(edit, paths: list[Path], first: RenderedPicture) -> None:
+def _lay_over(scene, paths: list[Path], first: RenderedPicture) -> None:
     """Has the pictures cover all else that the edit shows. Its sounds are heard."""
-    editor = edit.sequence_editor
+    editor = scene.sequence_editor
     editor.display_stack(None)  # out of meta strips: Blender renders what was open when the file was saved
     channel = max((strip.channel for strip in editor.strips), default=0) + 1
     if channel > _CHANNELS:
         raise OutputError("the edit has strips in the uppermost channel, where the frames are to lie; move them down")
     editor.channels[channel].mute = False
-    space = _keep_colours(edit, paths[0].suffix, first)
-    shown = [_picture_at(frame, edit, paths) for frame in range(edit.frame_start, edit.frame_end + 1)]
+    space = _keep_colours(scene, paths[0].suffix, first)
+    shown = [_picture_at(frame, scene, paths) for frame in range(scene.frame_start, scene.frame_end + 1)]
     for start in range(0, len(shown), _AT_ONCE):
         part = shown[start : start + _AT_ONCE]
-        strip = editor.strips.new_image(part[0].name, str(part[0]), channel, edit.frame_start + start)
+        strip = editor.strips.new_image(part[0].name, str(part[0]), channel, scene.frame_start + start)
         for path in part[1:]:
             strip.elements.append(path.name)
         strip.blend_type = "REPLACE"
@@ -227,12 +227,12 @@ def _lay_over(edit, paths: list[Path], first: RenderedPicture) -> None:
             strip.colorspace_settings.name = space
 
 
-def _keep_colours(edit, suffix: str, first: RenderedPicture) -> str | None:
+def _keep_colours(scene, suffix: str, first: RenderedPicture) -> str | None:
     """Has the view of PNG files, which are finished, change nothing any more; the colour space that they are in. EXR
     files are scene-linear: None."""
     if suffix == ".exr":
         return None
-    shown = _shown(edit)
+    shown = _shown(scene)
     try:
         shown.view_settings.view_transform = "Standard"
     except TypeError:
@@ -240,20 +240,20 @@ def _keep_colours(edit, suffix: str, first: RenderedPicture) -> str | None:
     for name, value in _CHANGES.items():
         setattr(shown.view_settings, name, value)
     if first.samples == "uint8":
-        edit.render.dither_intensity = 0  # it has been added to them
+        scene.render.dither_intensity = 0  # it has been added to them
     return shown.display_settings.display_device
 
 
-def _set_output(edit, output: Path, size: tuple[int, int]) -> None:
+def _set_output(scene, output: Path, size: tuple[int, int]) -> None:
     """The edit's own settings, if its output is a movie, else those of the command's films; the container by the
     output's ending. Nothing is burnt in again, and what else makes a picture of another size or place is off."""
-    render = edit.render
+    render = scene.render
     if render.image_settings.media_type == "VIDEO":
         render.ffmpeg.format = film_output.MOVIES[output.suffix.lower()][0]
         render.ffmpeg.use_autosplit = False
         film_output.set_place(render, output)
     else:
-        film_output.set_output(edit, output, "png", alpha=False)
+        film_output.set_output(scene, output, "png", alpha=False)
     render.resolution_x, render.resolution_y = size
     render.resolution_percentage = 100
     render.use_stamp = render.use_stamp_note = False

@@ -61,9 +61,9 @@ def is_movie(path: Path) -> bool:
     return path.suffix.lower() in MOVIES
 
 
-def size(edit) -> tuple[int, int]:
-    """Width and height of the pictures that Blender renders of an edit, in pixels."""
-    render = edit.render
+def size(scene) -> tuple[int, int]:
+    """Width and height of the pictures that Blender renders of a scene, in pixels."""
+    render = scene.render
     return tuple(n * render.resolution_percentage // 100 for n in (render.resolution_x, render.resolution_y))
 
 
@@ -127,18 +127,18 @@ def for_blender(path: str) -> str:
     return path.replace("{", "{{").replace("}", "}}")
 
 
-def set_output(edit, path: Path, file_format: str, *, alpha: bool) -> None:
+def set_output(scene, path: Path, file_format: str, *, alpha: bool) -> None:
     """Where and how the edit's render goes: a movie by its ending, else a folder of pictures named by frame.
 
     alpha: pictures keep the source's transparency. OutputError: Blender cannot write there."""
-    settings, render = edit.render.image_settings, edit.render
+    settings, render = scene.render.image_settings, scene.render
     set_place(render, path)
     if is_movie(path):
         container, codec, audio = MOVIES[path.suffix.lower()]
         settings.media_type = "VIDEO"
         settings.color_mode = "RGB"
         render.ffmpeg.format, render.ffmpeg.codec = container, codec
-        render.ffmpeg.audio_codec = audio if _has_sound(edit) else "NONE"
+        render.ffmpeg.audio_codec = audio if _has_sound(scene) else "NONE"
         render.ffmpeg.constant_rate_factor = "HIGH"
         return
     _set_format(settings, FORMATS[file_format])
@@ -152,21 +152,21 @@ def set_place(render, path: Path) -> None:
     render.filepath = for_blender(str(path) if is_movie(path) else f"{path}{os.sep}")
 
 
-def _has_sound(edit) -> bool:
-    """Whether an edit has sound strips, or one that it shows."""
-    shown_strips = [strip for shown in strips.shown_edits(edit) for strip in shown.sequence_editor.strips_all]
+def _has_sound(scene) -> bool:
+    """Whether a scene has sound strips, or one that it shows."""
+    shown_strips = [strip for shown in strips.shown_scenes(scene) for strip in shown.sequence_editor.strips_all]
     return any(strip.type == "SOUND" for strip in shown_strips)
 
 
-def set_pictures(edit, file_format: str, note: str) -> None:
+def set_pictures(scene, file_format: str, note: str) -> None:
     """What pictures a saved edit's render writes: every frame anew, as colours are set in the edit, with a note in
     their metadata."""
-    settings, render = edit.render.image_settings, edit.render
+    settings, render = scene.render.image_settings, scene.render
     settings.media_type = "IMAGE"
     _set_format(settings, FORMATS[file_format])
     render.use_file_extension = render.use_overwrite = True
     render.use_placeholder = False
-    edit.frame_step = 1
+    scene.frame_step = 1
     if not render.use_stamp:  # what is burnt into pictures stays as it is
         _stamp_nothing(render)
         render.use_stamp_note, render.stamp_note_text = True, note
@@ -184,45 +184,45 @@ def _stamp_nothing(render) -> None:
         setattr(render, name, False)
 
 
-def film(edit, output: Path) -> None:
+def film(scene, output: Path) -> None:
     """Renders an edit of new_edit.make_edit to a movie or a folder.
 
     OutputError: it cannot be rendered or written; finished pictures stay, and of a movie what was finished, under a
     name of its own. InterruptedRenderError: the same, by Ctrl-C or a farm's TERM."""
     prepare(output.parent if is_movie(output) else output)
-    feed = movie_feed.feeding(edit) if is_movie(output) and strips.effect_strips(edit) else nullcontext()
-    with progress(edit.frame_end - edit.frame_start + 1, "frame") as moved, _without_sources(edit), feed:
-        write(edit, output, moved)
+    feed = movie_feed.feeding(scene) if is_movie(output) and strips.effect_strips(scene) else nullcontext()
+    with progress(scene.frame_end - scene.frame_start + 1, "frame") as moved, _without_sources(scene), feed:
+        write(scene, output, moved)
 
 
-def write(edit, output: Path, moved: Callable[[], None], move: Callable[[Path, Path], object] = Path.replace) -> None:
+def write(scene, output: Path, moved: Callable[[], None], move: Callable[[Path, Path], object] = Path.replace) -> None:
     """Renders the frames of any edit to a movie, or to the pictures that its settings say in a prepared folder. Blender
     writes into a folder beside the output, and what is finished moves out of it.
 
     moved: called after each frame; move: moves a picture to its place, or raises an error
     OutputError, InterruptedRenderError: see `film`."""
-    kept = edit.render.filepath
+    kept = scene.render.filepath
     faults: list[str] = []
     with atomic_write.part_folder(output.parent if is_movie(output) else output) as part:
         part_film = part / f"film{output.suffix}"
         try:
-            edit.render.filepath = for_blender(str(part_film) if is_movie(output) else f"{part}{os.sep}")
+            scene.render.filepath = for_blender(str(part_film) if is_movie(output) else f"{part}{os.sep}")
             with (
                 render_job.telling(faults.append),
                 stoppable() as stopped,
                 quiet(),
-                _uncached(edit),
-                _moved(part, output, edit, moved, move) as missing,
+                _uncached(scene),
+                _moved(part, output, scene, moved, move) as missing,
             ):
-                bpy.ops.render.render(animation=True, scene=edit.name)
+                bpy.ops.render.render(animation=True, scene=scene.name)
             if is_movie(output) and not faults and not stopped:
-                _finish(part_film, output, len(range(edit.frame_start, edit.frame_end + 1, edit.frame_step)))
+                _finish(part_film, output, len(range(scene.frame_start, scene.frame_end + 1, scene.frame_step)))
             elif missing and not faults and not stopped:
                 raise OutputError(f"{output}: {len(missing)} frames were not written; {why_short(part)}")
         except RuntimeError as error:
             raise OutputError(f"{output}: {message(error)}") from None
         finally:
-            edit.render.filepath = kept
+            scene.render.filepath = kept
         if faults or stopped:
             rescued = _rescued(part_film, output) if is_movie(output) else ""
             if faults:
@@ -275,11 +275,11 @@ def message(error: RuntimeError) -> str:
 
 
 @contextmanager
-def _moved(part: Path, output: Path, edit, update: Callable[[], None], move: Callable[[Path, Path], object]):
+def _moved(part: Path, output: Path, scene, update: Callable[[], None], move: Callable[[Path, Path], object]):
     """Moves each finished picture from `part` to `output`, and calls both. Gives the pictures that are missing so
     far, by name; none of a movie's."""
-    frames = edit.frame_start, edit.frame_end
-    settings = edit.render.image_settings
+    frames = scene.frame_start, scene.frame_end
+    settings = scene.render.image_settings
     ending = next((name for name, kind in FORMATS.items() if settings.file_format == kind.blender), "")
     missing = {path.name: path for path in pictures_of(output, ending, frames)} if ending else {}
 
@@ -340,9 +340,9 @@ def stoppable():
 
 
 @contextmanager
-def _uncached(edit):
+def _uncached(scene):
     """Each frame is rendered once: those that Blender would keep would fill gigabytes."""
-    editor = edit.sequence_editor
+    editor = scene.sequence_editor
     if editor is None:
         yield
         return
@@ -355,10 +355,10 @@ def _uncached(edit):
 
 
 @contextmanager
-def _without_sources(edit):
+def _without_sources(scene):
     """Spares Blender what no frame shows: the source lies wholly below its effect, but Blender takes any Scene strip
     for transparent: it would decode the source and blend the two, 2/5 of all its work."""
-    sources = [edit.sequence_editor.strips_all[name] for name in strips.shown_sources(edit)]
+    sources = [scene.sequence_editor.strips_all[name] for name in strips.shown_sources(scene)]
     shown = [strip for strip in sources if not strip.mute]
     for strip in shown:
         strip.mute = True

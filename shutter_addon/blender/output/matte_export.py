@@ -21,17 +21,17 @@ from ..data import matte_content, matte_strips, recipe_export, snapshot, source_
 from ..rendering import effect_source
 
 
-def recipe_for(edit, effect, strip, path: Path) -> recipe.Recipe:
+def recipe_for(scene, effect, strip, path: Path) -> recipe.Recipe:
     """An effect as a recipe that is to lie at a path. What it cannot point to is written into a folder beside it, "NAME
     mattes". One of effect_source.FAULTS: the effect cannot be rendered as it stands, or a matte cannot be read or
     written. OSError: there can be no such folder."""
     regions = strips.matte_regions(effect)
     # Once before anything is written.
-    recipe_export.recipe_of(edit, effect, strip, [_ramp(region) for region in regions])
+    recipe_export.recipe_of(scene, effect, strip, [_ramp(region) for region in regions])
     folders = [_folder(region, path, number) for number, region in enumerate(regions, 1)]
-    _spare(folders, _read(edit, effect, strip, regions))
-    words = [_words(edit, effect, strip, *both, path) for both in zip(regions, folders, strict=True)]
-    return recipe_export.recipe_of(edit, effect, strip, words)
+    _spare(folders, _read(scene, effect, strip, regions))
+    words = [_words(scene, effect, strip, *both, path) for both in zip(regions, folders, strict=True)]
+    return recipe_export.recipe_of(scene, effect, strip, words)
 
 
 def _ramp(region) -> recipe.RampRegion:
@@ -53,9 +53,9 @@ def _is_one_of_many(region) -> bool:
     return region.image.source == "FILE" and path.exists() and ImageFiles(path).count > 1
 
 
-def _read(edit, effect, strip, regions) -> Iterator[Path]:
+def _read(scene, effect, strip, regions) -> Iterator[Path]:
     """A file of each medium that is read while mattes are written, or by those that are not."""
-    yield source_media.spec(strips.source_of(edit, effect, strip)).path
+    yield source_media.spec(strips.source_of(scene, effect, strip)).path
     for region in regions:
         if region.kind == "MATTE" and region.matte == "IMAGE":
             yield matte_content.image_path(region)
@@ -72,11 +72,11 @@ def _spare(folders: list[Path | None], read: Iterator[Path]) -> None:
             raise validation.EffectError(sentence.format(folder=folder))
 
 
-def _words(edit, effect, strip, region, folder: Path | None, path: Path) -> recipe.MatteRegion | recipe.RampRegion:
+def _words(scene, effect, strip, region, folder: Path | None, path: Path) -> recipe.MatteRegion | recipe.RampRegion:
     if region.kind == "RAMP":
         return _ramp(region)
     if folder is not None:
-        first = _write(edit, effect, strip, region, folder)
+        first = _write(scene, effect, strip, region, folder)
         return recipe.MatteRegion(region.shutter, "matte", recipe.relative(first, path.parent), timing="timeline")
     file, channel = matte_content.image_path(region), matte_content.channel(region)
     # A recipe's timeline begins with the strip, trimmed as it is.
@@ -85,12 +85,12 @@ def _words(edit, effect, strip, region, folder: Path | None, path: Path) -> reci
     return recipe.MatteRegion(region.shutter, "matte", recipe.relative(file, path.parent), **words)
 
 
-def _write(edit, effect, strip, region, folder: Path) -> Path:
+def _write(scene, effect, strip, region, folder: Path) -> Path:
     """Writes what a matte shows at each timeline frame of the effect strip, or one picture, if it shows that at all of
     them; the first one's path."""
     folder.mkdir(parents=True, exist_ok=True)
     with atomic_write.part_folder(folder) as part:
-        keys = _write_frames(edit, effect, strip, region, part)
+        keys = _write_frames(scene, effect, strip, region, part)
         kept = 1 if len(set(keys)) == 1 else len(keys)
         for number in range(1, kept + 1):
             os.replace(part / _name(number), folder / _name(number))
@@ -104,11 +104,11 @@ def _name(number: int) -> str:
     return f"{number:04d}.png"
 
 
-def _write_frames(edit, effect, strip, region, folder: Path) -> list:
+def _write_frames(scene, effect, strip, region, folder: Path) -> list:
     """Writes what a matte shows at each timeline frame of the effect strip; a key for each, equal for equal ones."""
     frames, keys = range(strip.left_handle, strip.right_handle), []
-    shown = snapshot.take(edit, effect, strip, frames)
-    content = snapshot.region_at(edit, effect, strip, list(effect.regions).index(region), frames).content
+    shown = snapshot.take(scene, effect, strip, frames)
+    content = snapshot.region_at(scene, effect, strip, list(effect.regions).index(region), frames).content
     with closing(effect_source.open_source(shown)) as source, closing(MatteValues.of(source)) as values:
         for number, frame in enumerate(frames, 1):
             with translated(rpt_):

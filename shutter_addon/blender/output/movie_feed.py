@@ -27,7 +27,7 @@ _ROWS, _COLUMNS = 64, 16
 
 
 @contextmanager
-def feeding(edit):
+def feeding(scene):
     """Inside, the movie of an edit of new_edit.make_edit is rendered from such files. It has the levels that Blender
     would give the effect's picture, but for one where rounding decides.
 
@@ -38,21 +38,21 @@ def feeding(edit):
             with suppress(OSError, struct.error):  # of pictures beyond the 4 GB of a TIFF
                 atomic_write.clear_up(place := Path(tempfile.gettempdir()))
                 folder = until_the_end.enter_context(atomic_write.part_folder(place))
-                size = edit.render.resolution_x, edit.render.resolution_y
-                until_the_end.enter_context(_fed(edit, LevelsFile(folder / "picture.tif", *size)))
+                size = scene.render.resolution_x, scene.render.resolution_y
+                until_the_end.enter_context(_fed(scene, LevelsFile(folder / "picture.tif", *size)))
         yield
 
 
 @contextmanager
-def _fed(edit, picture):
-    effect_strip = strips.effect_strips(edit)[0]
+def _fed(scene, picture):
+    effect_strip = strips.effect_strips(scene)[0]
     strip = _above(effect_strip, picture.path)
     filled = partial(fill, effect_strip, picture, [])
     try:
         with render_job.calling(bpy.app.handlers.render_pre, filled):
             yield
     finally:
-        edit.sequence_editor.strips.remove(strip)
+        scene.sequence_editor.strips.remove(strip)
         picture.close()
 
 
@@ -65,18 +65,18 @@ def _above(effect_strip, path: Path):
     return strip
 
 
-def fill(effect_strip, picture, film: list, edit, *_) -> None:
+def fill(effect_strip, picture, film: list, scene, *_) -> None:
     """Fills the file with the picture of the frame that is rendered next. film: the snapshot of all its frames, once it
     is read."""
-    if not render_job.is_film(edit) or render_job.stopping():
+    if not render_job.is_film(scene) or render_job.stopping():
         return
     try:
         if not film:
-            effect, frames = strips.effect_of(edit, effect_strip.scene), range(edit.frame_start, edit.frame_end + 1)
-            film.append(snapshot.take(edit, effect, effect_strip, frames, folder=render_settings.settings().inbetween))
+            effect, frames = strips.effect_of(scene, effect_strip.scene), range(scene.frame_start, scene.frame_end + 1)
+            film.append(snapshot.take(scene, effect, effect_strip, frames, folder=render_settings.settings().inbetween))
         context = render_context.of_render(say, render_job.stopping, levels=True)
-        picture.write(pictures.picture(context, film[0], edit.frame_current))
-        context.session.begin_next(film[0], edit.frame_current, context)
+        picture.write(pictures.picture(context, film[0], scene.frame_current))
+        context.session.begin_next(film[0], scene.frame_current, context)
     except BaseException as error:  # Blender would print it, and write the picture again that was there before
         if not isinstance(error, StoppedError):
             render_job.fail(in_words(error))

@@ -32,23 +32,23 @@ def check(folder: Path, file_format: str | None, frames: tuple[int, int], read: 
     film_output.spare(film_output.pictures_of(folder, file_format or "png", frames), read)
 
 
-def check_resumable(edit) -> None:
+def check_resumable(scene) -> None:
     """OutputError: the edit's pictures do not say which version of it they are of."""
-    if edit.render.use_stamp:
+    if scene.render.use_stamp:
         words = "the edit burns metadata into its pictures, so that they carry no version; turn Burn Into Image off"
         raise film_output.OutputError(f"--resume: {words}")
 
 
 @contextmanager
-def of_same_footage(edit) -> Iterator[dict[Path, tuple]]:
+def of_same_footage(scene) -> Iterator[dict[Path, tuple]]:
     """Gives a dictionary for the pictures that are rendered inside, with their stamps. They are removed if the footage
     is written to meanwhile: they carry the key of what it was, and would count as finished. Pictures that others have
     put in their places stay. OutputError: it was written to."""
-    before, rendered = versions.stamps(edit), {}
+    before, rendered = versions.stamps(scene), {}
     try:
         yield rendered
     finally:
-        changed = [path for path, stamp in versions.stamps(edit).items() if stamp != before.get(path)]
+        changed = [path for path, stamp in versions.stamps(scene).items() if stamp != before.get(path)]
         if changed:
             for picture, stamp in rendered.items():
                 if rendered_pictures.stamp(picture) == stamp:
@@ -57,7 +57,7 @@ def of_same_footage(edit) -> Iterator[dict[Path, tuple]]:
 
 
 def render(
-    edit, folder: Path, file_format: str, version: EditVersion, rendered: dict[Path, tuple], *, resume: bool
+    scene, folder: Path, file_format: str, version: EditVersion, rendered: dict[Path, tuple], *, resume: bool
 ) -> None:
     """Renders the edit's frames, from its first to its last, to pictures that carry the key of its version.
 
@@ -67,12 +67,12 @@ def render(
     OutputError, InterruptedRenderError: see film_output.film, or the folder is for another version by now; OSError:
     the folder cannot be written to"""
     if resume:
-        check_resumable(edit)
-    film_output.set_pictures(edit, file_format, edit_version.note(version.key))
+        check_resumable(scene)
+    film_output.set_pictures(scene, file_format, edit_version.note(version.key))
     film_output.prepare(folder)
     samples = film_output.FORMATS[file_format].samples
-    is_finished = partial(_is_finished, film_output.size(edit), samples, version.key, {})
-    pictures = {frame: folder / f"{frame:04d}.{file_format}" for frame in range(edit.frame_start, edit.frame_end + 1)}
+    is_finished = partial(_is_finished, film_output.size(scene), samples, version.key, {})
+    pictures = {frame: folder / f"{frame:04d}.{file_format}" for frame in range(scene.frame_start, scene.frame_end + 1)}
 
     def move(part, picture):
         job_file.guard(folder, version)  # again: it may be for a newer version by now
@@ -81,14 +81,14 @@ def render(
         rendered[picture] = stamp
 
     with film_output.progress(len(pictures), "frame") as moved:
-        write = partial(film_output.write, edit, folder, moved, move)
+        write = partial(film_output.write, scene, folder, moved, move)
         if resume:
-            _render_missing(edit, folder, pictures, is_finished, write, moved)
+            _render_missing(scene, folder, pictures, is_finished, write, moved)
         else:
             write()
 
 
-def _render_missing(edit, folder: Path, pictures: dict[int, Path], is_finished, write, moved) -> None:
+def _render_missing(scene, folder: Path, pictures: dict[int, Path], is_finished, write, moved) -> None:
     missing, waits = dict(pictures), False
     with Claims(folder) as claims, film_output.stoppable() as stopped:
         while True:
@@ -100,7 +100,7 @@ def _render_missing(edit, folder: Path, pictures: dict[int, Path], is_finished, 
             if stopped:
                 raise film_output.InterruptedRenderError(f"{folder}: stopped")
             if run := _claim_run(claims, missing, is_finished):
-                _render_run(edit, claims, run, write)
+                _render_run(scene, claims, run, write)
                 for frame in run:
                     del missing[frame]
             else:
@@ -128,8 +128,8 @@ def _claim_run(claims: Claims, missing: dict[int, Path], is_finished) -> dict[in
     return run
 
 
-def _render_run(edit, claims: Claims, run: dict[int, Path], write) -> None:
-    edit.frame_start, edit.frame_end = min(run), max(run)
+def _render_run(scene, claims: Claims, run: dict[int, Path], write) -> None:
+    scene.frame_start, scene.frame_end = min(run), max(run)
     try:
         write()
     finally:

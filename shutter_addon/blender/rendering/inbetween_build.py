@@ -46,9 +46,9 @@ class _Builds:
 _builds = _Builds()
 
 
-def look(edit, effect, strip) -> Look:
+def look(scene, effect, strip) -> Look:
     """How things are, or were a second ago. MediaError, EffectError: there is no source, or no place for frames."""
-    source = strips.source_of(edit, effect, strip)
+    source = strips.source_of(scene, effect, strip)
     settings = inbetween_settings.settings(effect)
     medium, doubled = _known(spec := source_media.spec(source))
     key = spec.key, *settings
@@ -95,14 +95,14 @@ class Build:
     scene: session_uid of the effect's scene; done, total: pairs of neighbouring source frames; settings: what it builds
     future: how far it came, an inbetween_folders.State; or MediaError"""
 
-    def __init__(self, edit, effect, strip, factor: int | None = None):
+    def __init__(self, scene, effect, strip, factor: int | None = None):
         """factor: builds what the strip needs with it, in place of all of the source with its own. EffectError,
         MediaError: it cannot begin."""
         self.settings = inbetween_settings.settings(effect)
-        medium, pairs = source_media.open_media(strips.source_of(edit, effect, strip)), None
+        medium, pairs = source_media.open_media(strips.source_of(scene, effect, strip)), None
         if factor is not None:
             self.settings = self.settings._replace(factor=factor)
-            pairs = _needed(edit, effect, strip, medium, self.settings)
+            pairs = _needed(scene, effect, strip, medium, self.settings)
         self.scene = effect.scene.session_uid
         self.done, self.total = 0, medium.count - 1 if pairs is None else len(pairs)
         self._stopped = threading.Event()
@@ -128,10 +128,10 @@ class Build:
         self._stopped.set()
 
 
-def _needed(edit, effect, strip, medium, settings) -> list[int]:
+def _needed(scene, effect, strip, medium, settings) -> list[int]:
     frames = range(strip.left_handle, strip.right_handle)
     try:
-        return strobing.pairs(snapshot.take(edit, effect, strip, frames), medium, settings)
+        return strobing.pairs(snapshot.take(scene, effect, strip, frames), medium, settings)
     except ShutterError as error:
         raise EffectError(str(error)) from None
     finally:
@@ -143,9 +143,9 @@ def running() -> Build | None:
     return _builds.running
 
 
-def start(edit, effect, strip, factor: int | None = None) -> Build:
+def start(scene, effect, strip, factor: int | None = None) -> Build:
     """Begins a build; factor: see Build. EffectError, MediaError: it cannot begin."""
-    _builds.running = Build(edit, effect, strip, factor)
+    _builds.running = Build(scene, effect, strip, factor)
     inbetween_settings.built.hold()
     return _builds.running
 

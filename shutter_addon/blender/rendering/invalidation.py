@@ -38,17 +38,17 @@ _TIMING = (
 )
 
 
-def current(edit, effect, strip, frame: float) -> Snapshot:
+def current(scene, effect, strip, frame: float) -> Snapshot:
     """The snapshot of an effect strip at a timeline frame, for what is drawn: taken once until something changes.
     EffectError, MediaError: as snapshot.take."""
-    scene = effect.scene.session_uid
+    uid = effect.scene.session_uid
 
     def take():
-        number, files = _files.get(scene, (None, None))
+        number, files = _files.get(uid, (None, None))
         known = files if number == revision.number() else None
-        return snapshot.take(edit, effect, strip, (frame,), folder=render_settings.settings().inbetween, files=known)
+        return snapshot.take(scene, effect, strip, (frame,), folder=render_settings.settings().inbetween, files=known)
 
-    return _current.get((scene, strip.name, frame), take)
+    return _current.get((uid, strip.name, frame), take)
 
 
 def forget() -> None:
@@ -94,10 +94,10 @@ def drop_lesser() -> None:
 
 def _drop(noted: set[int]) -> None:
     """Empties a set of session_uids of effect scenes, and drops what the sequencer keeps of those."""
-    scenes = {noted.pop() for _ in range(len(noted))}
-    for edit in bpy.data.scenes if scenes else ():
-        for strip in strips.effect_strips(edit):
-            if strip.scene.session_uid in scenes:
+    uids = {noted.pop() for _ in range(len(noted))}
+    for scene in bpy.data.scenes if uids else ():
+        for strip in strips.effect_strips(scene):
+            if strip.scene.session_uid in uids:
                 strip.invalidate_cache("RAW")
 
 
@@ -107,31 +107,31 @@ def drop_spoilt_later() -> None:
         render_job.soon(drop_spoilt)
 
 
-def invalidate_changed(edit) -> bool:
-    """Drops the finished frames of the edit's effects whose keys, strokes or source have changed since the last call;
+def invalidate_changed(scene) -> bool:
+    """Drops the finished frames of the scene's effects whose keys, strokes or source have changed since the last call;
     whether there are any.
 
     The values of keyed properties do not count: they change with every frame that plays."""
     drop_removed()
-    if not edit.virtual_shutter.effects:
+    if not scene.virtual_shutter.effects:
         return False
     changed = False
-    shown = {strip.scene: strip for strip in strips.effect_strips(edit)}
+    shown = {strip.scene: strip for strip in strips.effect_strips(scene)}
     looked = {}
-    for effect in edit.virtual_shutter.effects:
+    for effect in scene.virtual_shutter.effects:
         if (strip := shown.get(effect.scene)) is None:
             continue
-        scene = effect.scene.session_uid
-        signature = hash(tuple(_signature(edit, effect, strip, looked)))
-        if _signatures.setdefault(scene, signature) != signature:
-            _signatures[scene] = signature
-            strips.invalidate(edit, effect.scene)
+        uid = effect.scene.session_uid
+        signature = hash(tuple(_signature(scene, effect, strip, looked)))
+        if _signatures.setdefault(uid, signature) != signature:
+            _signatures[uid] = signature
+            strips.invalidate(scene, effect.scene)
             changed = True
-    _files.update((scene, (revision.number(), files)) for scene, files in looked.items())
+    _files.update((uid, (revision.number(), files)) for uid, files in looked.items())
     return changed
 
 
-def _signature(edit, effect, strip, looked: dict):
+def _signature(scene, effect, strip, looked: dict):
     """All that the effect's pictures depend on, but for properties with an update callback. looked: gets what the
     source reads, by the effect's scene."""
     for shutter in effect.shutters:
@@ -142,14 +142,14 @@ def _signature(edit, effect, strip, looked: dict):
         if region.kind == "MATTE":
             yield from _matte(region)
     path = effect.path_from_id()
-    for curve in fcurves.curves_under(edit, path + "."):
+    for curve in fcurves.curves_under(scene, path + "."):
         yield curve.data_path.removeprefix(path)
         yield from _curve(curve)
     transform = strip.transform
     # As words: "not a number" is never the same again.
     yield repr([getattr(transform, name) for name in geometry.TRANSFORM]), repr(tuple(transform.origin))
     yield strip.use_flip_x, strip.use_flip_y  # scribbles lie mirrored with it
-    if (source := strips.nearest_source(edit, effect, strip)) is not None:
+    if (source := strips.nearest_source(scene, effect, strip)) is not None:
         yield from _source(effect, source, looked)
 
 

@@ -27,13 +27,13 @@ _left_out: list[tuple[range, str]] = []  # of its film, see requirements.left_ou
 def begin(film: int) -> None:
     """Reads all effects for a job, on the main thread; film: session_uid of the scene that it renders."""
     _taken.clear()
-    scene = _scene(film)
-    for edit, effect, parts in shown_effects(scene) if scene else ():
-        if effect.scene.session_uid in _taken:  # of a copied edit: the first counts, as for strips.find_edit
+    film_scene = _scene(film)
+    for scene, effect, parts in shown_effects(film_scene) if film_scene else ():
+        if effect.scene.session_uid in _taken:  # of a copied scene: the first counts, as for strips.find_effect
             continue
         try:
-            frames = asked_frames(edit, parts, edit == scene)
-            _taken[effect.scene.session_uid] = snapshot.take(edit, effect, parts[0], frames)
+            frames = asked_frames(scene, parts, scene == film_scene)
+            _taken[effect.scene.session_uid] = snapshot.take(scene, effect, parts[0], frames)
         except effect_source.FAULTS as error:
             _taken[effect.scene.session_uid] = error
     look(film)
@@ -60,10 +60,10 @@ def left_out(scene) -> str | None:
     return next((why for frames, why in reasons if scene.frame_current in frames), None)
 
 
-def of(scene, scene_frame: float, ended: Callable[[], bool] | None = None) -> tuple[Snapshot, float]:
-    """The snapshot of an effect scene, and the timeline frame of its edit at which it shows one of its own frames. One
-    of effect_source.FAULTS: there is none. ended: whether nobody waits for it any longer."""
-    uid = scene.session_uid
+def of(effect_scene, scene_frame: float, ended: Callable[[], bool] | None = None) -> tuple[Snapshot, float]:
+    """The snapshot of an effect scene, and the timeline frame at which it shows one of its own frames. One of
+    effect_source.FAULTS: there is none. ended: whether nobody waits for it any longer."""
+    uid = effect_scene.session_uid
     if render_job.in_job():
         taken = _taken.get(uid)
         if taken is None or (isinstance(taken, Snapshot) and taken.timeline_frame(scene_frame) not in taken.frames):
@@ -74,20 +74,20 @@ def of(scene, scene_frame: float, ended: Callable[[], bool] | None = None) -> tu
             raise taken.with_traceback(None)
         return taken, taken.timeline_frame(scene_frame)
     folder = render_settings.settings().inbetween
-    edit, effect, strip = strips.find_edit(scene)
+    scene, effect, strip = strips.find_effect(effect_scene)
     frame = strips.timeline_frame(strip, scene_frame)
     if not bpy.app.background:
-        return invalidation.current(edit, effect, strip, frame), frame
-    frames = frame, frame + edit.frame_step
-    return snapshot.take(edit, effect, strip, frames, folder=folder), frame
+        return invalidation.current(scene, effect, strip, frame), frame
+    frames = frame, frame + scene.frame_step
+    return snapshot.take(scene, effect, strip, frames, folder=folder), frame
 
 
 def _late(uid: int, scene_frame: float) -> Snapshot | Exception:
-    if (scene := _scene(uid)) is None:
+    if (effect_scene := _scene(uid)) is None:
         return EffectError(rpt_("the effect was deleted while it was rendered"))
     try:
-        edit, effect, strip = strips.find_edit(scene)
-        return snapshot.take(edit, effect, strip, (strips.timeline_frame(strip, scene_frame),))
+        scene, effect, strip = strips.find_effect(effect_scene)
+        return snapshot.take(scene, effect, strip, (strips.timeline_frame(strip, scene_frame),))
     except effect_source.FAULTS as error:
         return error
 
@@ -97,24 +97,24 @@ def _scene(uid: int):
 
 
 def shown_effects(film):
-    """The effects that a film's scene shows, and the edits in its Scene strips: each with its edit and with the strips
-    that show it."""
-    for edit in strips.shown_edits(film):
-        shown = strips.effect_strips(edit)
-        for effect in edit.virtual_shutter.effects:
+    """The effects that a film's scene shows, and the scenes in its Scene strips: each with its scene and with the
+    strips that show it."""
+    for scene in strips.shown_scenes(film):
+        shown = strips.effect_strips(scene)
+        for effect in scene.virtual_shutter.effects:
             if parts := [strip for strip in shown if strip.scene == effect.scene]:
-                yield edit, effect, parts
+                yield scene, effect, parts
 
 
-def asked_frames(edit, parts, is_film: bool) -> set[float]:
-    """The timeline frames at which the parts of an effect may be asked for: those of the film, or in another edit,
+def asked_frames(scene, parts, is_film: bool) -> set[float]:
+    """The timeline frames at which the parts of an effect may be asked for: those of the film, or in another scene,
     which strips show, all."""
-    first, last = edit.frame_start, edit.frame_end
+    first, last = scene.frame_start, scene.frame_end
     asked = set()
     for strip in parts:
         low, high = strip.left_handle, strip.right_handle
         if is_film:
-            low, high = max(low, min(first, edit.frame_current)), min(high, max(last, edit.frame_current) + 1)
+            low, high = max(low, min(first, scene.frame_current)), min(high, max(last, scene.frame_current) + 1)
         start = strips.timeline_frame(strip, 0)  # a strip may begin between frames
         asked |= {start + number for number in range(math.floor(low - start) - 1, math.ceil(high - start) + 2)}
     return asked

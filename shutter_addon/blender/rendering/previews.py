@@ -115,8 +115,8 @@ def for_engine(context, effect_scene) -> Asked | None:
     region, looking.decision = context.region, None
     if region is None or region.type != "PREVIEW" or is_read(context):
         return None
-    edit, seen = selection.edit_of(context), preview_areas.shown(context)
-    owner, effect, strip = strips.find_edit(effect_scene)
+    edit, seen = selection.scene_of(context), preview_areas.shown(context)
+    owner, effect, strip = strips.find_effect(effect_scene)
     frame = strips.timeline_frame(strip, effect_scene.frame_current)
     is_seen = seen is not None and seen.effect == effect and edit.frame_current == frame
     look = preview_areas.look(context, edit, effect, seen.strip if is_seen else strip) if owner == edit else None
