@@ -41,9 +41,9 @@ def _before_save(*_):
     lifecycle.update()  # a script may have removed strips, since Blender last told
     lifecycle.leave_to_user()
     sharp_frame.give_back(bpy.context)
-    for edit in bpy.data.scenes:
-        if edit.virtual_shutter.effects and edit.library is None:
-            edit.virtual_shutter.version = versions.extension()
+    for scene in bpy.data.scenes:
+        if scene.virtual_shutter.effects and scene.library is None:
+            scene.virtual_shutter.version = versions.extension()
 
 
 @persistent
@@ -99,8 +99,8 @@ def _prepare(film: int, in_job: bool) -> bool:
         lifecycle.mend()
         copies.adopt()
         lifecycle.follow_sources()
-    for edit in bpy.data.scenes:
-        invalidation.invalidate_changed(edit)
+    for scene in bpy.data.scenes:
+        invalidation.invalidate_changed(scene)
     if in_job:
         job_snapshots.begin(film)
     return True
@@ -127,8 +127,8 @@ def _after_render(scene, *_):
 
 def _drop_frames():
     """Drops the finished frames of all effects."""
-    for edit in bpy.data.scenes:
-        strips.invalidate(edit)
+    for scene in bpy.data.scenes:
+        strips.invalidate(scene)
 
 
 HANDLERS = {

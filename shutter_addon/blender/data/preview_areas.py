@@ -20,7 +20,7 @@ class Shown:
 
     strips_above: whether others hide it; hides_strokes: by region that is drawn, whether its lines are hidden"""
 
-    edit: object
+    scene: object
     effect: object
     strip: object
     strips_above: bool
@@ -29,7 +29,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class Look:
-    """How an effect's picture is looked at in all previews of its edit.
+    """How an effect's picture is looked at in all previews of its scene.
 
     scale: how wide or high a pixel of the source is in the largest of them; None: there is none
     proxy: what Blender reads of the source for that one; None: the footage itself
@@ -61,37 +61,37 @@ def preview_region(area):
 
 def shown(context) -> Shown | None:
     """The effect strip under the playhead that the preview shows, as selection.seen has it."""
-    edit, space = selection.scene_of(context), context.space_data
-    if space.display_mode != "IMAGE" or space.display_channel or (seen := selection.seen(edit)) is None:
+    scene, space = selection.scene_of(context), context.space_data
+    if space.display_mode != "IMAGE" or space.display_channel or (seen := selection.seen(scene)) is None:
         return None
-    above = any(other.channel > seen[2].channel for other in selection.visible(edit))
+    above = any(other.channel > seen[2].channel for other in selection.visible(scene))
     return Shown(
         *seen, above, tuple(annotations.is_hidden(seen[1], region) for region in strips.drawn_regions(seen[1]))
     )
 
 
-def look(context, edit, effect, strip) -> Look:
+def look(context, scene, effect, strip) -> Look:
     """How an effect's picture is looked at."""
-    areas = list(_areas_of(context, edit))
-    scales = {area.spaces.active: _scale(context, edit, strip, area) for area in areas}
+    areas = list(_areas_of(context, scene))
+    scales = {area.spaces.active: _scale(context, scene, strip, area) for area in areas}
     scales = {space: scale for space, scale in scales.items() if math.isfinite(scale)}
-    is_plain = _is_plain(edit, strip) and all(_has(area.spaces.active, _PLAIN_SPACE) for area in areas)
+    is_plain = _is_plain(scene, strip) and all(_has(area.spaces.active, _PLAIN_SPACE) for area in areas)
     if not scales:
         return Look(None, None, is_plain)
     space = max(scales, key=scales.get)
-    return Look(scales[space], _proxy(edit, effect, strip, space), is_plain)
+    return Look(scales[space], _proxy(scene, effect, strip, space), is_plain)
 
 
-def _is_plain(edit, strip) -> bool:
-    """Whether the edit shows a strip's picture as it is."""
+def _is_plain(scene, strip) -> bool:
+    """Whether the scene shows a strip's picture as it is."""
     return (
         strip.blend_type in ("REPLACE", "ALPHA_OVER")
         and _has(strip, _PLAIN_STRIP)
         and all(modifier.mute for modifier in strip.modifiers)
-        and edit.display_settings.display_device == "sRGB"
-        and _has(edit.view_settings, _STANDARD)
-        and not edit.render.use_multiview
-        and not edit.sequence_editor.show_overlay_frame
+        and scene.display_settings.display_device == "sRGB"
+        and _has(scene.view_settings, _STANDARD)
+        and not scene.render.use_multiview
+        and not scene.sequence_editor.show_overlay_frame
     )
 
 
@@ -99,19 +99,19 @@ def _has(item, values: dict) -> bool:
     return all(getattr(item, name) == value for name, value in values.items())
 
 
-def _proxy(edit, effect, strip, space) -> strip_proxies.Proxy | None:
+def _proxy(scene, effect, strip, space) -> strip_proxies.Proxy | None:
     """What Blender reads of an effect's source in a preview; None: the footage itself."""
-    source, percent = strips.nearest_source(edit, effect, strip), _PERCENT.get(space.proxy_render_size)
+    source, percent = strips.nearest_source(scene, effect, strip), _PERCENT.get(space.proxy_render_size)
     if source is None or percent is None or not space.use_proxies:
         return None
-    return strip_proxies.proxy_of(edit, source, percent)
+    return strip_proxies.proxy_of(scene, source, percent)
 
 
-def _scale(context, edit, strip, area) -> float:
+def _scale(context, scene, strip, area) -> float:
     """How wide or high a pixel of the source is in a preview: in its picture, which is as small as Blender's menu has
     it; and on the screen, where our handler draws."""
     space = area.spaces.active
-    percent = _PERCENT.get(space.proxy_render_size, edit.render.resolution_percentage)
+    percent = _PERCENT.get(space.proxy_render_size, scene.render.resolution_percentage)
     size = strip.scene.render.resolution_x, strip.scene.render.resolution_y
     scale = percent / 100 * _pixel(geometry.picture_to_image(strip, size), size)
     if not context.window_manager.virtual_shutter.live:
@@ -127,9 +127,9 @@ def _pixel(matrix, size) -> float:
     return float(np.max(np.hypot(*matrix[:2, :2]) / size))
 
 
-def _areas_of(context, edit):
-    """The areas in which an edit's preview is drawn."""
+def _areas_of(context, scene):
+    """The areas in which a scene's preview is drawn."""
     for window, area in previews(context):
         shows = getattr(window.workspace, "sequencer_scene", None) or window.scene
-        if shows == edit and area.spaces.active.proxy_render_size != "NONE":
+        if shows == scene and area.spaces.active.proxy_render_size != "NONE":
             yield area

@@ -22,7 +22,7 @@ def follow() -> None:
 
 
 def is_other(space, seen) -> bool:
-    """Whether a preview has to get another annotation, for what selection.seen has found in its edit."""
+    """Whether a preview has to get another annotation, for what selection.seen has found in its scene."""
     wanted = seen[1].scene.annotation if seen else None
     if space.annotation is None:
         return wanted is not None and space.as_pointer() in _emptied

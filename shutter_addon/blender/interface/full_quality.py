@@ -16,7 +16,7 @@ _TICK = 0.1  # seconds between two looks at whether it has ended
 
 @dataclass
 class _View:
-    """How a preview was before; area: its address; rows, centre: as of _view_of."""
+    """How a preview was before; area: its address; rows, centre: see _view_of."""
 
     area: int
     size: str
@@ -44,9 +44,9 @@ class SHUTTER_OT_full_quality(Operator):
             previews.looking.whole = None
             _end()
         else:
-            window, area, found = _shown(context)
-            previews.looking.whole = previews.Whole(found.effect.scene.session_uid, found.edit.frame_current)
-            found.strip.invalidate_cache("RAW")
+            window, area, shown = _shown(context)
+            previews.looking.whole = previews.Whole(shown.effect.scene.session_uid, shown.scene.frame_current)
+            shown.strip.invalidate_cache("RAW")
             _begin(window, area)
         return {"FINISHED"}
 
@@ -56,8 +56,8 @@ def _shown(context):
     areas = sorted(preview_areas.previews(context), key=lambda pair: pair[1] != context.area)
     for window, area in areas:
         with context.temp_override(window=window, area=area, region=preview_areas.preview_region(area)):
-            if (found := preview_areas.shown(bpy.context)) is not None:
-                return window, area, found
+            if (shown := preview_areas.shown(bpy.context)) is not None:
+                return window, area, shown
     return None
 
 
@@ -84,8 +84,8 @@ def _end() -> None:
     """Has the view as before: what of it the user has not changed since."""
     global _before
     before, _before = _before, None
-    found = [pair for pair in preview_areas.previews(bpy.context) if before and pair[1].as_pointer() == before.area]
-    for window, area in found:
+    areas = [pair for pair in preview_areas.previews(bpy.context) if before and pair[1].as_pointer() == before.area]
+    for window, area in areas:
         space, region = area.spaces.active, preview_areas.preview_region(area)
         if (space.proxy_render_size, space.use_proxies) == ("SCENE", False):
             space.proxy_render_size, space.use_proxies = before.size, before.proxies

@@ -121,8 +121,8 @@ def _draw() -> None:
         return
     invalidation.drop_lesser()
     # Blender tells nobody of strokes that are drawn or erased, but it draws the preview again.
-    edit = selection.scene_of(context)
-    if edit is not None and edit.library is None and invalidation.invalidate_changed(edit):
+    scene = selection.scene_of(context)
+    if scene is not None and scene.library is None and invalidation.invalidate_changed(scene):
         bpy.app.timers.register(_redraw_once)  # what is tagged while it is drawn is not drawn again
     sharp_frame.follow_pen(context)
     if sharp_frame.is_shown(context.space_data):
@@ -130,7 +130,7 @@ def _draw() -> None:
     # A stroke that is being drawn would lie below our picture: Blender's own shows the same.
     if any(op.bl_idname == previews.PEN for op in context.window.modal_operators):
         return
-    if shown_annotations.is_other(context.space_data, selection.seen(edit)):
+    if shown_annotations.is_other(context.space_data, selection.seen(scene)):
         bpy.app.timers.register(_follow_once)  # nothing may be changed while it is drawn
     if not context.window_manager.virtual_shutter.live:
         return
@@ -208,7 +208,7 @@ def _warn(shown: Shown, say) -> None:
     """Says what a picture that is drawn over the sequencer's cannot show."""
     if shown.strips_above:
         say(rpt_("The strips above are hidden in this view"))
-    if shown.edit.view_settings.view_transform != "Standard":
+    if shown.scene.view_settings.view_transform != "Standard":
         say(rpt_("This view has the view transform Standard"))
 
 

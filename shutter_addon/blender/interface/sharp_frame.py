@@ -27,15 +27,15 @@ _pen = _Pen()
 
 def show(context) -> None:
     """Shows the source of the active effect, if that is beside it and not muted, where the pen draws for the effect."""
-    found = selection.active(context)
-    source = found and strips.nearest_source(found[0], found[1], found[2])
-    if source is None or source.mute or source.parent_meta() != found[2].parent_meta():
+    active = selection.active(context)
+    source = active and strips.nearest_source(*active)
+    if source is None or source.mute or source.parent_meta() != active[2].parent_meta():
         return
     give_back(context)
     _pen.channel = source.channel
     for _window, area in preview_areas.previews(context):
         space = area.spaces.active
-        if not space.display_channel and space.annotation == found[1].scene.annotation:
+        if not space.display_channel and space.annotation == active[1].scene.annotation:
             space.display_channel = _pen.channel
 
 

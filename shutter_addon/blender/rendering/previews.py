@@ -115,11 +115,11 @@ def for_engine(context, effect_scene) -> Asked | None:
     region, looking.decision = context.region, None
     if region is None or region.type != "PREVIEW" or is_read(context):
         return None
-    edit, seen = selection.scene_of(context), preview_areas.shown(context)
+    scene, seen = selection.scene_of(context), preview_areas.shown(context)
     owner, effect, strip = strips.find_effect(effect_scene)
     frame = strips.timeline_frame(strip, effect_scene.frame_current)
-    is_seen = seen is not None and seen.effect == effect and edit.frame_current == frame
-    look = preview_areas.look(context, edit, effect, seen.strip if is_seen else strip) if owner == edit else None
+    is_seen = seen is not None and seen.effect == effect and scene.frame_current == frame
+    look = preview_areas.look(context, scene, effect, seen.strip if is_seen else strip) if owner == scene else None
     snapshot = invalidation.current(owner, effect, strip, frame)
     if is_seen:
         looking.decision = _decide(context, seen, look, snapshot)
@@ -167,7 +167,7 @@ def request_of(context, shown: Shown) -> Request:
 
 
 def _look(context, shown: Shown) -> Look:
-    return preview_areas.look(context, shown.edit, shown.effect, shown.strip)
+    return preview_areas.look(context, shown.scene, shown.effect, shown.strip)
 
 
 def _decide(context, shown: Shown, look: Look, snapshot: Snapshot) -> Decision:
@@ -177,13 +177,13 @@ def _decide(context, shown: Shown, look: Look, snapshot: Snapshot) -> Decision:
 
 
 def _snapshot(shown: Shown) -> Snapshot:
-    return invalidation.current(shown.edit, shown.effect, shown.strip, shown.edit.frame_current)
+    return invalidation.current(shown.scene, shown.effect, shown.strip, shown.scene.frame_current)
 
 
 def _requested(context, render: RenderContext, shown: Shown, snapshot: Snapshot, look: Look) -> Request:
     """The picture in the previews' detail: in full, while it is looked at so. That ends here with the frame and with a
     change of the effect."""
-    frame = shown.edit.frame_current
+    frame = shown.scene.frame_current
     if (
         (whole := looking.whole) is not None
         and (whole.scene, whole.frame) == (snapshot.scene, frame)
@@ -198,7 +198,7 @@ def _requested(context, render: RenderContext, shown: Shown, snapshot: Snapshot,
 
 
 def _detail(look: Look) -> effect_source.Detail:
-    """What a picture is composed in for the previews of its edit: smaller by the power of two, of reduced.DIVISORS,
+    """What a picture is composed in for the previews of its scene: smaller by the power of two, of reduced.DIVISORS,
     that is nearest to the largest of them, and from the proxy that Blender reads for that one."""
     if look.scale is None:
         return effect_source.FULL
@@ -208,7 +208,7 @@ def _detail(look: Look) -> effect_source.Detail:
 
 def _is_drawn(context, shown: Shown, look: Look, source: FrameSource) -> bool:
     """Whether our draw handler shows the result, or in another view what covers it, in place of what Blender makes of
-    the engine's picture: wherever both are the same, in all previews of the edit. Not a still picture of full size:
+    the engine's picture: wherever both are the same, in all previews of the scene. Not a still picture of full size:
     what is drawn passes through 8 bits on its way to the screen, and lacks shades next to black."""
     settings = context.window_manager.virtual_shutter
     is_less = source.from_proxy or source.width < annotations.picture_size(shown.effect)[0]
@@ -243,13 +243,13 @@ def draft(request: Request, source: FrameSource) -> Request:
 
 def _is_rendered(shown: Shown) -> bool:
     """Whether the sequencer renders its previews."""
-    return shown.edit.render.sequencer_gl_preview == "RENDERED"
+    return shown.scene.render.sequencer_gl_preview == "RENDERED"
 
 
 def _time_up(shown: Shown) -> Callable[[], bool]:
     """What says whether a picture has been composed for so long that Blender has to look at its keys: it goes on when
     it is drawn again. Each time, it has half as long again, so that it comes to an end."""
-    frame = shown.effect.scene.session_uid, shown.edit.frame_current
+    frame = shown.effect.scene.session_uid, shown.scene.frame_current
     looking.slice = 1.5 * looking.slice if looking.slice_of == frame else _SLICE
     looking.slice_of, end = frame, time.monotonic() + looking.slice
     return lambda: time.monotonic() > end
