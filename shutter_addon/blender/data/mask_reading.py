@@ -114,9 +114,9 @@ def _spline_at(mask, spline, frame: float, keyed: np.ndarray | None) -> MaskSpli
         longest = mask_outlines.longest_segment(points, spline.use_cyclic)
         for parent, raw, here in families:
             points[here] = mask_handles.moved(points[here], _parent_matrix(parent, raw, frame))
-        anew = np.isin(types[:, 0], (mask_handles.AUTO, mask_handles.VECTOR))
-        again = mask_handles.with_handles(points, types, selected, spline.use_cyclic)
-        points = np.where(anew[:, None, None], again, points)
+        is_computed = np.isin(types[:, 0], (mask_handles.AUTO, mask_handles.VECTOR))
+        computed = mask_handles.with_handles(points, types, selected, spline.use_cyclic)
+        points = np.where(is_computed[:, None, None], computed, points)
     feathers = tuple(tuple((f.u, f.weight) for f in point.feather_points) for point in spline.points)
     _checked(mask, [*points.flat, *weights, *chain(*chain(*feathers))])
     return MaskSpline(
@@ -178,11 +178,11 @@ def _shapes(mask, layer) -> list[_Shape]:
     raw = _Layer.from_address(layer.as_pointer())
     ends = layer.splines[0].as_pointer(), layer.splines[-1].as_pointer()
     known = raw.name == layer.name.encode() and (raw.first_spline, raw.last_spline) == ends
-    shapes, before, here = [], None, raw.first_shape if known else None
-    while here and known:
-        shapes.append(_Shape.from_address(here))
+    shapes, before, address = [], None, raw.first_shape if known else None
+    while address and known:
+        shapes.append(_Shape.from_address(address))
         known = shapes[-1].prev == before and shapes[-1].points >= 0 and bool(shapes[-1].data)
-        before, here = here, shapes[-1].next
+        before, address = address, shapes[-1].next
     ascending = all(a.frame < b.frame for a, b in pairwise(shapes))
     if not (known and ascending and raw.last_shape == before):
         raise _unreadable(mask)
@@ -241,10 +241,10 @@ def _between_markers(track, name: str, size: int, frame: float, find) -> np.ndar
     frames, values = _markers(track, name, size)
     values = values.astype(np.float64)
     whole = int(frame)
-    here = min(max(find(frames.tolist(), whole), 0), len(frames) - 1)
-    if here + 1 < len(frames) and frames[here + 1] == frames[here] + 1:
-        return values[here] + (values[here + 1] - values[here]) * (frame - whole)
-    return values[here]
+    index = min(max(find(frames.tolist(), whole), 0), len(frames) - 1)
+    if index + 1 < len(frames) and frames[index + 1] == frames[index] + 1:
+        return values[index] + (values[index + 1] - values[index]) * (frame - whole)
+    return values[index]
 
 
 def _markers(track, name: str, size: int) -> tuple[np.ndarray, np.ndarray]:

@@ -48,8 +48,8 @@ def seen(scene):
     if not shown:
         return None
     active = scene.sequence_editor.active_strip
-    kin = _effects_of(scene, active)
-    strip, effect = max(shown, key=lambda pair: (pair[0] == active, pair[1] in kin, pair[0].channel))
+    related = _effects_of(scene, active)
+    strip, effect = max(shown, key=lambda pair: (pair[0] == active, pair[1] in related, pair[0].channel))
     return scene, effect, strip
 
 

@@ -143,10 +143,10 @@ def _around(effect, frames):
 
 def _followed(shutter, regions, camera: model.Camera) -> model.Region | model.Camera | None:
     """What a shutter follows. EffectError: there is no such region."""
-    wish = validation.word(shutter, "follow")
-    if wish == "NOTHING":
+    follow = validation.word(shutter, "follow")
+    if follow == "NOTHING":
         return None
-    if wish == "CAMERA":
+    if follow == "CAMERA":
         return camera
     followed = next((region for region in regions if region.name == shutter.follow_region), None)
     if followed is None:

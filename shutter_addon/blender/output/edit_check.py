@@ -70,11 +70,11 @@ def effects(scene, frames: range, compositor, *, find_cuts: bool) -> list[Effect
     find_cuts: which in-between frames are needed depends on cuts, so that more is read where some are missing: of a
     film without any, all of it. Otherwise they are counted as if there were no cuts."""
     # It asks no device, which would have to wait for its first picture: states and windows are known without.
-    looking = RenderSession(lambda: ("cpu", None), lambda: None)
+    session = RenderSession(lambda: ("cpu", None), lambda: None)
     try:
-        return [_effect(looking, shown, compositor, find_cuts) for shown in _shown_effects(scene, frames)]
+        return [_effect(session, shown, compositor, find_cuts) for shown in _shown_effects(scene, frames)]
     finally:
-        looking.forget()
+        session.forget()
 
 
 def _shown_effects(film, frames: range) -> Iterator[tuple]:
@@ -90,7 +90,7 @@ def _shown_effects(film, frames: range) -> Iterator[tuple]:
             yield scene, effect, parts[0], shown
 
 
-def _effect(looking: RenderSession, shown: tuple, compositor, find_cuts: bool) -> EffectCheck:
+def _effect(session: RenderSession, shown: tuple, compositor, find_cuts: bool) -> EffectCheck:
     """shown: of _shown_effects"""
     scene, effect, strip, frames = shown
     check = EffectCheck(scene, strip.name, frames, len(effect.shutters))
@@ -99,12 +99,12 @@ def _effect(looking: RenderSession, shown: tuple, compositor, find_cuts: bool) -
     try:
         taken = snapshot.take(scene, effect, strip, frames)
         check.folder = taken.inbetween.folder if taken.inbetween else None
-        requests = _requests(looking, taken, check)
+        requests = _requests(session, taken, check)
     except effect_source.FAULTS as error:
         check.faults.append(str(error))
         return check
     if requests:
-        renderer = looking.renderer(next(iter(requests.values())).source)
+        renderer = session.renderer(next(iter(requests.values())).source)
         source = renderer.source
         check.window = max(request.state.options.window for request in requests.values())
         check.factor = source.step
@@ -115,12 +115,12 @@ def _effect(looking: RenderSession, shown: tuple, compositor, find_cuts: bool) -
     return check
 
 
-def _requests(looking: RenderSession, taken, check: EffectCheck) -> dict[float, Request]:
+def _requests(session: RenderSession, taken, check: EffectCheck) -> dict[float, Request]:
     """What each frame asks for, where it can be shown; faults of others are noted, each at the first of its frames."""
-    requests, faults, context = {}, {}, RenderContext(looking, RenderSettings())
+    requests, faults, context = {}, {}, RenderContext(session, RenderSettings())
     for frame in sorted(taken.frames):
         try:
-            requests[frame] = looking.request(taken, frame, context)
+            requests[frame] = session.request(taken, frame, context)
         except effect_source.FAULTS as error:
             kind = re.sub(r"\bframe -?[\d.]+", "", str(error))
             faults.setdefault(kind, []).append(str(error))

@@ -323,17 +323,17 @@ def stoppable():
     once. Gives a list with the signal that came, if any.
 
     No exception gets through Blender: it prints it and renders on."""
-    came: list[int] = []
+    signals: list[int] = []
 
     def stop(number, _frame):
-        if came:
+        if signals:
             render_job.leave(INTERRUPTED)
-        came.append(number)
+        signals.append(number)
         render_job.stop()
 
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield came
+        yield signals
     finally:
         for number, handler in before.items():
             signal.signal(number, handler or signal.SIG_DFL)  # None: Blender's own, which Python cannot put back

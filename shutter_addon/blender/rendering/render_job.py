@@ -104,10 +104,10 @@ def ends_films() -> bool:
     return _job.film is not None and not bpy.app.is_job_running("RENDER")
 
 
-def script_waits(door: FrameType | None) -> bool:
-    """Whether a script waits for what Blender does now. door: the frame (inspect.currentframe) of the function of ours
+def script_waits(call_frame: FrameType | None) -> bool:
+    """Whether a script waits for what Blender does now. call_frame: that (inspect.currentframe) of the function of ours
     that Blender has called. Blender tells nobody of scripts that render, not even of `render.opengl`."""
-    return door is not None and door.f_back is not None
+    return call_frame is not None and call_frame.f_back is not None
 
 
 def in_job() -> bool:

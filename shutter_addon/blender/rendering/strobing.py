@@ -166,12 +166,12 @@ def _factor(state: FrameState, ratio: float) -> int | None:
 def _count(strip, snapshot: Snapshot, source, request) -> int:
     """About how many pairs the strip's pictures need, or a few more."""
     options = request.state.options
-    most = source.filmed - 1
+    all_pairs = source.filmed - 1
     if snapshot.timing is None:
-        return most
+        return all_pairs
     ends = (effect_source.source_index(snapshot, at, source)[0] for at in (strip.left_handle, strip.right_handle - 1))
     first, final = (index // options.step for index in ends)
-    return min(abs(final - first) + -(-options.window // options.step), most)
+    return min(abs(final - first) + -(-options.window // options.step), all_pairs)
 
 
 def pairs(snapshot: Snapshot, medium, settings: inbetween_settings.Settings) -> list[int]:
