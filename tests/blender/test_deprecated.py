@@ -8,7 +8,7 @@ ROOT = Path(__file__).parents[2]
 FOLDERS = ("shutter_addon", "scripts", "gallery", "tests", "docs", ".")
 SUFFIXES = {".py", ".md", ""}
 # Scenes, clips and masks have properties of the same names, which stay.
-OTHERS = {"scene", "edit", "edit()", "film", "clip", "mask"}
+OTHERS = {"scene", "effect_scene", "edit", "edit()", "film", "clip", "mask"}
 
 
 def deprecated(bpy):
