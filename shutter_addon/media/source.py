@@ -31,6 +31,7 @@ class SourceWrapper(FrameSource):
     options = _Forwarded()
     has_audio = _Forwarded()
     left_out = _Forwarded()
+    step = _Forwarded()
     shots = _Forwarded()
     from_proxy = _Forwarded()
 

@@ -252,3 +252,9 @@ def replace_factor(effect, factor):
     from shutter_addon.blender.data import inbetween_settings
 
     return inbetween_settings.settings(effect)._replace(factor=factor)
+
+
+def test_what_looks_smooth(bpy):
+    from shutter_addon.blender.rendering import strobing
+
+    assert [strobing.smooth(height) for height in (1080, 2160, 480)] == [3, 6, 2]

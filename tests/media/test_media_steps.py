@@ -89,9 +89,3 @@ def test_nothing_is_told_across_a_cut():
 def test_a_picture_of_few_pixels_tells_nothing():
     film = Film(shift(1), size=(20, 8))
     assert steps.moved(film, 0) is None
-
-
-def test_what_looks_smooth():
-    assert steps.smooth(1080) == 3
-    assert steps.smooth(2160) == 6
-    assert steps.smooth(480) == 2

@@ -23,10 +23,11 @@ def test_through_all_wrappers(bunny, tmp_path):
     with source:
         assert (source.count, source.fps) == (2 * movie.count - 1, 2 * movie.fps)
         assert source.options == {**movie.options, "inbetween": [2, "quick"]}
-        for name in FrameSource.__annotations__.keys() - {"count", "fps", "options", "shots"}:
+        for name in FrameSource.__annotations__.keys() - {"count", "fps", "options", "shots", "step"}:
             assert getattr(source, name) == getattr(movie, name), name
         assert source.files == [bunny]
         assert source.has_audio
+        assert (source.step, movie.step) == (2, 1)
         assert source.shots is source
         assert movie.shots is None
         assert source.has(6)

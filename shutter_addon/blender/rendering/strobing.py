@@ -98,9 +98,9 @@ def _look(effect, strip, snapshot, renderer, request):
     known = [(motion, way) for pair in pairs for way in ways[pair] if (motion := _moved[snapshot.source.key, pair])]
     height = effect.scene.render.resolution_y
     step = max((steps.step(motion, *way) for motion, way in known), default=0.0) * height / request.state.options.step
-    if step <= _smooth(height):
+    if step <= smooth(height):
         return None
-    factor = _factor(request.state, step / _smooth(height))
+    factor = _factor(request.state, step / smooth(height))
     if factor is None:
         return Strobing(step, None)
     key = snapshot.source.key, inbetween_settings.method(effect)
@@ -112,7 +112,7 @@ def _look(effect, strip, snapshot, renderer, request):
     return Strobing(step, factor, cost.seconds(count, factor), cost.bytes(count, factor))
 
 
-def _smooth(height: int) -> float:
+def smooth(height: int) -> float:
     """Up to how many pixels from frame to frame a streak looks smooth, in a picture of that height."""
     return max(_SMOOTH * height, _SMOOTH_PIXELS)
 
