@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Hashable
+from typing import Any, TypeVar
+
+T = TypeVar("T")
 
 
 class Memo:
@@ -12,22 +14,21 @@ class Memo:
     made: how many values there were, which tells one from the next where their keys are equal
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.made = 0
-        self.clear()
+        self._kept: tuple[Hashable, Any, bool] | None = None  # the key, its value, and whether that is exact
 
-    def get(self, key, make: Callable[[], Any], *, quick: bool = False):
+    def get(self, key: Hashable, make: Callable[[], T], *, quick: bool = False) -> T:
         """The value of a key: the last one, if it was its; else what `make` gives. Broken off, none is kept.
 
         quick: an approximation will do, and `make` may give one. What was made so does for quick requests alone."""
-        if self._key is None or self._key != key or not (quick or self._is_exact):
+        if self._kept is None or self._kept[0] != key or not (quick or self._kept[2]):
             self.clear()
             value = make()
             self.made += 1
-            self._key, self._value, self._is_exact = key, value, not quick
-        return self._value
+            self._kept = key, value, not quick
+        return self._kept[1]
 
     def clear(self) -> None:
         """Lets go of the value."""
-        self._key = self._value = None
-        self._is_exact = False
+        self._kept = None

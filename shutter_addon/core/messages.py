@@ -21,7 +21,7 @@ class EffectError(UserError, RuntimeError):
 
     words: what the sentence's braces stand for, so that an interface can translate the sentence (`template`)."""
 
-    def __init__(self, template: str, **words):
+    def __init__(self, template: str, **words: object):
         super().__init__(template.format(**words) if words else template)
         self.template, self.words = template, words
 
@@ -52,7 +52,7 @@ def sentence(text: object, longest: int = LONGEST) -> str:
     return f"{line[:head]} … {line[head + 3 - longest :]}"
 
 
-def of_file(error: OSError, place="") -> str:
+def of_file(error: OSError, place: str | os.PathLike[str] = "") -> str:
     """What the system says of a file, its place first. place: where the error has none."""
     return f"{os.fsdecode(error.filename or place)}: {error.strerror or error}"
 

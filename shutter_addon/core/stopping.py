@@ -11,6 +11,9 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from typing import TypeVar
+
+T = TypeVar("T")
 
 
 class StoppedError(Exception):
@@ -25,7 +28,7 @@ _stopped: ContextVar[Callable[[], bool]] = ContextVar("stopped", default=never)
 
 
 @contextmanager
-def once(stopped: Callable[[], bool]):
+def once(stopped: Callable[[], bool]) -> Iterator[None]:
     """Inside, on this thread, work ends once `stopped` says so."""
     token = _stopped.set(stopped)
     try:
@@ -40,18 +43,18 @@ def check() -> None:
         raise StoppedError
 
 
-def beside(steps: Iterable, patience: float | None) -> Iterator:
+def beside(steps: Iterable[T], patience: float | None) -> Iterator[T | None]:
     """What an iterable gives, found by a thread of its own, which goes ahead.
 
     patience: seconds after which it gives None where nothing was found yet; None: it waits. Closed early, it has the
     thread end at its next `check`, and waits for that."""
-    ended, found = threading.Event(), queue.SimpleQueue()
-    thread = threading.Thread(target=_find, args=(steps, ended, found), name="Virtual Shutter", daemon=True)
+    ended, results = threading.Event(), queue.SimpleQueue[tuple[T | None, Exception | None, bool]]()
+    thread = threading.Thread(target=_find, args=(steps, ended, results), name="Virtual Shutter", daemon=True)
     thread.start()
     try:
         while True:
             try:
-                step, error, is_last = found.get(timeout=patience)
+                step, error, is_last = results.get(timeout=patience)
             except queue.Empty:
                 yield None
                 continue
@@ -65,12 +68,12 @@ def beside(steps: Iterable, patience: float | None) -> Iterator:
         thread.join()
 
 
-def _find(steps, ended: threading.Event, found: queue.SimpleQueue) -> None:
+def _find(steps: Iterable, ended: threading.Event, results: queue.SimpleQueue) -> None:
     try:
         with once(ended.is_set):
             for step in steps:
-                found.put((step, None, False))
+                results.put((step, None, False))
                 check()
-        found.put((None, None, True))
+        results.put((None, None, True))
     except Exception as error:  # raised to whoever asks for the next step
-        found.put((None, error, True))
+        results.put((None, error, True))

@@ -14,8 +14,8 @@ import threading
 import time
 from collections.abc import Iterable
 from contextlib import suppress
-from itertools import count
 from pathlib import Path
+from typing import Self
 
 PATIENCE = 120.0  # seconds without a change after which a claim counts as abandoned
 BEAT = 10.0  # seconds from one touch to the next; network drives may show it up to a minute later
@@ -39,11 +39,11 @@ class Claims:
         self._lock, self._ended = threading.Lock(), threading.Event()
         self._thread = threading.Thread(target=self._touch, name="Virtual Shutter claims", daemon=True)
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         self._thread.start()
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self._ended.set()
         self._thread.join()
         for name in list(self._held):
@@ -54,14 +54,14 @@ class Claims:
         been finished meanwhile: look after this. OSError: the folder cannot be written to.
 
         name: letters, digits and underscores"""
-        for generation in count():
-            path = self._path(name, generation)
-            if _make(path):
-                with self._lock:
-                    self._held[name] = generation
-                return True
+        generation = 0
+        while not _make(path := self._path(name, generation)):
             if not self._is_abandoned(path):
                 return False
+            generation += 1
+        with self._lock:
+            self._held[name] = generation
+        return True
 
     def release(self, name: str) -> None:
         """Gives a claim back, and removes those that it was taken over from."""
@@ -75,7 +75,7 @@ class Claims:
         names = set(names)
         with suppress(OSError), os.scandir(self._folder) as entries:
             for entry in entries:
-                if (found := _NAME.fullmatch(entry.name)) and found[1] in names:
+                if (match := _NAME.fullmatch(entry.name)) and match[1] in names:
                     _remove(Path(entry.path))
 
     def _path(self, name: str, generation: int) -> Path:
@@ -118,7 +118,7 @@ def _make(path: Path) -> bool:
     return True
 
 
-def _look(path: Path):
+def _look(path: Path) -> tuple[bytes, int] | int | None:
     """What changes when a claim is touched or made anew; None: there is none. It is opened, as network drives tell the
     news then."""
     try:

@@ -73,10 +73,16 @@ class EditVersion:
     def from_data(cls, data: dict) -> EditVersion:
         """What `as_data` gave. KeyError, TypeError, ValueError: it gave no such thing."""
         footage = tuple(
-            Footage(str(one["name"]), int(one["files"]), str(one["content"]), str(one["missing"]))
+            Footage(
+                name=str(one["name"]),
+                files=int(one["files"]),
+                content=str(one["content"]),
+                missing=str(one["missing"]),
+            )
             for one in data["footage"]
         )
-        return cls(*(str(data[name]) for name in ("blend", "extension", "blender", "colours")), footage)
+        texts = {name: str(data[name]) for name in ("blend", "extension", "blender", "colours")}
+        return cls(footage=footage, **texts)
 
 
 def _configuration(version: EditVersion) -> str:
@@ -91,5 +97,5 @@ def note(key: str) -> str:
 
 def key_in(text: str) -> str | None:
     """The key in what a picture's metadata say; None: they say nothing of an edit."""
-    found = re.fullmatch(re.escape(_NOTE) + "([0-9a-f]{16})", text)
-    return found and found[1]
+    match = re.fullmatch(re.escape(_NOTE) + "([0-9a-f]{16})", text)
+    return match and match[1]

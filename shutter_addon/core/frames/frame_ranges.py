@@ -8,15 +8,15 @@ def runs(frames: Iterable[int]) -> list[tuple[int, int]]:
     """(first, last) of every run of the frames, in ascending order."""
     # numbers that follow one another have the same difference from their place among all
     groups = groupby(enumerate(sorted(set(frames))), lambda item: item[1] - item[0])
-    found = ([frame for _, frame in group] for _, group in groups)
-    return [(run[0], run[-1]) for run in found]
+    members = ([frame for _, frame in group] for _, group in groups)
+    return [(run[0], run[-1]) for run in members]
 
 
 def in_words(frames: Iterable[int]) -> str:
     """For use in a sentence: "frame 12", or "frames 12, 17 to 20"."""
-    found = runs(frames)
-    words = ", ".join(f"{first}" if first == last else f"{first} to {last}" for first, last in found)
-    return f"frame{'s' if len(found) > 1 or found[0][0] != found[0][1] else ''} {words}"
+    ends = runs(frames)
+    words = ", ".join(f"{first}" if first == last else f"{first} to {last}" for first, last in ends)
+    return f"frame{'s' if len(ends) > 1 or ends[0][0] != ends[0][1] else ''} {words}"
 
 
 def common(one: range, other: range) -> range:

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -97,8 +97,8 @@ class FrameSource(Protocol):
     def close(self) -> None:
         """Closes the file; a later read opens it again."""
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.close()

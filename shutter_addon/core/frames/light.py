@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 
-def to_linear(encoded) -> np.ndarray:
+def to_linear(encoded: ArrayLike) -> np.ndarray:
     """sRGB code values (1.0 = white) to linear light. Negative values pass through the linear foot."""
     encoded = np.asarray(encoded)
     curve = ((np.maximum(encoded, 0.04045) + 0.055) / 1.055) ** 2.4
     return np.where(encoded <= 0.04045, encoded / 12.92, curve).astype(encoded.dtype)
 
 
-def to_encoded(linear) -> np.ndarray:
+def to_encoded(linear: ArrayLike) -> np.ndarray:
     """Linear light to sRGB code values; the inverse of `to_linear`."""
     linear = np.asarray(linear)
     curve = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
     return np.where(linear <= 0.0031308, linear * 12.92, curve).astype(linear.dtype)
 
 
-def premultiplied(rgba: np.ndarray, convert=None) -> np.ndarray:
+def premultiplied(rgba: np.ndarray, convert: Callable[[np.ndarray], np.ndarray] | None = None) -> np.ndarray:
     """Straight RGBA (…, 4) to premultiplied, its colours converted on the way."""
     rgb = rgba[..., :3] if convert is None else convert(rgba[..., :3])
     return np.concatenate([rgb * rgba[..., 3:], rgba[..., 3:]], axis=-1)

@@ -84,13 +84,13 @@ class Planes:
         for plane in (cb, cr):
             plane -= 128
             plane <<= 9
-        found = np.empty((len(luma), 3, luma.shape[1]), np.uint8)
+        pixels = np.empty((len(luma), 3, luma.shape[1]), np.uint8)
         # Sums wrap around beyond 32 bits, as libswscale's do.
         colours = cr * m.red_of_cr, cb * m.green_of_cb + cr * m.green_of_cr, cb * m.blue_of_cb
         for channel, chroma in enumerate(colours):
             chroma += luma
-            found[:, channel] = chroma.clip(0, (1 << 30) - 1, out=chroma) >> 22
-        return np.moveaxis(found, 1, -1)
+            pixels[:, channel] = chroma.clip(0, (1 << 30) - 1, out=chroma) >> 22
+        return np.moveaxis(pixels, 1, -1)
 
 
 @lru_cache(8)

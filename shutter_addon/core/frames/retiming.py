@@ -2,8 +2,11 @@
 
 import math
 from bisect import bisect_left
+from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 
@@ -46,8 +49,17 @@ class StripTiming:
     keys: tuple[RetimingKey, ...] = ()
 
 
-def source_frame(strip: StripTiming, frame: float, medium) -> int:
-    """Frame of the medium that a source strip shows at a timeline frame; medium: it, opened, as a ShotSource.
+class Medium(Protocol):
+    """What a strip shows, opened: a FrameSource that says how many of its frames were filmed, every `step`-th."""
+
+    fps: Fraction | None
+    count: int
+    filmed: int
+    step: int
+
+
+def source_frame(strip: StripTiming, frame: float, medium: Medium) -> int:
+    """Frame of the medium that a source strip shows at a timeline frame.
 
     Trims, cuts, playback rate, retiming keys, reversed frames and strobe as Blender's sequencer applies them. Where
     there are frames between filmed ones, it is the nearest of all, which Blender knows nothing of. EffectError: how the
@@ -60,7 +72,7 @@ def source_frame(strip: StripTiming, frame: float, medium) -> int:
             'strip "{strip}" is not as long as its clip: retimed clips are not supported', strip=strip.name
         )
 
-    def position(time):
+    def position(time: float) -> np.float32:
         return _position(strip, rate, length, time)
 
     first = strip.content_trim_start + strip.first
@@ -123,7 +135,7 @@ def are_retiming_keys(keys: list[RetimingKey], indices: list[float]) -> bool:
     )
 
 
-def retimed(keys: list[RetimingKey], position: float) -> np.float32:
+def retimed(keys: Sequence[RetimingKey], position: float | np.float32) -> np.float32:
     """What the keys make of a position in the content, 0 to 1: lines between them, arcs through transitions."""
     k = max((i for i, key in enumerate(keys[:-1]) if key.index <= position), default=0)
     first, second = keys[k], keys[k + 1]
@@ -140,7 +152,13 @@ def _speed(first: RetimingKey, second: RetimingKey) -> np.float32:
     return np.float32(second.factor - first.factor) / np.float32(max(second.index - first.index, 1e-9))
 
 
-def _arc(first: RetimingKey, speed_in: float, second: RetimingKey, speed_out: float, position: float) -> np.float32:
+def _arc(
+    first: RetimingKey,
+    speed_in: np.float32,
+    second: RetimingKey,
+    speed_out: np.float32,
+    position: float | np.float32,
+) -> np.float32:
     """The circle that leaves the first key with one slope and reaches the second with the other."""
     # Its centre lies on both normals: x + slope·y is the same there as at the key.
     slopes = np.array([[1.0, speed_in], [1.0, speed_out]])

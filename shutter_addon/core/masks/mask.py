@@ -6,6 +6,7 @@ and centred on it: x to the right and y up, from 0 to 1.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from . import mask_filling, mask_outlines
 
 # Share 0 to 1 of a feather's way inward -> value.
-_FALLOFFS = {
+_FALLOFFS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "SMOOTH": lambda v: v * v * (3 - 2 * v),
     "SPHERE": lambda v: np.sqrt(2 * v - v * v),
     "ROOT": np.sqrt,
@@ -22,7 +23,7 @@ _FALLOFFS = {
     "LINEAR": lambda v: v,
 }
 # What lies below and a layer's value -> both. Sums are clamped after each layer.
-_BLENDS = {
+_BLENDS: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
     "MERGE_ADD": lambda below, v: below + v * (1 - below),
     "MERGE_SUBTRACT": lambda below, v: below - v * below,
     "ADD": np.add,
@@ -106,11 +107,11 @@ def _layer_value(layer: MaskLayer, width: int, height: int) -> np.ndarray:
     """What the splines of a layer cover: (height, width) float32, the lowest row first."""
     value = np.zeros((height, width), np.float32)
     outlines = [mask_outlines.outlines(spline, width, height) for spline in layer.splines]
-    found = [(spline, both) for spline, both in zip(layer.splines, outlines, strict=True) if both is not None]
-    if not found or layer.alpha == 0:
+    outlined = [(spline, both) for spline, both in zip(layer.splines, outlines, strict=True) if both is not None]
+    if not outlined or layer.alpha == 0:
         return value
-    filled = [edge for spline, (edge, _) in found if spline.fill]
+    filled = [edge for spline, (edge, _) in outlined if spline.fill]
     mask_filling.fill(value, filled, layer.fill_solver, layer.holes, layer.overlap)
-    quads = [mask_outlines.feather_quads(spline, *both, width, height) for spline, both in found]
+    quads = [mask_outlines.feather_quads(spline, *both, width, height) for spline, both in outlined]
     mask_filling.feather(value, np.concatenate(quads), _FALLOFFS[layer.falloff])
     return value

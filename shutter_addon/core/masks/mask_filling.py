@@ -6,6 +6,7 @@ have the lowest row first.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -34,7 +35,7 @@ def fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: bool
         _fill_together(value, group, lambda winding: winding != 0)
 
 
-def _fill_together(value: np.ndarray, polygons: list[np.ndarray], rule) -> None:
+def _fill_together(value: np.ndarray, polygons: list[np.ndarray], rule: Callable[[np.ndarray], np.ndarray]) -> None:
     """Sets the pixels to 1 whose winding number is one by the rule."""
     height, width = value.shape
     row, left, right, winding = _spans(polygons, height)
@@ -45,7 +46,7 @@ def _fill_together(value: np.ndarray, polygons: list[np.ndarray], rule) -> None:
         value[y, a:b] = 1
 
 
-def _spans(polygons: list[np.ndarray], height: int):
+def _spans(polygons: list[np.ndarray], height: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Along the middle of each row of pixels, what lies between two edges that follow each other: row, left, right and
     winding number (n,) each, in order."""
     none = np.zeros((0, 2))
@@ -59,7 +60,7 @@ def _spans(polygons: list[np.ndarray], height: int):
     return row[:-1][same], x[:-1][same], x[1:][same], winding[:-1][same]
 
 
-def _at_rows(start: np.ndarray, end: np.ndarray, height: int):
+def _at_rows(start: np.ndarray, end: np.ndarray, height: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Where edges (n, 2) cross the middles of rows of pixels: index of edge, row, x (m,) each."""
     lowest, highest = np.minimum(start[:, 1], end[:, 1]), np.maximum(start[:, 1], end[:, 1])
     first, last = (np.clip(np.ceil(y * height - 0.5), 0, height).astype(int) for y in (lowest, highest))
@@ -145,7 +146,7 @@ def _outer_loops(polygon: np.ndarray) -> list[np.ndarray]:
     return loops
 
 
-def feather(value: np.ndarray, quads: np.ndarray, falloff) -> None:
+def feather(value: np.ndarray, quads: np.ndarray, falloff: Callable[[np.ndarray], np.ndarray]) -> None:
     """Raises the pixels of `value` (h, w) that quads (n, 4, 2) cover to theirs: 1 at the first two corners, 0 at the
     last two, between them by mean value coordinates, and `falloff` of all."""
     height, width = value.shape
@@ -165,7 +166,7 @@ def feather(value: np.ndarray, quads: np.ndarray, falloff) -> None:
         np.maximum.at(flat, pixel, falloff(_nearness(ways_x, ways_y)))
 
 
-def _quad_rows(quads: np.ndarray, width: int, height: int):
+def _quad_rows(quads: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """The pixels that quads (n, 4, 2) cover, row by row: quad, row, first pixel and that behind the last, (m,) each.
 
     A quad is its two triangles on the sides of the way between its first and its third corner, as in Blender, which

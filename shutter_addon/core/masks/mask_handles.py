@@ -23,7 +23,7 @@ def with_handles(points: np.ndarray, types: np.ndarray, selected: np.ndarray, cy
     return _aligned(_smoothed(points, types, middle - before, after - middle), types, selected)
 
 
-def _smoothed(points, types, before, after) -> np.ndarray:
+def _smoothed(points: np.ndarray, types: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """The points with automatic and vector handles; before, after: the ways (n, 2) from and to the neighbours."""
     long_before, long_after = (np.where(length > 0, length, 1) for length in map(_lengths, (before, after)))
     along = after / long_after + before / long_before
@@ -41,7 +41,7 @@ def _smoothed(points, types, before, after) -> np.ndarray:
     return np.stack([left, middle, right], axis=1)
 
 
-def _aligned(points, types, selected) -> np.ndarray:
+def _aligned(points: np.ndarray, types: np.ndarray, selected: np.ndarray) -> np.ndarray:
     """The points with aligned handles in line: one of the two is turned, its length kept."""
     turned = ((types == ALIGNED) | (types == ALIGNED_DOUBLESIDE)) & (types != FREE).all(axis=1, keepdims=True)
     left, middle, right = points[:, 0], points[:, 1], points[:, 2]
@@ -67,13 +67,13 @@ def homography(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     for (x, y), (u, v) in zip(start, end, strict=True):
         rows += [(x, y, 1, 0, 0, 0, -u * x, -u * y), (0, 0, 0, x, y, 1, -v * x, -v * y)]
     try:
-        found = np.linalg.solve(np.array(rows), np.ravel(end))
+        numbers = np.linalg.solve(np.array(rows), np.ravel(end))
     except np.linalg.LinAlgError:
         return np.eye(3)
-    return np.append(found, 1.0).reshape(3, 3)
+    return np.append(numbers, 1.0).reshape(3, 3)
 
 
 def moved(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     """Points (…, 2) moved by a matrix (3, 3)."""
-    found = np.concatenate([points, np.ones_like(points[..., :1])], axis=-1) @ matrix.T
-    return found[..., :2] / found[..., 2:]
+    homogeneous = np.concatenate([points, np.ones_like(points[..., :1])], axis=-1) @ matrix.T
+    return homogeneous[..., :2] / homogeneous[..., 2:]

@@ -5,7 +5,12 @@ Polygons are in units of the picture: x to the right and y up from the lower lef
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from .mask import MaskSpline
 
 # Points a segment has at least and at most.
 _FEWEST, _MOST = 4, 32
@@ -17,7 +22,7 @@ _CAP_POINTS = 8, 64
 _SEGMENTS = 1 << 11
 
 
-def outlines(spline, width: int, height: int) -> tuple[np.ndarray, np.ndarray] | None:
+def outlines(spline: MaskSpline, width: int, height: int) -> tuple[np.ndarray, np.ndarray] | None:
     """The outline of a spline and that of its feather, (n, 2) float64 each, point by point; None: it covers nothing.
 
     A feather is a pixel wide at least: that is all there is of anti-aliasing.
@@ -48,7 +53,7 @@ def longest_segment(points: np.ndarray, cyclic: bool) -> float:
     return float(lengths[: None if cyclic else -1].max(initial=0))
 
 
-def _steps(spline, points: np.ndarray, weights: np.ndarray, larger: int) -> int:
+def _steps(spline: MaskSpline, points: np.ndarray, weights: np.ndarray, larger: int) -> int:
     """Points that a segment is cut into: one in four pixels of the longest segment, more where its feather changes."""
     longest = (spline.longest or longest_segment(points, spline.cyclic)) * larger
     steepest = 0.0
@@ -59,27 +64,29 @@ def _steps(spline, points: np.ndarray, weights: np.ndarray, larger: int) -> int:
     return int(np.clip(min(max(longest, 1), 128) // 1 + steepest / 0.005, 4 * _FEWEST, 4 * _MOST)) // 4
 
 
-def _positions(spline, count: int, steps: int) -> tuple[np.ndarray, np.ndarray]:
+def _positions(spline: MaskSpline, count: int, steps: int) -> tuple[np.ndarray, np.ndarray]:
     """Where on a spline of `count` points its outline's points lie: segment (n,) and u (n,) 0 to 1."""
     segments = count if spline.cyclic else count - 1
     segment, u = np.repeat(np.arange(segments), steps), np.tile(np.arange(steps) / steps, segments)
     return (segment, u) if spline.cyclic else (np.append(segment, segments - 1), np.append(u, 1.0))
 
 
-def _bezier(a, b, c, d, u: np.ndarray) -> np.ndarray:
+def _bezier(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray, u: np.ndarray) -> np.ndarray:
     u = u[:, None]
     v = 1 - u
     return v * v * v * a + 3 * u * v * v * b + 3 * u * u * v * c + u * u * u * d
 
 
-def _at(spline, points: np.ndarray, segment: np.ndarray, u: np.ndarray) -> np.ndarray:
+def _at(spline: MaskSpline, points: np.ndarray, segment: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Points (n, 2) of a spline; behind the end of an open one its last point."""
     this, following = points[segment % len(points)], points[(segment + 1) % len(points)]
-    found = _bezier(this[:, 1], this[:, 2], following[:, 0], following[:, 1], u)
-    return found if spline.cyclic else np.where((segment == len(points) - 1)[:, None], points[-1, 1], found)
+    inside = _bezier(this[:, 1], this[:, 2], following[:, 0], following[:, 1], u)
+    return inside if spline.cyclic else np.where((segment == len(points) - 1)[:, None], points[-1, 1], inside)
 
 
-def _even_offset(spline, points, weights, segment, u, edge) -> np.ndarray:
+def _even_offset(
+    spline: MaskSpline, points: np.ndarray, weights: np.ndarray, segment: np.ndarray, u: np.ndarray, edge: np.ndarray
+) -> np.ndarray:
     """The feather's outline (n, 2), at right angles to the spline."""
     before, after = u - _REACH < 0, u + _REACH > 1
     last = _at(spline, points, segment - before, u - _REACH + before)
@@ -91,20 +98,17 @@ def _even_offset(spline, points, weights, segment, u, edge) -> np.ndarray:
     return edge + _left_of(along) * _widths(spline, weights, segment, u)[:, None]
 
 
-def _smooth_offset(spline, points, weights, segment, u, edge) -> np.ndarray:
+def _smooth_offset(
+    spline: MaskSpline, points: np.ndarray, weights: np.ndarray, segment: np.ndarray, u: np.ndarray, edge: np.ndarray
+) -> np.ndarray:
     """The feather's outline (n, 2): a spline through the moved points, whose handles grow with the distances."""
     moves = _left_of(points[:, 1] - points[:, 0]) * weights[:, None]
     handles, moved = points - points[:, 1:2], points[:, 1] + moves
     after = (np.arange(len(points)) + 1) % len(points)
     base = np.linalg.norm(points[:, 1] - points[after, 1], axis=1)
     grown = np.linalg.norm(moved - moved[after], axis=1) / np.where(base > 0, base, 1)
-    hull = (
-        moved,
-        moved + handles[:, 2] * grown[:, None],
-        moved[after] + handles[after, 0] * grown[:, None],
-        moved[after],
-    )
-    feather = _bezier(*(corner[segment] for corner in hull), u)
+    right, left = moved + handles[:, 2] * grown[:, None], moved[after] + handles[after, 0] * grown[:, None]
+    feather = _bezier(moved[segment], right[segment], left[segment], moved[after][segment], u)
     # Feather points scale what there is; where there is none, they make none.
     plain = weights[segment] * (1 - u) + weights[after][segment] * u
     scaled = np.array([len(feather) > 0 for feather in spline.feathers])[segment] & (plain != 0)
@@ -112,7 +116,7 @@ def _smooth_offset(spline, points, weights, segment, u, edge) -> np.ndarray:
     return edge + (feather - edge) * scale[:, None]
 
 
-def _widths(spline, weights, segment, u) -> np.ndarray:
+def _widths(spline: MaskSpline, weights: np.ndarray, segment: np.ndarray, u: np.ndarray) -> np.ndarray:
     """The feather's width (n,) in mask space, eased or linear between points and feather points."""
     result = np.empty(len(u))
     for index, feather in enumerate(spline.feathers):
@@ -138,7 +142,7 @@ def _pixel_wide(edge: np.ndarray, feather: np.ndarray, pixel: float) -> np.ndarr
     return np.where(narrow[:, None], edge + np.stack([along[:, 1], -along[:, 0]], axis=1) * pixel, feather)
 
 
-def feather_quads(spline, edge: np.ndarray, feather: np.ndarray, width: int, height: int) -> np.ndarray:
+def feather_quads(spline: MaskSpline, edge: np.ndarray, feather: np.ndarray, width: int, height: int) -> np.ndarray:
     """The feather of a spline as quads (n, 4, 2): two corners on the spline, whose value is 1, and two beyond, of 0."""
     if spline.fill:
         return _between(edge, feather, closed=True)
@@ -158,7 +162,7 @@ def _between(edge: np.ndarray, feather: np.ndarray, closed: bool) -> np.ndarray:
     return quads if closed else quads[:-1]
 
 
-def _cap(centre, start, turn: float, size, width: int, height: int) -> np.ndarray:
+def _cap(centre: np.ndarray, start: np.ndarray, turn: float, size: np.ndarray, width: int, height: int) -> np.ndarray:
     """The half disc (n, 4, 2) at an end of an open spline, from a point of its feather on."""
     pixels = np.linalg.norm(start - centre) * min(width, height)
     count = int(np.clip(pixels // 2, *_CAP_POINTS))
@@ -178,8 +182,8 @@ def _without_loops(outline: np.ndarray, cyclic: bool) -> np.ndarray:
     for i, j in sorted(zip(second.tolist(), first.tolist(), strict=True)):
         if j >= i - 1 or (i + 1) % count == j or not (cyclic or i < count - 1):
             continue
-        found, _, at, _ = crossings(outline[[i, j]], outline[[(i + 1) % count, j + 1]])
-        if not len(found):
+        _, _, at, _ = crossings(outline[[i, j]], outline[[(i + 1) % count, j + 1]])
+        if not len(at):
             continue
         meeting = outline[i] + (outline[(i + 1) % count] - outline[i]) * at[0]
         inner = np.arange(count)
@@ -199,14 +203,14 @@ def crossings(starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndar
     # In the order of their left ends, a segment can meet those that follow until one begins behind its right end.
     order = np.argsort(lowest[:, 0], kind="stable")
     reach = np.searchsorted(lowest[order, 0], highest[order, 0], side="right")
-    found = [np.zeros((2, 0), int)]
+    pairs = [np.zeros((2, 0), int)]
     for a in range(0, len(order), _SEGMENTS):
         part = np.arange(a, min(a + _SEGMENTS, len(order)))
         here, there = ranges(part + 1, reach[part])
         here, there = order[here + a], order[there]
         near = (lowest[here, 1] <= highest[there, 1]) & (lowest[there, 1] <= highest[here, 1])
-        found.append(np.stack([here[near], there[near]]))
-    first, second = np.sort(np.concatenate(found, axis=1), axis=0)
+        pairs.append(np.stack([here[near], there[near]]))
+    first, second = np.sort(np.concatenate(pairs, axis=1), axis=0)
     a, b, gap = ways[first], ways[second], starts[second] - starts[first]
     area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):

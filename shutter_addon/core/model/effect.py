@@ -6,7 +6,7 @@ of whoever made it: a recipe's count from 1, Blender's are the edit's timeline f
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -39,7 +39,7 @@ class Drawings:
 
     frames: tuple[float, ...]
     strokes: tuple
-    eases: tuple[str, ...]
+    eases: tuple[keyframes.Ease, ...]
     aspect: float
     placement: Channel | None = None
 
@@ -50,7 +50,7 @@ class Drawings:
 
     def at(self, frame: float) -> list[np.ndarray]:
         """Strokes (n, 2) in fractions of the picture. FarStrokeError: a point is nowhere near it."""
-        placement = self.placement and self.placement.at(frame)
+        placement = self.placement.at(frame) if self.placement else None
         if not self.frames or (self.placement and placement is None):
             return []
         before, after, share = keyframes.eased_span(self.frames, self.eases, frame)
@@ -59,7 +59,7 @@ class Drawings:
 
     def drawing(self, index: int, frame: float) -> list[np.ndarray]:
         """The strokes of a drawing as they lie on the picture at a frame; raises as `at`."""
-        placement = self.placement and self.placement.at(frame)
+        placement = self.placement.at(frame) if self.placement else None
         return [] if self.placement and placement is None else self._on_picture(index, placement)
 
     def _on_picture(self, index: int, placement: np.ndarray | None) -> list[np.ndarray]:
@@ -78,7 +78,7 @@ class Region:
     shutter: index of the shutter; kind: "line" or "lasso", and
     width: of its lines, fraction of the picture's height
     location: (2,) fractions of the picture; rotation: degrees counter-clockwise; scale: about the shape's centre
-    opacity: 0 to 1, as of scribbles.layers"""
+    opacity: 0 to 1 (scribbles.layers)"""
 
     name: str
     shutter: int
@@ -128,7 +128,7 @@ class Region:
         they are nowhere near it."""
         return self._near(lambda: self.drawings.drawing(index, frame))
 
-    def _near(self, strokes: Callable) -> list[np.ndarray]:
+    def _near(self, strokes: Callable[[], list[np.ndarray]]) -> list[np.ndarray]:
         try:
             return strokes()
         except FarStrokeError:
@@ -219,7 +219,10 @@ class Camera:
         return motions.PICTURE
 
 
-STILL_CAMERA = Camera(*map(keyframes.Constant, ((0.0, 0.0), 0.0, 1.0)))
+STILL_CAMERA = Camera(
+    location=keyframes.Constant((0.0, 0.0)), rotation=keyframes.Constant(0.0), scale=keyframes.Constant(1.0)
+)
+Subject = Region | MatteRegion | Camera  # what the exposure of a shutter may follow
 
 
 def _placement(moving: Region | MatteRegion | PlacedRamp | Camera, frame: float) -> Placement:
@@ -238,7 +241,7 @@ class Shutter:
     name: str
     color: tuple[float, float, float]
     bars: Bars
-    follow: Region | MatteRegion | Camera | None = None
+    follow: Subject | None = None
     trail: Channel | None = None
     motion: motions.Motion = "scale"
     smooth: int = 0
@@ -287,7 +290,7 @@ class Effect:
         seen = tuple(matte for matte in laid if matte.opacity > 0)
         return FrameState(options, np.stack(bars), tuple(self._shapes_at(frame)), mattes=seen)
 
-    def _shapes_at(self, frame: float):
+    def _shapes_at(self, frame: float) -> Iterator[scribbles.Shape]:
         room = limits.MAX_POINTS
         for region in self.regions:
             if isinstance(region, MatteRegion):

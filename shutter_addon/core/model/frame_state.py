@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from . import scribbles, shutters
 from .mattes import Matte
@@ -67,7 +69,7 @@ class Following:
     turns: np.ndarray
     shifts: np.ndarray
 
-    def at(self, frames) -> tuple[np.ndarray, np.ndarray]:
+    def at(self, frames: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """The turns and shifts (L, N) of source frames (L,); of those that have none, such as −1, any."""
         rows = np.clip(np.asarray(frames) - self.first, 0, len(self.turns) - 1)
         return self.turns[rows], self.shifts[rows]
@@ -81,10 +83,10 @@ class Following:
         """The numbers of the shutters that follow what moves."""
         return np.flatnonzero((self.turns != 1).any(axis=0) | self.shifts.any(axis=0))
 
-    def of(self, chosen) -> Following | None:
+    def of(self, chosen: slice | Sequence[int]) -> Following | None:
         """That of some shutters alone; None: none of them moves."""
-        found = Following(self.first, self.turns[:, chosen], self.shifts[:, chosen])
-        return found if found.moving().size else None
+        part = Following(self.first, self.turns[:, chosen], self.shifts[:, chosen])
+        return part if part.moving().size else None
 
 
 @dataclass(frozen=True)
@@ -141,4 +143,5 @@ class FrameState:
         """The state of a picture in which one shutter, `chosen`, is everywhere."""
         options = replace(self.options, edge_aware=0.0)  # there is nothing to diffuse
         following = self.following and self.following.of([chosen])
-        return FrameState(options, self.bars[chosen, None], (), self.reference or float(self.bars[0].sum()), following)
+        reference = self.reference or float(self.bars[0].sum())
+        return FrameState(options=options, bars=self.bars[chosen, None], reference=reference, following=following)

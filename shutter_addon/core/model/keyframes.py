@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..messages import UserError
 from . import shutters
 
-EASES = ("linear", "bezier", "constant")
+Ease = Literal["linear", "bezier", "constant"]
+EASES: tuple[Ease, ...] = ("linear", "bezier", "constant")
 
 
-def eased(u: float, ease: str) -> float:
+def eased(u: float, ease: Ease) -> float:
     """Progress 0 to 1 through a span. "bezier" has flat handles of a third of the span: u²(3 − 2u)."""
     if ease == "constant":
         return 0.0 if u < 1 else 1.0
     return u * u * (3 - 2 * u) if ease == "bezier" else u
 
 
-def span(frames: list[float], frame: float) -> tuple[int, int, float]:
+def span(frames: Sequence[float], frame: float) -> tuple[int, int, float]:
     """Indices of the keys before and after `frame` in ascending `frames`, and the share 0 to 1 between them.
 
     Outside the keys both are the nearest one; on a key both are that key.
@@ -35,16 +38,17 @@ def span(frames: list[float], frame: float) -> tuple[int, int, float]:
     return before, after, (frame - frames[before]) / (frames[after] - frames[before])
 
 
-def between_bars(first, second, u: float, interpolation: str = "displacement") -> np.ndarray:
+def between_bars(first: ArrayLike, second: ArrayLike, u: float, interpolation: str = "displacement") -> np.ndarray:
     """Bars (L,) a share u of the way from one shutter to another: by displacement, or, as F-curves do, bar by bar
     ("value")."""
+    before, after = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
     if u <= 0:
-        return np.asarray(first, dtype=np.float64)
+        return before
     if u >= 1:
-        return np.asarray(second, dtype=np.float64)
+        return after
     if interpolation == "value":
-        return (1 - u) * np.asarray(first, dtype=np.float64) + u * np.asarray(second, dtype=np.float64)
-    return shutters.displace([first, second], [1 - u, u])
+        return (1 - u) * before + u * after
+    return shutters.displace(np.stack([before, after]), [1 - u, u])
 
 
 class Channel(Protocol):
@@ -66,7 +70,7 @@ class Constant:
         return _given(self.value)
 
 
-def are_still(*parts) -> bool:
+def are_still(*parts: object) -> bool:
     """Whether all of them, channels or what is made of channels, are known to be the same at every frame."""
     return all(getattr(part, "is_still", False) for part in parts)
 
@@ -77,7 +81,7 @@ class Keys:
 
     frames: tuple[float, ...]
     values: tuple
-    eases: tuple[str, ...]
+    eases: tuple[Ease, ...]
 
     def at(self, frame: float) -> np.ndarray:
         before, after, share = eased_span(self.frames, self.eases, frame)
@@ -92,7 +96,7 @@ class Samples:
     keys: frames and eases of the keys of the curve that was sampled, ascending; none where it is no curve of keys."""
 
     values: dict[float, Any]
-    keys: tuple[tuple[float, str], ...] = ()
+    keys: tuple[tuple[float, Ease], ...] = ()
 
     def at(self, frame: float) -> Any:
         """KeyError: the frame was not sampled."""
@@ -108,7 +112,7 @@ class SourceTime:
     """
 
     numbers: Channel
-    keys: tuple[tuple[float, str], ...]
+    keys: tuple[tuple[float, Ease], ...]
 
     def at(self, frame: float) -> tuple[float, bool]:
         time, later = float(self.numbers.at(frame)), float(self.numbers.at(frame + 0.5))
@@ -132,7 +136,7 @@ class Bars:
     share: channel of the share 0 to 1 of the way from the key before a frame to the key after it; None: by the eases"""
 
     channel: Channel
-    keys: tuple[tuple[float, str], ...] = ()
+    keys: tuple[tuple[float, Ease], ...] = ()
     share: Channel | None = None
 
     @property
@@ -162,13 +166,13 @@ class Bars:
         return eased_span(frames, [ease for _, ease in self.keys], frame)[2]
 
 
-def eased_span(frames, eases, frame: float) -> tuple[int, int, float]:
+def eased_span(frames: Sequence[float], eases: Sequence[Ease], frame: float) -> tuple[int, int, float]:
     """As span, the share with the ease of the span: eases are of the keys that begin them."""
     before, after, share = span(frames, frame)
     return before, after, eased(share, eases[before])
 
 
-def _given(value):
+def _given(value: Any) -> Any:
     if isinstance(value, UserError):
         raise value.with_traceback(None)  # which would grow with every raise
     return value

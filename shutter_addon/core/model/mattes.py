@@ -6,14 +6,13 @@ They are laid over the coefficients that scribbles give, in the order of the reg
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
 
-from ..frames.frame_source import FrameSource
-from ..frames.retiming import StripTiming, source_frame
+from ..frames.retiming import Medium, StripTiming, source_frame
 
 Blend = Literal["over", "add"]
 RampKind = Literal["linear", "radial", "angle"]
@@ -28,12 +27,26 @@ class MatteFile(Hashable, Protocol):
         """It, opened. MediaError: it cannot be read."""
 
 
-class MatteSource(FrameSource, Protocol):
-    """What was opened: width, height, count and fps as of a FrameSource."""
+class MatteSource(Medium, Protocol):
+    """What was opened: width and height in pixels."""
+
+    width: int
+    height: int
 
     def read(self, index: int) -> np.ndarray:
         """The values (height, width) float32 of a frame, 0 to 1, top row first. Beyond its ends the nearest one's.
         MediaError: they cannot be read."""
+
+    def close(self) -> None:
+        """Closes the file."""
+
+
+@dataclass(frozen=True)
+class NoFile:
+    """A MatteFile of which nobody may ask for values: a recipe's, as long as it is not known where that lies."""
+
+    def open(self) -> MatteSource:
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -52,9 +65,11 @@ class FileFrame:
     def index(self, source: MatteSource, shown: int) -> int:
         """Which frame it is, of the opened file, where the source shows the filmed frame `shown`; perhaps beyond its
         ends. EffectError: how the strip is retimed cannot be known."""
-        if self.timing is not None:
-            return source_frame(self.timing, self.time, source)
-        return (shown if self.time is None else math.floor(self.time)) + self.offset
+        if self.time is None:
+            return shown + self.offset
+        return (
+            math.floor(self.time) + self.offset if self.timing is None else source_frame(self.timing, self.time, source)
+        )
 
 
 @dataclass(frozen=True)
@@ -100,14 +115,17 @@ class Ramp:
         if self.kind == "angle":
             return (np.arctan2(along, across) / (2 * math.pi) % 1).astype(np.float32)
         if self.kind == "radial":
-            found = np.hypot(along, across) / (scale * math.hypot(width, height) / 2)
+            values = np.hypot(along, across) / (scale * math.hypot(width, height) / 2)
         else:
-            found = along / (scale * (width * abs(cos) + height * abs(sin))) + 0.5
-        return np.clip(found, 0, 1).astype(np.float32)
+            values = along / (scale * (width * abs(cos) + height * abs(sin))) + 0.5
+        return np.clip(values, 0, 1).astype(np.float32)
 
 
 class MaskShape(Hashable, Protocol):
     """A mask at one frame (core.masks.mask)."""
+
+    def values(self, width: int, height: int) -> np.ndarray:
+        """As Ramp.values."""
 
 
 Content = FileFrame | Ramp | MaskShape
@@ -142,7 +160,7 @@ class MatteReader(Protocol):
         """Closes the files; they are opened again when they are needed."""
 
 
-def blended(coefficients: np.ndarray, mattes: tuple[Matte, ...], values) -> np.ndarray:
+def blended(coefficients: np.ndarray, mattes: tuple[Matte, ...], values: Sequence[np.ndarray]) -> np.ndarray:
     """Coefficients (N, h, w), Σ = 1, with mattes laid over them: c ← (1 − m) c + m e for the matte's shutter e.
 
     coefficients: (N, h, w), or (N, 1, 1) for those of the whole picture; values: of each matte (h, w), 0 to 1"""

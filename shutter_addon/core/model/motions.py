@@ -7,7 +7,7 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -16,6 +16,8 @@ _DIRECTIONS = np.exp(1j * np.linspace(0, 2 * np.pi, 32, endpoint=False))
 
 # What of a motion counts beside the location.
 Motion = Literal["location", "rotation", "scale"]
+
+Points = TypeVar("Points", complex, np.ndarray)
 
 # From a pixel's corner to its middle.
 _CORNER = 0.5 + 0.5j
@@ -40,7 +42,7 @@ class Similarity:
     turn: complex = 1 + 0j
     shift: complex = 0j
 
-    def __call__(self, points):
+    def __call__(self, points: Points) -> Points:
         """Where a point, or an array of points, goes."""
         return self.turn * points + self.shift
 
@@ -78,18 +80,20 @@ def _points(strokes: Iterable) -> np.ndarray:
     return np.concatenate([np.asarray(stroke, dtype=np.float64) for stroke in strokes])
 
 
-def pixel(place, size) -> complex:
+def pixel(place: Sequence[float] | np.ndarray, size: tuple[int, int]) -> complex:
     """A place in fractions of the picture, y up, in pixels of a size as Similarity counts them."""
     return complex(place[0] * size[0], (1 - place[1]) * size[1]) - _CORNER
 
 
-def fractions(pixel: complex, size) -> tuple[float, float]:
+def fractions(pixel: complex, size: tuple[int, int]) -> tuple[float, float]:
     """The place in fractions of the picture, y up, that is at a pixel."""
     corner = pixel + _CORNER
     return corner.real / size[0], 1 - corner.imag / size[1]
 
 
-def carried(placement: Placement, motion: Similarity, before, after, size) -> Placement:
+def carried(
+    placement: Placement, motion: Similarity, before: np.ndarray, after: np.ndarray, size: tuple[int, int]
+) -> Placement:
     """The placement of a shape after a motion of the picture.
 
     before, after: centres (2,) of the shape as it is drawn when the motion begins and when it ends, fractions
@@ -100,8 +104,10 @@ def carried(placement: Placement, motion: Similarity, before, after, size) -> Pl
     return Placement(location, rotation, placement.scale * abs(motion.turn))
 
 
-def motion_between(first: Placement, second: Placement, before, after, size) -> Similarity:
-    """The motion of the picture that takes a shape from one placement to another; arguments as of `carried`."""
+def motion_between(
+    first: Placement, second: Placement, before: np.ndarray, after: np.ndarray, size: tuple[int, int]
+) -> Similarity:
+    """The motion of the picture that takes a shape from one placement to another; arguments like those of `carried`."""
     angle = math.radians(first.rotation - second.rotation)
     turn = cmath.rect(second.scale / first.scale, angle)
     start, end = (pixel(np.add(*each), size) for each in ((before, first.location), (after, second.location)))
@@ -134,7 +140,11 @@ def averaged(placements: Sequence[Placement], weights: np.ndarray) -> Placement:
 
 
 def thinned(
-    placements: Mapping[int, Placement], points, size, kept: Collection[int] = (), tolerance: float = 1.0
+    placements: Mapping[int, Placement],
+    points: np.ndarray,
+    size: tuple[int, int],
+    kept: Collection[float] = (),
+    tolerance: float = 1.0,
 ) -> list[int]:
     """The frames, ascending, whose keys say the motion: with linear eases between these, no point of the shape is
     farther than the tolerance from where it was.
@@ -162,7 +172,7 @@ def thinned(
     return [frames[i] for i in sorted(chosen)]
 
 
-def _numbers(placements: list[Placement]) -> np.ndarray:
+def _numbers(placements: Sequence[Placement]) -> np.ndarray:
     """Location, rotation and scale as an array (n, 4)."""
     return np.array([(*p.location, p.rotation, p.scale) for p in placements], dtype=np.float64)
 
@@ -176,7 +186,7 @@ def _farthest(points: np.ndarray) -> np.ndarray:
     return plane[np.unique((plane[:, None] * _DIRECTIONS.conj()).real.argmax(axis=0))]
 
 
-def _distances(frames: np.ndarray, numbers: np.ndarray, points: np.ndarray, size) -> np.ndarray:
+def _distances(frames: np.ndarray, numbers: np.ndarray, points: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """How far in pixels a shape's points lie at most, at each frame, from where linear keys at the first and the last
     frame put them."""
     share = ((frames - frames[0]) / (frames[-1] - frames[0]))[:, None]

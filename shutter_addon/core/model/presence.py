@@ -8,6 +8,8 @@ from collections.abc import Collection, Iterable
 from itertools import pairwise
 from typing import NamedTuple
 
+from .keyframes import Ease
+
 # Frames over which a region fades.
 FADE = 5
 
@@ -25,7 +27,7 @@ class Key(NamedTuple):
 
     frame: int
     value: float
-    ease: str
+    ease: Ease
 
 
 class Gap(NamedTuple):
@@ -34,8 +36,11 @@ class Gap(NamedTuple):
 
     first: float
     last: float
-    hard_first: bool
-    hard_last: bool
+    hard_first: bool = False
+    hard_last: bool = False
+
+
+_NONE_LATER = Gap(math.inf, math.inf)
 
 
 def keys(
@@ -49,38 +54,37 @@ def keys(
     fade: frames over which it comes and goes, fewer between gaps that are close; at a cut it does so at once, as a fade
     would show there
     beside: frames on each side of a gap at which it counts for nothing as well"""
-    found, before = [], -math.inf
-    for gap, following in pairwise([*gaps(seen, stops, beside), None]):
-        after = following.first if following else math.inf
+    changes: list[Key] = []
+    before = -math.inf
+    for gap, following in pairwise([*gaps(seen, stops, beside), _NONE_LATER]):
+        after = following.first
         if math.isfinite(gap.first):
             kept_before = max((frame for frame in kept if frame < gap.first), default=-math.inf)
             room = min(gap.first - kept_before, max((gap.first - before) // 2, 1))
             length = 1 if gap.hard_first else int(min(fade, room))
-            found.append(Key(int(gap.first) - length, 1.0, "constant" if gap.hard_first else "linear"))
-            found.append(Key(int(gap.first), 0.0, "constant"))
+            changes.append(Key(int(gap.first) - length, 1.0, "constant" if gap.hard_first else "linear"))
+            changes.append(Key(int(gap.first), 0.0, "constant"))
         if math.isfinite(gap.last):
             kept_after = min((frame for frame in kept if frame > gap.last), default=math.inf)
             room = min(kept_after - gap.last, max((after - gap.last) // 2, 1))
             length = 1 if gap.hard_last else int(min(fade, room))
-            found.append(Key(int(gap.last), 0.0, "constant" if gap.hard_last else "linear"))
-            found.append(Key(int(gap.last) + length, 1.0, "constant"))
+            changes.append(Key(int(gap.last), 0.0, "constant" if gap.hard_last else "linear"))
+            changes.append(Key(int(gap.last) + length, 1.0, "constant"))
         before = gap.last
-    return [found[frame] for frame in _last_at_each(found)]
-
-
-def _last_at_each(found: list[Key]) -> list[int]:
-    """Of keys, ascending, the places of those that no later one at the same frame replaces."""
-    return sorted({key.frame: place for place, key in enumerate(found)}.values())
+    # Of two at the same frame the later one counts.
+    places = {key.frame: place for place, key in enumerate(changes)}
+    return [changes[place] for place in sorted(places.values())]
 
 
 def gaps(seen: Collection[int], stops: Iterable[Stop], beside: int = 0) -> list[Gap]:
-    """Where nothing is there, ascending and apart; arguments as of `keys`."""
+    """Where nothing is there, ascending and apart; arguments like those of `keys`."""
     merged: list[Gap] = []
-    for first, last, *hard in sorted(_gap(seen, stop) for stop in stops):
-        gap = Gap(first - beside, last + beside, *hard)
+    for each in sorted(_gap(seen, stop) for stop in stops):
+        gap = each._replace(first=each.first - beside, last=each.last + beside)
         if merged and gap.first <= merged[-1].last + 1:
-            last = max(merged[-1], gap, key=lambda each: each.last)
-            gap = Gap(merged[-1].first, last.last, merged.pop().hard_first, last.hard_last)
+            before = merged.pop()
+            later = max(before, gap, key=lambda each: each.last)
+            gap = before._replace(last=later.last, hard_last=later.hard_last)
         merged.append(gap)
     return merged
 
@@ -88,7 +92,7 @@ def gaps(seen: Collection[int], stops: Iterable[Stop], beside: int = 0) -> list[
 def _gap(seen: Collection[int], stop: Stop) -> Gap:
     frame = stop.frame
     if frame in seen:
-        return Gap(frame, frame, False, False)
+        return Gap(frame, frame)
     if stop.is_forward:
-        return Gap(frame, min((s for s in seen if s > frame), default=math.inf) - 1, stop.is_cut, False)
-    return Gap(max((s for s in seen if s < frame), default=-math.inf) + 1, frame, False, stop.is_cut)
+        return Gap(frame, min((s for s in seen if s > frame), default=math.inf) - 1, hard_first=stop.is_cut)
+    return Gap(max((s for s in seen if s < frame), default=-math.inf) + 1, frame, hard_last=stop.is_cut)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 
@@ -67,7 +69,7 @@ def last(window: int) -> np.ndarray:
 
 
 # name: (label, description, function, parameters). "Custom" is no preset: it is whatever the bars are.
-PRESETS = {
+PRESETS: dict[str, tuple[str, str, Callable[..., np.ndarray], dict[str, float]]] = {
     "STILL": ("Still Frame", "One sharp frame", still, {}),
     "ANGLE_45": ("45°", "Open for an eighth of the frames", angle, {"degrees": 45.0}),
     "ANGLE_90": ("90°", "Open for a quarter of the frames", angle, {"degrees": 90.0}),
@@ -87,7 +89,7 @@ PRESETS = {
 }
 
 
-def bars(name: str, window: int, **parameters) -> np.ndarray:
+def bars(name: str, window: int, **parameters: float) -> np.ndarray:
     """Bars (L,) of the preset `name`, its own parameters overridden by `parameters`. KeyError: no such preset."""
     *_words, make, defaults = PRESETS[name]
     return make(window, **(defaults | parameters))

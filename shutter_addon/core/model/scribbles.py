@@ -6,10 +6,12 @@ of its height. Pictures here have their top row first.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 # A line never gets thinner than this radius in pixels: a 5-point diffusion would leak through it.
 _MIN_RADIUS = 0.7072
@@ -31,7 +33,7 @@ class Shape:
     opacity: float = 1.0  # 0 to 1
 
 
-def layers(shapes) -> list[tuple[float, tuple[Shape, ...]]]:
+def layers(shapes: Collection[Shape]) -> list[tuple[float, tuple[Shape, ...]]]:
     """What coefficients are the mean of where shapes are not quite opaque: shares, which add up to 1, each with the
     shapes that hold in it; the first has all that hold anywhere. So coefficients at an opacity of one half are halfway
     between those with the shape and those without it, and nothing jumps where it goes."""
@@ -39,7 +41,7 @@ def layers(shapes) -> list[tuple[float, tuple[Shape, ...]]]:
     return [(high - low, tuple(s for s in shapes if s.opacity >= high)) for low, high in pairwise(steps)]
 
 
-def resample(stroke, count: int, aspect: float = 1.0) -> np.ndarray:
+def resample(stroke: ArrayLike, count: int, aspect: float = 1.0) -> np.ndarray:
     """`count` points (count, 2) at equal arc lengths along a stroke (n, 2), its ends kept. aspect: the picture's width
     over its height, by which lengths are measured."""
     stroke = np.asarray(stroke, dtype=np.float64)
@@ -51,7 +53,9 @@ def resample(stroke, count: int, aspect: float = 1.0) -> np.ndarray:
     return np.stack([np.interp(at, length, stroke[:, axis]) for axis in (0, 1)], axis=1)
 
 
-def between_strokes(first, second, u: float, aspect: float = 1.0) -> list[np.ndarray]:
+def between_strokes(
+    first: Sequence[ArrayLike], second: Sequence[ArrayLike], u: float, aspect: float = 1.0
+) -> list[np.ndarray]:
     """Strokes a share u of the way from one drawing to the next, paired in order.
 
     Strokes of the same number of points move point by point, others by arc length (aspect: see `resample`). A stroke
@@ -78,7 +82,9 @@ def mapped(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
     return points @ matrix[:2, :2].T + matrix[:2, 2]
 
 
-def transform(strokes, location, rotation: float, scale: float, aspect: float) -> tuple[np.ndarray, ...]:
+def transform(
+    strokes: Iterable[ArrayLike], location: ArrayLike, rotation: float, scale: float, aspect: float
+) -> tuple[np.ndarray, ...]:
     """Strokes scaled, turned by `rotation` degrees counter-clockwise about the centre of their common bounding
     box, and moved by `location` (fractions). `aspect` is the picture's width over its height: circles stay round.
     """
@@ -92,7 +98,7 @@ def transform(strokes, location, rotation: float, scale: float, aspect: float) -
     return tuple((s - centre) @ turn.T + centre + np.asarray(location, dtype=np.float64) for s in strokes)
 
 
-def rasterise(shapes, width: int, height: int, *, border: bool = False) -> np.ndarray:
+def rasterise(shapes: Iterable[Shape], width: int, height: int, *, border: bool = False) -> np.ndarray:
     """Labels (height, width) uint16: 0 where free, 1 + shutter where a shape covers the pixel's centre.
 
     Later shapes win. `border` fixes the frame's edge to the first shutter, under every shape.
@@ -146,7 +152,7 @@ def _seen(starts: np.ndarray, steps: np.ndarray, size: np.ndarray, reach: float)
     return np.stack([low.max(axis=1, initial=0), high.min(axis=1, initial=1)])
 
 
-def _draw_segment(labels, a, b, radius, label) -> None:
+def _draw_segment(labels: np.ndarray, a: np.ndarray, b: np.ndarray, radius: float, label: int) -> None:
     height, width = labels.shape
     limit = np.array([width, height])
     low = np.clip(np.floor(np.minimum(a, b) - radius), 0, limit).astype(int)

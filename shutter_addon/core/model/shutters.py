@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .limits import MAX_BAR, MIN_EXPOSURE
 
@@ -23,7 +24,7 @@ class ShutterError(ValueError):
     """Bars that are no shutter; the message is one sentence for the user."""
 
 
-def check_bars(bars) -> np.ndarray:
+def check_bars(bars: ArrayLike) -> np.ndarray:
     """Bars as a float64 array (L,), or ShutterError: 1 to 256 numbers from 0 to a million, a millionth together or
     more. What counts is what they are as float32: Blender has no others."""
     bars = np.asarray(bars, dtype=np.float64)
@@ -42,12 +43,12 @@ def check_bars(bars) -> np.ndarray:
     return bars
 
 
-def exposure(bars) -> float:
+def exposure(bars: ArrayLike) -> float:
     """e(s) = Σ bars: the open time in frames."""
-    return float(np.sum(bars))
+    return float(np.asarray(bars).sum())
 
 
-def accumulation(bars) -> np.ndarray:
+def accumulation(bars: ArrayLike) -> np.ndarray:
     """S at the L + 1 frame boundaries, float64, from 0 to exactly 1. Bars as in `check_bars`."""
     sums = np.concatenate([[0.0], np.cumsum(np.asarray(bars, dtype=np.float64))])
     return sums / sums[-1]
@@ -66,7 +67,7 @@ class Quantile:
     end: np.ndarray
 
 
-def quantile(bars) -> Quantile:
+def quantile(bars: ArrayLike) -> Quantile:
     """The quantile of one shutter: a piece per open bar."""
     total = accumulation(bars)
     is_open = np.diff(total) > 0
@@ -75,7 +76,7 @@ def quantile(bars) -> Quantile:
     return Quantile(z, frames, frames + 1.0)
 
 
-def knots(shutters) -> Quantile:
+def knots(shutters: ArrayLike) -> Quantile:
     """The quantiles of N shutters (N, L) on the union of their levels; start and end have shape (K, N).
 
     The levels do not depend on the coefficients c: a pixel's quantile on piece k runs from c·start[k] to
@@ -105,7 +106,7 @@ def _on_levels(part: Quantile, levels: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return np.clip(start, part.start[piece], part.end[piece]), np.clip(end, part.start[piece], part.end[piece])
 
 
-def _bends(levels, start, end) -> np.ndarray:
+def _bends(levels: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Which inner levels are a jump or a change of slope of any shutter; shape (K - 1,)."""
     slope = (end - start) / np.diff(levels)[:, None]
     jumps = np.abs(start[1:] - end[:-1]) > 1e-9
@@ -113,24 +114,24 @@ def _bends(levels, start, end) -> np.ndarray:
     return (jumps | turns).any(axis=1)
 
 
-def weights(start, end, dz, window: int) -> np.ndarray:
+def weights(start: np.ndarray, end: np.ndarray, dz: np.ndarray, window: int) -> np.ndarray:
     """Normalised weights (…, L) of the frames from a quantile's pieces; start, end (…, K) and dz (K,).
 
     q(τ) = Q(τ + 1) − Q(τ): each piece spreads dz evenly over the time between its start and its end.
     """
     frames = np.arange(window, dtype=np.float64)
-    x0, x1 = np.asarray(start)[..., None], np.asarray(end)[..., None]
+    x0, x1 = start[..., None], end[..., None]
     # A time never passes slower than its level (slope ≥ 1), so x1 − x0 ≥ dz > 0.
     share = (np.clip(x1, frames, frames + 1) - np.clip(x0, frames, frames + 1)) / (x1 - x0)
     return np.einsum("...kl,k->...l", share, dz)
 
 
-def mix_exposure(shutters, coefficients) -> np.ndarray:
+def mix_exposure(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
     """e(q) = Σ cᵢ eᵢ for coefficients (…, N): the exposure of the interpolated shutter, shape (…)."""
-    return np.asarray(coefficients) @ np.sum(shutters, axis=1)
+    return np.asarray(coefficients) @ np.asarray(shutters).sum(axis=1)
 
 
-def displace(shutters, coefficients) -> np.ndarray:
+def displace(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
     """Displacement interpolation: bars (…, L) of the shutter between shutters (N, L), for coefficients (…, N)
     with Σc = 1, c ≥ 0 (paper §3.2, §3.4.1; exact). Σ of the result is e(q)."""
     shutters = np.atleast_2d(np.asarray(shutters, dtype=np.float64))
@@ -140,7 +141,7 @@ def displace(shutters, coefficients) -> np.ndarray:
     return q * mix_exposure(shutters, coefficients)[..., None]
 
 
-def mix(shutters, coefficients) -> np.ndarray:
+def mix(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
     """Value interpolation: bars (…, L) of Σ cᵢ sᵢ/eᵢ, scaled to e(q). Arguments as for `displace`."""
     shutters = np.atleast_2d(np.asarray(shutters, dtype=np.float64))
     coefficients = np.asarray(coefficients, dtype=np.float64)
@@ -151,13 +152,13 @@ def mix(shutters, coefficients) -> np.ndarray:
 INTERPOLATIONS = {"displacement": displace, "value": mix}
 
 
-def open_span(shutters) -> tuple[int, int]:
+def open_span(shutters: ArrayLike) -> tuple[int, int]:
     """First and one past the last frame of the window that any mix of these shutters (N, L) can expose."""
     used = np.flatnonzero(np.any(np.atleast_2d(shutters) > 0, axis=0))
     return int(used[0]), int(used[-1]) + 1
 
 
-def resample(bars, window: int) -> np.ndarray:
+def resample(bars: ArrayLike, window: int) -> np.ndarray:
     """Bars (window,) of the same shutter over a window of another length. Its shape stays, and its share of
     the window's light; its angle where no bar is averaged with others."""
     bars = np.asarray(bars, dtype=np.float64)
@@ -166,7 +167,7 @@ def resample(bars, window: int) -> np.ndarray:
     return np.diff(np.interp(at, np.arange(len(bars) + 1), total)) * window / len(bars)
 
 
-def spanning(bars, start: float, end: float) -> np.ndarray:
+def spanning(bars: ArrayLike, start: float, end: float) -> np.ndarray:
     """Bars (L,) of the same shutter in other times: it is open from one to the other, 0 ≤ start < end ≤ L, its quantile
     scaled and shifted, its exposure the same."""
     bars = np.asarray(bars, dtype=np.float64)
@@ -177,7 +178,7 @@ def spanning(bars, start: float, end: float) -> np.ndarray:
     return np.diff(np.maximum.accumulate(total))  # by rounding alone would it fall
 
 
-def multiplied(bars, old: int, new: int, position: str = "start") -> np.ndarray:
+def multiplied(bars: ArrayLike, old: int, new: int, position: str = "start") -> np.ndarray:
     """Bars of the same shutter, in time, where each source frame has `new` frames in place of `old`, both powers of 2.
 
     A window that ends within a source frame gets closed bars up to that frame's end; where `position` is "end" it is
@@ -191,7 +192,7 @@ def multiplied(bars, old: int, new: int, position: str = "start") -> np.ndarray:
     return resample(np.pad(bars, (before, lacking - before)), window)
 
 
-def open_angle(bars) -> float:
+def open_angle(bars: ArrayLike) -> float:
     """The shutter angle in degrees: 360 for a window that is open throughout, however bright its brightest bar is."""
     bars = np.asarray(bars, dtype=np.float64)
     return 360.0 * exposure(bars) / (len(bars) * max(bars.max(), 1e-30))

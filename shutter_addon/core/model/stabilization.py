@@ -44,7 +44,13 @@ class Measured(NamedTuple):
     log_scale: float
 
     def between(self, other: Measured, share: float) -> Measured:
-        return Measured(*((1 - share) * mine + share * its for mine, its in zip(self, other, strict=True)))
+        rest = 1 - share
+        return Measured(
+            shift=rest * self.shift + share * other.shift,
+            pivot=rest * self.pivot + share * other.pivot,
+            angle=rest * self.angle + share * other.angle,
+            log_scale=rest * self.log_scale + share * other.log_scale,
+        )
 
 
 class Base(NamedTuple):
@@ -80,9 +86,10 @@ class Stabilization:
             return None
         lower = max((f for f in self.frames if f <= frame), default=self.frames[0])
         upper = min((f for f in self.frames if f >= frame), default=self.frames[-1])
-        if lower == upper:
-            return self._averaged(lower)
-        return self._averaged(lower).between(self._averaged(upper), (frame - lower) / (upper - lower))
+        before, after = self._averaged(lower), self._averaged(upper)
+        if lower == upper or before is None or after is None:
+            return before or after
+        return before.between(after, (frame - lower) / (upper - lower))
 
     def _averaged(self, frame: int) -> Measured | None:
         """None: no track that is known so far has a marker there."""
@@ -108,9 +115,9 @@ class Stabilization:
 
 def _mean(tracks: list[Track], frame: int) -> complex | None:
     """The weighted mean of the markers at a frame."""
-    found = [(track.weight(frame), track.markers[frame]) for track in tracks if frame in track.markers]
-    total = sum(weight for weight, _ in found)
-    return sum(weight * place for weight, place in found) / total if total > _LEAST_WEIGHT else None
+    seen = [(track.weight(frame), track.markers[frame]) for track in tracks if frame in track.markers]
+    total = sum(weight for weight, _ in seen)
+    return sum(weight * place for weight, place in seen) / total if total > _LEAST_WEIGHT else None
 
 
 class Settings(NamedTuple):

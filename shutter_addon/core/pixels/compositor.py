@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..frames import light
 from ..model import shutters
@@ -30,7 +33,7 @@ def reach(state: FrameState, index: int, direction: int = 1) -> tuple[int, int]:
 
 
 def origin(options: Options, index: int, direction: int = 1) -> int:
-    """The position of the window's first frame; arguments as of `window_positions`."""
+    """The position of the window's first frame; arguments like those of `window_positions`."""
     return (index if direction > 0 else index + options.step - 1) - direction * options.before
 
 
@@ -56,12 +59,18 @@ def window_indices(options: Options, index: int, shot: range, direction: int = 1
     return source_frames(options, window_positions(options, index, direction), shot)
 
 
-def mixed_shutter(state: FrameState, coefficients) -> np.ndarray:
+def mixed_shutter(state: FrameState, coefficients: ArrayLike) -> np.ndarray:
     """The bars (…, L) of the shutter that pixels with coefficients (…, N) are exposed with, Σ coefficients = 1."""
     return shutters.INTERPOLATIONS[state.options.interpolation](state.bars, coefficients)
 
 
-def compose(state: FrameState, frames, present, coefficients, moves=None) -> np.ndarray:
+def compose(
+    state: FrameState,
+    frames: Sequence[np.ndarray],
+    present: ArrayLike,
+    coefficients: ArrayLike,
+    moves: tuple[np.ndarray, np.ndarray] | None = None,
+) -> np.ndarray:
     """The picture (H, W, 4) float64, scene-linear and premultiplied: F = e(q) · ∫ V(t + ⌊Q⁻¹(z)⌋) dz (§3.1, §3.4.1).
 
     frames: L pictures (H, W, 4), scene-linear, premultiplied; present: (L,) bool, False for frames left out, whose
@@ -75,7 +84,7 @@ def compose(state: FrameState, frames, present, coefficients, moves=None) -> np.
     frames = [_encode(frame) if encoded else frame for frame in frames]
     opaque = all((frame[..., 3] == 1).all() for frame in frames)
     y, x = np.indices(coefficients.shape[1:])
-    total, own = 0.0, x + 1j * y
+    total, own = np.zeros((*x.shape, 4)), x + 1j * y
     for weights, turns, shifts in _exposed(state, coefficients, np.asarray(present), moves):
         for k, frame in enumerate(frames):
             shown = frame if moves is None else seen(frame, turns[k] * own + shifts[k], sharp=opaque)
@@ -86,7 +95,9 @@ def compose(state: FrameState, frames, present, coefficients, moves=None) -> np.
     )
 
 
-def _exposed(state: FrameState, coefficients: np.ndarray, present: np.ndarray, moves) -> list[tuple]:
+def _exposed(
+    state: FrameState, coefficients: np.ndarray, present: np.ndarray, moves: tuple[np.ndarray, np.ndarray] | None
+) -> list[tuple]:
     """What is summed: weights (H, W, L) of the frames, and the turns and shifts (L, H, W), or None, by which each is
     seen there."""
     normalised = state.bars / state.bars.sum(axis=1, keepdims=True)
@@ -111,7 +122,7 @@ def seen(frame: np.ndarray, places: np.ndarray, *, sharp: bool) -> np.ndarray:
     x, y = np.clip(places.real, -2, width + 1), np.clip(places.imag, -2, height + 1)
     column, row = np.floor(x).astype(int), np.floor(y).astype(int)
 
-    def pixel(i, j):
+    def pixel(i: int, j: int) -> np.ndarray:
         return frame[np.clip(row + j, 0, height - 1), np.clip(column + i, 0, width - 1)]
 
     across, down = _weights(x - column, sharp), _weights(y - row, sharp)

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..frames.frame_source import FrameSource
 from ..model import motions
-from ..model.effect import Camera, Effect, Shutter
+from ..model.effect import Camera, Effect, Shutter, Subject
 from ..model.frame_state import Following, FrameState, Options
 from ..model.motions import Placement, Similarity
 from . import compositor, trails
@@ -43,21 +43,23 @@ class _Followed:
     """What a shutter follows of a region or the camera, asked as these are: its location alone, perhaps, and averaged
     over time. It depends on keys around a frame, and on no other picture."""
 
-    def __init__(self, shutter: Shutter):
-        self._subject, self._motion, self._smooth = shutter.follow, shutter.motion, shutter.smooth
-        self._weights, self._own, self._found = smoothing(shutter.smooth), {}, {}
+    def __init__(self, shutter: Shutter, subject: Subject):
+        self._subject, self._motion, self._smooth = subject, shutter.motion, shutter.smooth
+        self._weights = smoothing(shutter.smooth)
+        self._own: dict[float, tuple[Placement, np.ndarray | None]] = {}
+        self._averaged: dict[float, tuple[Placement, np.ndarray | None]] = {}
 
     def at(self, frame: float) -> tuple[Placement, np.ndarray | None]:
         """The placement and the centre (2,), None: nothing is drawn."""
         if not self._smooth:
             return self._at(frame)
-        if frame not in self._found:
+        if frame not in self._averaged:
             around = [self._at(frame + k) for k in range(-self._smooth, self._smooth + 1)]
             placements, centres = zip(*around, strict=True)
             is_drawn = all(centre is not None for centre in centres)
             centre = self._weights @ np.array(centres) if is_drawn else None
-            self._found[frame] = motions.averaged(placements, self._weights), centre
-        return self._found[frame]
+            self._averaged[frame] = motions.averaged(placements, self._weights), centre
+        return self._averaged[frame]
 
     def _at(self, frame: float) -> tuple[Placement, np.ndarray | None]:
         if frame not in self._own:
@@ -94,21 +96,21 @@ def followed(
     for way, shutter in dict(zip(ways, effect.shutters, strict=True)).items():
         if shutter.follow is None:
             continue
-        subject = _Followed(shutter)
-        found = [_motion(subject, frame, time, (source.width, source.height)) for time in times]
+        subject = _Followed(shutter, shutter.follow)
+        moves = [_motion(subject, frame, time, (source.width, source.height)) for time in times]
         followers = [other == way for other in ways]
-        turns[:, followers] = np.array([motion.turn for motion in found])[:, None]
-        shifts[:, followers] = np.array([motion.shift for motion in found])[:, None]
+        turns[:, followers] = np.array([motion.turn for motion in moves])[:, None]
+        shifts[:, followers] = np.array([motion.shift for motion in moves])[:, None]
     following = Following(frames.start, turns, shifts)
     bars, open_for = _with_trails(effect, state, following, at, source)
     return replace(state, bars=bars, following=following.of(slice(None)), open_for=open_for)
 
 
 def _with_trails(
-    effect: Effect, state: FrameState, following: Following, at: Shown, source
+    effect: Effect, state: FrameState, following: Following, at: Shown, source: FrameSource
 ) -> tuple[np.ndarray, dict[int, float]]:
     """The state's bars (N, L), those of shutters whose trail has a length open for it, and FrameState.open_for;
-    arguments as of `followed`."""
+    arguments like those of `followed`."""
     bars, open_for, size = state.bars.copy(), {}, (source.width, source.height)
     frame, index, direction = at
     positions = compositor.window_positions(state.options, index, direction)
@@ -149,22 +151,22 @@ def _times(shown: Callable[[float], int], frame: float, index: int, wanted: rang
                 apart = distance - 1 + (source - before) / (after - before)
                 if source not in times or apart < abs(times[source] - frame):
                     times[source] = frame + way * apart
-    found = np.array(sorted(times))
-    nearest = found[np.abs(found - np.arange(wanted.start, wanted.stop)[:, None]).argmin(axis=1)]
+    known = np.array(sorted(times))
+    nearest = known[np.abs(known - np.arange(wanted.start, wanted.stop)[:, None]).argmin(axis=1)]
     return [times[source] for source in nearest.tolist()]
 
 
-def _motion(subject: _Followed, frame: float, time: float, size) -> Similarity:
+def _motion(subject: _Followed, frame: float, time: float, size: tuple[int, int]) -> Similarity:
     """The motion of the picture from a timeline frame to a time that may lie between two; none where nothing is drawn
     that could be followed."""
     whole = frame + math.floor(time - frame)
     share = time - whole
-    frames = [frame, whole, whole + 1 if share else whole]
-    (start, *placements), (before, *centres) = zip(*map(subject.at, frames), strict=True)
-    if before is None or any(centre is None for centre in centres) or abs(start.scale) < _SMALLEST:
+    start, centre = subject.at(frame)
+    (first, first_centre), (second, second_centre) = subject.at(whole), subject.at(whole + 1 if share else whole)
+    if centre is None or first_centre is None or second_centre is None or abs(start.scale) < _SMALLEST:
         return Similarity()
-    placement = motions.between(*placements, share)
-    after = (1 - share) * centres[0] + share * centres[1]
-    if start == placement and np.array_equal(before, after):
+    placement = motions.between(first, second, share)
+    moved = (1 - share) * first_centre + share * second_centre
+    if start == placement and np.array_equal(centre, moved):
         return Similarity()  # to the bit
-    return motions.motion_between(start, placement, before, after, size)
+    return motions.motion_between(start, placement, centre, moved, size)

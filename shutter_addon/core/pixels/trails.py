@@ -53,7 +53,7 @@ def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) 
     before = (about - first) / (last - first)
     boundaries = np.arange(len(way), dtype=np.float64)
 
-    def starts(widths):
+    def starts(widths: np.ndarray | float) -> np.ndarray:
         return np.clip(about - before * widths, 0, len(bars) - widths)
 
     # The way within a span is piecewise linear in its width, and bends where an end passes a boundary.
@@ -63,7 +63,7 @@ def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) 
     moved = np.interp(starts(widths) + widths, boundaries, way) - np.interp(starts(widths), boundaries, way)
     moved = np.maximum.accumulate(moved)  # by rounding alone would it fall
     # Backward, for of widths that add no motion the least counts: a trail of no length is a still frame.
-    width = np.interp(-length, -moved[::-1], widths[::-1]) if length <= moved[-1] else len(bars)
-    width = max(float(width), _SHORTEST)
+    width = float(np.interp(-length, -moved[::-1], widths[::-1]) if length <= moved[-1] else len(bars))
+    width = max(width, _SHORTEST)
     start = float(starts(width))
     return shutters.spanning(bars, start, start + width), width

@@ -8,24 +8,34 @@ whole frame, recipe and effect agree within TOLERANCE.
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from decimal import Decimal
 from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from ..model import keyframes, limits
 from ..model.effect import Camera, Effect, MatteRegion, Region, Shutter
-from ..model.keyframes import Channel, Samples
+from ..model.frame_state import Interpolation
+from ..model.keyframes import Channel, Ease, Samples
 from . import recipe, recipe_file
 
 # Of the largest bar, of fractions of the picture, of degrees; of the larger key's value where that is above 1.
 TOLERANCE = 1e-4
 
+# Frames of keys, each with the ease of the span that it begins.
+_Eased = Sequence[tuple[float, Ease]]
 
-def baked(effect: Effect, shown: range, inbetween_method: str, mattes=()) -> recipe.Recipe:
+
+def baked(
+    effect: Effect,
+    shown: range,
+    inbetween_method: recipe.Method,
+    mattes: Iterable[recipe.MatteRegion | recipe.RampRegion] = (),
+) -> recipe.Recipe:
     """The recipe of an effect that is shown at these frames, of which the first is the recipe's frame 1. Its channels
     are sampled there, at their keys and at its drawings. EffectError: it cannot be rendered as it stands.
 
@@ -46,8 +56,8 @@ def baked(effect: Effect, shown: range, inbetween_method: str, mattes=()) -> rec
     # A region without strokes says nothing of how anything moves.
     known = {region.name for region in regions if region} | {recipe.CAMERA}
     follows = [name if name in known else None for name in _follows(effect, called)]
-    found = recipe.Recipe(
-        1,
+    sampled = recipe.Recipe(
+        version=1,
         shutters=[
             _following(effect.shutters[i], _shutter(effect, i, name, options.interpolation, shown), follows[i], shown)
             for i, name in enumerate(names)
@@ -61,7 +71,7 @@ def baked(effect: Effect, shown: range, inbetween_method: str, mattes=()) -> rec
         camera_influence=_number(effect.camera.influence, shown),
         **{name: value for name, value in asdict(options).items() if name not in ("step", "edge_aware")},
     )
-    return recipe_file.parse(recipe_file.dump(found))
+    return recipe_file.parse(recipe_file.dump(sampled))
 
 
 def _different(names: list[str]) -> list[str]:
@@ -96,41 +106,41 @@ def _region_names(effect: Effect) -> list[str]:
 def _follows(effect: Effect, names: list[str]) -> list[str | None]:
     """What each shutter follows, in a recipe's words."""
     words = {id(region): name for region, name in zip(effect.regions, names, strict=True)}
-    words |= {id(effect.camera): recipe.CAMERA, id(None): None}
-    return [words[id(shutter.follow)] for shutter in effect.shutters]
+    words[id(effect.camera)] = recipe.CAMERA
+    return [words.get(id(shutter.follow)) for shutter in effect.shutters]
 
 
-def _following(shutter: Shutter, found: recipe.Shutter, follow: str | None, shown: range) -> recipe.Shutter:
+def _following(shutter: Shutter, said: recipe.Shutter, follow: str | None, shown: range) -> recipe.Shutter:
     """A recipe's shutter with what it follows, and how far."""
-    trail = _number(shutter.trail, shown) if follow and shutter.trail else None
     if not follow:
-        return found
-    return replace(found, follow=follow, trail=trail, follow_motion=shutter.motion, follow_smooth=shutter.smooth)
+        return said
+    trail = _number(shutter.trail, shown) if shutter.trail else None
+    return replace(said, follow=follow, trail=trail, follow_motion=shutter.motion, follow_smooth=shutter.smooth)
 
 
-def _shutter(effect: Effect, index: int, name: str, interpolation: str, shown: range) -> recipe.Shutter:
-    shutter = effect.shutters[index]
-    color, sampled = tuple(_short(component) for component in shutter.color), shutter.bars
+def _shutter(effect: Effect, index: int, name: str, interpolation: Interpolation, shown: range) -> recipe.Shutter:
+    red, green, blue = (_short(component) for component in effect.shutters[index].color)
+    sampled = effect.shutters[index].bars
 
     @cache
-    def bars(frame):
+    def bars(frame: float) -> np.ndarray:
         return effect.checked(index, frame, sampled.at(frame, interpolation))
 
     if not isinstance(sampled.channel, Samples):
-        return recipe.Shutter(name, color, [_short(v) for v in bars(shown.start)])
+        return recipe.Shutter(name=name, color=(red, green, blue), bars=[_short(v) for v in bars(shown.start)])
 
-    def fits(first, second, frame, share):
+    def fits(first: float, second: float, frame: float, share: float) -> bool:
         ends = np.array([bars(first), bars(second)])
-        if interpolation == "value":  # every bar has an ease of its own
-            apart = np.abs(bars(frame) - keyframes.between_bars(*ends, share, "value")).max()
+        if interpolation == "value" or sampled.share is None:  # every bar has an ease of its own
+            apart = np.abs(bars(frame) - keyframes.between_bars(ends[0], ends[1], share, "value")).max()
         else:
             apart = abs(sampled.share.at(frame) - share) * np.ptp(ends, axis=0).max()
-        return apart <= TOLERANCE * ends.max()
+        return bool(apart <= TOLERANCE * ends.max())
 
     keys = _keys(fits, lambda *_: True, sampled.keys, [frame for frame, _ in sampled.keys], {}, shown)
     return recipe.Shutter(
-        name,
-        color,
+        name=name,
+        color=(red, green, blue),
         keys=[recipe.ShutterKey(_frame(frame, shown), [_short(v) for v in bars(frame)], ease) for frame, ease in keys],
     )
 
@@ -148,12 +158,12 @@ def _time(time: Channel, shown: range) -> list[recipe.ValueKey]:
 def _value_keys(at: Callable[[float], float], channel: Channel, shown: range) -> list[recipe.ValueKey]:
     """The keys of a number; at: its values, channel: where it was sampled."""
 
-    def fits(first, second, frame, share):
+    def fits(first: float, second: float, frame: float, share: float) -> bool:
         ends = np.array([at(first), at(second)])
         apart = abs((1 - share) * ends[0] + share * ends[1] - at(frame))
         return bool(apart <= max(TOLERANCE, 2e-6 * np.abs(ends).max()))  # of large numbers: float32 has no more digits
 
-    keys = [(shown.start, "linear")]
+    keys: _Eased = [(shown.start, "linear")]
     if isinstance(channel, Samples):
         frames = [frame for frame, _ in channel.keys]
         keys = _keys(fits, lambda frame, held: fits(held, held, frame, 0), channel.keys, frames, {}, shown)
@@ -168,59 +178,65 @@ def _region(region: Region, name: str, shutter: str, shown: range) -> recipe.Reg
     words = dict(zip(region.drawings.frames, region.drawings.eases, strict=True)) if len(drawings) > 1 else {}
     words = {number: words[number] for number in drawings if words}
     keys = _move_keys(region, words, shown)
-    first = min(drawings)
     redrawn = {number: strokes for number, strokes in drawings.items() if words and number != keys[0][0]}
     return recipe.Region(
-        shutter,
-        name,
-        region.kind.at(shown.start),
-        _short(region.width.at(shown.start)),
-        drawings[first],
-        [
-            recipe.RegionKey(_frame(frame, shown), *_place_words(region, frame), redrawn.get(frame), ease)
+        shutter=shutter,
+        name=name,
+        kind=region.kind.at(shown.start),
+        width=_short(region.width.at(shown.start)),
+        strokes=drawings[min(drawings)],
+        keys=[
+            recipe.RegionKey(strokes=redrawn.get(frame), ease=ease, **_placed(region, frame, shown))
             for frame, ease in keys
         ],
-        _number(region.opacity, shown),
+        opacity=_number(region.opacity, shown),
     )
 
 
 def _matte(
     region: MatteRegion, words: recipe.MatteRegion | recipe.RampRegion, name: str, shutter: str, shown: range
 ) -> recipe.MatteRegion | recipe.RampRegion:
-    numbers = {"opacity": _number(region.opacity, shown), "width": _number(region.feather, shown)}
-    own = {"invert": region.invert, "blend": region.blend, "keys": _camera(region, shown)}
-    return replace(words, name=name, shutter=shutter, **own, **numbers)
+    return replace(
+        words,
+        name=name,
+        shutter=shutter,
+        invert=region.invert,
+        blend=region.blend,
+        keys=_camera(region, shown),
+        opacity=_number(region.opacity, shown),
+        width=_number(region.feather, shown),
+    )
 
 
 def _camera(moving: Camera | MatteRegion, shown: range) -> list[recipe.CameraKey]:
     keys = _move_keys(moving, {}, shown)
-    return [recipe.CameraKey(_frame(frame, shown), *_place_words(moving, frame), ease) for frame, ease in keys]
+    return [recipe.CameraKey(ease=ease, **_placed(moving, frame, shown)) for frame, ease in keys]
 
 
-def _move_keys(moving: Region | MatteRegion | Camera, words: dict, shown: range) -> list[tuple[float, str]]:
-    """Frames and eases of the keys of location, rotation and scale; words: as of _keys."""
+def _move_keys(moving: Region | MatteRegion | Camera, words: Mapping[float, Ease], shown: range) -> _Eased:
+    """Frames and eases of the keys of location, rotation and scale; words: see _keys."""
     moves = [channel for channel in (moving.location, moving.rotation, moving.scale) if isinstance(channel, Samples)]
-    eases: dict[float, str] = {}
+    eases: dict[float, Ease] = {}
     for channel in moves:
         eases = dict(channel.keys) | eases
     frames = eases.keys() | words.keys()
 
     @cache
-    def place(frame):
+    def place(frame: float) -> np.ndarray:
         return _place(moving, frame)
 
     if not frames and tuple(place(shown.start)) != (0, 0, 0, 1):
         frames = {shown.start}
 
-    def fits(first, second, frame, share):
+    def fits(first: float, second: float, frame: float, share: float) -> bool:
         ends = np.array([place(first), place(second)])
         apart = np.abs((1 - share) * ends[0] + share * ends[1] - place(frame))
         return bool(np.all(apart <= TOLERANCE * np.maximum(1, np.abs(ends).max(axis=0))))
 
-    def still(frame, held):
+    def still(frame: float, held: float) -> bool:
         return fits(held, held, frame, 0)
 
-    return _keys(fits, still, eases, sorted(frames), words, shown) if frames or moves else []
+    return _keys(fits, still, eases.items(), sorted(frames), words, shown) if frames or moves else []
 
 
 def _place(moving: Region | MatteRegion | Camera, frame: float) -> np.ndarray:
@@ -228,23 +244,31 @@ def _place(moving: Region | MatteRegion | Camera, frame: float) -> np.ndarray:
     return np.array([x, y, rotation, scale])
 
 
-def _place_words(moving: Region | MatteRegion | Camera, frame: float) -> tuple:
-    """Location, rotation and scale at a frame, as a recipe has them."""
+def _placed(moving: Region | MatteRegion | Camera, frame: float, shown: range) -> dict[str, Any]:
+    """The frame, location, rotation and scale of a key, as a recipe has them."""
     x, y, rotation, scale = _place(moving, frame)
-    return (_short(x), _short(y)), _short_degrees(rotation), _short(scale)
+    location, degrees = (_short(x), _short(y)), _short_degrees(rotation)
+    return {"frame": _frame(frame, shown), "location": location, "rotation": degrees, "scale": _short(scale)}
 
 
-def _drawings(region: Region, frame: float) -> dict[int, list]:
+def _drawings(region: Region, frame: float) -> dict[float, list[recipe.Stroke]]:
     """A region's strokes by the frames they were drawn at, from the first that has any, as they lie at a frame."""
-    result = {}
+    result: dict[float, list[recipe.Stroke]] = {}
     for index, number in enumerate(region.drawings.frames):
         strokes = region.drawing(index, frame)
         if strokes or result:
-            result[number] = [[tuple(point) for point in np.round(points, 6).tolist()] for points in strokes]
+            result[number] = [[(x, y) for x, y in np.round(points, 6).tolist()] for points in strokes]
     return result
 
 
-def _keys(fits, still, keys, frames: list, words: dict, shown: range) -> list[tuple[float, str]]:
+def _keys(
+    fits: Callable[[float, float, float, float], bool],
+    still: Callable[[float, float], bool],
+    keys: Collection[tuple[float, Ease]],
+    frames: Sequence[float],
+    words: Mapping[float, Ease],
+    shown: range,
+) -> _Eased:
     """Frames and eases of the keys that give the effect at every whole frame of the strip.
 
     fits: whether at a frame a share is right between two keys; still: whether a frame shows what another does;
@@ -252,25 +276,26 @@ def _keys(fits, still, keys, frames: list, words: dict, shown: range) -> list[tu
     if not frames:
         return [(frame, "linear") for frame in shown]
 
-    def baked(outside, held):
+    def baked(outside: list[int], held: float) -> list[tuple[float, Ease]]:
         return [] if all(still(frame, held) for frame in outside) else [(frame, "linear") for frame in outside]
 
     eases = dict(keys)
-    keys = baked([frame for frame in shown if frame < frames[0]], frames[0])
+    kept = baked([frame for frame in shown if frame < frames[0]], frames[0])
     for first, second in pairwise(frames):
         # Keys may lie a million frames outside.
         between = range(max(math.floor(first) + 1, shown.start), min(math.ceil(second), shown.stop))
         shares = {frame: (frame - first) / (second - first) for frame in between}
-        candidates = [words[first]] if first in words else [eases.get(first, "linear"), *keyframes.EASES]
+        candidates = (words[first],) if first in words else (eases.get(first, "linear"), *keyframes.EASES)
         for word in candidates:
             if all(fits(first, second, frame, keyframes.eased(share, word)) for frame, share in shares.items()):
-                keys.append((first, word))
+                kept.append((first, word))
                 break
         else:
-            keys += [(first, candidates[0]), *((frame, "linear") for frame in shares)]
+            kept.append((first, candidates[0]))
+            kept += [(frame, "linear") for frame in shares]
     last = frames[-1]
-    keys.append((last, words.get(last) or eases.get(last, "linear")))
-    return keys + baked([frame for frame in shown if frame > last], last)
+    kept.append((last, words.get(last) or eases.get(last, "linear")))
+    return kept + baked([frame for frame in shown if frame > last], last)
 
 
 def _short(value: float) -> float:

@@ -17,11 +17,12 @@ import numpy as np
 from ..messages import UserError, sentence
 from ..model import effect, keyframes, mattes, motions, shutters
 from ..model.frame_state import Edges, Exposure, FrameState, Interpolation, Light, Options, Position
+from ..model.keyframes import Ease
 
 Point = tuple[float, float]
 Stroke = list[Point]
-Ease = Literal["linear", "bezier", "constant"]
 Factor = Literal[1, 2, 4, 8, 16]
+Method = Literal["quick", "good"]
 
 
 class RecipeError(UserError, ValueError):
@@ -72,11 +73,17 @@ class Shutter:
     follow_motion: motions.Motion = "scale"
     follow_smooth: int = 0
 
-    def over_time(self, follow: effect.Region | effect.Camera | None = None) -> effect.Shutter:
+    def over_time(self, follow: effect.Subject | None = None) -> effect.Shutter:
         """As plain data; follow: what is followed, in the same form."""
-        trail = None if self.trail is None else _numbers(self.trail)
-        how = self.follow_motion, self.follow_smooth
-        return effect.Shutter(self.name, self.color, self._bars_over_time(), follow, trail, *how)
+        return effect.Shutter(
+            name=self.name,
+            color=self.color,
+            bars=self._bars_over_time(),
+            follow=follow,
+            trail=None if self.trail is None else _numbers(self.trail),
+            motion=self.follow_motion,
+            smooth=self.follow_smooth,
+        )
 
     def _bars_over_time(self) -> keyframes.Bars:
         if not self.keys:
@@ -100,7 +107,7 @@ class RegionKey:
 
 @dataclass(frozen=True)
 class CameraKey:
-    """Where what the camera sees lies in the picture, as of a region whose centre is the picture's."""
+    """Where what the camera sees lies in the picture, like a region whose centre is the picture's."""
 
     frame: float
     location: Point = (0.0, 0.0)
@@ -109,12 +116,13 @@ class CameraKey:
     ease: Ease = "linear"
 
 
-def _moves(keys: list[RegionKey] | list[CameraKey]) -> list[keyframes.Channel]:
+def _moves(keys: list[RegionKey] | list[CameraKey]) -> dict[str, keyframes.Channel]:
     """Channels of location, rotation and scale."""
+    names = "location", "rotation", "scale"
     if not keys:
-        return [keyframes.Constant(value) for value in ((0.0, 0.0), 0.0, 1.0)]
-    frames, eases, *moves = _columns(keys, "frame", "ease", "location", "rotation", "scale")
-    return [keyframes.Keys(frames, values, eases) for values in moves]
+        return dict(zip(names, map(keyframes.Constant, ((0.0, 0.0), 0.0, 1.0)), strict=True))
+    frames, eases, *moves = _columns(keys, "frame", "ease", *names)
+    return {name: keyframes.Keys(frames, values, eases) for name, values in zip(names, moves, strict=True)}
 
 
 @dataclass(frozen=True)
@@ -132,6 +140,7 @@ class Region:
 
     def drawings(self) -> list[tuple[RegionKey | None, list[Stroke]]]:
         """The key that starts each drawing, and its strokes, in time."""
+        drawn: list[tuple[RegionKey | None, list[Stroke]]]
         drawn = [(key, key.strokes) for key in self.keys if key.strokes is not None]
         if not drawn or self.keys[0].strokes is None:
             drawn.insert(0, (self.keys[0] if self.keys else None, self.strokes))
@@ -141,13 +150,20 @@ class Region:
         """As plain data, for a picture of width / height = aspect; shutter: the index of its shutter."""
         drawn = self.drawings()
         drawings = effect.Drawings(
-            tuple(key.frame if key else 0.0 for key, _ in drawn),
-            tuple([np.asarray(stroke, float) for stroke in strokes] for _, strokes in drawn),
-            tuple(key.ease if key else "linear" for key, _ in drawn),
-            aspect,
+            frames=tuple(key.frame if key else 0.0 for key, _ in drawn),
+            strokes=tuple([np.asarray(stroke, float) for stroke in strokes] for _, strokes in drawn),
+            eases=tuple(key.ease if key else "linear" for key, _ in drawn),
+            aspect=aspect,
         )
-        fixed = self.name, shutter, keyframes.Constant(self.kind), keyframes.Constant(self.width), drawings
-        return effect.Region(*fixed, *_moves(self.keys), _numbers(self.opacity))
+        return effect.Region(
+            name=self.name,
+            shutter=shutter,
+            kind=keyframes.Constant(self.kind),
+            width=keyframes.Constant(self.width),
+            drawings=drawings,
+            opacity=_numbers(self.opacity),
+            **_moves(self.keys),
+        )
 
 
 @dataclass(frozen=True)
@@ -158,7 +174,7 @@ class MatteRegion:
     channel: one of CHANNELS, or the name of a channel of an EXR
     timing: whose frames show the matte's, frame by frame: those of the source, or of the timeline
     offset: the matte's frame, from 0, that belongs to the first of these
-    blend, opacity: as of core.model.mattes.Matte; width: its feather
+    blend, opacity: as core.model.mattes.Matte has them; width: its feather
     keys: how what it covers moves; the matte itself is not moved"""
 
     shutter: str
@@ -174,10 +190,10 @@ class MatteRegion:
     width: Keyable = 0.0
     keys: list[CameraKey] = field(default_factory=list)
 
-    def over_time(self, shutter: int, file: mattes.MatteFile | None) -> effect.MatteRegion:
+    def over_time(self, shutter: int, file: mattes.MatteFile) -> effect.MatteRegion:
         """As plain data; shutter: the index of its shutter, file: what is at its path."""
         first = None if self.timing == "source" else 1
-        return _matte(self, shutter, mattes.FileFrames(file, self.offset, first))
+        return _matte(self, shutter, mattes.FileFrames(file=file, offset=self.offset, first=first))
 
 
 @dataclass(frozen=True)
@@ -195,20 +211,36 @@ class RampRegion:
     width: Keyable = 0.0
     keys: list[CameraKey] = field(default_factory=list)
 
-    def over_time(self, shutter: int, file: mattes.MatteFile | None) -> effect.MatteRegion:
+    def over_time(self, shutter: int, file: mattes.MatteFile) -> effect.MatteRegion:
         """As plain data; shutter: the index of its shutter, file: the source's luminance."""
         if self.ramp == "luminance":
-            return _matte(self, shutter, mattes.FileFrames(file))
-        return _matte(self, shutter, effect.PlacedRamp(self.ramp, *_moves(self.keys)))
+            return _matte(self, shutter, mattes.FileFrames(file=file))
+        return _matte(self, shutter, effect.PlacedRamp(kind=self.ramp, **_moves(self.keys)))
 
 
 def _matte(region: MatteRegion | RampRegion, shutter: int, content: keyframes.Channel) -> effect.MatteRegion:
-    numbers = _numbers(region.opacity), _numbers(region.width), *_moves(region.keys)
-    return effect.MatteRegion(region.name, shutter, content, region.blend, region.invert, *numbers)
+    return effect.MatteRegion(
+        name=region.name,
+        shutter=shutter,
+        content=content,
+        blend=region.blend,
+        invert=region.invert,
+        opacity=_numbers(region.opacity),
+        feather=_numbers(region.width),
+        **_moves(region.keys),
+    )
 
 
 CHANNELS = ("luminance", "red", "green", "blue", "alpha")
 AnyRegion = Region | MatteRegion | RampRegion
+# What gives the file of a matte, or for a ramp the source's luminance.
+MatteFiles = Callable[[MatteRegion | RampRegion], mattes.MatteFile]
+
+
+def _no_file(_region: MatteRegion | RampRegion) -> mattes.MatteFile:
+    return mattes.NoFile()
+
+
 KINDS = {"line": Region, "lasso": Region, "matte": MatteRegion, "ramp": RampRegion}
 
 
@@ -230,7 +262,7 @@ class Recipe:
     stop_at_cuts: bool = True
     edge_aware: Keyable = 0.0
     inbetween: Factor = 1
-    inbetween_method: Literal["quick", "good"] = "quick"
+    inbetween_method: Method = "quick"
     time: list[ValueKey] = field(default_factory=list)
     camera: list[CameraKey] = field(default_factory=list)
     camera_influence: Keyable = 1.0
@@ -241,28 +273,27 @@ class Recipe:
         names = Options.__dataclass_fields__.keys() - {"step", "edge_aware"}
         return Options(**{name: getattr(self, name) for name in names}, step=self.inbetween)
 
-    def effect(
-        self, aspect: float, files: Callable[[MatteRegion | RampRegion], mattes.MatteFile] | None = None
-    ) -> effect.Effect:
+    def effect(self, aspect: float, files: MatteFiles = _no_file) -> effect.Effect:
         """As plain data, for a picture of width / height = aspect. Frame 1 is the strip's first.
 
-        files: what gives the file of a matte, or for a ramp the source's luminance; without it, mattes are empty"""
+        files: without it, nobody may ask for values of mattes"""
         order = {shutter.name: i for i, shutter in enumerate(self.shutters)}
         regions = tuple(
             region.over_time(order[region.shutter], aspect)
             if isinstance(region, Region)
-            else region.over_time(order[region.shutter], files and files(region))
+            else region.over_time(order[region.shutter], files(region))
             for region in self.regions
         )
-        camera = effect.Camera(*_moves(self.camera), _numbers(self.camera_influence))
-        followed = {region.name: region for region in regions} | {CAMERA: camera, None: None}
+        camera = effect.Camera(influence=_numbers(self.camera_influence), **_moves(self.camera))
+        followed: dict[str | None, effect.Subject | None] = {region.name: region for region in regions}
+        followed |= {CAMERA: camera, None: None}
         return effect.Effect(
-            tuple(shutter.over_time(followed[shutter.follow]) for shutter in self.shutters),
-            regions,
-            keyframes.Constant(self.options),
-            self._source_time(),
-            _numbers(self.edge_aware),
-            camera,
+            shutters=tuple(shutter.over_time(followed[shutter.follow]) for shutter in self.shutters),
+            regions=regions,
+            options=keyframes.Constant(self.options),
+            time=self._source_time(),
+            edge_aware=_numbers(self.edge_aware),
+            camera=camera,
         )
 
     def _source_time(self) -> keyframes.SourceTime | None:
@@ -271,8 +302,8 @@ class Recipe:
         keys = tuple((key.frame, key.ease) for key in self.time)
         return keyframes.SourceTime(_numbers(self.time), keys)
 
-    def at(self, frame: float, aspect: float, files=None) -> FrameState:
-        """The effect at a timeline frame (1 = the strip's first); aspect, files: as of `effect`."""
+    def at(self, frame: float, aspect: float, files: MatteFiles = _no_file) -> FrameState:
+        """The effect at a timeline frame (1 = the strip's first); aspect, files: as `effect` has them."""
         return self.effect(aspect, files).at(frame)
 
     def time_at(self, frame: float) -> float | None:
@@ -292,18 +323,20 @@ def _columns(keys: list, *names: str) -> list[tuple]:
     return [tuple(getattr(key, name) for key in keys) for name in names]
 
 
-def with_inbetween(source: Recipe, factor: int) -> Recipe:
+def with_inbetween(source: Recipe, factor: Factor) -> Recipe:
     """The same effect over another number of in-between frames: its bars stand for the same times.
 
     RecipeError: they would be too many."""
 
-    def changed(bars):
-        return bars and shutters.multiplied(bars, source.inbetween, factor, source.position).tolist()
+    def changed(bars: list[float]) -> list[float]:
+        return shutters.multiplied(bars, source.inbetween, factor, source.position).tolist()
 
     try:
-        found = [
-            replace(shutter, bars=changed(shutter.bars), keys=[replace(k, bars=changed(k.bars)) for k in shutter.keys])
-            for shutter in source.shutters
+        multiplied = [
+            replace(
+                each, bars=each.bars and changed(each.bars), keys=[replace(k, bars=changed(k.bars)) for k in each.keys]
+            )
+            for each in source.shutters
         ]
     except shutters.ShutterError:
         window = source.window * factor // source.inbetween
@@ -311,13 +344,13 @@ def with_inbetween(source: Recipe, factor: int) -> Recipe:
             f"window: {window} bars for {factor}× in-between frames, the most are {shutters.MAX_WINDOW}"
         ) from None
     window = -(-source.window * factor // source.inbetween)
-    return replace(source, window=window, shutters=found, inbetween=factor)
+    return replace(source, window=window, shutters=multiplied, inbetween=factor)
 
 
 def moved(source: Recipe, old: Path, new: Path) -> Recipe:
     """The same effect for a recipe in another folder: relative paths of mattes lead to the same files."""
 
-    def rebased(region):
+    def rebased(region: AnyRegion) -> AnyRegion:
         if not isinstance(region, MatteRegion) or Path(region.path).is_absolute():
             return region
         return replace(region, path=relative(old / region.path, new))
@@ -328,11 +361,8 @@ def moved(source: Recipe, old: Path, new: Path) -> Recipe:
 def relative(path: Path, folder: Path) -> str:
     """The path of a matte, as a recipe in a folder has it: relative, if there is such a one."""
     with suppress(ValueError):  # on another drive
-        found = os.path.relpath(path, folder)
+        way = os.path.relpath(path, folder)
         # ".." leads out of where a linked folder really lies
-        if os.path.realpath(os.path.join(folder, found)) == os.path.realpath(path):
-            return Path(found).as_posix()
+        if os.path.realpath(os.path.join(folder, way)) == os.path.realpath(path):
+            return Path(way).as_posix()
     return Path(os.path.abspath(path)).as_posix()
-
-
-# Reading: the converter checks the structure, _check what no type can say.

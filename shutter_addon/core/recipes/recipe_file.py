@@ -6,11 +6,12 @@ import json
 import math
 import re
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import is_dataclass
 from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal, get_args, get_origin
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
 from .. import atomic_write
 from ..model import limits, shutters
@@ -30,6 +31,9 @@ from .recipe import (
     Stroke,
     ValueKey,
 )
+
+if TYPE_CHECKING:
+    from cattrs import Converter
 
 # Longer numbers are read as floats, which need no time for it; a whole number that counts anything is far shorter.
 _MAX_DIGITS = 300
@@ -89,8 +93,8 @@ def dump(recipe: Recipe) -> str:
     return re.sub(r'"(?:[^"\\]|\\.)*"|\[[-+.\de,\s]+\]', _on_one_line, text) + "\n"
 
 
-def _on_one_line(found: re.Match) -> str:
-    text = found[0]
+def _on_one_line(match: re.Match) -> str:
+    text = match[0]
     return text if text[0] == '"' else " ".join(text.split()).replace("[ ", "[").replace(" ]", "]")
 
 
@@ -104,7 +108,7 @@ def save(recipe: Recipe, path: str | Path) -> None:
 _UNTOLD = {"opacity": 1.0, "follow_motion": "scale", "follow_smooth": 0, "camera_influence": 1.0}
 
 
-def _compact(value):
+def _compact(value: Any) -> Any:
     if isinstance(value, dict):
         keys = "keys", "time", "camera"
         told = {k: v for k, v in value.items() if v is not None and (k not in _UNTOLD or v != _UNTOLD[k])}
@@ -115,20 +119,23 @@ def _compact(value):
 class _Doubled(dict):
     """An object of JSON that has a field twice, its name in `field`: which one is meant, nobody knows."""
 
+    field: str
+
 
 def _object(pairs: list) -> dict:
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        found = _Doubled(found)
-        found.field = Counter(name for name, _ in pairs).most_common(1)[0][0]
-    return found
+    fields = dict(pairs)
+    if len(fields) == len(pairs):
+        return fields
+    doubled = _Doubled(fields)
+    doubled.field = Counter(name for name, _ in pairs).most_common(1)[0][0]
+    return doubled
 
 
 def _whole(digits: str) -> int | float:
     return int(digits) if len(digits) <= _MAX_DIGITS else float(digits)
 
 
-def _number(value, _kind) -> float:
+def _number(value: Any, _kind: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"{_shown(value)} is not a number")
     if not math.isfinite(value):
@@ -136,7 +143,7 @@ def _number(value, _kind) -> float:
     return float(value)
 
 
-def _keyable(converter, value, kind):
+def _keyable(converter: Converter, value: Any, kind: Any) -> float | list[ValueKey] | None:
     if value is None and kind != Keyable:
         return None
     if isinstance(value, list):
@@ -147,8 +154,8 @@ def _keyable(converter, value, kind):
         raise ValueError(f"{error}, nor a list of keys") from None
 
 
-def _exactly(wanted: type, name: str):
-    def structure(value, _kind):
+def _exactly(wanted: type, name: str) -> Callable[[Any, Any], Any]:
+    def structure(value: Any, _kind: Any) -> Any:
         if type(value) is not wanted:
             raise ValueError(f"{_shown(value)} is not {name}")
         return value
@@ -156,17 +163,17 @@ def _exactly(wanted: type, name: str):
     return structure
 
 
-def _choice(value, kind):
+def _choice(value: Any, kind: Any) -> Any:
     allowed = get_args(kind)
     if not any(type(value) is type(option) and value == option for option in allowed):
         raise ValueError(f"{_shown(value)} is none of {', '.join(map(str, allowed))}")
     return value
 
 
-def _tuple(kind, converter):
+def _tuple(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
     inner = get_args(kind)
 
-    def structure(value, _kind):
+    def structure(value: Any, _kind: Any) -> Any:
         if not isinstance(value, list):
             raise ValueError(f"{_shown(value)} is not a list")
         if len(value) != len(inner):
@@ -176,16 +183,16 @@ def _tuple(kind, converter):
     return structure
 
 
-def _list(kind, converter):
+def _list(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
     (inner,) = get_args(kind)
     structure_item = converter.get_structure_hook(inner)
 
-    def structure(value, _kind):
+    def structure(value: Any, _kind: Any) -> Any:
         if not isinstance(value, list):
             raise ValueError(f"{_shown(value)} is not a list")
         return [item(value, index) for index in range(len(value))]
 
-    def item(value, index):
+    def item(value: list, index: int) -> Any:
         try:
             return structure_item(value[index], inner)
         except Exception as error:  # the first one is enough; cattrs' own lists gather millions
@@ -197,12 +204,12 @@ def _list(kind, converter):
     return structure
 
 
-def _dataclass(kind, converter):
+def _dataclass(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
     from cattrs.gen import make_dict_structure_fn
 
     structure_fields = make_dict_structure_fn(kind, converter, _cattrs_forbid_extra_keys=True)
 
-    def structure(value, kind):
+    def structure(value: Any, kind: Any) -> Any:
         if not isinstance(value, dict):
             raise ValueError(f"{_shown(value)} is not an object")
         if isinstance(value, _Doubled):
@@ -212,7 +219,7 @@ def _dataclass(kind, converter):
     return structure
 
 
-def _region(converter, value, _kind):
+def _region(converter: Converter, value: Any, _kind: Any) -> AnyRegion:
     """Which of the kinds of regions it is, its field `kind` says."""
     word = value.get("kind", "line") if isinstance(value, dict) else "line"
     if isinstance(word, str) and word in KINDS:
@@ -224,8 +231,12 @@ def _region(converter, value, _kind):
     raise ClassValidationError("in a region", [error], Region)
 
 
+def _made_of(origin: Any) -> Callable[[Any], bool]:
+    return lambda kind: get_origin(kind) is origin
+
+
 @cache
-def _converter():
+def _converter() -> Converter:
     """RecipeError: cattrs is missing. Blender brings it; a Linux distribution's Blender may not, and effects render
     without it."""
     try:
@@ -239,16 +250,16 @@ def _converter():
     converter.register_structure_hook(int, _exactly(int, "a whole number"))
     converter.register_structure_hook(str, _exactly(str, "a text"))
     converter.register_structure_hook(bool, _exactly(bool, "true or false"))
-    converter.register_structure_hook_func(lambda kind: get_origin(kind) is Literal, _choice)
+    converter.register_structure_hook_func(_made_of(Literal), _choice)
     converter.register_structure_hook_func(lambda kind: kind in (Keyable, Keyable | None), partial(_keyable, converter))
     converter.register_structure_hook_func(lambda kind: kind == AnyRegion, partial(_region, converter))
-    converter.register_structure_hook_factory(lambda kind: get_origin(kind) is tuple, _tuple)
-    converter.register_structure_hook_factory(lambda kind: get_origin(kind) is list, _list)
+    converter.register_structure_hook_factory(_made_of(tuple), _tuple)
+    converter.register_structure_hook_factory(_made_of(list), _list)
     converter.register_structure_hook_factory(is_dataclass, _dataclass)
     return converter
 
 
-def _shown(value) -> str:
+def _shown(value: Any) -> str:
     """A value as JSON, or its first 40 characters; of large ones the rest is not looked at."""
     text = ""
     for part in json.JSONEncoder(ensure_ascii=False).iterencode(value):
@@ -271,7 +282,7 @@ def _first_fault(error: Exception) -> str:
     import cattrs
     from cattrs.errors import ForbiddenExtraKeysError
 
-    def described(error, kind):
+    def described(error: BaseException, kind: Any) -> str:
         if isinstance(error, KeyError):
             return "missing"
         if isinstance(error, ForbiddenExtraKeysError):
@@ -284,7 +295,7 @@ def _first_fault(error: Exception) -> str:
     return f"{place.lstrip('.') or 'recipe'}: {message}"
 
 
-def _require(condition, place: str, message: str) -> None:
+def _require(condition: object, place: str, message: str) -> None:
     if not condition:
         raise RecipeError(f"{place}: {message}")
 
@@ -321,8 +332,10 @@ def _check(recipe: Recipe) -> None:
     for i, region in enumerate(recipe.regions):
         there_is_none = f"there is no shutter {_shown(region.shutter)}"
         _require(region.shutter in places, f"regions[{i}].shutter", there_is_none)
-        check = _check_region if isinstance(region, Region) else _check_matte
-        check(region, f"regions[{i}]")
+        if isinstance(region, Region):
+            _check_region(region, f"regions[{i}]")
+        else:
+            _check_matte(region, f"regions[{i}]")
     points = sum(_most_points(region) for region in recipe.regions if isinstance(region, Region))
     _require(points <= limits.MAX_POINTS, "regions", f"{points} points at once, the most are {limits.MAX_POINTS}")
 

@@ -20,7 +20,12 @@ CORNERS = motions.offsets([motions.PICTURE])
 
 
 def with_placements(
-    region: Region, placements: Mapping[int, Placement], exact: Collection[int], size, *, thin: bool = True
+    region: Region,
+    placements: Mapping[int, Placement],
+    exact: Collection[int],
+    size: tuple[int, int],
+    *,
+    thin: bool = True,
 ) -> Region:
     """The region with these placements as its keys, in place of those that it has from the first of these frames to the
     last. At whole frames beyond these it stays where its keys put it, and its drawings stay where and as they are.
@@ -32,7 +37,8 @@ def with_placements(
     chosen = sorted(placements)
     if thin:
         # behind a drawing with an ease of its own the motion is to go straight
-        kept = {*exact, *drawn, *(frame + 1 for frame, ease in eases.items() if ease != "linear")}
+        straight = {frame + 1 for frame, ease in eases.items() if ease != "linear"}
+        kept = {*exact, *(frame for frame in drawn if frame is not None), *straight}
         shape = np.concatenate([motions.offsets(strokes) for strokes in drawn.values()])
         chosen = motions.thinned(placements, shape, size, kept)
     keys = _keys(RegionKey, region.keys, region.over_time(0, size[0] / size[1]), placements, exact, chosen)
@@ -41,10 +47,15 @@ def with_placements(
 
 
 def with_camera(
-    source: Recipe, placements: Mapping[int, Placement], exact: Collection[int], size, *, thin: bool = True
+    source: Recipe,
+    placements: Mapping[int, Placement],
+    exact: Collection[int],
+    size: tuple[int, int],
+    *,
+    thin: bool = True,
 ) -> Recipe:
-    """The recipe whose camera has these placements as its keys; arguments as of with_placements. Thinned keys are
-    within a quarter of a pixel of the placements, everywhere in the picture."""
+    """The recipe whose camera has these placements as its keys; arguments like those of with_placements. Thinned keys
+    are within a quarter of a pixel of the placements, everywhere in the picture."""
     chosen = motions.thinned(placements, CORNERS, size, exact, STEADY) if thin else sorted(placements)
     camera = source.effect(size[0] / size[1]).camera
     return replace(source, camera=_keys(CameraKey, source.camera, camera, placements, exact, chosen))
@@ -61,9 +72,12 @@ def _keys(
     """Keys with the chosen placements, in place of those from the first placement to the last; moving: what moves by
     `keys`, and still does so at whole frames beyond."""
     first, last = min(placements), max(placements)
-    found = {frame: moving.placement(frame) for frame in _cut(keys, first - 1, -1) + _cut(keys, last + 1, 1)}
-    found |= {frame: placements[frame] if frame in exact else _rounded(placements[frame]) for frame in chosen}
-    made = [kind(frame, there.location, there.rotation, there.scale) for frame, there in found.items()]
+    keyed = {frame: moving.placement(frame) for frame in _cut(keys, first - 1, -1) + _cut(keys, last + 1, 1)}
+    keyed |= {frame: placements[frame] if frame in exact else _rounded(placements[frame]) for frame in chosen}
+    made = [
+        kind(frame=frame, location=there.location, rotation=there.rotation, scale=there.scale)
+        for frame, there in keyed.items()
+    ]
     kept = [key for key in keys if not first <= key.frame <= last]
     return sorted(kept + made, key=lambda key: key.frame)
 
