@@ -13,12 +13,12 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.model import scribbles
-from ..core.model.effect import Camera, Region
-from ..core.model.motions import Placement, Similarity
+from ..core.model.motions import Motion, Placement, Similarity
 from . import pursuit, registration, tracking
 from .footage import Footage
-from .registration import Motion, Part
-from .tracking import Tracked, TrackingError
+from .pursuit import Sighting
+from .registration import Part
+from .tracking import Drawn, Subject, Tracked, TrackingError
 
 BARE = "what the regions leave of the picture has too few corners to follow"
 UNLIKE = "the picture is too unlike those before"
@@ -30,8 +30,8 @@ _MARGIN = 0.02  # heights of the picture about a region, where corners may be th
 
 
 def follow_camera(
-    camera: Camera,
-    regions: Sequence[Region],
+    camera: Subject,
+    regions: Sequence[Drawn],
     footage: Footage,
     start: int,
     frames: range,
@@ -48,8 +48,10 @@ def follow_camera(
 
 
 class _CameraTrack(tracking.Track):
-    def __init__(self, camera: Camera, regions: Sequence[Region], *arguments):
-        super().__init__(camera, *arguments)
+    def __init__(
+        self, camera: Subject, regions: Sequence[Drawn], footage: Footage, motion: Motion, frames: Collection[int]
+    ):
+        super().__init__(camera, footage, motion, frames)
         self._regions = regions
         self._begun: dict[int, Placement] = {}  # where it has begun anew
 
@@ -60,12 +62,12 @@ class _CameraTrack(tracking.Track):
         """As `_from`; where that ends, it begins anew, in place of where it was last: behind a cut, for windows end
         there; and where two frames can be compared again. How it moved in between, nobody knows: there is a fault."""
         last, fault = Tracked(start, self._placement(start), 1.0), None
-        for found in self._from(start, frames):
-            if found.fault:
-                fault = found
+        for tracked in self._from(start, frames):
+            if tracked.fault:
+                fault = tracked
             else:
-                last = found
-                yield found
+                last = tracked
+                yield tracked
         if fault is None:
             return
         rest = frames[frames.index(fault.frame) :]
@@ -127,32 +129,32 @@ class _Pursuit:
         self._last = frame, Similarity()  # where it was found last
         self._speed = Similarity()
 
-    def next(self, frame: int) -> tuple[Similarity, float] | None:
-        """The motion from the first frame, and its confidence; None: it is not found."""
+    def next(self, frame: int) -> Sighting | None:
+        """Where it is in a frame; None: it is not found."""
         picture, (before, known) = self._footage.picture(frame), self._last
-        found = self._found(picture, self._anchor)
-        if found[1] < _ANEW and before != self._anchor[1] and (anchor := self._anchor_at(before, known)):
-            anew = self._found(picture, anchor)
-            if anew[1] > found[1]:
-                self._anchor, found = anchor, anew
-        if found[1] < _LEAST:
+        sighting = self._compared(picture, self._anchor)
+        if sighting.confidence < _ANEW and before != self._anchor[1] and (anchor := self._anchor_at(before, known)):
+            anew = self._compared(picture, anchor)
+            if anew.confidence > sighting.confidence:
+                self._anchor, sighting = anchor, anew
+        if sighting.confidence < _LEAST:
             self._speed = Similarity()
             return None
-        self._speed = found[0].after(known.inverse()) if abs(frame - before) == 1 else Similarity()
-        self._last = frame, found[0]
-        return found
+        self._speed = sighting.motion.after(known.inverse()) if abs(frame - before) == 1 else Similarity()
+        self._last = frame, sighting.motion
+        return sighting
 
-    def _found(self, picture: np.ndarray, anchor: tuple[Part, int, Similarity]) -> tuple[Similarity, float]:
+    def _compared(self, picture: np.ndarray, anchor: tuple[Part, int, Similarity]) -> Sighting:
         """The surer one of two looks: where it would be if it went on, and where it was last."""
         part, _, motion = anchor
-        known, found = self._last[1], []
+        known, sightings = self._last[1], []
         for guess in (self._speed.after(known), known):
             match = part.find(picture, guess.after(motion.inverse()), self._motion)
             sure = pursuit.confidence(match, picture)
-            found.append((match.motion.after(motion) if match else known, sure))
+            sightings.append(Sighting(match.motion.after(motion) if match else known, sure))
             if sure >= _ANEW:
                 break
-        return max(found, key=lambda each: each[1])
+        return max(sightings, key=lambda each: each.confidence)
 
     def _anchor_at(self, frame: int, motion: Similarity) -> tuple[Part, int, Similarity] | None:
         try:

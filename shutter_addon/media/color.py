@@ -1,5 +1,7 @@
 """A source in any colour space that Blender knows."""
 
+from pathlib import Path
+
 import numpy as np
 from OpenImageIO import FLOAT, ColorConfig, ImageBuf, ImageBufAlgo
 
@@ -11,10 +13,10 @@ SCENE_LINEAR = "Linear Rec.709"  # of Blender's own configuration
 TRANSFERS = {"sRGB": "srgb", SCENE_LINEAR: "linear", "Non-Color": "linear"}
 
 
-def in_colorspace(source: FrameSource, name: str, config) -> FrameSource:
+def in_colorspace(source: FrameSource, name: str, config: str | Path | None) -> FrameSource:
     """The source, its samples taken as those of a colour space: the one itself, or a ColorSource around it.
 
-    name: Blender's, as of a strip's colour space
+    name: Blender's, as a strip has it
     config: path of the OpenColorIO configuration that defines it; not needed for sRGB and scene linear
     MediaError: the configuration has no such colour space"""
     if name in TRANSFERS:
@@ -28,20 +30,21 @@ class ColorSource(SourceWrapper):
 
     transfer, dtype = "linear", np.dtype(np.float32)
 
-    def __init__(self, source: FrameSource, name: str, config):
+    def __init__(self, source: FrameSource, name: str, config: str | Path | None):
         if config is None or name not in ColorConfig(str(config)).getColorSpaceNames():
             raise MediaError(f"{source.path.name}: unknown colour space {name}")
         super().__init__(source)
         self._name, self._config = name, str(config)
         self.options = {**source.options, "colorspace": name}
 
-    def read(self, index):
+    def read(self, index: int) -> np.ndarray:
         """The source's frame, scene linear. MediaError as well where it cannot be converted."""
         samples = self._source.read(index)
         scale = np.iinfo(samples.dtype).max if samples.dtype.kind == "u" else 1
         picture = ImageBuf(samples.astype(np.float32) / np.float32(scale))
         associated = self._source.alpha == "premultiplied"
         linear = ImageBufAlgo.colorconvert(picture, self._name, SCENE_LINEAR, associated, colorconfig=self._config)
-        if linear.has_error:
+        converted = linear.get_pixels(FLOAT)
+        if linear.has_error or converted is None:
             raise MediaError(f"{self._source.path.name}: no conversion from {self._name} ({linear.geterror()})")
-        return linear.get_pixels(FLOAT)
+        return converted

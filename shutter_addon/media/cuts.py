@@ -1,15 +1,23 @@
 """Cuts within a source, found by PySceneDetect, and frames that repeat the one before: decisions about few neighbouring
 frames, made of a small picture of each; and a source that knows where its shots end."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
 from functools import cache, lru_cache
 from itertools import pairwise, product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..core.frames import light
+from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Planes, as_rgba
 from .errors import MediaError
 from .source import SourceWrapper
+
+if TYPE_CHECKING:
+    from scenedetect.scene_detector import SceneDetector
 
 # The frames on each side of two neighbours that have a say in whether there is a cut between them: in so many, a film
 # animated on threes shows as many pictures as PySceneDetect compares.
@@ -49,11 +57,10 @@ Signature = np.ndarray
 def signature(frame: np.ndarray | Planes, transfer: str, alpha: str = "opaque") -> Signature:
     """A small picture (18, 32, 3) float32 of a frame (H, W, 4) or of its planes, in encoded levels from 0 to 255; of
     one that is smaller, as small. transfer, alpha: the source's."""
-    planar = isinstance(frame, Planes)
-    height, width = (frame.luma if planar else frame).shape[:2]
+    height, width = (frame.luma if isinstance(frame, Planes) else frame).shape[:2]
     down, right = max(1, height // (5 * _ROWS)), max(1, width // (10 * _COLUMNS))
     chosen = slice(down // 2, None, down), slice(right // 2, None, right)
-    samples = frame.samples(*chosen) if planar else frame[chosen]
+    samples = frame.samples(*chosen) if isinstance(frame, Planes) else frame[chosen]
     whole = samples.dtype.kind == "u"
     most = np.float32(np.iinfo(samples.dtype).max if whole else 1)
     samples = np.moveaxis(samples, -1, 1)  # a row for each colour: NumPy sums those fastest
@@ -167,10 +174,10 @@ def _stands_out(before: list[Signature], after: list[Signature]) -> bool:
     return _finds(detector, [*before[::-1], *after], WINDOW + 1)
 
 
-def _finds(detector, pictures: list[Signature], index: int) -> bool:
+def _finds(detector: SceneDetector, pictures: list[Signature], index: int) -> bool:
     """Whether a fresh detector finds a cut before that picture, of all."""
     whole = (np.rint(picture[..., ::-1]).clip(0, 255).astype(np.uint8) for picture in pictures)  # OpenCV has BGR
-    return index in [found for i, picture in enumerate(whole) for found in detector.process_frame(i, picture)]
+    return index in [cut for i, picture in enumerate(whole) for cut in detector.process_frame(i, picture)]
 
 
 def _moving(pictures: list[Signature]) -> list[Signature]:
@@ -202,7 +209,7 @@ def neighbours(index: int, count: int) -> range:
     return range(max(index - NEIGHBOURS, 0), min(index + NEIGHBOURS, count))
 
 
-def sides(signatures: dict[int, Signature | None], index: int) -> tuple[list[Signature], list[Signature]]:
+def sides(signatures: Mapping[int, Signature | None], index: int) -> tuple[list[Signature], list[Signature]]:
     """Of the neighbours' signatures, those before frame `index` and those from it on, as is_cut and is_duplicate take
     them: on each side up to the first frame that has none."""
     return _run(signatures, index - 1, -1)[::-1], _run(signatures, index, 1)
@@ -222,7 +229,7 @@ class ShotSource(SourceWrapper):
     what is decided without a frame that cannot be read is decided again.
     """
 
-    def __init__(self, source, step: int = 1):
+    def __init__(self, source: FrameSource, step: int = 1):
         super().__init__(source)
         self.step = step
         self.filmed = (source.count - 1) // step + 1  # how many frames are
@@ -230,8 +237,8 @@ class ShotSource(SourceWrapper):
         self._signatures: dict[int, Signature] = {}  # likewise
         self._handed: dict[int, np.ndarray | Planes] = {}
 
-    @property
-    def shots(self) -> "ShotSource":  # an attribute would keep its frames until Python looks for cycles
+    @property  # an attribute would keep its frames until Python looks for cycles
+    def shots(self) -> ShotSource:  # type: ignore[override]  # nobody sets a source's shots
         return self
 
     def read(self, index: int) -> np.ndarray:
@@ -257,7 +264,7 @@ class ShotSource(SourceWrapper):
         self._handed = {i: frame for i, frame in self._handed.items() if low - beyond <= i <= high + beyond}
         return shot
 
-    def _shot(self, index, low, high, is_cut) -> range:
+    def _shot(self, index: int, low: int, high: int, is_cut: Callable[[int], bool | None]) -> range:
         first = 0
         for i in self._after(low, high):
             if is_cut(i):
@@ -303,10 +310,10 @@ class ShotSource(SourceWrapper):
     def _is_cut(self, index: int) -> bool:
         if index in self._cuts:
             return self._cuts[index]
-        found, certain = self._decide(index)
+        cut, certain = self._decide(index)
         if certain:
-            self._cuts[index] = found
-        return found
+            self._cuts[index] = cut
+        return cut
 
     def _decide(self, index: int) -> tuple[bool, bool]:
         """Whether there is a cut before that filmed frame, and whether all that has a say in it could be read."""
@@ -326,11 +333,11 @@ class ShotSource(SourceWrapper):
             frame = self.decoded(index * self.step)
         except MediaError:
             return None
-        found = self._signatures[index] = signature(frame, self.transfer, self.alpha)
+        made = self._signatures[index] = signature(frame, self.transfer, self.alpha)
         self._hand_over(index * self.step, frame)
         while len(self._signatures) > _KEPT:
             del self._signatures[next(iter(self._signatures))]
-        return found
+        return made
 
     def _hand_over(self, index: int, frame: np.ndarray | Planes) -> None:
         self._handed[index] = frame
@@ -338,10 +345,10 @@ class ShotSource(SourceWrapper):
             del self._handed[next(iter(self._handed))]
 
 
-def _run(signatures: dict, start: int, step: int) -> list[Signature]:
+def _run(signatures: Mapping[int, Signature | None], start: int, step: int) -> list[Signature]:
     """The signatures from a frame on, as far as there are any."""
-    found = []
+    run = []
     while (picture := signatures.get(start)) is not None:
-        found.append(picture)
+        run.append(picture)
         start += step
-    return found
+    return run

@@ -1,14 +1,26 @@
 """Frames of one video stream by time stamp, in any order, each the same as in a decode from the start of the file."""
 
+from __future__ import annotations
+
 import heapq
 import math
+from collections.abc import Generator, Iterator
 from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 import av
+from av.container import InputContainer
+from av.packet import Packet
+from av.video.codeccontext import VideoCodecContext
 from av.video.frame import PictureType
+from av.video.stream import VideoStream
 
 from .errors import MediaError
 from .files import FOREIGN, OTHER, is_other
+
+if TYPE_CHECKING:
+    from av.rational import AVRational
 
 KEPT_DECODING = 16  # frames ahead that are cheaper to reach by decoding on than by a seek, whatever the file
 MISSING = 1.0  # seconds between a file's end and the end that it promises, from which on it counts as cut off
@@ -20,33 +32,43 @@ STILLS = frozenset({"image2", "alias_pix", "brender_pix", "fits", "ico"})
 DAMAGED = "its data are damaged"
 
 
+class File(NamedTuple):
+    """An open file, its video stream, and what decodes that."""
+
+    container: InputContainer
+    stream: VideoStream
+    codec: VideoCodecContext
+
+
 class FrameReader:
     """A file's video stream. Time stamps are in units of time_base; `start` is the stream's own.
 
     Memory: the frame on screen, its successor, and what the decoder holds. Not for two threads at once.
     """
 
-    def __init__(self, path, number=0):
+    def __init__(self, path: Path, number: int = 0):
         """number: which of the file's video streams. Raises MediaError if nothing of it can be decoded."""
         self._path, self._number, self._threads = path, number, "AUTO"
-        self.container = self.stream = self._codec = self._run = None
+        self._container: InputContainer | None = None
+        self._run: _Run | None = None
         self._landmarks = _Landmarks()
         try:
-            self._restart()
+            if self._restart().shown is None:
+                raise MediaError(f"{path.name}: no frame of it can be decoded")
         except av.error.FFmpegError as error:
+            self.close()
             raise MediaError(f"{path.name}: cannot be read as a movie ({reason(error)})") from error
-        finally:
-            if self.container is not None and self.shown is None:
-                self.close()
-        if self.container is None:
-            raise MediaError(f"{path.name}: no frame of it can be decoded")
+        except BaseException:
+            self.close()
+            raise
 
-    @property
-    def shown(self):
-        """The frame on screen at the time asked for last."""
-        return self._run.shown if self._run else None
+    def first(self) -> tuple[File, av.VideoFrame]:
+        """The open file, and the frame on screen at the time asked for last; at first that is the first. MediaError:
+        none of it can be decoded."""
+        run = self._run or self._restart()
+        return run.file, _known(run).frame
 
-    def frame_at(self, time, step):
+    def frame_at(self, time: float, step: float) -> av.VideoFrame:
         """The last frame whose time stamp is not later, or the first one; step: the usual distance of two frames.
 
         Raises MediaError, with the reason alone, if the file should have that frame but it cannot be decoded."""
@@ -59,131 +81,143 @@ class FrameReader:
         self._restart()
         return self._find(time, step)
 
-    def _find(self, time, step):
-        if not self._near(time, step):
-            self._seek(time, step)
-        run = self._run
-        while run.next is not None and run.next_time <= time:
+    def _find(self, time: float, step: float) -> av.VideoFrame:
+        run = self._run_at(time, step)
+        while run.next is not None and run.next.time <= time:
             run.advance()
+        shown = _known(run)
         if run.lost_between(time):
             raise MediaError(run.fault)
-        if time >= run.shown_time + max(run.shown.duration, step) and run.cut_off():
+        if time >= shown.time + max(shown.frame.duration, step) and run.cut_off():
             raise MediaError(run.fault or "the file is cut off")
-        return run.shown
+        return shown.frame
 
-    def close(self):
+    def close(self) -> None:
         """Closes the file and ends the decoder's threads, until it is next asked for a frame."""
         if self._run is not None:
             self._run.close()
-        if self.container is not None:
-            self.container.close()
+        if self._container is not None:
+            self._container.close()
         # PyAV's decoder has no close: its threads end when nothing refers to it.
-        self.container = self.stream = self._codec = self._run = None
+        self._container = self._run = None
 
-    def _near(self, time, step):
-        run = self._run
-        if run is None:
-            return False
-        if run.shown is None or time < run.shown_time:
+    def _is_near(self, run: _Run, time: float, step: float) -> bool:
+        if run.shown is None or time < run.shown.time:
             return run.is_first
-        return run.next is None or time - run.next_time <= max(KEPT_DECODING, self._landmarks.longest) * step
+        return run.next is None or time - run.next.time <= max(KEPT_DECODING, self._landmarks.longest) * step
 
-    def _seek(self, time, step):
-        for back in (0, 3, 50, 400):
-            if self._run and self._run_from(round(time - back * step)) and self._run.shown_time <= time:
-                return
-        self._restart()
+    def _run_at(self, time: float, step: float) -> _Run:
+        if self._run and (self._is_near(self._run, time, step) or self._seek(self._run.file, time, step)):
+            return self._run
+        return self._restart()
 
-    def _run_from(self, time):
-        """Decodes on from a key frame near that time; false if what comes out there is not clean."""
+    def _seek(self, file: File, time: float, step: float) -> bool:
+        return any(self._run_from(file, round(time - back * step), time) for back in (0, 3, 50, 400))
+
+    def _run_from(self, file: File, start: int, time: float) -> bool:
+        """Decodes on from a key frame near `start`; whether what comes out there is clean, and not after a time."""
         try:
-            self.container.seek(time, stream=self.stream)
+            file.container.seek(start, stream=file.stream)
         except av.error.FFmpegError:
             return False
-        self._codec.flush_buffers()
-        run = self._begin(seeking=True)
+        file.codec.flush_buffers()
+        shown = self._begin(file, seeking=True).shown
         # No I frame: a wrong index or a gradual refresh. What follows would lack references.
-        return run.shown is not None and (run.shown.key_frame or run.shown.pict_type == PictureType.I)
+        return (
+            shown is not None
+            and shown.time <= time
+            and (shown.frame.key_frame or shown.frame.pict_type == PictureType.I)
+        )
 
-    def _restart(self):
+    def _restart(self) -> _Run:
         """Decodes on from the start. Not by a seek: with an edit list or without an index that ends elsewhere."""
         self.close()
         if is_other(self._path):  # in the place of the file that was there
             raise MediaError(OTHER)
-        self.container = av.open(str(self._path))
-        self.stream = _video_stream(self.container, self._path.name, self._number)
-        self.time_base, self.start = fraction(self.stream.time_base), self.stream.start_time or 0
-        self._codec = _decoder(self.stream, self._threads)
-        self._begin(seeking=False)
+        self._container = av.open(str(self._path))
+        stream = _video_stream(self._container, self._path.name, self._number)
+        self.time_base, self.start = fraction(stream.time_base), stream.start_time or 0
+        return self._begin(File(self._container, stream, _decoder(stream, self._threads)), seeking=False)
 
-    def _begin(self, seeking):
+    def _begin(self, file: File, seeking: bool) -> _Run:
         """The one run that there is from now on."""
         if self._run is not None:
             self._run.close()
             self._run = None
-        self._run = _Run(self.container, self.stream, self._codec, self._landmarks, seeking)
+        self._run = _Run(file, self._landmarks, seeking)
         return self._run
 
 
 class _Landmarks:
     """What was seen of the key frames: their packets' time stamps and sizes, the most frames from one to the next."""
 
-    def __init__(self):
-        self.seen, self.longest, self._since = set(), 0, 0
+    def __init__(self) -> None:
+        self._seen: set[tuple[int | None, int]] = set()
+        self.longest = self._since = 0
 
-    def note(self, packet, from_start):
+    def note(self, packet: Packet, from_start: bool) -> None:
         """Takes in the next packet."""
         self._since = 0 if packet.is_keyframe else self._since + 1
         self.longest = max(self.longest, self._since)
         if packet.is_keyframe and from_start:
-            self.seen.add((time_of(packet), packet.size))
+            self._seen.add((time_of(packet), packet.size))
 
-    def knows(self, packet):
+    def knows(self, packet: Packet) -> bool:
         """Whether a decode from the start has met that key frame at that time."""
-        return (time_of(packet), packet.size) in self.seen
+        return (time_of(packet), packet.size) in self._seen
+
+
+class _Timed(NamedTuple):
+    """A frame and its time stamp."""
+
+    time: int
+    frame: av.VideoFrame
 
 
 class _Run:
     """One decode onwards from where the container stands.
 
-    shown, shown_time: the frame on screen and its time stamp; next, next_time: its successor; None past the end
+    shown: the frame on screen; next: its successor; None past the end
     fault: the last error's sentence; is_first: whether the file's first frame is shown
     """
 
-    def __init__(self, container, stream, codec, landmarks, seeking):
-        self._container, self._stream, self._codec, self._landmarks = container, stream, codec, landmarks
+    def __init__(self, file: File, landmarks: _Landmarks, seeking: bool):
+        self.file, self._landmarks = file, landmarks
         self.fault, self.is_first = "", not seeking
-        self._awaited, self._lost, self._end = [], [], -math.inf
+        self._awaited: list[int] = []
+        self._lost: list[int] = []
+        self._end = -math.inf
         self._ended = self._broken = False
         self._frames = self._decoded(seeking)
-        self.shown_time, self.shown = next(self._frames, (None, None))
-        self.next_time, self.next = next(self._frames, (None, None))
+        self.shown = next(self._frames, None)
+        self.next = next(self._frames, None)
 
-    def close(self):
+    def close(self) -> None:
         """Ends it. The generator refers to the run and the run to it: together they would wait for the collector."""
         self._frames.close()
 
-    def advance(self):
+    def advance(self) -> None:
         """On to the successor."""
-        self.shown_time, self.shown, self.is_first = self.next_time, self.next, False
-        self.next_time, self.next = next(self._frames, (None, None))
+        self.shown, self.is_first = self.next, False
+        self.next = next(self._frames, None)
 
-    def lost_between(self, time):
+    def lost_between(self, time: float) -> bool:
         """Whether a frame that the file has at or before that time, after the one shown, failed to decode."""
-        return any(self.shown_time < lost <= time for lost in self._lost)
+        return self.shown is not None and any(self.shown.time < lost <= time for lost in self._lost)
 
-    def cut_off(self):
+    def cut_off(self) -> bool:
         """Whether the file's end is reached, and before the end that it promises."""
-        if self._broken or not self._ended or self._container.duration is None:
+        container = self.file.container
+        if self._broken or not self._ended or container.duration is None:
             return self._broken
-        promised = ((self._container.start_time or 0) + self._container.duration) / av.time_base
+        promised = ((container.start_time or 0) + container.duration) / av.time_base
         return promised - self._end > MISSING
 
-    def _decoded(self, seeking):
-        """(time stamp, frame) in order of presentation. seeking: from the first key frame on, without the pictures
-        shown before it: in an open group they lean on frames that were not decoded."""
-        floor = None if seeking else -math.inf
-        misleading = self._container.format.name in MISLEADING
+    def _decoded(self, seeking: bool) -> Generator[_Timed, None, None]:
+        """Frames in order of presentation. seeking: from the first key frame on, without the pictures shown before it:
+        in an open group they lean on frames that were not decoded."""
+        floor: float | None = None if seeking else -math.inf
+        misleading = self.file.container.format.name in MISLEADING
         for packet in self._packets():
             if packet is not None:
                 self._landmarks.note(packet, from_start=not seeking)
@@ -201,37 +235,36 @@ class _Run:
                     self.fault = DAMAGED
                     self._lost.append(time)
                 else:
-                    yield time, frame
+                    yield _Timed(time, frame)
         self._settle(math.inf)
 
-    def _packets(self):
+    def _packets(self) -> Iterator[Packet | None]:
         """The stream's packets, then None. Packets of all streams are looked at, to know where the file ends."""
         try:
-            for packet in self._container.demux():
+            for packet in self.file.container.demux():
                 if packet.size == 0:  # PyAV's mark of the end; to the decoder an empty packet says the same
                     continue
-                if time_of(packet) is not None:
-                    end = (time_of(packet) + (packet.duration or 0)) * packet.time_base
-                    self._end = max(self._end, float(end))
-                if packet.stream_index == self._stream.index:
+                if (time := time_of(packet)) is not None:
+                    self._end = max(self._end, float((time + (packet.duration or 0)) * packet.time_base))
+                if packet.stream_index == self.file.stream.index:
                     yield packet
         except av.error.FFmpegError as error:
             self.fault, self._broken = f"the file is cut off or damaged ({reason(error)})", True
         self._ended = True
         yield None
 
-    def _decode(self, packet):
+    def _decode(self, packet: Packet | None) -> list[av.VideoFrame]:
         try:
-            return self._codec.decode(packet)
+            return self.file.codec.decode(packet)
         except (av.error.FFmpegError, ValueError) as error:  # ValueError: of a decoder that could not be opened
             self.fault = f"{DAMAGED} ({reason(error)})"
             return []
 
-    def _await(self, packet, floor):
+    def _await(self, packet: Packet | None, floor: float) -> None:
         if packet is not None and packet.pts is not None and packet.pts >= floor:
             heapq.heappush(self._awaited, packet.pts)
 
-    def _settle(self, time):
+    def _settle(self, time: float) -> None:
         """Notes which frames before that time never came. Without an error they were not meant to be shown."""
         while self._awaited and self._awaited[0] <= time:
             awaited = heapq.heappop(self._awaited)
@@ -239,23 +272,30 @@ class _Run:
                 self._lost.append(awaited)
 
 
-def time_of(item):
+def _known(run: _Run) -> _Timed:
+    """What a run shows. MediaError: what was put in the place of a file has no frame."""
+    if run.shown is None:
+        raise MediaError(run.fault or "no frame of it can be decoded")
+    return run.shown
+
+
+def time_of(item: Packet | av.VideoFrame) -> int | None:
     """The time stamp of a packet or frame; AVI files may have none but those of decoding."""
     return item.dts if item.pts is None else item.pts
 
 
-def fraction(rational):
-    """PyAV's rational as a Fraction; 0 where there is none."""
+def fraction(rational: AVRational | Fraction | None) -> Fraction:
+    """PyAV's rational, in its earlier versions a Fraction, as one; 0 where there is none."""
     return Fraction(rational.numerator, rational.denominator) if rational and rational.denominator else Fraction(0)
 
 
-def reason(error):
+def reason(error: Exception) -> str:
     """What libav says of an error, for use inside a sentence."""
     text = (getattr(error, "strerror", None) or str(error)).strip()
     return text[:1].lower() + text[1:]
 
 
-def _video_stream(container, name, number):
+def _video_stream(container: InputContainer, name: str, number: int) -> VideoStream:
     pictures = av.stream.Disposition.attached_pic
     streams = [s for s in container.streams.video if not s.disposition & pictures]
     if not streams or container.format.name == "tty":  # FFmpeg takes any text for a movie of a terminal
@@ -269,7 +309,7 @@ def _video_stream(container, name, number):
     return streams[number]
 
 
-def _decoder(stream, threads):
+def _decoder(stream: VideoStream, threads: str) -> VideoCodecContext:
     codec = stream.codec_context
     # FFmpeg's own decoders of VP8 and VP9 ignore the alpha channel; Blender turns to libvpx as well.
     if codec.name in ("vp8", "vp9") and stream.metadata.get("alpha_mode") == "1":

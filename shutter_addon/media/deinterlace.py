@@ -2,16 +2,18 @@
 
 import av
 import numpy as np
+from av.video.plane import VideoPlane
+from numpy.typing import DTypeLike
 
 PLANAR = frozenset({"yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuv411p", "gray"})
 
 
-def has_fields(frame):
+def has_fields(frame: av.VideoFrame) -> bool:
     """Whether Blender interpolates one field of such a frame; it blurs all others."""
     return frame.format.name in PLANAR and frame.width % 4 == 0 and frame.height % 4 == 0
 
 
-def interpolate_fields(frame):
+def interpolate_fields(frame: av.VideoFrame) -> av.VideoFrame:
     """A copy of the frame, its odd rows filtered with (-1 4 2 4 -1)/8 down the columns."""
     result = av.VideoFrame(frame.width, frame.height, frame.format.name)
     result.colorspace, result.color_range = frame.colorspace, frame.color_range
@@ -23,7 +25,7 @@ def interpolate_fields(frame):
     return result
 
 
-def blur_rows(picture, opaque):
+def blur_rows(picture: np.ndarray, opaque: bool) -> np.ndarray:
     """A copy of the RGBA picture, filtered with (1 2 1)/4 down the columns from the bottom row upwards.
 
     Whole numbers hand on what rounding leaves over to the next row. Blender leaves out an opaque picture's red."""
@@ -38,7 +40,7 @@ def blur_rows(picture, opaque):
     return result
 
 
-def samples_of(plane, dtype=np.uint8):
+def samples_of(plane: VideoPlane, dtype: DTypeLike = np.uint8) -> np.ndarray:
     """A plane's samples as a view (height, width) of its memory."""
     samples = np.frombuffer(plane, dtype)
     return samples.reshape(-1, plane.line_size // samples.itemsize)[: plane.height, : plane.width]

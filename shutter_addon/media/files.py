@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from typing import Protocol
 
 from .errors import MediaError
 
@@ -10,7 +11,7 @@ OTHER = "is no file, but a pipe, a socket or a device"
 FOREIGN = "an image of a kind that Blender does not read; save it as PNG, TIFF or EXR first"
 
 
-def check_file(path):
+def check_file(path: str | Path) -> Path:
     """The path as a Path; MediaError unless it is a file with something in it that may be read."""
     path = Path(path)
     if path.is_dir():
@@ -26,7 +27,7 @@ def check_file(path):
     return path
 
 
-def stamp(path) -> tuple[int, int] | None:
+def stamp(path: str | Path) -> tuple[int, int] | None:
     """What changes when a file is written to or replaced, or a folder's entries are; None: there is none."""
     try:
         status = os.stat(path)
@@ -35,7 +36,7 @@ def stamp(path) -> tuple[int, int] | None:
     return status.st_mtime_ns, status.st_size
 
 
-def check_sound(path):
+def check_sound(path: str | Path) -> None:
     """MediaError unless it is a file that has sound; without PyAV, unless it is a file."""
     path = check_file(path)
     try:
@@ -44,19 +45,19 @@ def check_sound(path):
         return
     try:
         with av.open(check_name(path)) as container:
-            found = container.streams.audio
+            has_sound = bool(container.streams.audio)
     except (av.error.FFmpegError, IndexError):
-        found = ()
-    if not found:
+        has_sound = False
+    if not has_sound:
         raise MediaError(f"{path.name}: has no sound, or cannot be read")
 
 
-def is_other(path):
+def is_other(path: Path) -> bool:
     """Whether something lies there that is neither a file nor a folder; who opens a pipe may wait for ever."""
     return path.exists() and not (path.is_file() or path.is_dir())
 
 
-def check_name(path):
+def check_name(path: str | Path) -> str:
     """The path as text, as OpenImageIO and Blender want it; MediaError unless it is UTF-8."""
     name = os.fspath(path)
     try:
@@ -67,13 +68,20 @@ def check_name(path):
     return name
 
 
-def check_size(name, width, height):
+def check_size(name: str, width: int, height: int) -> None:
     """MediaError for a picture of no pixels, or of more than can be worked with."""
     if not 0 < width * height <= PIXELS:
         raise MediaError(f"{name}: {width}×{height} are too many pixels, or none; up to 16384×16384 can be read")
 
 
-def check_index(source, index):
+class Frames(Protocol):
+    """What has so many frames."""
+
+    path: Path
+    count: int
+
+
+def check_index(source: Frames, index: int) -> None:
     """IndexError unless the source has a frame of that index."""
     if not 0 <= index < source.count:
         raise IndexError(f"frame {index} of {source.path.name}: it has frames 0 to {source.count - 1}")

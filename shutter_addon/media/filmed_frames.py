@@ -9,13 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from ..core.model import motions, scribbles
 from ..core.model.effect import Camera, Region
 from ..core.model.motions import Placement
-from .tracking import Tracked
+from .tracking import EMPTY, Subject, Tracked, TrackingError
+
+S = TypeVar("S", Region, Camera)
 
 
 class FilmedFrames:
@@ -43,41 +46,41 @@ class FilmedFrames:
     def index_at(self, place: int) -> int:
         return self.indices[place]
 
-    def seen(self, subject: Region | Camera) -> _Seen:
+    def seen(self, subject: S) -> _Seen[S]:
         """A subject as tracking asks for it, at places in place of timeline frames."""
         return _Seen(subject, self._timeline)
 
-    def on_timeline(self, subject: Region | Camera, tracked: Iterable[Tracked], size) -> Iterator[Tracked]:
+    def on_timeline(self, subject: Subject, tracked: Iterable[Tracked], size: tuple[int, int]) -> Iterator[Tracked]:
         """What was tracked by places, by timeline frames: the start, those behind it, those before it. A direction that
         ends early ends with a fault; size: width and height of the picture."""
-        found, faults = {}, {}
+        known, faults = {}, {}
         for each in tracked:
             if each.fault:
                 faults[each.frame] = each.fault
             else:
-                found[each.frame] = each
-        first, centre = subject.placement(self._begin), subject.centre(self._begin)
+                known[each.frame] = each
+        first, centre = subject.placement(self._begin), _centre(subject, self._begin)
         # where the frame is an in-between one, a filmed one beside it was tracked from as if it were that
-        origin = (self._between(subject, self._begin, found) or found[self.start]).placement
+        origin = (self._between(subject, self._begin, known) or known[self.start]).placement
         yield Tracked(self._begin, first, 1.0)
         for rest in (range(self._begin + 1, max(self._times) + 1), range(self._begin - 1, min(self._times) - 1, -1)):
             told = set()
             for frame in rest:
-                there, fault = self._between(subject, frame, found), self._fault(frame, faults, found)
+                there, fault = self._between(subject, frame, known), self._fault(frame, faults, known)
                 if fault is not None and fault not in told:
                     told.add(fault)
                     yield Tracked(frame, first, 0.0, faults[fault])
                 if there is None:
                     continue
-                after = subject.centre(frame)
+                after = _centre(subject, frame)
                 motion = motions.motion_between(origin, there.placement, centre, after, size)
                 moved = motions.unwound(motions.carried(first, motion, centre, after, size), there.placement)
                 yield replace(there, placement=moved)
 
-    def _fault(self, frame: int, faults: Mapping[int, str], found: Mapping[int, Tracked]) -> int | None:
+    def _fault(self, frame: int, faults: Mapping[int, str], known: Mapping[int, Tracked]) -> int | None:
         """The place of the fault by which what a timeline frame shows was not tracked, or was tracked anew; or None."""
         for place in self._beside(frame):
-            if place not in found:
+            if place not in known:
                 side = 1 if place > self.start else -1
                 passed = [at for at in faults if 0 < side * (at - self.start) <= side * (place - self.start)]
                 return max(passed, key=lambda at: side * at)
@@ -90,27 +93,35 @@ class FilmedFrames:
         time = self._times[frame]
         return self._places[math.floor(time)], self._places[math.ceil(time)]
 
-    def _between(self, subject, frame: int, found: Mapping[int, Tracked]) -> Tracked | None:
+    def _between(self, subject: Subject, frame: int, known: Mapping[int, Tracked]) -> Tracked | None:
         """Where it is at a timeline frame, by the filmed frames beside that; None: one of them was not tracked."""
-        beside = [found.get(place) for place in self._beside(frame)]
-        if None in beside:
+        before, after = (known.get(place) for place in self._beside(frame))
+        if before is None or after is None:
             return None
-        placements = [self._placed(subject, each, frame) for each in beside]
-        placement = motions.between(*placements, self._times[frame] % 1)
-        return Tracked(frame, placement, min(each.confidence for each in beside))
+        first, second = (self._placed(subject, each, frame) for each in (before, after))
+        placement = motions.between(first, second, self._times[frame] % 1)
+        return Tracked(frame, placement, min(before.confidence, after.confidence))
 
-    def _placed(self, subject, tracked: Tracked, frame: int) -> Placement:
+    def _placed(self, subject: Subject, tracked: Tracked, frame: int) -> Placement:
         """A placement in another timeline frame's drawing, which may lie elsewhere."""
-        moved = np.add(tracked.placement.location, subject.centre(self._timeline[tracked.frame]))
-        x, y = (float(number) for number in moved - subject.centre(frame))
+        moved = np.add(tracked.placement.location, _centre(subject, self._timeline[tracked.frame]))
+        x, y = (float(number) for number in moved - _centre(subject, frame))
         return replace(tracked.placement, location=(x, y))
 
 
-class _Seen:
-    def __init__(self, subject: Region | Camera, frames: list[int]):
-        self._subject, self._frames = subject, frames
+def _centre(subject: Subject, frame: int) -> np.ndarray:
+    """TrackingError: nothing is drawn there."""
+    if (centre := subject.centre(frame)) is None:
+        raise TrackingError(EMPTY)
+    return centre
 
-    def at(self, place: int) -> scribbles.Shape:
+
+class _Seen(Generic[S]):
+    def __init__(self, subject: S, frames: list[int]):
+        self._subject: S = subject
+        self._frames = frames
+
+    def at(self: _Seen[Region], place: int) -> scribbles.Shape:
         return self._subject.at(self._frames[place])
 
     def placement(self, place: int) -> Placement:

@@ -7,7 +7,7 @@ methodology for optical flow"). Along what has arrived, both frames are looked u
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache, lru_cache, partial
 
 import numpy as np
@@ -27,7 +27,14 @@ HALF_MAX = 65504  # the largest value of a half float, which infinite samples co
 ALIKE = 8  # levels of 255 by which the ends of a vector may differ before another flow is believed more
 
 
-def between(first, second, factor: int, method="quick", transfer="srgb", alpha="opaque") -> Iterator[np.ndarray]:
+def between(
+    first: np.ndarray,
+    second: np.ndarray,
+    factor: int,
+    method: str = "quick",
+    transfer: str = "srgb",
+    alpha: str = "opaque",
+) -> Iterator[np.ndarray]:
     """The frames at the times 1/factor … (factor-1)/factor between two frames, one by one: a function of the two alone,
     the same bits whatever the number of cores.
 
@@ -49,17 +56,22 @@ def between(first, second, factor: int, method="quick", transfer="srgb", alpha="
         yield _decoded(_mixed(ends, [path.at(t) for path in paths], t), first.dtype, transfer, alpha)
 
 
-def luma(frame, transfer: str, alpha: str) -> np.ndarray:
+def luma(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
     """A frame (H, W, 4) of a source, as it is displayed, in grey (H, W) uint8; transfer, alpha: the source's."""
     return _luma(_encoded(frame, transfer, alpha))
 
 
-def vectors(first, second) -> np.ndarray:
+def resized(luma: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """A smaller grey picture, of this width and height."""
+    return cv2.resize(luma, size, interpolation=cv2.INTER_AREA)
+
+
+def vectors(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Where the pixels of a small picture (H, W) uint8 go in another one, quickly: vectors (H, W, 2) in pixels."""
     return np.nan_to_num(_dis(first, second, finest=0, stride=4), posinf=0, neginf=0)
 
 
-def _dis(first, second, finest: int, stride: int) -> np.ndarray:
+def _dis(first: np.ndarray, second: np.ndarray, finest: int, stride: int) -> np.ndarray:
     """Vectors (H, W, 2) from the first picture's pixels to the second's.
 
     finest: how often the pictures are halved at least; stride: from a patch to the next, in pixels of these"""
@@ -70,28 +82,35 @@ def _dis(first, second, finest: int, stride: int) -> np.ndarray:
     return dis.calc(first, second, None)
 
 
-def _deep(first, second) -> np.ndarray:
+def _deep(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Likewise, at half size: at full size it takes four times as long and is no better."""
     half = [cv2.resize(luma, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for luma in (first, second)]
     vectors = cv2.optflow.createOptFlow_DeepFlow().calc(*half, None)
     return 2 * cv2.resize(vectors, first.shape[::-1], interpolation=cv2.INTER_LINEAR)
 
 
-# The flows of a method, from a picture (H, W) uint8 to another. What several say is weighed pixel by pixel.
-METHODS = {"quick": (partial(_dis, finest=1, stride=3),), "good": (partial(_dis, finest=0, stride=4), _deep)}
+# From a picture (H, W) uint8 to another: vectors (H, W, 2).
+Flow = Callable[[np.ndarray, np.ndarray], np.ndarray]
+# The flows of a method. What several say is weighed pixel by pixel.
+METHODS: dict[str, tuple[Flow, ...]] = {
+    "quick": (partial(_dis, finest=1, stride=3),),
+    "good": (partial(_dis, finest=0, stride=4), _deep),
+}
 
 
 class _Paths:
     """Where the pixels of two pictures go from one to the other."""
 
-    def __init__(self, luma, flow):
+    def __init__(self, luma: list[np.ndarray], flow: Flow):
         self._shape = luma[0].shape
         self._sides = [_carriers(a, b, flow) for a, b in (luma, luma[::-1])]
 
-    def at(self, t: float):
+    def at(self, t: float) -> tuple[np.ndarray, np.ndarray]:
         """At a time in 0 … 1, for each pixel: the vector (H, W, 2) from the first picture to the second that passes
         there, and how surely the first and the second show what it carries (H, W, 2), 0 to 1."""
-        (forth, cost), (back, other) = (self._carry(*side, s) for side, s in zip(self._sides, (t, 1 - t), strict=True))
+        (forth, cost), (back, other) = (
+            self._carry(*side, t=s) for side, s in zip(self._sides, (t, 1 - t), strict=True)
+        )
         vectors = np.where((cost <= other)[..., None], forth, -back)
         arrived = np.dstack([cost, other]) < np.inf
         vectors = _filled(vectors.astype(np.float32), arrived.any(axis=2))
@@ -99,7 +118,9 @@ class _Paths:
         fine = _grid(*self._shape) / STEP
         return _look(vectors, fine, cv2.INTER_LINEAR), _look(shown, fine, cv2.INTER_LINEAR)
 
-    def _carry(self, places, vectors, costs, t):
+    def _carry(
+        self, places: np.ndarray, vectors: np.ndarray, costs: np.ndarray, t: float
+    ) -> tuple[np.ndarray, np.ndarray]:
         """On every STEPth pixel at time t: vectors (h, w, 2) and costs (h, w), infinite where nothing arrives."""
         h, w = (-(-n // STEP) for n in self._shape)
         cells = np.floor((places + np.float32(t) * vectors) / STEP).astype(np.int32)
@@ -112,10 +133,11 @@ class _Paths:
         for corner in (0, 1, w + 4, w + 5):
             np.maximum.at(chosen, corners + corner, np.arange(len(corners), dtype=np.int32))
         chosen = chosen.reshape(h + 4, w + 4)[2:-2, 2:-2]
-        return np.append(vectors, np.float32([[0, 0]]), axis=0)[chosen], np.append(costs, np.float32(np.inf))[chosen]
+        nowhere, infinite = np.zeros((1, 2), np.float32), np.full(1, np.inf, np.float32)
+        return np.concatenate([vectors, nowhere])[chosen], np.concatenate([costs, infinite])[chosen]
 
 
-def _carriers(first, second, flow):
+def _carriers(first: np.ndarray, second: np.ndarray, flow: Flow) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places (n, 2) on every STEPth pixel, vectors (n, 2) and costs (n,), the dearest first: how much, in levels, the
     two ends differ."""
     stopping.check()
@@ -125,10 +147,11 @@ def _carriers(first, second, flow):
     cost = cv2.blur(cv2.absdiff(first, _look(second, grid + vectors, cv2.INTER_LINEAR)).astype(np.float32), (5, 5))
     cost = cost[::STEP, ::STEP].ravel()
     order = np.argsort(-cost, kind="stable")
-    return *(each[::STEP, ::STEP].reshape(-1, 2)[order] for each in (grid, vectors)), cost[order]
+    places, vectors = (each[::STEP, ::STEP].reshape(-1, 2)[order] for each in (grid, vectors))
+    return places, vectors, cost[order]
 
 
-def _filled(vectors, known):
+def _filled(vectors: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Vectors (h, w, 2) whose unknown ones are the mean of what is known around, from the coarser picture."""
     if known.all() or not known.any():
         return vectors
@@ -140,14 +163,14 @@ def _filled(vectors, known):
     return np.where(known[..., None], vectors, cv2.resize(coarse, known.shape[::-1], interpolation=cv2.INTER_LINEAR))
 
 
-def _mixed(ends, paths, t: float) -> np.ndarray:
+def _mixed(ends: list[np.ndarray], paths: list[tuple[np.ndarray, np.ndarray]], t: float) -> np.ndarray:
     """Linear light (H, W, 3 or 4) at time t: both frames looked up along each flow's paths."""
-    total = weights = 0
+    total = weights = np.zeros((), np.float32)
     for vectors, shown in paths:
         stopping.check()
         grid = _grid(*vectors.shape[:2])
         seen = _look(ends[0], grid - np.float32(t) * vectors), _look(ends[1], grid + np.float32(1 - t) * vectors)
-        late = np.float32(t) * shown[..., 1]
+        late: np.ndarray = np.float32(t) * shown[..., 1]
         late = (late / (late + np.float32(1 - t) * shown[..., 0]))[..., None]
         first, second = map(_light, seen)
         frame = first + late * (second - first)
@@ -158,14 +181,14 @@ def _mixed(ends, paths, t: float) -> np.ndarray:
     return total / weights
 
 
-def _difference(picture, other) -> np.ndarray:
+def _difference(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
     """How much two pictures differ around each pixel, (H, W) in levels of 255."""
     level = 255 / np.iinfo(picture.dtype).max if picture.dtype.kind == "u" else 255
     each = cv2.absdiff(picture, other)[..., :3].mean(axis=2, dtype=np.float32)
     return cv2.blur(each, (9, 9)) * np.float32(level)
 
 
-def _look(picture, places, how=None) -> np.ndarray:
+def _look(picture: np.ndarray, places: np.ndarray, how: int | None = None) -> np.ndarray:
     """The picture (H, W, …) at places (h, w, 2), x and y in pixels; its edge goes on beyond it."""
     return cv2.remap(picture, places, None, cv2.INTER_CUBIC if how is None else how, borderMode=cv2.BORDER_REPLICATE)
 
@@ -179,7 +202,7 @@ def _grid(height: int, width: int) -> np.ndarray:
 # Frames are looked up as display values, premultiplied: in those, cubic interpolation hardly rings around lights.
 
 
-def _encoded(frame, transfer, alpha) -> np.ndarray:
+def _encoded(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
     """A FrameSource's frame as that: (H, W, 3) where it is opaque, in its own whole numbers or as float32."""
     if alpha == "opaque" and transfer == "srgb" and frame.dtype.kind == "u":
         return np.ascontiguousarray(frame[..., :3])
@@ -193,7 +216,7 @@ def _encoded(frame, transfer, alpha) -> np.ndarray:
     return light.premultiplied(light.straight(rgba) if alpha == "premultiplied" else rgba, convert)
 
 
-def _luma(samples) -> np.ndarray:
+def _luma(samples: np.ndarray) -> np.ndarray:
     """(H, W) uint8, which DIS needs."""
     if samples.dtype == np.uint16:
         samples = (samples >> 8).astype(np.uint8)
@@ -202,7 +225,7 @@ def _luma(samples) -> np.ndarray:
     return cv2.cvtColor(np.ascontiguousarray(samples[..., :3]), cv2.COLOR_RGB2GRAY)
 
 
-def _light(samples) -> np.ndarray:
+def _light(samples: np.ndarray) -> np.ndarray:
     if samples.dtype.kind == "u":
         return _table(samples.dtype)[samples]
     if samples.shape[2] == 3:
@@ -212,13 +235,13 @@ def _light(samples) -> np.ndarray:
 
 
 @cache
-def _table(dtype) -> np.ndarray:
+def _table(dtype: np.dtype) -> np.ndarray:
     """Light of all display values of a whole-number type."""
     white = np.iinfo(dtype).max
     return light.to_linear(np.arange(white + 1) / white).astype(np.float32)
 
 
-def _decoded(frame, dtype, transfer, alpha) -> np.ndarray:
+def _decoded(frame: np.ndarray, dtype: np.dtype, transfer: str, alpha: str) -> np.ndarray:
     """Linear, premultiplied light as a FrameSource's frame."""
     convert = light.to_encoded if transfer == "srgb" else np.asarray
     if alpha == "opaque":

@@ -1,12 +1,16 @@
 """Folders in which a stranger may have put anything: no link is followed, and nothing but plain files is opened."""
 
+from __future__ import annotations
+
 import errno
 import hashlib
 import os
 import stat
+from collections.abc import Callable
 from contextlib import suppress
+from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, Self
 
 _OPENS = os.open in os.supports_dir_fd and os.scandir in os.supports_fd
 _PLAIN = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_NOCTTY", "O_BINARY"))
@@ -18,20 +22,20 @@ class Folder:
 
     Windows opens no folders: what a name stands for is looked at just before. Everything here may raise OSError."""
 
-    def __init__(self, path, within: "Folder | None" = None):
+    def __init__(self, path: str | Path, within: Folder | None = None):
         """path: a name where it lies within another folder. OSError: there is none, or it is a link."""
-        self.path = within.path / path if within else Path(path)
+        self.path: Path = within.path / path if within else Path(path)
         place = within._at(path) if within else {"path": path}
-        self._descriptor = None
+        self._descriptor: int | None = None
         _check(os.stat(**place, follow_symlinks=False), stat.S_ISDIR, errno.ENOTDIR)
         if _OPENS:
             self._descriptor = os.open(**place, flags=os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
 
-    def folder(self, name: str) -> "Folder":
+    def folder(self, name: str) -> Folder:
         """A folder in this one."""
         return Folder(name, self)
 
-    def make(self, name: str) -> "Folder":
+    def make(self, name: str) -> Folder:
         """A folder in this one, new if there is none."""
         with suppress(FileExistsError):
             os.mkdir(**self._at(name))
@@ -39,8 +43,8 @@ class Folder:
 
     def entries(self) -> list[os.DirEntry]:
         """All that lies here."""
-        with os.scandir(self.path if self._descriptor is None else self._descriptor) as found:
-            return list(found)
+        with os.scandir(self.path if self._descriptor is None else self._descriptor) as entries:
+            return list(entries)
 
     def files(self) -> list[os.DirEntry]:
         """The plain files that lie here."""
@@ -50,7 +54,7 @@ class Folder:
         """That of the name itself, if it is a link."""
         return os.stat(**self._at(name), follow_symlinks=False)
 
-    def open(self, name: str, most: int) -> BinaryIO:
+    def open(self, name: str, most: int) -> BufferedReader:
         """A plain file of at most so many bytes, to be read."""
         _check(self.status(name), stat.S_ISREG, errno.EINVAL)
         file = os.fdopen(os.open(**self._at(name), flags=os.O_RDONLY | _PLAIN), "rb")
@@ -95,24 +99,24 @@ class Folder:
             os.close(self._descriptor)
             self._descriptor = None
 
-    def _at(self, name):
+    def _at(self, name: str | Path) -> dict[str, Any]:
         if self._descriptor is None:
             return {"path": self.path / name}
         return {"path": name, "dir_fd": self._descriptor}
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
-def _check(status, is_kind, otherwise) -> None:
+def _check(status: os.stat_result, is_kind: Callable[[int], bool], otherwise: int) -> None:
     if stat.S_ISLNK(status.st_mode) or getattr(status, "st_reparse_tag", 0) == _JUNCTION:
         raise OSError(errno.ELOOP, "it is a link, and none is followed")
     if not is_kind(status.st_mode):
         raise _error(otherwise)
 
 
-def _error(number) -> OSError:
+def _error(number: int) -> OSError:
     return OSError(number, os.strerror(number))

@@ -37,7 +37,8 @@ def _write(path: Path, spec: OpenImageIO.ImageSpec, samples: np.ndarray) -> None
     try:
         with atomic_write.writing(path) as part:
             name = check_name(part)
-            output = OpenImageIO.ImageOutput.create(name)
+            if (output := OpenImageIO.ImageOutput.create(name)) is None:
+                raise MediaError(f"{path}: {OpenImageIO.geterror() or 'cannot be written'}")
             written = output.open(name, spec) and output.write_image(np.ascontiguousarray(samples))
             if not (output.close() and written):
                 raise MediaError(f"{path}: {output.geterror() or 'cannot be written'}")

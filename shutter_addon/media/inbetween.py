@@ -7,7 +7,7 @@ are built together."""
 import os
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, as_completed, wait
 from contextlib import suppress
 from functools import partial
@@ -34,6 +34,9 @@ AHEAD = 640 << 20  # bytes of them for frames that are read ahead; enough to rea
 LAYERS = 26
 _PAUSE = 1.0  # seconds between two looks at what other processes have built
 
+# What makes the frames of a pair: flow.between, or what stands for it.
+Between = Callable[..., Iterator[np.ndarray]]
+
 
 class InbetweenSource(SourceWrapper):
     """A source with its in-between frames, at `factor` times its rate.
@@ -41,7 +44,7 @@ class InbetweenSource(SourceWrapper):
     Frame i·factor is the source's frame i. Those between come from the cache in `folder`; where the pair is a cut, they
     are the nearer source frame, and where it is two equal frames, the first."""
 
-    def __init__(self, source: FrameSource, folder, factor: int, method: str):
+    def __init__(self, source: FrameSource, folder: str | Path, factor: int, method: str):
         super().__init__(source)
         self.factor = factor
         self._cache = InbetweenCache(source, folder, factor, method)
@@ -74,10 +77,10 @@ class InbetweenSource(SourceWrapper):
         real = self._real(index)
         return self._cache.read(index) if real is None else self._source.read(real)
 
-    def _is_there(self, index):
+    def _is_there(self, index: int) -> bool:
         return self._cache.has(index) or self._real(index) is not None
 
-    def _real(self, index):
+    def _real(self, index: int) -> int | None:
         """The source frame that is shown at a frame; None: an in-between frame is."""
         pair, step = divmod(index, self.factor)
         kind = "same" if step == 0 else self._cache.kinds.get(pair)
@@ -88,13 +91,13 @@ class InbetweenSource(SourceWrapper):
 
 def build(
     source: FrameSource,
-    folder,
+    folder: str | Path,
     factor: int,
     method: str,
     frames: tuple[int, int] | None = None,
     update: Callable[[int, int], None] = lambda done, total: None,
     cancelled: Callable[[], bool] = lambda: False,
-    between=None,
+    between: Between | None = None,
     pairs: Sequence[int] | None = None,
 ) -> State:
     """Builds in-between frames in `folder`. Pictures that are there are checked, and damaged ones are built again.
@@ -118,7 +121,9 @@ def build(
             "install the zip of Virtual Shutter that is made for your system"
         )
     if between is None:
-        from .flow import between
+        from . import flow
+
+        between = flow.between
     cache = InbetweenCache(source, folder, factor, method)
     pairs = _pairs(source, frames) if pairs is None else pairs
     cache.prepare()
@@ -167,12 +172,14 @@ class Cost(NamedTuple):
         return pairs * (factor - 1) * self.size
 
 
-def cost(source: FrameSource, pair: int, method: str, between=None) -> Cost:
+def cost(source: FrameSource, pair: int, method: str, between: Between | None = None) -> Cost:
     """About what in-between frames of a source cost, by two that are made of one pair, and written: several pairs at a
     time take hardly less each, as one has all processors already. between: as for `build`. MediaError: they cannot be
     made."""
     if between is None:
-        from .flow import between
+        from . import flow
+
+        between = flow.between
     when = [time.perf_counter()]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "picture.png" if source.dtype.kind == "u" else "picture.exr")
@@ -194,7 +201,12 @@ def _pairs(source: FrameSource, frames: tuple[int, int] | None) -> range:
 
 
 def _tasks(
-    cache: InbetweenCache, pairs: list[int], claims: Claims, others: list[int], between, cancelled
+    cache: InbetweenCache,
+    pairs: list[int],
+    claims: Claims,
+    others: list[int],
+    between: Between,
+    cancelled: Callable[[], bool],
 ) -> Iterator[Callable[[], bool]]:
     """Yields a function for each pair that builds it and returns whether it is finished; adds those to `others` that
     other processes have claimed. Frames are read here, in the caller's thread; the functions may run in any."""
@@ -240,7 +252,7 @@ class _Near:
         self._signatures = {i: picture for i, picture in self._signatures.items() if i in beside}
         return first, second, kind
 
-    def _kind(self, first, second, index):
+    def _kind(self, first: np.ndarray, second: np.ndarray, index: int) -> str | None:
         if np.array_equal(first, second):
             return "same"
         here = self._signature(index), self._signature(index + 1)
@@ -252,11 +264,11 @@ class _Near:
             return "cut"
         return "same" if cuts.is_duplicate(*sides) else None
 
-    def _frame(self, index):
+    def _frame(self, index: int) -> np.ndarray:
         frame = self._frames.get(index)
         return self._source.read(index) if frame is None else frame
 
-    def _signature(self, index):
+    def _signature(self, index: int) -> cuts.Signature:
         if index not in self._signatures:
             frame = self._frame(index)
             if index > min(self._frames) and len(self._frames) < self._most:  # those before the pair are not needed
@@ -286,14 +298,23 @@ def _finished_by_another(cache: InbetweenCache, pair: int) -> bool:
     return cache.is_sound(pair)
 
 
-def _build_claimed(claims: Claims, cache: InbetweenCache, pair: int, make) -> bool:
+def _build_claimed(
+    claims: Claims, cache: InbetweenCache, pair: int, make: Callable[[InbetweenCache, int], bool]
+) -> bool:
     try:
         return make(cache, pair)
     finally:
         claims.release(_claim(pair))
 
 
-def _make(first, second, between, cancelled, cache, pair) -> bool:
+def _make(
+    first: np.ndarray,
+    second: np.ndarray,
+    between: Between,
+    cancelled: Callable[[], bool],
+    cache: InbetweenCache,
+    pair: int,
+) -> bool:
     source = cache.source
     pictures = between(first, second, cache.factor, cache.method, source.transfer, source.alpha)
     with suppress(stopping.StoppedError), stopping.once(cancelled):
@@ -304,12 +325,12 @@ def _make(first, second, between, cancelled, cache, pair) -> bool:
     return False
 
 
-def _note_kind(kind, cache, pair) -> bool:
+def _note_kind(kind: str, cache: InbetweenCache, pair: int) -> bool:
     cache.note(pair_line(pair, kind))
     return True
 
 
-def _in_parallel(tasks, workers) -> Iterator[bool]:
+def _in_parallel(tasks: Iterable[Callable[[], bool]], workers: int) -> Iterator[bool]:
     """Runs tasks in threads, and yields their results. The next task is taken only when a thread is free, since a task
     holds its frames in memory."""
     with ThreadPoolExecutor(workers) as pool:

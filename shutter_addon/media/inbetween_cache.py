@@ -10,6 +10,7 @@ import stat
 import zlib
 from contextlib import suppress
 from functools import lru_cache, partial
+from io import BufferedReader
 from pathlib import Path
 from typing import NamedTuple
 
@@ -61,7 +62,7 @@ class InbetweenCache:
     kinds: {pair: "same" or "cut"} of pairs without pictures
     """
 
-    def __init__(self, source: FrameSource, folder, factor: int, method: str):
+    def __init__(self, source: FrameSource, folder: str | Path, factor: int, method: str):
         self.source, self.factor, self.method = source, factor, method
         made_of = {
             "maker": MAKER,
@@ -87,9 +88,9 @@ class InbetweenCache:
         kinds: dict[int, str] = {}
         with suppress(OSError), Folder(self.folder) as folder:
             checks = read_checks(folder)
-            for name, found in checks.digests.items():
+            for name, known in checks.digests.items():
                 if self._is_between(frame := int(name[:8])) and name == self._name(frame):
-                    digests[frame] = found
+                    digests[frame] = known
             kinds = {pair: kind for pair, kind in checks.kinds.items() if pair < self.source.count - 1}
         self.digests, self.kinds, self._loaded = digests, kinds, stamp  # together: other threads may read them
 
@@ -126,8 +127,8 @@ class InbetweenCache:
         if not self._is_sound(frame):
             raise MediaError(f"{path}: this in-between frame is damaged or gone; build in-between frames again")
         image = self._open(path)
-        samples = image and image.read_image(0, 0, 0, self._spec.nchannels, self._spec.format)
-        if samples is None or image.has_error:
+        samples = image.read_image(0, 0, 0, self._spec.nchannels, self._spec.format) if image else None
+        if image is None or samples is None or image.has_error:
             raise MediaError(
                 f"{path}: this in-between frame cannot be decoded; remove in-between frames, and build again"
             )
@@ -188,13 +189,13 @@ class InbetweenCache:
             checks.remove(f"{self._token}.sha256")
         raise MediaError(f"{self.source.path}: was written to while in-between frames were built; build them again")
 
-    def _name(self, frame):
+    def _name(self, frame: int) -> str:
         return f"{frame:08d}{self._suffix}"
 
-    def _is_between(self, frame):
+    def _is_between(self, frame: int) -> bool:
         return 0 < frame < (self.source.count - 1) * self.factor and frame % self.factor != 0
 
-    def _is_sound(self, frame):
+    def _is_sound(self, frame: int) -> bool:
         """Whether a frame's picture matches one of its digests, and is of the source's size and samples."""
         path, digests = self.picture(frame), self.digests.get(frame)
         try:
@@ -207,7 +208,7 @@ class InbetweenCache:
             image.close()
         return image is not None
 
-    def _open(self, path):
+    def _open(self, path: Path) -> ImageInput | None:
         """The opened image file, if it is as `write_picture` makes them for this source; else None."""
         wishes = ImageSpec()
         wishes.attribute("oiio:UnassociatedAlpha", 1)  # no premultiplication on reading
@@ -268,7 +269,8 @@ def write_picture(path: Path, picture: np.ndarray, alpha: str) -> bool:
     spec["png:compressionLevel"] = 1
     spec["png:filter"] = 0x20  # "up" alone: half the time of a choice for each row, and files as small
     spec["compression"] = "piz"
-    output = ImageOutput.create(name)
+    if (output := ImageOutput.create(name)) is None:
+        raise MediaError(f"{path}: cannot be written ({geterror()})")
     samples = np.ascontiguousarray(picture[..., : spec.nchannels])
     written = output.open(name, spec) and output.write_image(samples)
     return output.close() and written and is_whole_picture(path)
@@ -280,7 +282,7 @@ _SHAPE = (
 )
 
 
-def _spec(width, height, dtype, alpha) -> ImageSpec:
+def _spec(width: int, height: int, dtype: np.dtype, alpha: str) -> ImageSpec:
     """What `write_picture` writes: size, channels and sample type."""
     return ImageSpec(width, height, 3 if alpha == "opaque" else 4, SAMPLES[dtype.name])
 
@@ -298,14 +300,14 @@ def folder_stamp(folder: Path) -> tuple | None:
         with Folder(folder) as opened:
             changed = opened.status(".").st_mtime_ns
             with suppress(OSError), opened.folder(CHECKS) as checks:
-                found = [(entry.name, entry.stat(follow_symlinks=False)) for entry in checks.entries()]
-                return changed, *sorted((name, info.st_size, info.st_mtime_ns) for name, info in found)
+                files = [(entry.name, entry.stat(follow_symlinks=False)) for entry in checks.entries()]
+                return changed, *sorted((name, info.st_size, info.st_mtime_ns) for name, info in files)
             return (changed,)
     except OSError:
         return None
 
 
-def stamp(folder, stem: str, factor: int, method: str) -> tuple:
+def stamp(folder: str | Path, stem: str, factor: int, method: str) -> tuple:
     """A value that changes when in-between frames in `folder` are built or removed, of any source with this stem of its
     file's name.
 
@@ -340,7 +342,7 @@ class Checks(NamedTuple):
 
 
 def read_checks(cache: Folder) -> Checks:
-    checks = Checks({}, {}, [], [])
+    checks = Checks(digests={}, kinds={}, own=[], unreadable=[])
     try:
         with cache.folder(CHECKS) as folder:
             for name in [entry.name for entry in folder.files() if entry.name.endswith(".sha256")]:
@@ -359,7 +361,7 @@ def read_checks(cache: Folder) -> Checks:
     return checks
 
 
-def _read_lines(file, checks: Checks) -> bool:
+def _read_lines(file: BufferedReader, checks: Checks) -> bool:
     """Adds the lines of a file to the checks. Returns whether all of them are of our format; the last one may be cut
     off, as on a full disk."""
     ours = others = 0
@@ -404,7 +406,7 @@ def _sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def relative_path(path: Path, folder) -> str:
+def relative_path(path: Path, folder: str | Path) -> str:
     """The path relative to the folder, so that it holds after both are moved together."""
     try:
         return Path(os.path.relpath(path, folder)).as_posix()

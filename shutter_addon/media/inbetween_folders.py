@@ -54,7 +54,7 @@ class State(NamedTuple):
     total: int
 
 
-def state(source: FrameSource, folder, factor: int, method: str) -> State:
+def state(source: FrameSource, folder: str | Path, factor: int, method: str) -> State:
     """How far a source's in-between frames are built, as the names of their files tell. Only a build or a read opens
     these files.
 
@@ -62,7 +62,7 @@ def state(source: FrameSource, folder, factor: int, method: str) -> State:
     MediaError: a file of the source is gone."""
     cache, total = InbetweenCache(source, folder, factor, method), source.count - 1
 
-    def finished():
+    def finished() -> int:
         cache.load()
         return len(cache.finished())
 
@@ -75,7 +75,7 @@ def state(source: FrameSource, folder, factor: int, method: str) -> State:
     return State("stale" if stale else "missing", 0, total)
 
 
-def size(folder, source: FrameSource | None = None) -> int:
+def size(folder: str | Path, source: FrameSource | None = None) -> int:
     """The bytes that `purge` would free. Pictures that have changed count as well, though it does not remove them.
 
     While nothing changes it is fast. MediaError: a file of the source is gone."""
@@ -84,7 +84,7 @@ def size(folder, source: FrameSource | None = None) -> int:
 
 
 def purge(
-    folder, source: FrameSource | None = None, left: Callable[[Path, int], None] = lambda path, count: None
+    folder: str | Path, source: FrameSource | None = None, left: Callable[[Path, int], None] = lambda path, count: None
 ) -> int:
     """Removes in-between frames in `folder`, of one source or of all, stale ones included. Returns the bytes freed.
 
@@ -108,21 +108,21 @@ def forget() -> None:
     content_hash.cache_clear()
 
 
-def _caches(folder) -> list[tuple[str, dict]]:
+def _caches(folder: str | Path) -> list[tuple[str, dict]]:
     """(name, manifest) of every cache in `folder`."""
-    found = []
+    caches = []
     with suppress(OSError), Folder(folder) as top:
         for entry in sorted(top.entries(), key=lambda entry: entry.name):
             with suppress(OSError), top.folder(entry.name) as cache:
                 if (manifest := _manifest(cache)) is not None:
-                    found.append((entry.name, manifest))
-    return found
+                    caches.append((entry.name, manifest))
+    return caches
 
 
 def _manifest(cache: Folder) -> dict | None:
     """A cache's manifest; None if it is not one of ours, or does not match the folder's name."""
     with suppress(ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        manifest = json.loads(content_of(cache, MANIFEST))
+        manifest = json.loads(content_of(cache, MANIFEST) or b"")
         made_of = {key: value for key, value in manifest.items() if key != "path"}
         named = cache.path.name.endswith(f"-{manifest_key(made_of)}")
         if named and made_of["maker"] == MAKER and manifest.keys() >= {"path", "source", "settings"}:
@@ -130,7 +130,7 @@ def _manifest(cache: Folder) -> dict | None:
     return None
 
 
-def _chosen(folder, source: FrameSource | None) -> list[str]:
+def _chosen(folder: str | Path, source: FrameSource | None) -> list[str]:
     """The names of the caches in `folder`: of one source, stale ones included, or of all."""
     path, made_of = (None, None) if source is None else (relative_path(source.path, folder), identity(source))
     return [
@@ -172,7 +172,7 @@ def _size(folder: Path) -> int:
     return 0
 
 
-def _remove(top: Folder, name: str, left) -> int:
+def _remove(top: Folder, name: str, left: Callable[[Path, int], None]) -> int:
     try:
         with top.folder(name) as cache:
             if _manifest(cache) is None:  # another folder than a moment ago
@@ -214,5 +214,5 @@ def _remembered(known: dict[Path, tuple], folder: Path, find: Callable[[], int])
     return known[folder][1]
 
 
-def _irremovable(folder, error: OSError) -> MediaError:
+def _irremovable(folder: str | Path, error: OSError) -> MediaError:
     return MediaError(f"{folder}: cannot be removed ({error.strerror or error})")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -45,9 +46,11 @@ class MatteSource:
     fps: frames per second, None for images; files: the movie, or those of the frames
     """
 
-    step = 1  # as of a source without in-between frames
+    step = 1  # it has no in-between frames
 
-    def __init__(self, path, channel="luminance", *, files=None, stream=0):
+    def __init__(
+        self, path: str | Path, channel: str = "luminance", *, files: Sequence[str] | None = None, stream: int = 0
+    ):
         """As MatteFile has them."""
         self._frames = open_channel(path, channel, files=files, stream=stream)
         self.path, self.count = self._frames.path, self._frames.count
@@ -66,10 +69,10 @@ class MatteSource:
         """Closes the file; a later read opens it again."""
         self._frames.close()
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

@@ -6,8 +6,9 @@ from collections.abc import Hashable
 
 import numpy as np
 
-from ..core.model.mattes import FileFrame, Matte, MatteFile, MatteSource
+from ..core.model.mattes import Content, FileFrame, Matte, MatteFile, MatteSource
 from ..core.pixels.matte_grid import block_means, feathered, fitted
+from .cuts import ShotSource
 
 
 class MatteValues:
@@ -21,8 +22,8 @@ class MatteValues:
         self._made: list[tuple[Hashable, np.ndarray]] = []
 
     @classmethod
-    def of(cls, source) -> MatteValues:
-        """For the pictures of a source, as core.model.mattes has them: a ShotSource."""
+    def of(cls, source: ShotSource) -> MatteValues:
+        """For the pictures of a source, as core.model.mattes has them."""
         return cls(source.width, source.height, source.step)
 
     def values(self, mattes: tuple[Matte, ...], index: int, block: int) -> list[tuple[Hashable, np.ndarray]]:
@@ -33,21 +34,25 @@ class MatteValues:
         known, self._made = dict(self._made), []
         for matte in mattes:
             key = self._content_key(matte.content, index), matte.feather, matte.invert, block
-            self._made.append((key, known[key] if key in known else self._values(matte, key[0], block)))
+            self._made.append((key, known[key] if key in known else self._values(matte, index, block)))
         return list(self._made)
 
-    def _content_key(self, content, index: int) -> Hashable:
+    def _content_key(self, content: Content, index: int) -> Hashable:
         if not isinstance(content, FileFrame):
             return content
+        return content.file, self._frame(content, index)
+
+    def _frame(self, content: FileFrame, index: int) -> int:
+        """The frame of its file, which is opened."""
         if content.file not in self._sources:
             self._sources[content.file] = content.file.open()
         source = self._sources[content.file]
-        return content.file, min(max(content.index(source, index // self._step), 0), source.count - 1)
+        return min(max(content.index(source, index // self._step), 0), source.count - 1)
 
-    def _values(self, matte: Matte, key, block: int) -> np.ndarray:
+    def _values(self, matte: Matte, index: int, block: int) -> np.ndarray:
         if isinstance(matte.content, FileFrame):
-            file, frame = key
-            values = fitted(self._sources[file].read(frame), *self._size)
+            frame = self._frame(matte.content, index)
+            values = fitted(self._sources[matte.content.file].read(frame), *self._size)
         else:
             values = matte.content.values(*self._size)
         values = feathered(values, matte.feather * self._size[1])

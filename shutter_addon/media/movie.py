@@ -1,19 +1,28 @@
 """Frames of a movie: those that Blender's movie strip shows, converted to RGB as Blender converts them."""
 
+from __future__ import annotations
+
 import gc
 import math
 import re
 import threading
+from collections.abc import Iterator
 from contextlib import contextmanager
 from fractions import Fraction
 from functools import partial
+from pathlib import Path
 
 import av
 import numpy as np
+from av.container import InputContainer
+from av.filter import Graph
+from av.stream import Stream
+from av.video.format import VideoFormat
 from av.video.reformatter import ColorRange
+from av.video.stream import VideoStream
 
 from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import Planes, matrix
+from ..core.frames.planes import Matrix, Planes, matrix
 from .channels import CHANNELS, no_channel
 from .decode import FrameReader, fraction, reason
 from .deinterlace import blur_rows, has_fields, interpolate_fields, samples_of
@@ -38,13 +47,22 @@ class MovieSource(FrameSource):
 
     transfer = "srgb"
 
-    def __init__(self, path, *, stream=0, deinterlace=False, divisor=1, size=None):
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        stream: int = 0,
+        deinterlace: bool = False,
+        divisor: int = 1,
+        size: tuple[int, int] | None = None,
+    ):
         """divisor: how many times smaller than the file's the frames are each way (ReducedSource)
         size: what opaque frames are fitted to, width and height, in place of `divisor`"""
         self.path = check_file(path)
         self._deinterlace, self._divisor, self._fitted_to = deinterlace, divisor, size
         self.options = {"stream": stream, "deinterlace": bool(deinterlace)}
-        self._graph = self._graph_key = None
+        self._graph: Graph | None = None
+        self._graph_key: tuple | None = None
         self._converting = threading.Lock()  # planes are converted on any thread
         self._reader = FrameReader(self.path, stream)
         try:
@@ -53,20 +71,20 @@ class MovieSource(FrameSource):
             self.close()
             raise
 
-    def _probe(self):
-        reader, first = self._reader, self._reader.shown
-        self.fps = fraction(reader.stream.guessed_rate)
-        self.count = _count(reader.container, reader.stream, self.fps)
+    def _probe(self) -> None:
+        file, first = self._reader.first()
+        self.fps = fraction(file.stream.guessed_rate)
+        self.count = _count(file.container, file.stream, self.fps)
         if self.count < 1:
             raise MediaError(f"{self.path.name}: its length is unknown; put it into an MP4 or MKV file first")
-        self.has_audio = bool(reader.container.streams.audio)
-        self._step = float(1 / (self.fps * reader.time_base))
+        self.has_audio = bool(file.container.streams.audio)
+        self._step = float(1 / (self.fps * self._reader.time_base))
         self._turns = -round(first.rotation / 90) % 4
         filmed = first.width, first.height
         size = self._fitted_to or tuple(reduced_size(length, self._divisor) for length in filmed)
         self.width, self.height = size[::-1] if self._turns % 2 else size
         deep = max(component.bits for component in first.format.components) > 8
-        self._format, self.dtype = ("rgba64le", np.dtype(np.uint16)) if deep else ("rgba", np.dtype(np.uint8))
+        self._format, self.dtype = "rgba64le" if deep else "rgba", np.dtype(np.uint16 if deep else np.uint8)
         # Blender takes 8-bit colours for straight, but those of deeper movies, its floats, for premultiplied.
         has_alpha = any(component.is_alpha for component in first.format.components)
         self.alpha = "opaque" if not has_alpha else "premultiplied" if deep else "straight"
@@ -74,34 +92,35 @@ class MovieSource(FrameSource):
         in_conversion = size != filmed and self.alpha != "straight"
         self._size, self._scaler = (size, REDUCER) if in_conversion else (filmed, SCALER)
 
-    def read(self, index):
+    def read(self, index: int) -> np.ndarray:
         """The frame as a new array (height, width, 4), RGBA, top row first.
 
         Raises MediaError for a frame that is damaged or cut off, IndexError outside 0 … count-1."""
         with self._named(index):
             return self._pixels(self._frame(index))
 
-    def _picture(self, index, frame):
+    def _picture(self, index: int, frame: av.VideoFrame) -> np.ndarray:
         with self._named(index):
             return self._pixels(frame)
 
-    def decoded(self, index):
+    def decoded(self, index: int) -> np.ndarray | Planes:
         """As `read`, or the frame's planes, where they are 8-bit 4:2:0 and as large as the frame, and BT.601 or 709.
 
         They are those of the decoder's own memory. What they become is what libswscale makes of them, by SCALER."""
         with self._named(index):
             frame = self._frame(index)
-            if (found := self._matrix(frame)) is None:
+            if (to_rgb := self._matrix(frame)) is None:
                 return self._pixels(frame)
-            luma, *chroma = map(samples_of, frame.planes)
-            return Planes(luma, tuple(chroma), found, partial(self._picture, index, frame))
+            luma, cb, cr = map(samples_of, frame.planes)
+            rgba = partial(self._picture, index, frame)
+            return Planes(luma=luma, chroma=(cb, cr), matrix=to_rgb, rgba=rgba)
 
-    def _frame(self, index):
+    def _frame(self, index: int) -> av.VideoFrame:
         check_index(self, index)
         return self._reader.frame_at(self._reader.start + _round(index * self._step), self._step)
 
     @contextmanager
-    def _named(self, index):
+    def _named(self, index: int) -> Iterator[None]:
         """Inside, what fails is said of that frame, by MediaError."""
         try:
             yield
@@ -110,7 +129,7 @@ class MovieSource(FrameSource):
         except MediaError as error:
             raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {error}") from error
 
-    def _matrix(self, frame):
+    def _matrix(self, frame: av.VideoFrame) -> Matrix | None:
         """What makes RGB of the frame's planes; None where more has to be done with it."""
         if frame.format.name not in _PLANAR_420 or self._deinterlace or self._turns:
             return None
@@ -118,7 +137,7 @@ class MovieSource(FrameSource):
             return None
         return matrix(frame.colorspace, frame.format.name == "yuvj420p" or frame.color_range == ColorRange.JPEG)
 
-    def _pixels(self, frame):
+    def _pixels(self, frame: av.VideoFrame) -> np.ndarray:
         by_fields = self._deinterlace and has_fields(frame)
         frame = interpolate_fields(frame) if by_fields else frame
         picture = self._converted(frame, self._format)
@@ -128,18 +147,18 @@ class MovieSource(FrameSource):
             picture = reduced(picture, self._divisor, self.alpha)
         return self._upright(picture)
 
-    def _converted(self, frame, pix_fmt):
+    def _converted(self, frame: av.VideoFrame, pix_fmt: str) -> np.ndarray:
         with self._converting:
             graph = self._graph_for(frame, pix_fmt)
             graph.vpush(frame)
             return graph.vpull().to_ndarray()
 
-    def _upright(self, picture):
+    def _upright(self, picture: np.ndarray) -> np.ndarray:
         return np.require(np.rot90(picture, -self._turns), requirements=["C", "W"])
 
-    def _graph_for(self, frame, pix_fmt):
+    def _graph_for(self, frame: av.VideoFrame, pix_fmt: str) -> Graph:
         key = (frame.format.name, frame.width, frame.height, frame.colorspace, frame.color_range, pix_fmt)
-        if key != self._graph_key:
+        if self._graph is None or key != self._graph_key:
             self._drop_graph()
             graph = av.filter.Graph()
             scale = "scale", "{}:{}:flags={}".format(*self._size, self._scaler)
@@ -153,13 +172,13 @@ class MovieSource(FrameSource):
             self._graph, self._graph_key = graph, key
         return self._graph
 
-    def close(self):
+    def close(self) -> None:
         """Closes the file and ends all threads; a later read opens it again."""
         self._reader.close()
         with self._converting:
             self._drop_graph()
 
-    def _drop_graph(self):
+    def _drop_graph(self) -> None:
         """Ends its threads. PyAV's graph and its filters refer to each other, and it has no close: the dicts in which
         it holds them are emptied, or the threads would wait for the garbage collector."""
         for held in gc.get_referents(self._graph):
@@ -171,36 +190,36 @@ class MovieSource(FrameSource):
 class MovieChannel(MovieSource):
     """One channel of a movie's frames: those of MovieSource, whose attributes it has."""
 
-    def __init__(self, path, channel, *, stream=0):
+    def __init__(self, path: str | Path, channel: str, *, stream: int = 0):
         """channel: one of CHANNELS. MediaError: it is another one, or the movie cannot be read."""
         if channel not in CHANNELS:
             raise no_channel(check_file(path), channel, CHANNELS)
         super().__init__(path, stream=stream)
         self._channel = channel
 
-    def read(self, index):
+    def read(self, index: int) -> np.ndarray:
         """The samples (height, width, n) that the channel is made of: n is 3, RGB, for the luminance of colours, 0 for
         the alpha of an opaque movie, 1 otherwise. Raises what MovieSource raises."""
         if self._channel == "alpha" and self.alpha == "opaque":
             return np.empty((self.height, self.width, 0), self.dtype)
         return super().read(index)
 
-    def decoded(self, index):
+    def decoded(self, index: int) -> np.ndarray | Planes:
         return self.read(index)
 
-    def _pixels(self, frame):
+    def _pixels(self, frame: av.VideoFrame) -> np.ndarray:
         if self._channel == "luminance" and _is_grey(frame):
             grey = self._converted(frame, "gray16le" if self.dtype == np.uint16 else "gray")
             return self._upright(grey)[..., None]
         return super()._pixels(frame)[..., CHANNELS[self._channel]]
 
 
-def _is_opaque_yuv(pixels):
+def _is_opaque_yuv(pixels: VideoFormat) -> bool:
     """Whether a frame's format has luma and chroma, and no alpha."""
     return not pixels.is_rgb and len(pixels.components) == 3 and not any(each.is_alpha for each in pixels.components)
 
 
-def _is_grey(frame):
+def _is_grey(frame: av.VideoFrame) -> bool:
     """Whether a frame's luma is the luminance of its RGB: it has no chroma, or a neutral one, as grey pictures get."""
     name, bits = frame.format.name, frame.format.components[0].bits
     if name.startswith("gray"):
@@ -211,11 +230,11 @@ def _is_grey(frame):
     return all((samples_of(plane, dtype) == neutral).all() for plane in list(frame.planes)[1:3])
 
 
-def _round(x):
+def _round(x: float) -> int:
     return math.floor(x + 0.5)  # as in C; Python rounds halves to even
 
 
-def _count(container, stream, fps):
+def _count(container: InputContainer, stream: VideoStream, fps: Fraction) -> int:
     """The movie's length as Blender takes it from what the container says, without decoding; 0: unknown."""
     if not fps:
         return 0
@@ -229,5 +248,5 @@ def _count(container, stream, fps):
     return _round((container.duration / av.time_base - max(late, 0.0)) * float(fps))
 
 
-def _start(stream):
+def _start(stream: Stream) -> float:
     return float((stream.start_time or 0) * fraction(stream.time_base))

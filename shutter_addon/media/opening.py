@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 from ..core.frames.frame_source import FrameSource
 from .color import in_colorspace
@@ -17,17 +20,17 @@ if TYPE_CHECKING:
 
 
 def open_source(
-    path,
+    path: str | Path,
     *,
-    stream=0,
-    fps=None,
-    files=None,
-    colorspace=None,
-    config=None,
-    alpha=None,
-    deinterlace=False,
-    divisor=1,
-    size=None,
+    stream: int = 0,
+    fps: Fraction | None = None,
+    files: Sequence[str] | None = None,
+    colorspace: str | None = None,
+    config: str | Path | None = None,
+    alpha: str | None = None,
+    deinterlace: bool = False,
+    divisor: int = 1,
+    size: tuple[int, int] | None = None,
 ) -> FrameSource:
     """Opens a movie, or the image sequence that starts with the file `path`. MediaError: it cannot be read.
 
@@ -43,7 +46,9 @@ def open_source(
     """
     path = Path(path)
     if _is_movie(path, files):
-        source = _movies(path).MovieSource(path, stream=stream, deinterlace=deinterlace, divisor=divisor, size=size)
+        movies = _movies(path)
+        source: FrameSource
+        source = movies.MovieSource(path, stream=stream, deinterlace=deinterlace, divisor=divisor, size=size)
     else:
         source = smaller(SequenceSource(path, files=files, fps=fps, alpha=alpha), divisor)
     try:
@@ -53,10 +58,10 @@ def open_source(
         raise
 
 
-def with_proxy(source: FrameSource, path, **options) -> FrameSource:
+def with_proxy(source: FrameSource, path: str | Path, **options: Any) -> FrameSource:
     """The source with its frames read from a proxy; the source itself, where there is none that fits.
 
-    path, options: of the proxy, as of open_source"""
+    path, options: of the proxy, as open_source takes them"""
     try:
         from .proxy import ProxySource, fits
 
@@ -68,21 +73,23 @@ def with_proxy(source: FrameSource, path, **options) -> FrameSource:
         return source
 
 
-def open_channel(path, channel, *, files=None, stream=0) -> SequenceChannel | MovieChannel:
+def open_channel(
+    path: str | Path, channel: str, *, files: Sequence[str] | None = None, stream: int = 0
+) -> SequenceChannel | MovieChannel:
     """Opens what `open_source` opens, for one channel alone. MediaError: it cannot be read, or has no such channel.
 
-    channel: one of channels.CHANNELS, or the name of a channel of the images' own; files, stream: as of open_source"""
+    channel: one of channels.CHANNELS, or the name of a channel of the images' own; files, stream: see open_source"""
     path = Path(path)
     if _is_movie(path, files):
         return _movies(path).MovieChannel(path, channel, stream=stream)
     return SequenceChannel(path, channel, files=files)
 
 
-def _is_movie(path, files):
+def _is_movie(path: Path, files: Sequence[str] | None) -> bool:
     return files is None and path.suffix.lower() not in IMAGE_SUFFIXES
 
 
-def _movies(path):
+def _movies(path: Path) -> ModuleType:
     """The module that reads movies. MediaError: this one cannot be read, for want of PyAV."""
     try:
         from . import movie

@@ -1,6 +1,7 @@
 """Frames of a source, decoded ahead of time by a thread."""
 
 import threading
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -29,14 +30,14 @@ class PrefetchSource(SourceWrapper):
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
 
-    def want(self, indices) -> None:
+    def want(self, indices: Iterable[int]) -> None:
         """Decodes these frames, in this order, and frees all others."""
         with self._changed:
             self._wanted = list(dict.fromkeys(indices))
             self._drop()
             self._wake()
 
-    def ready(self, indices) -> bool:
+    def ready(self, indices: Iterable[int]) -> bool:
         """Whether all these frames are decoded, so that `read` does not wait."""
         with self._changed:
             return self._done.keys() >= set(indices)
@@ -101,9 +102,8 @@ class PrefetchSource(SourceWrapper):
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._thread is not mine or self._next() is not None)
-                if self._thread is not mine:
+                if self._thread is not mine or (index := self._next()) is None:
                     return
-                index = self._next()
             frame = self._frame(index)
             with self._changed:
                 if self._thread is mine:

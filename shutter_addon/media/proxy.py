@@ -32,7 +32,7 @@ class ProxySource(SourceWrapper):
         except MediaError:
             return self._source.read(index)
         if frame.shape[:2] != (self.height, self.width):
-            frame = _resized(frame, self.width, self.height)
+            frame = _resized(frame, self.width, self.height, self._proxy.path.name)
         if (self._proxy.dtype, self._proxy.transfer) == (self.dtype, self.transfer):
             return frame
         return self._samples[frame if frame.dtype == np.uint8 else frame.view(np.uint16)]
@@ -54,13 +54,16 @@ class ProxySource(SourceWrapper):
         self._source.close()
 
 
-def _resized(frame: np.ndarray, width: int, height: int) -> np.ndarray:
-    """A frame of bytes or halves at another size. OpenImageIO takes 15 times as long for bytes."""
+def _resized(frame: np.ndarray, width: int, height: int, name: str) -> np.ndarray:
+    """A frame of bytes or halves at another size. OpenImageIO takes 15 times as long for bytes. MediaError: it has no
+    memory for that."""
     if frame.dtype == np.uint8:
         small = av.VideoFrame.from_ndarray(frame, format="rgba")
         return small.reformat(width=width, height=height, interpolation="BILINEAR").to_ndarray()
     resized = ImageBufAlgo.resize(ImageBuf(frame.astype(np.float32)), "triangle", roi=ROI(0, width, 0, height))
-    return resized.get_pixels(FLOAT).astype(frame.dtype)
+    if (pixels := resized.get_pixels(FLOAT)) is None:
+        raise MediaError(f"{name}: cannot be resized ({resized.geterror()})")
+    return pixels.astype(frame.dtype)
 
 
 def fits(proxy: FrameSource, source: FrameSource) -> bool:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from ..core.model.motions import Similarity
+from ..core.model.motions import Motion, Similarity
 from . import registration
 from .footage import Footage
-from .registration import Match, Motion, Part
+from .registration import Match, Part
 
 COVERED = "the subject is covered, or looks too different"
 LEFT = "the subject has left the picture"
@@ -22,6 +23,13 @@ _SHIFTED = 0.6  # what a location is worth where rotation and scale could not be
 _FADING = 0.6  # below it another frame is taken to compare with beside the first
 _AROUND = 0.05  # widths of the picture around its place within which it is sought at least
 _REPEATED = 0.3  # what a part is worth that looks like what is beside it
+
+
+class Sighting(NamedTuple):
+    """Where something is in a picture: its motion from the first one, and how sure that is, 0 to 1."""
+
+    motion: Similarity
+    confidence: float
 
 
 class PartPursuit:
@@ -40,51 +48,51 @@ class PartPursuit:
         # the last picture in which it was found, the motion, its confidence
         self._seen = footage.picture(frame), Similarity(), 1.0
 
-    def next(self, frame: int) -> tuple[Similarity, float] | None:
-        """The motion from the first picture to a frame's, and its confidence; None: it is not there."""
+    def next(self, frame: int) -> Sighting | None:
+        """Where it is in a frame's picture; None: it is not there."""
         picture, missed = self._footage.picture(frame), self._missed
-        found = None if missed else self._found(picture, self._speed.after(self._known))
-        if found is None:
+        sighting = None if missed else self._near(picture, self._speed.after(self._known))
+        if sighting is None:
             self._look_anew()
-            found = self._found_elsewhere(picture, missed, self._look)
-        elif found[1] < DOUBTFUL:
-            found = self._found_elsewhere(picture, missed) or found
-        if found is None:
+            sighting = self._elsewhere(picture, missed, self._look)
+        elif sighting.confidence < DOUBTFUL:
+            sighting = self._elsewhere(picture, missed) or sighting
+        if sighting is None:
             if not missed:
                 self.reason = LEFT if self._leaves(picture) else COVERED
             self._missed += 1
             return None
-        self._speed = found[0].after(self._known.inverse()) if not missed else Similarity()
-        self._known, self._seen, self._missed = found[0], (picture, *found), 0
-        return found
+        self._speed = sighting.motion.after(self._known.inverse()) if not missed else Similarity()
+        self._known, self._seen, self._missed = sighting.motion, (picture, *sighting), 0
+        return sighting
 
-    def _found(self, picture, guess: Similarity) -> tuple[Similarity, float] | None:
+    def _near(self, picture: np.ndarray, guess: Similarity) -> Sighting | None:
         """As `next`, near to a guess: as it looked first or, if that is not sure, as it looked later."""
         match = self._first.find(picture, guess, self._motion)
         sure = confidence(match, picture)
-        if sure >= SURE:
+        if match and sure >= SURE:
             self._first.learn(match)
-        if sure >= _FADING:
-            return match.motion, sure
+        if match and sure >= _FADING:
+            return Sighting(match.motion, sure)
         later = self._by_later_look(picture, guess)
         if later is None:
-            return (match.motion, sure) if sure >= _LOST else None
+            return Sighting(match.motion, sure) if match and sure >= _LOST else None
         points = self._first.points
-        if sure < SURE and np.abs(later[0](points) - guess(points)).max() > 1:
+        if sure < SURE and np.abs(later.motion(points) - guess(points)).max() > 1:
             # from there the first look may be near enough
-            again = self._first.find(picture, later[0], self._motion)
+            again = self._first.find(picture, later.motion, self._motion)
             if confidence(again, picture) > sure:
                 match, sure = again, confidence(again, picture)
-        return (match.motion, sure) if sure >= min(SURE, later[1]) else later
+        return Sighting(match.motion, sure) if match and sure >= min(SURE, later.confidence) else later
 
-    def _by_later_look(self, picture, guess: Similarity) -> tuple[Similarity, float] | None:
+    def _by_later_look(self, picture: np.ndarray, guess: Similarity) -> Sighting | None:
         if self._look.part is self._first:
             self._look_anew()
-        found = self._look.find(picture, guess, self._motion)
-        if found is None or found[1] < SURE * self._look.worth:
+        sighting = self._look.find(picture, guess, self._motion)
+        if sighting is None or sighting.confidence < SURE * self._look.worth:
             self._look_anew()
-            found = self._look.find(picture, guess, self._motion) or found
-        return found
+            sighting = self._look.find(picture, guess, self._motion) or sighting
+        return sighting
 
     def _look_anew(self) -> None:
         """Takes the look that it had when it was found last."""
@@ -92,19 +100,19 @@ class PartPursuit:
         if later := self._first.again(picture, motion):
             self._look = _Look(later, motion, max(_DRIFT * worth, _LEAST))
 
-    def _found_elsewhere(self, picture, missed: int, *looks: _Look) -> tuple[Similarity, float] | None:
-        """As `_found`, of all places where it may be by now; only if it looks as it did first, or as in other looks."""
+    def _elsewhere(self, picture: np.ndarray, missed: int, *looks: _Look) -> Sighting | None:
+        """As `_near`, of all places where it may be by now; only if it looks as it did first, or as in other looks."""
         radius = _AROUND * picture.shape[1] * (1 + missed / 4)
-        found = []
+        sightings = []
         for look in (_Look(self._first, Similarity(), 1.0), *looks):
             from_there = self._known.after(look.motion.inverse())
             for guess in (from_there, look.part.seek(picture, from_there, radius)):
-                match = guess and look.part.find(picture, guess, self._motion)
-                if (sure := confidence(match, picture)) >= _AGAIN:
-                    found.append((match.motion.after(look.motion), look.worth * sure))
-        return max(found, key=lambda each: each[1], default=None)
+                match = look.part.find(picture, guess, self._motion) if guess else None
+                if match and (sure := confidence(match, picture)) >= _AGAIN:
+                    sightings.append(Sighting(match.motion.after(look.motion), look.worth * sure))
+        return max(sightings, key=lambda each: each.confidence, default=None)
 
-    def _leaves(self, picture) -> bool:
+    def _leaves(self, picture: np.ndarray) -> bool:
         """Whether most of the part would lie outside of the picture if it went on."""
         places = self._speed.after(self._speed).after(self._known)(self._first.points)
         height, width = picture.shape
@@ -120,14 +128,14 @@ class _Look:
     motion: Similarity
     worth: float
 
-    def find(self, picture, guess: Similarity, motion: Motion) -> tuple[Similarity, float] | None:
-        """The motion from the first picture, and its confidence: by corners or, where these do not agree on the
-        motion, on the location alone."""
+    def find(self, picture: np.ndarray, guess: Similarity, motion: Motion) -> Sighting | None:
+        """Where it is by corners or, where these do not agree on the motion, by the location alone."""
         guess = guess.after(self.motion.inverse())
-        for way, share in ((motion, 1.0), ("location", _SHIFTED)):
+        ways: list[tuple[Motion, float]] = [(motion, 1.0), ("location", _SHIFTED)]
+        for way, share in ways:
             match = self.part.find(picture, guess, way)
-            if (sure := confidence(match, picture)) >= _LOST:
-                return match.motion.after(self.motion), share * self.worth * sure
+            if match and (sure := confidence(match, picture)) >= _LOST:
+                return Sighting(match.motion.after(self.motion), share * self.worth * sure)
         return None
 
 

@@ -1,6 +1,7 @@
 """Frames at a half or a quarter of their width and height, for previews."""
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from ..core.frames.frame_source import FrameSource
 from .source import SourceWrapper
@@ -33,7 +34,7 @@ def reduced_size(length: int, divisor: int) -> int:
 
 def reduced(frame: np.ndarray, divisor: int, alpha: str) -> np.ndarray:
     """The means over squares of a frame (height, width, 4), of the same type; at the right and the bottom the last
-    pixel goes on. alpha: as of FrameSource; straight colours count by their cover."""
+    pixel goes on. alpha: a FrameSource's; straight colours count by their cover."""
     if divisor == 1:
         return frame
     down, right = (-length % divisor for length in frame.shape[:2])
@@ -53,7 +54,7 @@ def reduced(frame: np.ndarray, divisor: int, alpha: str) -> np.ndarray:
     return (np.rint(means) if whole else means).astype(frame.dtype)
 
 
-def _sums(frame: np.ndarray, divisor: int, dtype) -> np.ndarray:
+def _sums(frame: np.ndarray, divisor: int, dtype: DTypeLike) -> np.ndarray:
     """The sums over squares of a frame whose sides they divide."""
     height, width, channels = frame.shape
     squares = frame.reshape(height // divisor, divisor, width // divisor, divisor, channels)

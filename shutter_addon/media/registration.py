@@ -7,7 +7,7 @@ Equal pictures give equal results, whatever the number of threads.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -98,25 +98,22 @@ class Part:
         crop = np.s_[top : y + height + margin, left : x + width + margin]
         self._picture, self._mask = np.ascontiguousarray(picture[crop]), np.ascontiguousarray(weight[crop])
         self._origin = complex(left, top)
-        found = _corners(self._picture, self._mask)
-        self.points = found + self._origin
-        columns, rows = found.real.astype(int), found.imag.astype(int)
+        corners = _corners(self._picture, self._mask)
+        self.points = corners + self._origin
+        columns, rows = corners.real.astype(int), corners.imag.astype(int)
         self._believed = self._mask[rows, columns].astype(np.float64)
         self._weights = self._believed.copy()
         self._ends = np.array([complex(a, b) for a in (x, x + width) for b in (y, y + height)])
 
     def find(self, picture: np.ndarray, guess: Similarity, motion: Motion) -> Match | None:
         """Where it is in a picture, near to a guess. None: its corners are not found there, or do not agree."""
-        found = None
-        for _ in range(3):  # where the guess was far off, what was found is a better one
-            found = self._match(picture, guess, motion)
-            if found is None:
-                return None
-            moved = np.abs(found.motion(self._ends) - guess(self._ends)).max()
-            guess = found.motion
-            if moved < 2:
+        match = self._match(picture, guess, motion)
+        for _ in range(2):  # where the guess was far off, what was found is a better one
+            if match is None or np.abs(match.motion(self._ends) - guess(self._ends)).max() < 2:
                 break
-        return replace(found, likeness=self._likeness(picture, found.motion))
+            guess = match.motion
+            match = self._match(picture, guess, motion)
+        return match and replace(match, likeness=self._likeness(picture, match.motion))
 
     def seek(self, picture: np.ndarray, known: Similarity, radius: float) -> Similarity | None:
         """Where in a picture its pixels are most alike, turned and scaled as in `known`, within a radius of pixels of
@@ -171,7 +168,7 @@ class Part:
         wanted = self._weights * np.where(match.agreeing, 1.0, 0.05)
         self._believed += np.where(match.seen, 0.2 * (wanted - self._believed), 0)
 
-    def _match(self, picture, guess, motion) -> Match | None:
+    def _match(self, picture: np.ndarray, guess: Similarity, motion: Motion) -> Match | None:
         size = self._picture.shape[::-1]
         back = cv2.warpAffine(picture, matrix(guess, self._origin), size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
         there = guess(self.points)
@@ -180,35 +177,35 @@ class Part:
         total, weights = self._believed.sum(), np.where(seen, self._believed, 0)
         if seen.sum() < FEWEST[motion] or weights.sum() <= 0.02 * total:
             return None
-        found, good = self._flow(back)
+        moved, good = self._flow(back)
         good &= seen
         tolerance = max(1.0, max(picture.shape) / 640)
-        fitted = fit(self.points, found, np.where(good, weights, 0), motion, tolerance)
+        fitted = fit(self.points, moved, np.where(good, weights, 0), motion, tolerance)
         if fitted is None:
             return None
         change, agreeing = fitted
-        off = np.abs(change(self.points) - found)
+        off = np.abs(change(self.points) - moved)
         error = _expected_error(self.points[agreeing], off[agreeing], weights[agreeing], self._ends, motion)
         return Match(
-            guess.after(change),
-            agreeing,
-            seen,
-            float(weights[agreeing].sum() / weights.sum()),
-            float(weights.sum() / total),
-            error,
+            motion=guess.after(change),
+            agreeing=agreeing,
+            seen=seen,
+            share=float(weights[agreeing].sum() / weights.sum()),
+            visible=float(weights.sum() / total),
+            error=error,
         )
 
-    def _flow(self, picture) -> tuple[np.ndarray, np.ndarray]:
+    def _flow(self, picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where each corner is in a picture, and whether it comes back from there."""
-        options = {"winSize": self._window, "maxLevel": _LEVELS}
+        options: dict[str, Any] = {"winSize": self._window, "maxLevel": _LEVELS}
         options["criteria"] = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 0.01)
         start = _pairs(self.points - self._origin)
-        there, found, _ = cv2.calcOpticalFlowPyrLK(self._picture, picture, start, None, **options)
+        there, forth, _ = cv2.calcOpticalFlowPyrLK(self._picture, picture, start, None, **options)
         again, back, _ = cv2.calcOpticalFlowPyrLK(picture, self._picture, there, None, **options)
         close = np.hypot(*(again - start).T) < _THERE_AND_BACK
-        return _plane(there) + self._origin, found.ravel().astype(bool) & back.ravel().astype(bool) & close.ravel()
+        return _plane(there) + self._origin, forth.ravel().astype(bool) & back.ravel().astype(bool) & close.ravel()
 
-    def _likeness(self, picture, motion) -> float:
+    def _likeness(self, picture: np.ndarray, motion: Similarity) -> float:
         """Correlation of the part's pixels with those in another picture, as far as they lie in it; both smaller."""
         x, y, width, height = self.box
         share = min(1.0, _SOUGHT / max(width, height))
@@ -235,7 +232,9 @@ def correlation(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> fl
     return (cross + _NOISE) / (np.sqrt((powers[0] + _NOISE) * (powers[1] + _NOISE)))
 
 
-def fit(source: np.ndarray, target: np.ndarray, weights: np.ndarray, motion: Motion, tolerance: float):
+def fit(
+    source: np.ndarray, target: np.ndarray, weights: np.ndarray, motion: Motion, tolerance: float
+) -> tuple[Similarity, np.ndarray] | None:
     """The similarity close to none that takes most weight of the source's points to the target's within a tolerance in
     pixels, and which points (n,) bool; None: too few agree. By RANSAC, then by least squares."""
     usable = np.flatnonzero(weights > 0)
@@ -246,19 +245,19 @@ def fit(source: np.ndarray, target: np.ndarray, weights: np.ndarray, motion: Mot
     off = np.abs(turns[:, None] * p + shifts[:, None] - q)
     scores = (w * np.maximum(0, 1 - (off / tolerance) ** 2)).sum(axis=1)
     best = int(scores.argmax())
-    found = Similarity(complex(turns[best]), complex(shifts[best]))
+    fitted = Similarity(complex(turns[best]), complex(shifts[best]))
     for _ in range(4):
-        off = np.abs(found(p) - q)
+        off = np.abs(fitted(p) - q)
         close = off < tolerance
         if close.sum() < FEWEST[motion]:
             return None
-        found = _least_squares(p[close], q[close], (w * (1 - (off / tolerance) ** 2))[close], motion)
+        fitted = _least_squares(p[close], q[close], (w * (1 - (off / tolerance) ** 2))[close], motion)
     agreeing = np.zeros(len(source), bool)
-    agreeing[usable[np.abs(found(p) - q) < tolerance]] = True
-    return (found, agreeing) if agreeing.sum() >= FEWEST[motion] else None
+    agreeing[usable[np.abs(fitted(p) - q) < tolerance]] = True
+    return (fitted, agreeing) if agreeing.sum() >= FEWEST[motion] else None
 
 
-def _hypotheses(p, q, motion) -> tuple[np.ndarray, np.ndarray]:
+def _hypotheses(p: np.ndarray, q: np.ndarray, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     """Turns and shifts (k,) of similarities, each by one or two pairs of points."""
     count = len(p)
     if motion == "location":
@@ -279,7 +278,7 @@ def _hypotheses(p, q, motion) -> tuple[np.ndarray, np.ndarray]:
     return turns, (q[first] + q[second] - turns * (p[first] + p[second])) / 2
 
 
-def _least_squares(p, q, weights, motion) -> Similarity:
+def _least_squares(p: np.ndarray, q: np.ndarray, weights: np.ndarray, motion: Motion) -> Similarity:
     """The best similarity between points, by complex regression."""
     total = weights.sum()
     middle, target = (weights * p).sum() / total, (weights * q).sum() / total
@@ -293,7 +292,9 @@ def _least_squares(p, q, weights, motion) -> Similarity:
     return Similarity(turn, complex(target - turn * middle))
 
 
-def _expected_error(points, off, weights, ends, motion) -> float:
+def _expected_error(
+    points: np.ndarray, off: np.ndarray, weights: np.ndarray, ends: np.ndarray, motion: Motion
+) -> float:
     """Standard error in pixels, where it is largest, of a motion that was fitted to points which it leaves off by so
     much. Corners beside one another err alike: only every fourth counts as one by itself."""
     count = max(len(points) / 4, 1.0)
@@ -306,23 +307,23 @@ def _expected_error(points, off, weights, ends, motion) -> float:
     return float(np.sqrt(variance * (1 + lever)))
 
 
-def _corners(picture, weight) -> np.ndarray:
+def _corners(picture: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """The corners (n,) in the part of a picture whose weight is above 0, more than noise and apart from one another."""
     mask = (weight > 0).astype(np.uint8)
     apart = max(3.0, np.sqrt(mask.sum() / MOST_CORNERS) * 0.6)
     strength = cv2.cornerMinEigenVal(picture, 5)
     mask &= (strength > _WEAKEST).astype(np.uint8)
-    found = cv2.goodFeaturesToTrack(picture, MOST_CORNERS, _QUALITY, apart, mask=mask, blockSize=5)
-    return np.zeros(0, complex) if found is None else _plane(found)
+    corners = cv2.goodFeaturesToTrack(picture, MOST_CORNERS, _QUALITY, apart, mask=mask, blockSize=5)
+    return np.zeros(0, complex) if corners is None else _plane(corners)
 
 
-def _plane(pairs) -> np.ndarray:
+def _plane(pairs: np.ndarray) -> np.ndarray:
     """Points (n, 1, 2) as complex numbers."""
     pairs = pairs.reshape(-1, 2).astype(np.float64)
     return pairs[:, 0] + 1j * pairs[:, 1]
 
 
-def _pairs(points) -> np.ndarray:
+def _pairs(points: np.ndarray) -> np.ndarray:
     return np.stack([points.real, points.imag], axis=-1).astype(np.float32)[:, None]
 
 

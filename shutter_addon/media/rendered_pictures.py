@@ -40,7 +40,8 @@ def read(path: Path, edit: str | None = None) -> RenderedPicture | None:
         key = edit_version.key_in(spec.get_string_attribute("Note"))
         if edit not in (None, key) or not _is_sound(path, image):
             return None
-        return RenderedPicture((spec.width, spec.height), spec.nchannels, str(spec.format), key)
+        size = spec.width, spec.height
+        return RenderedPicture(size=size, channels=spec.nchannels, samples=str(spec.format), edit=key)
     except (OSError, UnicodeDecodeError):  # the latter of names in a damaged file
         return None
     finally:
@@ -59,11 +60,14 @@ def stamp(path: Path) -> tuple[int, int, int] | None:
 
 
 def is_transparent(path: Path) -> bool:
-    """Whether a pixel of a sound picture, whose last channel is alpha, is not opaque."""
+    """Whether a pixel of a picture, whose last channel is alpha, is not opaque; False where it cannot be read."""
     image = ImageInput.open(check_name(path))
+    if image is None:
+        return False
     try:
-        alpha = image.spec().nchannels - 1
-        return image.read_image(0, 0, alpha, alpha + 1, "float").min() < 1
+        last = image.spec().nchannels - 1
+        alpha = image.read_image(0, 0, last, last + 1, "float")
+        return alpha is not None and bool(alpha.min() < 1)
     finally:
         image.close()
 

@@ -1,8 +1,12 @@
 """Frames of an image sequence, or of one image: the samples that the files hold, whatever their format."""
 
+from __future__ import annotations
+
 import bisect
 import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from fractions import Fraction
 from functools import lru_cache, partial
 from itertools import pairwise
 from pathlib import Path
@@ -29,6 +33,9 @@ NO_GREY = frozenset({"X", "BY", "RY"})  # beside these, Y is not all of the pict
 MISSING = 100  # numbers in a row; what lies beyond a wider gap is another sequence, or a stray number
 LONGEST = 1_048_574  # Blender's last frame
 
+Window = tuple[int, int, int, int]  # x, y, width, height
+Layer = tuple[ImageSpec, list[int]]  # what describes a part of an image, and the positions of channels in it
+
 
 class ImageFiles:
     """The files of an image sequence, by frame.
@@ -40,7 +47,7 @@ class ImageFiles:
     path: the first file; files: those there are, in order; count: of frames
     """
 
-    def __init__(self, path, files=None):
+    def __init__(self, path: str | Path, files: Sequence[str] | None = None):
         """MediaError: there is no first file, or its folder cannot be listed."""
         path = Path(path)
         self.left_out = ""
@@ -55,11 +62,11 @@ class ImageFiles:
             self.files = [folder / file for file in files]
             if not self.files:
                 raise MediaError(f"{path.name}: an image sequence without files")
-            self._starts = range(len(self.files))
+            self._starts = [*range(len(self.files))]
             self.path = check_file(self.files[0])
         self.count = self._starts[-1] + 1
 
-    def __getitem__(self, index):
+    def __getitem__(self, index: int) -> Path:
         return self.files[bisect.bisect_right(self._starts, index) - 1]
 
 
@@ -71,7 +78,14 @@ class SequenceSource(FrameSource):
     sample type; one with alpha among them, and the source has alpha.
     """
 
-    def __init__(self, path, *, files=None, fps=None, alpha=None):
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        files: Sequence[str] | None = None,
+        fps: Fraction | None = None,
+        alpha: str | None = None,
+    ):
         self._files = ImageFiles(path, files)
         self.path, self.count, self.left_out = self._files.path, self._files.count, self._files.left_out
         self.fps = fps
@@ -84,11 +98,11 @@ class SequenceSource(FrameSource):
         self.options = {}
 
     @property
-    def files(self):
+    def files(self) -> list[Path]:
         """The file of each frame."""
         return [self._files[index] for index in range(self.count)]
 
-    def read(self, index):
+    def read(self, index: int) -> np.ndarray:
         """The frame as a new array (height, width, 4), RGBA, top row first.
 
         Raises MediaError for a file that is missing, damaged or unlike the first, IndexError outside 0 … count-1."""
@@ -98,19 +112,19 @@ class SequenceSource(FrameSource):
             self._check_like_first(path, spec)
             return self._expand(_samples(image, spec, layer, path))
 
-    def _check_like_first(self, path, spec):
+    def _check_like_first(self, path: Path, spec: ImageSpec) -> None:
         size, dtype = (spec.width, spec.height), _dtype(spec)
         whole = size == (spec.full_width, spec.full_height)
         _check_size_like_first(self, path, size, "" if whole else " (its data window)")
         if dtype != self.dtype:
             raise MediaError(f"{path.name}: has {dtype} samples, but {self.path.name} has {self.dtype}")
 
-    def _usual_alpha(self):
+    def _usual_alpha(self) -> str:
         """What Blender assumes, whatever a TIFF says of itself."""
         deep_tiff = self.path.suffix.lower() in (".tif", ".tiff") and self.dtype == np.uint16
         return "premultiplied" if self.transfer == "linear" or deep_tiff else "straight"
 
-    def _expand(self, samples):
+    def _expand(self, samples: np.ndarray) -> np.ndarray:
         """Y, YA, RGB or RGBA samples as RGBA."""
         picture = np.empty((self.height, self.width, 4), self.dtype)
         channels = samples.shape[2]
@@ -119,7 +133,7 @@ class SequenceSource(FrameSource):
         picture[..., 3] = samples[..., -1] if channels in ALPHA else opaque
         return picture
 
-    def close(self):
+    def close(self) -> None:
         """Nothing stays open between frames."""
 
 
@@ -135,44 +149,46 @@ class SequenceChannel:
 
     fps = None
 
-    def __init__(self, path, channel, *, files=None):
+    def __init__(self, path: str | Path, channel: str, *, files: Sequence[str] | None = None):
         """channel: one of CHANNELS, or the name of one of the files' own. MediaError: they have none of that name."""
         self._files = ImageFiles(path, files)
         self.path, self.count = self._files.path, self._files.count
-        self._found = partial(_channel_named, channel)
-        with _opened(self.path, self._found) as (image, spec, _positions):
+        self._layer_of = partial(_channel_named, channel)
+        with _opened(self.path, self._layer_of) as (image, spec, _positions):
             _, _, self.width, self.height = _picture_window(image, spec, self.path)
 
     @property
-    def files(self):
+    def files(self) -> list[Path]:
         """The file of each frame."""
         return [self._files[index] for index in range(self.count)]
 
-    def read(self, index):
+    def read(self, index: int) -> np.ndarray:
         """The samples (height, width, n) that the channel is made of, top row first: n is 3, RGB, for the luminance of
         colours, 0 for the alpha of an opaque image, 1 otherwise.
 
         Raises MediaError for a file that is missing, damaged or unlike the first, IndexError outside 0 … count-1."""
         check_index(self, index)
         path = check_file(self._files[index])
-        with _opened(path, self._found) as (image, spec, positions):
+        with _opened(path, self._layer_of) as (image, spec, positions):
             window = _picture_window(image, spec, path)
             _check_size_like_first(self, path, window[2:])
             if not positions:
                 return np.empty((self.height, self.width, 0), np.uint8)
             return _in_window(_samples(image, spec, positions, path), spec, window)
 
-    def close(self):
+    def close(self) -> None:
         """Nothing stays open between frames."""
 
 
-def _check_size_like_first(sequence, path, size, window=""):
+def _check_size_like_first(
+    sequence: SequenceSource | SequenceChannel, path: Path, size: tuple[int, int], window: str = ""
+) -> None:
     if size != (sequence.width, sequence.height):
         first = f"{sequence.path.name} is {sequence.width}×{sequence.height}"
         raise MediaError(f"{path.name}: is {size[0]}×{size[1]}{window}, but {first}")
 
 
-def _picture_window(image, spec, path):
+def _picture_window(image: ImageInput, spec: ImageSpec, path: Path) -> Window:
     """(x, y, width, height) of what a SequenceChannel shows of an image."""
     if image.format_name() != "openexr" or spec.roi.contains(spec.roi_full):
         return spec.x, spec.y, spec.width, spec.height
@@ -180,7 +196,7 @@ def _picture_window(image, spec, path):
     return spec.full_x, spec.full_y, spec.full_width, spec.full_height
 
 
-def _in_window(samples, spec, window):
+def _in_window(samples: np.ndarray, spec: ImageSpec, window: Window) -> np.ndarray:
     """An image's samples in a window (x, y, width, height), 0 beside them."""
     x, y, width, height = window
     if window == (spec.x, spec.y, spec.width, spec.height):
@@ -192,26 +208,27 @@ def _in_window(samples, spec, window):
     return picture
 
 
-def _numbered(path):
+def _numbered(path: Path) -> tuple[list[int], list[Path], Path | None]:
     """(frame numbers from 0, files, the file beyond too wide a gap or None) from that file on: those that differ in the
     last number of the name only."""
     parts = _last_number(path.stem)
     if parts is None:
         return [0], [path], None
-    first, found = int(parts[1]), {}
+    prefix, first, suffix = parts
+    by_frame: dict[int, Path] = {}
     for file in numbered_alike(path):
-        digits = _last_number(file.stem)[1]
-        number = int(digits) - first
-        if number >= 0 and (number not in found or len(digits) == len(parts[1])):
-            found[number] = file
-    numbers = sorted(found)
+        digits = file.stem[len(prefix) : len(file.stem) - len(suffix)]
+        number = int(digits) - int(first)
+        if number >= 0 and (number not in by_frame or len(digits) == len(first)):
+            by_frame[number] = file
+    numbers = sorted(by_frame)
     gaps = (i for i, (a, b) in enumerate(pairwise(numbers), 1) if b - a > MISSING + 1 or b >= LONGEST)
     end = next(gaps, len(numbers))
-    files = [found[number] for number in numbers]
+    files = [by_frame[number] for number in numbers]
     return numbers[:end], files[:end], files[end] if end < len(files) else None
 
 
-def numbered_alike(path):
+def numbered_alike(path: Path) -> list[Path]:
     """The files in a file's folder, in order, whose name differs from its own in the last number only, if at all.
     MediaError: the folder cannot be listed."""
     parts = _last_number(path.stem)
@@ -222,13 +239,13 @@ def numbered_alike(path):
     return [file for file in sorted(_listed(path.parent)) if alike.fullmatch(file.name)]
 
 
-def _last_number(stem):
+def _last_number(stem: str) -> tuple[str, str, str] | None:
     """(what is before it, its digits, what is behind it) of the last number in a file's stem; None: there is none."""
     match = re.fullmatch(r"(.*?)(\d+)(\D*)", stem, re.DOTALL)
-    return match and match.groups()
+    return (match[1], match[2], match[3]) if match else None
 
 
-def by_number(path):
+def by_number(path: Path) -> Callable[[int], Path] | None:
     """A function that gives the file i numbers on from that one, in the same folder; None: its stem has no number."""
     parts = _last_number(path.stem)
     if parts is None:
@@ -237,14 +254,14 @@ def by_number(path):
     return lambda i: path.with_name(f"{before}{int(digits) + i:0{len(digits)}d}{behind}{path.suffix}")
 
 
-def _listed(folder):
+def _listed(folder: Path) -> list[Path]:
     try:
         return list(folder.iterdir())
     except OSError as error:
         raise MediaError(f"{folder}: cannot be listed ({error.strerror})") from None
 
 
-def _has_alpha(path):
+def _has_alpha(path: Path) -> bool:
     """Whether that file of a sequence has alpha, as far as it can be read; it is opened only if it changed since."""
     if path.suffix.lower() in WITHOUT_ALPHA:
         return False
@@ -256,17 +273,18 @@ def _has_alpha(path):
 
 
 @lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
-def _had_alpha(path, _size, _mtime):
+def _had_alpha(path: Path, _size: int, _mtime: int) -> bool:
     with _opened(path) as (_image, _spec, layer):
         return len(layer) in ALPHA
 
 
-def _first_colours(image, path):
+def _first_colours(image: ImageInput, path: Path) -> Layer:
     """(spec, positions) of the channels that Blender shows."""
     spec = whole = image.spec()
     if image.format_name() != "openexr":
         return spec, [*range(min(spec.nchannels, 4))]
-    names, part = [], 0
+    names: list[str] = []
+    part = 0
     while image.seek_subimage(part, 0):
         spec = image.spec()
         layer = _colour_channels(spec.channelnames)
@@ -279,10 +297,11 @@ def _first_colours(image, path):
     raise MediaError(f"{path.name}: no colour channels, only {', '.join(names)}")
 
 
-def _channel_named(channel, image, path):
+def _channel_named(channel: str, image: ImageInput, path: Path) -> Layer:
     """(spec, positions) of a channel: three for the luminance of colours, none for the alpha of an opaque image.
     What an EXR calls "red" itself is that: coefficients have the names of shutters."""
-    names, part, is_exr = [], 0, image.format_name() == "openexr"
+    names: list[str] = []
+    part, is_exr = 0, image.format_name() == "openexr"
     while (is_exr or channel not in CHANNELS) and image.seek_subimage(part, 0):
         spec = image.spec()
         if not spec.deep:
@@ -299,32 +318,34 @@ def _channel_named(channel, image, path):
     return spec, colours if channel == "luminance" else (3 * colours)[CHANNELS[channel]]
 
 
-def _colour_channels(names):
+def _colour_channels(names: Iterable[str]) -> list[int]:
     """Where an EXR keeps the colours that Blender shows: those of its first layer, there plain ones or "Combined"
     before other passes; XYZ for want of colours, and then grey."""
-    passes = {}
+    passes: dict[str, dict[str, int]] = {}
     for position, name in enumerate(names):
         place, _, channel = name.rpartition(".")
         passes.setdefault(place, {})[channel.upper()] = position
     order = sorted(passes, key=_rank)
     for kinds in COLOURS:
-        for channels in map(passes.get, order):
+        for channels in map(passes.__getitem__, order):
             for wanted in kinds:
                 if channels.keys() >= set(wanted) and not ("Y" in kinds and channels.keys() & NO_GREY):
                     return [channels[channel] for channel in wanted]
     return []
 
 
-def _rank(place):
+def _rank(place: str) -> tuple[str, bool, str]:
     layer, _, name = place.rpartition(".")
     return layer, name not in ("", "Combined"), name
 
 
 @contextmanager
-def _opened(path, found=_first_colours):
+def _opened(
+    path: Path, layer_of: Callable[[ImageInput, Path], Layer] = _first_colours
+) -> Iterator[tuple[ImageInput, ImageSpec, list[int]]]:
     """(open image, spec, positions of channels). MediaError: there is no such image.
 
-    found: gives spec and positions; those of the colours are Y, YA, RGB or RGBA"""
+    layer_of: gives spec and positions; those of the colours are Y, YA, RGB or RGBA"""
     wishes = ImageSpec()
     wishes.attribute("oiio:UnassociatedAlpha", 1)  # no premultiplication on reading
     image = ImageInput.open(check_name(path), wishes)
@@ -333,7 +354,7 @@ def _opened(path, found=_first_colours):
     try:
         if image.format_name() not in BLENDERS_FORMATS.split():
             raise MediaError(f"{path.name}: {FOREIGN}")
-        spec, layer = found(image, path)
+        spec, layer = layer_of(image, path)
         check_size(path.name, spec.width, spec.height)
         yield image, spec, layer
     except UnicodeDecodeError as error:  # names within a damaged file
@@ -342,11 +363,11 @@ def _opened(path, found=_first_colours):
         image.close()
 
 
-def _dtype(spec):
+def _dtype(spec: ImageSpec) -> np.dtype:
     return np.dtype(SAMPLES.get(str(spec.format), np.float32))
 
 
-def _samples(image, spec, layer, path):
+def _samples(image: ImageInput, spec: ImageSpec, layer: list[int], path: Path) -> np.ndarray:
     """The layer's samples (height, width, channels)."""
     kinds = {np.uint8: "uint8", np.uint16: "uint16", np.float16: "half", np.float32: "float"}
     kind, first, stop = kinds[_dtype(spec).type], min(layer), max(layer) + 1
@@ -361,7 +382,7 @@ def _samples(image, spec, layer, path):
     return samples.astype(_dtype(spec), copy=False)
 
 
-def _told(geterror, path, otherwise):
+def _told(geterror: Callable[[], str], path: Path, otherwise: str) -> str:
     """What OpenImageIO says of an error in a file, for use inside a sentence; it may quote bytes that are no text."""
     try:
         text = geterror()
@@ -370,5 +391,5 @@ def _told(geterror, path, otherwise):
     return " ".join(text.replace(str(path), path.name).split()).partition(". ")[0] or otherwise
 
 
-def _as_text(error):
+def _as_text(error: UnicodeDecodeError) -> str:
     return error.object.decode(errors="replace")

@@ -1,5 +1,8 @@
 """A source around another one: what every wrapper shares."""
 
+from collections.abc import Iterable
+from typing import Any
+
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
@@ -9,10 +12,10 @@ from ..core.frames.planes import Planes
 class _Forwarded:
     """An attribute of the wrapped source, unless the wrapper sets its own."""
 
-    def __set_name__(self, _owner, name):
+    def __set_name__(self, _owner: type, name: str) -> None:
         self._name = name
 
-    def __get__(self, wrapper, _owner=None):
+    def __get__(self, wrapper: "SourceWrapper | None", _owner: type | None = None) -> Any:
         return self if wrapper is None else getattr(wrapper._source, self._name)
 
 
@@ -44,7 +47,7 @@ class SourceWrapper(FrameSource):
     def decoded(self, index: int) -> np.ndarray | Planes:
         return self.read(index)  # which may give other frames than the source
 
-    def want(self, indices) -> None:
+    def want(self, indices: Iterable[int]) -> None:
         self._source.want(indices)
 
     def has(self, index: int) -> bool:

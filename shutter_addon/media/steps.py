@@ -51,12 +51,12 @@ def moved(source: FrameSource, index: int) -> Moved | None:
     return Moved(*(points[known].astype(np.complex64) / first.shape[0] for points in (places, ends)))
 
 
-def step(found: Moved, before: Similarity, after: Similarity) -> float:
+def step(moved: Moved, before: Similarity, after: Similarity) -> float:
     """How far, in heights of the picture, what moves most goes in an exposure that follows something: SHARE of the
     picture goes as far or farther.
 
     before, after: where the points of the shown picture lie in the two frames, in heights of the picture"""
-    ways = after.inverse()(found.after) - before.inverse()(found.before)
+    ways = after.inverse()(moved.after) - before.inverse()(moved.before)
     return float(np.quantile(np.abs(ways), 1 - SHARE))
 
 
@@ -64,4 +64,4 @@ def _small(source: FrameSource, index: int) -> np.ndarray:
     luma = flow.luma(source.read(index), source.transfer, source.alpha)
     rows = min(ROWS, luma.shape[0])
     size = max(1, round(luma.shape[1] * rows / luma.shape[0])), rows
-    return flow.cv2.resize(luma, size, interpolation=flow.cv2.INTER_AREA)
+    return flow.resized(luma, size)

@@ -15,13 +15,12 @@ from typing import Protocol
 import numpy as np
 
 from ..core.model import motions, scribbles
-from ..core.model.effect import Camera, Region
-from ..core.model.motions import Placement, Similarity
+from ..core.model.motions import Motion, Placement, Similarity
 from . import registration
 from .errors import MediaError
 from .footage import Footage
-from .pursuit import DOUBTFUL, SURE, PartPursuit, confidence, distinctness
-from .registration import Motion, Part
+from .pursuit import DOUBTFUL, SURE, PartPursuit, Sighting, confidence, distinctness
+from .registration import Part
 
 PATIENCE = 25  # frames for which a lost subject is looked for
 
@@ -58,8 +57,22 @@ class Tracked:
     fault: str = ""
 
 
+class Subject(Protocol):
+    """What is tracked: as effect.Region and effect.Camera, whole frames alone."""
+
+    def placement(self, frame: int, /) -> Placement: ...
+
+    def centre(self, frame: int, /) -> np.ndarray | None: ...
+
+
+class Drawn(Subject, Protocol):
+    """A subject that has strokes."""
+
+    def at(self, frame: int, /) -> scribbles.Shape: ...
+
+
 def follow(
-    region: Region,
+    region: Drawn,
     footage: Footage,
     start: int,
     frames: range,
@@ -99,18 +112,19 @@ class Pursuit(Protocol):
 
     reason: str
 
-    def next(self, frame: int) -> tuple[Similarity, float] | None:
-        """The motion from the first picture to a frame's, and its confidence; None: it is not there."""
+    def next(self, frame: int) -> Sighting | None:
+        """Where it is in a frame; None: it is not there."""
 
 
 class Track(ABC):
     """What tracking a subject, a region or the camera, needs to know."""
 
-    def __init__(self, subject: Region | Camera, footage: Footage, motion: Motion, frames: Collection[int]):
+    def __init__(self, subject: Subject, footage: Footage, motion: Motion, frames: Collection[int]):
         """frames: all at which the subject's centre is asked for."""
         self._subject, self._footage, self._motion = subject, footage, motion
-        self._centres = {frame: subject.centre(frame) for frame in frames}
-        if any(centre is None for centre in self._centres.values()):
+        centres = {frame: subject.centre(frame) for frame in frames}
+        self._centres = {frame: centre for frame, centre in centres.items() if centre is not None}
+        if len(self._centres) < len(centres):
             raise TrackingError(EMPTY)
         self._parts: dict[int, tuple[Part, float]] = {}
 
@@ -155,16 +169,16 @@ class Track(ABC):
         """From `start` towards an anchor, and then blended with the way back from there."""
         step = 1 if anchor > start else -1
         there, back, faults = {}, {}, []
-        for found in self._from(start, range(start + step, anchor, step)):
-            if found.fault:
-                faults.append(found)
+        for tracked in self._from(start, range(start + step, anchor, step)):
+            if tracked.fault:
+                faults.append(tracked)
             else:
-                there[found.frame] = found
-                yield found
+                there[tracked.frame] = tracked
+                yield tracked
         if self._has_part(anchor):  # or what was found from the start alone has to do
             returning = list(self._from(anchor, range(anchor - step, start, -step)))
-            back = {found.frame: found for found in returning if not found.fault}
-            faults += [found for found in returning if found.fault]
+            back = {tracked.frame: tracked for tracked in returning if not tracked.fault}
+            faults += [tracked for tracked in returning if tracked.fault]
         for frame in range(start + step, anchor, step):
             share = (frame - start) / (anchor - start)
             if blended := _blended(there.get(frame), back.get(frame), share):
@@ -176,20 +190,22 @@ class Track(ABC):
         """Frames one after another, away from `start`."""
         self._footage.want(frames)
         origin, pursuit, worth = self._pursuit(start)
-        last, shown, lost = Tracked(start, self._placement(start), 1.0), start, []
+        last, shown = Tracked(start, self._placement(start), 1.0), start
+        lost: list[int] = []
         for frame in frames:
             self._footage.picture(frame)  # in the order in which they are read, before cuts are looked for
             if self._footage.cut(shown, frame):
                 fault = pursuit.reason if lost else SHOT_ENDS
                 yield Tracked((lost or [frame])[0], last.placement, 0.0, fault)
                 return
-            found, shown = pursuit.next(frame), frame
-            if found is None:
+            sighting, shown = pursuit.next(frame), frame
+            if sighting is None:
                 lost.append(frame)
                 if len(lost) > PATIENCE:
                     break
                 continue
-            seen = Tracked(frame, self._carried(origin, frame, found[0], last.placement), worth * found[1])
+            placement = self._carried(origin, frame, sighting.motion, last.placement)
+            seen = Tracked(frame, placement, worth * sighting.confidence)
             yield from self._bridged(last, seen, lost)
             last, lost = seen, []
             yield last
@@ -208,27 +224,28 @@ class Track(ABC):
         moved = motions.carried(self._placement(origin), motion, before, after, self._footage.size)
         return motions.unwound(moved, near)
 
-    def _bridged(self, last: Tracked, found: Tracked, lost: list[int]) -> Iterator[Tracked]:
+    def _bridged(self, last: Tracked, seen: Tracked, lost: list[int]) -> Iterator[Tracked]:
         """Frames at which the subject was not seen, on a straight way between those beside them, however the shape is
         redrawn meanwhile."""
         for missing in lost:
-            share = (missing - last.frame) / (found.frame - last.frame)
-            centre = (1 - share) * self._centres[last.frame] + share * self._centres[found.frame]
-            straight = motions.between(last.placement, found.placement, share)
-            x, y = (float(number) for number in straight.location + centre - self._centres[missing])
+            share = (missing - last.frame) / (seen.frame - last.frame)
+            centre = (1 - share) * self._centres[last.frame] + share * self._centres[seen.frame]
+            straight = motions.between(last.placement, seen.placement, share)
+            x, y = (float(number) for number in np.add(straight.location, centre) - self._centres[missing])
             yield Tracked(missing, replace(straight, location=(x, y)), 0.0)
 
 
 class _RegionTrack(Track):
     """Tracks what a region covers."""
 
-    def __init__(self, region: Region, *arguments):
-        super().__init__(region, *arguments)
+    def __init__(self, region: Drawn, footage: Footage, motion: Motion, frames: Collection[int]):
+        super().__init__(region, footage, motion, frames)
+        self._region = region
         self._doubted: dict[int, int | None] = {}
 
     def _part(self, frame: int) -> tuple[Part, float]:
         """Corners far from the region are less surely its own; those of a pattern may be those of its next period."""
-        shape, (width, height) = self._subject.at(frame), self._footage.size
+        shape, (width, height) = self._region.at(frame), self._footage.size
         covered = scribbles.rasterise([replace(shape, shutter=0)], width, height) > 0
         if not covered.any():
             raise TrackingError(OUTSIDE)
@@ -293,15 +310,14 @@ class _RegionTrack(Track):
     def _is_seen_behind(self, frame: int, other: int, shown: set[int]) -> bool:
         """Whether the look of a frame is surely seen soon behind another one."""
         step = 1 if other > frame else -1
-        behind = range(other + step, other + step * (PATIENCE + 1), step)
-        behind = list(takewhile(shown.__contains__, behind))
+        behind = list(takewhile(shown.__contains__, range(other + step, other + step * (PATIENCE + 1), step)))
         self._footage.want(behind)
         pursuit = PartPursuit(self.part(frame)[0], self._footage, frame, self._motion, self._known(frame, other))
         for each in behind:
             if self._footage.cut(each - step, each):
                 break
-            found = pursuit.next(each)
-            if found and found[1] >= SURE:
+            sighting = pursuit.next(each)
+            if sighting and sighting.confidence >= SURE:
                 return True
         return False
 
@@ -310,9 +326,8 @@ class _RegionTrack(Track):
 
     def _known(self, frame: int, other: int) -> Similarity:
         """The motion from one frame to another, both of which have a right placement."""
-        both = ((self._subject.placement(each), self._centres[each]) for each in (frame, other))
-        placements, centres = zip(*both, strict=True)
-        return motions.motion_between(*placements, *centres, self._footage.size)
+        first, second = self._subject.placement(frame), self._subject.placement(other)
+        return motions.motion_between(first, second, self._centres[frame], self._centres[other], self._footage.size)
 
 
 def _falloff(away: np.ndarray, reach: float) -> np.ndarray:
