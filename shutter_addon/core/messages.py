@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 LONGEST = 300  # characters of a sentence, as users see it
@@ -27,7 +27,7 @@ class EffectError(UserError, RuntimeError):
 
 
 @contextmanager
-def translated(translate: Callable[[str], str]):
+def translated(translate: Callable[[str], str]) -> Iterator[None]:
     """Context in which the sentences of EffectErrors are passed on in the user's language. translate: a template into
     it."""
     try:
@@ -37,7 +37,7 @@ def translated(translate: Callable[[str], str]):
             raise
         words = dict(error.words)
         if fault := words.get("fault"):
-            words["fault"] = translate(fault)
+            words["fault"] = translate(str(fault))
         raise EffectError(translate(error.template).format(**words)) from None
 
 

@@ -5,12 +5,15 @@ It tells nobody of strokes and of files on disk: previews look for them when the
 """
 
 from collections.abc import Callable, Hashable
+from typing import Any, TypeVar
+
+T = TypeVar("T")
 
 
 class Revision:
     """number: grows with every change"""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.number = 0
 
     def changed(self) -> None:
@@ -37,10 +40,11 @@ class UntilChange:
 
     _MOST = 64
 
-    def __init__(self):
-        self._number, self._values = -1, {}
+    def __init__(self) -> None:
+        self._number = -1
+        self._values: dict[Hashable, tuple[bool, Any]] = {}
 
-    def get(self, key: Hashable, make: Callable):
+    def get(self, key: Hashable, make: Callable[[], T]) -> T:
         """The value that `make` gives for a key; what it raised, if it did."""
         if self._number != number() or len(self._values) >= self._MOST:
             self._number, self._values = number(), {}
