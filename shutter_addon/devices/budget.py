@@ -20,18 +20,22 @@ UNKNOWN = 6 << 30
 class Budget:
     """Bytes that textures may take on a GPU, for all devices that reach it, on any thread.
 
-    limit: the most; None until a device tells (`tell`)
     used: those that are taken
     """
 
     def __init__(self, limit: int | None = None):
-        self.limit, self.used = limit, 0
+        self._limit, self.used = limit, 0
         self._lock = Lock()
+
+    @property
+    def limit(self) -> int:
+        """The most; until a device tells, what a GPU gets that does not say what it has."""
+        return allowed(None) if self._limit is None else self._limit
 
     def tell(self, memory: int | None) -> None:
         """Sets the limit, if there is none, by the bytes of the GPU's memory; None: it does not say."""
-        if self.limit is None:
-            self.limit = allowed(memory)
+        if self._limit is None:
+            self._limit = allowed(memory)
 
     def take(self, size: int) -> bool:
         """Takes so many bytes, if they are left. Whether they were."""

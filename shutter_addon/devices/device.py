@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import AbstractContextManager
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -23,6 +24,13 @@ class Texture(Protocol):
 
     def release(self) -> None:
         """Frees its memory; inside `Device.current` or `Device.freeing`."""
+
+
+class Holder(Protocol):
+    """What holds textures that can be made again: a window."""
+
+    def release(self) -> None:
+        """Frees them."""
 
 
 class Device(Protocol):
@@ -70,7 +78,15 @@ class Device(Protocol):
         run. TypeError: as for `write`."""
 
     def run(
-        self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, blocks=None, **constants
+        self,
+        program: Pass,
+        extent: tuple[int, ...],
+        /,
+        *,
+        textures: Mapping[str, Texture] | None = None,
+        images: Mapping[str, Texture] | None = None,
+        blocks: Mapping[str, np.ndarray] | None = None,
+        **constants: Any,
     ) -> None:
         """Runs a pass over `extent` invocations (x, y[, z]). Later passes read what it stored. StoppedError
         (core.stopping): the picture is not wanted any longer, and the pass is not run.
@@ -80,10 +96,10 @@ class Device(Protocol):
         constants: {name: number or tuple of numbers} for its constants, by keyword
         """
 
-    def use(self, window) -> None:
+    def use(self, window: Holder) -> None:
         """Notes that a window is in use. Where there is no room, others are freed by `window.release`."""
 
-    def forget(self, window) -> None:
+    def forget(self, window: Holder) -> None:
         """Notes that a window was freed."""
 
     def release(self) -> None:

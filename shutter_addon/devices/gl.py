@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
+from typing import Any, Self
 
 import moderngl
 import numpy as np
@@ -36,7 +37,7 @@ _FREE_MEMORY = 0x87FC
 
 
 @contextmanager
-def _kept_context():
+def _kept_context() -> Iterator[None]:
     """Restores the thread's current context at the end. On EGL moderngl would leave the thread without one."""
     if not _EGL:
         yield
@@ -52,7 +53,7 @@ def _kept_context():
 
 
 @cache
-def _egl():
+def _egl() -> ctypes.CDLL:
     egl = ctypes.CDLL("libEGL.so.1")
     for name in ("Context", "Display", "Surface"):
         getattr(egl, f"eglGetCurrent{name}").restype = ctypes.c_void_p
@@ -61,16 +62,16 @@ def _egl():
 
 
 @cache
-def _gl(name: str):
+def _gl(name: str) -> Callable[..., Any]:
     """An OpenGL function without a result. ctypes releases Python's lock while it runs: other threads go on."""
-    if not _EGL:
+    if sys.platform == "win32":
         return getattr(ctypes.windll.opengl32, name)  # of OpenGL 1.1; others are not there
     find = _egl().eglGetProcAddress
     find.restype, find.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
     return ctypes.CFUNCTYPE(None)(find(name.encode()))
 
 
-def _memory(context, renderer: str) -> int | None:
+def _memory(context: moderngl.Context, renderer: str) -> int | None:
     """Bytes of the memory of a current context's GPU; None: it does not say. Of what is free, the largest power of two:
     it is to be the same at the next start."""
     if is_software(renderer):
@@ -79,8 +80,8 @@ def _memory(context, renderer: str) -> int | None:
         if extension in context.extensions:
             kilobytes = (ctypes.c_int * 4)()
             _gl("glGetIntegerv")(ctypes.c_uint(name), kilobytes)
-            if (found := kilobytes[0] << 10) > 0:
-                return found if name == _TOTAL_MEMORY else 1 << found.bit_length() - 1
+            if (memory := kilobytes[0] << 10) > 0:
+                return memory if name == _TOTAL_MEMORY else 1 << memory.bit_length() - 1
     return None
 
 
@@ -97,7 +98,7 @@ class GLDevice(PagedDevice):
 
     def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None):
         super().__init__(budget or Budget(), ask_others)
-        backend = {"backend": "egl"} if _EGL else {}
+        backend: dict[str, Any] = {"backend": "egl"} if _EGL else {}
         try:
             with _kept_context():
                 self._context = moderngl.create_context(standalone=True, require=430, **backend)
@@ -106,14 +107,14 @@ class GLDevice(PagedDevice):
                     self.budget.tell(_memory(self._context, info["GL_RENDERER"]))
         except Exception as error:  # moderngl raises whatever its platform raises
             raise NoDeviceError(f"no OpenGL 4.3: {error}") from None
-        self._programs = {}
-        self._blocks = {}
+        self._programs: dict[Pass, tuple[moderngl.ComputeShader, dict[str, Any]]] = {}
+        self._blocks: dict[int, moderngl.Buffer] = {}
         self.name = info["GL_RENDERER"]
         self.max_layers = info["GL_MAX_ARRAY_TEXTURE_LAYERS"]
         self.max_size = info["GL_MAX_TEXTURE_SIZE"]
 
     @contextmanager
-    def current(self):
+    def current(self) -> Iterator[Self]:
         """See Device. Afterwards the thread's previous context is current again."""
         with _kept_context(), self._context:
             yield self
@@ -133,12 +134,12 @@ class GLDevice(PagedDevice):
     def _free(self, own: moderngl.TextureArray) -> None:
         own.release()
 
-    def write(self, texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
+    def write(self, texture: Any, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
         """See Device. `opaque` changes nothing here."""
         height, width = array.shape[:2]
         texture.gpu.write(array, viewport=(0, 0, layer, width, height, 1), alignment=1)
 
-    def read(self, texture) -> np.ndarray:
+    def read(self, texture: Any) -> np.ndarray:
         """See Device."""
         components, _, dtype = FORMATS[texture.kind]
         width, height, layers = texture.size
@@ -148,9 +149,18 @@ class GLDevice(PagedDevice):
         return array
 
     def run(
-        self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, blocks=None, **constants
+        self,
+        program: Pass,
+        extent: tuple[int, ...],
+        /,
+        *,
+        textures: Mapping[str, Any] | None = None,
+        images: Mapping[str, Any] | None = None,
+        blocks: Mapping[str, np.ndarray] | None = None,
+        **constants: Any,
     ) -> None:
         """See Device."""
+        textures, images, blocks = textures or {}, images or {}, blocks or {}
         stopping.check()
         if program not in self._programs:
             shader = self._context.compute_shader(source(program))
@@ -169,7 +179,7 @@ class GLDevice(PagedDevice):
         self._dispatch(shader, *program.groups(extent))
         self._context.memory_barrier()
 
-    def _dispatch(self, shader, *groups: int) -> None:
+    def _dispatch(self, shader: moderngl.ComputeShader, *groups: int) -> None:
         """Dispatches the shader. A software renderer returns only when the pass is done; on EGL the call goes through
         ctypes, so that Python's other threads run meanwhile."""
         if _EGL:

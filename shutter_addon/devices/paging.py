@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 
 from .budget import MEGABYTE, Budget
-from .device import NoDeviceError
+from .device import Holder, NoDeviceError, Texture
 
 TEXEL_BYTES = {
     "rgba8": 4,
@@ -40,11 +41,12 @@ class PagedTexture:
     def __init__(self, device: PagedDevice, size: tuple[int, int, int], kind: str):
         width, height, layers = size
         self.size, self.kind, self.bytes = size, kind, width * height * layers * TEXEL_BYTES[kind]
-        self.own, self.waiting = None, None
+        self.own: Any = None
+        self.waiting: np.ndarray | None = None
         self._device = device
 
     @property
-    def gpu(self):
+    def gpu(self) -> Any:
         """`own`, on the device in any case."""
         self._device.bring((self,))
         return self.own
@@ -55,7 +57,7 @@ class PagedTexture:
 
 
 class PagedDevice(ABC):
-    """What devices share.
+    """What devices share. Textures that a device is given are its own.
 
     budget: of the GPU, with others that reach it
     ask_others: called where the budget is full, has them free what they hold; None: there are none
@@ -69,7 +71,7 @@ class PagedDevice(ABC):
     def __init__(self, budget: Budget, ask_others: Callable[[], None] | None = None):
         self.budget, self.ask_others = budget, ask_others
         self._held: dict[PagedTexture, None] = {}  # on the device, used longest ago first
-        self._windows: dict = {}  # likewise; the last one is in use
+        self._windows: dict[Holder, None] = {}  # likewise; the last one is in use
 
     def texture(self, width: int, height: int, layers: int, kind: str) -> PagedTexture:
         """See Device."""
@@ -78,14 +80,14 @@ class PagedDevice(ABC):
         self._held[texture] = None
         return texture
 
-    def bring(self, textures: Iterable[PagedTexture]) -> None:
+    def bring(self, textures: Iterable[Texture]) -> None:
         """Has textures on the device, all at the same time. NoDeviceError: it has no room for them."""
-        textures = tuple(texture for texture in textures if isinstance(texture, PagedTexture))
-        for texture in textures:
+        paged = tuple(texture for texture in textures if isinstance(texture, PagedTexture))
+        for texture in paged:
             if texture.own is None:
                 if texture.waiting is None:
                     raise ValueError("the texture was released")
-                texture.own = self._made(texture, textures)
+                texture.own = self._made(texture, paged)
                 for layer, values in enumerate(texture.waiting):
                     self.write(texture, values, layer)
                 texture.waiting = None
@@ -100,21 +102,21 @@ class PagedDevice(ABC):
             self._free(own)
             self.budget.give_back(texture.bytes)
 
-    def send(self, texture, frame: np.ndarray):
+    def send(self, texture: Any, frame: np.ndarray) -> Any:
         """See Device."""
         self.write(texture, frame, opaque=True)
         return texture
 
-    def use(self, window) -> None:
+    def use(self, window: Holder) -> None:
         """Notes that a window is in use: others are freed (`window.release`) before it, where there is no room."""
         self._windows.pop(window, None)
         self._windows[window] = None
 
-    def forget(self, window) -> None:
+    def forget(self, window: Holder) -> None:
         """Notes that a window was freed."""
         self._windows.pop(window, None)
 
-    def _made(self, texture: PagedTexture, beside: tuple):
+    def _made(self, texture: PagedTexture, beside: tuple[PagedTexture, ...]) -> Any:
         width, height, layers = texture.size
         possible = max(width, height) <= self.max_size and layers <= self.max_layers
         while possible and texture.bytes <= self.budget.limit:
@@ -129,7 +131,7 @@ class PagedDevice(ABC):
             f" in the {self.budget.limit // MEGABYTE} MB that it may take"
         )
 
-    def _make_room(self, beside: tuple) -> bool:
+    def _make_room(self, beside: tuple[PagedTexture, ...]) -> bool:
         """Frees something that is not in use, nor among the textures `beside`. Whether there was anything."""
         used = self.budget.used
         if self.ask_others is not None and used > sum(texture.bytes for texture in self._held):
@@ -147,17 +149,17 @@ class PagedDevice(ABC):
         return False
 
     @abstractmethod
-    def _make(self, width: int, height: int, layers: int, kind: str):
+    def _make(self, width: int, height: int, layers: int, kind: str) -> Any:
         """What the library has for a texture. NoDeviceError: it has no room for it."""
 
     @abstractmethod
-    def _free(self, own) -> None:
+    def _free(self, own: Any) -> None:
         """Frees what `_make` gave."""
 
     @abstractmethod
-    def write(self, texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
+    def write(self, texture: Any, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
         """See Device."""
 
     @abstractmethod
-    def read(self, texture) -> np.ndarray:
+    def read(self, texture: Any) -> np.ndarray:
         """See Device."""

@@ -48,7 +48,7 @@ class Pass:
     blocks: dict[str, int] = field(default_factory=dict)
     local_size: tuple[int, int, int] = LOCAL_SIZE
 
-    def __hash__(self):
+    def __hash__(self) -> int:
         return hash((self.name, *self.defines.values()))
 
     def groups(self, extent: tuple[int, ...]) -> tuple[int, ...]:
