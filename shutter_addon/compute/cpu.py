@@ -6,11 +6,13 @@ thread gets hold of Python's lock.
 
 from __future__ import annotations
 
-from contextlib import nullcontext
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..core import stopping
 from ..core.frames import light
@@ -26,6 +28,11 @@ from .request import Coefficients, Request
 # Pieces of a quantile that are computed in one step.
 TOGETHER = 3
 
+Window = TiledFrames | TiledSums
+Weight = tuple[int, np.ndarray | float]  # of a frame: (h, w) or a number
+Weighted = tuple[int, np.ndarray | float, np.ndarray | None]  # the same, and the shares by which shutters look at it
+Look = Callable[[int, Any], np.ndarray]
+
 
 class Mix(NamedTuple):
     """A tile with the coefficients c (N, h, w) of its blocks of pixels, block × block each."""
@@ -34,7 +41,7 @@ class Mix(NamedTuple):
     c: np.ndarray
     block: int
 
-    def pixels(self, values):
+    def pixels(self, values: np.ndarray | float) -> Any:
         """See Tile.pixels."""
         return self.tile.pixels(values, self.block)
 
@@ -55,8 +62,16 @@ class Solver:
 
     gave_up = False
 
-    def solve(self, labels: np.ndarray, count: int, guide=None, strength: float = 0.0, *, warm=False) -> np.ndarray:
-        if follows_edges(labels, guide, strength):
+    def solve(
+        self,
+        labels: np.ndarray,
+        count: int,
+        guide: np.ndarray | None = None,
+        strength: float = 0.0,
+        *,
+        warm: bool = False,
+    ) -> np.ndarray:
+        if guide is not None and follows_edges(labels, guide, strength):
             return diffuse_along_edges(labels, count, guide, strength)
         return diffuse(labels, count)
 
@@ -67,7 +82,9 @@ class Solver:
 class Matting:
     """core.model.mattes, with the methods of compute.matting.Matting."""
 
-    def lay(self, beneath: np.ndarray, shown: tuple[mattes.Matte, ...], layers) -> np.ndarray:
+    def lay(
+        self, beneath: np.ndarray, shown: tuple[mattes.Matte, ...], layers: Sequence[tuple[Hashable, np.ndarray]]
+    ) -> np.ndarray:
         return mattes.blended(beneath, shown, [values for _, values in layers])
 
     def release(self) -> None:
@@ -91,7 +108,7 @@ class CPUCompositor:
     name = "NumPy"
     takes_planes = False
 
-    def current(self):
+    def current(self) -> AbstractContextManager[CPUCompositor]:
         return nullcontext(self)
 
     freeing = current
@@ -122,11 +139,11 @@ class CPUCompositor:
 
     def over_black(self, drawn: np.ndarray) -> np.ndarray:
         """A scene-linear picture of `draw` as Renderer.picture has it of levels."""
-        found = np.full(drawn.shape, 255, np.uint8)
-        found[..., :3] = 255 * light.to_encoded(np.nan_to_num(drawn[..., :3]).clip(0, 1)) + np.float32(0.5)
-        return found
+        levels = np.full(drawn.shape, 255, np.uint8)
+        levels[..., :3] = 255 * light.to_encoded(np.nan_to_num(drawn[..., :3]).clip(0, 1)) + np.float32(0.5)
+        return levels
 
-    def draw(self, window, request: Request, coefficients: Coefficients) -> np.ndarray:
+    def draw(self, window: Window, request: Request, coefficients: Coefficients) -> np.ndarray:
         """The picture (H, W, 4), top row first: float32, or levels in uint8; arguments as for GPUCompositor.draw."""
         state, index, direction = request.state, request.index, request.direction
         source, options, (handle, block) = window.source, state.options, coefficients
@@ -135,11 +152,12 @@ class CPUCompositor:
         bars = state.bars[:, ::direction]
         origin = int(compositor.window_positions(options, index, direction).min())
         frames = compositor.source_frames(options, origin + np.arange(options.window), window.shot)
-        exposed = Exposed(options, bars, origin, frames >= 0, direction)
-        if state.following is None:
-            expose = _way(window, exposed)
-        else:
+        exposed = Exposed(options=options, bars=bars, origin=origin, present=frames >= 0, direction=direction)
+        expose: Callable[[Mix], np.ndarray]
+        if state.following is not None and isinstance(window, TiledFrames):
             expose = partial(_followed, window, exposed, state.following.at(frames))
+        else:
+            expose = _way(window, exposed)
         for tile in window.tiles:
             stopping.check()
             mix = Mix(tile, tile.coefficients(handle, block), block)
@@ -166,7 +184,7 @@ def _few(pieces: int, frames: int) -> bool:
     return 3 * pieces <= frames
 
 
-def _way(window, exposed: Exposed):
+def _way(window: Window, exposed: Exposed) -> Callable[[Mix], np.ndarray]:
     """The fastest function Mix → light of its tile. In it, time 0 is the first frame that any shutter exposes."""
     options, bars, origin, present, direction = exposed
     first, last = shutters.open_span(bars)
@@ -181,28 +199,29 @@ def _way(window, exposed: Exposed):
     return partial(_by_frames, window, weigh, origin, None if whole else np.flatnonzero(present) - first, direction)
 
 
-def _mixed(times, c: np.ndarray) -> np.ndarray:
+def _mixed(times: ArrayLike, c: np.ndarray) -> np.ndarray:
     """Σ cᵢ · timesᵢ (K, h, w) float32 for coefficients c (N, h, w) and times, or other numbers, (K, N)."""
     times = np.asarray(times, dtype=np.float32)
     return (times @ c.reshape(len(c), -1)).reshape(-1, *c.shape[1:])
 
 
-def _by_pieces(window: TiledSums, knots: shutters.Quantile, origin: int, count: int, mix: Mix):
+def _by_pieces(window: TiledSums, knots: shutters.Quantile, origin: int, count: int, mix: Mix) -> np.ndarray:
     """The light (3, h, w) of a tile from the sums at the ends of the quantile's pieces."""
 
-    def until(times):
+    def until(times: np.ndarray) -> np.ndarray:
         x = np.full((1, 1), times[0], np.float32) if np.ptp(times) == 0 else _mixed(times[None], mix.c)[0]
         # Rounding must not lead beyond what is held.
         x = np.clip(x, np.float32(0), np.float32(count))
         return window.light_between(mix.tile, origin, mix.pixels(x))
 
-    total, late = 0.0, None
+    total: np.ndarray | float = 0.0
+    late = np.zeros(())
     for k, pace in enumerate(_pace(knots)):
         goes_on = k and np.array_equal(knots.start[k], knots.end[k - 1])
         early = late if goes_on else until(knots.start[k])
         late = until(knots.end[k])
         total += (late - early) / mix.pixels(_mixed(pace[None], mix.c)[0])
-    return total
+    return np.asarray(total)
 
 
 def _pace(knots: shutters.Quantile) -> np.ndarray:
@@ -210,15 +229,15 @@ def _pace(knots: shutters.Quantile) -> np.ndarray:
     return (knots.end - knots.start) / np.diff(knots.z)[:, None]
 
 
-def _displaced(knots: shutters.Quantile, count: int, c: np.ndarray):
+def _displaced(knots: shutters.Quantile, count: int, c: np.ndarray) -> Iterator[Weight]:
     """Yields (frame, weight (h, w) or a number) of the interpolated shutter, of frames that may have any."""
     ends, pace, dz = np.arange(count) + 1, _pace(knots), np.diff(knots.z).astype(np.float32)[:, None, None]
     # The quantile's pieces that are over everywhere at each frame's end, and those that have begun somewhere.
     over = np.searchsorted(-_least(-knots.end, c), ends, "right").tolist()
     begun = np.searchsorted(_least(knots.start, c), ends, "left").tolist()
-    before = 0.0
+    before: np.ndarray | float = 0.0
     for end, low, high in zip(ends.tolist(), over, begun, strict=True):
-        after = float(knots.z[low])
+        after: np.ndarray | float = float(knots.z[low])
         for k in range(low, high, TOGETHER):
             some = slice(k, min(k + TOGETHER, high))
             passed = _mixed(end - knots.start[some], c)
@@ -231,7 +250,7 @@ def _displaced(knots: shutters.Quantile, count: int, c: np.ndarray):
 
 def _least(times: np.ndarray, c: np.ndarray) -> np.ndarray:
     """The least (K,) of mixed times (K, N) on a tile, as far as the range of each coefficient tells."""
-    low, high = (np.float64(extreme(c, axis=(1, 2))) for extreme in (np.min, np.max))
+    low, high = (extreme(c, axis=(1, 2)).astype(np.float64) for extreme in (np.min, np.max))
     # What the coefficients' least leave of 1 goes to the earliest times first, as far as their most allow.
     order = np.argsort(times, axis=1)
     given = np.minimum(np.cumsum((high - low)[order], axis=1), max(0.0, 1 - low.sum()))
@@ -239,17 +258,24 @@ def _least(times: np.ndarray, c: np.ndarray) -> np.ndarray:
     return (times * low).sum(axis=1) + (shares * np.take_along_axis(times, order, axis=1)).sum(axis=1)
 
 
-def _valued(normalised: np.ndarray, c: np.ndarray):
+def _valued(normalised: np.ndarray, c: np.ndarray) -> Iterator[Weight]:
     """As _displaced, by value interpolation."""
     for frame in np.flatnonzero(normalised.any(axis=0)).tolist():
         yield frame, _mixed(normalised[None, :, frame], c)[0]
 
 
-def _by_frames(window, weigh, origin: int, present, direction: int, mix: Mix):
+def _by_frames(
+    window: Window,
+    weigh: Callable[[np.ndarray], Iterator[Weight]],
+    origin: int,
+    present: np.ndarray | None,
+    direction: int,
+    mix: Mix,
+) -> np.ndarray:
     """The light (3 or 4, h, w) of a tile, frame after frame; present: the frames that are, None for all of them."""
     weighted = ((frame, mix.pixels(weight), None) for frame, weight in weigh(mix.c))
 
-    def look(frame, _):
+    def look(frame: int, _: object) -> np.ndarray:
         return window.light(mix.tile, origin + frame)
 
     if present is None:
@@ -257,17 +283,17 @@ def _by_frames(window, weigh, origin: int, present, direction: int, mix: Mix):
     return _without_absent(look, mix.tile, present, direction, list(weighted), [(1.0, None)])
 
 
-def _followed(window: TiledFrames, exposed: Exposed, moves, mix: Mix):
+def _followed(window: TiledFrames, exposed: Exposed, moves: tuple[np.ndarray, np.ndarray], mix: Mix) -> np.ndarray:
     """The light (3 or 4, h, w) of a tile where shutters follow something; moves: the turns and shifts (L, N) of all
     frames of the window."""
     (options, bars, origin, there, direction), c = exposed, mix.c
     first, last = shutters.open_span(bars)
 
-    def look(frame, shares):
-        mixed = (np.tensordot(part[first + frame], shares, axes=1) for part in moves)
-        return window.seen(mix.tile, origin + first + frame, *(mix.pixels(part) for part in mixed))
+    def look(frame: int, shares: np.ndarray) -> np.ndarray:
+        turn, shift = (mix.pixels(np.tensordot(part[first + frame], shares, axes=1)) for part in moves)
+        return window.seen(mix.tile, origin + first + frame, turn, shift)
 
-    def weighed(weights, shares):
+    def weighed(weights: Iterable[Weight], shares: np.ndarray) -> list[Weighted]:
         return [(frame, mix.pixels(weight), shares) for frame, weight in weights]
 
     if options.interpolation == "displacement":
@@ -287,31 +313,39 @@ def _followed(window: TiledFrames, exposed: Exposed, moves, mix: Mix):
     return _without_absent(look, mix.tile, np.flatnonzero(there) - first, direction, weighted, parts)
 
 
-def _sum(look, weighted) -> np.ndarray | None:
-    """Of entries (frame, weight, shares): the light of `look(frame, shares)`, weighted; None: there are none."""
+def _sum(look: Look, weighted: Iterable[Weighted]) -> np.ndarray:
+    """The light of `look(frame, shares)`, weighted; of one frame at least."""
     total = None
     for frame, weight, shares in weighted:
         light_ = look(frame, shares)
         light_ *= weight
         total = light_ if total is None else np.add(total, light_, out=total)
+    if total is None:
+        raise ValueError("no frame is exposed")
     return total
 
 
-def _without_absent(look, tile: Tile, present: np.ndarray, direction: int, weighted: list, parts: list):
+def _without_absent(
+    look: Look,
+    tile: Tile,
+    present: np.ndarray,
+    direction: int,
+    weighted: list[Weighted],
+    parts: Sequence[tuple[np.ndarray | float, np.ndarray | None]],
+) -> np.ndarray:
     """The light (3 or 4, h, w) where the weight of absent frames is given to the others; where there are none, to the
     nearest, in parts (part, shares)."""
     centre = sum(weight * (frame + 0.5) for frame, weight, _ in weighted) - direction * compositor.CLOSE
     kept = [entry for entry in weighted if entry[0] in present]
     share = sum(weight for _, weight, _ in kept)
-    picture = _sum(look, kept)
-    picture = 0.0 if picture is None else picture / np.maximum(share, np.float32(1e-6))
+    picture: np.ndarray | float = _sum(look, kept) / np.maximum(share, np.float32(1e-6)) if kept else 0.0
     alone = np.broadcast_to(share <= 1e-6, tile.shape)
     if alone.any():
         nearest = present[np.abs(np.expand_dims(centre, -1) - (present + 0.5)).argmin(axis=-1)]
         for frame in np.unique(np.broadcast_to(nearest, tile.shape)[alone]).tolist():
-            found = sum(part * look(frame, shares) for part, shares in parts)
-            picture = np.where(alone & (nearest == frame), found, picture)
-    return picture
+            alone_there = sum(part * look(frame, shares) for part, shares in parts)
+            picture = np.where(alone & (nearest == frame), alone_there, picture)
+    return np.asarray(picture)
 
 
 def _linear(planes: np.ndarray) -> np.ndarray:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
+from typing import Any
+
 import numpy as np
 
 from ..core import stopping
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
-from ..core.model.frame_state import Options
+from ..core.model.frame_state import Light, Options
 from ..core.pixels import compositor
 from .resampling import around, resampled
 from .running_sums import RunningSums, summable
@@ -26,7 +29,7 @@ WHITE = (1 << 16) - 1
 class Tile:
     """A part of the picture: its number, and `rows` and `columns` as slices."""
 
-    def __init__(self, number: int, top: int, left: int, source):
+    def __init__(self, number: int, top: int, left: int, source: FrameSource):
         self.number = number
         self.rows = slice(top, min(top + TILE[0], source.height))
         self.columns = slice(left, min(left + TILE[1], source.width))
@@ -41,14 +44,14 @@ class Tile:
         c = np.maximum(handle[:, rows, columns], 0, dtype=np.float32)
         return c / c.sum(axis=0)
 
-    def pixels(self, values, block: int):
+    def pixels(self, values: np.ndarray | float, block: int) -> Any:
         """Values (h, w) of the tile's blocks for each of its pixels; a single one stays what it is."""
-        if block == 1 or np.size(values) == 1:
+        if isinstance(values, float) or block == 1 or values.size == 1:
             return values
         return values.repeat(block, 0).repeat(block, 1)[: self.shape[0], : self.shape[1]]
 
 
-def _tiles(source) -> list[Tile]:
+def _tiles(source: FrameSource) -> list[Tile]:
     corners = [(top, left) for top in range(0, source.height, TILE[0]) for left in range(0, source.width, TILE[1])]
     return [Tile(number, *corner, source) for number, corner in enumerate(corners)]
 
@@ -65,10 +68,10 @@ class TiledFrames:
         self.tiles = _tiles(source)
         self.frames: dict[int, np.ndarray] = {}
         self._at: dict[int, int] = {}  # position: source frame
-        self._decode = None
+        self._decode = _decoder(source, "linear")
 
     @property
-    def held(self):
+    def held(self) -> Collection[int]:
         return self.frames.keys()
 
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
@@ -86,7 +89,7 @@ class TiledFrames:
         """The light (3 or 4, h, w) float32 of the frame at a position: premultiplied, `1 / unit` for white."""
         return self._decode(tile.of(self.frames[self._at[position]]))
 
-    def seen(self, tile: Tile, position: int, turn, shift) -> np.ndarray:
+    def seen(self, tile: Tile, position: int, turn: np.ndarray, shift: np.ndarray) -> np.ndarray:
         """As `light`, of what the frame shows at turn · z + shift for each pixel z; turn, shift: (h, w), or alike."""
         if not (np.any(turn != 1) or np.any(shift)):
             return self.light(tile, position)
@@ -116,18 +119,18 @@ class TiledSums(RunningSums):
         """Whether running sums can be made of a source, in at most SUMS_BYTES."""
         return summable(source) and 12 * source.width * source.height * (capacity + 1) <= SUMS_BYTES
 
-    def _add(self, frame: int, same: int | None, known: int, next_: int) -> None:
+    def _add(self, light: Light, frame: int, same: int | None, known: int, next_: int) -> None:
         picture = self.source.read(frame) if same is None else None
-        levels = np.rint(_curve(self.source, self._options.light) * WHITE).astype(np.uint32)
+        levels = np.rint(_curve(self.source, light) * WHITE).astype(np.uint32)
         combine = np.add if next_ > known else np.subtract
 
         for tile, sums in zip(self.tiles, self._sums, strict=True):
             stopping.check()
             for k, colour in enumerate(sums):
-                if same is None:
-                    light_ = levels.take(tile.of(picture)[..., k])
-                else:
+                if same is not None:
                     light_ = colour[(same + 1) % self.layers] - colour[same % self.layers]
+                elif picture is not None:
+                    light_ = levels.take(tile.of(picture)[..., k])
                 combine(colour[known % self.layers], light_, out=colour[next_ % self.layers])
 
     def light(self, tile: Tile, position: int) -> np.ndarray:
@@ -146,11 +149,11 @@ class TiledSums(RunningSums):
             place += origin % self.layers
             place *= base[0].size
             place += np.arange(base[0].size).reshape(tile.shape)
-            sums = sums.reshape(3, -1)
+            flat = sums.reshape(3, -1)
             # The layers lie in a ring.
-            early = sums.take(place, axis=1, mode="wrap")
+            early = flat.take(place, axis=1, mode="wrap")
             place += base[0].size
-            late = sums.take(place, axis=1, mode="wrap")
+            late = flat.take(place, axis=1, mode="wrap")
         result = _difference(late, early)
         result *= x - whole
         result += _difference(early, base)
@@ -165,13 +168,13 @@ def _difference(late: np.ndarray, early: np.ndarray) -> np.ndarray:
     return (late - early).view(np.int32).astype(np.float32)
 
 
-def _conversion(source, summed: str):
+def _conversion(source: FrameSource, summed: str) -> Callable[[np.ndarray], np.ndarray] | None:
     """From a source's colours to those in the light that is summed (Options.light); None: they are."""
     wanted = {"encoded": "srgb", "linear": "linear"}[summed]
     return None if source.transfer == wanted else light.to_linear if wanted == "linear" else light.to_encoded
 
 
-def _curve(source, summed: str) -> np.ndarray:
+def _curve(source: FrameSource, summed: str) -> np.ndarray:
     """The light float32 that is summed for every value of a whole type."""
     most = np.iinfo(source.dtype).max
     values = np.arange(most + 1, dtype=np.float32) / np.float32(most)
@@ -179,12 +182,12 @@ def _curve(source, summed: str) -> np.ndarray:
     return convert(values) if convert else values
 
 
-def _decoder(source, summed: str):
+def _decoder(source: FrameSource, summed: str) -> Callable[[np.ndarray], np.ndarray]:
     """A function from samples (h, w, 4) to the light (3 or 4, h, w) float32 that is summed, premultiplied."""
     convert = _conversion(source, summed)
     whole, opaque = np.dtype(source.dtype).kind == "u", source.alpha == "opaque"
     white = np.float32(np.iinfo(source.dtype).max if whole else 1)
-    curve = _curve(source, summed) if whole else None
+    curve = _curve(source, summed) if whole else np.empty(0, np.float32)
 
     def decode(samples: np.ndarray) -> np.ndarray:
         if source.alpha == "premultiplied" or not whole:

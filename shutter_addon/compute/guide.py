@@ -9,6 +9,9 @@ goes in a still picture would else make coefficients flicker. What moves differs
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import Any
+
 import numpy as np
 
 from ..core.frames import light
@@ -53,11 +56,11 @@ class Guides:
         self._source = source
         self._short = min(source.width, source.height)
         self._cell = cell_of(self._short)
-        self._kept = frozenset()
+        self._kept: frozenset[int] = frozenset()
         self._reduced: dict[int, np.ndarray] = {}
         self._made = Memo()
 
-    def keep(self, indices) -> None:
+    def keep(self, indices: Iterable[int]) -> None:
         """Says which frames may be needed from now on; all others are forgotten."""
         self._kept = frozenset(indices)
         self._reduced = {i: picture for i, picture in self._reduced.items() if i in self._kept}
@@ -113,7 +116,7 @@ class NotedSource:
     def __init__(self, source: FrameSource, guides: Guides):
         self._source, self._guides = source, guides
 
-    def __getattr__(self, name: str):
+    def __getattr__(self, name: str) -> Any:
         return getattr(self._source, name)
 
     def read(self, index: int) -> np.ndarray:
@@ -152,7 +155,7 @@ def _smoothed(planes: np.ndarray, sigma: float, axis: int) -> np.ndarray:
     weights = (weights / (2 * weights.sum() - weights[0])).astype(np.float32)
     padded = np.pad(planes, [(radius, radius) if a == axis else (0, 0) for a in range(3)], mode="edge")
 
-    def at(offset):
+    def at(offset: int) -> np.ndarray:
         cells = [slice(None)] * 3
         cells[axis] = slice(radius + offset, radius + offset + length)
         return padded[tuple(cells)]

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.frames.frame_source import FrameSource
 from ..core.model import scribbles
 from ..core.model.frame_state import FrameState
 
@@ -32,7 +33,7 @@ def labelled(state: FrameState, size: tuple[int, int]) -> list[LabelLayer]:
     ]
 
 
-def grid(source, state: FrameState) -> tuple[int, int]:
+def grid(source: FrameSource, state: FrameState) -> tuple[int, int]:
     """The size (w, h) of the labels and the coefficients of a source's pictures."""
     block = state.options.aggregate
     return -(-source.width // block), -(-source.height // block)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Sequence
 from functools import cache
 
 import numpy as np
 
 from ..core.model.mattes import Matte
-from ..devices.device import Device
+from ..devices.device import Device, Texture
 from ..devices.passes import LOCAL_ROW, Image, Pass
 
 # Mattes that one pass lays, whose values are on the device at once.
@@ -38,11 +39,13 @@ class Matting:
 
     def __init__(self, device: Device):
         self._device = device
-        self._textures: dict[str, object] = {}
-        self._held: dict[int, object] = {}  # by layer: the key of the values in it
+        self._textures: dict[str, Texture] = {}
+        self._held: dict[int, Hashable] = {}  # by layer: the key of the values in it
 
-    def lay(self, beneath, mattes: tuple[Matte, ...], layers):
-        """Coefficients, a texture array rgba32f as of a solver, valid until the next call.
+    def lay(
+        self, beneath: Texture, mattes: tuple[Matte, ...], layers: Sequence[tuple[Hashable, np.ndarray]]
+    ) -> Texture:
+        """Coefficients, a texture array rgba32f like a solver's, valid until the next call.
 
         beneath: coefficients, a texture of a solver or of GPUCompositor.constant
         layers: of each matte a key, and its values (h, w) float32 (core.model.mattes.MatteReader.values)"""
@@ -70,7 +73,7 @@ class Matting:
             beneath, ends = over, ends[::-1]
         return beneath
 
-    def _texture(self, name: str, size: tuple[int, int, int], kind: str):
+    def _texture(self, name: str, size: tuple[int, int, int], kind: str) -> Texture:
         texture = self._textures.get(name)
         if texture is None or texture.size != size:
             if texture is not None:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from ..core.frames.frame_source import FrameSource
 from ..devices.budget import Budget
-from ..devices.device import Device, NoDeviceError
+from ..devices.device import Device, Holder, NoDeviceError
 from ..devices.paging import TEXEL_BYTES
 from . import cpu_window
 from .window import beside, open_window
@@ -43,18 +43,18 @@ class _CountingDevice:
             raise NoDeviceError("over the budget")
         return _CountedTexture(self.budget, size)
 
-    def use(self, window) -> None:
+    def use(self, window: Holder) -> None:
         """It has no other windows."""
 
     forget = use
 
 
 def of_window(device: Device, source: FrameSource, capacity: int, moved: bool, shutters: int) -> Needs:
-    """What a window on a GPU needs, with all that is made beside it; arguments as of open_window.
+    """What a window on a GPU needs, with all that is made beside it; arguments like those of open_window.
 
     NoDeviceError: not even a picture has room on the device."""
     counting = _CountingDevice(device)
-    window = open_window(counting, source, capacity, moved, shutters)
+    window = open_window(counting, source, capacity, moved, shutters)  # type: ignore[arg-type]  # it makes textures alone
     gpu = min(counting.budget.used + beside(source, shutters), counting.budget.limit)
     return Needs(gpu, capacity * frame_bytes(source) if window.sends else 0, window.sends)
 

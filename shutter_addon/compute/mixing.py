@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from ..devices.device import Device
+from ..devices.device import Device, Texture
 from ..devices.passes import LOCAL_ROW, Image, Pass
 
 
@@ -24,15 +24,16 @@ class Mixing:
     """A sum of shares of coefficients."""
 
     def __init__(self, device: Device):
-        self._device, self._sum = device, None
+        self._device = device
+        self._sum: Texture | None = None
 
-    def add(self, mixed, added, share: float, size: tuple[int, int]):
-        """The sum with one more share, a texture array rgba32f as of a solver, valid until the next sum is begun.
+    def add(self, mixed: Texture | None, added: Texture, share: float, size: tuple[int, int]) -> Texture:
+        """The sum with one more share, a texture array rgba32f like a solver's, valid until the next sum is begun.
 
         mixed: what was returned last; None: this begins a sum
         added: coefficients, a texture of a solver or of GPUCompositor.constant; size: (h, w) of the sum"""
         height, width = size
-        if mixed is None and (self._sum is None or self._sum.size != (width, height, added.size[2])):
+        if self._sum is None or (mixed is None and self._sum.size != (width, height, added.size[2])):
             self.release()
             self._sum = self._device.texture(width, height, added.size[2], "rgba32f")
         self._device.run(

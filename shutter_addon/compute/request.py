@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..core.model.frame_state import FrameState
 
@@ -40,5 +40,5 @@ class Coefficients(NamedTuple):
     handle: on a GPU a texture array rgba32f, four shutters per layer, top row first; with NumPy an array (N, h, w)
     block: each value is for block × block pixels; a single value is for the whole picture"""
 
-    handle: object
+    handle: Any
     block: int

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 
-def around(places: np.ndarray, shape) -> tuple[slice, slice, np.ndarray, np.ndarray]:
+def around(places: np.ndarray, shape: tuple[int, ...]) -> tuple[slice, slice, np.ndarray, np.ndarray]:
     """The rows and columns of a frame of a shape (height, width, …) that are needed to see it at places (h, w), x + iy;
     and where the places lie in these."""
     height, width = shape[:2]
@@ -28,9 +28,13 @@ def resampled(planes: np.ndarray, x: np.ndarray, y: np.ndarray, *, sharp: bool) 
     column, row = np.floor(x).astype(np.intp), np.floor(y).astype(np.intp)
     across, down = _weights((x - column).astype(np.float32), sharp), _weights((y - row).astype(np.float32), sharp)
     columns = {i: np.clip(column + i, 0, width - 1) for i in across}
-    flat, total, low, high = planes.reshape(count, -1), 0.0, np.inf, -np.inf
+    flat = planes.reshape(count, -1)
+    total: np.ndarray | float = 0.0
+    low: np.ndarray | float = np.inf
+    high: np.ndarray | float = -np.inf
     for j, weight in down.items():
-        line, start = 0.0, np.clip(row + j, 0, height - 1) * width
+        line: np.ndarray | float = 0.0
+        start = np.clip(row + j, 0, height - 1) * width
         for i, own in across.items():
             pixels = flat.take(start + columns[i], axis=1)
             if {i, j} <= {0, 1}:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Collection
 
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
-from ..core.model.frame_state import Options
+from ..core.model.frame_state import Light, Options
 from ..core.pixels import compositor
 
 
@@ -33,10 +34,10 @@ class RunningSums(ABC):
         self.start = self.stop = 0
         self.shot = range(source.count)
         self._frames: dict[int, int] = {}  # position: source frame
-        self._options: Options | None = None
+        self._light: Light | None = None
 
     @property
-    def held(self):
+    def held(self) -> Collection[int]:
         """The source frames that are summed, a collection of their indices."""
         return self._frames.values()
 
@@ -50,15 +51,15 @@ class RunningSums(ABC):
         first, last = int(positions.min()), int(positions.max()) + 1
         frames = compositor.source_frames(options, np.arange(first, last), shot).tolist()
         if not self._continues(first, frames, options):
-            self._options, self._frames = options, {}
+            self._light, self._frames = options.light, {}
             self.start = self.stop = first
         while self.stop < last:
             self._keep(max(self.start, self.stop + 1 - self.capacity), self.stop)
-            self._extend(frames[self.stop - first], self.stop, self.stop + 1)
+            self._extend(options.light, frames[self.stop - first], self.stop, self.stop + 1)
             self.stop += 1
         while self.start > first:
             self._keep(self.start, min(self.stop, self.start - 1 + self.capacity))
-            self._extend(frames[self.start - 1 - first], self.start, self.start - 1)
+            self._extend(options.light, frames[self.start - 1 - first], self.start, self.start - 1)
             self.start -= 1
 
     def _continues(self, first: int, frames: list[int], options: Options) -> bool:
@@ -67,8 +68,7 @@ class RunningSums(ABC):
         last = first + len(frames)
         overlap = range(max(first, self.start), min(last, self.stop))
         return (
-            self._options is not None
-            and self._options.light == options.light
+            self._light == options.light
             and first <= self.stop
             and self.start <= last
             and all(self._frames[position] == frames[position - first] for position in overlap)
@@ -79,17 +79,18 @@ class RunningSums(ABC):
         self.start, self.stop = start, stop
         self._frames = {position: frame for position, frame in self._frames.items() if start <= position < stop}
 
-    def _extend(self, frame: int, known: int, next_: int) -> None:
+    def _extend(self, light: Light, frame: int, known: int, next_: int) -> None:
         """As _add; notes the frame."""
         same = next((position for position, held in self._frames.items() if held == frame), None)
-        self._add(frame, same, known, next_)
+        self._add(light, frame, same, known, next_)
         self._frames[min(known, next_)] = frame
 
     @abstractmethod
-    def _add(self, frame: int, same: int | None, known: int, next_: int) -> None:
+    def _add(self, light: Light, frame: int, same: int | None, known: int, next_: int) -> None:
         """Makes the sum at position next_, from that at its neighbour `known` and the source frame between the two.
 
+        light: what is summed
         same: a position that shows this frame already, so that it need not be read; None: there is none"""
 
     def release(self) -> None:
-        self._frames, self._options = {}, None
+        self._frames, self._light = {}, None

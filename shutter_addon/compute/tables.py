@@ -33,12 +33,12 @@ def table(state: FrameState) -> np.ndarray:
     return result
 
 
-def _pieces(bars) -> np.ndarray:
+def _pieces(bars: np.ndarray) -> np.ndarray:
     return _pieces_of(bars.tobytes(), bars.dtype, bars.shape)
 
 
 @lru_cache(16)
-def _pieces_of(content: bytes, dtype, shape: tuple[int, int]) -> np.ndarray:
+def _pieces_of(content: bytes, dtype: np.dtype, shape: tuple[int, ...]) -> np.ndarray:
     """Bars seldom change from frame to frame."""
     knots = shutters.knots(np.frombuffer(content, dtype).reshape(shape))
     start, end = padded(knots.start), padded(knots.end)
@@ -49,7 +49,7 @@ def _pieces_of(content: bytes, dtype, shape: tuple[int, int]) -> np.ndarray:
     return np.concatenate([start, end, last], axis=1)
 
 
-def _bars(bars) -> np.ndarray:
+def _bars(bars: np.ndarray) -> np.ndarray:
     first, last = shutters.open_span(bars)
     return padded((bars / bars.sum(axis=1, keepdims=True)).T[first:last])
 
@@ -60,7 +60,9 @@ def moved_tables(state: FrameState, frames: np.ndarray) -> tuple[np.ndarray, np.
 
     By displacement there is one motion, in which the shutters' own are mixed; by value one for all shutters that move
     alike: the table has a row for each frame and motion. Behind these it has one for each motion, 1 for its shutters.
-    frames: the source frames (L,) of the window; −1: none"""
+    frames: the source frames (L,) of the window; −1: none. ValueError: nothing is followed"""
+    if state.following is None:
+        raise ValueError("nothing is followed")
     turns, shifts = state.following.at(frames)
     numbers = np.stack([turns.real - 1, turns.imag, shifts.real, shifts.imag], axis=1)  # (L, 4, N)
     values = table(state)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator
 from functools import cache
+from typing import Any
 
 import numpy as np
 
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Planes, chroma_step
-from ..core.model.frame_state import Options
+from ..core.model.frame_state import Light, Options
 from ..core.pixels import compositor
 from ..devices.budget import is_software
-from ..devices.device import Device, NoDeviceError
+from ..devices.device import Device, NoDeviceError, Texture
 from ..devices.passes import Image, Pass
 from .running_sums import RunningSums, summable
 
@@ -66,13 +68,15 @@ class Window:
     rows, tops: rows of pixels in a band (the last band may have fewer), and the top row of each band
     """
 
+    layers: int
     sends = False
 
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int):
         self.device, self.source, self.capacity, self.shutters = device, source, capacity, shutters
         self.shot = range(source.count)
-        self.textures: list = []
-        self.picture = self._levels = None
+        self.textures: list[Texture] = []
+        self.picture: Texture | None = None
+        self._levels: Texture | None = None
         device.use(self)
 
     @property
@@ -110,12 +114,12 @@ class Window:
     def _height(self, top: int) -> int:
         return min(self.rows, self.source.height - top)
 
-    def bands(self):
+    def bands(self) -> Iterator[tuple[int, int, Texture]]:
         """Yields (top row, height in pixels, texture array) of each band; the texture is valid until the next one."""
         for top, texture in zip(self.tops, self.textures, strict=True):
             yield top, self._height(top), texture
 
-    def levels(self):
+    def levels(self) -> Texture:
         """The texture that the compositor draws levels into, made when it is first asked for."""
         if self._levels is None:
             self._levels = self.device.texture(self.source.width, self.source.height, 1, "rgba8")
@@ -165,7 +169,7 @@ class Frames(Window):
         self._cut(self.source.width * self.pixel_bytes * self.layers, min(most, SENT_BYTES, BAND_BYTES))
 
     @property
-    def held(self):
+    def held(self) -> Collection[int]:
         """The source frames that are loaded, a collection of their indices."""
         return self._held.values()
 
@@ -190,7 +194,7 @@ class Frames(Window):
         for top, height, texture in super().bands():
             self._send(texture, frame[top : top + height], layer)
 
-    def bands(self):
+    def bands(self) -> Iterator[tuple[int, int, Texture]]:
         if self._host is None:
             yield from super().bands()
             return
@@ -214,7 +218,7 @@ class Frames(Window):
             frame = np.concatenate([light.to_linear(frame[..., :3]), frame[..., 3:]], axis=-1)
         return frame
 
-    def _send(self, texture, rows: np.ndarray, layer: int) -> None:
+    def _send(self, texture: Texture, rows: np.ndarray, layer: int) -> None:
         self.device.write(texture, rows, layer, opaque=self.source.alpha == "opaque")
 
     def release(self) -> None:
@@ -256,7 +260,7 @@ class WholeFrames(Frames):
     def _place(self, frame: np.ndarray, layer: int) -> None:
         self._send(self.textures[layer // self.layers], frame, layer % self.layers)
 
-    def stacks(self):
+    def stacks(self) -> Iterator[tuple[range, Texture]]:
         """Yields (slots, texture array) of each array; the texture is valid until the next one."""
         stacks = [range(k, min(k + self.layers, self.capacity)) for k in range(0, self.capacity, self.layers)]
         if self._host is None:
@@ -280,7 +284,8 @@ class PackedFrames(WholeFrames):
     _kind = "rgba16ui"
 
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1):
-        self._light, self._sent = "linear", None
+        self._light: Light = "linear"
+        self._sent: Texture | None = None
         super().__init__(device, source, capacity, shutters)
         try:
             self._sent = device.texture(source.width, source.height, 1, "rgba8")
@@ -297,8 +302,10 @@ class PackedFrames(WholeFrames):
             self._held.clear()
         super().load(positions, options, shot)
 
-    def _send(self, texture, rows: np.ndarray, layer: int) -> None:
+    def _send(self, texture: Texture, rows: np.ndarray, layer: int) -> None:
         size = self.source.width, self.source.height
+        if self._sent is None:
+            raise ValueError("the window was released")
         self.device.write(self._sent, rows, opaque=True)
         program = packing(decoding(self.source.transfer, self._light), self._light == "linear")
         textures, images = {"frame": self._sent}, {"packed_frames": texture}
@@ -406,7 +413,7 @@ class Sums(RunningSums, Window):
         # A workgroup reads all layers of its pixels. In tiles, they are one run of memory.
         texels, _, tiles = _in_tiles(source.width, source.height, self.layers)
         self.tiled = stores_rows(device) and texels <= device.max_size and tiles <= device.max_layers
-        self._sent = {}
+        self._sent: dict[str, Texture] = {}
         self._allocate("rgba16ui", 8)
         try:
             self._hold("frame")
@@ -437,7 +444,7 @@ class Sums(RunningSums, Window):
             texture.release()
         self._sent = {}
 
-    def _send(self, index: int) -> tuple[str, dict]:
+    def _send(self, index: int) -> tuple[str, dict[str, Any]]:
         """Sends a source frame: as what (`accumulation`), and the arguments of the pass that adds it."""
         frame = self.source.decoded(index) if self.device.takes_planes else self.source.read(index)
         if isinstance(frame, Planes):
@@ -446,7 +453,7 @@ class Sums(RunningSums, Window):
         sent = self.device.send(self._sent["frame"], frame)
         return "colours" if sent is self._sent["frame"] else "numbers", {"textures": {"frame": sent}}
 
-    def _send_planes(self, frame: Planes) -> dict:
+    def _send_planes(self, frame: Planes) -> dict[str, Any]:
         self._hold("luma", "chroma")
         self.device.write(self._sent["luma"], _in_fours(frame.luma))
         for layer, plane in enumerate(frame.chroma):
@@ -461,20 +468,21 @@ class Sums(RunningSums, Window):
             "blue_of": matrix.blue_of_cb,
         }
 
-    def _add(self, frame: int, same: int | None, known: int, next_: int) -> None:
-        given = {"images": {}, "known": known % self.layers, "next": next_ % self.layers}
+    def _add(self, light: Light, frame: int, same: int | None, known: int, next_: int) -> None:
+        images: dict[str, Texture] = {}
+        given: dict[str, Any] = {"known": known % self.layers, "next": next_ % self.layers}
         if same is None:
             sent, arguments = self._send(frame)
             given |= arguments | {"whole": float(self.whole)}
+            images = given.pop("images", images)
         else:
             sent = "before"
             given |= {"before": same % self.layers, "after": (same + 1) % self.layers}
-        decode = decoding(self.source.transfer, self._options.light)
+        decode = decoding(self.source.transfer, light)
         program = accumulation(decode, sent, next_ < known, self.tiled)
         for top, height, sums in self.bands():
             size = self.source.width, height
-            given["images"] = given["images"] | {"sums": sums}
-            self.device.run(program, size, size=size, top=top, **given)
+            self.device.run(program, size, images=images | {"sums": sums}, size=size, top=top, **given)
 
     def release(self) -> None:
         RunningSums.release(self)

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.frames.frame_source import FrameSource
+from ..core.frames.frame_source import FrameSource, ShotFinder
 from ..core.pixels import compositor
 from .request import Request
 
 
-def stops_at_cuts(request: Request, source: FrameSource) -> bool:
-    """Whether the window ends at cuts: if Options.stop_at_cuts is set and the source knows its shots."""
-    return request.state.options.stop_at_cuts and source.shots is not None
+def shots_of(request: Request, source: FrameSource) -> ShotFinder | None:
+    """What finds the cuts at which the window ends, if Options.stop_at_cuts is set and the source knows its shots."""
+    return source.shots if request.state.options.stop_at_cuts else None
 
 
 def reach(request: Request, beside: int) -> tuple[int, int]:
@@ -30,24 +30,24 @@ def shot_of(request: Request, source: FrameSource, beside: int, *, known: bool =
     window does not reach are not looked for: the clip's ends take their place.
 
     It reads frames in which cuts are looked for. known: it reads none, and knows only the cuts found before."""
-    index, (low, high) = request.index, reach(request, beside)
-    if not stops_at_cuts(request, source):
+    index, (low, high), shots = request.index, reach(request, beside), shots_of(request, source)
+    if shots is None:
         return range(source.count)
-    shot = source.shots.around(index, low, high, known=known)
+    shot = shots.around(index, low, high, known=known)
     last = shot.stop - 1
     if request.state.options.edges == "mirror" and (last < high) != (shot.start > low):
         # Frames mirrored at one end of the shot may lie beyond its other end.
         low, high = (min(low, 2 * last - high), high) if last < high else (low, max(high, 2 * shot.start - low))
-        shot = source.shots.around(index, low, high, known=known)
+        shot = shots.around(index, low, high, known=known)
     return shot
 
 
 def looked_for_cuts(request: Request, source: FrameSource, beside: int) -> tuple[set[int], set[int]]:
     """The source frames in which `shot_of` will look for cuts, and those in which it has, which wait to be read."""
     low, high = reach(request, beside)
-    if not stops_at_cuts(request, source):
+    if (shots := shots_of(request, source)) is None:
         return set(), set()
-    return source.shots.lacking(request.index, low, high), source.shots.handed()
+    return shots.lacking(request.index, low, high), shots.handed()
 
 
 def positions(request: Request, shot: range) -> np.ndarray:
