@@ -84,7 +84,8 @@ def shapes(count: int) -> tuple[scribbles.Shape, ...]:
     ]
     shutter = itertools.cycle(range(count))
     return tuple(
-        scribbles.Shape(next(shutter), kind, 0.02, (np.array(points),)) for kind, points in drawn[: max(count, 4)]
+        scribbles.Shape(shutter=next(shutter), kind=kind, width=0.02, strokes=(np.array(points),))
+        for kind, points in drawn[: max(count, 4)]
     )
 
 
@@ -111,14 +112,14 @@ def measure(compositor, size: tuple[int, int], window: int) -> dict:
     ms: a picture's time, from the next frame to the composed picture on the device; readback_ms: to have it on the host
     fps: pictures a second without reading them back; memory: bytes of the device's textures, None for NumPy
     error: the largest of random pixels, in 8-bit levels, against the reference. NoDeviceError: there is no room."""
-    state = FrameState(Options(window), bars("preset", SHUTTERS, window), shapes(SHUTTERS))
+    state = FrameState(options=Options(window=window), bars=bars("preset", SHUTTERS, window), shapes=shapes(SHUTTERS))
     renderer = Renderer(compositor, source := Noise(*size))
     try:
         with compositor.current():
             times = []
             for index in range(PICTURES + 1):
                 start = time.perf_counter()
-                picture = compositor.read(drawn := renderer.draw(Request(index, state)))
+                picture = compositor.read(drawn := renderer.draw(Request(index=index, state=state)))
                 middle = time.perf_counter()
                 compositor.read(drawn)
                 readback = time.perf_counter() - middle
@@ -128,7 +129,8 @@ def measure(compositor, size: tuple[int, int], window: int) -> dict:
             memory = compositor.device.budget.used if hasattr(compositor, "device") else None
             rng = np.random.default_rng(window)
             y, x = rng.integers(0, source.height, COMPARED), rng.integers(0, source.width, COMPARED)
-            found, coefficients = picture[y, x, :3].copy(), renderer.coefficients(Request(index, state))[:, y, x]
+            colours = picture[y, x, :3].copy()
+            coefficients = renderer.coefficients(Request(index=index, state=state))[:, y, x]
         codes = np.stack([source.read(k)[y, x] for k in range(index, index + window)])
     finally:
         renderer.close()
@@ -141,7 +143,7 @@ def measure(compositor, size: tuple[int, int], window: int) -> dict:
         "readback_ms": readback * 1000,
         "fps": 1 / max(seconds, 1e-6),
         "memory": memory,
-        "error": levels_apart(found, reference(state, codes, coefficients)),
+        "error": levels_apart(colours, reference(state, codes, coefficients)),
     }
 
 
@@ -191,8 +193,8 @@ def largest_that_plays(rows: Timetable, size: tuple[int, int]) -> dict:
             high = middle
             if why == "too slow":
                 break
-    found = {"width": size[0], "height": size[1], "window": LENGTHS[low - 1] if low else None}
-    return found | ({"left_out": why} if why == "too slow" else {})
+    largest = {"width": size[0], "height": size[1], "window": LENGTHS[low - 1] if low else None}
+    return largest | ({"left_out": why} if why == "too slow" else {})
 
 
 def run(compositor, sizes=SIZES, windows=WINDOWS, seconds: float = 60.0, update=lambda: None) -> tuple[list, list]:
@@ -220,11 +222,11 @@ def table(rows: list[dict], plays: list[dict]) -> str:
         numbers = f"{row['ms']:.1f}", f"{row['fps']:.1f}", f"{row['readback_ms']:.1f}", memory, f"{row['error']:.2f}"
         lines.append(f"{place} {' | '.join(numbers)} |")
     lines += ["", f"| size | most frames that play at {RATE} frames/s |", "|---|--:|"]
-    for found in plays:
-        known = "none" if found["window"] is None else str(found["window"])
-        if found.get("left_out"):
-            known = "not measured" if found["window"] is None else f"{known} or more"
-        lines.append(f"| {found['width']}×{found['height']} | {known} |")
+    for row in plays:
+        known = "none" if row["window"] is None else str(row["window"])
+        if row.get("left_out"):
+            known = "not measured" if row["window"] is None else f"{known} or more"
+        lines.append(f"| {row['width']}×{row['height']} | {known} |")
     return "\n".join(lines)
 
 

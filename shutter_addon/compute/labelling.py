@@ -47,7 +47,7 @@ def sole_of(layers: list[LabelLayer]) -> int | None:
 
 def _layer(share: float, labels: np.ndarray) -> LabelLayer:
     digest = hashlib.blake2b(np.ascontiguousarray(labels), digest_size=16).digest()
-    return LabelLayer(share, labels, _sole(labels), (share, labels.shape, digest))
+    return LabelLayer(share=share, labels=labels, sole=_sole(labels), key=(share, labels.shape, digest))
 
 
 def _sole(labels: np.ndarray) -> int | None:

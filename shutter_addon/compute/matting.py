@@ -21,7 +21,7 @@ _READ = {"reads": True, "writes": False}
 def blend_pass(count: int, adds: bool) -> Pass:
     """Lays so many mattes; adds: any by the blend "add"."""
     return Pass(
-        "matte_blend",
+        name="matte_blend",
         images={
             "under": Image("rgba32f", **_READ),
             "values": Image("r32f", **_READ),

@@ -12,7 +12,7 @@ from ..devices.passes import LOCAL_ROW, Image, Pass
 def mix_pass(begins: bool) -> Pass:
     """Adds a share to a sum, or begins one."""
     return Pass(
-        "mix",
+        name="mix",
         images={"added": Image("rgba32f", reads=True, writes=False), "mixed": Image("rgba32f", reads=not begins)},
         constants={"size": "ivec2", "given": "ivec2", "share": "float"},
         defines={"BEGINS": int(begins)},

@@ -62,7 +62,7 @@ class Renderer:
             return self.compositor.read(self.draw(request))
 
     def draw(self, request: Request):
-        """The picture on the device (GPUCompositor.draw); with NumPy, an array as of `picture`. It is valid until the
+        """The picture on the device (GPUCompositor.draw); with NumPy an array, like `picture`'s. It is valid until the
         next picture of this renderer, and composed only if it is not the last one."""
         if self._window is None or not self._window.is_open:
             self._drawn.clear()

@@ -322,7 +322,7 @@ class PackedFrames(WholeFrames):
 def packing(decode: int, squared: bool) -> Pass:
     """The pass that packs a frame; decode: of `decoding`; squared: what is summed is linear light."""
     return Pass(
-        "pack",
+        name="pack",
         samplers={"frame": "sampler2DArray"},
         images={"packed_frames": Image("rgba16ui")},
         constants={"size": "ivec2", "layer": "int"},
@@ -375,7 +375,7 @@ def accumulation(decode: int, sent: str, back: bool, tiled: bool) -> Pass:
     tiled: the sums are stored in tiles
     """
     return Pass(
-        "accumulate",
+        name="accumulate",
         samplers=_COLOURS if sent in ("colours", "numbers") else {},
         images={"sums": Image("rgba16ui", reads=True)} | (_PLANES if sent == "planes" else {}),
         constants={"size": "ivec2", "known": "int", "next": "int"} | _OF_SENT[sent],

@@ -61,7 +61,7 @@ class _CameraTrack(tracking.Track):
     def _onward(self, start: int, frames: range) -> Iterator[Tracked]:
         """As `_from`; where that ends, it begins anew, in place of where it was last: behind a cut, for windows end
         there; and where two frames can be compared again. How it moved in between, nobody knows: there is a fault."""
-        last, fault = Tracked(start, self._placement(start), 1.0), None
+        last, fault = Tracked(frame=start, placement=self._placement(start), confidence=1.0), None
         for tracked in self._from(start, frames):
             if tracked.fault:
                 fault = tracked
@@ -79,7 +79,7 @@ class _CameraTrack(tracking.Track):
             yield replace(fault, fault=GOES_ON)
         if begin is not None:
             self._begun[begin] = last.placement
-            yield Tracked(begin, last.placement, 1.0)
+            yield Tracked(frame=begin, placement=last.placement, confidence=1.0)
             yield from self._onward(begin, rest[rest.index(begin) + 1 :])
 
     def _next_begin(self, frames: range) -> int | None:

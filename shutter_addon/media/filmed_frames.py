@@ -62,14 +62,14 @@ class FilmedFrames:
         first, centre = subject.placement(self._begin), _centre(subject, self._begin)
         # where the frame is an in-between one, a filmed one beside it was tracked from as if it were that
         origin = (self._between(subject, self._begin, known) or known[self.start]).placement
-        yield Tracked(self._begin, first, 1.0)
+        yield Tracked(frame=self._begin, placement=first, confidence=1.0)
         for rest in (range(self._begin + 1, max(self._times) + 1), range(self._begin - 1, min(self._times) - 1, -1)):
             told = set()
             for frame in rest:
                 there, fault = self._between(subject, frame, known), self._fault(frame, faults, known)
                 if fault is not None and fault not in told:
                     told.add(fault)
-                    yield Tracked(frame, first, 0.0, faults[fault])
+                    yield Tracked(frame=frame, placement=first, confidence=0.0, fault=faults[fault])
                 if there is None:
                     continue
                 after = _centre(subject, frame)
@@ -100,7 +100,7 @@ class FilmedFrames:
             return None
         first, second = (self._placed(subject, each, frame) for each in (before, after))
         placement = motions.between(first, second, self._times[frame] % 1)
-        return Tracked(frame, placement, min(before.confidence, after.confidence))
+        return Tracked(frame=frame, placement=placement, confidence=min(before.confidence, after.confidence))
 
     def _placed(self, subject: Subject, tracked: Tracked, frame: int) -> Placement:
         """A placement in another timeline frame's drawing, which may lie elsewhere."""

@@ -149,7 +149,7 @@ class Track(ABC):
         return self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
 
     def _both_ways(self, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
-        yield Tracked(start, self._subject.placement(start), 1.0)
+        yield Tracked(frame=start, placement=self._subject.placement(start), confidence=1.0)
         for rest in (range(start + 1, frames.stop), range(start - 1, frames.start - 1, -1)):
             anchor = next((frame for frame in rest if frame in anchors), None)
             if anchor is None:
@@ -183,20 +183,20 @@ class Track(ABC):
             share = (frame - start) / (anchor - start)
             if blended := _blended(there.get(frame), back.get(frame), share):
                 yield blended
-        yield Tracked(anchor, self._subject.placement(anchor), 1.0)
+        yield Tracked(frame=anchor, placement=self._subject.placement(anchor), confidence=1.0)
         yield from (fault for fault in faults if fault.frame not in there | back)
 
     def _from(self, start: int, frames: range) -> Iterator[Tracked]:
         """Frames one after another, away from `start`."""
         self._footage.want(frames)
         origin, pursuit, worth = self._pursuit(start)
-        last, shown = Tracked(start, self._placement(start), 1.0), start
+        last, shown = Tracked(frame=start, placement=self._placement(start), confidence=1.0), start
         lost: list[int] = []
         for frame in frames:
             self._footage.picture(frame)  # in the order in which they are read, before cuts are looked for
             if self._footage.cut(shown, frame):
                 fault = pursuit.reason if lost else SHOT_ENDS
-                yield Tracked((lost or [frame])[0], last.placement, 0.0, fault)
+                yield Tracked(frame=(lost or [frame])[0], placement=last.placement, confidence=0.0, fault=fault)
                 return
             sighting, shown = pursuit.next(frame), frame
             if sighting is None:
@@ -205,12 +205,12 @@ class Track(ABC):
                     break
                 continue
             placement = self._carried(origin, frame, sighting.motion, last.placement)
-            seen = Tracked(frame, placement, worth * sighting.confidence)
+            seen = Tracked(frame=frame, placement=placement, confidence=worth * sighting.confidence)
             yield from self._bridged(last, seen, lost)
             last, lost = seen, []
             yield last
         if lost:
-            yield Tracked(lost[0], last.placement, 0.0, pursuit.reason)
+            yield Tracked(frame=lost[0], placement=last.placement, confidence=0.0, fault=pursuit.reason)
 
     def _has_part(self, frame: int) -> bool:
         try:
@@ -232,7 +232,7 @@ class Track(ABC):
             centre = (1 - share) * self._centres[last.frame] + share * self._centres[seen.frame]
             straight = motions.between(last.placement, seen.placement, share)
             x, y = (float(number) for number in np.add(straight.location, centre) - self._centres[missing])
-            yield Tracked(missing, replace(straight, location=(x, y)), 0.0)
+            yield Tracked(frame=missing, placement=replace(straight, location=(x, y)), confidence=0.0)
 
 
 class _RegionTrack(Track):
@@ -343,4 +343,6 @@ def _blended(first: Tracked | None, second: Tracked | None, share: float) -> Tra
     weights = (1 - share) * (first.confidence + 1e-3), share * (second.confidence + 1e-3)
     share = weights[1] / sum(weights)
     placement = motions.between(first.placement, second.placement, share)
-    return Tracked(first.frame, placement, (1 - share) * first.confidence + share * second.confidence)
+    return Tracked(
+        frame=first.frame, placement=placement, confidence=(1 - share) * first.confidence + share * second.confidence
+    )

@@ -28,15 +28,16 @@ def content(effect, strip, region, moves, frames, time: keyframes.Channel | None
     if region.kind == "RAMP":
         ramp = validation.word(region, "ramp")
         if ramp != "LUMINANCE":
-            return PlacedRamp(ramp.lower(), *moves)
-        return mattes.FileFrames(_of_strip(strips.source_of(scene, effect, strip), "luminance"))
+            location, rotation, scale = moves
+            return PlacedRamp(kind=ramp.lower(), location=location, rotation=rotation, scale=scale)
+        return mattes.FileFrames(file=_of_strip(strips.source_of(scene, effect, strip), "luminance"))
     matte = validation.word(region, "matte")
     if matte == "STRIP":
         return _strip_frames(strip, region, frames)
     if matte == "MASK":
         return _mask_shapes(scene, effect, strip, region, frames, time)
     first = strips.origin(strip) if validation.word(region, "timing") == "TIMELINE" else None
-    return mattes.FileFrames(image_file(region), validation.number(region, "offset"), first)
+    return mattes.FileFrames(file=image_file(region), offset=validation.number(region, "offset"), first=first)
 
 
 def channel(region) -> str:
@@ -69,7 +70,7 @@ def image_file(region) -> MatteFile:
     if region.image.source == "SEQUENCE":
         listed = _listed(path, stamps)
         stamps = *stamps, source_media.between((region.image.session_uid,), len(listed), listed.__getitem__)
-    return MatteFile(path, channel(region), files, stamp=stamps)
+    return MatteFile(path=path, channel=channel(region), files=files, stamp=stamps)
 
 
 @lru_cache(64)
@@ -147,7 +148,9 @@ def _tried(function, *arguments):
 
 def _strip_frames(strip, region, frames) -> keyframes.Channel:
     parts, word = matte_strips.parts_for(region, strip), channel(region)
-    shown = {part.name: mattes.FileFrames(_of_strip(part, word), timing=strip_timing.timing_of(part)) for part in parts}
+    shown = {
+        part.name: mattes.FileFrames(file=_of_strip(part, word), timing=strip_timing.timing_of(part)) for part in parts
+    }
     if len(parts) == 1:
         return shown[parts[0].name]
     return keyframes.Samples({f: shown[matte_strips.part_at(parts, f).name].at(f) for f in frames})
@@ -156,4 +159,4 @@ def _strip_frames(strip, region, frames) -> keyframes.Channel:
 def _of_strip(strip, word: str) -> MatteFile:
     """A channel of what a movie, image or clip strip reads. MediaError: it has no files."""
     spec = source_media.spec(strip)
-    return MatteFile(spec.path, word, spec.files, spec.options["stream"], spec.key)
+    return MatteFile(path=spec.path, channel=word, files=spec.files, stream=spec.options["stream"], stamp=spec.key)

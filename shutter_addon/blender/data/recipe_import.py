@@ -70,7 +70,7 @@ def _set_number(scene, owner, path: str, name: str, value: recipe.Keyable, first
 def matte_image(path: str | Path, channel: str = "luminance"):
     """The movie, image sequence or picture at a path, to which a region can point. MediaError: there is none, or none
     with such a channel."""
-    with MatteFile(Path(path), channel).open() as matte:
+    with MatteFile(path=Path(path), channel=channel).open() as matte:
         path, count = matte.path, matte.count
     name = _kept(check_name(path))
     is_sequence = path.suffix.lower() in IMAGE_SUFFIXES and count > 1
@@ -181,7 +181,7 @@ def _add_matte(scene, effect, strip, source: recipe.MatteRegion | recipe.RampReg
 
 def _set_moves(scene, moving, path: str, keys: list, first: float, **curve) -> None:
     """Location, rotation and scale of a region or of the camera, and their keys."""
-    start = keys[0] if keys else recipe.CameraKey(0)
+    start = keys[0] if keys else recipe.CameraKey(frame=0)
     moving.location, moving.rotation, moving.scale = start.location, np.radians(start.rotation), start.scale
     if not keys:
         return

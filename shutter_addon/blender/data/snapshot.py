@@ -86,16 +86,16 @@ def take(
     source = strips.source_of(scene, effect, strip)
     stamps = (files or {}).get(source.name) or source_files(effect, source, folder)
     return Snapshot(
-        effect.scene.session_uid,
-        strips.timeline_frame(strip, 0),
-        strip.left_handle,
-        (scene.frame_step, scene.frame_end),
-        frozenset(frames),
-        read(scene, effect, strip, frames),
-        source_media.spec(source, stamps.key),
-        None if effect.use_source_time else timing_of(source),
-        inbetween_settings.settings(effect, folder) if inbetween_settings.factor(effect) > 1 else None,
-        stamps.built,
+        scene=effect.scene.session_uid,
+        origin=strips.timeline_frame(strip, 0),
+        first=strip.left_handle,
+        film=(scene.frame_step, scene.frame_end),
+        frames=frozenset(frames),
+        effect=read(scene, effect, strip, frames),
+        source=source_media.spec(source, stamps.key),
+        timing=None if effect.use_source_time else timing_of(source),
+        inbetween=inbetween_settings.settings(effect, folder) if inbetween_settings.factor(effect) > 1 else None,
+        built=stamps.built,
     )
 
 
@@ -120,15 +120,15 @@ def read(scene, effect, strip, frames, *, thorough: bool = False) -> model.Effec
     )
     camera = _camera(curves, effect, around)
     return model.Effect(
-        tuple(
+        shutters=tuple(
             replace(_shutter(curves, effect, i, options, frames, thorough), follow=_followed(shutter, regions, camera))
             for i, shutter in enumerate(effect.shutters)
         ),
-        regions,
-        options,
-        sampling.time,
-        _channel(curves, effect, path, "edge_aware", frames),
-        camera,
+        regions=regions,
+        options=options,
+        time=sampling.time,
+        edge_aware=_channel(curves, effect, path, "edge_aware", frames),
+        camera=camera,
     )
 
 
@@ -253,7 +253,7 @@ def _options_at(effect, curves: dict, frame: float) -> Options:
 
     words = {name: at(name).lower() for name in OPTIONS}
     return Options(
-        validation.number(effect, "window"),
+        window=validation.number(effect, "window"),
         **words,
         aggregate=int(at("aggregate")),
         border=at("border"),
@@ -275,7 +275,9 @@ def _shutter(
     trail = _channel(curves, shutter, path, "trail", frames) if is_trail else None
     motion = validation.word(shutter, "follow_motion").lower()
     smooth = validation.number(shutter, "follow_smooth")
-    return model.Shutter(shutter.name, tuple(shutter.color), bars, None, trail, motion, smooth)
+    return model.Shutter(
+        name=shutter.name, color=tuple(shutter.color), bars=bars, follow=None, trail=trail, motion=motion, smooth=smooth
+    )
 
 
 def _bars(curves: Curves, path: str, shutter, options: keyframes.Channel, frames, thorough: bool) -> keyframes.Bars:
@@ -353,7 +355,14 @@ class _Sampling:
     @staticmethod
     def of(curves: Curves, effect, strip, frames) -> "_Sampling":
         time = _source_time(curves, effect.path_from_id(), effect, frames) if effect.use_source_time else None
-        return _Sampling(curves, effect, strip, frames, _placement(curves, effect, strip, frames), time)
+        return _Sampling(
+            curves=curves,
+            effect=effect,
+            strip=strip,
+            frames=frames,
+            placement=_placement(curves, effect, strip, frames),
+            time=time,
+        )
 
 
 def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region | model.MatteRegion:
@@ -368,27 +377,42 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
     if faults := [value for value in (content, blend) if isinstance(value, UserError)]:
         content, blend = keyframes.Constant(faults[0]), "OVER"
     opacity, feather = (_channel(curves, region, path, name, frames) for name in ("opacity", "feather"))
-    numbers = content, blend.lower(), region.invert, opacity, feather
-    return model.MatteRegion(region.name, shutter, *numbers, *moves)
+    location, rotation, scale = moves
+    return model.MatteRegion(
+        name=region.name,
+        shutter=shutter,
+        content=content,
+        blend=blend.lower(),
+        invert=region.invert,
+        opacity=opacity,
+        feather=feather,
+        location=location,
+        rotation=rotation,
+        scale=scale,
+    )
 
 
 def _region(sampling: _Sampling, path: str, region, shutter: int) -> model.Region:
     curves, frames = sampling.curves, sampling.frames
+    location, rotation, scale = _moves(curves, region, path, frames)
     return model.Region(
-        region.name,
-        shutter,
-        keyframes.Constant(_tried(lambda: validation.word(region, "kind").lower())),
-        _channel(curves, region, path, "width", frames),
-        _drawings(curves, path, sampling.effect, region, sampling.placement, frames),
-        *_moves(curves, region, path, frames),
-        _channel(curves, region, path, "opacity", frames),
+        name=region.name,
+        shutter=shutter,
+        kind=keyframes.Constant(_tried(lambda: validation.word(region, "kind").lower())),
+        width=_channel(curves, region, path, "width", frames),
+        drawings=_drawings(curves, path, sampling.effect, region, sampling.placement, frames),
+        location=location,
+        rotation=rotation,
+        scale=scale,
+        opacity=_channel(curves, region, path, "opacity", frames),
     )
 
 
 def _camera(curves: Curves, effect, frames) -> model.Camera:
     path = effect.camera.path_from_id()
-    moves = _moves(curves, effect.camera, path, frames)
-    return model.Camera(*moves, _channel(curves, effect.camera, path, "influence", frames))
+    location, rotation, scale = _moves(curves, effect.camera, path, frames)
+    influence = _channel(curves, effect.camera, path, "influence", frames)
+    return model.Camera(location=location, rotation=rotation, scale=scale, influence=influence)
 
 
 def _moves(curves: Curves, moving, path: str, frames) -> tuple[keyframes.Channel, ...]:
@@ -412,11 +436,11 @@ def _drawings(curves: Curves, path: str, effect, region, placement, frames) -> m
     is_curve = timing is not None and not isinstance(timing, EffectError)
     eases = dict(curves.keys([timing])) if is_curve and len(numbers) > 1 else {}
     return model.Drawings(
-        numbers,
-        tuple(annotations.strokes_of(drawing) if i in needed else None for i, drawing in enumerate(drawings)),
-        tuple(eases.get(number, "linear") for number in numbers),
-        width / height,
-        placement,
+        frames=numbers,
+        strokes=tuple(annotations.strokes_of(drawing) if i in needed else None for i, drawing in enumerate(drawings)),
+        eases=tuple(eases.get(number, "linear") for number in numbers),
+        aspect=width / height,
+        placement=placement,
     )
 
 

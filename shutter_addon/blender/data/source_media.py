@@ -78,7 +78,7 @@ def between(place: tuple, count: int, path) -> int:
         return 0
     look = _looks.pop(place, None)
     if look is None or len(look.known) != count:
-        look = _Look([None] * count, 0, count)
+        look = _Look(known=[None] * count, next=0, due=count)
     _looks[place] = look
     while len(_looks) > _KEPT:
         del _looks[next(iter(_looks))]
@@ -160,7 +160,9 @@ def _spec(strip, key: tuple) -> SourceSpec:
         "alpha": _alpha(strip),
         "deinterlace": strip.type == "MOVIE" and strip.use_deinterlace,
     }
-    return SourceSpec(key, path(0), None if _is_movie(strip) else tuple(path(i) for i in range(count)), options)
+    return SourceSpec(
+        key=key, path=path(0), files=None if _is_movie(strip) else tuple(path(i) for i in range(count)), options=options
+    )
 
 
 def open_media(strip) -> FrameSource:

@@ -35,7 +35,9 @@ def of_edit(scene) -> EditVersion:
     with open(bpy.data.filepath, "rb") as file:
         blend = hashlib.file_digest(file, "sha256").hexdigest()
     footage = tuple(map(_footage, _footage_files(scene)))
-    return EditVersion(blend, extension(), blender(), colour_configuration.name(), footage)
+    return EditVersion(
+        blend=blend, extension=extension(), blender=blender(), colours=colour_configuration.name(), footage=footage
+    )
 
 
 def read_files(scene) -> list[Path]:
@@ -82,7 +84,7 @@ def _footage(files: list[Path]) -> Footage:
         for path, digest in zip(files, pool.map(partial(_digest, whole=whole), files), strict=True):
             missing = missing or ("" if digest else path.name)
             content.update(digest or b"missing: " + os.fsencode(path.name))
-    return Footage(files[0].name, len(files), content.hexdigest(), missing)
+    return Footage(name=files[0].name, files=len(files), content=content.hexdigest(), missing=missing)
 
 
 def _digest(path: Path, whole: int) -> bytes | None:

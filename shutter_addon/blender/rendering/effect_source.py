@@ -50,7 +50,13 @@ class SourceKey:
 
     @staticmethod
     def of(snapshot: Snapshot, detail: Detail = FULL) -> SourceKey:
-        return SourceKey(snapshot.scene, snapshot.source, snapshot.inbetween, snapshot.built, detail)
+        return SourceKey(
+            scene=snapshot.scene,
+            spec=snapshot.source,
+            inbetween=snapshot.inbetween,
+            built=snapshot.built,
+            detail=detail,
+        )
 
     def open(self, *, planes: bool = False) -> ShotSource:
         """The source; planes: see PrefetchSource. EffectError, MediaError: there is none."""

@@ -44,16 +44,18 @@ class RenderContext:
 
 def of_drawing() -> RenderContext:
     """For what is drawn on the main thread; without a window, what draws there is a script."""
-    return RenderContext(sessions.WINDOW, render_settings.settings()) if in_window() else of_render()
+    return RenderContext(session=sessions.WINDOW, settings=render_settings.settings()) if in_window() else of_render()
 
 
 def of_engine(say, stopped) -> RenderContext:
     """For the engine: a preview where Blender draws, else a render."""
     if in_window() and not render_job.ends_films():
-        return RenderContext(sessions.WINDOW, render_settings.settings(), say, stopped)
+        return RenderContext(session=sessions.WINDOW, settings=render_settings.settings(), say=say, stopped=stopped)
     return of_render(say, stopped)
 
 
 def of_render(say=print, stopped=never, *, levels: bool = False) -> RenderContext:
     """For a render: on a device apart from the window's, which need not be current. NoDeviceError: there is none."""
-    return RenderContext(sessions.of_render(), render_settings.settings(), say, stopped, levels)
+    return RenderContext(
+        session=sessions.of_render(), settings=render_settings.settings(), say=say, stopped=stopped, levels=levels
+    )

@@ -99,7 +99,7 @@ class RenderSession:
             state = following.followed(
                 snapshot.effect, state, shown, source, lambda other: source_index(snapshot, other, source)[0]
             )
-        request = Request(index, state, direction, key, levels=context.levels)
+        request = Request(index=index, state=state, direction=direction, source=key, levels=context.levels)
         self._requests[snapshot.scene] = snapshot, frame, request
         return request
 

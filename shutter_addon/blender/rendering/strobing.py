@@ -102,14 +102,14 @@ def _look(effect, strip, snapshot, renderer, request):
         return None
     factor = _factor(request.state, step / smooth(height))
     if factor is None:
-        return Strobing(step, None)
+        return Strobing(step=step, factor=None)
     key = snapshot.source.key, inbetween_settings.method(effect)
     if key not in _costs:
         _measuring.wanted = partial(_measure_cost, snapshot.source, pairs[0], key)
     if (cost := _costs.get(key)) is None:
-        return Strobing(step, factor)
+        return Strobing(step=step, factor=factor)
     count = _count(strip, snapshot, renderer.source, request)
-    return Strobing(step, factor, cost.seconds(count, factor), cost.bytes(count, factor))
+    return Strobing(step=step, factor=factor, seconds=cost.seconds(count, factor), size=cost.bytes(count, factor))
 
 
 def smooth(height: int) -> float:

@@ -101,7 +101,7 @@ class Region:
         location, rotation, scale = (channel.at(frame) for channel in (self.location, self.rotation, self.scale))
         moved = scribbles.transform(self.unmoved(frame), location, rotation, scale, self.drawings.aspect)
         kind, width, opacity = (channel.at(frame) for channel in (self.kind, self.width, self.opacity))
-        return scribbles.Shape(self.shutter, kind, width, moved, float(opacity))
+        return scribbles.Shape(shutter=self.shutter, kind=kind, width=width, strokes=moved, opacity=float(opacity))
 
     def placement(self, frame: float) -> Placement:
         """Its keyed numbers at a frame."""
@@ -161,7 +161,14 @@ class MatteRegion:
     def at(self, frame: float) -> mattes.Matte:
         """The matte at a frame."""
         opacity, feather = (float(channel.at(frame)) for channel in (self.opacity, self.feather))
-        return mattes.Matte(self.shutter, self.content.at(frame), self.blend, opacity, feather, self.invert)
+        return mattes.Matte(
+            shutter=self.shutter,
+            content=self.content.at(frame),
+            blend=self.blend,
+            opacity=opacity,
+            feather=feather,
+            invert=self.invert,
+        )
 
     def placement(self, frame: float) -> Placement:
         """Its keyed numbers at a frame."""
@@ -192,7 +199,7 @@ class PlacedRamp:
 
     def at(self, frame: float) -> mattes.Ramp:
         placed = _placement(self, frame)
-        return mattes.Ramp(self.kind, placed.location, placed.rotation, placed.scale)
+        return mattes.Ramp(kind=self.kind, location=placed.location, rotation=placed.rotation, scale=placed.scale)
 
 
 @dataclass(frozen=True)
@@ -288,7 +295,7 @@ class Effect:
         bars = [self.bars_at(index, frame) for index in range(len(self.shutters))]
         laid = [region.at(frame) for region in self.regions if isinstance(region, MatteRegion)]
         seen = tuple(matte for matte in laid if matte.opacity > 0)
-        return FrameState(options, np.stack(bars), tuple(self._shapes_at(frame)), mattes=seen)
+        return FrameState(options=options, bars=np.stack(bars), shapes=tuple(self._shapes_at(frame)), mattes=seen)
 
     def _shapes_at(self, frame: float) -> Iterator[scribbles.Shape]:
         room = limits.MAX_POINTS

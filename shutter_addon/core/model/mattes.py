@@ -87,8 +87,8 @@ class FileFrames:
     def at(self, frame: float) -> FileFrame:
         """What is shown at a timeline frame."""
         if self.timing is not None:
-            return FileFrame(self.file, 0, frame, self.timing)
-        return FileFrame(self.file, self.offset, None if self.first is None else frame - self.first)
+            return FileFrame(file=self.file, offset=0, time=frame, timing=self.timing)
+        return FileFrame(file=self.file, offset=self.offset, time=None if self.first is None else frame - self.first)
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ class Gap(NamedTuple):
     hard_last: bool = False
 
 
-_NONE_LATER = Gap(math.inf, math.inf)
+_NONE_LATER = Gap(first=math.inf, last=math.inf)
 
 
 def keys(
@@ -92,7 +92,7 @@ def gaps(seen: Collection[int], stops: Iterable[Stop], beside: int = 0) -> list[
 def _gap(seen: Collection[int], stop: Stop) -> Gap:
     frame = stop.frame
     if frame in seen:
-        return Gap(frame, frame)
+        return Gap(first=frame, last=frame)
     if stop.is_forward:
-        return Gap(frame, min((s for s in seen if s > frame), default=math.inf) - 1, hard_first=stop.is_cut)
-    return Gap(max((s for s in seen if s < frame), default=-math.inf) + 1, frame, hard_last=stop.is_cut)
+        return Gap(first=frame, last=min((s for s in seen if s > frame), default=math.inf) - 1, hard_first=stop.is_cut)
+    return Gap(first=max((s for s in seen if s < frame), default=-math.inf) + 1, last=frame, hard_last=stop.is_cut)

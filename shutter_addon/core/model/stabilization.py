@@ -71,10 +71,11 @@ class Stabilization:
         location = [track for track in tracks if track.location]
         known = sorted({frame for track in location for frame in track.frames()})
         before = max((frame for frame in known if frame <= anchor), default=known[0] if known else anchor)
-        frame, there = anchor, Measured(0, _mean(location, before) or 0, 0.0, 0.0)
+        frame, there = anchor, Measured(shift=0, pivot=_mean(location, before) or 0, angle=0.0, log_scale=0.0)
         for reference, track in sorted(near, key=lambda each: abs(each[0] - anchor)):
             if reference != frame:
-                frame, there = reference, self._averaged(reference) or Measured(0, there.pivot, 0.0, 0.0)
+                still = Measured(shift=0, pivot=there.pivot, angle=0.0, log_scale=0.0)
+                frame, there = reference, self._averaged(reference) or still
             away = track.markers[reference] - there.pivot
             base = there.shift - track.markers[reference], there.angle - cmath.phase(away)
             self._bases.append((track, Base(*base, there.log_scale - math.log(abs(away) + _BIAS))))
@@ -109,8 +110,10 @@ class Stabilization:
                 angle += share * cmath.phase(away * cmath.rect(1, base.angle))
                 log_scale += share * (math.log(abs(away) + _BIAS) + base.log_scale)
         if not total:
-            return Measured(shift, pivot, 0.0, 0.0)
-        return Measured(shift, pivot, angle / total, log_scale / total if self._scaled else 0.0)
+            return Measured(shift=shift, pivot=pivot, angle=0.0, log_scale=0.0)
+        return Measured(
+            shift=shift, pivot=pivot, angle=angle / total, log_scale=log_scale / total if self._scaled else 0.0
+        )
 
 
 def _mean(tracks: list[Track], frame: int) -> complex | None:
