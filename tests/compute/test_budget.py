@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -63,8 +64,7 @@ def limited(two_devices):
     assert [each.used for each in budgets] == [0] * len(budgets)
     for device in two_devices:
         device.ask_others = None
-        assert not device._held
-        assert not device._windows
+        assert (device._held, device._windows) == ({}, {})  # what stays here takes the host's memory, which none counts
 
 
 def film(seed=3, **kind):
@@ -73,21 +73,32 @@ def film(seed=3, **kind):
 
 def free(compositor):
     """What it has itself; its device stays."""
-    with compositor.current():
-        for texture in compositor._textures.values():
-            texture.release()
+    with mock.patch.object(compositor.device, "release"):
+        compositor.release()
 
 
 def moment(**given):
     return state(np.random.default_rng(4), **given)
 
 
+class NotedCompositor(GPUCompositor):
+    """windows: all that it has made."""
+
+    def __init__(self, device):
+        super().__init__(device)
+        self.windows = []
+
+    def window(self, *given):
+        self.windows.append(super().window(*given))
+        return self.windows[-1]
+
+
 def rendered(device, source: FrameSource, states, mattes=None):
-    """The pictures of these moments at frames 2, 3, …, and the renderer, closed."""
-    compositor = GPUCompositor(device)
+    """The pictures of these moments at frames 2, 3, …, the kind of their window, and what was slow in the last one."""
+    compositor = NotedCompositor(device)
     renderer = Renderer(compositor, source, mattes)
     pictures = [renderer.picture(Request(2 + i, shown)) for i, shown in enumerate(states)]
-    shortages, kind = set(renderer.shortages), type(renderer._window).__name__
+    shortages, kind = set(renderer.shortages), type(compositor.windows[-1]).__name__
     renderer.close()
     free(compositor)
     return np.array(pictures), kind, shortages
@@ -180,13 +191,15 @@ def test_several_effects_take_turns_and_show_the_same(limited):
     """The window that was used longest ago is freed, and read again; none takes a smaller way."""
     sources, limit = [film(seed) for seed in range(3)], PIXELS * (SUMS + BESIDE + 40)
     alone = [rendered(limited(limit), source, [moment()] * 2)[0] for source in sources]
-    compositor = GPUCompositor(limited(limit))
+    compositor = NotedCompositor(limited(limit))
     renderers = [Renderer(compositor, source) for source in sources]
     for index in range(2):
         for renderer, wanted in zip(renderers, alone, strict=True):
             assert np.array_equal(renderer.picture(Request(2 + index, moment())), wanted[index])
-            assert type(renderer._window) is window.Sums
-    assert sum(renderer._window.is_open for renderer in renderers) == 1
+            assert type(compositor.windows[-1]) is window.Sums
+            assert compositor.windows[-1].is_open
+    assert len(compositor.windows) == 6
+    assert sum(each.is_open for each in compositor.windows) == 1
     assert np.array_equal(
         renderers[0].picture(Request(3, moment())), alone[0][1]
     )  # its last one, whose texture was freed
@@ -216,7 +229,7 @@ def test_devices_share_a_budget(limited):
     """What one has taken the other lacks, until it is asked to free it."""
     wanted, _, _ = rendered(limited(ROOMY), film(), [moment()] * 2)
     shared = Budget(PIXELS * (SUMS + BESIDE))
-    source, compositors = film(), [GPUCompositor(limited(shared, which)) for which in range(2)]
+    source, compositors = film(), [NotedCompositor(limited(shared, which)) for which in range(2)]
     first, second = (Renderer(compositor, source) for compositor in compositors)
     assert np.array_equal(first.picture(Request(2, moment())), wanted[0])
     assert shared.used > PIXELS * SUMS
@@ -224,7 +237,7 @@ def test_devices_share_a_budget(limited):
         compositors[1].device.texture(*SIZE, SUMS // 8, "rgba16ui")
     compositors[1].device.ask_others = first.release
     assert np.array_equal(second.picture(Request(2, moment())), wanted[0])
-    assert first._window is None
+    assert not any(each.is_open for each in compositors[0].windows)
     compositors[0].device.ask_others = second.release
     assert np.array_equal(first.picture(Request(3, moment())), wanted[1])
     for renderer, compositor in zip((first, second), compositors, strict=True):
@@ -232,22 +245,23 @@ def test_devices_share_a_budget(limited):
         free(compositor)
 
 
-def test_a_driver_that_has_less_than_it_says_gets_less(limited, monkeypatch):
+def test_a_driver_that_has_less_than_it_says_gets_less(kind, limited, monkeypatch):
     most, held = PIXELS * 64, []
-    device = limited(ROOMY)
-    make = type(device)._make
 
-    def small(self, width, height, layers, kind):
-        if self.budget.used > most:
-            raise NoDeviceError("out of memory")
-        held.append(self.budget.used)
-        return make(self, width, height, layers, kind)
+    class Small(kind):
+        def _make(self, *given):
+            if self.budget.used > most:
+                raise NoDeviceError("out of memory")
+            held.append(self.budget.used)
+            return super()._make(*given)
 
     shown = [moment(), moment(shapes=SHAPES[:2])]
-    roomy, *_ = rendered(device, film(), shown)
-    monkeypatch.setattr(type(device), "_make", small)
+    roomy, *_ = rendered(limited(ROOMY), film(), shown)
     monkeypatch.setattr(window, "SENT_BYTES", most // 8)
+    device = Small(Budget(ROOMY))
     pictures, _, shortages = rendered(device, film(), shown)
+    assert device.budget.used == 0
+    device.release()
     assert shortages == {"window"}
     assert np.abs(pictures - roomy).max() <= 2**-14
     assert max(held) <= most

@@ -277,9 +277,8 @@ def test_sums_over_the_budget_are_not_made(monkeypatch, made):
     source, moment = footage(rng), made(rng)
     expected = Renderer(CPUCompositor(), source).picture(Request(2, moment))
     monkeypatch.setattr(cpu_window, "SUMS_BYTES", 0)
-    renderer = Renderer(CPUCompositor(), source)
-    picture = renderer.picture(Request(2, moment))
-    assert isinstance(renderer._window, cpu_window.TiledFrames)
+    assert isinstance(CPUCompositor().window(source, moment.options.window), cpu_window.TiledFrames)
+    picture = Renderer(CPUCompositor(), source).picture(Request(2, moment))
     assert np.abs(picture - expected).max() < 2**-15
 
 
@@ -316,7 +315,7 @@ def test_long_windows_of_shutters_far_apart(device, count):
 @pytest.mark.parametrize("edges", ["hold", "shorten"])
 @pytest.mark.parametrize("stored", ["uint8", "float32"])
 def test_each_pixel_looks_up_its_pieces(gpu_device, monkeypatch, edges, stored):
-    monkeypatch.setattr(composition_passes, "_MOST_ITERATIONS", 0)
+    monkeypatch.setattr(composition_passes, "frames_iterations", lambda *_: np.inf)
     rng = np.random.default_rng(19)
     source = footage(rng, dtype=np.dtype(stored), transfer="linear" if stored == "float32" else "srgb")
     check(GPUCompositor(gpu_device), source, far_apart(rng, 5, 16, edges=edges), 15)
@@ -526,16 +525,16 @@ def test_a_device_too_small_for_the_window_streams_it(monkeypatch):
     source, moment = footage(rng), state(rng)
     device = open_compositor("gpu")
     whole = Renderer(device, source).picture(Request(0, moment))
-    make = GLDevice._make
 
-    def small(self, width, height, layers, kind):
-        if kind == "rgba16ui" or (layers >= 16 and height > 16):
-            raise NoDeviceError("no room")
-        return make(self, width, height, layers, kind)
+    class Small(GLDevice):
+        def _make(self, width, height, layers, kind):
+            if kind == "rgba16ui" or (layers >= 16 and height > 16):
+                raise NoDeviceError("no room")
+            return super()._make(width, height, layers, kind)
 
-    monkeypatch.setattr(GLDevice, "_make", small)
     monkeypatch.setattr(window, "BAND_BYTES", source.width * 4 * 16 * 16)
-    assert np.abs(Renderer(device, source).picture(Request(0, moment)) - whole).max() <= 2**-15
+    picture = Renderer(GPUCompositor(Small()), source).picture(Request(0, moment))
+    assert np.abs(picture - whole).max() <= 2**-15
 
 
 def test_history_leaves_no_trace(device):
@@ -574,8 +573,9 @@ def test_running_sums_wrap_around(device, window):
     source.read = lambda index: source.frames[0]
     renderer, moment = Renderer(device, source), few_pieces(np.random.default_rng(25), window)
     renderer.draw(Request(0, moment))
+    # NumPy's have room for 65537 frames, which would take too long to sum.
     for sums in getattr(renderer._window, "_sums", ()):
-        sums += np.uint32(2**32 - 300 * cpu_window.WHITE)  # NumPy's have room for 65537 frames
+        sums += np.uint32(2**32 - 300 * cpu_window.WHITE)
     for index in range(700):
         if index % 50 == 0 or index > 690:
             assert np.abs(renderer.picture(Request(index, moment)) - 1).max() < 1e-6

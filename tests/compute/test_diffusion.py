@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from all_passes import PASSES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.sparse import coo_matrix, diags
@@ -454,7 +455,7 @@ def test_more_cycles_come_closer(monkeypatch, solve):
 @pytest.mark.parametrize("size", [(8, 5), (5, 8), (8, 8), (1, 7), (7, 1), (1, 1), (4, 3)])
 def test_the_coarsest_grid_is_solved_exactly(gpu_device, size):
     """Against NumPy: a symmetric nine-point operator, right sides of two layers, and a cell with no equation."""
-    width, height = size
+    (width, height), solve = size, next(each for each in PASSES if each.name == "diffuse_solve")
     rng = np.random.default_rng(width + 10 * height)
     cells = np.arange(width * height).reshape(height, width)
     matrix = np.zeros((width * height,) * 2)
@@ -481,7 +482,7 @@ def test_the_coarsest_grid_is_solved_exactly(gpu_device, size):
             images[name] = gpu_device.texture(width, height, len(values), "rgba32f")
             for layer, part in enumerate(values.astype(np.float32)):
                 gpu_device.write(images[name], part, layer)
-        gpu_device.run(diffusion_gpu._SOLVE, (1, 1, 2), images=images, size=size)
+        gpu_device.run(solve, (1, 1, 2), images=images, size=size)
         solution = gpu_device.read(images["solution"])
     if dead is not None:
         matrix[dead, dead] = 1

@@ -1,5 +1,6 @@
 """What a window is said to need is what it takes."""
 
+import tracemalloc
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,6 +10,7 @@ from shutter_addon.compute import memory_needs
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.renderer import open_gl
 from shutter_addon.compute.window import beside, open_window
+from shutter_addon.core.model.frame_state import Options
 from shutter_addon.devices.budget import Budget
 from shutter_addon.devices.device import NoDeviceError
 
@@ -48,11 +50,17 @@ def test_without_room_the_frames_stay_on_the_host(device):
     assert needs.gpu <= device.budget.limit
 
 
-@pytest.mark.parametrize(("dtype", "alpha", "moved"), [(np.uint8, "opaque", False), (np.uint16, "straight", False)])
-def test_with_numpy(dtype, alpha, moved):
+@pytest.mark.parametrize(("dtype", "alpha", "curve"), [(np.uint8, "opaque", 0), (np.uint16, "straight", 1 << 16)])
+def test_with_numpy(dtype, alpha, curve):
+    """curve: how many float32 of light there are beside the frames, whatever their size."""
     pictures = source(dtype, alpha)
     pictures.read = lambda index: np.zeros((50, 70, 4), dtype)
-    window = CPUCompositor().window(pictures, WINDOW, moved)
-    sums = getattr(window, "_sums", [])
-    taken = sum(each.nbytes for each in sums) or WINDOW * pictures.read(0).nbytes
-    assert memory_needs.of_numpy_window(pictures, WINDOW, moved) == (0, taken, False)
+    tracemalloc.start()
+    try:
+        window = CPUCompositor().window(pictures, WINDOW)
+        window.load(np.arange(WINDOW), Options(WINDOW), range(pictures.count))
+        arrays = tracemalloc.take_snapshot().filter_traces([tracemalloc.DomainFilter(True, np.lib.tracemalloc_domain)])
+    finally:
+        tracemalloc.stop()
+    taken = sum(trace.size for trace in arrays.traces) - 4 * curve
+    assert memory_needs.of_numpy_window(pictures, WINDOW, moved=False) == (0, taken, False)
