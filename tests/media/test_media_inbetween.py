@@ -417,7 +417,7 @@ def test_pairs_at_work_fit_into_memory(monkeypatch, processors, size, samples):
     """And with them the frames beyond, up to eight that have a say in whether there is a cut."""
     monkeypatch.setattr(inbetween.os, "process_cpu_count", lambda: processors, raising=False)
     source = SimpleNamespace(width=size[0], height=size[1], dtype=np.dtype(samples))
-    workers, ahead = inbetween._workers(source), inbetween._ahead(source)
+    workers, ahead = inbetween._workers(source), inbetween._ahead(source)  # pictures too large for any build in a test
     pair = 26 * 16 * size[0] * size[1]  # layers of four float32
     beyond = ahead * 4 * source.dtype.itemsize * size[0] * size[1]
     assert beyond <= 640 << 20
@@ -450,13 +450,18 @@ def test_frames_read_ahead_have_a_bound_and_are_read_once_within_it(tmp_path, mo
     for number in range(30):
         noise = random.integers(0, 2, picture(2).shape)
         save_image(tmp_path / "shot" / f"{number:02d}.png", (picture(2) | noise).astype(np.uint8))
+    monkeypatch.setattr(inbetween.os, "process_cpu_count", lambda: 1, raising=False)
     with open_source(tmp_path / "shot" / "00.png") as source:
         size, found = source.read(0).nbytes, []
         for room in (8, 3, 0):
             monkeypatch.setattr(inbetween, "AHEAD", room * size)
-            near = inbetween._Near(counting := Counting(source))
-            found.append([near.pair(index)[2] for index in range(first, 29)])
-            assert counting.most <= 2 + room + 1  # the pair, what waits, and what is being read
+            folder, counting = tmp_path / f"{room}", Counting(source)
+            assert build(counting, folder, pairs=range(first, 29)).done == 29 - first
+            cache = inbetween_cache.InbetweenCache(source, folder, FACTOR, "quick")
+            cache.load()
+            found.append((cache.kinds, kept(folder)))
+            # The pair, what waits, what is being read, and the first of the pair that was just built.
+            assert counting.most <= 2 + room + 2
             again = len(counting.reads) - len(set(counting.reads))
             assert again == 0 if room == 8 else 0 < again <= 30 - first
     assert found[0] == found[1] == found[2]

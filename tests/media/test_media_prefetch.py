@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shutter_addon.core import stopping
 from shutter_addon.media import MediaError, PrefetchSource, open_source
 
 
@@ -61,7 +62,7 @@ def test_frames_are_the_sources_in_any_order(ahead, source):
         ahead.want(rng.integers(0, 12, rng.integers(0, 9)))
         index = int(rng.integers(0, 12))
         assert np.array_equal(ahead.read(index), source.frames[index])
-    assert source.threads == {ahead._thread}
+    assert len(source.threads) == 1
     assert threading.current_thread() not in source.threads
 
 
@@ -129,19 +130,21 @@ def test_an_error_of_a_frame_that_two_threads_read(ahead, source):
     """It is read again for the second."""
     source.gate.clear()
     outcomes, both = [], threading.Barrier(3, timeout=10)
+    waiting = [threading.Event() for _ in range(2)]
 
-    def read():
-        with pytest.raises(MediaError, match="frame 13") as caught:
+    def read(waits):
+        looks = iter((None, waits.set))  # before it waits, and while it does
+        with (
+            stopping.once(lambda: bool((look := next(looks, None)) and look())),
+            pytest.raises(MediaError, match="frame 13") as caught,
+        ):
             ahead.read(13)
         outcomes.append(str(caught.value))
         both.wait()
 
-    for _ in range(2):
-        threading.Thread(target=read, daemon=True).start()
-    until = time.monotonic() + 10
-    while len(ahead._asked) < 2:
-        assert time.monotonic() < until
-        time.sleep(0.001)
+    for waits in waiting:
+        threading.Thread(target=read, args=(waits,), daemon=True).start()
+    assert all(waits.wait(10) for waits in waiting)
     source.gate.set()
     both.wait()
     assert len(outcomes) == source.reads.count(13) == 2

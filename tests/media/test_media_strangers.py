@@ -248,11 +248,13 @@ def test_nothing_is_written_through_links_in_the_place_of_files(source, folder, 
     assert not any(path.is_symlink() for path in place.rglob("*"))
 
 
-def test_nothing_is_taken_down_through_links(source, folder, place, outside, tmp_path):
+def test_nothing_is_taken_down_through_links(source, folder, place, outside, monkeypatch):
     before = listed(outside)
-    for planted in (Path.symlink_to, Path.hardlink_to):
-        one = inbetween_cache.InbetweenCache(source, folder, FACTOR, "quick")
-        planted(place / "checks" / f"{one._token}.sha256", outside / "checks" / "mine.sha256")
+    for name, planted in (("0000aaaa", Path.symlink_to), ("0000bbbb", Path.hardlink_to)):
+        with monkeypatch.context() as chance:
+            chance.setattr(inbetween_cache.secrets, "token_hex", lambda _bytes, name=name: name)
+            one = inbetween_cache.InbetweenCache(source, folder, FACTOR, "quick")
+        planted(place / "checks" / f"{name}.sha256", outside / "checks" / "mine.sha256")
         with pytest.raises(MediaError, match="in-between frames cannot be written there"):
             one.note("# 1 same")
     assert listed(outside) == before
@@ -421,15 +423,25 @@ def test_a_source_that_became_a_pipe_is_one_sentence(source, folder):
             ask(source, folder)
 
 
-def test_what_is_known_of_folders_is_bounded_and_forgotten(source, tmp_path):
-    for number in range(2 * inbetween_folders._KEPT):
-        state(source, tmp_path / f"{number}")
+def test_what_is_known_of_folders_is_bounded_and_forgotten(source, tmp_path, monkeypatch):
+    looked, load, digests = [], inbetween_cache.InbetweenCache.load, inbetween_folders.read_checks
+    monkeypatch.setattr(inbetween_cache.InbetweenCache, "load", lambda cache: looked.append(cache.folder) or load(cache))
+    monkeypatch.setattr(inbetween_folders, "read_checks", lambda cache: looked.append(cache.path) or digests(cache))
+
+    def looks(ask, *given):
+        looked.clear()
+        ask(*given)
+        return len(looked)
+
     build(source, tmp_path / "cache")
-    inbetween_folders.size(tmp_path / "cache")
-    assert len(inbetween_folders._finished) == inbetween_folders._KEPT
+    for ask in ((state, source, tmp_path / "cache"), (inbetween_folders.size, tmp_path / "cache")):
+        assert [looks(*ask) for _ in range(2)] == [1, 0]
+        inbetween_folders.forget()
+        assert [looks(*ask) for _ in range(2)] == [1, 0]
+    for number in range(128):
+        state(source, tmp_path / f"{number}")
+    assert [looks(state, source, tmp_path / f"{number}") for number in (127, 120, 0, 1)] == [0, 0, 1, 1]
     inbetween_folders.forget()
-    assert not inbetween_folders._finished
-    assert not inbetween_folders._sizes
     assert inbetween_cache.content_hash.cache_info().currsize == 0
 
 
