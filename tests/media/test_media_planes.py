@@ -72,14 +72,16 @@ def test_of_a_film(bunny):
 @pytest.mark.parametrize(("space", "range_"), [(BT709, LIMITED), (BT601, FULL)])
 @pytest.mark.parametrize("light", ["linear", "encoded"])
 def test_a_device_makes_the_bits_of_libswscale(gl, tmp_path, monkeypatch, size, space, range_, light):
-    found = []
+    found, texture = [], gl.texture
     with open_source(film(tmp_path / "noise.mkv", size, space, range_)) as source, gl.current():
         for planar in (True, False):
+            kinds = []
+            monkeypatch.setattr(gl, "texture", lambda *given, kinds=kinds: kinds.append(given[-1]) or texture(*given))
             monkeypatch.setattr(gl, "takes_planes", planar, raising=False)
             window = Sums(gl, source, 3)
             try:
                 window.load(np.arange(3), Options(window=3, light=light), range(source.count))
-                assert ("luma" in window._sent) == planar
+                assert ("r32ui" in kinds) == planar  # of luma and chroma
                 sums = np.concatenate([gl.read(texture).ravel() for texture in window.textures])
                 found.append(sums.copy())
             finally:
@@ -103,25 +105,25 @@ def test_other_frames_are_as_they_are_read(tmp_path, pixels, space, given):
 @pytest.mark.parametrize("given", [{}, {"divisor": 2}, {"deinterlace": True}], ids=str)
 def test_conversion_by_way_of_planes_has_the_same_bits(tmp_path, monkeypatch, pixels, given):
     path = film(tmp_path / "noise.mkv", (64, 48), BT709, LIMITED, pixels)
-    assert movie._is_opaque_yuv(av.VideoFormat(pixels))
+    assert movie._is_opaque_yuv(av.VideoFormat(pixels))  # what the next lines do without
     with open_source(path, **given) as by_planes, open_source(path, **given) as directly:
         found = by_planes.read(1)
-        monkeypatch.setattr(movie, "_is_opaque_yuv", lambda _: False)
+        monkeypatch.setattr(movie, "_is_opaque_yuv", lambda _: False)  # nothing else decides which way is taken
         assert np.array_equal(found, directly.read(1))
 
 
 @pytest.mark.parametrize("pixels", ["yuva420p", "gray", "rgb24", "gbrp", "rgba", "pal8"])
 def test_what_has_no_planes_of_chroma_alone(pixels):
-    assert not movie._is_opaque_yuv(av.VideoFormat(pixels))
+    assert not movie._is_opaque_yuv(av.VideoFormat(pixels))  # no codec stores frames of some of these
 
 
 def test_a_conversion_that_fails_is_said_of_its_frame(bunny, monkeypatch):
-    def fails(*_):
+    def fails():
         raise av.error.MemoryError(12, "Cannot allocate memory")
 
     with open_source(bunny) as source:
         planes = source.decoded(5)
-        monkeypatch.setattr(source, "_converted", fails)
+        monkeypatch.setattr(av.filter, "Graph", fails)
         for converted in (planes.rgba, lambda: source.read(5)):
             with pytest.raises(MediaError, match=r"^frame 5 of .* cannot be decoded"):
                 converted()
