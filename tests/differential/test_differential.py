@@ -12,7 +12,7 @@ from cases import KINDS, make
 from compare import PICTURE, DifferenceError, can_be_a_film, check, check_films, open_devices, within
 from reference import DEFAULTS, picture, shown
 
-from shutter_addon.compute import cpu, resampling
+from shutter_addon.compute import cpu, cpu_window
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import keyframes, mattes, scribbles, shutters
 from shutter_addon.core.pixels import compositor, following, trails
@@ -107,12 +107,16 @@ FAULTS = {
     "an ease": (keyframes, "eased", lambda u, ease: u),
     "a jump too early": (keyframes, "eased", lambda u, ease: 1.0 if ease == "constant" else eased(u, ease)),
     "redrawn strokes": (scribbles, "between_strokes", lambda first, second, u, aspect: [*map(np.array, first)]),
-    "holes in lassos": (scribbles, "_fill", lambda labels, points, label: False),
+    "lassos left empty": (
+        scribbles,
+        "rasterise",
+        lambda shapes, *size, border: rasterise(outlines(shapes), *size, border=border),
+    ),
     "no displacement": (shutters, "displace", shutters.mix),
     "another curve": (light, "to_linear", lambda code: np.sign(code) * np.abs(code) ** 2.2),
     "an edge twice": (compositor, "source_frames", lambda *given: twice(*given)),
     "nothing followed": (following, "followed", lambda effect, state, *_: state),
-    "a dull filter": (resampling, "_weights", lambda t, sharp: {-1: 0 * t, 0: 1 - t, 1: t, 2: 0 * t}),
+    "a dull filter": (cpu_window, "resampled", lambda planes, x, y, sharp: resampled(planes, x, y, sharp=False)),
     "trails of no length": (trails, "with_length", lambda bars, *_: (bars, len(bars))),
     "edges passed over": (cpu.Solver, "solve", lambda solver, labels, count, *_, warm: solve(solver, labels, count)),
     "mattes in another order": (mattes, "blended", lambda c, shown, values: blended(c, shown[::-1], values[::-1])),
@@ -126,6 +130,12 @@ FAULTS = {
 }
 eased, source_frames, solve = keyframes.eased, compositor.source_frames, cpu.Solver.solve
 blended, ramp_values = mattes.blended, mattes.Ramp.values
+rasterise, resampled = scribbles.rasterise, cpu_window.resampled
+
+
+def outlines(shapes):
+    """Lassos as the thinnest lines."""
+    return [replace(shape, kind="line", width=0.0) if shape.kind == "lasso" else shape for shape in shapes]
 
 
 def unturned(ramp, *size):

@@ -60,7 +60,9 @@ def test_the_quick_look_agrees_with_pyscenedetect(monkeypatch):
     """What the quick look rules out, PySceneDetect finds no cut in either."""
     from scenedetect import detectors
 
-    unlike = SimpleNamespace(process_frame=lambda number, _picture: [number])  # the other detector: any two pictures are
+    unlike = SimpleNamespace(
+        process_frame=lambda number, _picture: [number]
+    )  # the other detector: any two pictures are
     monkeypatch.setattr(detectors, "HashDetector", lambda *_, **__: unlike)
     chance = np.random.default_rng(0)
     rounded = (np.full((18, 32, 3), level, np.float32) for level in (100.49, 126.51))  # by 27 levels, but for rounding

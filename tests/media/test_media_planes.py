@@ -72,11 +72,11 @@ def test_of_a_film(bunny):
 @pytest.mark.parametrize(("space", "range_"), [(BT709, LIMITED), (BT601, FULL)])
 @pytest.mark.parametrize("light", ["linear", "encoded"])
 def test_a_device_makes_the_bits_of_libswscale(gl, tmp_path, monkeypatch, size, space, range_, light):
-    found, texture = [], gl.texture
+    found, make = [], gl.texture
     with open_source(film(tmp_path / "noise.mkv", size, space, range_)) as source, gl.current():
         for planar in (True, False):
             kinds = []
-            monkeypatch.setattr(gl, "texture", lambda *given, kinds=kinds: kinds.append(given[-1]) or texture(*given))
+            monkeypatch.setattr(gl, "texture", lambda *given, kinds=kinds: kinds.append(given[-1]) or make(*given))
             monkeypatch.setattr(gl, "takes_planes", planar, raising=False)
             window = Sums(gl, source, 3)
             try:

@@ -425,7 +425,9 @@ def test_a_source_that_became_a_pipe_is_one_sentence(source, folder):
 
 def test_what_is_known_of_folders_is_bounded_and_forgotten(source, tmp_path, monkeypatch):
     looked, load, digests = [], inbetween_cache.InbetweenCache.load, inbetween_folders.read_checks
-    monkeypatch.setattr(inbetween_cache.InbetweenCache, "load", lambda cache: looked.append(cache.folder) or load(cache))
+    monkeypatch.setattr(
+        inbetween_cache.InbetweenCache, "load", lambda cache: looked.append(cache.folder) or load(cache)
+    )
     monkeypatch.setattr(inbetween_folders, "read_checks", lambda cache: looked.append(cache.path) or digests(cache))
 
     def looks(ask, *given):
