@@ -92,25 +92,45 @@ def test_a_frame_that_cannot_be_read_fails_only_when_it_is_shown(film, render, t
         render(edit, [5])
 
 
-def test_what_a_job_takes_away_meanwhile_is_not_missed(bpy):
+@pytest.mark.parametrize("look", range(4))
+def test_what_a_job_takes_away_meanwhile_is_not_missed(film, monkeypatch, look):
     """Scenes that are gone are forgotten on the main thread; a render job may take up what was begun for them between
-    the look at what is known and its removal, which is where this one does."""
+    the look at what is known and its removal, which is where this one does: at one of the looks."""
+    from shutter_addon.blender.data import snapshot
     from shutter_addon.blender.rendering import session
+    from shutter_addon.blender.rendering.render_context import RenderContext
+    from shutter_addon.blender.rendering.render_settings import RenderSettings
+    from shutter_addon.compute.renderer import Renderer
+
+    edit, _source, effect, strip = film
+    found, looks, closed, close = session.RenderSession(lambda: ("cpu", None), None), iter(range(9)), [], Renderer.close
+    monkeypatch.setattr(Renderer, "close", lambda renderer: closed.append(renderer) or close(renderer))
 
     class Job:
         def __hash__(self):
-            return hash(7)
+            return hash(effect.scene.session_uid)
 
         def __eq__(self, other):
-            for known in (found._shown, found._begun, found._renderers):
-                known.pop(7, None)
+            if next(looks) == look:
+                found.forget()
             return False
 
-    for name in ("_shown", "_begun", "_renderers"):
-        found = session.RenderSession(None, None)
-        getattr(found, name)[7] = None
-        found.keep({Job()})
-        assert getattr(found, name) == {}
+    taken = snapshot.take(edit, effect, strip, (1, 2, 3))
+    for frame in (1, 2):
+        found.begin_next(taken, frame, RenderContext(found, RenderSettings()))
+    found.keep({Job()})
+    assert next(looks) == look + 1
+    assert len(closed) == 1
+
+
+def held_up(session, until):
+    """A thread of which the session's own waits for an event."""
+    assert session.threaded
+    begun = threading.Event()
+    thread = threading.Thread(target=session.run, args=(lambda: begun.set() or until.wait(10),))
+    thread.start()
+    assert begun.wait(10)
+    return thread
 
 
 def test_who_is_stopped_waits_neither_for_a_device_nor_for_others_to_be_closed(film):
@@ -118,37 +138,41 @@ def test_who_is_stopped_waits_neither_for_a_device_nor_for_others_to_be_closed(f
     from shutter_addon.blender.rendering import effect_source, job_snapshots, render_context, sessions
 
     scene, answer, half = film[2].scene, threading.Event(), effect_source.Detail(2)
-    waits = sessions.OFFSCREEN._submit(answer.wait, 10).future
+    waits = held_up(sessions.OFFSCREEN, answer)
     stops = iter([False])  # and then it is stopped
     with pytest.raises(StoppedError):
         picture_of(scene, 1, stopped=lambda: next(stops, True))
-    assert not waits.done()
+    assert waits.is_alive()
     answer.set()
     context = render_context.of_render()
     first = context.request(*job_snapshots.of(scene, 1), effect_source.FULL)
     answer.clear()
-    waits = sessions.OFFSCREEN._submit(answer.wait, 10).future
+    waits = held_up(sessions.OFFSCREEN, answer)
     second = context.request(*job_snapshots.of(scene, 1), half)
     assert (first.source.detail, second.source.detail) == (effect_source.FULL, half)
-    assert not waits.done()
+    assert waits.is_alive()
     answer.set()
     sessions.forget()
 
 
-def test_who_asks_for_room_keeps_what_it_uses(film):
+def test_who_asks_for_room_keeps_what_it_uses(film, monkeypatch):
     """The other one may ask it in turn, while it waits for that."""
+    from shutter_addon.blender.devices import available
     from shutter_addon.blender.rendering import effect_source, job_snapshots, session
     from shutter_addon.blender.rendering.render_context import RenderContext
     from shutter_addon.blender.rendering.render_settings import RenderSettings
 
+    asks, opened = [], available.OPEN["cpu"]
+    monkeypatch.setitem(available.OPEN, "cpu", lambda memory, ask: asks.append(ask) or opened(memory, ask))
     found = session.RenderSession(lambda: ("cpu", None), lambda: found.free())
     context = RenderContext(found, RenderSettings())
     request = context.request(*job_snapshots.of(film[2].scene, 1), effect_source.FULL)
     found.picture(request)
     renderer = found.renderer(request.source)
-    window = renderer._window
-    found._ask()
-    assert renderer._window is window
+    assert not renderer.missing(request)
+    (ask,) = asks
+    ask()
+    assert not renderer.missing(request)
     found.free()
-    assert renderer._window is None
+    assert renderer.missing(request)
     found.forget()
