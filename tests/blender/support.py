@@ -3,7 +3,9 @@
 import dataclasses
 import json
 import subprocess
+import sys
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import OpenImageIO
@@ -149,3 +151,25 @@ def small_disk(folder, size):
         yield folder
     finally:
         subprocess.run(["umount", "--lazy", str(folder)], check=True)  # a worker may still read there
+
+
+def remembering(what):
+    """The names of the extension's modules that remember something, in whatever variable: a path below the folder
+    `what`, or a key that is the number `what`. What a module keeps of things that are gone shows nowhere else."""
+    modules = [module for name, module in sys.modules.items() if name.startswith("shutter_addon.") and module]
+    return {module.__name__.rpartition(".")[2] for module in modules if _mentions(vars(module), what, set())}
+
+
+def _mentions(value, what, seen: set) -> bool:
+    if id(value) in seen:
+        return False
+    seen.add(id(value))
+    if isinstance(value, str | Path) and isinstance(what, Path):
+        return str(what) in str(value)
+    if isinstance(value, dict):
+        keyed = isinstance(what, int) and what in value
+        return keyed or any(_mentions(part, what, seen) for pair in value.copy().items() for part in pair)
+    if isinstance(value, list | tuple | set | frozenset):
+        return any(_mentions(part, what, seen) for part in tuple(value))
+    is_ours = type(value).__module__.startswith("shutter_addon.")
+    return is_ours and hasattr(value, "__dict__") and _mentions(vars(value), what, seen)

@@ -1,17 +1,20 @@
 """In-between frames are built, stopped, found again and removed, by the operators of the panel."""
 
+import itertools
 import shutil
 import sys
 import threading
 import time
 from concurrent.futures import wait
 from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 import pytest
-from support import request, write_frames
+from support import remembering, request, write_frames
 
 FACTOR, COUNT = 4, 6
+LATER = itertools.count(10, 10)  # seconds, more with each look at the time
 
 
 @pytest.fixture
@@ -70,11 +73,12 @@ def made(edit, folder, first=None):
 
 
 def look(bpy, inbetween_build):
-    """What the panel finds, now."""
+    """What the panel finds, so long after its last look that it looks again."""
     from shutter_addon.blender.data import selection
 
-    inbetween_build._looks.clear()
-    return inbetween_build.look(*selection.active(bpy.context))
+    later = SimpleNamespace(monotonic=lambda: time.monotonic() + next(LATER))
+    with mock.patch.object(inbetween_build, "time", later):
+        return inbetween_build.look(*selection.active(bpy.context))
 
 
 def shown(bpy, inbetween_build):
@@ -190,12 +194,20 @@ def test_a_build_ends_at_once_where_a_pair_takes_long(bpy, inbetween_build, effe
     inbetween_build.ended()
 
 
-def test_a_second_build_is_refused_and_nothing_is_removed_meanwhile(bpy, inbetween_build, effect, monkeypatch):
-    monkeypatch.setattr(inbetween_build._builds, "running", SimpleNamespace(scene=0))
+def test_a_second_build_is_refused_and_nothing_is_removed_meanwhile(bpy, inbetween_build, effect, flow, tmp_path):
+    from shutter_addon.blender.data import selection
+
+    begun, answer = threading.Semaphore(0), threading.Event()
+    flow += [begun.release, lambda: answer.wait(30)]
+    build = inbetween_build.start(*selection.active(bpy.context))
+    assert begun.acquire(timeout=20)
     for operator in ("inbetween_build", "inbetween_purge"):
         with pytest.raises(RuntimeError, match="In-between frames are being built; Esc stops that"):
             getattr(bpy.ops.shutter, operator)()
-    monkeypatch.undo()
+    assert inbetween_build.running() is build
+    answer.set()
+    assert build.future.result(30) == ("ready", COUNT - 1, COUNT - 1)
+    assert len(pictures(tmp_path)) == (COUNT - 1) * (FACTOR - 1)
 
 
 def test_a_changed_source_makes_them_stale(bpy, inbetween_build, effect, tmp_path):
@@ -273,25 +285,18 @@ def test_a_folder_that_is_a_link_is_one_sentence_when_it_is_to_be_emptied(bpy, i
     assert shown(bpy, inbetween_build) == ("ready", COUNT - 1, COUNT - 1)
 
 
-@pytest.mark.usefixtures("effect")
-def test_what_is_known_is_forgotten_with_the_file(bpy, inbetween_build, edit):
-    from shutter_addon.blender.data import inbetween_settings
-    from shutter_addon.blender.rendering import invalidation as finished
-    from shutter_addon.media import inbetween_cache, inbetween_folders
+def test_what_is_known_is_forgotten_with_the_file(bpy, inbetween_build, edit, effect, tmp_path):
+    from shutter_addon.blender.rendering import invalidation
+    from shutter_addon.media import inbetween_cache
 
+    scene = effect.scene.session_uid
     bpy.ops.shutter.inbetween_build()
     look(bpy, inbetween_build)
-    finished.invalidate_changed(edit)
+    invalidation.invalidate_changed(edit)
+    assert remembering(tmp_path) >= {"inbetween_folders", "inbetween_build", "inbetween_settings"}
+    assert "invalidation" in remembering(scene)
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    known = [
-        inbetween_folders._finished,
-        inbetween_folders._sizes,
-        inbetween_build._looks,
-        inbetween_build._media,
-        finished._signatures,
-        inbetween_settings.built._known,
-    ]
-    assert not any(known)
+    assert remembering(tmp_path) == remembering(scene) == set()
     assert inbetween_cache.content_hash.cache_info().currsize == 0
 
 
