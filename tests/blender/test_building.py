@@ -285,14 +285,15 @@ def test_a_folder_that_is_a_link_is_one_sentence_when_it_is_to_be_emptied(bpy, i
     assert shown(bpy, inbetween_build) == ("ready", COUNT - 1, COUNT - 1)
 
 
-def test_what_is_known_is_forgotten_with_the_file(bpy, inbetween_build, edit, effect, tmp_path):
+@pytest.mark.usefixtures("effect")
+def test_what_is_known_is_forgotten_with_the_file(bpy, inbetween_build, tmp_path):
     from shutter_addon.blender.rendering import invalidation
     from shutter_addon.media import inbetween_cache
 
-    scene = effect.scene.session_uid
+    scene = bpy.context.scene.virtual_shutter.effects[0].scene.session_uid
     bpy.ops.shutter.inbetween_build()
     look(bpy, inbetween_build)
-    invalidation.invalidate_changed(edit)
+    invalidation.invalidate_changed(bpy.context.scene)
     assert remembering(tmp_path) >= {"inbetween_folders", "inbetween_build", "inbetween_settings"}
     assert "invalidation" in remembering(scene)
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support import recipe, request, write_frames
+from support import recipe, remembering, request, write_frames
 
 from shutter_addon.core.recipes import recipe_file
 
@@ -201,23 +201,30 @@ def test_what_is_known_of_effects_goes_with_them(edit, effect):
     from shutter_addon.blender.editing import lifecycle
     from shutter_addon.blender.rendering import invalidation
 
+    scene = effect.scene.session_uid
     invalidation.invalidate_changed(edit)
-    assert effect.scene.session_uid in invalidation._signatures
+    assert "invalidation" in remembering(scene)
     edit.sequence_editor.strips.remove(next(strip for strip in edit.sequence_editor.strips if strip.type == "SCENE"))
     lifecycle.update()
     invalidation.invalidate_changed(edit)
-    assert not invalidation._signatures
+    assert remembering(scene) == set()
 
 
-def test_stamps_of_in_between_frames_are_bounded(effect, tmp_path):
+def test_stamps_of_in_between_frames_are_bounded(effect, tmp_path, monkeypatch):
     from shutter_addon.blender.data import inbetween_settings, snapshot, strips
 
     effect.inbetween = "4"
     source = strips.source_of(effect.id_data, effect, strips.effect_strips(effect.id_data)[0])
-    stamps = inbetween_settings.built
-    for number in range(2 * stamps._MOST):
-        snapshot.source_files(effect, source, tmp_path / f"{number}")
-    assert len(stamps._known) == stamps._MOST
+    cache, asked = inbetween_settings.inbetween_cache, []
+    stamp = cache.stamp
+    monkeypatch.setattr(cache, "stamp", lambda folder, *given: asked.append(folder.name) or stamp(folder, *given))
+    inbetween_settings.built.hold()  # of what is known nothing is asked
+    try:
+        for number in (*range(128), 127, 100, 0):
+            snapshot.source_files(effect, source, tmp_path / f"{number}")
+    finally:
+        inbetween_settings.built.release()
+    assert asked == [f"{number}" for number in (*range(128), 0)]
 
 
 def test_a_file_replaced_in_the_middle_is_rendered(bpy, edit, effect, render, images):
@@ -321,20 +328,26 @@ def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, rend
     assert counts[0] >= len(long.elements)
     assert len(counts) >= 5
     assert 2 <= max(counts[1:]) < 10
-    assert not source_media._resting
     asked.clear()
     source_media.files_key(long)
     assert len(asked) == 102
 
 
-def test_what_is_known_of_files_is_bounded(edit, long, monkeypatch):
+@pytest.mark.usefixtures("effect", "clock")
+def test_what_is_known_of_files_is_bounded(edit, asked):
     from shutter_addon.blender.data import source_media
 
-    monkeypatch.setattr(source_media, "_KEPT", 4)
-    for number in range(6):
-        long.name = f"images {number}"
-        source_media.files_key(long)
-    assert [name for _edit, name in source_media._looks] == [f"images {number}" for number in range(2, 6)]
+    source = edit.sequence_editor.strips["images"]
+
+    def asks(number):
+        asked.clear()
+        source.name = f"images {number}"
+        source_media.files_key(source)
+        return len(asked)
+
+    ends, all_files = 2, 2 + len(source.elements)
+    assert {asks(number) for number in range(300)} == {all_files}
+    assert [asks(number) for number in (299, 200, 0)] == [ends, ends, all_files]
 
 
 def test_finished_frames_are_kept_while_nothing_changes(bpy, edit, effect, render, images):
