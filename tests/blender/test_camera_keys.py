@@ -334,7 +334,7 @@ def test_it_lays_the_picture_as_blender_does(bpy, edit, render, clip, kind):
     strip.stabilize2d = True
     shown = render(edit, [2, 5, 8, COUNT], "8")
     for frame, picture_there in shown.items():
-        laid = follow_stabilization._shifted(clip, SIZE)(frame).inverse()
+        laid = follow_stabilization.unstabilized(clip, SIZE)(frame).inverse()
         expected = cv2.warpAffine(picture(frame - 1), registration.matrix(laid), SIZE).astype(float)
         inside = cv2.warpAffine(np.ones((HEIGHT, WIDTH), np.uint8), registration.matrix(laid), SIZE)
         inside = cv2.erode(inside, np.ones((5, 5), np.uint8), borderValue=0) > 0
@@ -351,7 +351,7 @@ def test_the_camera_follows_a_clips_stabilization(bpy, edit, effect, clip):
     bpy.context.view_layer.update()
     bpy.ops.ed.undo_push(message="before")
     assert call(bpy, "follow_stabilization") == {"FINISHED"}
-    laid = follow_stabilization._shifted(bpy.data.movieclips[0], SIZE)
+    laid = follow_stabilization.unstabilized(bpy.data.movieclips[0], SIZE)
     assert apart(placements(bpy), {frame: laid(frame - 10) for frame in TRUTH}, 16) < 0.3
     assert {kind for *_, kind in keys(bpy)[0]} == {"GENERATED", "KEYFRAME"}
     bpy.ops.ed.undo()

@@ -101,12 +101,13 @@ def test_the_report_for_people(noise, check, bpy, tmp_path, capsys):
     )
 
 
-def test_the_device_and_its_memory_are_those_that_are_asked_for(noise, check, monkeypatch):
-    from shutter_addon.blender.rendering import render_settings
+def test_the_device_and_its_memory_are_those_that_are_asked_for(noise, check):
+    from shutter_addon.blender.rendering import render_settings, sessions
 
     report = check("--device", "cpu")[2]
     assert (report["device"], report["memory"]["gpu_limit"]) == ("NumPy", None)
-    monkeypatch.setattr(render_settings, "_budget", None)  # as in a process of its own
+    with render_settings.using(render_settings.RenderSettings(gpu_memory=123)):
+        sessions.settle()  # a process of its own has known no other limit
     report = check("--gpu-memory", "123")[2]
     assert report["device"] == "NumPy" or report["memory"]["gpu_limit"] == 123 << 20
 

@@ -79,12 +79,13 @@ def test_the_preference_chooses(effect, preferred):
     """From the next render on, if the command asks for nothing else."""
     from shutter_addon.blender.data import preferences
     from shutter_addon.blender.devices import available
-    from shutter_addon.blender.rendering import render_context, render_settings, sessions
+    from shutter_addon.blender.rendering import job_snapshots, render_context, render_settings, sessions
 
     def composed_by():
         sessions.settle()
         picture_of(effect.scene, 1)
-        return type(render_context.of_render().session._compositor.result())
+        context = render_context.of_render()
+        return type(context.renderer(context.request(*job_snapshots.of(effect.scene, 1))).compositor)
 
     for wanted, found in (("CPU", CPUCompositor), ("AUTO", GPUCompositor), ("OPENGL", GPUCompositor)):
         preferred.device = wanted
@@ -99,7 +100,7 @@ def test_what_is_lacking_is_said_of_all(bpy, monkeypatch):
     from shutter_addon.blender.devices import available
 
     monkeypatch.setattr(available, "opengl", lambda: available.OpenGL(lacking="no OpenGL 4.3: none"))
-    monkeypatch.setattr(available, "_blender_in_background", lambda: False)
+    monkeypatch.setattr(available, "opens_in_background", lambda: False)
     both = "no OpenGL 4.3: none, and Blender's own GPU cannot be used without a window here"
     assert available.choose("auto") == ("cpu", f"{both}; composing with NumPy, which is slow")
     for wanted, lacking in (("gpu", both), ("opengl", both.split(",")[0]), ("blender", both.split("and ")[1])):

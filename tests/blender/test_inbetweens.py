@@ -2,7 +2,9 @@
 
 Pictures are compared with means of frames that are known: the cache is written with random ones in place of flow's."""
 
+import itertools
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -163,7 +165,8 @@ def test_in_betweens_of_a_file_that_was_replaced_are_not_shown(cache, film, add,
     from shutter_addon.blender.rendering import invalidation
     from shutter_addon.media import MediaError
 
-    monkeypatch.setattr(source_media, "_REST", 0.0)
+    seconds = itertools.count(1e6, 10)  # so that all files are looked at each time
+    monkeypatch.setattr(source_media, "time", SimpleNamespace(monotonic=lambda: next(seconds)))
     first, _ = film
     *_, effect = add(first, COUNT, np.ones(6))
     before = picture_of(effect.scene, 2)

@@ -272,7 +272,7 @@ def test_sound_that_cannot_be_had(saved, join, change, words):
 def test_more_pictures_than_a_strip_is_given(saved, join, monkeypatch):
     from shutter_addon.blender.output import film_join
 
-    monkeypatch.setattr(film_join, "_AT_ONCE", 3)
+    monkeypatch.setattr(film_join, "AT_ONCE", 3)
     _, _, output = join(saved / "exr")
     assert np.array_equal(_pictures(output), _pictures(saved / "film.mkv"))
 

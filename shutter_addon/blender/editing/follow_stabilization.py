@@ -31,7 +31,7 @@ def follow(scene, effect, strip) -> None:
     times = follow_track.clip_times(scene, effect, strip, camera.follow_clip)
     if start not in times:
         raise EffectError(rpt_("the current frame is outside of the Shutter strip"))
-    shifted = _shifted(camera.follow_clip, size)
+    shifted = unstabilized(camera.follow_clip, size)
     seen = {frame: shifted(time) for frame, time in times.items()}
     keys = MotionKeys(effect, None, _motion(camera.follow_clip.tracking.stabilization))
     keys.begin(start)
@@ -50,7 +50,7 @@ def _motion(settings) -> str:
     return "SCALE" if settings.use_stabilize_scale else "ROTATION"
 
 
-def _shifted(clip, size) -> Callable[[float], Similarity]:
+def unstabilized(clip, size) -> Callable[[float], Similarity]:
     """The motion of the picture from where stabilization lays it to where the clip has it, at a time in the clip's
     frames. EffectError: the clip is not stabilized."""
     settings = clip.tracking.stabilization

@@ -19,7 +19,7 @@ from ..rendering import render_job
 from . import film_output
 from .film_output import OutputError
 
-_AT_ONCE = 1000  # pictures of a strip: Blender copies all that it has for each that is added
+AT_ONCE = 1000  # pictures of a strip: Blender copies all that it has for each that is added
 _CHANNELS = 128  # of Blender's sequencer
 _CHANGES = {"look": "None", "exposure": 0.0, "gamma": 1.0, "use_curve_mapping": False, "use_white_balance": False}
 
@@ -216,8 +216,8 @@ def _lay_over(scene, paths: list[Path], first: RenderedPicture) -> None:
     editor.channels[channel].mute = False
     space = _keep_colours(scene, paths[0].suffix, first)
     shown = [_picture_at(frame, scene, paths) for frame in range(scene.frame_start, scene.frame_end + 1)]
-    for start in range(0, len(shown), _AT_ONCE):
-        part = shown[start : start + _AT_ONCE]
+    for start in range(0, len(shown), AT_ONCE):
+        part = shown[start : start + AT_ONCE]
         strip = editor.strips.new_image(part[0].name, str(part[0]), channel, scene.frame_start + start)
         for path in part[1:]:
             strip.elements.append(path.name)
