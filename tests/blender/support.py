@@ -153,6 +153,17 @@ def small_disk(folder, size):
         subprocess.run(["umount", "--lazy", str(folder)], check=True)  # a worker may still read there
 
 
+class Like:
+    """An item of Blender's data that has some attributes of its own."""
+
+    def __init__(self, item, **own):
+        self.item = item
+        vars(self).update(own)
+
+    def __getattr__(self, name):
+        return getattr(self.item, name)
+
+
 def remembering(what):
     """The names of the extension's modules that remember something, in whatever variable: a path below the folder
     `what`, or a key that is the number `what`. What a module keeps of things that are gone shows nowhere else."""

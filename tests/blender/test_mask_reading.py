@@ -1,13 +1,12 @@
 """Masks at any frame, against Blender's own Mask strip."""
 
-import ctypes
 import random
 from contextlib import contextmanager
 from itertools import product
 
 import numpy as np
 import pytest
-from support import write_frames
+from support import Like, write_frames
 
 from shutter_addon.core.masks.mask import coverage
 
@@ -276,27 +275,22 @@ def test_reading_leaves_the_mask_as_it_is(bpy, mask, mask_editor, clip, edit):
     assert [shape.layers[0].splines[0].points[0][1][0] for shape in shapes] == pytest.approx([0.1, 0.35, 0.6, 0.6])
     assert shapes[2] == shapes[3] != shapes[0]
     # Shape keys that do not fit have no effect.
-    mask_reading._shapes(mask, layer)[0].points = 4
-    assert mask_reading.mask_at(mask, 5) == shapes[2]
-    mask_reading._shapes(mask, layer)[0].points = 5
+    twice = Like(mask, layers=[Like(layer, splines=[spline, spline])])
+    assert mask_reading.mask_at(twice, 5).layers[0].splines == 2 * shapes[2].layers[0].splines
     assert mask_reading.mask_at(mask, 5) == shapes[0]
 
 
-def test_another_blender_is_refused(bpy, mask, mask_editor, clip, monkeypatch):
+def test_another_blender_is_refused(bpy, mask, mask_editor, clip):
+    """As if what lies behind a layer's name lay farther on."""
     from shutter_addon.blender.data import mask_reading
     from shutter_addon.blender.data.validation import EffectError
 
-    draw(mask.layers.new(name="L"), blob(random.Random(2), 5))
-
-    class Longer(ctypes.Structure):
-        _fields_ = tuple(
-            (name, ctypes.c_char * 256 if name == "name" else kind) for name, kind in mask_reading._Layer._fields_
-        )
-
+    layer = mask.layers.new(name="L")
+    draw(layer, blob(random.Random(2), 5))
     mask_reading.mask_at(mask, 5)
-    monkeypatch.setattr(mask_reading, "_Layer", Longer)
+    moved = Like(layer, as_pointer=lambda: layer.as_pointer() + 8)
     with pytest.raises(EffectError, match='mask "M": it cannot be read in this version of Blender'):
-        mask_reading.mask_at(mask, 5)
+        mask_reading.mask_at(Like(mask, layers=[moved]), 5)
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 1e20])

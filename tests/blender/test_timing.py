@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support import write_frames
+from support import Like, write_frames
 
 GOOD = [(0.0, 0.0), (29.0, 0.3725), (51.0, 1.0)]
 
@@ -63,13 +63,10 @@ def test_another_layout_is_said(bpy, edit, tmp_path):
     source.right_handle = 21
     source.retiming_keys.add(timeline_frame=1)
     source.retiming_keys[-1].timeline_frame = 52
-    assert [key.index for key in strip_timing._retiming_keys(source)] == [0, 51]
-    where = [SimpleNamespace(as_pointer=lambda key=key: key.as_pointer() + 4) for key in source.retiming_keys]
-    for place, key in zip(where, source.retiming_keys, strict=True):
-        place.timeline_frame = key.timeline_frame
-    moved = SimpleNamespace(name=source.name, content_start=source.content_start, retiming_keys=where)
+    assert [key.index for key in strip_timing.timing_of(source).keys] == [0, 51]
+    moved = [Like(key, as_pointer=lambda key=key: key.as_pointer() + 4) for key in source.retiming_keys]
     with pytest.raises(EffectError, match='strip "images": its retiming keys cannot be read'):
-        strip_timing._retiming_keys(moved)
+        strip_timing.timing_of(Like(source, retiming_keys=moved))
 
 
 def test_a_still_of_a_million_frames_takes_no_time(bpy, edit, tmp_path):
