@@ -42,7 +42,7 @@ def _fault(bars) -> str:
 
 def of_sources() -> set:
     """What is written in the code itself, as Blender's own tool for translators finds it: reports, labels, pgettext."""
-    found, reports = {}, bl_extract_messages._gen_reports(None)
+    found, reports = {}, bl_extract_messages._gen_reports(None)  # Blender's, which nothing else makes
     bl_extract_messages.dump_py_messages_from_files(found, reports, map(str, SOURCES), settings.I18nSettings())
     return set(found)
 

@@ -4,12 +4,13 @@ import json
 
 import numpy as np
 import pytest
-from support import picture_of, recipe, sequencer, state, write_frames
+from support import picture_of, recipe, remembering, sequencer, state, write_frames
 
 from shutter_addon.core.recipes import recipe_file
 
 REGION = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
 MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
+REMEMBER = "lifecycle", "invalidation"  # what modules know of an effect's annotation, and of its scene
 KEYED = recipe(4, {1: [1, 0, 0, 0], 9: [0, 0, 0, 1]}, [1, 1, 1, 1], regions=[MOVED])
 
 
@@ -336,53 +337,47 @@ def test_an_edit_appended_twice_has_two_effects_of_its_own(bpy, library, render)
 
 
 def test_nothing_is_remembered_of_what_is_gone(bpy, edit, add):
-    from shutter_addon.blender.editing import lifecycle
-    from shutter_addon.blender.rendering import invalidation
-
-    first, second = add(1), add(101)
+    effects = [add(start).scene for start in (1, 101)]
     update(bpy)
-    annotation, scene = second.scene.annotation.session_uid, second.scene.session_uid
-    picture_of(second.scene, 5)
-    assert annotation in lifecycle._layer_names
-    assert scene in invalidation._signatures
-    edit.sequence_editor.strips.remove(second)
+    stays, goes = ((scene.annotation.session_uid, scene.session_uid) for scene in effects)
+    picture_of(effects[1], 5)
+    assert [remembering(uid) >= {module} for uid, module in zip(goes, REMEMBER, strict=True)] == [True, True]
+    edit.sequence_editor.strips.remove(scene_strips(edit)[-1])
     update(bpy)
-    assert list(lifecycle._layer_names) == [first.scene.annotation.session_uid]
-    assert scene not in invalidation._signatures
+    assert [remembering(uid) >= {module} for uid, module in zip(stays, REMEMBER, strict=True)] == [True, True]
+    assert [remembering(uid) for uid in goes] == [set(), set()]
+    del effects[:]
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    assert not lifecycle._layer_names
-    assert not invalidation._signatures
+    assert [remembering(uid) for uid in stays] == [set(), set()]
 
 
 def test_only_the_last_effects_that_were_removed_are_kept(edit, add):
     from shutter_addon.blender.editing import undelete
 
     scene, effect = add().scene, edit.virtual_shutter.effects[0]
-    for i in range(3 * undelete._MOST):
-        scene.virtual_shutter.identity = f"identity {i % (2 * undelete._MOST)}"
+    for number in (*range(64), 0, *range(64, 127)):
+        scene.virtual_shutter.identity = f"identity {number}"
         undelete.keep(edit, effect)
-    assert len(undelete._effects) == undelete._MOST
-    assert list(undelete._effects)[-1] == scene.virtual_shutter.identity
-    assert undelete.restore(edit, "identity 1000") is None
-    assert (
-        undelete.restore(edit, scene.virtual_shutter.identity).virtual_shutter.identity
-        == scene.virtual_shutter.identity
-    )
+    found = {number: undelete.restore(edit, f"identity {number}") for number in range(128)}
+    kept = {number: scene for number, scene in found.items() if scene is not None}
+    assert list(kept) == [0, *range(64, 127)]
+    assert all(scene.virtual_shutter.identity == f"identity {number}" for number, scene in kept.items())
 
 
 def test_the_extension_leaves_nothing_kept(bpy, edit, add):
     from shutter_addon.blender import handlers
-    from shutter_addon.blender.editing import lifecycle, undelete
+    from shutter_addon.blender.editing import undelete
 
-    add()
+    scene = add().scene
     undelete.keep(edit, edit.virtual_shutter.effects[0])
     update(bpy)
-    assert undelete._effects
-    assert lifecycle._layer_names
+    annotation, identity = scene.annotation.session_uid, scene.virtual_shutter.identity
+    assert "lifecycle" in remembering(annotation)
+    assert undelete.restore(edit, identity) is not None
     handlers.unregister()
     try:
-        assert not undelete._effects
-        assert not lifecycle._layer_names
+        assert undelete.restore(edit, identity) is None
+        assert remembering(annotation) == set()
     finally:
         handlers.register()
 

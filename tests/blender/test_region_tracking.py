@@ -468,7 +468,7 @@ def test_every_sentence_of_the_tracker_can_be_translated():
     named = vars(tracking) | vars(camera_tracking) | vars(pursuit)
     said = {words for name, words in named.items() if name.isupper() and isinstance(words, str)}
     assert len(said) > 5
-    assert said == set(track_region._FAULTS)
+    assert said == set(track_region.FAULTS)
 
 
 def test_the_next_unsure_frame(bpy, region):

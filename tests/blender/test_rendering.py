@@ -38,7 +38,8 @@ def film(bpy, edit, tmp_path):
     edit.render.use_file_extension = True
     edit.render.filepath = f"{tmp_path / 'out'}/"
     yield edit
-    render_job._job.failure = None  # of a render before, in this Python
+    render_job.begin(edit)  # which forgets the failure of the one before
+    render_job.end(edit, alone=False)
 
 
 def broken(tmp_path):
@@ -320,7 +321,8 @@ def test_blender_itself_renders_an_effect_without_its_camera(bpy, film, blender,
 
 def test_a_scene_within_a_film_does_not_begin_it_again(bpy, film, monkeypatch):
     """Blender tells of a render's beginning for every Scene strip, at every frame."""
-    from shutter_addon.blender import handlers
+    from shutter_addon.blender.data import source_media
+    from shutter_addon.blender.rendering import render_job
 
     shown = bpy.data.scenes.new("Shown")
     shown.render.engine, shown.render.resolution_x, shown.render.resolution_y = "CYCLES", 8, 8
@@ -328,12 +330,12 @@ def test_a_scene_within_a_film_does_not_begin_it_again(bpy, film, monkeypatch):
     shown.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     shown.collection.objects.link(shown.camera)
     film.sequence_editor.strips.new_scene("Shown", shown, 7, 1)
-    told, begun, prepare = [], [], handlers._prepare
-    monkeypatch.setattr(handlers, "_prepare", lambda *arguments: begun.append(arguments) or prepare(*arguments))
+    told, begun, prepare = [], [], source_media.look_again  # once, as a film begins
+    monkeypatch.setattr(source_media, "look_again", lambda: begun.append(render_job.film()) or prepare())
     bpy.app.handlers.render_init.append(lambda scene, *_: told.append(scene.name))
     try:
         bpy.ops.render.render(animation=True)
     finally:
         bpy.app.handlers.render_init.pop()
     assert told.count("Shown") > 1
-    assert begun == [(film.session_uid, False)]
+    assert begun == [film.session_uid]

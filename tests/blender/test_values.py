@@ -496,8 +496,8 @@ def show(bpy, edit):
                 if hasattr(cls, "poll"):
                     cls.poll(context)
             split_gizmo.SHUTTER_GGT_split.poll(context)
-            for cls in (*panels._InSidebar.__subclasses__(), *panels._InProperties.__subclasses__()):
-                if cls.poll(context):
+            for cls in panels.classes:
+                if issubclass(cls, bpy.types.Panel) and cls.poll(context):
                     drawn = type("Drawn", (), {"layout": Layout()})()
                     next(base for base in cls.__mro__ if "draw" in vars(base)).draw(drawn, context)
             found = selection.active(context)

@@ -43,6 +43,7 @@ def traces():
             for owner in OWNERS
             for name in getattr(bpy.types, owner).bl_rna.properties.keys()  # noqa: SIM118
         },
+        # Blender's own, which nothing else lists.
         "menus": {f.__module__ for draw in draws for f in getattr(draw, "_draw_funcs", [draw])},
         "keymaps": {(config.name, keymap.name, len(keymap.keymap_items)) for config, keymap in keymaps},
     }

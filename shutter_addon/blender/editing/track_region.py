@@ -33,7 +33,7 @@ from . import motion_keys
 from .motion_keys import MotionKeys, placement_now
 
 # Sentences of media/tracking.py and media/camera_tracking.py, which are looked up where they are shown.
-_FAULTS = (
+FAULTS = (
     n_("the shot ends here"),
     n_("the subject is covered, or looks too different"),
     n_("the subject has left the picture"),
