@@ -197,6 +197,7 @@ def build():
 def device_queue():
     """What comes last of what the render's device has to do; None: it has done it."""
     session = part("blender.rendering.sessions").OFFSCREEN
+    # Its `run` would wait here, and begin a thread where there is none.
     return session._executor and session._executor.submit(lambda: None)
 
 

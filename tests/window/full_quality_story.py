@@ -21,7 +21,7 @@ def interface(name):
 
 def button(operator="shutter.full_quality"):
     """The middle of a note's button in the preview; None: it has none."""
-    found = interface("note_buttons")._placed.get((story.preview().as_pointer(), operator))
+    found = interface("note_buttons").places.get((story.preview().as_pointer(), operator))
     return found and ((found[0][0] + found[0][2]) / 2, (found[0][1] + found[0][3]) / 2)
 
 
@@ -36,7 +36,7 @@ def clicked():
 
 
 def view():
-    rows, centre = interface("full_quality")._view_of(story.preview())
+    rows, centre = interface("full_quality")._view_of(story.preview())  # as the operator measures it
     return [rows, *centre]
 
 

@@ -89,7 +89,7 @@ def opened():
 
 def look():
     building = part("blender.rendering.inbetween_build")
-    building._looks.clear()
+    building._looks.clear()  # which a second would do as well
     return building.look(*part("blender.data.selection").active(bpy.context))
 
 

@@ -32,11 +32,11 @@ def sessions():
 
 def held(which):
     """What a session's textures take, and the kind of its window; None: it has none."""
-    device = which._compositor.result().device
-    ((_key, renderer),) = which._renderers.values()
-    window = renderer._window
+    # Whoever asks a session for its renderer has it made, and the memory that it takes is what is told here.
+    device, ((_key, renderer),) = which._compositor.result().device, which._renderers.values()
+    window = renderer._window  # likewise
     kind = type(window).__name__ if window is not None and window.is_open else None
-    return sum(texture.bytes for texture in device._held), kind
+    return sum(texture.bytes for texture in device._held), kind  # a budget is shared with the other session's
 
 
 def shown():
@@ -45,6 +45,7 @@ def shown():
     edit().frame_set(frame)
     area_of("SEQUENCE_EDITOR", "PREVIEW").tag_redraw()
     window = sessions().WINDOW
+    # As in `held`.
     yield from until(lambda: window._renderers and held(window)[1], "the preview is composed", 60)
     yield 1.0
 
@@ -52,10 +53,16 @@ def shown():
 def told_in_the_preview():
     """What a preview says of a GPU that has no room for its frames."""
     preview = sys.modules[f"{traces.NAME}.shutter_addon.blender.interface.preview"]
-    said, call = [], preview._Notes.__call__
-    preview._Notes.__call__ = lambda notes, sentence: (said.append(sentence), call(notes, sentence))[1]
+    said, wrapped = [], preview.drawing.wrapped
+
+    def noted(words, *room):
+        if len(room) == 2:  # unlike in panels, which give no size
+            said.append(words)
+        return wrapped(words, *room)
+
+    preview.drawing.wrapped = noted
     yield from shown()
-    preview._Notes.__call__ = call
+    preview.drawing.wrapped = wrapped
     saw(said=said)
 
 
@@ -77,10 +84,11 @@ def story():
         while rendering():
             most = max(most, budget.used)
             with suppress(ValueError, RuntimeError):  # the film's thread takes its renderer out for a moment
-                if offscreen._renderers and held(offscreen)[1]:  # what is drawn after it has that freed
+                # As in `held`; what is drawn after it has that freed.
+                if offscreen._renderers and held(offscreen)[1]:
                     found |= {"job": held(offscreen), "freed": held(window)}
             yield 0.05
-        kind = type(offscreen._compositor.result().device).__name__
+        kind = type(offscreen._compositor.result().device).__name__  # the one that has rendered, and no other
         found |= {"device": kind, "limit": budget.limit, "before": before}
         yield from shown()
         most = max(most, budget.used)

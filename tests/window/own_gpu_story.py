@@ -53,7 +53,9 @@ def written(folder):
 
 def held():
     """The job's device, and what its textures take."""
+    # The one that renders just now: to ask for it would make another where there is none.
     device = part("rendering.sessions").OFFSCREEN._compositor.result().device
+    # The budget counts the preview's as well.
     return type(device).__name__, device.name, sum(texture.bytes for texture in device._held)
 
 

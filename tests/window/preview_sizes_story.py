@@ -29,6 +29,7 @@ def space():
 
 def composed():
     """The sizes of what the window's session holds, and whether that is read from a proxy."""
+    # What was composed, in place of what would be now.
     sources = [renderer.source for _key, renderer in sessions().WINDOW._renderers.values()]
     return [[source.width, source.height] + ["proxy"] * source.from_proxy for source in sources]
 
@@ -157,7 +158,7 @@ def kept_time():
     edit, drawn = story.edit(), []
 
     def note():
-        ((_snapshot, _frame, request),) = sessions().WINDOW._requests.values()
+        ((_snapshot, _frame, request),) = sessions().WINDOW._requests.values()  # what was drawn, as above
         drawn.append((time.perf_counter(), edit.frame_current, request.index))
 
     kept, edit.sync_mode = edit.sync_mode, "FRAME_DROP"

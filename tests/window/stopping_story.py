@@ -6,6 +6,7 @@ SHUTTER_RECIPE: of a picture that takes hundreds of passes; SHUTTER_HIDDEN: a pa
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folders)
 import os
 import sys
+import threading
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -32,14 +33,14 @@ class Passes:
         if not os.environ.get("SHUTTER_HIDDEN"):
             devices.append(part("devices.gl").GLDevice)
         for device in devices:
-            device._dispatch = self._counted(device._dispatch)
+            device.run = self._counted(device.run)
         renderer = part("compute.renderer").Renderer
         renderer.picture = self._noted(renderer.picture)
 
-    def _counted(self, dispatch):
-        def counted(*arguments):
+    def _counted(self, run):
+        def counted(*arguments, **bound):
+            run(*arguments, **bound)
             self.all += 1
-            return dispatch(*arguments)
 
         return counted
 
@@ -81,9 +82,9 @@ def story():
     key("Escape")
     yield from until(lambda: not rendering(), "Esc ends the render", 60, wait=TICK)
     ended = passes.all
-    last = part("blender.rendering.sessions").OFFSCREEN._submit(lambda: None)
-    done = getattr(last, "future", last).done
-    yield from until(done, "the render's device is free", 60, wait=TICK)
+    last = threading.Thread(target=part("blender.rendering.sessions").OFFSCREEN.run, args=(lambda: None,))
+    last.start()
+    yield from until(lambda: not last.is_alive(), "the render's device is free", 60, wait=TICK)
     saw(after=passes.all - ended, whole=passes.whole[0], finished_after=len(passes.whole) - whole)
     # what comes next is right
     edit().render.filepath = str(OUT / "after") + "/"

@@ -54,7 +54,7 @@ def opened():
 
 
 def label():
-    found = look.interface("note_buttons")._placed.get((story.preview().as_pointer(), BUTTON))
+    found = look.interface("note_buttons").places.get((story.preview().as_pointer(), BUTTON))
     return found and found[1].label
 
 

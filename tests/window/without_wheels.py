@@ -59,13 +59,13 @@ def devices_named():
     opengl, layout = part("devices.available").opengl, Mock()
     opengl.cache_clear()
     panels = part("interface.option_panels")
-    panels._draw_devices(layout)
+    panels._draw_devices(layout)  # the rest of its panel asks more of a layout
     assert not layout.mock_calls
     assert not opengl.cache_info().currsize
     yield from until(lambda: opengl.cache_info().currsize, "OpenGL is tried", 10)
     labels = []
     sentence, panels.sentence = panels.sentence, lambda _layout, words: labels.append(words.partition(": ")[0])
-    panels._draw_devices(layout)
+    panels._draw_devices(layout)  # likewise
     panels.sentence = sentence
     assert labels == ["Preview", "Renders"], labels
 
@@ -79,16 +79,17 @@ def story():
     add_effect()
     yield 1.0
     shot("preview")
-    engine = part("rendering.engine").VirtualShutterEngine
-    say, said = engine._say, []
-    engine._say = lambda self, message: (said.append(message), say(self, message))
+    contexts, said = part("rendering.render_context"), []
+    of_engine = contexts.of_engine
+    contexts.of_engine = lambda say, stopped: of_engine(lambda words: (said.append(words), say(words)), stopped)
     edit.frame_set(3)
     yield 1.0
-    assert part("rendering.sessions").WINDOW._compositor.result().device.name, "the preview is on Blender's GPU"
     assert not said, said
     effect = edit.virtual_shutter.effects[0]
-    context = part("rendering.render_context").of_drawing()
-    shown = part("rendering.pictures").picture(context, *part("rendering.job_snapshots").of(effect.scene, 3))
+    context, asked = contexts.of_drawing(), part("rendering.job_snapshots").of(effect.scene, 3)
+    compositor = context.renderer(context.request(*asked)).compositor
+    assert compositor.device.name, "the preview is on Blender's GPU"
+    shown = part("rendering.pictures").picture(context, *asked)
     for strip in part("data.strips").effect_strips(edit):
         strip.invalidate_cache("RAW")
     yield from rendered()

@@ -22,13 +22,13 @@ class Button:
     values: dict = field(default_factory=dict)
 
 
-_placed: dict[tuple[int, str], tuple[tuple, Button]] = {}  # by region and operator: left, bottom, right, top
+places: dict[tuple[int, str], tuple[tuple, Button]] = {}  # by region and operator: left, bottom, right, top
 
 
 def clear(region) -> None:
     """Takes all buttons from a region."""
-    for key in [key for key in _placed if key[0] == region.as_pointer()]:
-        del _placed[key]
+    for key in [key for key in places if key[0] == region.as_pointer()]:
+        del places[key]
 
 
 def width(button: Button) -> float:
@@ -39,14 +39,14 @@ def width(button: Button) -> float:
 def place(region, left: float, bottom: float, button: Button) -> None:
     """Puts a button into a region: its gizmo draws it."""
     box = left, bottom, left + width(button), bottom + HEIGHT * drawing.ui_scale()
-    _placed[region.as_pointer(), button.operator] = box, button
+    places[region.as_pointer(), button.operator] = box, button
 
 
 class SHUTTER_GT_note_button(Gizmo):
     bl_idname = "SHUTTER_GT_note_button"
 
     def draw(self, context):
-        if (placed := _placed.get((context.region.as_pointer(), self.operator))) is None:
+        if (placed := places.get((context.region.as_pointer(), self.operator))) is None:
             return
         (left, bottom, right, top), button = placed
         look = context.preferences.themes[0].user_interface.wcol_tool
@@ -59,7 +59,7 @@ class SHUTTER_GT_note_button(Gizmo):
             drawing.text(left + _PAD * unit, bottom + 6 * unit, button.label, color=(*color, 1.0))
 
     def test_select(self, context, location):
-        if (placed := _placed.get((context.region.as_pointer(), self.operator))) is None:
+        if (placed := places.get((context.region.as_pointer(), self.operator))) is None:
             return -1
         (left, bottom, right, top), _button = placed
         return 0 if left <= location[0] <= right and bottom <= location[1] <= top else -1
@@ -84,7 +84,7 @@ class SHUTTER_GGT_note_buttons(GizmoGroup):
 
     def draw_prepare(self, context):
         for gizmo in self.gizmos:
-            placed = _placed.get((context.region.as_pointer(), gizmo.operator))
+            placed = places.get((context.region.as_pointer(), gizmo.operator))
             for name, value in (placed[1].values if placed else {}).items():
                 setattr(gizmo.target_set_operator(gizmo.operator), name, value)
 
@@ -98,6 +98,6 @@ def register():
 
 
 def unregister():
-    _placed.clear()
+    places.clear()
     for cls in reversed(classes):
         bpy.utils.unregister_class(cls)
