@@ -38,8 +38,9 @@ def film(bpy, edit, tmp_path):
     edit.render.use_file_extension = True
     edit.render.filepath = f"{tmp_path / 'out'}/"
     yield edit
-    render_job.begin(edit)  # which forgets the failure of the one before
-    render_job.end(edit, alone=False)
+    scene = bpy.context.scene  # of whatever file is open now
+    render_job.begin(scene)  # which forgets the failure of the one before
+    render_job.end(scene, alone=False)
 
 
 def broken(tmp_path):
