@@ -2,7 +2,6 @@
 
 import itertools
 import shutil
-import sys
 import threading
 import time
 from concurrent.futures import wait
@@ -12,6 +11,8 @@ from unittest import mock
 import numpy as np
 import pytest
 from support import remembering, request, write_frames
+
+from shutter_addon.media import flow as optical_flow
 
 FACTOR, COUNT = 4, 6
 LATER = itertools.count(10, 10)  # seconds, more with each look at the time
@@ -36,7 +37,7 @@ def flow(monkeypatch):
         weights = np.arange(1, factor) / factor
         return [(first * (1 - weight) + second * weight).astype(first.dtype) for weight in weights]
 
-    monkeypatch.setitem(sys.modules, "shutter_addon.media.flow", SimpleNamespace(between=between))
+    monkeypatch.setattr(optical_flow, "between", between)
     return calls
 
 

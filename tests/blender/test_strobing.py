@@ -2,15 +2,15 @@
 
 In-between frames are random ones in place of flow's, which takes long."""
 
-import sys
 import time
-import types
 
 import cv2
 import numpy as np
 import pytest
 from standin import between
 from support import request, write_frames
+
+from shutter_addon.media import flow
 
 WIDTH, HEIGHT, COUNT = 320, 180, 12  # at this height, 2 pixels look smooth
 
@@ -170,7 +170,7 @@ def test_drawing_never_waits_and_measures_once(add, monkeypatch):
 
 @pytest.fixture
 def smoothed(bpy, monkeypatch):
-    monkeypatch.setitem(sys.modules, "shutter_addon.media.flow", types.SimpleNamespace(between=between))
+    monkeypatch.setattr(flow, "between", between)
 
     def press(factor):
         return bpy.ops.shutter.smooth_streaks("EXEC_DEFAULT", factor=str(factor))
