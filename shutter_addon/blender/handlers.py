@@ -12,6 +12,7 @@ from .data import inbetween_settings, preview_areas, source_media, strips, versi
 from .editing import copies, lifecycle, shown_annotations, track_region, undelete
 from .interface import inbetween_operators, sharp_frame
 from .rendering import invalidation, job_snapshots, render_job, sessions
+from .rendering.render_job import Where
 
 
 @persistent
@@ -79,11 +80,11 @@ def _before_render(scene, *_):
     if render_job.cancelling():
         return
     is_film = render_job.begin(scene)
-    if scene.render.engine == strips.ENGINE and not render_job.in_job():
+    if scene.render.engine == strips.ENGINE and render_job.where() is not Where.JOB:
         invalidation.drop_spoilt()
     if is_film and scene.render.engine != strips.ENGINE:
         film = scene.session_uid
-        if not render_job.on_main_thread(partial(_prepare, film, render_job.in_job())):
+        if not render_job.on_main_thread(partial(_prepare, film, render_job.where() is Where.JOB)):
             render_job.fail("Blender's window did not answer, and the effects could not be read")
 
 

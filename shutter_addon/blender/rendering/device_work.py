@@ -7,19 +7,13 @@ import threading
 from concurrent.futures import Future, wait
 from typing import NamedTuple
 
-import bpy
-
 from ...core import stopping
 from ...core.stopping import StoppedError
 from ..devices import gpu_relay
 from ..devices.blender_gpu import require_context
+from .render_job import Where, where
 
 _PATIENCE = 0.1  # seconds between two looks at whether a picture is still wanted
-
-
-def in_window() -> bool:
-    """Whether this is the main thread of a Blender with a window."""
-    return not bpy.app.background and threading.current_thread() is threading.main_thread()
 
 
 class Work(NamedTuple):
@@ -47,8 +41,9 @@ class Work(NamedTuple):
 def result_of(future: Future, relayed: bool, stopped):
     """The future's result. StoppedError: it is not waited for any longer. NoDeviceError: it cannot be waited for, as
     Blender's GPU is not current."""
-    while not wait([future], 0 if in_window() else _PATIENCE).done:
-        if in_window() and not gpu_relay.serve() and relayed:
+    is_window = where() is Where.WINDOW
+    while not wait([future], 0 if is_window else _PATIENCE).done:
+        if is_window and not gpu_relay.serve() and relayed:
             require_context()
         if stopped():
             raise StoppedError

@@ -10,7 +10,8 @@ import numpy as np
 from ...core.messages import of_file, signed
 from ...core.stopping import StoppedError
 from ..data.strips import ENGINE
-from . import device_work, effect_source, invalidation, job_snapshots, pictures, previews, render_context, render_job
+from . import effect_source, invalidation, job_snapshots, pictures, previews, render_context, render_job
+from .render_job import Where
 
 
 class VirtualShutterEngine(bpy.types.RenderEngine):
@@ -34,7 +35,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
     def _render(self, depsgraph, called_by_script: bool):
         scene, width, height = depsgraph.scene, self.resolution_x, self.resolution_y
         asked = None
-        if device_work.in_window() and not (called_by_script or render_job.runs()):
+        if render_job.where() is Where.WINDOW and not (called_by_script or render_job.runs()):
             asked = previews.for_engine(bpy.context, scene)
         if asked is None:
             shown, frame = job_snapshots.of(scene, scene.frame_current, self._stopped)
@@ -45,7 +46,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             invalidation.keep_until_drawn(scene.session_uid)
         if is_drawn:
             return  # nothing, which costs Blender the least
-        last = job_snapshots.pictures.get(scene.session_uid) if render_job.in_job() else None
+        last = job_snapshots.pictures.get(scene.session_uid) if render_job.where() is Where.JOB else None
         if last is not None and last.shape == (height, width, 4):
             self._show(last)  # in the render's window, which would be empty until this one is made
         context = render_context.of_engine(self._say, self._stopped)
@@ -53,7 +54,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         picture = pictures.resized(picture, width, height, detail.divisor)
         self._show(picture)
         self.update_progress(1.0)
-        if render_job.in_job():
+        if render_job.where() is Where.JOB:
             job_snapshots.pictures[scene.session_uid] = picture
         context.session.begin_next(shown, frame, context)
 

@@ -18,6 +18,7 @@ from ..data import requirements, snapshot, strips
 from ..data.snapshot import Snapshot
 from ..data.validation import EffectError
 from . import effect_source, invalidation, render_job, render_settings, sessions
+from .render_job import Where
 
 _taken: dict[int, Snapshot | Exception] = {}  # by effect scene: of the job that runs
 pictures: dict[int, np.ndarray] = {}  # likewise: the last one, which the render's window shows until the next is made
@@ -56,7 +57,7 @@ def look(film: int) -> None:
 
 def left_out(scene) -> str | None:
     """Why the sequencer leaves an effect out of a film's current frame; None: it does not."""
-    reasons = _left_out if render_job.in_job() else requirements.left_out(scene)
+    reasons = _left_out if render_job.where() is Where.JOB else requirements.left_out(scene)
     return next((why for frames, why in reasons if scene.frame_current in frames), None)
 
 
@@ -64,7 +65,7 @@ def of(effect_scene, scene_frame: float, ended: Callable[[], bool] | None = None
     """The snapshot of an effect scene, and the timeline frame at which it shows one of its own frames. One of
     effect_source.FAULTS: there is none. ended: whether nobody waits for it any longer."""
     uid = effect_scene.session_uid
-    if render_job.in_job():
+    if render_job.where() is Where.JOB:
         taken = _taken.get(uid)
         if taken is None or (isinstance(taken, Snapshot) and taken.timeline_frame(scene_frame) not in taken.frames):
             taken = render_job.on_main_thread(lambda: _late(uid, scene_frame), ended)

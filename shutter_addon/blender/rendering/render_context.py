@@ -11,8 +11,8 @@ from ...compute.request import Request
 from ...core.stopping import never
 from ..data.snapshot import Snapshot
 from . import render_job, render_settings, sessions
-from .device_work import in_window
 from .effect_source import Detail
+from .render_job import Where
 from .render_settings import RenderSettings
 from .session import RenderSession
 
@@ -44,12 +44,14 @@ class RenderContext:
 
 def of_drawing() -> RenderContext:
     """For what is drawn on the main thread; without a window, what draws there is a script."""
-    return RenderContext(session=sessions.WINDOW, settings=render_settings.settings()) if in_window() else of_render()
+    if render_job.where() is Where.WINDOW:
+        return RenderContext(session=sessions.WINDOW, settings=render_settings.settings())
+    return of_render()
 
 
 def of_engine(say, stopped) -> RenderContext:
     """For the engine: a preview where Blender draws, else a render."""
-    if in_window() and not render_job.ends_films():
+    if not render_job.ends_films():
         return RenderContext(session=sessions.WINDOW, settings=render_settings.settings(), say=say, stopped=stopped)
     return of_render(say, stopped)
 

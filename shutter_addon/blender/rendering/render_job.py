@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from enum import Enum
 from types import FrameType
 
 import bpy
@@ -28,6 +29,17 @@ def _to_stderr(text: str) -> None:
         print(signed(text), file=sys.stderr, flush=True)
 
 
+class Where(Enum):
+    """Where Blender calls the extension: without a window; on the main thread of one; on the thread of a job, while the
+    window goes on; or likewise, while it waits for every picture (View ▸ Render Sequencer Animation), so that this
+    thread may read Blender's data by itself, and must not wait for the main one."""
+
+    BACKGROUND = "background"
+    WINDOW = "window"
+    JOB = "job"
+    WAITED_FOR = "waited for"
+
+
 @dataclass
 class _Job:
     """The render that runs, or ran last.
@@ -37,7 +49,7 @@ class _Job:
     begun: whether its first frame has; stopping: whether it is to end with the frame that is made
     failure: the sentence that ends it; tell: what is done with that in the background
     cancelling: whether the small render runs whose error ends it
-    waited_for: whether the window waits for every picture that its thread makes, see in_job"""
+    waited_for: whether the window waits for every picture that its thread makes, see Where"""
 
     film: int | None = None
     begun: bool = False
@@ -58,8 +70,9 @@ def begin(scene) -> bool:
     if _job.film is not None and (_job.begun or is_effect):
         return False
     # Render Sequencer Animation says of no film that it begins, only of each effect in it.
-    _job.waited_for = is_effect and _beside_main_thread() and "RENDER_OT_opengl" in operators_running()
-    if is_effect and not (bpy.app.background or _beside_main_thread()):
+    is_job = where() in (Where.JOB, Where.WAITED_FOR)
+    _job.waited_for = is_effect and is_job and "RENDER_OT_opengl" in operators_running()
+    if is_effect and where() is Where.WINDOW:
         return False  # a preview
     _job.film, _job.begun, _job.failure, _job.stopping = scene.session_uid, False, None, False
     return True
@@ -99,7 +112,7 @@ def end(scene, alone: bool) -> None:
 def ends_films() -> bool:
     """Whether what fails here and now is a film: in the background, in a job of the window, or in a script there. Else
     it is a preview, on the main thread."""
-    if bpy.app.background or _beside_main_thread():
+    if where() is not Where.WINDOW:
         return True
     return _job.film is not None and not bpy.app.is_job_running("RENDER")
 
@@ -110,21 +123,13 @@ def script_waits(call_frame: FrameType | None) -> bool:
     return call_frame is not None and call_frame.f_back is not None
 
 
-def in_job() -> bool:
-    """Whether this is the thread of a job of the window, which goes on meanwhile.
-
-    It does not in View ▸ Render Sequencer Animation: its main thread waits while a picture is made. So the job's thread
-    may read Blender's data by itself, and must not wait for the main thread."""
-    return _beside_main_thread() and not _job.waited_for
-
-
-def window_waits() -> bool:
-    """Whether this is a thread for which the window waits, see in_job."""
-    return _beside_main_thread() and _job.waited_for
-
-
-def _beside_main_thread() -> bool:
-    return not bpy.app.background and threading.current_thread() is not threading.main_thread()
+def where() -> Where:
+    """Where we are called."""
+    if bpy.app.background:
+        return Where.BACKGROUND
+    if threading.current_thread() is threading.main_thread():
+        return Where.WINDOW
+    return Where.WAITED_FOR if _job.waited_for else Where.JOB
 
 
 def operators_running() -> set[str]:
@@ -157,7 +162,7 @@ def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None):
     """What a function gives on Blender's main thread, where its data and its operators belong; None: it was not waited
     for, and is not called any more. ended: whether nobody waits for it any longer; without it, the window is not waited
     for long. Once it is called, its end is waited for."""
-    if not in_job():
+    if where() is not Where.JOB:
         return function()
     chance, done, deadline, results = threading.Lock(), threading.Event(), time.monotonic() + _LONG, []
     ended = ended or (lambda: time.monotonic() > deadline)
@@ -182,7 +187,7 @@ def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None):
 
 def soon(function: Callable[[], None]) -> None:
     """Has a function called on the main thread: at once, if this is it."""
-    if _beside_main_thread():
+    if where() in (Where.JOB, Where.WAITED_FOR):
         bpy.app.timers.register(function)
     else:
         function()
@@ -215,9 +220,10 @@ def cancel(ended=None) -> None:
     (After one Blender would go on with the next, and crash.)
 
     ended: whether the window has ended it meanwhile; without it, the window is not waited for long."""
-    if in_job():
+    if where() is Where.JOB:
         on_main_thread(_cancel_and_show, ended)
-    elif window_waits():  # until this picture is done, which is left out; what comes meanwhile fails likewise
+    elif where() is Where.WAITED_FOR:
+        # Until this picture is done, which is left out. What comes meanwhile fails likewise.
         soon(_cancel_and_show)
     else:
         _cancel()

@@ -6,6 +6,7 @@ import bpy
 
 from ..devices import available, gpu_relay
 from . import render_job, render_settings
+from .render_job import Where
 from .session import RenderSession
 
 _ANSWER = 5.0  # seconds that a job waits for the window to free memory
@@ -13,7 +14,7 @@ _ANSWER = 5.0  # seconds that a job waits for the window to free memory
 
 def _ask_window() -> None:
     """Has the window free what it shows, for a job: it is not drawn meanwhile, and makes it again."""
-    if render_job.in_job():
+    if render_job.where() is Where.JOB:
         gpu_relay.ask(WINDOW.free, _ANSWER)
 
 
@@ -41,7 +42,7 @@ def device_names() -> tuple[str, str]:
 
 def of_render() -> RenderSession:
     """That of the render which runs on this thread."""
-    if not render_job.window_waits():
+    if render_job.where() is not Where.WAITED_FOR:
         return OFFSCREEN
     WAITED_FOR.settle()  # for a film of which Blender does not say that it begins
     return WAITED_FOR if OFFSCREEN.device == "relayed" else OFFSCREEN
@@ -58,7 +59,7 @@ def settle() -> None:
 def end_job() -> None:
     """Lets go of what a job of the window has begun, and of its snapshots. A script's next still may go on from the
     one before."""
-    if render_job.in_job():
+    if render_job.where() is Where.JOB:
         OFFSCREEN.rest()
     OFFSCREEN.forget_requests()
 
