@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -24,7 +23,7 @@ class Request:
     index: int
     state: FrameState
     direction: int = 1
-    source: Hashable = None
+    source: Any = None
     levels: bool = False
     quick: bool = False
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -20,9 +21,9 @@ class Shown:
 
     strips_above: whether others hide it; hides_strokes: by region that is drawn, whether its lines are hidden"""
 
-    scene: object
-    effect: object
-    strip: object
+    scene: Any
+    effect: Any
+    strip: Any
     strips_above: bool
     hides_strokes: tuple[bool, ...]
 

@@ -1,11 +1,13 @@
 """What is seen, and what is active: the scene, the strip, its effect, and the effect's shutter and region."""
 
+from typing import Any
+
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from .strips import SOURCES, effect_of, effect_strips
 
 
-def scene_of(context):
+def scene_of(context: Any) -> Any:
     """The scene whose sequencer the context shows, or None."""
     return getattr(context, "sequencer_scene", None) or context.scene
 

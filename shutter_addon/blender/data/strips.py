@@ -1,6 +1,7 @@
 """Effect strips: a Scene strip above its source, and the scene, data and source that belong to it."""
 
 import math
+from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -54,7 +55,7 @@ def effect_of(scene, effect_scene):
     return next((effect for effect in scene.virtual_shutter.effects if effect.scene == effect_scene), None)
 
 
-def find_effect(effect_scene):
+def find_effect(effect_scene: Any) -> tuple[Any, Any, Any]:
     """Scene, effect and one of its strips for an effect scene. EffectError: nothing uses it any more."""
     for scene in bpy.data.scenes:
         if (effect := effect_of(scene, effect_scene)) is not None:
@@ -79,7 +80,7 @@ def timeline_frame(strip, scene_frame: float) -> float:
     return origin(strip) + scene_frame - strip.scene.frame_start
 
 
-def source_of(scene, effect, strip):
+def source_of(scene: Any, effect: Any, strip: Any) -> Any:
     """The effect's source strip: of those with its identity (parts of a cut strip, copies) the nearest in time, then
     the nearest below. EffectError: there is none any more, or none that has frames."""
     if (source := nearest_source(scene, effect, strip)) is None:
@@ -97,7 +98,7 @@ def shown_sources(scene) -> set[str]:
     return {source.name for source in sources if source is not None}
 
 
-def nearest_source(scene, effect, strip):
+def nearest_source(scene: Any, effect: Any, strip: Any) -> Any:
     """What source_of finds, or None."""
 
     def distance(other):

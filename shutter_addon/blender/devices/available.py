@@ -1,9 +1,10 @@
 """Which device renders: an OpenGL 4.3 context of its own, else Blender's own GPU, else NumPy."""
 
 import threading
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import bpy
 import gpu
@@ -17,7 +18,7 @@ from .gpu_relay import RelayedDevice
 
 CHOICES = ("auto", "gpu", "opengl", "blender", "cpu")  # gpu: opengl, or else blender
 # Given a Budget and `ask_others`, as PagedDevice.
-OPEN = {
+OPEN: dict[str, Callable[..., Any]] = {
     "opengl": partial(open_compositor, "gpu"),
     "blender": lambda *memory: GPUCompositor(BlenderDevice(*memory)),
     "relayed": lambda *memory: GPUCompositor(RelayedDevice(*memory)),  # Blender's from a thread of a window's job

@@ -4,8 +4,9 @@ device is not Blender's."""
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from concurrent.futures import Future, wait
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ...core import stopping
 from ...core.stopping import StoppedError
@@ -29,7 +30,7 @@ class Work(NamedTuple):
         self.ended.set()
         self.future.cancel()
 
-    def result(self, stopped):
+    def result(self, stopped: Callable[[], bool]) -> Any:
         """As result_of. Not waited for, it is broken off."""
         try:
             return result_of(self.future, self.relayed, stopped)
@@ -38,7 +39,7 @@ class Work(NamedTuple):
             raise
 
 
-def result_of(future: Future, relayed: bool, stopped):
+def result_of(future: Future, relayed: bool, stopped: Callable[[], bool]) -> Any:
     """The future's result. StoppedError: it is not waited for any longer. NoDeviceError: it cannot be waited for, as
     Blender's GPU is not current."""
     is_window = where() is Where.WINDOW
@@ -50,7 +51,7 @@ def result_of(future: Future, relayed: bool, stopped):
     return future.result()
 
 
-def broken_off(stopped, function, *arguments):
+def broken_off(stopped: Callable[[], bool], function: Callable[..., Any], *arguments: Any) -> Any:
     """What a function gives, unless it is broken off."""
     with stopping.once(stopped):
         return function(*arguments)

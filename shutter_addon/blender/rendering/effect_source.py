@@ -83,5 +83,6 @@ def source_index(snapshot: Snapshot, frame: float, source: ShotSource) -> tuple[
     if snapshot.effect.time is not None:
         time, backward = snapshot.effect.time.at(frame)
         return retiming.nearest(time - 1, source.step, source.count), backward
+    assert snapshot.timing is not None  # of a strip without source time
     with translated(rpt_):
         return retiming.source_frame(snapshot.timing, frame, source), snapshot.timing.use_reverse_frames

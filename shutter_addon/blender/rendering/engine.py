@@ -3,6 +3,7 @@
 import inspect
 import sys
 import traceback
+from typing import Any
 
 import bpy
 import numpy as np
@@ -19,7 +20,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
     bl_label = "Virtual Shutter"
     bl_use_preview = False
 
-    def render(self, depsgraph):
+    def render(self, depsgraph: Any) -> None:
         if render_job.cancelling():
             self.report({"ERROR"}, self.bl_label)  # whatever it says, it ends the other render
             return
@@ -32,7 +33,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             elif not self.test_break():
                 render_job.cancel(self.test_break)
 
-    def _render(self, depsgraph, called_by_script: bool):
+    def _render(self, depsgraph: Any, called_by_script: bool) -> None:
         scene, width, height = depsgraph.scene, self.resolution_x, self.resolution_y
         asked = None
         if render_job.where() is Where.WINDOW and not (called_by_script or render_job.runs()):
@@ -90,7 +91,7 @@ def in_words(error: BaseException) -> str:
     return f"internal error: {error!r}"
 
 
-def fail(engine, sentence: str) -> None:
+def fail(engine: Any, sentence: str) -> None:
     """Says why there is no picture, and ends the render: Blender would go on and write the frame without the effect.
 
     A preview has its own way to say it, and nothing to end."""
@@ -104,11 +105,11 @@ def fail(engine, sentence: str) -> None:
 classes = (VirtualShutterEngine,)
 
 
-def register():
+def register() -> None:
     for cls in classes:
         bpy.utils.register_class(cls)
 
 
-def unregister():
+def unregister() -> None:
     for cls in reversed(classes):
         bpy.utils.unregister_class(cls)

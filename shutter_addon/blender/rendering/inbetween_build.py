@@ -2,11 +2,13 @@
 
 import threading
 import time
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from ...core.frames.frame_source import FrameSource
 from ...core.messages import EffectError
 from ...core.model.shutters import ShutterError
 from ...media import MediaError, inbetween_folders
@@ -46,18 +48,17 @@ class _Builds:
 _builds = _Builds()
 
 
-def look(scene, effect, strip) -> Look:
+def look(scene: Any, effect: Any, strip: Any) -> Look:
     """How things are, or were a second ago. MediaError, EffectError: there is no source, or no place for frames."""
     source = strips.source_of(scene, effect, strip)
     settings = inbetween_settings.settings(effect)
     medium, doubled = _known(spec := source_media.spec(source))
     key = spec.key, *settings
-    when, *facts = _looks.get(key, (0.0,))
-    if not when or time.monotonic() - when > _FRESH:
-        facts = inbetween_folders.state(medium, *settings), inbetween_folders.size(settings[0], medium)
-        _looks[key] = time.monotonic(), *facts
+    if key not in _looks or time.monotonic() - _looks[key][0] > _FRESH:
+        state, size = inbetween_folders.state(medium, *settings), inbetween_folders.size(settings[0], medium)
+        _looks[key] = time.monotonic(), state, size
         _trim(_looks)
-    return Look(*facts, doubled.result() * (settings[1] - 1) if doubled.done() else None)
+    return Look(*_looks[key][1:], doubled.result() * (settings[1] - 1) if doubled.done() else None)
 
 
 def _known(spec: source_media.SourceSpec) -> tuple:
@@ -76,13 +77,13 @@ def _trim(known: dict) -> None:
         del known[next(iter(known))]
 
 
-def _estimated(medium) -> int:
+def _estimated(medium: FrameSource) -> int:
     with medium, suppress(MediaError, OSError):  # a build says what is wrong
         return estimate(medium, 2)
     return 0
 
 
-def _in_thread(function, *arguments) -> Future:
+def _in_thread(function: Callable[..., Any], *arguments: Any) -> Future:
     pool = ThreadPoolExecutor(1, "Virtual Shutter")
     future = pool.submit(function, *arguments)
     pool.shutdown(wait=False)
@@ -95,7 +96,7 @@ class Build:
     scene: session_uid of the effect's scene; done, total: pairs of neighbouring source frames; settings: what it builds
     future: how far it came, an inbetween_folders.State; or MediaError"""
 
-    def __init__(self, scene, effect, strip, factor: int | None = None):
+    def __init__(self, scene: Any, effect: Any, strip: Any, factor: int | None = None):
         """factor: builds what the strip needs with it, in place of all of the source with its own. EffectError,
         MediaError: it cannot begin."""
         self.settings = inbetween_settings.settings(effect)
@@ -108,13 +109,12 @@ class Build:
         self._stopped = threading.Event()
         self.future = _in_thread(self._build, _builds.left, medium, pairs)
 
-    def _build(self, before, medium, pairs):
+    def _build(self, before: Any, medium: FrameSource, pairs: list[int] | None) -> Any:
         wait(before)
         with medium:
-            told = {"update": self._update, "cancelled": self._stopped.is_set}
-            return build(medium, *self.settings, **told, pairs=pairs)
+            return build(medium, *self.settings, update=self._update, cancelled=self._stopped.is_set, pairs=pairs)
 
-    def _update(self, done, _total):
+    def _update(self, done: int, _total: int) -> None:
         self.done = done
 
     def result(self) -> inbetween_folders.State:
@@ -128,7 +128,7 @@ class Build:
         self._stopped.set()
 
 
-def _needed(scene, effect, strip, medium, settings) -> list[int]:
+def _needed(scene: Any, effect: Any, strip: Any, medium: FrameSource, settings: Any) -> list[int]:
     frames = range(strip.left_handle, strip.right_handle)
     try:
         return strobing.pairs(snapshot.take(scene, effect, strip, frames), medium, settings)
@@ -143,7 +143,7 @@ def running() -> Build | None:
     return _builds.running
 
 
-def start(scene, effect, strip, factor: int | None = None) -> Build:
+def start(scene: Any, effect: Any, strip: Any, factor: int | None = None) -> Build:
     """Begins a build; factor: see Build. EffectError, MediaError: it cannot begin."""
     _builds.running = Build(scene, effect, strip, factor)
     inbetween_settings.built.hold()
@@ -152,12 +152,13 @@ def start(scene, effect, strip, factor: int | None = None) -> Build:
 
 def ended() -> None:
     """What the build that was stopped, or has run to its end, has built counts from now on."""
-    _builds.left, _builds.running = (_builds.running.future,), None
+    if _builds.running is not None:
+        _builds.left, _builds.running = (_builds.running.future,), None
     inbetween_settings.built.release()
     _looks.clear()
 
 
-def purge(effect, source) -> tuple[int, list[tuple]]:
+def purge(effect: Any, source: Any) -> tuple[int, list[tuple]]:
     """Removes the in-between frames of an effect's source strip, of every factor and method; the bytes that they took,
     and the folders where other files stay, with their number. EffectError, MediaError, OSError: it cannot be done."""
     wait(_builds.left)

@@ -4,10 +4,14 @@ Blender knows of a strip's own properties only. Properties of the effect drop fr
 strokes and the source are compared with what they were, as no callback tells of them.
 """
 
+from collections.abc import Hashable, Iterator
+from typing import Any
+
 import bpy
 import numpy as np
 
 from ...core import revision
+from ...core.messages import EffectError
 from ...media import MediaError
 from ..data import (
     fcurves,
@@ -20,7 +24,6 @@ from ..data import (
     strips,
 )
 from ..data.snapshot import Snapshot, SourceFiles
-from ..data.validation import EffectError
 from . import render_job, render_settings
 
 _signatures: dict[int, int] = {}  # by effect scene
@@ -38,12 +41,12 @@ _TIMING = (
 )
 
 
-def current(scene, effect, strip, frame: float) -> Snapshot:
+def current(scene: Any, effect: Any, strip: Any, frame: float) -> Snapshot:
     """The snapshot of an effect strip at a timeline frame, for what is drawn: taken once until something changes.
     EffectError, MediaError: as snapshot.take."""
     uid = effect.scene.session_uid
 
-    def take():
+    def take() -> Snapshot:
         number, files = _files.get(uid, (None, None))
         known = files if number == revision.number() else None
         return snapshot.take(scene, effect, strip, (frame,), folder=render_settings.settings().inbetween, files=known)
@@ -107,7 +110,7 @@ def drop_spoilt_later() -> None:
         render_job.soon(drop_spoilt)
 
 
-def invalidate_changed(scene) -> bool:
+def invalidate_changed(scene: Any) -> bool:
     """Drops the finished frames of the scene's effects whose keys, strokes or source have changed since the last call;
     whether there are any.
 
@@ -117,7 +120,7 @@ def invalidate_changed(scene) -> bool:
         return False
     changed = False
     shown = {strip.scene: strip for strip in strips.effect_strips(scene)}
-    looked = {}
+    looked: dict[int, dict[str, SourceFiles]] = {}
     for effect in scene.virtual_shutter.effects:
         if (strip := shown.get(effect.scene)) is None:
             continue
@@ -131,7 +134,7 @@ def invalidate_changed(scene) -> bool:
     return changed
 
 
-def _signature(scene, effect, strip, looked: dict):
+def _signature(scene: Any, effect: Any, strip: Any, looked: dict) -> Iterator[Hashable]:
     """All that the effect's pictures depend on, but for properties with an update callback. looked: gets what the
     source reads, by the effect's scene."""
     for shutter in effect.shutters:
@@ -153,14 +156,14 @@ def _signature(scene, effect, strip, looked: dict):
         yield from _source(effect, source, looked)
 
 
-def _curve(curve):
+def _curve(curve: Any) -> Iterator[Hashable]:
     yield curve.array_index, curve.mute, curve.extrapolation
     yield from _keys(curve.keyframe_points)
     for modifier in curve.modifiers:
         yield from (repr(getattr(modifier, p.identifier)) for p in modifier.bl_rna.properties if p.type != "POINTER")
 
 
-def _keys(points):
+def _keys(points: Any) -> Iterator[Hashable]:
     for name in ("handle_left", "co", "handle_right"):
         yield _bytes(points, name, 2, np.float32)
     interpolations = _bytes(points, "interpolation", 1, np.int32)
@@ -171,14 +174,14 @@ def _keys(points):
             yield _bytes(points, name, 1, np.float32)
 
 
-def _strokes(annotation, layer: str):
+def _strokes(annotation: Any, layer: str) -> Iterator[Hashable]:
     for drawing in annotation.layers[layer].frames if annotation and layer in annotation.layers else ():
         yield drawing.frame_number
         for stroke in drawing.strokes:
             yield _bytes(stroke.points, "co", 3, np.float32)
 
 
-def _matte(region):
+def _matte(region: Any) -> Iterator[Hashable]:
     """What a matte shows, but for properties of the region."""
     try:
         if region.matte == "IMAGE":
@@ -192,7 +195,7 @@ def _matte(region):
         yield str(error)
 
 
-def _mask(mask):
+def _mask(mask: Any) -> Iterator[Hashable]:
     # Blender tells of these; many points take long to read.
     yield _masks.get(mask.session_uid, lambda: hash((mask.frame_start, mask_reading.mask_at(mask, mask.frame_start))))
     yield from mask_reading.motion(mask)
@@ -201,12 +204,12 @@ def _mask(mask):
         yield from _curve(curve)
 
 
-def _timing(source):
+def _timing(source: Any) -> Iterator[Hashable]:
     yield tuple(getattr(source, name) for name in _TIMING)
     yield tuple(key.timeline_frame for key in getattr(source, "retiming_keys", ()))
 
 
-def _source(effect, source, looked: dict):
+def _source(effect: Any, source: Any, looked: dict) -> Iterator[Hashable]:
     yield from _timing(source)
     yield source_media.reading(source)
     try:
@@ -218,7 +221,7 @@ def _source(effect, source, looked: dict):
         yield files
 
 
-def _bytes(collection, name: str, size: int, dtype) -> bytes:
-    values = np.empty(size * len(collection), dtype)
+def _bytes(collection: Any, name: str, size: int, dtype: type) -> bytes:
+    values: np.ndarray = np.empty(size * len(collection), dtype)
     collection.foreach_get(name, values)
     return values.tobytes()

@@ -7,16 +7,17 @@ is read on the main thread when it is asked for.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core.messages import EffectError
 from ...core.stopping import StoppedError
 from ..data import requirements, snapshot, strips
 from ..data.snapshot import Snapshot
-from ..data.validation import EffectError
 from . import effect_source, invalidation, render_job, render_settings, sessions
 from .render_job import Where
 
@@ -55,13 +56,13 @@ def look(film: int) -> None:
     _left_out[:] = requirements.left_out(scene) if scene else []
 
 
-def left_out(scene) -> str | None:
+def left_out(scene: Any) -> str | None:
     """Why the sequencer leaves an effect out of a film's current frame; None: it does not."""
     reasons = _left_out if render_job.where() is Where.JOB else requirements.left_out(scene)
     return next((why for frames, why in reasons if scene.frame_current in frames), None)
 
 
-def of(effect_scene, scene_frame: float, ended: Callable[[], bool] | None = None) -> tuple[Snapshot, float]:
+def of(effect_scene: Any, scene_frame: float, ended: Callable[[], bool] | None = None) -> tuple[Snapshot, float]:
     """The snapshot of an effect scene, and the timeline frame at which it shows one of its own frames. One of
     effect_source.FAULTS: there is none. ended: whether nobody waits for it any longer."""
     uid = effect_scene.session_uid
@@ -93,11 +94,11 @@ def _late(uid: int, scene_frame: float) -> Snapshot | Exception:
         return error
 
 
-def _scene(uid: int):
+def _scene(uid: int) -> Any:
     return next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
 
 
-def shown_effects(film):
+def shown_effects(film: Any) -> Iterator[tuple[Any, Any, list]]:
     """The effects that a film's scene shows, and the scenes in its Scene strips: each with its scene and with the
     strips that show it."""
     for scene in strips.shown_scenes(film):
@@ -107,7 +108,7 @@ def shown_effects(film):
                 yield scene, effect, parts
 
 
-def asked_frames(scene, parts, is_film: bool) -> set[float]:
+def asked_frames(scene: Any, parts: Any, is_film: bool) -> set[float]:
     """The timeline frames at which the parts of an effect may be asked for: those of the film, or in another scene,
     which strips show, all."""
     first, last = scene.frame_start, scene.frame_end

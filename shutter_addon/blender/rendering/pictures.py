@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import OpenImageIO
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -40,13 +42,13 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
     return made
 
 
-def _say_once(sentence: str, say) -> None:
+def _say_once(sentence: str, say: Callable[[str], None]) -> None:
     if sentence not in _said:
         _said.add(sentence)
         say(sentence)
 
 
-def _say_of_cuts(say) -> None:
+def _say_of_cuts(say: Callable[[str], None]) -> None:
     if package := cuts.missing_package():
         sentence = f"Stop at Cuts finds none, and exposures run across them: the Python package {package} is missing"
         _say_once(sentence, say)
@@ -82,4 +84,4 @@ def resized(picture: np.ndarray, width: int, height: int, divisor: int = 1) -> n
     small = OpenImageIO.ImageBufAlgo.resize(
         OpenImageIO.ImageBuf(np.ascontiguousarray(picture)), roi=OpenImageIO.ROI(0, width, 0, height)
     )
-    return small.get_pixels(OpenImageIO.FLOAT).reshape(height, width, 4)
+    return np.asarray(small.get_pixels(OpenImageIO.FLOAT)).reshape(height, width, 4)

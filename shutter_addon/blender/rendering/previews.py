@@ -11,7 +11,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
@@ -109,7 +109,7 @@ class _Looking:
 looking = _Looking()
 
 
-def for_engine(context, effect_scene) -> Asked | None:
+def for_engine(context: Any, effect_scene: Any) -> Asked | None:
     """What the engine is asked for while Blender draws a preview; None: somebody else asks. One of
     effect_source.FAULTS: the effect cannot be shown."""
     region, looking.decision = context.region, None
@@ -118,14 +118,15 @@ def for_engine(context, effect_scene) -> Asked | None:
     scene, seen = selection.scene_of(context), preview_areas.shown(context)
     owner, effect, strip = strips.find_effect(effect_scene)
     frame = strips.timeline_frame(strip, effect_scene.frame_current)
-    is_seen = seen is not None and seen.effect == effect and scene.frame_current == frame
-    look = preview_areas.look(context, scene, effect, seen.strip if is_seen else strip) if owner == scene else None
+    if seen is not None and (seen.effect != effect or scene.frame_current != frame):
+        seen = None
+    look = preview_areas.look(context, scene, effect, seen.strip if seen else strip) if owner == scene else None
     snapshot = invalidation.current(owner, effect, strip, frame)
-    if is_seen:
+    if seen and look:
         looking.decision = _decide(context, seen, look, snapshot)
         return Asked(snapshot, frame, looking.decision.request.source.detail, looking.decision.is_drawn)
-    in_full = look is None or looking.whole is not None
-    return Asked(snapshot, frame, effect_source.FULL if in_full else _detail(look), False)
+    detail = effect_source.FULL if look is None or looking.whole is not None else _detail(look)
+    return Asked(snapshot, frame, detail, False)
 
 
 def take_decision() -> Decision | None:
@@ -134,7 +135,7 @@ def take_decision() -> Decision | None:
     return decision
 
 
-def for_drawing(context, shown: Shown, decision: Decision | None) -> Drawing:
+def for_drawing(context: Any, shown: Shown, decision: Decision | None) -> Drawing:
     """What our draw handler draws. decision: the engine's; it holds unless something has changed since. One of
     effect_source.FAULTS: the effect cannot be shown."""
     settings, snapshot = context.window_manager.virtual_shutter, _snapshot(shown)
@@ -160,17 +161,17 @@ def for_drawing(context, shown: Shown, decision: Decision | None) -> Drawing:
     )
 
 
-def request_of(context, shown: Shown) -> Request:
+def request_of(context: Any, shown: Shown) -> Request:
     """What our draw handler draws of the effect strip at the current frame. One of effect_source.FAULTS: it cannot be
     shown."""
     return _drafted(context, shown, _decide(context, shown, _look(context, shown), _snapshot(shown)).request)
 
 
-def _look(context, shown: Shown) -> Look:
+def _look(context: Any, shown: Shown) -> Look:
     return preview_areas.look(context, shown.scene, shown.effect, shown.strip)
 
 
-def _decide(context, shown: Shown, look: Look, snapshot: Snapshot) -> Decision:
+def _decide(context: Any, shown: Shown, look: Look, snapshot: Snapshot) -> Decision:
     render = render_context.of_drawing()
     request = _requested(context, render, shown, snapshot, look)
     return Decision(snapshot, request, _is_drawn(context, shown, look, render.renderer(request).source))
@@ -180,7 +181,7 @@ def _snapshot(shown: Shown) -> Snapshot:
     return invalidation.current(shown.scene, shown.effect, shown.strip, shown.scene.frame_current)
 
 
-def _requested(context, render: RenderContext, shown: Shown, snapshot: Snapshot, look: Look) -> Request:
+def _requested(context: Any, render: RenderContext, shown: Shown, snapshot: Snapshot, look: Look) -> Request:
     """The picture in the previews' detail: in full, while it is looked at so. That ends here with the frame and with a
     change of the effect."""
     frame = shown.scene.frame_current
@@ -200,13 +201,13 @@ def _requested(context, render: RenderContext, shown: Shown, snapshot: Snapshot,
 def _detail(look: Look) -> effect_source.Detail:
     """What a picture is composed in for the previews of its scene: smaller by the power of two, of reduced.DIVISORS,
     that is nearest to the largest of them, and from the proxy that Blender reads for that one."""
-    if look.scale is None:
+    if (scale := look.scale) is None:
         return effect_source.FULL
-    divisor = min(DIVISORS, key=lambda number: abs(math.log2(max(look.scale, 1e-3) * number)))
+    divisor = min(DIVISORS, key=lambda number: abs(math.log2(max(scale, 1e-3) * number)))
     return effect_source.Detail(divisor, look.proxy)
 
 
-def _is_drawn(context, shown: Shown, look: Look, source: FrameSource) -> bool:
+def _is_drawn(context: Any, shown: Shown, look: Look, source: FrameSource) -> bool:
     """Whether our draw handler shows the result, or in another view what covers it, in place of what Blender makes of
     the engine's picture: wherever both are the same, in all previews of the scene. Not a still picture of full size:
     what is drawn passes through 8 bits on its way to the screen, and lacks shades next to black."""
@@ -222,7 +223,7 @@ def _is_drawn(context, shown: Shown, look: Look, source: FrameSource) -> bool:
     )
 
 
-def _drafted(context, shown: Shown, request: Request) -> Request:
+def _drafted(context: Any, shown: Shown, request: Request) -> Request:
     is_result = context.window_manager.virtual_shutter.view in RESULTS and _is_rendered(shown)
     if looking.whole is not None or (is_result and not is_going(context)):
         return request
@@ -260,7 +261,7 @@ def was_drawn() -> None:
     looking.slice_of, looking.slice = None, _SLICE
 
 
-def is_going(context) -> bool:
+def is_going(context: Any) -> bool:
     """Whether the film plays, or may_be_late."""
     is_playing = any(window.screen.is_animation_playing for window in context.window_manager.windows)
     return is_playing or may_be_late()
@@ -279,7 +280,7 @@ def may_be_late() -> bool:
     return time.monotonic() < looking.late_until
 
 
-def is_read(context) -> bool:
+def is_read(context: Any) -> bool:
     """Whether somebody reads the sequencer's picture from the window, for whom it has to be whole."""
     tool = context.workspace and context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     return bool(_READERS & render_job.operators_running()) or (tool is not None and tool.idname == _READING_TOOL)

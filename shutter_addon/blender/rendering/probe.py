@@ -1,5 +1,6 @@
 """What one pixel of the preview is made with: its coefficients and its shutter."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +19,7 @@ class Probed:
     bars: np.ndarray
 
 
-def at(renderer: Renderer, request: Request, point) -> Probed | None:
+def at(renderer: Renderer, request: Request, point: Sequence[float]) -> Probed | None:
     """What the pixel at a point is made with; None: the point lies beside the picture.
 
     point: fractions of the picture, y up. It is called where Blender's GPU draws; one texel is read, and coefficients

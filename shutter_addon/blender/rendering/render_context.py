@@ -49,15 +49,16 @@ def of_drawing() -> RenderContext:
     return of_render()
 
 
-def of_engine(say, stopped) -> RenderContext:
+def of_engine(say: Callable[[str], None], stopped: Callable[[], bool]) -> RenderContext:
     """For the engine: a preview where Blender draws, else a render."""
     if not render_job.ends_films():
         return RenderContext(session=sessions.WINDOW, settings=render_settings.settings(), say=say, stopped=stopped)
     return of_render(say, stopped)
 
 
-def of_render(say=print, stopped=never, *, levels: bool = False) -> RenderContext:
+def of_render(
+    say: Callable[[str], None] = print, stopped: Callable[[], bool] = never, *, levels: bool = False
+) -> RenderContext:
     """For a render: on a device apart from the window's, which need not be current. NoDeviceError: there is none."""
-    return RenderContext(
-        session=sessions.of_render(), settings=render_settings.settings(), say=say, stopped=stopped, levels=levels
-    )
+    session, settings = sessions.of_render(), render_settings.settings()
+    return RenderContext(session=session, settings=settings, say=say, stopped=stopped, levels=levels)

@@ -8,11 +8,12 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum
 from types import FrameType
+from typing import Any
 
 import bpy
 
@@ -64,7 +65,7 @@ _job = _Job()
 _spent: list[tuple[str, str]] = []  # names of the scenes and cameras of small renders, see _cancel
 
 
-def begin(scene) -> bool:
+def begin(scene: Any) -> bool:
     """A render begins. True: that of a film or a picture; not of a scene in one, nor of a preview."""
     is_effect = scene.render.engine == ENGINE
     if _job.film is not None and (_job.begun or is_effect):
@@ -88,7 +89,7 @@ def film() -> int | None:
     return _job.film
 
 
-def is_film(scene) -> bool:
+def is_film(scene: Any) -> bool:
     """Whether this scene's frames are what is rendered; called before each of them."""
     if scene.session_uid != _job.film:
         return False
@@ -96,7 +97,7 @@ def is_film(scene) -> bool:
     return True
 
 
-def end(scene, alone: bool) -> None:
+def end(scene: Any, alone: bool) -> None:
     """A render has ended. alone: no Python waits for it, Blender itself renders, and would go on or end with exit code
     1."""
     if scene.session_uid == _job.film:
@@ -139,7 +140,7 @@ def operators_running() -> set[str]:
 
 
 @contextmanager
-def telling(to: Callable[[str], None]):
+def telling(to: Callable[[str], None]) -> Iterator[None]:
     """Inside, the sentence that ends a render in the background goes there in place of stderr."""
     before, _job.tell = _job.tell, to
     try:
@@ -149,7 +150,7 @@ def telling(to: Callable[[str], None]):
 
 
 @contextmanager
-def calling(handlers: list, function: Callable):
+def calling(handlers: list, function: Callable) -> Iterator[None]:
     """Inside, one of bpy.app.handlers has that function."""
     handlers.append(function)
     try:
@@ -158,7 +159,7 @@ def calling(handlers: list, function: Callable):
         handlers.remove(function)
 
 
-def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None):
+def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None) -> Any:
     """What a function gives on Blender's main thread, where its data and its operators belong; None: it was not waited
     for, and is not called any more. ended: whether nobody waits for it any longer; without it, the window is not waited
     for long. Once it is called, its end is waited for."""
@@ -167,7 +168,7 @@ def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None):
     chance, done, deadline, results = threading.Lock(), threading.Event(), time.monotonic() + _LONG, []
     ended = ended or (lambda: time.monotonic() > deadline)
 
-    def call():
+    def call() -> None:
         if chance.acquire(blocking=False):
             try:
                 results.append((True, function()))
@@ -215,7 +216,7 @@ def failure() -> str | None:
     return _job.failure
 
 
-def cancel(ended=None) -> None:
+def cancel(ended: Callable[[], bool] | None = None) -> None:
     """Ends the render that runs, as soon as this returns to Blender: from a picture, or from what comes before a frame.
     (After one Blender would go on with the next, and crash.)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -32,7 +33,7 @@ _budget: tuple[int, Budget] | None = None  # with the megabytes that it was made
 
 
 @contextmanager
-def using(settings: RenderSettings):
+def using(settings: RenderSettings) -> Iterator[None]:
     """Inside, on this thread, renders have these settings."""
     token = _settings.set(settings)
     try:
@@ -53,7 +54,8 @@ def wanted() -> str:
 
 def _wanted_memory() -> int:
     """The megabytes that the command sets, else the user's preference; 0: as many as are allowed."""
-    return preferences.gpu_memory() if settings().gpu_memory is None else settings().gpu_memory
+    wanted_here = settings().gpu_memory
+    return preferences.gpu_memory() if wanted_here is None else wanted_here
 
 
 def memory() -> Budget:

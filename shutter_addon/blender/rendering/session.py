@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -44,7 +44,7 @@ class RenderSession:
         self._chosen: tuple[str, str | None] | None = None
         self._executor: ThreadPoolExecutor | None = None
         self._compositor: Future | None = None
-        self._renderers: dict = {}
+        self._renderers: dict[int, tuple[SourceKey, Renderer]] = {}
         self._requests: dict[int, tuple[Snapshot, float, Request]] = {}  # by scene: the last one
         self._shown: dict[int, float] = {}  # by scene: the timeline frame that was shown last
         self._begun: dict[int, tuple[tuple, Work]] = {}  # by scene: the key of a request, its picture
@@ -61,11 +61,11 @@ class RenderSession:
         """Whether the device belongs to a thread of its own; otherwise to whichever calls."""
         return self.device != "blender"
 
-    def run(self, function, *arguments, stopped=never):
+    def run(self, function: Callable[..., Any], *arguments: Any, stopped: Callable[[], bool] = never) -> Any:
         """The result of a function that uses the device. StoppedError: it is not waited for any longer, and ends."""
         return self._submit(function, *arguments, stopped=stopped).result(stopped)
 
-    def _submit(self, function, *arguments, stopped=never) -> Work:
+    def _submit(self, function: Callable[..., Any], *arguments: Any, stopped: Callable[[], bool] = never) -> Work:
         """A function that uses the device, called after those before it. stopped: asked where it is called at once."""
         ended = threading.Event()
         if self.threaded:
@@ -74,7 +74,7 @@ class RenderSession:
             with suppress(RuntimeError):  # Python ends, and its threads take no more work
                 future = self._executor.submit(broken_off, ended.is_set, function, *arguments)
                 return Work(future, ended, self.device == "relayed")
-        done = Future()
+        done: Future = Future()
         done.set_result(broken_off(stopped, function, *arguments))
         return Work(done, ended, False)
 
@@ -87,10 +87,11 @@ class RenderSession:
         detail: None: as it was the last time, for who asks for no picture"""
         known = self._renderers.get(snapshot.scene)
         key = SourceKey.of(snapshot, detail or (known[0].detail if known else FULL))
-        source = self.renderer(key, context.say, context.stopped).source
-        known, at, last = self._requests.get(snapshot.scene, (None, None, None))
-        if known is snapshot and at == frame and (last.source, last.levels) == (key, context.levels):
-            return last
+        source: Any = self.renderer(key, context.say, context.stopped).source  # what the key has opened
+        if (last := self._requests.get(snapshot.scene)) and last[0] is snapshot and last[1] == frame:
+            request = last[2]
+            if (request.source, request.levels) == (key, context.levels):
+                return request
         with translated(rpt_):
             state = _in_blocks(snapshot.effect.at(frame), key.detail.divisor)
             index, backward = source_index(snapshot, frame, source)
@@ -103,7 +104,7 @@ class RenderSession:
         self._requests[snapshot.scene] = snapshot, frame, request
         return request
 
-    def picture(self, request: Request, stopped=never) -> np.ndarray:
+    def picture(self, request: Request, stopped: Callable[[], bool] = never) -> np.ndarray:
         """The requested picture, if need be the one that was begun for it. StoppedError: it is not waited for."""
         key, begun = self._begun.pop(request.source.scene, (None, None))
         if begun is not None and key != request.key:
@@ -111,7 +112,7 @@ class RenderSession:
             begun = None
         return (begun or self._begin(request, stopped)).result(stopped)
 
-    def _begin(self, request: Request, stopped=never) -> Work:
+    def _begin(self, request: Request, stopped: Callable[[], bool] = never) -> Work:
         return self._submit(self.renderer(request.source).picture, request, stopped=stopped)
 
     def begin_next(self, snapshot: Snapshot, frame: float, context: RenderContext) -> None:
@@ -128,29 +129,31 @@ class RenderSession:
                 request = self.request(snapshot, frame + step, context, FULL)
                 self._begun[snapshot.scene] = request.key, self._begin(request)
 
-    def coefficients(self, request: Request, stopped=never) -> np.ndarray:
+    def coefficients(self, request: Request, stopped: Callable[[], bool] = never) -> np.ndarray:
         """See Renderer.coefficients."""
         return self.run(self.renderer(request.source).coefficients, request, stopped=stopped)
 
-    def renderer(self, key: SourceKey, say=print, stopped=never) -> Renderer:
+    def renderer(
+        self, key: SourceKey, say: Callable[[str], None] = print, stopped: Callable[[], bool] = never
+    ) -> Renderer:
         """The renderer that reads what the key says: the only one that its effect has. One of FAULTS: there is none."""
         compositor = self._opened(say, stopped)
-        known, renderer = self._renderers.pop(key.scene, (None, None))
-        if known != key:
-            if renderer is not None:
-                self._submit(renderer.close)
+        known = self._renderers.pop(key.scene, None)
+        if known is None or known[0] != key:
+            if known is not None:
+                self._submit(known[1].close)
             source = key.open(planes=compositor.takes_planes)
-            renderer = Renderer(compositor, source, MatteValues.of(source))
-        self._renderers[key.scene] = key, renderer
+            known = key, Renderer(compositor, source, MatteValues.of(source))
+        self._renderers[key.scene] = known
         while len(self._renderers) > _KEPT:
             self._submit(self._renderers.pop(next(iter(self._renderers)))[1].close)
-        return renderer
+        return known[1]
 
-    def _opened(self, say, stopped):
+    def _opened(self, say: Callable[[str], None], stopped: Callable[[], bool]) -> Any:
         """The compositor, opened if need be."""
         if self._compositor is None:
             self._compositor = self._submit(available.OPEN[self.device], render_settings.memory(), self._ask).future
-            if message := self._chosen[1]:
+            if self._chosen and (message := self._chosen[1]):
                 say(message)
         try:
             return result_of(self._compositor, self.device == "relayed", stopped)
@@ -183,7 +186,7 @@ class RenderSession:
         for _key, renderer in list(self._renderers.values()):
             renderer.source.want(())
 
-    def _drop_begun(self, places) -> None:
+    def _drop_begun(self, places: Iterable[int]) -> None:
         for place in places:
             _key, begun = self._begun.pop(place, (None, None))
             if begun is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 
 from ..devices import available, gpu_relay
@@ -71,7 +73,7 @@ def drop_removed() -> None:
         session.keep(scenes)
 
 
-def forget(*_) -> None:
+def forget(*_: Any) -> None:
     """Closes all sources and frees the devices: when a file is loaded, and when the extension goes."""
     for session in SESSIONS:
         session.forget()

@@ -10,13 +10,14 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
+from ...core.frames.frame_source import FrameSource
 from ...core.messages import translated
 from ...core.model import shutters
 from ...core.model.frame_state import FrameState
@@ -26,6 +27,7 @@ from ...media import MediaError, inbetween, steps
 from ...media.cuts import ShotSource
 from ..data import inbetween_settings
 from ..data.snapshot import Snapshot
+from ..data.source_media import SourceSpec
 from . import effect_source
 
 FACTORS = 2, 4, 8, 16
@@ -75,7 +77,7 @@ class Looked(NamedTuple):
     is_busy: bool
 
 
-def look(effect, strip, snapshot: Snapshot, renderer: Renderer, request: Request) -> Looked:
+def look(effect: Any, strip: Any, snapshot: Snapshot, renderer: Renderer, request: Request) -> Looked:
     """Looks at a picture's exposure. What is not known is asked for."""
     _measuring.wanted, before = None, last(effect)
     frame, known = effect.id_data.frame_current, _look(effect, strip, snapshot, renderer, request)
@@ -83,13 +85,13 @@ def look(effect, strip, snapshot: Snapshot, renderer: Renderer, request: Request
     return Looked(known=known, is_new=known != before, is_busy=is_busy())
 
 
-def last(effect) -> Strobing | None:
+def last(effect: Any) -> Strobing | None:
     """What the last look has found, if it was at the effect's current frame."""
     frame, known = _last_looks.get(effect.scene.session_uid, (None, None))
     return known if frame == effect.id_data.frame_current else None
 
 
-def _look(effect, strip, snapshot, renderer, request):
+def _look(effect: Any, strip: Any, snapshot: Snapshot, renderer: Renderer, request: Request) -> Strobing | None:
     ways = _ways(renderer, request)
     pairs = _chosen(sorted(ways))
     if lacking := [pair for pair in pairs if (snapshot.source.key, pair) not in _moved]:
@@ -117,19 +119,20 @@ def smooth(height: int) -> float:
     return max(_SMOOTH * height, _SMOOTH_PIXELS)
 
 
-def _ways(renderer, request) -> dict[int, list[tuple[Similarity, Similarity]]]:
+def _ways(renderer: Renderer, request: Request) -> dict[int, list[tuple[Similarity, Similarity]]]:
     """By pairs of filmed frames, each by its first, over which a shutter stays open that is seen: where the points of
     the shown picture lie in the two, in heights of the picture, for each of these shutters."""
     state, source = request.state, renderer.source
-    options, count, ways = state.options, state.options.step, {}
+    options, count = state.options, state.options.step
+    ways: dict[int, list[tuple[Similarity, Similarity]]] = {}
     shot = renderer.shot(request, known=True)
     frames = compositor.window_indices(options, request.index, shot, request.direction)
     for i in _seen(state):
         is_open = state.bars[i] > 0
         both = is_open[1:] & is_open[:-1] & (frames[1:] != frames[:-1]) & (frames[1:] >= 0) & (frames[:-1] >= 0)
         for pair in set((np.minimum(frames[1:], frames[:-1])[both] // count).tolist()):
-            ends = pair * count, (pair + 1) * count
-            ways.setdefault(pair, []).append(tuple(_way(state, i, end, source.height) for end in ends))
+            before, after = (_way(state, i, end * count, source.height) for end in (pair, pair + 1))
+            ways.setdefault(pair, []).append((before, after))
     return ways
 
 
@@ -163,7 +166,7 @@ def _factor(state: FrameState, ratio: float) -> int | None:
     return next((factor for factor in possible if factor >= ratio * now), possible[-1] if possible else None)
 
 
-def _count(strip, snapshot: Snapshot, source, request) -> int:
+def _count(strip: Any, snapshot: Snapshot, source: Any, request: Request) -> int:
     """About how many pairs the strip's pictures need, or a few more."""
     options = request.state.options
     all_pairs = source.filmed - 1
@@ -174,11 +177,12 @@ def _count(strip, snapshot: Snapshot, source, request) -> int:
     return min(abs(final - first) + -(-options.window // options.step), all_pairs)
 
 
-def pairs(snapshot: Snapshot, medium, settings: inbetween_settings.Settings) -> list[int]:
+def pairs(snapshot: Snapshot, medium: FrameSource, settings: inbetween_settings.Settings) -> list[int]:
     """The pairs of filmed frames, each by its first, ascending, whose in-between frames an effect strip needs with
     these settings, in place of its own, at the snapshot's frames: those across cuts as well, which take no time.
     EffectError, MediaError: that cannot be known."""
-    factor, needed = settings.factor, set()
+    factor = settings.factor
+    needed: set[int] = set()
     source = ShotSource(inbetween.InbetweenSource(medium, *settings), factor)
     has_trails = any(shutter.trail for shutter in snapshot.effect.shutters)
     for frame in snapshot.frames:
@@ -226,7 +230,7 @@ def forget() -> None:
         known.clear()
 
 
-def _measure_motion(spec, lacking: list[int]) -> None:
+def _measure_motion(spec: SourceSpec, lacking: list[int]) -> None:
     for pair in lacking:
         _moved[spec.key, pair] = None  # what cannot be read is not tried again
     if not steps.is_possible():
@@ -239,7 +243,7 @@ def _measure_motion(spec, lacking: list[int]) -> None:
         del _moved[next(iter(_moved))]
 
 
-def _measure_cost(spec, pair: int, key: tuple) -> None:
+def _measure_cost(spec: SourceSpec, pair: int, key: tuple) -> None:
     _costs[key] = None
     with suppress(MediaError, OSError), spec.open() as medium:
         _costs[key] = inbetween.cost(medium, pair, key[1])

@@ -35,7 +35,7 @@ class Options:
     light: Light = "linear"
     exposure: Exposure = "normalized"
     edges: Edges = "hold"
-    aggregate: Literal[1, 2, 4] = 1
+    aggregate: int = 1
     border: bool = False
     stop_at_cuts: bool = True
     edge_aware: float = 0.0
