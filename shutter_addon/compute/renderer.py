@@ -4,6 +4,7 @@ window, composition."""
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,8 +17,12 @@ from .cpu import CPUCompositor
 from .labelling import LabelLayer, grid, labelled, sole_of
 from .request import Coefficients, Request
 
+if TYPE_CHECKING:
+    from ..devices.gl import GLDevice
+    from .gpu import GPUCompositor
 
-def open_compositor(device: str = "gpu", *memory):
+
+def open_compositor(device: str = "gpu", *memory: Any) -> CPUCompositor | GPUCompositor:
     """The compositor "gpu", on OpenGL 4.3, or "cpu", on NumPy; memory: the arguments of GLDevice. NoDeviceError: there
     is no OpenGL 4.3."""
     if device == "cpu":
@@ -27,7 +32,7 @@ def open_compositor(device: str = "gpu", *memory):
     return GPUCompositor(open_gl(*memory))
 
 
-def open_gl(*memory):
+def open_gl(*memory: Any) -> GLDevice:
     """A device on an OpenGL 4.3 context of its own; memory: the arguments of GLDevice. NoDeviceError: there is none, or
     no moderngl."""
     try:
@@ -40,16 +45,18 @@ def open_gl(*memory):
 class Renderer:
     """Pictures of one source. It keeps the window's frames, and the last result of each stage.
 
+    compositor: a CPUCompositor or a GPUCompositor
     mattes: what reads the mattes of its pictures; None: they have none
     shortages: what was slow in the last picture, as the device has no room: "window", every picture sends the frames;
     "diffusion", NumPy diffuses
     """
 
-    def __init__(self, compositor, source: FrameSource, mattes: MatteReader | None = None):
+    def __init__(self, compositor: Any, source: FrameSource, mattes: MatteReader | None = None):
         self.compositor, self.source, self._mattes = compositor, source, mattes
         self._solver, self._matting, self._mixing = compositor.solver(), compositor.matting(), compositor.mixing()
         self._guides = guide.Guides(source)
-        self._window = self._kind = None
+        self._window: Any = None
+        self._kind: tuple[int, bool, int] | None = None
         self.shortages: set[str] = set()
         self._labels, self._solved, self._laid, self._drawn = Memo(), Memo(), Memo(), Memo()
 
@@ -61,7 +68,7 @@ class Renderer:
                 return self.compositor.over_black(self.draw(replace(request, levels=False)))
             return self.compositor.read(self.draw(request))
 
-    def draw(self, request: Request):
+    def draw(self, request: Request) -> Any:
         """The picture on the device (GPUCompositor.draw); with NumPy an array, like `picture`'s. It is valid until the
         next picture of this renderer, and composed only if it is not the last one."""
         if self._window is None or not self._window.is_open:
@@ -69,7 +76,7 @@ class Renderer:
         with self.compositor.current():
             return self._drawn.get(request.key, lambda: self._composed(request), quick=request.quick)
 
-    def _composed(self, request: Request):
+    def _composed(self, request: Request) -> Any:
         wanted_later = self._want(request)
         labels = self.labels(request)
         # Before coefficients are solved for: the window reads the frames that guide the diffusion.
@@ -166,7 +173,7 @@ class Renderer:
         sole = _sole(request, labels)
         return request if sole is None else replace(request, state=request.state.alone(sole))
 
-    def _loaded_window(self, request: Request, labels: list[LabelLayer]):
+    def _loaded_window(self, request: Request, labels: list[LabelLayer]) -> Any:
         """The window, with the frames loaded that the picture exposes."""
         window = self._window_for(request)
         self._keep_guides(request)
@@ -182,7 +189,7 @@ class Renderer:
         moved = self._exposing(request, self.labels(request)).state.following is not None
         return request.state.options.window, moved, len(request.state.bars)
 
-    def _window_for(self, request: Request):
+    def _window_for(self, request: Request) -> Any:
         kind = self._kind_for(request)
         if self._window is None or self._kind != kind or not self._window.is_open:
             self.release_window()
@@ -203,11 +210,11 @@ class Renderer:
             return Coefficients(self.compositor.constant(np.ones(1)), self._everywhere)
         return Coefficients(self._mixture(request, labels), request.state.options.aggregate)
 
-    def _mixture(self, request: Request, labels: list[LabelLayer]):
+    def _mixture(self, request: Request, labels: list[LabelLayer]) -> Any:
         """Coefficients on the device, with the mattes laid over what the scribbles give. They are laid again only if
         either has changed since the last call."""
         state = request.state
-        if not state.mattes:
+        if not state.mattes or self._mattes is None:
             return self._diffused(request, labels)
         values = self._mattes.values(state.mattes, request.index, state.options.aggregate)
         count, sole = len(state.bars), sole_of(labels)
@@ -218,13 +225,13 @@ class Renderer:
         key = state.mattes, [key for key, _ in values], count, sole, below
         return self._laid.get(key, lambda: self._matting.lay(beneath, state.mattes, values))
 
-    def _diffused(self, request: Request, labels: list[LabelLayer]):
+    def _diffused(self, request: Request, labels: list[LabelLayer]) -> Any:
         """Coefficients on the device. They are solved for only if labels or what guides them changed since the last
         call, or if the last solution was a quick one and this must not be."""
         options, count = request.state.options, len(request.state.bars)
         frames = self._guiding(request, self.shot(request)) if options.edge_aware else ()
 
-        def solve():
+        def solve() -> Any:
             self._keep_guides(request)
             guided = (self._guides.guide(frames, options.aggregate), options.edge_aware) if frames else ()
             mixed = self._mixed(labels, count, guided, request.quick)
@@ -234,7 +241,7 @@ class Renderer:
         key = count, frames and (frames, options.edge_aware), [layer.key for layer in labels]
         return self._solved.get(key, solve, quick=request.quick)
 
-    def _mixed(self, layers: list[LabelLayer], count: int, guided: tuple, quick: bool):
+    def _mixed(self, layers: list[LabelLayer], count: int, guided: tuple, quick: bool) -> Any:
         """The coefficients of all layers, solved for one after the other and added up. A solution that another layer
         has begun from would depend on that one."""
         if len(layers) == 1:
