@@ -60,7 +60,7 @@ from shutter_addon.core.model import mattes, scribbles, shutters
 from shutter_addon.core.model.frame_state import Following, FrameState, Options
 from shutter_addon.core.pixels import compositor
 from shutter_addon.devices.gl import GLDevice
-from shutter_addon.devices.passes import LOCAL_ROW, Image, Pass
+from shutter_addon.devices.passes import Pass, read_pass
 
 HERE = Path(__file__).resolve().with_suffix("")
 METHODS = ("ours", "paper", "average", "edges", "follow")
@@ -445,24 +445,20 @@ def copied(device) -> dict:
     return {"pass": "copy", "method": "ours", "bars": "", **nothing, "device": device.name, "ms": ms, "error": error}
 
 
-def _program(name: str, samplers, state: FrameState, **defines) -> Pass:
-    return Pass(
-        str(HERE / name),
-        dict.fromkeys(samplers, "sampler2DArray"),
-        {"picture": Image("rgba32f")},
-        {"size": "ivec2", "top": "int", "height": "int", "first_layer": "int"},
-        {"LAST": state.options.window, "DECODE": int(state.options.light == "linear"), **defines},
-        local_size=LOCAL_ROW,
+def _program(name: str, state: FrameState, **defines: int) -> Pass:
+    return read_pass(
+        str(HERE / name), LAST=state.options.window, DECODE=int(state.options.light == "linear"), **defines
     )
 
 
 def _appendix_a(state: FrameState, shared: bool) -> Pass:
-    defines = {"SHUTTERS": len(state.bars), "AGGREGATE": state.options.aggregate, "SHARED": int(shared)}
-    return _program("appendix_a", ("frames", "coefficients", "sums"), state, **defines)
+    return _program(
+        "appendix_a", state, SHUTTERS=len(state.bars), AGGREGATE=state.options.aggregate, SHARED=int(shared)
+    )
 
 
 def _average(state: FrameState) -> Pass:
-    return _program("average", ("frames",), state)
+    return _program("average", state)
 
 
 def jobs(case: Case, passes, methods):

@@ -3,6 +3,23 @@
 // its colours with NUMBERS in one of 0 to 2²⁴ − 1, R + 256 G + 65536 B;
 // with PLANES by the whole numbers of libswscale (core/frames/planes.py) from samples of luma and chroma;
 // or with AGAIN one that the sums hold already, between the layers `before` and `after`.
+layout(local_size_x = 8, local_size_y = 16) in;  // a tile
+layout(rgba16ui) uniform uimage2DArray sums;
+uniform ivec2 size;
+uniform int known, next;
+#if AGAIN
+uniform int before, after;
+#else
+uniform int top;
+uniform float whole;
+#  if PLANES
+layout(r32ui) uniform readonly uimage2DArray luma, chroma;  // a software renderer's texelFetch takes longer
+uniform ivec2 chroma_step, luma_of, green_of;
+uniform int red_of, blue_of;
+#  else
+uniform sampler2DArray frame;
+#  endif
+#endif
 #include "light.glsl"
 #include "sums.glsl"
 

@@ -2,6 +2,7 @@
 // between the knots of the table. A frame's weight is Q at its end less Q at its start.
 // For many pieces: every frame is fetched once. Pieces that end before in every pixel of the block are summed for all of
 // them; only those that a pixel may be inside of are looked at pixel by pixel, about one to a frame.
+uniform int rows, first, last;
 #include "compose.glsl"
 
 int frame;

@@ -1,6 +1,7 @@
 // A pixel's own shutter by displacement interpolation, exact (paper §3.4.1): its quantile is Σ cᵢ Sᵢ⁻¹, linear
 // between the knots of the table; each piece spreads its share evenly over the frames that it passes.
 // For few pieces: a frame is fetched again for every piece that touches it.
+uniform int rows;
 #include "compose.glsl"
 
 int frame;

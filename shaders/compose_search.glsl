@@ -1,7 +1,7 @@
 // As compose_frames.glsl, every pixel for itself: for each frame it looks up its own piece, by bisection.
 // For many pieces between shutters that lie far apart in time, which neighbours do not share: there, looking at pieces
 // for a whole block takes pieces times frames, and more loops than software renderers go through.
-#define QUADS 1
+uniform int rows, first, last;
 #include "compose.glsl"
 
 int frame;

@@ -4,6 +4,13 @@
 // table: a row of 2 · GROUPS + 1 vectors for the gains, then one a piece, as in include/compose.glsl; ROWS pieces, in a
 // loop that a compiler unrolls. The window's time 0 lies `origin` positions from the first of the sums, and time runs
 // backwards with BACK. (Of time nothing but whole frames depends on where the sums begin: pictures must not.)
+layout(local_size_x = 64, local_size_y = 2) in;
+layout(rgba32f) uniform readonly image2DArray coefficients;
+layout(rgba16ui) uniform readonly uimage2DArray sums;
+layout(std140) uniform table_block { vec4 table[TABLE]; };
+uniform ivec2 size;
+uniform int top, block_bits, origin, layers, first_layer, held;
+uniform float unit;
 #include "light.glsl"
 #include "finish.glsl"
 #include "sums.glsl"

@@ -1,4 +1,5 @@
 // A pixel's own shutter by value interpolation: q = Σ cᵢ sᵢ/eᵢ, a row of the table per frame that any of them exposes.
+uniform int first, last;
 #include "compose.glsl"
 
 int frame;

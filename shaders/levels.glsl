@@ -1,4 +1,8 @@
 // A picture as the levels of an 8-bit file, top row first: display code values (view transform Standard) over black.
+layout(local_size_x = 64) in;
+layout(rgba32f) uniform readonly image2DArray picture;
+layout(rgba8) uniform writeonly image2DArray levels;
+uniform ivec2 size;
 #include "light.glsl"
 
 void main()

@@ -1,10 +1,15 @@
 // Lays COUNT mattes over coefficients, four shutters of a pixel: core/model/mattes.py's `blended`.
-#include "inside.glsl"
+layout(local_size_x = 64) in;
+layout(rgba32f) uniform readonly image2DArray under;
+layout(r32f) uniform readonly image2DArray values;  // a matte in each layer
+layout(rgba32f) uniform image2DArray over;
+layout(std140) uniform table_block { vec4 table[MOST]; };  // of each matte: its shutter, whether it adds, its opacity
+uniform ivec2 size, beneath;
 
 void main()
 {
   ivec3 p = ivec3(gl_GlobalInvocationID);
-  if (!inside(p.xy, size)) {
+  if (any(greaterThanEqual(p.xy, size))) {
     return;
   }
   // Coefficients of the whole picture have one texel.

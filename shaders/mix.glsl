@@ -1,10 +1,18 @@
 // Adds a share of coefficients to a sum of them, four shutters of a pixel.
-#include "inside.glsl"
+layout(local_size_x = 64) in;
+layout(rgba32f) uniform readonly image2DArray added;
+#if BEGINS
+layout(rgba32f) uniform writeonly image2DArray mixed;
+#else
+layout(rgba32f) uniform image2DArray mixed;
+#endif
+uniform ivec2 size, given;
+uniform float share;
 
 void main()
 {
   ivec3 p = ivec3(gl_GlobalInvocationID);
-  if (!inside(p.xy, size)) {
+  if (any(greaterThanEqual(p.xy, size))) {
     return;
   }
   // Coefficients of the whole picture have one texel.

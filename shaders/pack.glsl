@@ -2,6 +2,11 @@
 // a rim of two pixels before and three behind that repeat the frame's edges. Linear light is kept as its square root, so
 // that dark steps are small; encoded light as it is.
 // DECODE: how samples become the light that is summed, 0 as they are, 1 made linear, 2 made encoded.
+layout(local_size_x = 64) in;
+uniform sampler2DArray frame;
+layout(rgba16ui) uniform writeonly uimage2DArray packed_frames;
+uniform ivec2 size;
+uniform int layer;
 #include "light.glsl"
 #include "packed.glsl"
 

@@ -1,6 +1,11 @@
 // The paper's Appendix A as it stands: every Q(τ) by bisection in nine steps, every S⁻¹ by binary search within its
 // bounds, S in shared memory. SHUTTERS, LAST (frames of the window), AGGREGATE: pixels along a block that shares q.
 // SHARED 0 looks S up in its texture instead, which software renderers are quicker at.
+layout(local_size_x = 64) in;
+uniform sampler2DArray frames, coefficients, sums;
+layout(rgba32f) uniform writeonly image2DArray picture;
+uniform ivec2 size;
+uniform int top, height, first_layer;
 #include "light.glsl"
 
 #if SHARED

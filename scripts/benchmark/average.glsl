@@ -1,4 +1,9 @@
 // The plain mean of the window's LAST frames: what every composition is measured against.
+layout(local_size_x = 64) in;
+uniform sampler2DArray frames;
+layout(rgba32f) uniform writeonly image2DArray picture;
+uniform ivec2 size;
+uniform int top, height, first_layer;
 #include "light.glsl"
 
 void main()

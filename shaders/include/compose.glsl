@@ -9,14 +9,32 @@
 // With MOVED shutters follow something: see moved.glsl.
 // GROUPS of four shutters, TILED, EDGES, DECODE, PREMULTIPLIED, ENCODED: see compute/gpu.py. Software renderers run both
 // sides of every branch: what is costly stands in loops or behind these definitions.
-#include "light.glsl"
+layout(local_size_x = 64) in;
+layout(rgba32f) uniform readonly image2DArray table;
+uniform ivec2 size;
+uniform int top, block_bits;
+#if MOVED
+uniform sampler2DArray coefficients;  // no image: others take all that Vulkan guarantees
+#else
+layout(rgba32f) uniform readonly image2DArray coefficients;
+uniform int origin, direction, layers, lowest, lowest_layer;
+#endif
 #if SUMS
-#include "sums.glsl"
+layout(rgba16ui) uniform readonly uimage2DArray sums;
+uniform int held;
+uniform float unit;
+#elif !PACKED
+uniform sampler2DArray frames;
+#endif
+#if !MOVED && !SUMS || EDGES == 2 && !MOVED
+uniform int count;
 #endif
 
-#ifndef QUADS
-#  define QUADS 4
+#include "light.glsl"
+#if SUMS
+#  include "sums.glsl"
 #endif
+
 #if QUADS == 4
 #  define EACH(does) \
     does(0); \
@@ -51,7 +69,7 @@ vec4 coefficients_at(ivec2 pixel, int group)
 {
   ivec3 place = ivec3((pixel + ivec2(0, top)) >> block_bits, group);
 #if MOVED
-  vec4 found = max(texelFetch(coefficients, place, 0), 0.0);  // no image: others take all that Vulkan guarantees
+  vec4 found = max(texelFetch(coefficients, place, 0), 0.0);
   // Which are zero, the compiler then knows.
   return found * vec4(lessThan(ivec4(0, 1, 2, 3), ivec4(SHUTTERS - 4 * group)));
 #else

@@ -1,5 +1,12 @@
 // Stores a pixel of the finished picture, of `height` rows. LEVELS: display code values (view transform Standard), top row
 // first; else scene-linear, bottom row first: Blender's order, and GL's. Both are premultiplied.
+#if LEVELS
+layout(rgba8) uniform writeonly image2DArray picture;
+#else
+layout(rgba32f) uniform writeonly image2DArray picture;
+uniform int height;
+#endif
+
 void finish(ivec2 pixel, vec4 color)
 {
 #if LEVELS

@@ -6,6 +6,23 @@
 // table: as for compose.glsl, a row for each frame and motion; from row `parts` on, one for each motion: 1 for its shutters.
 // SEVERAL: other passes have other frames. CONTINUED: what those before have summed is in `summed`; UNFINISHED: another
 // one follows. SHARP: as in core.pixels.compositor.seen.
+layout(rgba32f) uniform readonly image2DArray moves;
+uniform int motions;
+#if PACKED
+layout(rgba16ui) uniform readonly uimage2DArray packed_frames;
+#endif
+#if EDGES == 2
+uniform int seen_first, seen_last, parts;
+#endif
+#if CONTINUED
+uniform sampler2DArray summed;
+#endif
+#if UNFINISHED
+layout(rgba32f) uniform writeonly image2DArray picture;
+#else
+#  include "finish.glsl"
+#endif
+
 int motion = 0;
 
 vec4 moved_weights(float t)
@@ -172,10 +189,6 @@ vec4 nearest_light(int quad, int pixel)
   }
   return light;
 }
-#endif
-
-#if !UNFINISHED
-#include "finish.glsl"
 #endif
 
 void store(int quad, int pixel, float gain)

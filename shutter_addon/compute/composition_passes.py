@@ -4,12 +4,11 @@ the fastest."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
 from ..core.model.frame_state import Options
-from ..devices.passes import LOCAL_ROW, Image, Pass
+from ..devices.passes import Pass, read_pass
 from .window import BLOCK, Sums
 
 # Rows of pixels that one invocation of compose_sums composes.
@@ -18,22 +17,7 @@ PAIR = 2
 EDGES = {"hold": 0, "mirror": 1, "shorten": 2}
 # What a picture is stored as, by whether it is levels.
 PICTURE = {False: "rgba32f", True: "rgba8"}
-_READ = Image("rgba32f", reads=True, writes=False)
-LEVELS = Pass(
-    "levels",
-    images={"picture": _READ, "levels": Image("rgba8")},
-    constants={"size": "ivec2"},
-    local_size=LOCAL_ROW,
-)
-_COEFFICIENTS = {"coefficients": _READ}
-_PLACE = {"size": "ivec2", "top": "int", "block_bits": "int"}
-_LAYERS = dict.fromkeys(("origin", "direction", "layers", "lowest", "lowest_layer"), "int")
-_OF_SUMS = {"sums": Image("rgba16ui", reads=True, writes=False)}
-_UNIT = {"held": "int", "unit": "float"}
-# Constants that only some passes use: Blender's `gpu` has no others.
-_OF_WAY = {"pieces": ("rows",), "value": ("first", "last")} | dict.fromkeys(
-    ("frames", "search"), ("rows", "first", "last")
-)
+LEVELS = read_pass("levels")
 # Rows of pixels that one invocation composes, by the pass; BLOCK for all others.
 _LINES = {"sums": PAIR, "search": 4}
 # Loop iterations of an invocation. Mesa's software renderer ends its loops after 65,535 in all, without an error.
@@ -77,13 +61,6 @@ class Moved:
     unfinished: bool
 
 
-def _stored_as(levels: bool) -> tuple[dict, dict]:
-    """The images and constants of a pass that stores a finished picture: of levels, or scene-linear
-    (shaders/include/finish.glsl)."""
-    return {"picture": Image(PICTURE[levels])}, {} if levels else {"height": "int"}
-
-
-@cache
 def composition(way: str, groups: int, stored: str, edges: int, light: Light) -> Pass:
     """The pass compose_<way> for a way of `way_of` other than "sums".
 
@@ -91,91 +68,58 @@ def composition(way: str, groups: int, stored: str, edges: int, light: Light) ->
     stored: what the window holds: "frames", "sums", or sums in "tiles"
     edges: a number of EDGES
     """
-    summed = stored != "frames"
-    images, constants = _stored_as(light.levels)
-    return Pass(
+    return read_pass(
         f"compose_{way}",
-        samplers={} if summed else {"frames": "sampler2DArray"},
-        images=images | _COEFFICIENTS | {"table": _READ} | (_OF_SUMS if summed else {}),
-        constants=_PLACE
-        | constants
-        | _LAYERS
-        | dict.fromkeys(_OF_WAY[way], "int")
-        | ({"count": "int"} if edges == 2 or not summed else {})
-        | (_UNIT if summed else {}),
-        defines={
-            "MOVED": 0,
-            "PACKED": 0,
-            "GROUPS": groups,
-            "SUMS": int(summed),
-            "TILED": int(stored == "tiles"),
-            "EDGES": edges,
-            "DECODE": light.decode,
-            "PREMULTIPLIED": int(light.premultiplied),
-            "ENCODED": int(light.encoded),
-            "LEVELS": int(light.levels),
-        },
-        local_size=LOCAL_ROW,
+        MOVED=0,
+        PACKED=0,
+        CONTINUED=0,
+        UNFINISHED=0,
+        QUADS=lines_of(way) // 4,
+        GROUPS=groups,
+        SUMS=int(stored != "frames"),
+        TILED=int(stored == "tiles"),
+        EDGES=edges,
+        **_light(light),
     )
 
 
-@cache
 def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, light: Light) -> Pass:
     """The pass compose_sums for `rows` pieces. back: the source plays in reverse; groups: as for `composition`."""
-    images, constants = _stored_as(light.levels)
-    return Pass(
+    return read_pass(
         "compose_sums",
-        images=images | _COEFFICIENTS | _OF_SUMS,
-        constants=_PLACE | constants | _UNIT | {"origin": "int", "layers": "int", "first_layer": "int"},
-        defines={
-            "ROWS": rows,
-            "GROUPS": groups,
-            "BACK": int(back),
-            "TILED": int(tiled),
-            "ENCODED": int(light.encoded),
-            "LEVELS": int(light.levels),
-        },
-        blocks={"table": (1 + rows) * (2 * groups + 1)},
-        local_size=(64, 2, 1),
+        ROWS=rows,
+        GROUPS=groups,
+        TABLE=(1 + rows) * (2 * groups + 1),
+        BACK=int(back),
+        TILED=int(tiled),
+        **_light(light),
     )
 
 
-@cache
 def composition_of_moved(way: str, moved: Moved, light: Light) -> Pass:
     """The pass of a way, "frames", "search" or "value", where shutters follow something."""
-    levels = light.levels and not moved.unfinished
-    images, constants = ({"picture": Image("rgba32f")}, {}) if moved.unfinished else _stored_as(levels)
-    images |= {"table": _READ, "moves": _READ}
-    images |= {"packed_frames": Image("rgba16ui", reads=True, writes=False)} if moved.packed else {}
-    sampled = ("coefficients", *(("summed",) if moved.continued else ()), *(() if moved.packed else ("frames",)))
-    numbers = ("motions", *_OF_WAY[way], *(("seen_first", "seen_last", "parts") if moved.shortened else ()))
-    return Pass(
+    return read_pass(
         f"compose_{way}",
-        samplers=dict.fromkeys(sampled, "sampler2DArray"),
-        images=images,
-        constants=_PLACE | constants | dict.fromkeys(numbers, "int"),
-        defines={
-            "MOVED": 1,
-            "PACKED": int(moved.packed),
-            "SQUARED": int(not light.encoded),
-            "SEVERAL": int(moved.continued or moved.unfinished),
-            "QUADS": moved.quads,
-            "GROUPS": -(-moved.shutters // 4),
-            "SHUTTERS": moved.shutters,
-            "MIXED": moved.mixed,
-            "SUMS": 0,
-            "TILED": 0,
-            "EDGES": EDGES["shorten"] if moved.shortened else 0,
-            "DECODE": light.decode,
-            "PREMULTIPLIED": int(light.premultiplied),
-            "ENCODED": int(light.encoded),
-            "SHARP": int(moved.sharp),
-            "CONTINUED": int(moved.continued),
-            "UNFINISHED": int(moved.unfinished),
-            "LEVELS": int(levels),
-        },
-        local_size=LOCAL_ROW,
+        MOVED=1,
+        PACKED=int(moved.packed),
+        CONTINUED=int(moved.continued),
+        UNFINISHED=int(moved.unfinished),
+        QUADS=moved.quads,
+        GROUPS=-(-moved.shutters // 4),
+        SHUTTERS=moved.shutters,
+        MIXED=moved.mixed,
+        SUMS=0,
+        TILED=0,
+        EDGES=EDGES["shorten"] if moved.shortened else 0,
+        SHARP=int(moved.sharp),
+        SQUARED=int(not light.encoded),
+        SEVERAL=int(moved.continued or moved.unfinished),
+        **_light(light),
     )
+
+
+def _light(light: Light) -> dict[str, int]:
+    return {name.upper(): int(value) for name, value in vars(light).items()}
 
 
 def lines_of(way: str) -> int:

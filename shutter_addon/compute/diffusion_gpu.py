@@ -20,7 +20,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..devices.passes import Image, Pass
+from ..devices.passes import Pass, read_pass
 
 # V-cycles of a solve that starts from nothing. Largest error × 255 after 1, 2, 3, 4 cycles: 3.9, 0.67, 0.66, 0.66 over
 # the scenes of the tests (median 2.1, 0.13, 0.07, 0.07), and 11, 1.6, 0.25, 0.24 over their lattices of dots. The error
@@ -49,53 +49,22 @@ NOTHING = 1 / 4096
 # Cells (y, x) of 2 × 2 in the order of a smoothing sweep.
 _COLOURS = ((0, 0), (1, 1), (0, 1), (1, 0))
 
-READ = Image("rgba32f", reads=True, writes=False)
-STORED = Image("rgba32f")
-CHANGED = Image("rgba32f", reads=True)
-LABELS = {"labels": Image("r32ui", reads=True, writes=False)}
-GRID = {"first": "int", "last": "int", "size": "ivec2"}
-GRIDS = {**GRID, "coarse": "ivec2"}
+
+def operators(ties: str) -> dict[str, Pass]:
+    """The passes that depend on what ties a grid's cells (shaders/multigrid.glsl)."""
+    return {
+        name: read_pass("multigrid", name.upper(), **{ties: 1}) for name in ("weights", "coarsen", "smooth", "restrict")
+    }
 
 
-def tile_pass(
-    name: str,
-    reads: tuple[str, ...],
-    images: dict[str, Image],
-    constants: dict[str, str],
-    sampled: tuple[str, ...] = (),
-) -> Pass:
-    """A pass over a list of tiles. It reads textures as images, as texelFetch is far slower on a software renderer, but
-    for `sampled` and the list: Vulkan guarantees four images."""
-    samplers = dict.fromkeys(("tiles", *sampled), "sampler2DArray")
-    return Pass(name, samplers=samplers, images={**dict.fromkeys(reads, READ), **images}, constants=constants)
-
-
-_START = tile_pass("diffuse_start", (), {**LABELS, "solution": STORED, "own": STORED}, {**GRID, "warm": "int"})
-_CLEAR = tile_pass(
-    "diffuse_clear", ("finer",), dict.fromkeys(("solution", "own", "right"), STORED), {**GRID, "warm": "int"}
-)
-_WEIGHTS_FINEST = tile_pass("diffuse_weights_finest", (), {**LABELS, "weights": STORED}, {**GRID, "hold": "float"})
-_WEIGHTS = tile_pass("diffuse_weights", ("stencil",), {"weights": STORED}, {**GRID, "hold": "float"})
-_COARSEN_FINEST = tile_pass("diffuse_coarsen_finest", ("weights",), {"next": STORED}, GRIDS)
-_COARSEN = tile_pass("diffuse_coarsen", ("stencil", "weights"), {"next": STORED}, GRIDS)
-_SMOOTH_FINEST = tile_pass("diffuse_smooth_finest", (), {**LABELS, "solution": CHANGED}, {**GRID, "colour": "int"})
-_SMOOTH = tile_pass("diffuse_smooth", ("stencil", "right"), {"solution": CHANGED}, {**GRID, "colour": "ivec2"})
-_PROLONG = tile_pass("diffuse_prolong", ("from", "coarser", "weights"), {"to": STORED}, {**GRIDS, "amount": "float"})
-_RESTRICT_FINEST = tile_pass("diffuse_restrict_finest", ("own", "weights"), {"next": STORED}, GRIDS)
-_RESTRICT = tile_pass("diffuse_restrict", ("stencil", "own", "weights"), {"next": STORED}, GRIDS, ("right",))
-_COARSER = {"weights": _WEIGHTS, "coarsen": _COARSEN, "restrict": _RESTRICT}
-_SOLVE = Pass(
-    "diffuse_solve",
-    images={"stencil": READ, "right": READ, "solution": STORED},
-    constants={"size": "ivec2"},
-    defines={"SOLVED": SOLVED},
-    local_size=(1, 1, 1),
-)
-FINISH = tile_pass("diffuse_finish", (), {"solution": CHANGED}, {**GRID, "layers": "int", "nothing": "float"})
-_EXPAND = tile_pass("diffuse_expand", ("coarser",), {"solution": STORED}, GRIDS)
-_EXPAND_RIM = tile_pass(
-    "diffuse_expand_rim", ("coarser",), {"solution": STORED}, {**GRIDS, "layers": "int", "beyond": "vec2"}
-)
+_START = read_pass("diffusion", "START")
+_CLEAR = read_pass("diffusion", "CLEAR")
+_COARSER = operators("STENCIL")
+_PROLONG = read_pass("diffusion", "PROLONG", IN_PLACE=0)
+_SOLVE = read_pass("coarsest", SOLVED=SOLVED)
+FINISH = read_pass("diffusion", "FINISH")
+_EXPAND = read_pass("diffusion", "EXPAND")
+_EXPAND_RIM = read_pass("diffusion", "EXPAND_RIM")
 
 
 class _Grid:
@@ -143,13 +112,7 @@ class _Grid:
 class Diffusion:
     """compute.diffusion.diffuse on a device. Its textures are kept until the size or the number of shutters changes."""
 
-    # The passes over the pixels, by what those over coarser grids are called.
-    finest = {
-        "weights": _WEIGHTS_FINEST,
-        "coarsen": _COARSEN_FINEST,
-        "smooth": _SMOOTH_FINEST,
-        "restrict": _RESTRICT_FINEST,
-    }
+    finest = operators("LABELS")  # those over the pixels
 
     def __init__(self, device):
         self._device = device
@@ -301,15 +264,12 @@ class Diffusion:
         """Gauss-Seidel sweeps: red-black at full size, where cells have four neighbours, and else in four colours.
 
         back: in the opposite order"""
-        way = -1 if back else 1
-        for _ in range(sweeps):
-            if grid.finest:
-                for colour in (0, 1)[::way]:
-                    self._run(self._pass(grid, "smooth"), grid, "near", 32, grid.layers, colour=colour)
-            else:
-                for y, x in _COLOURS[::way]:
-                    if x < grid.size[0] and y < grid.size[1]:
-                        self._run(_SMOOTH, grid, "near", 16, grid.layers, colour=(x, y))
+        cells, colours = 32, [0, 1]
+        if not grid.finest:
+            cells, colours = 16, [(x, y) for y, x in _COLOURS if x < grid.size[0] and y < grid.size[1]]
+        values = grid.textures["solution"]
+        for colour in (colours[::-1] if back else colours) * sweeps:
+            self._run(self._pass(grid, "smooth"), grid, "near", cells, grid.layers, values=values, colour=colour)
 
     def _pass(self, grid: _Grid, name: str) -> Pass:
         return self.finest[name] if grid.finest else _COARSER[name]
@@ -344,7 +304,7 @@ class Diffusion:
         own = {"size": grid.size, "layers": grid.layers, "first": first, "last": last, "tiles": self._tiles}
         given = {**own, **grid.textures, **extra}
         # These passes have four invocations for each tile, and take two tiles to a row of eight.
-        rows = -(-(last - first) // 2) if program in (_WEIGHTS, self.finest["weights"]) else last - first
+        rows = -(-(last - first) // 2) if program.step == "WEIGHTS" else last - first
         self._device.run(
             program,
             (cells, rows, layers),

@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from ..core.pixels.conductances import cell_side, resistances
-from ..devices.passes import LOCAL_ROW, Image, Pass
-from .diffusion_gpu import CHANGED, FINISH, GRID, GRIDS, LABELS, NOTHING, READ, STORED, Diffusion, tile_pass
+from ..devices.passes import read_pass
+from .diffusion_gpu import FINISH, NOTHING, Diffusion, operators
 from .edge_diffusion import CYCLES, SWEEPS, TWICE, first_solved, is_enough
 
 # Where the guide's cells are larger than pixels: the iterations of conjugate gradients in each cycle, first of cycles
@@ -21,43 +21,22 @@ NEAR_SWEEPS = 2  # over the pixels near scribbles
 # Parts that a sum over all cells is made of.
 PARTS = 1024
 
-_RESISTANCES = {"resistances": Image("r32f", reads=True, writes=False)}
-_PLACED = {**GRID, "guided": "ivec2", "side": "int"}
-_LINKS = tile_pass("edges_links", (), {**LABELS, **_RESISTANCES, "links": STORED}, _PLACED)
-_WEIGHTS = tile_pass("edges_weights", ("links",), {"weights": STORED}, {**GRID, "hold": "float"})
-_COARSEN = tile_pass("edges_coarsen", ("links", "weights"), {"next": STORED}, GRIDS)
-_SMOOTH = tile_pass("edges_smooth", ("links",), {"solution": CHANGED}, {**GRID, "colour": "int"})
-_RESTRICT = tile_pass("edges_restrict", ("links", "own", "weights"), {"next": STORED}, GRIDS)
-_ADD = tile_pass("edges_add", ("coarser", "weights"), {"solution": CHANGED}, GRIDS)
-_ZERO = Pass("edges_zero", images={"values": STORED}, constants={"size": "ivec2"})
-_MISSING = tile_pass("edges_missing", ("stencil", "right", "values"), {"result": STORED}, {**GRID, "amount": "float"})
-_TURN = tile_pass("edges_turn", ("values", "sums"), {"result": CHANGED}, {**GRID, "fresh": "int"})
-_STEP = tile_pass("edges_step", ("values", "right"), {"solution": CHANGED, "result": CHANGED}, GRID, ("sums",))
-_DOT = Pass(
-    "edges_dot",
-    images={"values": READ, "right": READ, "result": STORED},
-    constants={"size": "ivec2", "parts": "int"},
-    local_size=LOCAL_ROW,
-)
-_CHANGE = Pass(
-    "edges_change",
-    images={"solution": READ, "own": CHANGED, "result": STORED},
-    constants={"size": "ivec2", "parts": "int"},
-    local_size=LOCAL_ROW,
-)
-_SUM = Pass(
-    "edges_sum",
-    images={"result": READ, "sums": CHANGED},
-    constants={"parts": "int", "place": "int"},
-    local_size=(1, 1, 1),
-)
+_LINKS = read_pass("edge_diffusion", "LINKS")
+_ADD = read_pass("diffusion", "PROLONG", IN_PLACE=1)
+_MISSING = read_pass("multigrid", "MISSING", STENCIL=1)
+_ZERO = read_pass("edge_diffusion", "ZERO")
+_TURN = read_pass("edge_diffusion", "TURN")
+_STEP = read_pass("edge_diffusion", "STEP")
+_DOT = read_pass("edge_diffusion", "DOT")
+_CHANGE = read_pass("edge_diffusion", "CHANGE")
+_SUM = read_pass("edge_diffusion", "SUM")
 
 
 class EdgeDiffusion(Diffusion):
     """compute.edge_diffusion.diffuse_along_edges on a device; grids and passes are those of Diffusion, but for the
     pixels' own, and conjugate gradients on one of them."""
 
-    finest = {"weights": _WEIGHTS, "coarsen": _COARSEN, "smooth": _SMOOTH, "restrict": _RESTRICT}
+    finest = operators("LINKS")
 
     def __init__(self, device):
         super().__init__(device)
@@ -180,7 +159,7 @@ class EdgeDiffusion(Diffusion):
             for _ in range(2 if twice > 0 else 1):
                 self._visit(index + 1, iterations, twice - 1)
         below = {"coarse": coarser[0].size, "coarser": coarser[0].textures["solution"]}
-        self._run(_ADD, grid, "near", 16, grid.layers, **below)
+        self._run(_ADD, grid, "near", 16, grid.layers, **below, to=grid.textures["solution"], amount=1.0)
         self._smooth(grid, self._sweeps, back=True)
 
     def _clear(self, grid, values) -> None:
@@ -190,7 +169,8 @@ class EdgeDiffusion(Diffusion):
         """By how much the coefficients have changed at most, since the last call or the start."""
         grid = self._grids[0]
         parts = min(PARTS, grid.size[0] * grid.size[1])
-        images = {"solution": grid.textures["solution"], "own": grid.textures["own"], "result": self._more["parts"]}
+        own = {"values": grid.textures["solution"], "noted": grid.textures["own"]}
+        images = {**own, "result": self._more["parts"]}
         self._device.run(_CHANGE, (parts, 1, grid.layers), images=images, size=grid.size, parts=parts)
         return self._device.read(self._more["parts"])[:, :, :parts].max()
 

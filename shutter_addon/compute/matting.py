@@ -3,35 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from functools import cache
 
 import numpy as np
 
 from ..core.model.mattes import Matte
 from ..devices.device import Device, Texture
-from ..devices.passes import LOCAL_ROW, Image, Pass
+from ..devices.passes import Pass, read_pass
 
 # Mattes that one pass lays, whose values are on the device at once.
 MOST = 8
 
-_READ = {"reads": True, "writes": False}
 
-
-@cache
 def blend_pass(count: int, adds: bool) -> Pass:
     """Lays so many mattes; adds: any by the blend "add"."""
-    return Pass(
-        name="matte_blend",
-        images={
-            "under": Image("rgba32f", **_READ),
-            "values": Image("r32f", **_READ),
-            "over": Image("rgba32f", reads=True),
-        },
-        constants={"size": "ivec2", "beneath": "ivec2"},
-        defines={"COUNT": count, "ADDS": int(adds)},
-        blocks={"table": MOST},
-        local_size=LOCAL_ROW,
-    )
+    return read_pass("matte_blend", COUNT=count, ADDS=int(adds), MOST=MOST)
 
 
 class Matting:

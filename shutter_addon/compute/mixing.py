@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 from ..devices.device import Device, Texture
-from ..devices.passes import LOCAL_ROW, Image, Pass
+from ..devices.passes import Pass, read_pass
 
 
-@cache
 def mix_pass(begins: bool) -> Pass:
     """Adds a share to a sum, or begins one."""
-    return Pass(
-        name="mix",
-        images={"added": Image("rgba32f", reads=True, writes=False), "mixed": Image("rgba32f", reads=not begins)},
-        constants={"size": "ivec2", "given": "ivec2", "share": "float"},
-        defines={"BEGINS": int(begins)},
-        local_size=LOCAL_ROW,
-    )
+    return read_pass("mix", BEGINS=int(begins))
 
 
 class Mixing:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from ..core.model.frame_state import Light, Options
 from ..core.pixels import compositor
 from ..devices.budget import is_software
 from ..devices.device import Device, NoDeviceError, Texture
-from ..devices.passes import Image, Pass
+from ..devices.passes import Pass, read_pass
 from .running_sums import RunningSums, summable
 
 # Bytes of a texture array, at most. Mesa's software renderer reads wrong values, without an error, from one over 2 GiB.
@@ -318,17 +317,9 @@ class PackedFrames(WholeFrames):
             self._sent.release()
 
 
-@cache
 def packing(decode: int, squared: bool) -> Pass:
     """The pass that packs a frame; decode: of `decoding`; squared: what is summed is linear light."""
-    return Pass(
-        name="pack",
-        samplers={"frame": "sampler2DArray"},
-        images={"packed_frames": Image("rgba16ui")},
-        constants={"size": "ivec2", "layer": "int"},
-        defines={"DECODE": decode, "SQUARED": int(squared)},
-        local_size=(64, 1, 1),
-    )
+    return read_pass("pack", DECODE=decode, SQUARED=int(squared))
 
 
 def decoding(stored: str, light: str) -> int:
@@ -350,21 +341,6 @@ def _in_tiles(width: int, height: int, layers: int) -> tuple[int, int, int]:
     return across * down * layers, -(-width // across), -(-height // down)
 
 
-# What the pass that adds a frame binds of it, by how it was sent, and its constants; what was sent before is taken from
-# the sums themselves. Images hold samples of planes: a software renderer's texelFetch takes longer.
-_COLOURS = {"frame": "sampler2DArray"}
-_PLANES = {name: Image("r32ui", reads=True, writes=False) for name in ("luma", "chroma")}
-_OF_FRAME = {"top": "int", "whole": "float"}
-_OF_MATRIX = {"luma_of": "ivec2", "red_of": "int", "green_of": "ivec2", "blue_of": "int"}
-_OF_SENT = {
-    "colours": _OF_FRAME,
-    "numbers": _OF_FRAME,
-    "planes": _OF_FRAME | _OF_MATRIX | {"chroma_step": "ivec2"},
-    "before": {"before": "int", "after": "int"},
-}
-
-
-@cache
 def accumulation(decode: int, sent: str, back: bool, tiled: bool) -> Pass:
     """The pass that makes a layer of sums from its neighbour: with the frame between the two added, or subtracted.
 
@@ -374,20 +350,14 @@ def accumulation(decode: int, sent: str, back: bool, tiled: bool) -> Pass:
     back: it is subtracted
     tiled: the sums are stored in tiles
     """
-    return Pass(
-        name="accumulate",
-        samplers=_COLOURS if sent in ("colours", "numbers") else {},
-        images={"sums": Image("rgba16ui", reads=True)} | (_PLANES if sent == "planes" else {}),
-        constants={"size": "ivec2", "known": "int", "next": "int"} | _OF_SENT[sent],
-        defines={
-            "DECODE": decode,
-            "AGAIN": int(sent == "before"),
-            "BACK": int(back),
-            "TILED": int(tiled),
-            "NUMBERS": int(sent == "numbers"),
-            "PLANES": int(sent == "planes"),
-        },
-        local_size=(TILE[0], TILE[1], 1),
+    return read_pass(
+        "accumulate",
+        DECODE=decode,
+        AGAIN=int(sent == "before"),
+        BACK=int(back),
+        TILED=int(tiled),
+        NUMBERS=int(sent == "numbers"),
+        PLANES=int(sent == "planes"),
     )
 
 

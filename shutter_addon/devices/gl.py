@@ -16,7 +16,7 @@ from ..core import stopping
 from .budget import Budget, is_software, machine_memory
 from .device import NoDeviceError
 from .paging import PagedDevice
-from .passes import Pass, source
+from .passes import Pass
 
 _EGL = sys.platform == "linux"
 
@@ -163,7 +163,7 @@ class GLDevice(PagedDevice):
         textures, images, blocks = textures or {}, images or {}, blocks or {}
         stopping.check()
         if program not in self._programs:
-            shader = self._context.compute_shader(source(program))
+            shader = self._context.compute_shader(program.source)
             self._programs[program] = shader, {name: shader[name] for name in shader}
         shader, used = self._programs[program]
         self.bring([*(textures[name] for name in program.samplers), *(images[name] for name in program.images)])

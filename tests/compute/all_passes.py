@@ -3,6 +3,8 @@
 import importlib.util
 import itertools
 
+import pytest
+
 from shutter_addon.compute import composition_passes, diffusion_gpu, edge_diffusion_gpu, matting, mixing, window
 from shutter_addon.compute.composition_passes import (
     Light,
@@ -19,6 +21,8 @@ _WAYS = ("frames", "search", "value")
 def _declared():
     for module in (diffusion_gpu, edge_diffusion_gpu, composition_passes):
         yield from (value for value in vars(module).values() if isinstance(value, Pass))
+    for ties in ("LABELS", "LINKS", "STENCIL"):
+        yield from diffusion_gpu.operators(ties).values()
 
 
 def _composing():
@@ -65,3 +69,4 @@ def _unpacking():
 
 
 PASSES = list(dict.fromkeys((*_declared(), *_composing(), *_filling(), *_unpacking())))
+each_pass = pytest.mark.parametrize("program", PASSES, ids=lambda program: f"{program.file}-{program.step}".strip("-"))

@@ -4,9 +4,9 @@ import math
 import re
 
 import pytest
-from all_passes import PASSES
+from all_passes import each_pass
 
-from shutter_addon.devices.passes import SHADERS, body
+from shutter_addon.devices.passes import read_pass
 
 # Images, samplers and uniform blocks of a pass; bytes of a block, and of all constants; invocations of a workgroup
 # along each axis, and in all.
@@ -60,12 +60,10 @@ WORDS_OF_METAL = set(
 )
 NAMED = re.compile(r"\b(?:void|bool|u?int|float|[biu]?vec[234]|mat[234]|Column)\s+(\w+)")
 
-each_pass = pytest.mark.parametrize("program", PASSES, ids=lambda program: program.name)
 
-
-def code(name: str) -> str:
-    """The source of a shader without its comments."""
-    return re.sub(r"//.*", "", body(name))
+def code(program) -> str:
+    """The source of a pass without its comments."""
+    return re.sub(r"//.*", "", program.body)
 
 
 @pytest.mark.parametrize("api", LIMITS)
@@ -94,13 +92,13 @@ def test_images_have_a_format_that_every_vulkan_has(program):
 
 @each_pass
 def test_a_source_has_nothing_that_some_device_lacks(program):
-    assert not MISSING.findall(code(program.name))
+    assert not MISSING.findall(code(program))
 
 
 @each_pass
 def test_no_name_is_a_word_of_metal(program):
     named = {
-        *NAMED.findall(code(program.name)),
+        *NAMED.findall(code(program)),
         *program.constants,
         *program.samplers,
         *program.images,
@@ -110,15 +108,16 @@ def test_no_name_is_a_word_of_metal(program):
     assert not named & WORDS_OF_METAL
 
 
-@pytest.mark.parametrize("name", sorted(path.stem for path in SHADERS.glob("show_*.glsl")))
-def test_what_draws_in_previews_has_no_name_that_is_a_word_of_metal(name):
-    assert not set(NAMED.findall(code(name))) & WORDS_OF_METAL
-    assert not MISSING.findall(code(name))
+@pytest.mark.parametrize("step", ["QUAD", "PICTURE", "COEFFICIENTS", "SCRIBBLES"])
+def test_what_draws_in_previews_has_no_name_that_is_a_word_of_metal(step):
+    program = read_pass("show", step)
+    assert not {*NAMED.findall(code(program)), *program.constants, *program.samplers} & WORDS_OF_METAL
+    assert not MISSING.findall(code(program))
 
 
 @each_pass
 def test_a_source_is_as_cpp_takes_it(program):
     """Blender makes C++ of it by macros: there, arrays are no values, and a struct without a constructor has none."""
-    text = code(program.name)
+    text = code(program)
     assert not re.findall(r"[(,]\s*(?:in\s+)?(?!out|inout)\w+\s+\w+\[", text)
     assert not [name for name in re.findall(r"\bstruct\s+(\w+)", text) if re.search(rf"\b{name}\(", text)]

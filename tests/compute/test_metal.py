@@ -2,10 +2,7 @@
 
 import re
 
-import pytest
-from all_passes import PASSES
-
-from shutter_addon.devices.passes import body
+from all_passes import each_pass
 
 
 def completed(program) -> str:
@@ -23,10 +20,10 @@ def completed(program) -> str:
     constants = " ".join(f"{kind} {name};" for name, kind in program.constants.items())
     lines.append(f"layout(push_constant, std430) uniform constants {{ {constants} }} PushConstants;")
     lines += [f"#define {name} (PushConstants.{name})" for name in program.constants]
-    return "\n".join([*lines, "#line 1", body(program.name)])
+    return "\n".join([*lines, "#line 1", program.body])
 
 
-@pytest.mark.parametrize("program", PASSES, ids=lambda program: program.name)
+@each_pass
 def test_a_pass_translates(program, to_metal):
     text = to_metal(completed(program), "comp")
     assert "kernel void" in text

@@ -2,31 +2,51 @@
 
 import re
 
-import pytest
-from all_passes import PASSES
+from all_passes import PASSES, each_pass
 
-from shutter_addon.devices.passes import SHADERS, body
+from shutter_addon.devices.passes import SHADERS
 
 # Of what is declared inside the sources, whatever it is: variables, parameters, functions.
 DECLARED = re.compile(r"\b(?:bool|u?int|float|[biu]?vec[234])\s+(\w+)")
 BYTES = {"int": 4, "float": 4, "ivec2": 8, "vec2": 8}
 
 
-@pytest.mark.parametrize("program", PASSES, ids=lambda program: program.name)
+@each_pass
 def test_constants_and_textures_share_no_name_with_a_variable(program):
     """On Vulkan they are macros."""
-    declared = set(DECLARED.findall(body(program.name)))
+    declared = set(DECLARED.findall(program.body))
     assert declared
     assert not declared & {*program.constants, *program.samplers, *program.images, *program.blocks}
 
 
-@pytest.mark.parametrize("program", PASSES, ids=lambda program: program.name)
+@each_pass
 def test_constants_fit(program):
     """128 bytes are what every Vulkan driver has."""
     assert sum(BYTES[kind] for kind in program.constants.values()) <= 128
 
 
-def test_every_source_has_its_pass():
-    names = {program.name for program in PASSES} | {"unpack"}
-    passes = {path.stem for path in SHADERS.glob("*.glsl") if not path.stem.startswith("show_")}  # those draw
-    assert names == passes
+@each_pass
+def test_all_that_is_declared_is_read(program):
+    """Blender declares it itself, and refuses constants that a source does not use."""
+    assert not re.findall(r"(?m)^(?:layout|uniform|in |out ).*|^#(?!\s*define ).*", program.body)
+    for name in (*program.constants, *program.samplers, *program.images, *program.blocks):
+        assert re.search(rf"\b{name}\b", re.sub("//.*", "", program.body)), name
+
+
+def test_every_step_of_every_source_has_its_pass():
+    for path in SHADERS.glob("*.glsl"):
+        named = set(re.findall(r"(?:#ifn?def |defined\()(\w+)", path.read_text(encoding="utf-8")))
+        passes = [program for program in PASSES if program.file == path.stem]
+        assert passes or path.stem in ("blender_gpu", "show")
+        assert not passes or named <= {name for program in passes for name in (program.step, *program.defines)}
+
+
+@each_pass
+def test_lines_are_numbered_as_in_the_files(program):
+    """What compilers say of a line can be looked up."""
+    files = [path.read_text(encoding="utf-8").splitlines() for path in SHADERS.rglob("*.glsl")]
+    _, *parts = re.split(r"(?m)^#line (\d+)$\n?", program.source)
+    for first, text in zip(parts[::2], parts[1::2], strict=True):
+        for number, line in enumerate(text.splitlines(), int(first)):
+            if line and "binding = " not in line:
+                assert any(line in file[number - 1 : number] for file in files), (number, line)

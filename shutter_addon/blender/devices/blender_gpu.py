@@ -24,11 +24,11 @@ from ...core import stopping
 from ...devices.budget import Budget, is_software, machine_memory
 from ...devices.device import NoDeviceError
 from ...devices.paging import TEXEL_BYTES, PagedDevice
-from ...devices.passes import LOCAL_ROW, Image, Pass, body
+from ...devices.passes import Pass, read_pass
 
-_TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
+TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
 _AS_IT_IS, _WHOLE, _OPAQUE_BYTES, _PAIRS_OF_BYTES, _SIXTEEN_BITS = range(5)
-# Format (as in GLSL): NumPy's type of what is written and read, the format sent, how shaders/unpack.glsl unpacks it.
+# Format (as in GLSL): NumPy's type of what is written and read, the format sent, how it is unpacked (UNPACK).
 FORMATS = {
     "rgba8": (np.uint8, "RG32F", _PAIRS_OF_BYTES),
     "rgba16": (np.uint16, "RGBA32F", _SIXTEEN_BITS),
@@ -43,13 +43,7 @@ _SENT_BYTES = 16 << 20
 
 
 # Samplers and images, as many as any pass has; with OpenGL alone.
-LETTING_GO = Pass(
-    "let_go",
-    samplers={f"sampled_{i}": "sampler2DArray" for i in range(4)},
-    images={f"stored_{i}": Image("rgba32f") for i in range(4)},
-    constants={"layer": "int"},
-    local_size=(1, 1, 1),
-)
+LETTING_GO = read_pass("blender_gpu", "LET_GO")
 
 
 _unused: list = []  # objects of the gpu module that are to be freed
@@ -255,16 +249,8 @@ def _trial() -> list[str]:
     return [bpy.app.binary_path, *options, "--python-expr", "import gpu; gpu.init()"]
 
 
-@cache
 def unpacking(kind: str, packing: int) -> Pass:
-    return Pass(
-        "unpack",
-        {"sent": "sampler2DArray"},
-        {"stored": Image(kind)},
-        {"size": "ivec2", "top": "int", "layer": "int"},
-        {"PACKING": packing},
-        local_size=LOCAL_ROW,
-    )
+    return read_pass("blender_gpu", "UNPACK", PACKING=packing, FORMAT=kind)
 
 
 def _exchanged(texture: Texture) -> tuple:
@@ -302,7 +288,7 @@ def _compiled(program: Pass) -> gpu.types.GPUShader:
     for name, value in program.defines.items():
         info.define(name, str(value))
     for slot, (name, kind) in enumerate(program.samplers.items()):
-        info.sampler(slot, _TYPES[kind], name)
+        info.sampler(slot, TYPES[kind], name)
     for slot, (name, image) in enumerate(program.images.items()):
         kind = "UINT_2D_ARRAY" if image.format.endswith("ui") else "FLOAT_2D_ARRAY"
         qualifiers = {way for way, used in (("READ", image.reads), ("WRITE", image.writes)) if used}
@@ -312,5 +298,5 @@ def _compiled(program: Pass) -> gpu.types.GPUShader:
     for name, kind in program.constants.items():
         info.push_constant(kind.upper(), name)
     info.local_group_size(*program.local_size)
-    info.compute_source(body(program.name))
+    info.compute_source(program.body)
     return gpu.shader.create_from_info(info)

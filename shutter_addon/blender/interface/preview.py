@@ -187,7 +187,7 @@ def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> No
         _tell_missing(renderer, request, say)
     if wanted.draws_result:
         texture = renderer.draw(replace(request, quick=True, levels=True))
-        quad.draw("show_picture", {"picture": texture}, wanted.left, 1.0, opacity=shown.strip.blend_alpha)
+        quad.draw("PICTURE", {"picture": texture}, wanted.left, 1.0, opacity=shown.strip.blend_alpha)
     if settings.view == "SCRIBBLES":
         _show_scribbles(quad, shown.effect, renderer, request)
     elif settings.view == "COEFFICIENTS":
@@ -305,13 +305,13 @@ def _show_source(quad, shown: Shown, renderer, request, right: float) -> None:
     moving = following and following.of([following.moving()[0]])
     plain = replace(request, state=FrameState(options, still, following=moving), levels=True)
     texture = renderer.draw(plain)
-    quad.draw("show_picture", {"picture": texture}, 0.0, right, opacity=shown.strip.blend_alpha)
+    quad.draw("PICTURE", {"picture": texture}, 0.0, right, opacity=shown.strip.blend_alpha)
 
 
 def _show_scribbles(quad, effect, renderer, request) -> None:
     labels, block = renderer.drawn_labels(request)
     quad.draw(
-        "show_scribbles",
+        "SCRIBBLES",
         {"labels": labels, "palette": _palette(effect)},
         opacity=0.7,
         block=block,
@@ -323,7 +323,7 @@ def _show_coefficients(quad, effect, renderer, request) -> None:
     coefficients, block = renderer.drawn_coefficients(replace(request, quick=True))
     count = len(request.state.bars)
     textures = {"coefficients": coefficients, "palette": _palette(effect)}
-    quad.draw("show_coefficients", textures, opacity=0.75, block=block, count=count, size=_size(renderer))
+    quad.draw("COEFFICIENTS", textures, opacity=0.75, block=block, count=count, size=_size(renderer))
 
 
 def _size(renderer) -> tuple[int, int]:

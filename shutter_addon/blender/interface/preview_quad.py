@@ -1,11 +1,11 @@
-"""Where a strip's picture lies in a preview, and what draws there: shaders/show_*.glsl."""
+"""Where a strip's picture lies in a preview, and what draws there: shaders/show.glsl."""
 
 import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from ...core.model.scribbles import mapped
-from ...devices.passes import body
+from ...devices.passes import read_pass
 from ..data import geometry
 from ..devices import blender_gpu
 
@@ -24,7 +24,7 @@ class Quad:
         return mapped(self._matrix, np.asarray(points, dtype=np.float64))
 
     def draw(self, name: str, textures: dict, left: float = 0.0, right: float = 1.0, **constants) -> None:
-        """Draws from `left` to `right`, in fractions of the picture's width, through a shader of shaders/."""
+        """Draws from `left` to `right`, in fractions of the picture's width, by a step of shaders/show.glsl."""
         low, high = np.maximum(self._low, (left, 0)), np.minimum(self._high, (right, 1))
         if (low >= high).any():
             return
@@ -41,36 +41,27 @@ class Quad:
         gpu.state.blend_set("NONE")
 
 
-SAMPLERS = {
-    "show_picture": {"picture": "FLOAT_2D_ARRAY"},
-    "show_coefficients": {"coefficients": "FLOAT_2D_ARRAY", "palette": "FLOAT_2D_ARRAY"},
-    "show_scribbles": {"labels": "UINT_2D_ARRAY", "palette": "FLOAT_2D_ARRAY"},
-}
-CONSTANTS = {
-    "show_picture": {"opacity": "FLOAT"},
-    "show_coefficients": {"opacity": "FLOAT", "size": "IVEC2", "block": "INT", "count": "INT"},
-    "show_scribbles": {"opacity": "FLOAT", "size": "IVEC2", "block": "INT"},
-}
 _shaders: dict = {}
 
 
 def _shader(name: str):
     if name not in _shaders:
+        quad, shown = read_pass("show", "QUAD"), read_pass("show", name)
         between = gpu.types.GPUStageInterfaceInfo("show_interface")
-        between.smooth("VEC2", "at")
         info = gpu.types.GPUShaderCreateInfo()
-        info.push_constant("MAT4", "ModelViewProjectionMatrix")
-        info.push_constant("BOOL", "srgbTarget")  # set by Blender: what is drawn into encodes by itself
-        for constant, kind in CONSTANTS[name].items():
-            info.push_constant(kind, constant)
-        for slot, (sampler, kind) in enumerate(SAMPLERS[name].items()):
-            info.sampler(slot, kind, sampler)
-        info.vertex_in(0, "VEC2", "corner")
-        info.vertex_in(1, "VEC2", "place")
+        for constant, kind in (quad.constants | shown.constants).items():
+            info.push_constant(kind.upper(), constant)
+        for slot, (sampler, kind) in enumerate(shown.samplers.items()):
+            info.sampler(slot, blender_gpu.TYPES[kind], sampler)
+        for slot, (given, kind) in enumerate(quad.ins.items()):
+            info.vertex_in(slot, kind.upper(), given)
+        for given, kind in quad.outs.items():
+            between.smooth(kind.upper(), given)
         info.vertex_out(between)
-        info.fragment_out(0, "VEC4", "shown")
-        info.vertex_source(body("show_quad"))
-        info.fragment_source(body(name))
+        for slot, (given, kind) in enumerate(shown.outs.items()):
+            info.fragment_out(slot, kind.upper(), given)
+        info.vertex_source(quad.body)
+        info.fragment_source(shown.body)
         _shaders[name] = gpu.shader.create_from_info(info)
     return _shaders[name]
 

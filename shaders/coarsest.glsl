@@ -2,7 +2,10 @@
 // Blender's Python have no memory that a workgroup shares.
 // Cells are numbered along the shorter side, so that none is tied to one more than BAND − 1 before it. The matrix is
 // symmetric, its lower half is all of it: rows[BAND · i + d] ties cell i to cell i − d; d = 0 turns into 1 / pivot.
-#include "inside.glsl"
+layout(local_size_x = 1) in;
+layout(rgba32f) uniform readonly image2DArray stencil, right;  // as in multigrid.glsl
+layout(rgba32f) uniform writeonly image2DArray solution;
+uniform ivec2 size;
 #define CELLS (SOLVED * SOLVED)
 #define BAND (SOLVED + 2)
 
@@ -17,7 +20,7 @@ ivec2 cell(int i)
 void tie(int i, ivec2 p, float value)
 {
   int number = size.x > size.y ? p.x * size.y + p.y : p.y * size.x + p.x;
-  if (number < i && inside(p, size)) {
+  if (number < i && all(greaterThanEqual(p, ivec2(0))) && all(lessThan(p, size))) {
     rows[BAND * i + i - number] = value;
   }
 }
