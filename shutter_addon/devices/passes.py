@@ -9,8 +9,8 @@ NAME == number or defined(STEP), or several of these joined by && and ||.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
@@ -35,7 +35,7 @@ class Image:
     writes: bool
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Pass:
     """A compute pass, or a stage of what draws; `read_pass` gives it.
 
@@ -54,15 +54,15 @@ class Pass:
     file: str
     step: str
     defines: dict[str, int | str]
-    source: str
-    body: str
-    samplers: dict[str, str]
-    images: dict[str, Image]
-    constants: dict[str, str]
-    blocks: dict[str, int]
-    ins: dict[str, str]
-    outs: dict[str, str]
-    local_size: tuple[int, int, int]
+    source: str = ""
+    body: str = ""
+    samplers: dict[str, str] = field(default_factory=dict)
+    images: dict[str, Image] = field(default_factory=dict)
+    constants: dict[str, str] = field(default_factory=dict)
+    blocks: dict[str, int] = field(default_factory=dict)
+    ins: dict[str, str] = field(default_factory=dict)
+    outs: dict[str, str] = field(default_factory=dict)
+    local_size: tuple[int, int, int] = (1, 1, 1)
 
     def groups(self, extent: tuple[int, ...]) -> tuple[int, ...]:
         """The workgroups that cover `extent` invocations (x, y[, z])."""
@@ -72,50 +72,54 @@ class Pass:
 @cache
 def read_pass(file: str, step: str = "", **defines: int | str) -> Pass:
     """The pass of a step of shaders/FILE.glsl, compiled with these macros; the same one for the same arguments."""
-    samplers, images, constants, blocks, local_size = {}, {}, {}, {}, (1, 1, 1)
-    between = {"in": {}, "out": {}}
+    program = Pass(file, step, defines)
     source = ["#version 430", *(f"#define {name} {value}" for name, value in defines.items())]
     body = []
     for line in _live(SHADERS / f"{file}.glsl", {step: 1, **defines}):
-        declared, bound = line.partition("  //")[0], [line]
-        if found := _LOCAL_SIZE.fullmatch(declared):
-            local_size = tuple(int(size or 1) for size in found.groups())
-        elif found := _SAMPLERS.fullmatch(declared):
-            kind, names = found[1], found[2].split(", ")
-            bound = [
-                f"layout(binding = {unit}) uniform {kind} {name};" for unit, name in enumerate(names, len(samplers))
-            ]
-            samplers |= dict.fromkeys(names, kind)
-        elif found := _IMAGES.fullmatch(declared):
-            form, declares, access, names = *found.groups()[:3], found[4].split(", ")
-            bound = [
-                f"layout(binding = {unit}, {form}) {declares} {name};" for unit, name in enumerate(names, len(images))
-            ]
-            image = Image(defines.get(form, form), reads=access != "writeonly", writes=access != "readonly")
-            images |= dict.fromkeys(names, image)
-        elif found := _BLOCK.fullmatch(declared):
-            bound = [line.replace("(", f"(binding = {len(blocks)}, ", 1)]
-            blocks[found[1]] = int(defines.get(found[2], found[2]))
-        elif found := _CONSTANTS.fullmatch(declared):
-            constants |= dict.fromkeys(found[2].split(", "), found[1])
-        elif found := _BETWEEN.fullmatch(declared):
-            between[found[1]][found[3]] = found[2]
-        elif not line.startswith("#line"):
+        declared = _declared(program, line.partition("  //")[0])
+        source.append(declared or line)
+        if not declared and not line.startswith("#line"):
             body.append(line)
-        source.append(" ".join(bound))
-    texts = "\n".join(source), "\n".join(body)
-    bindings = samplers, images, constants, blocks, between["in"], between["out"]
-    return Pass(file, step, defines, *texts, *bindings, local_size)
+    program.source, program.body = "\n".join(source), "\n".join(body)
+    return program
+
+
+def _declared(program: Pass, line: str) -> str:
+    """Notes what a line declares. The line with its bindings; empty: it declares nothing."""
+    defines, samplers, images = program.defines, len(program.samplers), len(program.images)
+    if found := _LOCAL_SIZE.fullmatch(line):
+        x, y, z = (int(size or 1) for size in found.groups())
+        program.local_size = x, y, z
+    elif found := _SAMPLERS.fullmatch(line):
+        kind, names = found[1], found[2].split(", ")
+        program.samplers |= dict.fromkeys(names, kind)
+        return " ".join(f"layout(binding = {k}) uniform {kind} {name};" for k, name in enumerate(names, samplers))
+    elif found := _IMAGES.fullmatch(line):
+        form, kind, access, names = found[1], found[2], found[3], found[4].split(", ")
+        image = Image(str(defines.get(form, form)), reads=access != "writeonly", writes=access != "readonly")
+        program.images |= dict.fromkeys(names, image)
+        return " ".join(f"layout(binding = {k}, {form}) {kind} {name};" for k, name in enumerate(names, images))
+    elif found := _BLOCK.fullmatch(line):
+        unit = len(program.blocks)
+        program.blocks[found[1]] = int(defines.get(found[2], found[2]))
+        return line.replace("(", f"(binding = {unit}, ", 1)
+    elif found := _CONSTANTS.fullmatch(line):
+        program.constants |= dict.fromkeys(found[2].split(", "), found[1])
+    elif found := _BETWEEN.fullmatch(line):
+        (program.ins if found[1] == "in" else program.outs)[found[3]] = found[2]
+    else:
+        return ""
+    return line
 
 
 # Of a condition: whether its lines count, whether those of a later branch may, or none any more.
 _LIVE, _WAITS, _OVER = range(3)
 
 
-def _live(path: Path, macros: dict) -> Iterator[str]:
+def _live(path: Path, macros: Mapping[str, int | str]) -> Iterator[str]:
     """The lines of a source whose conditions hold, others blank; includes in place, numbered for compilers."""
     yield "#line 1"
-    around = []  # the states of the conditions around a line
+    around: list[int] = []  # the states of the conditions around a line
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
         word, rest = found.groups() if (found := _DIRECTIVE.fullmatch(line.partition("  //")[0])) else ("", "")
         if word in ("if", "ifdef", "ifndef"):
@@ -137,11 +141,11 @@ def _live(path: Path, macros: dict) -> Iterator[str]:
             yield line if live and not word else ""
 
 
-def _holds(condition: str, macros: dict) -> bool:
+def _holds(condition: str, macros: Mapping[str, int | str]) -> bool:
     return any(all(_is(term, macros) for term in terms.split(" && ")) for terms in condition.split(" || "))
 
 
-def _is(term: str, macros: dict) -> bool:
+def _is(term: str, macros: Mapping[str, int | str]) -> bool:
     """KeyError: Python gives no value for the macro."""
     name, _, number = term.removeprefix("!").partition(" == ")
     if name.startswith("defined("):

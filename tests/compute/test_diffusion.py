@@ -455,7 +455,7 @@ def test_more_cycles_come_closer(monkeypatch, solve):
 @pytest.mark.parametrize("size", [(8, 5), (5, 8), (8, 8), (1, 7), (7, 1), (1, 1), (4, 3)])
 def test_the_coarsest_grid_is_solved_exactly(gpu_device, size):
     """Against NumPy: a symmetric nine-point operator, right sides of two layers, and a cell with no equation."""
-    (width, height), solve = size, next(each for each in PASSES if each.name == "diffuse_solve")
+    (width, height), solve = size, next(each for each in PASSES if each.file == "coarsest")
     rng = np.random.default_rng(width + 10 * height)
     cells = np.arange(width * height).reshape(height, width)
     matrix = np.zeros((width * height,) * 2)
