@@ -1,5 +1,5 @@
 // Adds a frame to the running sums, or takes it away: from the layer `known` to the layer `next`.
-// The frame: the one that was sent, in light that is summed (DECODE: 0 as it is, 1 made linear, 2 encoded), `whole` for white,
+// The frame: the one that was sent, in the light that is summed, `whole` for white,
 // its colours with NUMBERS in one of 0 to 2²⁴ − 1, R + 256 G + 65536 B;
 // with PLANES by the whole numbers of libswscale (core/frames/planes.py) from samples of luma and chroma;
 // or with AGAIN one that the sums hold already, between the layers `before` and `after`.
@@ -63,12 +63,7 @@ void main()
   vec3 color = sent.rgb;
 #    endif
 #  endif
-#  if DECODE == 1
-  color = to_linear(color);
-#  elif DECODE == 2
-  color = to_encoded(color);
-#  endif
-  uvec2 light = packed_light(uvec3(ivec3(color * whole + 0.5)));
+  uvec2 light = packed_light(uvec3(ivec3(decoded(color) * whole + 0.5)));
 #endif
   uvec2 sum = sum_at(place, known);
   imageStore(sums, place_in_layer(place, next), halves_of(BACK != 0 ? minus(sum, light) : plus(sum, light)));

@@ -19,9 +19,7 @@ uniform float unit;
 // Above one another in an invocation: to a software renderer the table is as dear as the sums, but four pixels are
 // slower than one.
 #define PIXELS 2
-#define EACH(does) \
-  does(0); \
-  does(1)
+#define EACH(does) does(0); does(1)
 
 vec4 c[PIXELS * GROUPS];
 ivec3 place[PIXELS];  // of a pixel's sums

@@ -8,12 +8,8 @@ layout(r32ui) uniform readonly uimage2DArray labels;
 layout(rgba32f) uniform writeonly image2DArray solution, own;
 uniform int warm;
 
-void main()
+void at(ivec3 p)
 {
-  ivec3 p = ivec3(corner(size) + in_eights(), gl_GlobalInvocationID.z);
-  if (!inside(p.xy, size)) {
-    return;
-  }
   int label = int(imageLoad(labels, ivec3(p.xy, 0)).r);
   vec4 value = vec4(equal(ivec4(label - 1 - 4 * p.z), ivec4(0, 1, 2, 3)));
   imageStore(own, p, value);
@@ -28,21 +24,18 @@ layout(rgba32f) uniform readonly image2DArray finer;
 layout(rgba32f) uniform writeonly image2DArray solution, own, right;
 uniform int warm;
 
-void main()
+void at(ivec3 p)
 {
-  ivec3 p = ivec3(corner(size) + in_eights(), gl_GlobalInvocationID.z);
-  if (inside(p.xy, size)) {
-    imageStore(solution, p, warm == 0 ? vec4(0.0) : imageLoad(finer, ivec3(2 * p.xy, p.z)));
-    imageStore(own, p, vec4(0.0));
-    imageStore(right, p, vec4(0.0));
-  }
+  imageStore(solution, p, warm == 0 ? vec4(0.0) : imageLoad(finer, ivec3(2 * p.xy, p.z)));
+  imageStore(own, p, vec4(0.0));
+  imageStore(right, p, vec4(0.0));
 }
 
 #elif defined(PROLONG) || defined(EXPAND) || defined(EXPAND_RIM)
 layout(rgba32f) uniform readonly image2DArray coarser;
 uniform ivec2 coarse;  // the coarser grid's size
 
-// Its four cells around the 2 × 2 cells from p on, row by row. Invocations run over 2 × 2 cells.
+// Its four cells around the 2 × 2 cells from p on, row by row. Invocations run over such.
 mat4 around(ivec3 p)
 {
   ivec2 a = p.xy / 2;
@@ -64,12 +57,8 @@ layout(rgba32f) uniform writeonly image2DArray to;
 #  endif
 uniform float amount;
 
-void main()
+void at(ivec3 p)
 {
-  ivec3 p = ivec3(corner(size) + 2 * in_fours(), gl_GlobalInvocationID.z);
-  if (!inside(p.xy, size)) {
-    return;
-  }
   mat4 cells = amount * around(p);
   for (int k = 0; k < 4; k++) {
     ivec3 q = p + ivec3(k % 2, k / 2, 0);
@@ -95,13 +84,8 @@ void store(ivec3 p, mat4 cells)
 
 #ifdef EXPAND
 // Coefficients far from all scribbles, smooth as they are, linear between the coarser grid's cells.
-
-void main()
+void at(ivec3 p)
 {
-  ivec3 p = ivec3(corner(size) + 2 * in_fours(), gl_GlobalInvocationID.z);
-  if (!inside(p.xy, size)) {
-    return;
-  }
   mat4 m = around(p);
   store(p, mat4(m[0], 0.5 * (m[0] + m[1]), 0.5 * (m[0] + m[2]), 0.25 * (m[0] + m[1] + m[2] + m[3])));
 }
@@ -122,13 +106,9 @@ mat4 values(ivec2 a, ivec2 b, vec2 bend, int layer)
   return mat4(value, beside, mix(value, below, bend.y), mix(beside, across, bend.y));
 }
 
-void main()
+void at(ivec3 p)
 {
-  ivec2 p = corner(size) + 2 * in_fours();
-  if (!inside(p, size)) {
-    return;
-  }
-  ivec2 a = p / 2;
+  ivec2 a = p.xy / 2;
   vec2 ends = vec2(equal(a, coarse - 1));
   ivec2 b = max(a + 1 - 2 * ivec2(ends), 0);
   vec2 bend = mix(vec2(0.5), beyond, ends);
@@ -140,7 +120,7 @@ void main()
   // No shutter gets less than nothing, and all of them together one.
   bend = any(lessThan(least, vec4(0.0))) ? mix(bend, vec2(0.0), ends) : bend;
   for (int layer = 0; layer < layers; layer++) {
-    store(ivec3(p, layer), values(a, b, bend, layer));
+    store(ivec3(p.xy, layer), values(a, b, bend, layer));
   }
 }
 
@@ -156,19 +136,27 @@ vec4 kept(ivec3 p)
   return value * vec4(greaterThanEqual(value, vec4(nothing)));
 }
 
-void main()
+void at(ivec3 p)
 {
-  ivec2 p = corner(size) + in_eights();
-  if (!inside(p, size)) {
-    return;
-  }
   float sum = 0.0;
   for (int layer = 0; layer < layers; layer++) {
-    sum += dot(kept(ivec3(p, layer)), vec4(1.0));
+    sum += dot(kept(ivec3(p.xy, layer)), vec4(1.0));
   }
   for (int layer = 0; layer < layers; layer++) {
     vec4 first_one = vec4(layer == 0 ? 1.0 : 0.0, 0.0, 0.0, 0.0);
-    imageStore(solution, ivec3(p, layer), sum > 0.0 ? kept(ivec3(p, layer)) / sum : first_one);
+    imageStore(solution, ivec3(p.xy, layer), sum > 0.0 ? kept(ivec3(p.xy, layer)) / sum : first_one);
   }
 }
 #endif
+
+void main()
+{
+#if defined(PROLONG) || defined(EXPAND) || defined(EXPAND_RIM)
+  ivec3 p = ivec3(corner(size) + 2 * IN_FOURS, gl_GlobalInvocationID.z);
+#else
+  ivec3 p = ivec3(corner(size) + IN_EIGHTS, gl_GlobalInvocationID.z);
+#endif
+  if (inside(p.xy, size)) {
+    at(p);
+  }
+}

@@ -33,7 +33,7 @@ float resistance(ivec2 p)
 
 void main()
 {
-  ivec2 p = corner(size) + in_eights();
+  ivec2 p = corner(size) + IN_EIGHTS;
   if (!inside(p, size)) {
     return;
   }
@@ -126,7 +126,7 @@ uniform int fresh;
 
 void main()
 {
-  ivec3 p = ivec3(corner(size) + in_eights(), gl_GlobalInvocationID.z);
+  ivec3 p = ivec3(corner(size) + IN_EIGHTS, gl_GlobalInvocationID.z);
   if (!inside(p.xy, size)) {
     return;
   }
@@ -148,7 +148,7 @@ layout(rgba32f) uniform image2DArray solution, result;
 
 void main()
 {
-  ivec3 p = ivec3(corner(size) + in_eights(), gl_GlobalInvocationID.z);
+  ivec3 p = ivec3(corner(size) + IN_EIGHTS, gl_GlobalInvocationID.z);
   if (!inside(p.xy, size)) {
     return;
   }

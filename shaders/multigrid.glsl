@@ -221,24 +221,16 @@ void add_column(int n)
   row[below + b] += value.w;
 }
 
-void clear_entry(int k)
-{
-  row[k] = 0.0;
-}
-
-void clear_product(int n)
-{
-  product[n] = 0.0;
-}
-
 void main()
 {
-  p = corner(coarse) + in_fours();
+  p = corner(coarse) + IN_FOURS;
   if (!inside(p, coarse)) {
     return;
   }
-  EACH_OF_9(clear_entry);
-  EACH_OF_25(clear_product);
+#  define CLEAR_ENTRY(k) row[k] = 0.0
+#  define CLEAR_PRODUCT(n) product[n] = 0.0
+  EACH_OF_9(CLEAR_ENTRY);
+  EACH_OF_25(CLEAR_PRODUCT);
   EACH_OF_9(add_equation);
   EACH_OF_25(add_column);
   imageStore(next, ivec3(p, 0), vec4(row[0], row[1], row[2], row[3]));
@@ -293,7 +285,7 @@ void add_missing(int k)
 
 void main()
 {
-  p = ivec3(corner(coarse) + in_fours(), gl_GlobalInvocationID.z);
+  p = ivec3(corner(coarse) + IN_FOURS, gl_GlobalInvocationID.z);
   if (!inside(p.xy, coarse)) {
     return;
   }
@@ -332,7 +324,7 @@ uniform ivec2 colour;
 
 void main()
 {
-  ivec3 p = ivec3(corner(size) + 2 * in_fours() + colour, gl_GlobalInvocationID.z);
+  ivec3 p = ivec3(corner(size) + 2 * IN_FOURS + colour, gl_GlobalInvocationID.z);
   if (!inside(p.xy, size)) {
     return;
   }
@@ -344,7 +336,7 @@ uniform int colour;
 
 void main()
 {
-  ivec3 p = ivec3(corner(size) + in_fours() * ivec2(2, 1), gl_GlobalInvocationID.z);
+  ivec3 p = ivec3(corner(size) + IN_FOURS * ivec2(2, 1), gl_GlobalInvocationID.z);
   p.x += (p.y + colour) & 1;
   if (!inside(p.xy, size)) {
     return;
@@ -366,7 +358,7 @@ uniform float amount;
 
 void main()
 {
-  ivec3 p = ivec3(corner(size) + in_eights(), gl_GlobalInvocationID.z);
+  ivec3 p = ivec3(corner(size) + IN_EIGHTS, gl_GlobalInvocationID.z);
   if (!inside(p.xy, size)) {
     return;
   }

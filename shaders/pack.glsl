@@ -1,7 +1,6 @@
 // A frame as exposures that follow something read it: a whole number a pixel, with that of the pixel below beside it, and
 // a rim of two pixels before and three behind that repeat the frame's edges. Linear light is kept as its square root, so
 // that dark steps are small; encoded light as it is.
-// DECODE: how samples become the light that is summed, 0 as they are, 1 made linear, 2 made encoded.
 layout(local_size_x = 64) in;
 uniform sampler2DArray frame;
 layout(rgba16ui) uniform writeonly uimage2DArray packed_frames;
@@ -13,12 +12,7 @@ uniform int layer;
 uint packed_at(ivec2 pixel)
 {
   vec3 color = texelFetch(frame, ivec3(clamp(pixel, ivec2(0), size - 1), 0), 0).rgb;
-#if DECODE == 1
-  color = to_linear(color);
-#elif DECODE == 2
-  color = to_encoded(color);
-#endif
-  return packed_color(color);
+  return packed_color(decoded(color));
 }
 
 void main()

@@ -18,6 +18,9 @@ uniform sampler2DArray coefficients;  // no image: others take all that Vulkan g
 #else
 layout(rgba32f) uniform readonly image2DArray coefficients;
 uniform int origin, direction, layers, lowest, lowest_layer;
+#  if !SUMS || EDGES == 2
+uniform int count;
+#  endif
 #endif
 #if SUMS
 layout(rgba16ui) uniform readonly uimage2DArray sums;
@@ -26,21 +29,21 @@ uniform float unit;
 #elif !PACKED
 uniform sampler2DArray frames;
 #endif
-#if !MOVED && !SUMS || EDGES == 2 && !MOVED
-uniform int count;
+
+#if UNFINISHED
+layout(rgba32f) uniform writeonly image2DArray picture;
 #endif
 
 #include "light.glsl"
+#if !UNFINISHED
+#  include "finish.glsl"
+#endif
 #if SUMS
 #  include "sums.glsl"
 #endif
 
 #if QUADS == 4
-#  define EACH(does) \
-    does(0); \
-    does(1); \
-    does(2); \
-    does(3)
+#  define EACH(does) does(0); does(1); does(2); does(3)
 #else
 #  define EACH(does) does(0)
 #endif
@@ -175,12 +178,7 @@ vec4 frame_light(ivec2 place, int slot)
   color.rgb = to_encoded(straight(color)) * color.a;
 #  endif
 #else
-#  if DECODE == 1
-  color.rgb = to_linear(color.rgb);
-#  elif DECODE == 2
-  color.rgb = to_encoded(color.rgb);
-#  endif
-  color.rgb *= color.a;
+  color.rgb = decoded(color.rgb) * color.a;
 #endif
   return color;
 }
@@ -204,10 +202,8 @@ int layer_of(int frame)
 #endif
 
 #if MOVED
-#include "moved.glsl"
+#  include "moved.glsl"
 #else
-#include "finish.glsl"
-
 // Frames one after another: at each, the sum at its end is looked up, and that at its start is known.
 void expose(int quad, int frame, vec4 weight)
 {
@@ -247,6 +243,7 @@ vec4 nearest_light(int quad, int pixel, int frame)
 #endif
 }
 #endif
+#endif
 
 void store(int quad, int pixel, float gain)
 {
@@ -261,15 +258,27 @@ void store(int quad, int pixel, float gain)
 #endif
 #if EDGES == 2
   // Where nothing of the shutter is left, the nearest frame that there is (core/pixels/compositor.py has the 1e-3).
+#  if MOVED
+  for (int once = share[quad][pixel] > 1e-6 ? 1 : 0; once < 1; once++) {
+    color = nearest_light(quad, pixel, int(centre[quad][pixel] - 1e-3));
+  }
+#  else
   color = share[quad][pixel] > 1e-6 ? color : nearest_light(quad, pixel, int(centre[quad][pixel] - 1e-3));
+#  endif
 #endif
-#if ENCODED
+#if CONTINUED
+  color += texelFetch(summed, ivec3(at, 0), 0);
+#endif
+#if UNFINISHED
+  imageStore(picture, ivec3(at, 0), color);
+#else
+#  if ENCODED
   color.rgb = to_linear_exact(straight(color)) * color.a;
-#endif
+#  endif
   color.rgb *= gain;
   finish(at + ivec2(0, top), color);
-}
 #endif
+}
 
 void finish_quad(int quad)
 {

@@ -17,11 +17,6 @@ uniform int seen_first, seen_last, parts;
 #if CONTINUED
 uniform sampler2DArray summed;
 #endif
-#if UNFINISHED
-layout(rgba32f) uniform writeonly image2DArray picture;
-#else
-#  include "finish.glsl"
-#endif
 
 int motion = 0;
 
@@ -172,9 +167,9 @@ void expose(int quad, int frame, vec4 weight)
 
 #if EDGES == 2  // shorten
 // A pixel's light in the frame that is nearest to its exposure's time, if it is among these frames.
-vec4 nearest_light(int quad, int pixel)
+vec4 nearest_light(int quad, int pixel, int frame)
 {
-  int nearest = clamp(int(centre[quad][pixel] - 1e-3), seen_first, seen_last);
+  int nearest = clamp(frame, seen_first, seen_last);
   vec4 light = vec4(0.0);
   for (motion = 0; motion < motions; motion++) {
     int row = nearest * motions + motion;
@@ -190,29 +185,3 @@ vec4 nearest_light(int quad, int pixel)
   return light;
 }
 #endif
-
-void store(int quad, int pixel, float gain)
-{
-  ivec2 at = corner + ivec2(0, 4 * quad + pixel);
-  if (at.y >= size.y) {
-    return;
-  }
-  vec4 color = total[quad][pixel] / max(share[quad][pixel], 1e-6);
-#if EDGES == 2
-  for (int once = share[quad][pixel] > 1e-6 ? 1 : 0; once < 1; once++) {
-    color = nearest_light(quad, pixel);
-  }
-#endif
-#if CONTINUED
-  color += texelFetch(summed, ivec3(at, 0), 0);
-#endif
-#if UNFINISHED
-  imageStore(picture, ivec3(at, 0), color);
-#else
-#  if ENCODED
-  color.rgb = to_linear_exact(straight(color)) * color.a;
-#  endif
-  color.rgb *= gain;
-  finish(at, color);
-#endif
-}

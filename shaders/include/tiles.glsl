@@ -30,14 +30,5 @@ ivec2 corner(ivec2 grid)
 }
 
 // The place of invocation (x, ·) in rows of eight, or of four.
-ivec2 in_eights()
-{
-  int x = int(gl_GlobalInvocationID.x);
-  return ivec2(x & 7, x >> 3);
-}
-
-ivec2 in_fours()
-{
-  int x = int(gl_GlobalInvocationID.x);
-  return ivec2(x & 3, x >> 2);
-}
+#define IN_EIGHTS ivec2(gl_GlobalInvocationID.x & 7u, gl_GlobalInvocationID.x >> 3)
+#define IN_FOURS ivec2(gl_GlobalInvocationID.x & 3u, gl_GlobalInvocationID.x >> 2)
