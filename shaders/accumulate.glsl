@@ -25,14 +25,12 @@ uniform sampler2DArray frame;
 
 #if PLANES
 // A texel has four samples, side by side.
-int sample_of(uvec4 texel, int x)
-{
+int sample_of(uvec4 texel, int x) {
   return int((texel.r >> ((x & 3) << 3)) & 255u);
 }
 
 // Sums wrap around beyond 32 bits, as libswscale's do.
-vec3 color_at(ivec2 pixel)
-{
+vec3 color_at(ivec2 pixel) {
   ivec2 place = (pixel * chroma_step + (chroma_step >> 1)) >> 16;
   int light = ((sample_of(imageLoad(luma, ivec3(pixel.x >> 2, pixel.y, 0)), pixel.x) << 9) - luma_of.x) * luma_of.y + (1 << 21);
   int cb = (sample_of(imageLoad(chroma, ivec3(place.x >> 2, place.y, 0)), place.x) - 128) << 9;
@@ -42,8 +40,7 @@ vec3 color_at(ivec2 pixel)
 }
 #endif
 
-void main()
-{
+void main() {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
   if (any(greaterThanEqual(pixel, size))) {
     return;

@@ -14,8 +14,7 @@ layout(FORMAT) uniform writeonly image2DArray stored;
 uniform ivec2 size;
 uniform int top, layer;
 
-void main()
-{
+void main() {
   ivec2 p = ivec2(gl_GlobalInvocationID.xy);
   if (any(greaterThanEqual(p, size))) {
     return;
@@ -44,8 +43,7 @@ uniform sampler2DArray sampled_0, sampled_1, sampled_2, sampled_3;
 layout(rgba32f) uniform writeonly image2DArray stored_0, stored_1, stored_2, stored_3;
 uniform int layer;
 
-void main()
-{
+void main() {
   ivec3 first = ivec3(0, 0, layer);
   vec4 sum = texelFetch(sampled_0, first, 0) + texelFetch(sampled_1, first, 0) + texelFetch(sampled_2, first, 0) +
              texelFetch(sampled_3, first, 0);

@@ -12,21 +12,18 @@ uniform ivec2 size;
 float rows[CELLS * BAND];
 vec4 x[CELLS];
 
-ivec2 cell(int i)
-{
+ivec2 cell(int i) {
   return size.x > size.y ? ivec2(i / size.y, i % size.y) : ivec2(i % size.x, i / size.x);
 }
 
-void tie(int i, ivec2 p, float value)
-{
+void tie(int i, ivec2 p, float value) {
   int number = size.x > size.y ? p.x * size.y + p.y : p.y * size.x + p.x;
   if (number < i && all(greaterThanEqual(p, ivec2(0))) && all(lessThan(p, size))) {
     rows[BAND * i + i - number] = value;
   }
 }
 
-void load_row(int i, int layer)
-{
+void load_row(int i, int layer) {
   ivec2 p = cell(i);
   for (int k = 1; k < BAND; k++) {
     rows[BAND * i + k] = 0.0;
@@ -42,8 +39,7 @@ void load_row(int i, int layer)
   x[i] = imageLoad(right, ivec3(p, layer));
 }
 
-void main()
-{
+void main() {
   int layer = int(gl_GlobalInvocationID.z);
   int count = size.x * size.y;
   int reach = min(size.x, size.y) + 1;  // of the cells that one is tied to

@@ -12,15 +12,13 @@ vec4 after[QUADS];
 vec4 middle[GROUPS];  // of the block's coefficients
 float reach = 0.0;  // how far they lie from it at most: half the sum of what they differ by
 
-void add_to_middle(int quad)
-{
+void add_to_middle(int quad) {
   for (int g = 0; g < GROUPS; g++) {
     middle[g] += c[quad * GROUPS + g] * vec4(0.25 / float(QUADS));
   }
 }
 
-void widen_reach(int quad)
-{
+void widen_reach(int quad) {
   vec4 apart = vec4(0.0);
   for (int g = 0; g < GROUPS; g++) {
     mat4 own = c[quad * GROUPS + g];
@@ -32,8 +30,7 @@ void widen_reach(int quad)
   reach = max(reach, max(max(apart.x, apart.y), max(apart.z, apart.w)));
 }
 
-void find_middle()
-{
+void find_middle() {
   for (int g = 0; g < GROUPS; g++) {
     middle[g] = vec4(0.0);
   }
@@ -46,8 +43,7 @@ void find_middle()
 float from = 1e9;
 float until = 0.0;
 
-void widen_exposure(int quad)
-{
+void widen_exposure(int quad) {
   vec4 start = mixed(quad, 0, 1);
   vec4 end = mixed(quad, GROUPS, rows);
   vec2 low = min(start.xy, start.zw);
@@ -58,8 +54,7 @@ void widen_exposure(int quad)
 #endif
 
 // The middle's quantile in the table's row, at the piece's start (column 0) or end (column GROUPS).
-float middle_time(int column, int row)
-{
+float middle_time(int column, int row) {
   float time = 0.0;
   for (int g = 0; g < GROUPS; g++) {
     time += dot(middle[g], imageLoad(table, ivec3(column + g, row, 0)));
@@ -68,26 +63,22 @@ float middle_time(int column, int row)
 }
 
 // dz, and the time by which the shutters differ at most: no pixel is further from the middle than `reach` times that.
-vec2 extent_of(int row)
-{
+vec2 extent_of(int row) {
   return imageLoad(table, ivec3(2 * GROUPS, row, 0)).rg;
 }
 
-void add_piece(int quad, int row, float dz)
-{
+void add_piece(int quad, int row, float dz) {
   vec4 start = mixed(quad, 0, row);
   vec4 end = mixed(quad, GROUPS, row);
   after[quad] += dz * clamp((boundary - start) / max(end - start, 1e-7), 0.0, 1.0);
 }
 
-void add_frame(int quad)
-{
+void add_frame(int quad) {
   expose(quad, frame, after[quad] - before[quad]);
   before[quad] = after[quad];
 }
 
-void main()
-{
+void main() {
   if (!start_block()) {
     return;
   }

@@ -10,8 +10,7 @@ vec4 end[QUADS];
 vec4 density[QUADS];
 float from, until;  // the block's times
 
-void start_piece(int quad, int row)
-{
+void start_piece(int quad, int row) {
   start[quad] = mixed(quad, 0, row);
   end[quad] = mixed(quad, GROUPS, row);
   density[quad] = imageLoad(table, ivec3(2 * GROUPS, row, 0)).r / max(end[quad] - start[quad], 1e-7);
@@ -21,14 +20,12 @@ void start_piece(int quad, int row)
   until = max(until, max(high.x, high.y));
 }
 
-void add_frame(int quad)
-{
+void add_frame(int quad) {
   vec4 open = min(end[quad], float(frame + 1)) - max(start[quad], float(frame));
   expose(quad, frame, max(open, 0.0) * density[quad]);
 }
 
-void main()
-{
+void main() {
   if (!start_block()) {
     return;
   }

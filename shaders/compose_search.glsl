@@ -10,8 +10,7 @@ vec4 before = vec4(0.0);  // Q at the frame's start
 ivec4 row = ivec4(1);  // of each pixel: the first piece that does not end before the boundary
 
 // A pixel's quantile in the table's row, at the piece's start (column 0) or end (column GROUPS).
-float time_at(int pixel, int column, int row)
-{
+float time_at(int pixel, int column, int row) {
   float time = 0.0;
   for (int g = 0; g < GROUPS; g++) {
     time += dot(c[g][pixel], imageLoad(table, ivec3(column + g, row, 0)));
@@ -20,8 +19,7 @@ float time_at(int pixel, int column, int row)
 }
 
 // Q of a pixel at the boundary. row: from which on its piece is looked for, then that piece.
-float searched(int pixel, inout int row)
-{
+float searched(int pixel, inout int row) {
   int end = rows + 1;
   while (row < end) {
     int middle = (row + end) / 2;
@@ -38,8 +36,7 @@ float searched(int pixel, inout int row)
   return piece.z + piece.x * clamp((boundary - from) / max(until - from, 1e-7), 0.0, 1.0);
 }
 
-void main()
-{
+void main() {
   if (!start_block()) {
     return;
   }

@@ -30,13 +30,11 @@ float exposure;
 ivec2 corner;
 
 // Beyond the picture's edge the last pixel inside.
-ivec2 pixel_at(int k)
-{
+ivec2 pixel_at(int k) {
   return ivec2(corner.x, min(corner.y + k, size.y - 1));
 }
 
-void start_pixel(int k)
-{
+void start_pixel(int k) {
   float sum = 0.0;
   for (int g = 0; g < GROUPS; g++) {
     vec4 loaded = imageLoad(coefficients, ivec3((pixel_at(k) + ivec2(0, top)) >> block_bits, g));
@@ -50,19 +48,16 @@ void start_pixel(int k)
   total[k] = vec3(0.0);
 }
 
-uvec2 sum_until(int k, int time)
-{
+uvec2 sum_until(int k, int time) {
   int layer = clamp(BACK != 0 ? origin - time : origin + time, 0, held) + first_layer;
   return sum_at(place[k], layer < layers ? layer : layer - layers);
 }
 
-vec3 light_between(uvec2 early, uvec2 late)
-{
+vec3 light_between(uvec2 early, uvec2 late) {
   return unpacked_light(BACK != 0 ? minus(early, late) : minus(late, early));
 }
 
-void add_piece(int k)
-{
+void add_piece(int k) {
   float start = 0.0;
   float end = 0.0;
   for (int g = 0; g < GROUPS; g++) {
@@ -78,8 +73,7 @@ void add_piece(int k)
   total[k] += light * (exposure / max(end - start, 1e-7));
 }
 
-void finish_pixel(int k)
-{
+void finish_pixel(int k) {
   ivec2 pixel = pixel_at(k);
   vec3 light = total[k] * unit;
 #if ENCODED
@@ -92,8 +86,7 @@ void finish_pixel(int k)
   finish(pixel + ivec2(0, top), vec4(light * gain, 1.0));
 }
 
-void main()
-{
+void main() {
   corner = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, PIXELS);
   if (any(greaterThanEqual(corner, size))) {
     return;

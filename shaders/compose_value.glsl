@@ -4,8 +4,7 @@ uniform int first, last;
 
 int frame;
 
-void add_frame(int quad)
-{
+void add_frame(int quad) {
 #if MOVED
   expose(quad, frame, mixed(quad, 0, 1 + (frame - first) * motions + motion));
 #else
@@ -13,8 +12,7 @@ void add_frame(int quad)
 #endif
 }
 
-void main()
-{
+void main() {
   if (!start_block()) {
     return;
   }

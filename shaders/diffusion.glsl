@@ -8,8 +8,7 @@ layout(r32ui) uniform readonly uimage2DArray labels;
 layout(rgba32f) uniform writeonly image2DArray solution, own;
 uniform int warm;
 
-void at(ivec3 p)
-{
+void at(ivec3 p) {
   int label = int(imageLoad(labels, ivec3(p.xy, 0)).r);
   vec4 value = vec4(equal(ivec4(label - 1 - 4 * p.z), ivec4(0, 1, 2, 3)));
   imageStore(own, p, value);
@@ -24,8 +23,7 @@ layout(rgba32f) uniform readonly image2DArray finer;
 layout(rgba32f) uniform writeonly image2DArray solution, own, right;
 uniform int warm;
 
-void at(ivec3 p)
-{
+void at(ivec3 p) {
   imageStore(solution, p, warm == 0 ? vec4(0.0) : imageLoad(finer, ivec3(2 * p.xy, p.z)));
   imageStore(own, p, vec4(0.0));
   imageStore(right, p, vec4(0.0));
@@ -36,8 +34,7 @@ layout(rgba32f) uniform readonly image2DArray coarser;
 uniform ivec2 coarse;  // the coarser grid's size
 
 // Its four cells around the 2 × 2 cells from p on, row by row. Invocations run over such.
-mat4 around(ivec3 p)
-{
+mat4 around(ivec3 p) {
   ivec2 a = p.xy / 2;
   ivec2 b = min(a + 1, coarse - 1);
   return mat4(imageLoad(coarser, ivec3(a, p.z)), imageLoad(coarser, ivec3(b.x, a.y, p.z)),
@@ -57,8 +54,7 @@ layout(rgba32f) uniform writeonly image2DArray to;
 #  endif
 uniform float amount;
 
-void at(ivec3 p)
-{
+void at(ivec3 p) {
   mat4 cells = amount * around(p);
   for (int k = 0; k < 4; k++) {
     ivec3 q = p + ivec3(k % 2, k / 2, 0);
@@ -71,8 +67,7 @@ void at(ivec3 p)
 #elif defined(EXPAND) || defined(EXPAND_RIM)
 layout(rgba32f) uniform writeonly image2DArray solution;
 
-void store(ivec3 p, mat4 cells)
-{
+void store(ivec3 p, mat4 cells) {
   for (int k = 0; k < 4; k++) {
     ivec3 q = p + ivec3(k % 2, k / 2, 0);
     if (inside(q.xy, size)) {
@@ -84,8 +79,7 @@ void store(ivec3 p, mat4 cells)
 
 #ifdef EXPAND
 // Coefficients far from all scribbles, smooth as they are, linear between the coarser grid's cells.
-void at(ivec3 p)
-{
+void at(ivec3 p) {
   mat4 m = around(p);
   store(p, mat4(m[0], 0.5 * (m[0] + m[1]), 0.5 * (m[0] + m[2]), 0.25 * (m[0] + m[1] + m[2] + m[3])));
 }
@@ -97,8 +91,7 @@ uniform int layers;
 uniform vec2 beyond;
 
 // The four cells' values.
-mat4 values(ivec2 a, ivec2 b, vec2 bend, int layer)
-{
+mat4 values(ivec2 a, ivec2 b, vec2 bend, int layer) {
   vec4 value = imageLoad(coarser, ivec3(a, layer));
   vec4 beside = mix(value, imageLoad(coarser, ivec3(b.x, a.y, layer)), bend.x);
   vec4 below = imageLoad(coarser, ivec3(a.x, b.y, layer));
@@ -106,8 +99,7 @@ mat4 values(ivec2 a, ivec2 b, vec2 bend, int layer)
   return mat4(value, beside, mix(value, below, bend.y), mix(beside, across, bend.y));
 }
 
-void at(ivec3 p)
-{
+void at(ivec3 p) {
   ivec2 a = p.xy / 2;
   vec2 ends = vec2(equal(a, coarse - 1));
   ivec2 b = max(a + 1 - 2 * ivec2(ends), 0);
@@ -130,14 +122,12 @@ layout(rgba32f) uniform image2DArray solution;
 uniform int layers;
 uniform float nothing;
 
-vec4 kept(ivec3 p)
-{
+vec4 kept(ivec3 p) {
   vec4 value = imageLoad(solution, p);
   return value * vec4(greaterThanEqual(value, vec4(nothing)));
 }
 
-void at(ivec3 p)
-{
+void at(ivec3 p) {
   float sum = 0.0;
   for (int layer = 0; layer < layers; layer++) {
     sum += dot(kept(ivec3(p.xy, layer)), vec4(1.0));
@@ -149,8 +139,7 @@ void at(ivec3 p)
 }
 #endif
 
-void main()
-{
+void main() {
 #if defined(PROLONG) || defined(EXPAND) || defined(EXPAND_RIM)
   ivec3 p = ivec3(corner(size) + 2 * IN_FOURS, gl_GlobalInvocationID.z);
 #else

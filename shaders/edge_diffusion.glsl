@@ -12,14 +12,12 @@ layout(rgba32f) uniform writeonly image2DArray links;
 uniform ivec2 guided;  // the size of `resistances`
 uniform int side;  // of its cells, in pixels
 
-float resistance_of(ivec2 cell)
-{
+float resistance_of(ivec2 cell) {
   return imageLoad(resistances, ivec3(clamp(cell, ivec2(0), guided - 1), 0)).r;
 }
 
 // Of a pixel: linear between the middles of cells.
-float resistance(ivec2 p)
-{
+float resistance(ivec2 p) {
   if (side == 1) {
     return resistance_of(p);
   }
@@ -31,8 +29,7 @@ float resistance(ivec2 p)
   return mix(above, below, share.y);
 }
 
-void main()
-{
+void main() {
   ivec2 p = corner(size) + IN_EIGHTS;
   if (!inside(p, size)) {
     return;
@@ -56,8 +53,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(rgba32f) uniform writeonly image2DArray values;
 uniform ivec2 size;
 
-void main()
-{
+void main() {
   ivec3 p = ivec3(gl_GlobalInvocationID);
   if (all(lessThan(p.xy, size))) {
     imageStore(values, p, vec4(0.0));
@@ -77,8 +73,7 @@ layout(rgba32f) uniform writeonly image2DArray result;
 uniform ivec2 size;
 uniform int parts;
 
-void main()
-{
+void main() {
   int n = int(gl_GlobalInvocationID.x);
   int layer = int(gl_GlobalInvocationID.z);
   if (n >= parts) {
@@ -106,8 +101,7 @@ layout(rgba32f) uniform image2DArray sums;
 uniform int parts;
 uniform int place;  // which of `sums` it becomes; the one before it moves to place + 1
 
-void main()
-{
+void main() {
   int layer = int(gl_GlobalInvocationID.z);
   vec4 total = vec4(0.0);
   for (int k = 0; k < parts; k++) {
@@ -124,8 +118,7 @@ layout(rgba32f) uniform readonly image2DArray sums;  // residual · guess of thi
 layout(rgba32f) uniform image2DArray result;
 uniform int fresh;
 
-void main()
-{
+void main() {
   ivec3 p = ivec3(corner(size) + IN_EIGHTS, gl_GlobalInvocationID.z);
   if (!inside(p.xy, size)) {
     return;
@@ -146,8 +139,7 @@ uniform sampler2DArray sums;  // residual · guess, and direction · answer, its
 layout(rgba32f) uniform readonly image2DArray values, right;
 layout(rgba32f) uniform image2DArray solution, result;
 
-void main()
-{
+void main() {
   ivec3 p = ivec3(corner(size) + IN_EIGHTS, gl_GlobalInvocationID.z);
   if (!inside(p.xy, size)) {
     return;

@@ -5,8 +5,7 @@ layout(rgba8) uniform writeonly image2DArray levels;
 uniform ivec2 size;
 #include "light.glsl"
 
-void main()
-{
+void main() {
   ivec2 p = ivec2(gl_GlobalInvocationID.xy);
   if (any(greaterThanEqual(p, size))) {
     return;

@@ -6,8 +6,7 @@ layout(rgba32f) uniform image2DArray over;
 layout(std140) uniform table_block { vec4 table[MOST]; };  // of each matte: its shutter, whether it adds, its opacity
 uniform ivec2 size, beneath;
 
-void main()
-{
+void main() {
   ivec3 p = ivec3(gl_GlobalInvocationID);
   if (any(greaterThanEqual(p.xy, size))) {
     return;

@@ -9,8 +9,7 @@ layout(rgba32f) uniform image2DArray mixed;
 uniform ivec2 size, given;
 uniform float share;
 
-void main()
-{
+void main() {
   ivec3 p = ivec3(gl_GlobalInvocationID);
   if (any(greaterThanEqual(p.xy, size))) {
     return;

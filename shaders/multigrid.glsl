@@ -8,32 +8,27 @@
 // beyond the edge are zero.
 layout(rgba32f) uniform readonly image2DArray stencil;
 
-bool is_free(ivec2 i)
-{
+bool is_free(ivec2 i) {
   return inside(i, size) && imageLoad(stencil, ivec3(i, 2)).x > 0.0;
 }
 #elif defined(LINKS)
 layout(rgba32f) uniform readonly image2DArray links;  // above, left, right, below; zeros for fixed pixels
 
-vec4 links_of(ivec2 i)
-{
+vec4 links_of(ivec2 i) {
   return inside(i, size) ? imageLoad(links, ivec3(i, 0)) : vec4(0.0);
 }
 
-bool is_free(ivec2 i)
-{
+bool is_free(ivec2 i) {
   return dot(links_of(i), vec4(1.0)) > 0.0;
 }
 #elif !defined(RESTRICT)
 layout(r32ui) uniform readonly uimage2DArray labels;
 
-bool is_free(ivec2 i)
-{
+bool is_free(ivec2 i) {
   return inside(i, size) && imageLoad(labels, ivec3(i, 0)).r == 0u;
 }
 
-vec4 links_of(ivec2 i)
-{
+vec4 links_of(ivec2 i) {
   return is_free(i) ? vec4(i.y > 0, i.x > 0, i.x < size.x - 1, i.y < size.y - 1) : vec4(0.0);
 }
 #endif
@@ -47,8 +42,7 @@ layout(rgba32f) uniform writeonly image2DArray weights;
 uniform float hold;
 
 // What ties the free cell i to the free ones around it, and its diagonal; nothing for a fixed cell.
-void couplings(ivec2 i, out float c[9], out float diagonal)
-{
+void couplings(ivec2 i, out float c[9], out float diagonal) {
 #  ifdef STENCIL
   diagonal = 0.0;
   for (int k = 0; k < 9; k++) {
@@ -72,20 +66,17 @@ void couplings(ivec2 i, out float c[9], out float diagonal)
 #  endif
 }
 
-bool is_fixed(ivec2 i)
-{
+bool is_fixed(ivec2 i) {
   return inside(i, size) && !is_free(i);
 }
 
 // Whether the coarse cell at i is fixed, and what lies on either side of it across a line is not: no wall.
-bool is_dot(ivec2 i, ivec2 across)
-{
+bool is_dot(ivec2 i, ivec2 across) {
   return is_fixed(i) && !is_fixed(i + across) && !is_fixed(i - across);
 }
 
 // What a cell takes of the coarse cells before and after it in its row, or in its column.
-vec2 between(ivec2 i, bool in_row)
-{
+vec2 between(ivec2 i, bool in_row) {
   float c[9];
   float diagonal;
   couplings(i, c, diagonal);
@@ -115,16 +106,14 @@ vec2 between(ivec2 i, bool in_row)
   return total > 1e-3 * diagonal ? ends / total : vec2(0.0);
 }
 
-void store(ivec2 i, vec4 value)
-{
+void store(ivec2 i, vec4 value) {
   if (inside(i, size)) {
     imageStore(weights, ivec3(i, 0), value);
   }
 }
 
 // Invocations (·, y) run over the 2 × 2 cells of two tiles.
-void main()
-{
+void main() {
   ivec2 id = ivec2(gl_GlobalInvocationID);
   ivec2 p = corner(first + 2 * id.y + (id.x >> 2), size) + 2 * ivec2(id.x & 1, id.x >> 1 & 1);
   if (!inside(p, size)) {
@@ -175,8 +164,7 @@ float row[9];
 float product[25];  // of the cells 2p − 2 … 2p + 2
 
 // Adds row i of A, whose cell is number `at` of the 25.
-void add_row(ivec2 i, int at, float weight)
-{
+void add_row(ivec2 i, int at, float weight) {
 #  ifdef STENCIL
   vec4 before = weight * imageLoad(stencil, ivec3(i, 0));
   vec4 after = weight * imageLoad(stencil, ivec3(i, 1));
@@ -199,16 +187,14 @@ void add_row(ivec2 i, int at, float weight)
 #  endif
 }
 
-void add_equation(int k)
-{
+void add_equation(int k) {
   ivec2 i = 2 * p + OFFSET(k);
   if (inside(i, size)) {
     add_row(i, AMONG_25(k), imageLoad(weights, ivec3(i, 0))[TAKES(k)]);
   }
 }
 
-void add_column(int n)
-{
+void add_column(int n) {
   ivec2 j = 2 * p + OFFSET_OF_25(n);
   vec4 value = inside(j, size) ? product[n] * imageLoad(weights, ivec3(j, 0)) : vec4(0.0);
   int a = n % 5 / 2;
@@ -221,8 +207,7 @@ void add_column(int n)
   row[below + b] += value.w;
 }
 
-void main()
-{
+void main() {
   p = corner(coarse) + IN_FOURS;
   if (!inside(p, coarse)) {
     return;
@@ -250,8 +235,7 @@ vec4 total;
 vec4 near[25];  // the cells 2p − 2 … 2p + 2; beyond the frame's edge the last ones again
 
 // What equation i misses, whose cell is number `at` of the 25.
-vec4 missing(ivec3 i, int at)
-{
+vec4 missing(ivec3 i, int at) {
 #  ifdef STENCIL
   vec4 before = imageLoad(stencil, ivec3(i.xy, 0));
   vec4 after = imageLoad(stencil, ivec3(i.xy, 1));
@@ -270,21 +254,18 @@ vec4 missing(ivec3 i, int at)
 #  endif
 }
 
-void load_near(int n)
-{
+void load_near(int n) {
   near[n] = imageLoad(own, ivec3(clamp(2 * p.xy + OFFSET_OF_25(n), ivec2(0), size - 1), p.z));
 }
 
-void add_missing(int k)
-{
+void add_missing(int k) {
   ivec3 i = ivec3(2 * p.xy + OFFSET(k), p.z);
   if (inside(i.xy, size)) {
     total += imageLoad(weights, ivec3(i.xy, 0))[TAKES(k)] * missing(i, AMONG_25(k));
   }
 }
 
-void main()
-{
+void main() {
   p = ivec3(corner(coarse) + IN_FOURS, gl_GlobalInvocationID.z);
   if (!inside(p.xy, coarse)) {
     return;
@@ -307,8 +288,7 @@ layout(rgba32f) uniform readonly image2DArray values;
 layout(rgba32f) uniform readonly image2DArray right;
 
 // What an equation takes of the cells around p.
-vec4 taken_around(ivec3 p)
-{
+vec4 taken_around(ivec3 p) {
   vec4 before = imageLoad(stencil, ivec3(p.xy, 0));
   vec4 after = imageLoad(stencil, ivec3(p.xy, 1));
   vec4 total = before.x * NEAR(-1, -1) + before.y * NEAR(0, -1) + before.z * NEAR(1, -1) + before.w * NEAR(-1, 0);
@@ -322,8 +302,7 @@ vec4 taken_around(ivec3 p)
 // A quarter of a Gauss-Seidel sweep. Invocations run over the cells of one of four colours.
 uniform ivec2 colour;
 
-void main()
-{
+void main() {
   ivec3 p = ivec3(corner(size) + 2 * IN_FOURS + colour, gl_GlobalInvocationID.z);
   if (!inside(p.xy, size)) {
     return;
@@ -334,8 +313,7 @@ void main()
 // Half a red-black Gauss-Seidel sweep. Invocations run over the pixels of one colour.
 uniform int colour;
 
-void main()
-{
+void main() {
   ivec3 p = ivec3(corner(size) + IN_FOURS * ivec2(2, 1), gl_GlobalInvocationID.z);
   p.x += (p.y + colour) & 1;
   if (!inside(p.xy, size)) {
@@ -356,8 +334,7 @@ void main()
 layout(rgba32f) uniform writeonly image2DArray result;
 uniform float amount;
 
-void main()
-{
+void main() {
   ivec3 p = ivec3(corner(size) + IN_EIGHTS, gl_GlobalInvocationID.z);
   if (!inside(p.xy, size)) {
     return;

@@ -9,14 +9,12 @@ uniform int layer;
 #include "light.glsl"
 #include "packed.glsl"
 
-uint packed_at(ivec2 pixel)
-{
+uint packed_at(ivec2 pixel) {
   vec3 color = texelFetch(frame, ivec3(clamp(pixel, ivec2(0), size - 1), 0), 0).rgb;
   return packed_color(decoded(color));
 }
 
-void main()
-{
+void main() {
   ivec2 place = ivec2(gl_GlobalInvocationID.xy);
   if (any(greaterThanEqual(place, size + RIM))) {
     return;

@@ -6,8 +6,7 @@ in vec2 place;
 out vec2 at;
 uniform mat4 ModelViewProjectionMatrix;
 
-void main()
-{
+void main() {
   at = place;
   gl_Position = ModelViewProjectionMatrix * vec4(corner, 0.0, 1.0);
 }
@@ -19,8 +18,7 @@ uniform float opacity;
 #  include "light.glsl"
 
 // Premultiplied code values as the region takes them: what is drawn over a preview, Blender shows with a gamma of 2.2.
-vec4 on_region(vec4 color)
-{
+vec4 on_region(vec4 color) {
   return srgbTarget ? vec4(pow(max(straight(color), 0.0), vec3(2.2)) * color.a, color.a) : color;
 }
 #endif
@@ -29,8 +27,7 @@ vec4 on_region(vec4 color)
 // A composed picture's levels.
 uniform sampler2DArray picture;
 
-void main()
-{
+void main() {
   shown = on_region(texture(picture, vec3(at.x, 1.0 - at.y, 0.0)) * opacity);
 }
 
@@ -40,8 +37,7 @@ uniform sampler2DArray coefficients, palette;
 uniform ivec2 size;
 uniform int block, count;
 
-void main()
-{
+void main() {
   ivec2 pixel = ivec2(vec2(at.x, 1.0 - at.y) * vec2(size));
   vec3 mix_of_colors = vec3(0.0);
   float sum = 0.0;
@@ -60,8 +56,7 @@ uniform sampler2DArray palette;
 uniform ivec2 size;
 uniform int block;
 
-void main()
-{
+void main() {
   ivec2 pixel = ivec2(vec2(at.x, 1.0 - at.y) * vec2(size));
   int label = int(texelFetch(labels, ivec3(pixel / block, 0), 0).r);
   vec3 color = texelFetch(palette, ivec3(max(label - 1, 0), 0, 0), 0).rgb;

@@ -17,8 +17,7 @@ shared float accumulation[SHUTTERS][LAST + 1];
 
 float c[SHUTTERS];
 
-void load_accumulations()
-{
+void load_accumulations() {
 #if SHARED
   int local = int(gl_LocalInvocationIndex);
   for (int entry = local; entry < SHUTTERS * (LAST + 1); entry += 64) {
@@ -29,15 +28,13 @@ void load_accumulations()
 #endif
 }
 
-void load_coefficients(ivec2 block)
-{
+void load_coefficients(ivec2 block) {
   for (int i = 0; i < SHUTTERS; i++) {
     c[i] = texelFetch(coefficients, ivec3(block, i / 4), 0)[i % 4];
   }
 }
 
-float inverse_accumulation(int i, float z, int low, int high, out int found)
-{
+float inverse_accumulation(int i, float z, int low, int high, out int found) {
   while (low < high) {
     int mid = (low + high) / 2;
     if (!(z < S(i, mid))) {
@@ -56,8 +53,7 @@ float inverse_accumulation(int i, float z, int low, int high, out int found)
   return float(low - 1) + (z - below) / (above - below);
 }
 
-float inverse_mixed(float z, int lows[SHUTTERS], int highs[SHUTTERS], out int bounds[SHUTTERS])
-{
+float inverse_mixed(float z, int lows[SHUTTERS], int highs[SHUTTERS], out int bounds[SHUTTERS]) {
   float result = 0.0;
   for (int i = 0; i < SHUTTERS; i++) {
     result += c[i] * inverse_accumulation(i, z, lows[i], highs[i], bounds[i]);
@@ -65,8 +61,7 @@ float inverse_mixed(float z, int lows[SHUTTERS], int highs[SHUTTERS], out int bo
   return result;
 }
 
-float mixed_accumulation(float time, inout int lowest[SHUTTERS])
-{
+float mixed_accumulation(float time, inout int lowest[SHUTTERS]) {
   int lows[SHUTTERS] = lowest;
   int highs[SHUTTERS];
   for (int i = 0; i < SHUTTERS; i++) {
@@ -90,8 +85,7 @@ float mixed_accumulation(float time, inout int lowest[SHUTTERS])
   return z;
 }
 
-vec3 frame_light(ivec2 pixel, int layer)
-{
+vec3 frame_light(ivec2 pixel, int layer) {
   vec3 color = texelFetch(frames, ivec3(pixel, layer), 0).rgb;
 #if DECODE
   color = to_linear(color);
@@ -99,8 +93,7 @@ vec3 frame_light(ivec2 pixel, int layer)
   return color;
 }
 
-void main()
-{
+void main() {
   load_accumulations();
   ivec2 block = ivec2(gl_GlobalInvocationID.xy);
   ivec2 corner = block * AGGREGATE;

@@ -6,8 +6,7 @@ uniform ivec2 size;
 uniform int top, height, first_layer;
 #include "light.glsl"
 
-void main()
-{
+void main() {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
   if (pixel.x >= size.x || pixel.y >= size.y) {
     return;

@@ -63,13 +63,11 @@ vec4 share[QUADS];  // of the exposure that fell on frames that are there
 vec4 centre[QUADS];  // of the exposure in time, frames left out included
 
 // A pixel of a quad; beyond the picture's edge the last one inside.
-ivec2 pixel_at(int quad, int pixel)
-{
+ivec2 pixel_at(int quad, int pixel) {
   return min(corner + ivec2(0, 4 * quad + pixel), size - 1);
 }
 
-vec4 coefficients_at(ivec2 pixel, int group)
-{
+vec4 coefficients_at(ivec2 pixel, int group) {
   ivec3 place = ivec3((pixel + ivec2(0, top)) >> block_bits, group);
 #if MOVED
   vec4 found = max(texelFetch(coefficients, place, 0), 0.0);
@@ -82,8 +80,7 @@ vec4 coefficients_at(ivec2 pixel, int group)
 
 #if SUMS
 // Where a pixel's sums begin. The block is as high as a tile of them.
-ivec3 place_of_light(int quad, int pixel)
-{
+ivec3 place_of_light(int quad, int pixel) {
 #if TILED
   return corner_place + ivec3(8 * (4 * quad + pixel), 0, 0);
 #else
@@ -92,25 +89,21 @@ ivec3 place_of_light(int quad, int pixel)
 }
 
 // The layer of the sum at a position, or at the nearest that is there.
-int layer_at(int position)
-{
+int layer_at(int position) {
   int layer = clamp(position - lowest, 0, held) + lowest_layer;
   return layer < layers ? layer : layer - layers;
 }
 
 // The layer of the sum where the window's frame begins.
-int start_of(int frame)
-{
+int start_of(int frame) {
   return layer_at(origin + direction * frame + (direction < 0 ? 1 : 0));
 }
 
-vec3 light_between(uvec2 start, uvec2 end)
-{
+vec3 light_between(uvec2 start, uvec2 end) {
   return unpacked_light(direction < 0 ? minus(start, end) : minus(end, start));
 }
 
-void start_light(int quad)
-{
+void start_light(int quad) {
   int layer = start_of(first);
   for (int pixel = 0; pixel < 4; pixel++) {
     sum_before[4 * quad + pixel] = sum_at(place_of_light(quad, pixel), layer);
@@ -118,14 +111,12 @@ void start_light(int quad)
   }
 }
 #else
-void start_light(int quad)
-{
+void start_light(int quad) {
   total[quad] = mat4(0.0);
 }
 #endif
 
-void start_quad(int quad)
-{
+void start_quad(int quad) {
   vec4 sum = vec4(0.0);
   for (int g = 0; g < GROUPS; g++) {
     mat4 loaded = mat4(coefficients_at(pixel_at(quad, 0), g),
@@ -145,8 +136,7 @@ void start_quad(int quad)
 }
 
 // False where the block lies outside the picture.
-bool start_block()
-{
+bool start_block() {
   corner = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, 4 * QUADS);
 #if TILED
   corner_place = place_of_sums(corner);
@@ -156,8 +146,7 @@ bool start_block()
 }
 
 // Σ cᵢ tableᵢ, for the table's row and the first of its columns.
-vec4 mixed(int quad, int column, int row)
-{
+vec4 mixed(int quad, int column, int row) {
   vec4 sum = vec4(0.0);
   for (int g = 0; g < GROUPS; g++) {
     sum += imageLoad(table, ivec3(column + g, row, 0)) * c[quad * GROUPS + g];
@@ -168,8 +157,7 @@ vec4 mixed(int quad, int column, int row)
 #if !SUMS
 #  if !PACKED
 // The frame's light as it is summed, premultiplied.
-vec4 frame_light(ivec2 place, int slot)
-{
+vec4 frame_light(ivec2 place, int slot) {
   vec4 color = texelFetch(frames, ivec3(place, slot), 0);
 #if PREMULTIPLIED
 #  if DECODE == 1
@@ -186,8 +174,7 @@ vec4 frame_light(ivec2 place, int slot)
 
 #  if !MOVED
 // The layer of the window's frame, or of the shot's end beyond which it lies.
-int layer_of(int frame)
-{
+int layer_of(int frame) {
   int index = origin + direction * frame;
 #if EDGES == 1  // mirror
   int period = max(2 * (count - 1), 1);
@@ -205,8 +192,7 @@ int layer_of(int frame)
 #  include "moved.glsl"
 #else
 // Frames one after another: at each, the sum at its end is looked up, and that at its start is known.
-void expose(int quad, int frame, vec4 weight)
-{
+void expose(int quad, int frame, vec4 weight) {
 #if EDGES == 2  // shorten
   centre[quad] += weight * (float(frame) + 0.5);
   int index = origin + direction * frame;
@@ -231,8 +217,7 @@ void expose(int quad, int frame, vec4 weight)
 
 #if EDGES == 2
 // The light of the frame that is nearest to the window's among those that are there.
-vec4 nearest_light(int quad, int pixel, int frame)
-{
+vec4 nearest_light(int quad, int pixel, int frame) {
 #if SUMS
   int position = clamp(origin + direction * frame, 0, count - 1);
   ivec3 place = place_of_light(quad, pixel);
@@ -245,8 +230,7 @@ vec4 nearest_light(int quad, int pixel, int frame)
 #endif
 #endif
 
-void store(int quad, int pixel, float gain)
-{
+void store(int quad, int pixel, float gain) {
   ivec2 at = corner + ivec2(0, 4 * quad + pixel);
   if (at.y >= size.y) {
     return;
@@ -280,8 +264,7 @@ void store(int quad, int pixel, float gain)
 #endif
 }
 
-void finish_quad(int quad)
-{
+void finish_quad(int quad) {
   vec4 gain = mixed(quad, 0, 0);
   store(quad, 0, gain.x);
   store(quad, 1, gain.y);

@@ -7,8 +7,7 @@ layout(rgba32f) uniform writeonly image2DArray picture;
 uniform int height;
 #endif
 
-void finish(ivec2 pixel, vec4 color)
-{
+void finish(ivec2 pixel, vec4 color) {
 #if LEVELS
   color.rgb = to_level(clamp(straight(color), 0.0, 1.0)) * color.a;
   imageStore(picture, ivec3(pixel, 0), color);

@@ -20,8 +20,7 @@ uniform sampler2DArray summed;
 
 int motion = 0;
 
-vec4 moved_weights(float t)
-{
+vec4 moved_weights(float t) {
   return vec4(((1.0 - 0.5 * t) * t - 0.5) * t,
               (1.5 * t - 2.5) * t * t + 1.0,
               ((2.0 - 1.5 * t) * t + 0.5) * t,
@@ -30,8 +29,7 @@ vec4 moved_weights(float t)
 
 // The distance from a pixel to the place that is seen there, its whole and its broken part. Beyond the frame's last
 // pixels all is the same, and large numbers have no fractions.
-void part(ivec2 pixel, vec2 away, out ivec2 whole, out vec2 broken)
-{
+void part(ivec2 pixel, vec2 away, out ivec2 whole, out vec2 broken) {
   away = clamp(away, vec2(-1 - pixel), vec2(size - pixel));
   vec2 below = floor(away);
   whole = ivec2(below);
@@ -46,8 +44,7 @@ struct Column {
   vec3 a, b, c, d;
 };
 
-Column column_at(ivec2 place, int layer)
-{
+Column column_at(ivec2 place, int layer) {
   uvec2 upper = words_of(imageLoad(packed_frames, ivec3(place, layer)));
   uvec2 lower = words_of(imageLoad(packed_frames, ivec3(place + ivec2(0, 2), layer)));
   Column column;
@@ -58,14 +55,12 @@ Column column_at(ivec2 place, int layer)
   return column;
 }
 
-vec3 column_light(Column column, vec4 y)
-{
+vec3 column_light(Column column, vec4 y) {
   return y.x * column.a + y.y * column.b + y.z * column.c + y.w * column.d;
 }
 
 // The light of a frame at a pixel and a distance from it.
-vec4 seen_light(ivec2 pixel, vec2 away, int layer)
-{
+vec4 seen_light(ivec2 pixel, vec2 away, int layer) {
   ivec2 whole;
   vec2 t;
   part(pixel, away, whole, t);
@@ -81,8 +76,7 @@ vec4 seen_light(ivec2 pixel, vec2 away, int layer)
 }
 #else
 // The light of a frame at a pixel and a distance from it.
-vec4 seen_light(ivec2 pixel, vec2 away, int layer)
-{
+vec4 seen_light(ivec2 pixel, vec2 away, int layer) {
   ivec2 whole;
   vec2 t;
   part(pixel, away, whole, t);
@@ -116,15 +110,13 @@ vec4 seen_light(ivec2 pixel, vec2 away, int layer)
 #endif
 
 // turn · z + shift − z, where a pixel's (turn − 1, shift) is `move`.
-vec2 moved_by(vec4 move, ivec2 pixel)
-{
+vec2 moved_by(vec4 move, ivec2 pixel) {
   vec2 z = vec2(pixel);
   return vec2(move.x * z.x - move.y * z.y, move.y * z.x + move.x * z.y) + move.zw;
 }
 
 // (turn − 1, shift) of a quad's pixels, a column each.
-mat4 moves_of(int quad, int row)
-{
+mat4 moves_of(int quad, int row) {
 #if MIXED == 1
   vec4 own = imageLoad(moves, ivec3(1, row, 0));
   return mat4(own, own, own, own);
@@ -140,8 +132,7 @@ mat4 moves_of(int quad, int row)
 #endif
 }
 
-void expose(int quad, int frame, vec4 weight)
-{
+void expose(int quad, int frame, vec4 weight) {
   int row = frame * motions + motion;
   vec4 place = imageLoad(moves, ivec3(0, row, 0));
   centre[quad] += weight * (float(frame) + 0.5);
@@ -167,8 +158,7 @@ void expose(int quad, int frame, vec4 weight)
 
 #if EDGES == 2  // shorten
 // A pixel's light in the frame that is nearest to its exposure's time, if it is among these frames.
-vec4 nearest_light(int quad, int pixel, int frame)
-{
+vec4 nearest_light(int quad, int pixel, int frame) {
   int nearest = clamp(frame, seen_first, seen_last);
   vec4 light = vec4(0.0);
   for (motion = 0; motion < motions; motion++) {

@@ -11,8 +11,7 @@ const vec3 PACKED_WHITE = vec3(2047.0, 2047.0, 1023.0);
 const vec3 PACKED_WHITE = vec3(2040.0, 2040.0, 1020.0);
 #endif
 
-uint packed_color(vec3 light)
-{
+uint packed_color(vec3 light) {
 #if SQUARED
   light = sqrt(max(light, 0.0));
 #endif
@@ -21,8 +20,7 @@ uint packed_color(vec3 light)
 }
 
 // In units of packed_unit().
-vec3 unpacked_color(uint color)
-{
+vec3 unpacked_color(uint color) {
   vec3 light = vec3(ivec3(color & 2047u, (color >> 11) & 2047u, color >> 22));
 #if SQUARED
   return light * light;
@@ -31,8 +29,7 @@ vec3 unpacked_color(uint color)
 #endif
 }
 
-vec3 packed_unit()
-{
+vec3 packed_unit() {
 #if SQUARED
   return 1.0 / (PACKED_WHITE * PACKED_WHITE);
 #else

@@ -4,33 +4,28 @@
 
 const uint FIELD = 0x1FFFFFu;
 
-uvec2 minus(uvec2 a, uvec2 b)
-{
+uvec2 minus(uvec2 a, uvec2 b) {
   return uvec2(a.x - b.x, a.y - b.y - (a.x < b.x ? 1u : 0u));
 }
 
-uvec2 plus(uvec2 a, uvec2 b)
-{
+uvec2 plus(uvec2 a, uvec2 b) {
   uint low = a.x + b.x;
   return uvec2(low, a.y + b.y + (low < a.x ? 1u : 0u));
 }
 
-uvec2 packed_light(uvec3 light)
-{
+uvec2 packed_light(uvec3 light) {
   return uvec2(light.r | (light.g << 21), (light.g >> 11) | (light.b << 10));
 }
 
 // As signed integers, which convert to floats in one instruction.
-vec3 unpacked_light(uvec2 difference)
-{
+vec3 unpacked_light(uvec2 difference) {
   uint green = (difference.x >> 21) | (difference.y << 11);
   return vec3(ivec3(difference.x & FIELD, green & FIELD, difference.y >> 10));
 }
 
 // Where a pixel's sums begin. TILED: those of a tile of 8 × 16 pixels lie behind one another in a row of texels, a layer
 // of texels holds a row of tiles.
-ivec3 place_of_sums(ivec2 pixel)
-{
+ivec3 place_of_sums(ivec2 pixel) {
 #if TILED
   return ivec3(((pixel.y & 15) << 3) + (pixel.x & 7), pixel.x >> 3, pixel.y >> 4);
 #else
@@ -38,8 +33,7 @@ ivec3 place_of_sums(ivec2 pixel)
 #endif
 }
 
-ivec3 place_in_layer(ivec3 place, int layer)
-{
+ivec3 place_in_layer(ivec3 place, int layer) {
 #if TILED
   return place + ivec3(layer << 7, 0, 0);
 #else
@@ -48,7 +42,6 @@ ivec3 place_in_layer(ivec3 place, int layer)
 }
 
 // imageLoad: a software renderer's texelFetch of whole numbers takes three times as long.
-uvec2 sum_at(ivec3 place, int layer)
-{
+uvec2 sum_at(ivec3 place, int layer) {
   return words_of(imageLoad(sums, place_in_layer(place, layer)));
 }

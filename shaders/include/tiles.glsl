@@ -8,14 +8,12 @@ uniform ivec2 size;  // of the grid
 #define OFFSET(k) (ivec2((k) % 3, (k) / 3) - 1)
 
 // Whether a cell lies in a grid of that size.
-bool inside(ivec2 i, ivec2 grid)
-{
+bool inside(ivec2 i, ivec2 grid) {
   return all(greaterThanEqual(i, ivec2(0))) && all(lessThan(i, grid));
 }
 
 // The first cell of entry n of the list, or one beyond the grid where the list has ended.
-ivec2 corner(int n, ivec2 grid)
-{
+ivec2 corner(int n, ivec2 grid) {
   if (n >= last) {
     return grid;
   }
@@ -24,8 +22,7 @@ ivec2 corner(int n, ivec2 grid)
 }
 
 // Of the tile of invocations (·, y).
-ivec2 corner(ivec2 grid)
-{
+ivec2 corner(ivec2 grid) {
   return corner(first + int(gl_GlobalInvocationID.y), grid);
 }
 
