@@ -7,7 +7,7 @@
 // i mod `layers`; or with SUMS the running sums instead, from position `lowest` on, the shot's ends extended: position
 // i's in that layer.
 // With MOVED shutters follow something: see moved.glsl.
-// GROUPS of four shutters, TILED, EDGES, DECODE, PREMULTIPLIED, ENCODED: see compute/gpu.py. Software renderers run both
+// GROUPS of four shutters, TILED, EDGES, DECODE, PREMULTIPLIED, ENCODED: see compute/composition_passes.py. Software renderers run both
 // sides of every branch: what is costly stands in loops or behind these definitions.
 layout(local_size_x = 64) in;
 layout(rgba32f) uniform readonly image2DArray table;

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.model.frame_state import Options
+from ..devices.llvmpipe import MOST_ITERATIONS
 from ..devices.passes import Pass, read_pass
 from .window import BLOCK, Sums
 
@@ -20,8 +21,6 @@ PICTURE = {False: "rgba32f", True: "rgba8"}
 LEVELS = read_pass("levels")
 # Rows of pixels that one invocation composes, by the pass; BLOCK for all others.
 _LINES = {"sums": PAIR, "search": 4}
-# Loop iterations of an invocation. Mesa's software renderer ends its loops after 65,535 in all, without an error.
-_MOST_ITERATIONS = 60_000
 # The numbers of pieces for which compose_sums is compiled. A table with another number is filled up with empty pieces.
 _ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 
@@ -146,7 +145,7 @@ def way_of(window, options: Options, values: np.ndarray, span: tuple[int, int], 
         return "sums"
     if not isinstance(window, Sums) and 3 * rows < 2 * frames:
         return "pieces"
-    return "frames" if frames_iterations(values, span) <= _MOST_ITERATIONS else "search"
+    return "frames" if frames_iterations(values, span) <= MOST_ITERATIONS else "search"
 
 
 def frames_iterations(values: np.ndarray, span: tuple[int, int]) -> int:
@@ -172,11 +171,11 @@ def moved_way(
     frames = span[1] - span[0]
     mixing = frames * motions * (mixed if mixed > 1 else 0)
     if options.interpolation == "value":
-        return "value", quads if frames * (1 + motions) + quads * mixing <= _MOST_ITERATIONS else 1
+        return "value", quads if frames * (1 + motions) + quads * mixing <= MOST_ITERATIONS else 1
     loops = frames_iterations(values, span) + frames
-    if loops + mixing > _MOST_ITERATIONS:
+    if loops + mixing > MOST_ITERATIONS:
         return "search", 1
-    return "frames", quads if loops + quads * mixing <= _MOST_ITERATIONS else 1
+    return "frames", quads if loops + quads * mixing <= MOST_ITERATIONS else 1
 
 
 def filled_rows(rows: int) -> float:

@@ -12,13 +12,13 @@ from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Planes, chroma_step
 from ..core.model.frame_state import Light, Options
 from ..core.pixels import compositor
-from ..devices.budget import is_software
+from ..devices import llvmpipe
 from ..devices.device import Device, NoDeviceError, Texture
 from ..devices.passes import Pass, read_pass
 from .running_sums import RunningSums, summable
 
-# Bytes of a texture array, at most. Mesa's software renderer reads wrong values, without an error, from one over 2 GiB.
-BAND_BYTES = 1 << 30
+# Bytes of a texture array, at most.
+BAND_BYTES = llvmpipe.MOST_BYTES
 # What is sent at a time of frames that stay on the host: a share of what the device allows; bytes of a band, at most.
 SENT_SHARE, SENT_BYTES = 1 / 8, 64 << 20
 
@@ -330,8 +330,8 @@ def decoding(stored: str, light: str) -> int:
 
 
 def stores_rows(device: Device) -> bool:
-    """Whether the device keeps textures in memory row by row, as Mesa's software renderer does; a GPU keeps tiles."""
-    return is_software(device.name)
+    """Whether the device keeps textures in memory row by row."""
+    return llvmpipe.is_llvmpipe(device.name)
 
 
 def _in_tiles(width: int, height: int, layers: int) -> tuple[int, int, int]:

@@ -68,8 +68,3 @@ def machine_memory() -> int | None:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError):
         return None
-
-
-def is_software(renderer: str) -> bool:
-    """Whether a renderer, as it calls itself, is Mesa's software renderer, whose memory is the machine's."""
-    return "llvmpipe" in renderer

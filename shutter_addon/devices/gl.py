@@ -13,8 +13,9 @@ import moderngl
 import numpy as np
 
 from ..core import stopping
-from .budget import Budget, is_software, machine_memory
+from .budget import Budget, machine_memory
 from .device import NoDeviceError
+from .llvmpipe import is_llvmpipe
 from .paging import PagedDevice
 from .passes import Pass
 
@@ -74,7 +75,7 @@ def _gl(name: str) -> Callable[..., Any]:
 def _memory(context: moderngl.Context, renderer: str) -> int | None:
     """Bytes of the memory of a current context's GPU; None: it does not say. Of what is free, the largest power of two:
     it is to be the same at the next start."""
-    if is_software(renderer):
+    if is_llvmpipe(renderer):
         return machine_memory()
     for extension, name in (("GL_NVX_gpu_memory_info", _TOTAL_MEMORY), ("GL_ATI_meminfo", _FREE_MEMORY)):
         if extension in context.extensions:

@@ -21,8 +21,9 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core import stopping
-from ...devices.budget import Budget, is_software, machine_memory
+from ...devices.budget import Budget, machine_memory
 from ...devices.device import NoDeviceError
+from ...devices.llvmpipe import is_llvmpipe
 from ...devices.paging import TEXEL_BYTES, PagedDevice
 from ...devices.passes import Pass, read_pass
 
@@ -99,7 +100,7 @@ class BlenderDevice(PagedDevice):
         self.name = gpu.platform.renderer_get()
         self.max_layers = gpu.capabilities.max_texture_layers_get()
         self.max_size = gpu.capabilities.max_texture_size_get()
-        self.budget.tell(machine_memory() if is_software(self.name) else None)
+        self.budget.tell(machine_memory() if is_llvmpipe(self.name) else None)
 
     def current(self):
         """See Device. NoDeviceError: Blender's GPU is not current on this thread."""
