@@ -1,7 +1,6 @@
 """The command with random in-between frames in place of optical flow's, so that the right ones are known."""
 
 import sys
-import types
 
 import numpy as np
 
@@ -19,7 +18,8 @@ def between(first, second, factor, *_):
 
 
 if __name__ == "__main__":
-    sys.modules["shutter_addon.media.flow"] = types.SimpleNamespace(between=between)
     from shutter_addon.__main__ import main
+    from shutter_addon.media import flow
 
+    flow.between = between
     sys.exit(main())

@@ -10,7 +10,6 @@ import shutil
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
 
@@ -46,7 +45,7 @@ def frame(number, speed=8):
 def prepared():
     """The extension, whose panel of in-between frames is open and others are not, in a saved file with an effect."""
     driver.enable()
-    sys.modules[f"{traces.NAME}.shutter_addon.media.flow"] = SimpleNamespace(between=slow_blend)
+    part("media.flow").between = slow_blend
     cuts = part("media.cuts")  # as optical flow, they need OpenCV; there are none in this film
     cuts.missing_package, cuts.may_be_cut, cuts.is_cut = lambda: None, lambda *_: False, lambda *_: False
     panels = part("blender.interface.panels")
