@@ -40,3 +40,20 @@ def test_every_page_and_picture_is_linked():
     }
     files = {path for path in (ROOT / "docs").rglob("*") if path.is_file()}
     assert not files - linked
+
+
+def test_what_the_page_of_developers_says_where_to_look_is_there():
+    """Each file, and each name that stands in brackets behind one."""
+    page = (ROOT / "docs" / "developers.md").read_text(encoding="utf-8")
+    rows = page.partition("| looking for | open |")[2].partition("\n\n")[0].splitlines()[2:]
+    assert len(rows) > 30
+    for row in rows:
+        folder, text = ROOT / "shutter_addon", ""
+        for brackets, word in re.findall(r"(\(?)`([\w/.]+)`", row.rpartition(" | ")[2].replace(", `", ", (`")):
+            if word.endswith((".py", ".glsl")):
+                places = [ROOT / "shutter_addon" / word, ROOT / word, folder / word]
+                file = next((place for place in places if place.is_file()), None)
+                assert file, word
+                folder, text = file.parent, file.read_text(encoding="utf-8")
+            elif brackets and not word.endswith("/"):
+                assert re.search(rf"\b(def|class|void) {word.rpartition('.')[2]}\b", text), f"{word} in {file.name}"

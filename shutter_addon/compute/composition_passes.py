@@ -26,7 +26,7 @@ _ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 
 
 @dataclass(frozen=True)
-class Light:
+class LightFormat:
     """How light is read, summed and stored.
 
     decode: a number of window.decoding
@@ -60,7 +60,7 @@ class Moved:
     unfinished: bool
 
 
-def composition(way: str, groups: int, stored: str, edges: int, light: Light) -> Pass:
+def composition(way: str, groups: int, stored: str, edges: int, light: LightFormat) -> Pass:
     """The pass compose_<way> for a way of `way_of` other than "sums".
 
     groups: of four shutters
@@ -82,7 +82,7 @@ def composition(way: str, groups: int, stored: str, edges: int, light: Light) ->
     )
 
 
-def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, light: Light) -> Pass:
+def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, light: LightFormat) -> Pass:
     """The pass compose_sums for `rows` pieces. back: the source plays in reverse; groups: as for `composition`."""
     return read_pass(
         "compose_sums",
@@ -95,7 +95,7 @@ def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, light: 
     )
 
 
-def composition_of_moved(way: str, moved: Moved, light: Light) -> Pass:
+def composition_of_moved(way: str, moved: Moved, light: LightFormat) -> Pass:
     """The pass of a way, "frames", "search" or "value", where shutters follow something."""
     return read_pass(
         f"compose_{way}",
@@ -117,7 +117,7 @@ def composition_of_moved(way: str, moved: Moved, light: Light) -> Pass:
     )
 
 
-def _light(light: Light) -> dict[str, int]:
+def _light(light: LightFormat) -> dict[str, int]:
     return {name.upper(): int(value) for name, value in vars(light).items()}
 
 

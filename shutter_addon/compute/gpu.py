@@ -12,7 +12,7 @@ from .composition_passes import (
     EDGES,
     LEVELS,
     PICTURE,
-    Light,
+    LightFormat,
     Moved,
     composition,
     composition_of_moved,
@@ -46,7 +46,7 @@ def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int):
     filled = np.zeros((1 + rows, *values.shape[1:]), np.float32)
     filled[: len(values)] = values
     back = request.direction < 0
-    light = Light(decode=0, premultiplied=False, encoded=state.options.light == "encoded", levels=request.levels)
+    light = LightFormat(decode=0, premultiplied=False, encoded=state.options.light == "encoded", levels=request.levels)
     return composition_of_sums(rows, -(-len(state.bars) // 4), back, window.tiled, light), {
         "images": {},
         "blocks": {"table": filled.reshape(-1, 4)},
@@ -78,7 +78,7 @@ def _from_frames(way: str, window, request: Request, rows: int, origin: int, sho
     # In these shaders, frame 0 is the shot's first.
     given |= {"count": len(window.shot), "origin": origin - window.shot.start, "lowest": lowest - window.shot.start}
     stored = "frames" if not summed else "tiles" if window.tiled else "sums"
-    light = Light(decode, source.alpha == "premultiplied", options.light == "encoded", request.levels)
+    light = LightFormat(decode, source.alpha == "premultiplied", options.light == "encoded", request.levels)
     return composition(way, -(-len(state.bars) // 4), stored, edges, light), given
 
 
@@ -270,7 +270,7 @@ class GPUCompositor:
         sums = "sum", "other sum"
         picture = window.levels() if request.levels else window.picture
         alpha, decode = window.source.alpha, 0 if packed else decoding(window.transfer, options.light)
-        light = Light(decode, alpha == "premultiplied", options.light == "encoded", request.levels)
+        light = LightFormat(decode, alpha == "premultiplied", options.light == "encoded", request.levels)
         for held, stack in window.stacks():
             before, after = held.start > 0, held.stop < window.capacity
             inside = (slots >= held.start) & (slots < held.stop)

@@ -1,5 +1,5 @@
-"""Renders pictures of a source, each a function of one request, in four stages (Renderer.draw): labels, coefficients,
-window, composition."""
+"""Renders pictures of a source, each a function of one request, in four stages (Renderer.draw): labels, window,
+coefficients, composition."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Renderer:
         self._window: Any = None
         self._kind: tuple[int, bool, int] | None = None
         self.shortages: set[str] = set()
-        self._labels, self._solved, self._laid, self._drawn = Memo(), Memo(), Memo(), Memo()
+        self._kept_labels, self._kept_diffusion, self._kept_mattes, self._kept_picture = Memo(), Memo(), Memo(), Memo()
 
     def picture(self, request: Request) -> np.ndarray:
         """The picture (H, W, 4), top row first: scene-linear float32, premultiplied. Of levels: 8-bit sRGB over black,
@@ -72,9 +72,9 @@ class Renderer:
         """The picture on the device (GPUCompositor.draw); with NumPy an array, like `picture`'s. It is valid until the
         next picture of this renderer, and composed only if it is not the last one."""
         if self._window is None or not self._window.is_open:
-            self._drawn.clear()
+            self._kept_picture.clear()
         with self.compositor.current():
-            return self._drawn.get(request.key, lambda: self._composed(request), quick=request.quick)
+            return self._kept_picture.get(request.key, lambda: self._composed(request), quick=request.quick)
 
     def _composed(self, request: Request) -> Any:
         wanted_later = self._want(request)
@@ -95,7 +95,7 @@ class Renderer:
             if (sole := _sole(request, labels)) is not None:
                 values = np.eye(count, dtype=np.float32)[sole]
                 return np.broadcast_to(values[:, None, None], (count, *labels[0].labels.shape))
-            return self.compositor.coefficients(self._mixture(request, labels), count)
+            return self.compositor.coefficients(self._with_mattes(request, labels), count)
 
     def drawn_coefficients(self, request: Request) -> Coefficients:
         """Coefficients on the device, of all shutters. They are valid until the next call of any method."""
@@ -104,7 +104,7 @@ class Renderer:
             if (sole := _sole(request, labels)) is not None:
                 constant = self.compositor.constant(np.eye(len(request.state.bars))[sole])
                 return Coefficients(constant, self._everywhere)
-            return Coefficients(self._mixture(request, labels), request.state.options.aggregate)
+            return Coefficients(self._with_mattes(request, labels), request.state.options.aggregate)
 
     def drawn_labels(self, request: Request) -> tuple[object, int]:
         """Labels of the first layer on the device, a GPU: (texture array r32ui, block), top row first, each texel for
@@ -116,7 +116,7 @@ class Renderer:
     def labels(self, request: Request) -> list[LabelLayer]:
         """Labels of the request's scribbles, of each of scribbles.layers."""
         state, size = request.state, grid(self.source, request.state)
-        return self._labels.get((size, state.options.border, state.shapes_key), lambda: labelled(state, size))
+        return self._kept_labels.get((size, state.options.border, state.shapes_key), lambda: labelled(state, size))
 
     def shot(self, request: Request, *, known: bool = False) -> range:
         """See window_frames.shot_of."""
@@ -208,9 +208,9 @@ class Renderer:
         """What the composition takes: a single 1 where one shutter holds everywhere."""
         if _sole(request, labels) is not None:
             return Coefficients(self.compositor.constant(np.ones(1)), self._everywhere)
-        return Coefficients(self._mixture(request, labels), request.state.options.aggregate)
+        return Coefficients(self._with_mattes(request, labels), request.state.options.aggregate)
 
-    def _mixture(self, request: Request, labels: list[LabelLayer]) -> Any:
+    def _with_mattes(self, request: Request, labels: list[LabelLayer]) -> Any:
         """Coefficients on the device, with the mattes laid over what the scribbles give. They are laid again only if
         either has changed since the last call."""
         state = request.state
@@ -219,11 +219,11 @@ class Renderer:
         values = self._mattes.values(state.mattes, request.index, state.options.aggregate)
         count, sole = len(state.bars), sole_of(labels)
         if sole is None:
-            beneath, below = self._diffused(request, labels), self._solved.made
+            beneath, below = self._diffused(request, labels), self._kept_diffusion.made
         else:
             beneath, below = self.compositor.constant(np.eye(count)[sole]), None
         key = state.mattes, [key for key, _ in values], count, sole, below
-        return self._laid.get(key, lambda: self._matting.lay(beneath, state.mattes, values))
+        return self._kept_mattes.get(key, lambda: self._matting.lay(beneath, state.mattes, values))
 
     def _diffused(self, request: Request, labels: list[LabelLayer]) -> Any:
         """Coefficients on the device. They are solved for only if labels or what guides them changed since the last
@@ -234,14 +234,14 @@ class Renderer:
         def solve() -> Any:
             self._keep_guides(request)
             guided = (self._guides.guide(frames, options.aggregate), options.edge_aware) if frames else ()
-            mixed = self._mixed(labels, count, guided, request.quick)
+            mixed = self._solved_layers(labels, count, guided, request.quick)
             self._note_shortage("diffusion", self._solver.gave_up)
             return mixed
 
         key = count, frames and (frames, options.edge_aware), [layer.key for layer in labels]
-        return self._solved.get(key, solve, quick=request.quick)
+        return self._kept_diffusion.get(key, solve, quick=request.quick)
 
-    def _mixed(self, layers: list[LabelLayer], count: int, guided: tuple, quick: bool) -> Any:
+    def _solved_layers(self, layers: list[LabelLayer], count: int, guided: tuple, quick: bool) -> Any:
         """The coefficients of all layers, solved for one after the other and added up. A solution that another layer
         has begun from would depend on that one."""
         if len(layers) == 1:
@@ -262,7 +262,7 @@ class Renderer:
                 self._window.release()
                 self._window = None
                 self._note_shortage("window", False)
-                self._drawn.clear()
+                self._kept_picture.clear()
             self._guides.keep(())
         if self.source.shots is not None:
             self.source.shots.release()
@@ -277,8 +277,8 @@ class Renderer:
             self._solver.release()
             self._matting.release()
             self._mixing.release()
-        self._solved.clear()
-        self._laid.clear()
+        self._kept_diffusion.clear()
+        self._kept_mattes.clear()
 
     def close(self) -> None:
         """Frees what the renderer has on the device, and closes the source."""

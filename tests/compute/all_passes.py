@@ -7,7 +7,7 @@ import pytest
 
 from shutter_addon.compute import composition_passes, diffusion_gpu, edge_diffusion_gpu, matting, mixing, window
 from shutter_addon.compute.composition_passes import (
-    Light,
+    LightFormat,
     Moved,
     composition,
     composition_of_moved,
@@ -27,7 +27,7 @@ def _declared():
 
 def _composing():
     def light(levels, encoded=False, premultiplied=True):
-        return Light(1, premultiplied, encoded, levels)
+        return LightFormat(1, premultiplied, encoded, levels)
 
     def moved(quads, packed, at=(False, False), **others):
         given = {"shutters": 3, "mixed": 3, "shortened": packed, "sharp": True} | others
