@@ -11,9 +11,11 @@ import platform
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from statistics import median
+from typing import Any
 
 import numpy as np
 
@@ -51,6 +53,7 @@ MEASURED = (
 class Noise(FrameSource):
     """A clip of random frames, every one another cut of the same noise."""
 
+    path, fps, options = Path("noise"), None, {}
     transfer, alpha, dtype, count = "srgb", "opaque", np.dtype(np.uint8), 100_000
 
     def __init__(self, width: int, height: int):
@@ -60,6 +63,9 @@ class Noise(FrameSource):
         pixels = rng.integers(0, 256, (self._size + 1_000_003, 4), dtype=np.uint8)
         pixels[:, 3] = 255
         self._pixels = pixels
+
+    def close(self) -> None:
+        """There is no file."""
 
     def read(self, index: int) -> np.ndarray:
         start = index * 7919 % 1_000_003
@@ -94,7 +100,7 @@ def reference(state: FrameState, codes: np.ndarray, coefficients: np.ndarray) ->
     large.
 
     codes: (L, P, 4) uint8 of the window's frames; coefficients: (N, P)"""
-    frames = light.premultiplied(codes / 255.0, light.to_linear)[:, None]
+    frames: Any = light.premultiplied(codes / 255.0, light.to_linear)[:, None]
     c, present = coefficients[:, None].astype(np.float64), np.ones(len(frames), dtype=bool)
     step = max(1, (1 << 21) // state.bars.size // len(frames))
     parts = (slice(start, start + step) for start in range(0, codes.shape[1], step))
@@ -106,7 +112,7 @@ def levels_apart(picture: np.ndarray, expected: np.ndarray) -> float:
     return float(np.abs(light.to_encoded(picture) - light.to_encoded(expected)).max() * 255)
 
 
-def measure(compositor, size: tuple[int, int], window: int) -> dict:
+def measure(compositor: Any, size: tuple[int, int], window: int) -> dict:
     """A row of the table: pictures of a size (width, height) with a window of so many frames.
 
     ms: a picture's time, from the next frame to the composed picture on the device; readback_ms: to have it on the host
@@ -153,7 +159,7 @@ class Timetable:
 
     seconds: there are in all"""
 
-    def __init__(self, compositor, seconds: float):
+    def __init__(self, compositor: Any, seconds: float):
         self._compositor = compositor
         self._end = time.monotonic() + seconds
         self._pace = 0.0
@@ -197,7 +203,13 @@ def largest_that_plays(rows: Timetable, size: tuple[int, int]) -> dict:
     return largest | ({"left_out": why} if why == "too slow" else {})
 
 
-def run(compositor, sizes=SIZES, windows=WINDOWS, seconds: float = 60.0, update=lambda: None) -> tuple[list, list]:
+def run(
+    compositor: Any,
+    sizes: Sequence[tuple[int, int]] = SIZES,
+    windows: Sequence[int] = WINDOWS,
+    seconds: float = 60.0,
+    update: Callable[[], Any] = lambda: None,
+) -> tuple[list, list]:
     """The rows of `measure`, and for each size that of `largest_that_plays`. update: called after each of them."""
     timetable, rows, plays = Timetable(compositor, seconds), [], []
     for size in sizes:

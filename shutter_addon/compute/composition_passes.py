@@ -4,6 +4,7 @@ the fastest."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -82,7 +83,7 @@ def composition(way: str, groups: int, stored: str, edges: int, light: LightForm
     )
 
 
-def composition_of_sums(rows: int, groups: int, back: bool, tiled: bool, light: LightFormat) -> Pass:
+def composition_of_sums(rows: float, groups: int, back: bool, tiled: bool, light: LightFormat) -> Pass:
     """The pass compose_sums for `rows` pieces. back: the source plays in reverse; groups: as for `composition`."""
     return read_pass(
         "compose_sums",
@@ -126,7 +127,7 @@ def lines_of(way: str) -> int:
     return _LINES.get(way, BLOCK)
 
 
-def way_of(window, options: Options, values: np.ndarray, span: tuple[int, int], shortened: bool) -> str:
+def way_of(window: Any, options: Options, values: np.ndarray, span: tuple[int, int], shortened: bool) -> str:
     """The fastest way to compose: the name of a pass, without compose_.
 
     values: the table of tables.table, a row of gains and a row per piece

@@ -13,6 +13,8 @@ of a colour's cells are a run of memory, whichever way they lie.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..core import stopping
@@ -38,6 +40,8 @@ SOLVED = 128
 # Of that grid's operator, with ones on its diagonal: below this an eigenvalue is rounding.
 ROUNDING = 1e-6
 _CROSS = ((-1, 0), (0, -1), (0, 1), (1, 0))
+
+Offset = tuple[int, int]  # (dy, dx)
 
 
 def diffuse(labels: np.ndarray, count: int) -> np.ndarray:
@@ -110,9 +114,9 @@ class _Grid:
     solver: of the coarsest grid: what gives the solution of all equations
     """
 
-    solver = None
+    solver: np.ndarray | None = None
 
-    def __init__(self, ties, diagonal, held):
+    def __init__(self, ties: dict[Offset, Any], diagonal: np.ndarray, held: Any):
         """held: of the diagonal, what ties cells to fixed ones."""
         self.shape, self.coarse = diagonal.shape, tuple((n + 1) // 2 for n in diagonal.shape)
         inverse = np.divide(1, diagonal, where=diagonal > 0, out=np.zeros_like(diagonal))
@@ -121,16 +125,17 @@ class _Grid:
         self.diagonal, self.inverse, self.takes = map(_by_colour, (diagonal, inverse, scale))
         self.pitch = pitch = self.coarse[1] + 2
         weights = {offset: None if np.ndim(tie) == 0 else _by_colour(tie) for offset, tie in ties.items()}
-        self.ties, self.parents = {}, {}
+        self.ties: dict[Offset, list] = {}
+        self.parents: dict[Offset, list[int]] = {}
         for y, x in COLOURS:
             self.parents[y, x] = [b * pitch + a for b in range(y + 1) for a in range(x + 1)]
             self.takes[y, x] /= len(self.parents[y, x])
-            self.ties[y, x] = found = []
+            self.ties[y, x] = tied = []
             for (dy, dx), weight in weights.items():
                 (down, b), (across, a) = divmod(y + dy, 2), divmod(x + dx, 2)
-                found.append(((b, a), down * pitch + across, None if weight is None else weight[y, x]))
+                tied.append(((b, a), down * pitch + across, None if weight is None else weight[y, x]))
 
-    def steps(self, count: int):
+    def steps(self, count: int) -> Any:
         """Slices of all cells of a colour, to be computed in one step for `count` shutters."""
         last, step = self.takes.shape[-1] - self.pitch - 1, max(1, TOGETHER // count)
         return (slice(k, min(k + step, last)) for k in range(self.pitch + 1, last, step))
@@ -154,7 +159,7 @@ def _coarser(fine: _Grid) -> _Grid:
     return _Grid({offset: -entry for offset, entry in entries.items()}, diagonal, diagonal + sum(entries.values()))
 
 
-def _moved(padded: np.ndarray, offset) -> np.ndarray:
+def _moved(padded: np.ndarray, offset: Offset) -> np.ndarray:
     """The neighbours at an offset (dy, dx) of all cells (H, W), from (H + 2, W + 2)."""
     dy, dx = offset
     return padded[1 + dy : padded.shape[0] - 1 + dy, 1 + dx : padded.shape[1] - 1 + dx]
@@ -164,7 +169,8 @@ def _halved(entries: dict, axis: int) -> dict:
     """PᵀAP for linear interpolation P along one axis, whose coarse cells lie on the even ones.
 
     entries: {(dy, dx): (H, W)} of the nine-point operator A; those that are missing are 0"""
-    result, nothing = {}, np.broadcast_to(np.float32(0), entries[0, 0].shape)
+    result: dict[Offset, np.ndarray] = {}
+    nothing = np.broadcast_to(np.float32(0), entries[0, 0].shape)
     for beside in (-1, 0, 1):
         keys = [(along, beside) if axis == 0 else (beside, along) for along in (-1, 0, 1)]
         before, own, after = (np.moveaxis(entries.get(key, nothing), axis, 0) for key in keys)
@@ -220,7 +226,7 @@ def _cycle(grids: list[_Grid], number: int, solution: np.ndarray, right: np.ndar
         _smooth(grid, solution, right)
 
 
-def _pulls(grid: _Grid, solution: np.ndarray, right: np.ndarray, y: int, x: int):
+def _pulls(grid: _Grid, solution: np.ndarray, right: np.ndarray, y: int, x: int) -> Any:
     """Yields (cells, pull, spare): the right-hand side and all that its neighbours give (N, n) each of a colour's
     cells, and an array (N, n) to compute with."""
     stopping.check()

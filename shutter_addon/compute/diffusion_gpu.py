@@ -17,9 +17,11 @@ scribbles are or were in the last solve, and W and f are set to zero there and o
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
+from ..devices.device import Device, Texture
 from ..devices.passes import Pass, read_pass
 
 # V-cycles of a solve that starts from nothing. Largest error × 255 after 1, 2, 3, 4 cycles: 3.9, 0.67, 0.66, 0.66 over
@@ -91,7 +93,7 @@ class _Grid:
         changed: tiles of 4 × 4 cells whose operator may not be that of the last solve
     """
 
-    def __init__(self, device, width: int, height: int, layers: int, finest: bool):
+    def __init__(self, device: Device, width: int, height: int, layers: int, finest: bool):
         self.size = width, height
         self.layers = layers
         self.finest = finest
@@ -114,13 +116,13 @@ class Diffusion:
 
     finest = operators("LABELS")  # those over the pixels
 
-    def __init__(self, device):
+    def __init__(self, device: Device):
         self._device = device
-        self._grids = []
-        self._made_for = None
-        self._tiles = None
+        self._grids: list[_Grid] = []
+        self._made_for: tuple[int, int, int] | None = None
+        self._tiles: Any = None
 
-    def solve(self, labels: np.ndarray, count: int, *, warm: bool = False):
+    def solve(self, labels: np.ndarray, count: int, *, warm: bool = False) -> Texture:
         """Coefficients from labels (H, W) uint16, 0 free, 1 + shutter fixed: a texture array rgba32f, shutter i in
         layer i // 4 and channel i % 4. The next call overwrites it. Nothing is read back from the device.
 
@@ -148,7 +150,7 @@ class Diffusion:
             self._tiles.release()
         self._grids, self._made_for, self._tiles = [], None, None
 
-    def _prepare(self, shape, count) -> bool:
+    def _prepare(self, shape: tuple[int, ...], count: int) -> bool:
         """Makes the grids for a size (H, W) and a number of shutters. Whether they were there, with a solution."""
         height, width = shape
         if self._made_for == (width, height, count):
@@ -220,8 +222,8 @@ class Diffusion:
         for fine, coarse in pairwise(self._grids):
             weights, coarsen = (self._pass(fine, name) for name in ("weights", "coarsen"))
             self._run(weights, fine, "changed", 8, hold=HOLD)
-            to = {"size": fine.size, "coarse": coarse.size, "next": coarse.textures["stencil"]}
-            self._run(coarsen, coarse, "changed", 16, **fine.textures, **to)
+            to: dict[str, Any] = {"size": fine.size, "coarse": coarse.size, "next": coarse.textures["stencil"]}
+            self._run(coarsen, coarse, "changed", 16, **(fine.textures | to))
 
     def _cycle(self, index: int) -> None:
         """A V-cycle over the grid of this index and all coarser ones."""
@@ -235,7 +237,7 @@ class Diffusion:
         self._hand_down(grid, *coarser)
         for _ in range(1 + first_whole):
             self._cycle(index + 1)
-        self._take_up(grid, *coarser, "reached")
+        self._take_up(grid, coarser[0], "reached")
         self._smooth(grid, sweeps)
 
     def _solve_coarsest(self, grid: _Grid) -> None:
@@ -251,11 +253,11 @@ class Diffusion:
         """U becomes W + P U' with the next grid's U'."""
         self._prolong(grid, coarse, tiles, {"from": grid.textures["own"], "to": grid.textures["solution"]}, 1.0)
 
-    def _prolong(self, grid: _Grid, coarse: _Grid, tiles: str, images, amount: float) -> None:
+    def _prolong(self, grid: _Grid, coarse: _Grid, tiles: str, images: dict[str, Texture], amount: float) -> None:
         coarser = {"coarse": coarse.size, "coarser": coarse.textures["solution"]}
         self._run(_PROLONG, grid, tiles, 16, grid.layers, **coarser, **images, amount=amount)
 
-    def _restrict(self, grid: _Grid, coarse: _Grid, own) -> None:
+    def _restrict(self, grid: _Grid, coarse: _Grid, own: Texture) -> None:
         """What a grid's equations miss with these values becomes the next grid's right-hand side."""
         to = {"coarse": coarse.size, "next": coarse.textures["right"]}
         self._run(self._pass(grid, "restrict"), grid, "feeding", 16, grid.layers, own=own, **to)
@@ -264,7 +266,8 @@ class Diffusion:
         """Gauss-Seidel sweeps: red-black at full size, where cells have four neighbours, and else in four colours.
 
         back: in the opposite order"""
-        cells, colours = 32, [0, 1]
+        cells: int = 32
+        colours: list[Any] = [0, 1]
         if not grid.finest:
             cells, colours = 16, [(x, y) for y, x in _COLOURS if x < grid.size[0] and y < grid.size[1]]
         values = grid.textures["solution"]
@@ -280,7 +283,7 @@ class Diffusion:
             self._run(FINISH, grid, "near", 64, nothing=NOTHING)
             if index + 1 < len(self._grids):
                 coarse = self._grids[index + 1]
-                below = {"coarse": coarse.size, "coarser": coarse.textures["solution"]}
+                below: dict[str, Any] = {"coarse": coarse.size, "coarser": coarse.textures["solution"]}
                 self._run(_EXPAND, grid, "far", 16, grid.layers, **below)
                 beyond = tuple(-(2 * m + 1) / (4 * m + 8) for m in self._margin(index))
                 self._run(_EXPAND_RIM, grid, "rim", 16, **below, beyond=beyond)
@@ -290,7 +293,7 @@ class Diffusion:
         sizes = zip(self._grids[0].size, self._grids[index].size, strict=True)
         return [(pixels - 0.5) / 2**index - (cells - 1) for pixels, cells in sizes]
 
-    def _run(self, program: Pass, grid: _Grid, tiles: str, cells: int, layers: int = 1, **extra) -> None:
+    def _run(self, program: Pass, grid: _Grid, tiles: str, cells: int, layers: int = 1, **extra: Any) -> None:
         """Runs a pass over a list of the grid's tiles.
 
         tiles: the list, a key of grid.ranges

@@ -10,6 +10,9 @@ pixels is. On the grids before it conductances are smooth, and V-cycles are enou
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from typing import Any
+
 import numpy as np
 
 from ..core import stopping
@@ -31,6 +34,8 @@ TWICE = 2
 # A cell of which more than this share of the diagonal is no tie to free cells does not follow them fully.
 GROUNDED = 1e-3
 _OFFSETS = tuple((y, x) for y in (-1, 0, 1) for x in (-1, 0, 1))
+
+Ties = dict[tuple[int, int], Any]  # arrays (H, W), or 0, by offset (dy, dx)
 
 
 def diffuse_along_edges(labels: np.ndarray, count: int, guide: np.ndarray, strength: float) -> np.ndarray:
@@ -59,7 +64,7 @@ def diffuse_along_edges(labels: np.ndarray, count: int, guide: np.ndarray, stren
 
 def follows_edges(labels: np.ndarray, guide: np.ndarray | None, strength: float) -> bool:
     """Whether there is anything to diffuse with other conductances than 1."""
-    return guide is not None and strength > 0 and 0 < np.count_nonzero(labels) < labels.size
+    return guide is not None and strength > 0 and 0 < int(np.count_nonzero(labels)) < labels.size
 
 
 def is_enough(change: float, before: float) -> bool:
@@ -81,14 +86,14 @@ class _Grid:
     takes: {(b, a): (H, W)} what cell (y, x) takes of the next grid's cell (y // 2 + b, x // 2 + a)
     """
 
-    def __init__(self, weights, diagonal):
+    def __init__(self, weights: Ties, diagonal: np.ndarray):
         self.shape, self.weights, self.diagonal = diagonal.shape, weights, diagonal
         self.live = diagonal > 0
         self.inverse = np.divide(1, diagonal, where=self.live, out=np.zeros_like(diagonal))
         self.takes = _prolongation(weights, diagonal, self.live)
 
 
-def _finest(free, across, down) -> _Grid:
+def _finest(free: np.ndarray, across: np.ndarray, down: np.ndarray) -> _Grid:
     height, width = free.shape
     ties = {(0, 1): across, (1, 0): down, (0, -1): across, (-1, 0): down}
     whole, diagonal = {}, np.zeros((height, width), np.float32)
@@ -99,14 +104,14 @@ def _finest(free, across, down) -> _Grid:
     return _Grid(whole, diagonal * free)
 
 
-def _prolongation(ties, diagonal, live):
+def _prolongation(ties: Ties, diagonal: np.ndarray, live: np.ndarray) -> Ties:
     """Between two coarse cells of a row or a column a cell takes of each as much as all that lies on its side pulls;
     between four, what its own equation makes of those around it."""
 
-    def tie(dy, dx):
+    def tie(dy: int, dx: int) -> np.ndarray:
         return ties.get((dy, dx), np.float32(0))
 
-    def divided(a, b):
+    def divided(a: Any, b: Any) -> np.ndarray:
         return np.divide(a, b, where=b > 0, out=np.zeros_like(diagonal))
 
     grounded = diagonal - sum(ties.values()) > GROUNDED * diagonal
@@ -119,7 +124,7 @@ def _prolongation(ties, diagonal, live):
     height, width = live.shape
     odd_row, odd_column = np.arange(height)[:, None] % 2 == 1, np.arange(width) % 2 == 1
 
-    def near(values, dy, dx):
+    def near(values: np.ndarray, dy: int, dx: int) -> np.ndarray:
         return _part(_padded(values[None]), (dy, dx))[0]
 
     between = {
@@ -143,14 +148,14 @@ def _prolongation(ties, diagonal, live):
 
 
 def _coarser(fine: _Grid) -> _Grid:
-    def answer(values):
+    def answer(values: np.ndarray) -> np.ndarray:
         return -_restricted(fine, _missing(fine, _padded(_prolonged(fine, values)), 0.0))
 
     weights, diagonal = _galerkin(fine.shape, answer)
     return _Grid(weights, np.maximum(diagonal, 0))
 
 
-def _unbalanced(solution, across, down) -> np.ndarray:
+def _unbalanced(solution: np.ndarray, across: np.ndarray, down: np.ndarray) -> np.ndarray:
     """What flows into each pixel (N, H, W). By differences: a diagonal that is rounded would leak like a ground."""
     values = _inner(solution)
     flow = np.zeros_like(values)
@@ -163,7 +168,7 @@ def _unbalanced(solution, across, down) -> np.ndarray:
     return flow
 
 
-def _cycle(grids, right, solved: int, iterations: int, twice: int = 0) -> np.ndarray:
+def _cycle(grids: list[_Grid], right: np.ndarray, solved: int, iterations: int, twice: int = 0) -> np.ndarray:
     """An approximate solution (N, H, W), by a cycle over these grids.
 
     solved: which of them conjugate gradients solve in so many iterations; none if it is 0 or less
@@ -188,7 +193,7 @@ def _cycle(grids, right, solved: int, iterations: int, twice: int = 0) -> np.nda
     return _inner(values)
 
 
-def _conjugate_gradients(grids, right, iterations: int) -> np.ndarray:
+def _conjugate_gradients(grids: list[_Grid], right: np.ndarray, iterations: int) -> np.ndarray:
     solution, residual, direction = np.zeros_like(right), right, np.zeros_like(right)
     before = np.zeros((len(right), 1, 1), np.float32)
     for _ in range(iterations):
@@ -203,15 +208,15 @@ def _conjugate_gradients(grids, right, iterations: int) -> np.ndarray:
     return solution
 
 
-def _dot(one, other):
+def _dot(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return (one * other).sum(axis=(1, 2), keepdims=True)
 
 
-def _ratio(a, b):
+def _ratio(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.divide(a, b, out=np.zeros_like(a), where=b > 0)
 
 
-def _prolonged(grid: _Grid, coarse) -> np.ndarray:
+def _prolonged(grid: _Grid, coarse: np.ndarray) -> np.ndarray:
     total = np.zeros((len(coarse), *grid.shape), np.float32)
     for (b, a), weights in grid.takes.items():
         stopping.check()
@@ -223,7 +228,7 @@ def _prolonged(grid: _Grid, coarse) -> np.ndarray:
     return total
 
 
-def _restricted(grid: _Grid, values) -> np.ndarray:
+def _restricted(grid: _Grid, values: np.ndarray) -> np.ndarray:
     """The transpose of _prolonged."""
     height, width = ((n + 1) // 2 for n in grid.shape)
     total = np.zeros((len(values), height + 1, width + 1), np.float32)
@@ -234,7 +239,7 @@ def _restricted(grid: _Grid, values) -> np.ndarray:
     return total[:, :height, :width]
 
 
-def _galerkin(shape, answer):
+def _galerkin(shape: tuple[int, ...], answer: Callable[[np.ndarray], np.ndarray]) -> Any:
     """The next coarser grid's operator: {offset: what a cell gives its neighbour, (h, w)} and its diagonal (h, w).
 
     shape: of the finer grid; answer: gives PᵀAP of values (N, h, w). Coarse cells three apart do not meet in a row of
@@ -258,7 +263,7 @@ def _beyond(size: int, offset: int) -> np.ndarray:
     return (neighbours < 0) | (neighbours >= size)
 
 
-def _smooth(level, solution, right, colours) -> None:
+def _smooth(level: _Grid, solution: np.ndarray, right: np.ndarray, colours: Iterable[Any]) -> None:
     """A Gauss-Seidel sweep over the padded solution, in four colours."""
     height, width = level.shape
     for y, x in colours:
@@ -272,7 +277,7 @@ def _smooth(level, solution, right, colours) -> None:
         np.copyto(own, total * level.inverse[cells], where=level.live[cells])
 
 
-def _missing(level, solution, right) -> np.ndarray:
+def _missing(level: _Grid, solution: np.ndarray, right: Any) -> np.ndarray:
     """What the equations of the live cells of a padded solution still miss, (N, H, W)."""
     stopping.check()
     total = right - level.diagonal * _inner(solution)
@@ -290,7 +295,7 @@ def _inner(padded: np.ndarray) -> np.ndarray:
     return padded[:, 1:-1, 1:-1]
 
 
-def _part(padded: np.ndarray, offset) -> np.ndarray:
+def _part(padded: np.ndarray, offset: tuple[int, int]) -> np.ndarray:
     """The neighbours at an offset (dy, dx) of all cells."""
     dy, dx = offset
     return padded[:, 1 + dy : padded.shape[1] - 1 + dy, 1 + dx : padded.shape[2] - 1 + dx]

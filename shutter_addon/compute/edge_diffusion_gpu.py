@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from ..core.pixels.conductances import cell_side, resistances
+from ..devices.device import Device, Texture
 from ..devices.passes import read_pass
-from .diffusion_gpu import FINISH, NOTHING, Diffusion, operators
+from .diffusion_gpu import FINISH, NOTHING, Diffusion, _Grid, operators
 from .edge_diffusion import CYCLES, SWEEPS, TWICE, first_solved, is_enough
 
 # Where the guide's cells are larger than pixels: the iterations of conjugate gradients in each cycle, first of cycles
@@ -38,12 +40,12 @@ class EdgeDiffusion(Diffusion):
 
     finest = operators("LINKS")
 
-    def __init__(self, device):
+    def __init__(self, device: Device):
         super().__init__(device)
-        self._more = {}
+        self._more: dict[str, Texture] = {}
         self._solved, self._sweeps = 0, 0
 
-    def solve(self, labels: np.ndarray, count: int, guide: np.ndarray, strength: float):
+    def solve(self, labels: np.ndarray, count: int, guide: np.ndarray, strength: float) -> Texture:  # type: ignore[override]  # it has a guide
         """As Diffusion.solve; guide and strength as for diffuse_along_edges. Some pixel has to be fixed, and some free.
         Where the guide's cells are pixels, a number is read back after each cycle: whether it was enough.
 
@@ -56,7 +58,7 @@ class EdgeDiffusion(Diffusion):
         self._device.write(self._grids[0].textures["labels"], np.ascontiguousarray(labels, dtype=np.uint32))
         self._device.write(self._more["resistances"], resistances(guide, strength)[..., None])
         self._list_tiles(labels, 0 if side == 1 else self._solved, anew=True)
-        placed = {"guided": guide.shape[1::-1], "side": side, "resistances": self._more["resistances"]}
+        placed: dict[str, Any] = {"guided": guide.shape[1::-1], "side": side, "resistances": self._more["resistances"]}
         self._run(_LINKS, self._grids[0], "anew", 64, **placed)
         self._start(0)
         self._coarsen()
@@ -79,7 +81,7 @@ class EdgeDiffusion(Diffusion):
         self._more = {}
         super().release()
 
-    def _provide(self, cells) -> None:
+    def _provide(self, cells: tuple[int, int]) -> None:
         """Makes the textures that plain diffusion has not. Those of conjugate gradients are zero: sums go over all of
         them, and passes leave out tiles where nothing is free."""
         grid, finest = self._grids[self._solved], self._grids[0]
@@ -117,7 +119,7 @@ class EdgeDiffusion(Diffusion):
         self._take_up(grid, coarse, "reached")
         self._smooth(grid, sweeps, back=True)
 
-    def _conjugate_gradients(self, grid, iterations: int) -> None:
+    def _conjugate_gradients(self, grid: _Grid, iterations: int) -> None:
         """They go on from the grid's solution."""
         own, more = grid.textures, self._more
         solution, right = own["solution"], own["right"]
@@ -151,10 +153,10 @@ class EdgeDiffusion(Diffusion):
             self._solve_coarsest(grid)
             return
         self._smooth(grid, self._sweeps)
-        self._restrict(grid, *coarser, grid.textures["solution"])
-        self._clear(*coarser, coarser[0].textures["solution"])
+        self._restrict(grid, coarser[0], grid.textures["solution"])
+        self._clear(coarser[0], coarser[0].textures["solution"])
         if index + 1 == self._solved:
-            self._conjugate_gradients(*coarser, iterations)
+            self._conjugate_gradients(coarser[0], iterations)
         else:
             for _ in range(2 if twice > 0 else 1):
                 self._visit(index + 1, iterations, twice - 1)
@@ -162,7 +164,7 @@ class EdgeDiffusion(Diffusion):
         self._run(_ADD, grid, "near", 16, grid.layers, **below, to=grid.textures["solution"], amount=1.0)
         self._smooth(grid, self._sweeps, back=True)
 
-    def _clear(self, grid, values) -> None:
+    def _clear(self, grid: _Grid, values: Texture) -> None:
         self._device.run(_ZERO, (*grid.size, grid.layers), images={"values": values}, size=grid.size)
 
     def _change(self) -> float:
@@ -174,7 +176,7 @@ class EdgeDiffusion(Diffusion):
         self._device.run(_CHANGE, (parts, 1, grid.layers), images=images, size=grid.size, parts=parts)
         return self._device.read(self._more["parts"])[:, :, :parts].max()
 
-    def _dot(self, grid, one, other, place: int) -> None:
+    def _dot(self, grid: _Grid, one: Texture, other: Texture, place: int) -> None:
         parts = min(PARTS, grid.size[0] * grid.size[1])
         images = {"values": one, "right": other, "result": self._more["parts"]}
         self._device.run(_DOT, (parts, 1, grid.layers), images=images, size=grid.size, parts=parts)

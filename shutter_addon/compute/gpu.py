@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
+from typing import Any
+
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
 from ..core.pixels import compositor
-from ..devices.device import Device, NoDeviceError
+from ..devices.device import Device, NoDeviceError, Texture
+from ..devices.passes import Pass
 from . import cpu
 from .composition_passes import (
     EDGES,
@@ -29,15 +33,15 @@ from .matting import Matting
 from .mixing import Mixing
 from .request import Coefficients, Request
 from .tables import moved_tables, padded, table
-from .window import BLOCK, Frames, PackedFrames, Sums, WholeFrames, decoding, open_window
+from .window import BLOCK, PackedFrames, Sums, WholeFrames, Window, decoding, open_window
 
 
-def _extent(window: Sums) -> dict:
+def _extent(window: Sums) -> dict[str, Any]:
     """Constants about running sums that all passes over them have."""
     return {"layers": window.layers, "held": window.stop - window.start, "unit": 1 / window.whole}
 
 
-def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int):
+def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int) -> tuple[Pass, dict[str, Any]]:
     """compose_sums for a table of pieces, and its arguments for Device.run but for the band's.
 
     origin: the position of the window's first frame"""
@@ -56,13 +60,15 @@ def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int):
     }
 
 
-def _from_frames(way: str, window, request: Request, rows: int, origin: int, shortened: bool):
+def _from_frames(
+    way: str, window: Any, request: Request, rows: int, origin: int, shortened: bool
+) -> tuple[Pass, dict[str, Any]]:
     """The pass of another way, and its arguments: as _from_sums.
 
     rows: pieces in the table; shortened: as for way_of"""
     state, direction = request.state, request.direction
     options, source, summed = state.options, window.source, isinstance(window, Sums)
-    given = {"images": {}, "textures": {}, "rows": rows, "direction": direction}
+    given: dict[str, Any] = {"images": {}, "textures": {}, "rows": rows, "direction": direction}
     given["first"], given["last"] = state.open_span
     if summed:
         lowest, decode, edges = window.start, 0, 2 if shortened else 0
@@ -90,11 +96,14 @@ class Solver:
 
     def __init__(self, device: Device):
         self.gave_up = False
-        self._device, self._sent = device, None
+        self._device = device
+        self._sent: Texture | None = None
         self._plain, self._edged = Diffusion(device), EdgeDiffusion(device)
         self._refused: set = set()  # what the device had no room for
 
-    def solve(self, labels: np.ndarray, count: int, guide=None, strength: float = 0.0, *, warm: bool = False):
+    def solve(
+        self, labels: np.ndarray, count: int, guide: Any = None, strength: float = 0.0, *, warm: bool = False
+    ) -> Texture:
         """As Diffusion.solve; along the edges of a guide (EdgeDiffusion.solve) where there are some to follow."""
         edges = follows_edges(labels, guide, strength)
         kind = labels.shape, count, edges
@@ -107,7 +116,7 @@ class Solver:
         self.gave_up = True
         return self._send(cpu.Solver().solve(labels, count, guide, strength))
 
-    def _solved(self, labels: np.ndarray, count: int, guide, strength: float, edges: bool, warm: bool):
+    def _solved(self, labels: np.ndarray, count: int, guide: Any, strength: float, edges: bool, warm: bool) -> Texture:
         self.gave_up = False
         self._free_sent()
         if edges:
@@ -116,16 +125,16 @@ class Solver:
         self._edged.release()
         return self._plain.solve(labels, count, warm=warm)
 
-    def _send(self, coefficients: np.ndarray):
+    def _send(self, coefficients: np.ndarray) -> Texture:
         """Coefficients (N, h, w) as a texture."""
         count, height, width = coefficients.shape
-        self._sent = self._device.texture(width, height, -(-count // 4), "rgba32f")
-        for layer in range(self._sent.size[2]):
+        sent = self._sent = self._device.texture(width, height, -(-count // 4), "rgba32f")
+        for layer in range(sent.size[2]):
             four = coefficients[4 * layer : 4 * layer + 4]
             values = np.zeros((height, width, 4), np.float32)
             values[..., : len(four)] = np.moveaxis(four, 0, -1)
-            self._device.write(self._sent, values, layer)
-        return self._sent
+            self._device.write(sent, values, layer)
+        return sent
 
     def _free_sent(self) -> None:
         if self._sent is not None:
@@ -148,22 +157,22 @@ class GPUCompositor:
     def __init__(self, device: Device):
         self.name = device.name
         self.device = device
-        self._textures: dict[str, object] = {}
+        self._textures: dict[str, Texture] = {}
 
     @property
     def takes_planes(self) -> bool:
         """Whether frames that are planes are quickest to send."""
         return self.device.takes_planes
 
-    def current(self):
+    def current(self) -> AbstractContextManager:
         """A context manager: all other methods are called inside it, on any one thread (Device.current)."""
         return self.device.current()
 
-    def freeing(self):
+    def freeing(self) -> AbstractContextManager:
         """A context manager: what windows, solvers and matting hold is released inside it (Device.freeing)."""
         return self.device.freeing()
 
-    def window(self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4) -> Frames | Sums:
+    def window(self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4) -> Window:
         """A window of `capacity` frames on the device; moved: pictures of it have FrameState.following; shutters: of
         these pictures."""
         return open_window(self.device, source, capacity, moved, shutters)
@@ -180,32 +189,32 @@ class GPUCompositor:
         """What adds up shares of coefficients. What it gives is valid until its next sum."""
         return Mixing(self.device)
 
-    def constant(self, values: np.ndarray):
+    def constant(self, values: np.ndarray) -> Texture:
         """Coefficients (N,) of the whole picture, as a texture of one texel. Valid until the next call."""
         return self._filled("constant", padded(values).astype(np.float32)[:, None, None, :], "rgba32f")
 
-    def labels(self, values: np.ndarray):
+    def labels(self, values: np.ndarray) -> Texture:
         """Labels (H, W) uint16 as a texture r32ui. Valid until the next call."""
         return self._filled("labels", values.astype(np.uint32)[None, ..., None], "r32ui")
 
-    def coefficients(self, handle, count: int) -> np.ndarray:
+    def coefficients(self, handle: Texture, count: int) -> np.ndarray:
         """Coefficients (N, h, w) float32 of `count` shutters, read from a texture of a solver or of `constant`."""
         values = self.device.read(handle)
         return np.moveaxis(values, -1, 1).reshape(-1, *values.shape[1:3])[:count]
 
-    def read(self, drawn) -> np.ndarray:
+    def read(self, drawn: Texture) -> np.ndarray:
         """A picture of `draw` as an array (H, W, 4), top row first: float32, or levels in uint8."""
         picture = self.device.read(drawn)[0]
         return picture if drawn.kind == PICTURE[True] else picture[::-1]
 
-    def over_black(self, drawn) -> np.ndarray:
+    def over_black(self, drawn: Texture) -> np.ndarray:
         """A scene-linear picture of `draw` as Renderer.picture has it of levels."""
         size = drawn.size[:2]
         texture = self._texture("levels", *size, 1, "rgba8")
         self.device.run(LEVELS, size, images={"picture": drawn, "levels": texture}, size=size)
         return self.device.read(texture)[0]
 
-    def draw(self, window, request: Request, coefficients: Coefficients):
+    def draw(self, window: Any, request: Request, coefficients: Coefficients) -> Texture:
         """The picture on the device, premultiplied: a texture array rgba32f of one layer, scene-linear, bottom row
         first; or of levels rgba8, display code values, top row first. It is one of the window's, valid until its next
         picture of the kind.
@@ -244,7 +253,7 @@ class GPUCompositor:
             )
         return picture
 
-    def _draw_moved(self, window: WholeFrames, request: Request, coefficients: Coefficients):
+    def _draw_moved(self, window: WholeFrames, request: Request, coefficients: Coefficients) -> Texture:
         """As `draw`, where shutters follow something: a pass for each texture array of frames, which adds what is seen
         of these to what those before have."""
         state, options, (width, height) = (
@@ -260,7 +269,7 @@ class GPUCompositor:
         mixed = moves.shape[1] - 1
         most = BLOCK // 4 if packed and not shortened else 1
         way, quads = moved_way(options, values[: len(values) - motions], (first, last), motions, mixed, most)
-        given = {"size": (width, height), "top": 0, "height": height}
+        given: dict[str, Any] = {"size": (width, height), "top": 0, "height": height}
         given["block_bits"] = (coefficients.block - 1).bit_length()
         given |= {"first": first, "last": last, "rows": len(values) - 1 - motions, "motions": motions}
         given |= {"seen_first": int(there[0]), "seen_last": int(there[-1]), "parts": len(values) - motions}
@@ -268,7 +277,7 @@ class GPUCompositor:
         # What is left out is read in another's place: what lies in its own may be no number.
         slots = np.where(frames < 0, frames[there[0]], frames) % window.capacity
         sums = "sum", "other sum"
-        picture = window.levels() if request.levels else window.picture
+        picture: Any = window.levels() if request.levels else window.picture
         alpha, decode = window.source.alpha, 0 if packed else decoding(window.transfer, options.light)
         light = LightFormat(decode, alpha == "premultiplied", options.light == "encoded", request.levels)
         for held, stack in window.stacks():
@@ -292,11 +301,11 @@ class GPUCompositor:
             )
             program = composition_of_moved(way, moved, light)
             images["packed_frames"] = stack
-            extent = width, -(-height // (4 * program.defines["QUADS"]))
+            extent = width, -(-height // (4 * int(program.defines["QUADS"])))
             self.device.run(program, extent, textures={**images, "frames": stack}, images=images, **given)
         return picture
 
-    def _texture(self, name: str, width: int, height: int, layers: int, kind: str):
+    def _texture(self, name: str, width: int, height: int, layers: int, kind: str) -> Texture:
         texture = self._textures.get(name)
         if texture is None or texture.size != (width, height, layers):
             if texture is not None:
@@ -304,7 +313,7 @@ class GPUCompositor:
             texture = self._textures[name] = self.device.texture(width, height, layers, kind)
         return texture
 
-    def _filled(self, name: str, values: np.ndarray, kind: str):
+    def _filled(self, name: str, values: np.ndarray, kind: str) -> Texture:
         layers, height, width, _ = values.shape
         texture = self._texture(name, width, height, layers, kind)
         for layer in range(layers):
