@@ -24,7 +24,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from shutter_addon.core.model.effect import Drawings, Region
+from shutter_addon.core.model.effect import Drawings, Moves, Region
 from shutter_addon.core.model.keyframes import Constant
 from shutter_addon.media import PrefetchSource, open_source, tracking
 from shutter_addon.media.cuts import ShotSource
@@ -51,9 +51,8 @@ def scaled(footage: Path, size: tuple[int, int], folder: Path) -> Path:
 
 
 def region(kind: str, aspect: float) -> Region:
-    drawings = Drawings((0.0,), ([np.array(REGIONS[kind])],), ("linear",), aspect)
-    numbers = Constant((0.0, 0.0)), Constant(0.0), Constant(1.0)
-    return Region(kind, 0, Constant(kind), Constant(0.02), drawings, *numbers)
+    drawings = Drawings(kind, (0.0,), ([np.array(REGIONS[kind])],), ("linear",), aspect)
+    return Region(Moves(), kind, 0, Constant(kind), Constant(0.02), drawings)
 
 
 def decode(path: Path, _kind: str) -> dict:

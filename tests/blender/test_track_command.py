@@ -99,8 +99,8 @@ def test_frames_beyond_those_that_are_tracked_stay(track, film, tmp_path, ease):
         recipe_file.load(tmp_path / name).effect(WIDTH / HEIGHT).regions[1] for name in ("recipe.json", "t.json")
     )
     for frame in (1, 2, 3, 4, 8, 9, 10, 11, 12):
-        assert after.location.at(frame) == pytest.approx(before.location.at(frame)), frame
-        assert after.scale.at(frame) == pytest.approx(before.scale.at(frame)), frame
+        assert after.moves.location.at(frame) == pytest.approx(before.moves.location.at(frame)), frame
+        assert after.moves.scale.at(frame) == pytest.approx(before.moves.scale.at(frame)), frame
     if ease == "linear":
         assert [key.frame for key in keys(tmp_path / "t.json")] == [1, 4, 5, 6, 7, 8, 12]
 
@@ -113,10 +113,10 @@ def test_a_redrawn_shape_stays_drawn_as_it_was_and_on_what_it_covers(track, film
     region, before = (recipe_file.load(tmp_path / name).regions[1] for name in ("t.json", "recipe.json"))
     shapes = [each.over_time(1, WIDTH / HEIGHT) for each in (region, before)]
     for frame in range(1, COUNT + 1):
-        after, was = (np.concatenate(shape.unmoved(frame)) for shape in shapes)
+        after, was = (np.concatenate(shape.drawings.at(frame)) for shape in shapes)
         assert after == pytest.approx(was, abs=1e-9)
-        since = motions.centre(shapes[0].unmoved(frame)) - motions.centre(shapes[0].unmoved(5))
-        assert since + shapes[0].location.at(frame) == pytest.approx(expected(frame), abs=1.2 / WIDTH)
+        since = motions.centre(shapes[0].drawings.at(frame)) - motions.centre(shapes[0].drawings.at(5))
+        assert since + shapes[0].moves.location.at(frame) == pytest.approx(expected(frame), abs=1.2 / WIDTH)
 
 
 def test_what_a_keyed_time_shows_is_tracked(track, film, tmp_path):

@@ -17,8 +17,8 @@ def made(bars, regions=(), **options) -> effect.Effect:
 
 
 def region(strokes, placement=None, name="Face") -> effect.Region:
-    drawings = effect.Drawings((1.0,), (strokes,), ("linear",), 1.0, placement)
-    return effect.Region(name, 0, *map(Constant, ("line", 0.1)), drawings, *map(Constant, ((0, 0), 0.0, 1.0)))
+    drawings = effect.Drawings(name, (1.0,), (strokes,), ("linear",), 1.0, placement)
+    return effect.Region(effect.Moves(), name, 0, Constant("line"), Constant(0.1), drawings)
 
 
 def test_an_error_among_samples_is_raised_at_its_frame_alone():
@@ -42,15 +42,14 @@ def changed(**channels) -> effect.Effect:
     )
     strokes, placement = ([np.array([[0.1, 0.2], [0.5, 0.9]])], [np.zeros((2, 2))]), channels.pop("placement", None)
     frames = channels.pop("drawn", (1.0,))
-    drawings = effect.Drawings(frames, strokes[: len(frames)], ("linear",) * len(frames), 1.0, placement)
-    numbers = {"kind": "line", "width": 0.1, "location": (0, 0), "rotation": 0.0, "scale": 1.0}
-    scribble = {name: channels.pop(name, Constant(value)) for name, value in numbers.items()}
+    drawings = effect.Drawings("Face", frames, strokes[: len(frames)], ("linear",) * len(frames), 1.0, placement)
+    numbers = {name: channels.pop(name) for name in ("location", "rotation", "scale") if name in channels}
+    kind, width = (channels.pop(name, Constant(value)) for name, value in (("kind", "line"), ("width", 0.1)))
     ramp = Constant(mattes.Ramp("linear", (0, 0), 0.0, 1.0))
     matte = {"content": ramp, "opacity": Constant(1.0), "feather": Constant(0.0)} | channels
-    moves = {name: Constant(numbers[name]) for name in ("location", "rotation", "scale")}
     regions = (
-        effect.Region("Face", 0, drawings=drawings, **scribble),
-        effect.MatteRegion("Sky", 0, blend="over", invert=False, **matte, **moves),
+        effect.Region(effect.Moves(**numbers), "Face", 0, kind, width, drawings),
+        effect.MatteRegion(effect.Moves(), "Sky", 0, blend="over", invert=False, **matte),
     )
     return effect.Effect((effect.Shutter("Sharp", (1, 1, 1), Bars(bars)),), regions, options, edge_aware=edge_aware)
 
@@ -58,7 +57,7 @@ def changed(**channels) -> effect.Effect:
 def test_the_state_of_a_still_effect_is_made_once():
     still = changed(placement=Constant(np.eye(3)))
     assert still.at(1) is still.at(3.5)
-    placed = effect.PlacedRamp("linear", *map(Constant, ((0, 0), 0.0, 1.0)))
+    placed = effect.PlacedRamp("linear", effect.Moves())
     assert (ramped := changed(content=placed)).at(1) is ramped.at(3.5)
     closed = changed(bars=Constant(0 * FIRST))
     for frame in (1, 3):
@@ -80,7 +79,7 @@ def test_the_state_of_a_still_effect_is_made_once():
         {"drawn": (1.0, 5.0)},
         {"placement": Samples({1: np.eye(3), 3: np.diag([0.5, 0.5, 1])})},
         {"content": Samples({i: mattes.Ramp("linear", (i, 0), 0.0, 1.0) for i in (1, 3)})},
-        {"content": effect.PlacedRamp("linear", Constant((0, 0)), keyed(0.0, 90.0), Constant(1.0))},
+        {"content": effect.PlacedRamp("linear", effect.Moves(rotation=keyed(0.0, 90.0)))},
         {"opacity": keyed(1.0, 0.5)},
         {"feather": keyed(0.0, 0.5)},
     ],

@@ -9,7 +9,7 @@ import pytest
 from test_tracking import ASSETS, HEIGHT, MIDDLE, PIXEL, SIZE, WIDTH, Film, ellipse, still, warped
 
 from shutter_addon.core.model import motions
-from shutter_addon.core.model.effect import STILL_CAMERA, Camera, Drawings, Region
+from shutter_addon.core.model.effect import STILL_CAMERA, Camera, Drawings, Moves, Region
 from shutter_addon.core.model.keyframes import Constant, Keys
 from shutter_addon.core.model.motions import Placement, Similarity
 from shutter_addon.media import camera_tracking, open_source, pursuit, tracking
@@ -59,9 +59,9 @@ def lasso(count):
     points = MIDDLE + RADII[0] * np.cos(turns) + 1j * RADII[1] * np.sin(turns)
     shape = np.stack([points.real / WIDTH, 1 - points.imag / HEIGHT], axis=1)
     way = [(VELOCITY * (n - count / 2) / WIDTH, 0.0) for n in (0, count)]
-    drawings = Drawings((0.0,), ([shape],), ("linear",), WIDTH / HEIGHT)
+    drawings = Drawings("subject", (0.0,), ([shape],), ("linear",), WIDTH / HEIGHT)
     location = Keys((0, count), tuple(way), ("linear", "linear"))
-    return Region("subject", 0, Constant("lasso"), Constant(0.0), drawings, location, Constant(0.0), Constant(1.0))
+    return Region(Moves(location), "subject", 0, Constant("lasso"), Constant(0.0), drawings)
 
 
 def tracked(source, regions=(), start=0, camera=STILL_CAMERA, **options):
@@ -177,10 +177,10 @@ def test_it_goes_on_from_where_it_is_and_meets_a_key_that_is_right():
     truth = film(11)[1]
     start, key = Placement((0.1, -0.2), 30.0, 2.0), Placement((0.1, 0.1), 30.0, 2.0)
     keys = [Keys((2, 10), ends, ("linear",) * 2) for ends in zip(*map(numbers, (start, key)), strict=True)]
-    found, _ = tracked(film(11)[0], start=2, camera=Camera(*keys), anchors=[10])
+    found, _ = tracked(film(11)[0], start=2, camera=Camera(Moves(*keys)), anchors=[10])
     assert (found[2].placement, found[10].placement) == (start, key)
     assert error(found, truth, 2, 3) > 5, "which has to come to the key"
-    free, _ = tracked(film(11)[0], start=2, camera=Camera(*keys))
+    free, _ = tracked(film(11)[0], start=2, camera=Camera(Moves(*keys)))
     assert max(error(free, truth, 2, n) for n in free) < 0.15
 
 
@@ -193,8 +193,8 @@ ALL = [np.array([(-1, -1), (2, -1), (2, 2), (-1, 2)])]
 
 
 def everywhere():
-    drawings = Drawings((0.0,), (ALL,), ("linear",), WIDTH / HEIGHT)
-    return Region("all", 0, *map(Constant, ("lasso", 0.0)), drawings, *map(Constant, ((0.0, 0.0), 0.0, 1.0)))
+    drawings = Drawings("all", (0.0,), (ALL,), ("linear",), WIDTH / HEIGHT)
+    return Region(Moves(), "all", 0, Constant("lasso"), Constant(0.0), drawings)
 
 
 @pytest.mark.parametrize(

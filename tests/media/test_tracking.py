@@ -11,7 +11,7 @@ import pytest
 
 from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.core.model import motions, scribbles
-from shutter_addon.core.model.effect import Drawings, Region
+from shutter_addon.core.model.effect import Drawings, Moves, Region
 from shutter_addon.core.model.keyframes import Constant, Keys
 from shutter_addon.core.model.motions import Similarity
 from shutter_addon.media import open_source, pursuit, tracking
@@ -110,9 +110,9 @@ def strokes(kind):
 
 
 def region(kind, *, drawn=None, location=(0.0, 0.0)):
-    drawings = Drawings((0.0,), (strokes(kind) if drawn is None else drawn,), ("linear",), WIDTH / HEIGHT)
+    drawings = Drawings("r", (0.0,), (strokes(kind) if drawn is None else drawn,), ("linear",), WIDTH / HEIGHT)
     location = location if hasattr(location, "at") else Constant(location)
-    return Region("r", 0, Constant(kind), Constant(0.02), drawings, location, Constant(0.0), Constant(1.0))
+    return Region(Moves(location), "r", 0, Constant(kind), Constant(0.02), drawings)
 
 
 def followed(source, kind, start, frames=None, **options):
@@ -319,13 +319,13 @@ def test_between_two_keys_both_count(subject, ground):
 def test_a_shape_that_is_redrawn_meanwhile_stays_on_its_subject(subject, ease):
     """A still film: the shape's own way from drawing to drawing is made up for."""
     drawn = [stroke + shift for shift in ((0, 0), (0.15, 0.05)) for stroke in strokes("lasso")]
-    drawings = Drawings((2.0, 9.0), (drawn[:1], drawn[1:]), (ease,) * 2, WIDTH / HEIGHT)
+    drawings = Drawings("r", (2.0, 9.0), (drawn[:1], drawn[1:]), (ease,) * 2, WIDTH / HEIGHT)
     given = replace(region("lasso"), drawings=drawings)
     source = Film([subject if n not in (4, 5) else subject[:, ::-1] for n in range(10)])
     tracked, _ = followed(source, "lasso", 2, region=given)
     assert sure(tracked) == set(range(10)) - {4, 5}
     for frame, each in tracked.items():
-        off = motions.centre(given.unmoved(frame)) + each.placement.location - motions.centre(drawn[:1])
+        off = motions.centre(given.drawings.at(frame)) + each.placement.location - motions.centre(drawn[:1])
         assert np.hypot(*(off * SIZE)) / PIXEL <= 0.5
 
 

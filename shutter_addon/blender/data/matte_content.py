@@ -22,14 +22,12 @@ from .validation import EffectError
 
 def content(effect, strip, region, moves, frames, time: keyframes.Channel | None) -> keyframes.Channel:
     """The channel of a matte or a ramp, sampled at timeline frames; strip: the effect strip that shows it, moves:
-    channels of the region's location, rotation and scale, time: see core.model.effect.Effect. EffectError,
-    MediaError: there is none."""
+    the region's, time: see core.model.effect.Effect. EffectError, MediaError: there is none."""
     scene = effect.id_data
     if region.kind == "RAMP":
         ramp = validation.word(region, "ramp")
         if ramp != "LUMINANCE":
-            location, rotation, scale = moves
-            return PlacedRamp(kind=ramp.lower(), location=location, rotation=rotation, scale=scale)
+            return PlacedRamp(ramp.lower(), moves)
         return mattes.FileFrames(file=_of_strip(strips.source_of(scene, effect, strip), "luminance"))
     matte = validation.word(region, "matte")
     if matte == "STRIP":

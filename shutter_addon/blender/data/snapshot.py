@@ -170,7 +170,7 @@ def strokes_at(scene, effect, strip, index: int, frame: float) -> list[np.ndarra
     if effect.regions[index].kind in strips.MATTES:
         return []
     with translated(rpt_):
-        return region_at(scene, effect, strip, index, (frame,)).unmoved(frame)
+        return region_at(scene, effect, strip, index, (frame,)).drawings.at(frame)
 
 
 def region_at(scene, effect, strip, index: int, frames) -> model.Region | model.MatteRegion:
@@ -377,7 +377,6 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
     if faults := [value for value in (content, blend) if isinstance(value, UserError)]:
         content, blend = keyframes.Constant(faults[0]), "OVER"
     opacity, feather = (_channel(curves, region, path, name, frames) for name in ("opacity", "feather"))
-    location, rotation, scale = moves
     return model.MatteRegion(
         name=region.name,
         shutter=shutter,
@@ -386,41 +385,35 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
         invert=region.invert,
         opacity=opacity,
         feather=feather,
-        location=location,
-        rotation=rotation,
-        scale=scale,
+        moves=moves,
     )
 
 
 def _region(sampling: _Sampling, path: str, region, shutter: int) -> model.Region:
     curves, frames = sampling.curves, sampling.frames
-    location, rotation, scale = _moves(curves, region, path, frames)
     return model.Region(
         name=region.name,
         shutter=shutter,
         kind=keyframes.Constant(_tried(lambda: validation.word(region, "kind").lower())),
         width=_channel(curves, region, path, "width", frames),
         drawings=_drawings(curves, path, sampling.effect, region, sampling.placement, frames),
-        location=location,
-        rotation=rotation,
-        scale=scale,
+        moves=_moves(curves, region, path, frames),
         opacity=_channel(curves, region, path, "opacity", frames),
     )
 
 
 def _camera(curves: Curves, effect, frames) -> model.Camera:
     path = effect.camera.path_from_id()
-    location, rotation, scale = _moves(curves, effect.camera, path, frames)
     influence = _channel(curves, effect.camera, path, "influence", frames)
-    return model.Camera(location=location, rotation=rotation, scale=scale, influence=influence)
+    return model.Camera(_moves(curves, effect.camera, path, frames), influence)
 
 
-def _moves(curves: Curves, moving, path: str, frames) -> tuple[keyframes.Channel, ...]:
-    """Location, rotation and scale of a region or of the camera."""
-    return (
-        _channel(curves, moving, path, "location", frames),
-        _channel(curves, moving, path, "rotation", frames, np.degrees),
-        _channel(curves, moving, path, "scale", frames),
+def _moves(curves: Curves, moving, path: str, frames) -> model.Moves:
+    """Of a region or of the camera."""
+    return model.Moves(
+        location=_channel(curves, moving, path, "location", frames),
+        rotation=_channel(curves, moving, path, "rotation", frames, np.degrees),
+        scale=_channel(curves, moving, path, "scale", frames),
     )
 
 
@@ -436,6 +429,7 @@ def _drawings(curves: Curves, path: str, effect, region, placement, frames) -> m
     is_curve = timing is not None and not isinstance(timing, EffectError)
     eases = dict(curves.keys([timing])) if is_curve and len(numbers) > 1 else {}
     return model.Drawings(
+        name=region.name,
         frames=numbers,
         strokes=tuple(annotations.strokes_of(drawing) if i in needed else None for i, drawing in enumerate(drawings)),
         eases=tuple(eases.get(number, "linear") for number in numbers),

@@ -57,7 +57,7 @@ def _key(scene, effect, strip, index: int, points: dict[int, Points]) -> None:
     shape = snapshot.region_at(scene, effect, strip, index, points)
     moves = {frame: _motions(points, frame) for frame in known}
     placements = followed(shape, sorted(points), moves, start, size)
-    kept = motions.thinned(placements, motions.offsets(shape.unmoved(start)), size, known)
+    kept = motions.thinned(placements, motions.offsets(shape.drawings.at(start)), size, known)
     frames = range(min(placements), max(placements) + 1)
     confidence = {frame: float(frame in placements) for frame in frames}
     keys.write({frame: placements[frame] for frame in kept}, confidence)
@@ -147,7 +147,7 @@ def _points(scene, effect, strip, index: int, start: int) -> dict[int, Points]:
         raise EffectError(sentence.format(track=name, clip=region.follow_clip.name, frame=start))
     with translated(rpt_):
         shape = snapshot.region_at(scene, effect, strip, index, by_frame)
-        if not all(shape.unmoved(frame) for frame in by_frame):
+        if not all(shape.drawings.at(frame) for frame in by_frame):
             raise EffectError(rpt_('region "{name}" has no strokes').format(name=region.name))
     return by_frame
 

@@ -242,7 +242,7 @@ def unsure_among(effect, index: int | None, frames) -> int:
 
 def _region(scene, effect, strip, index: int, frames, here: Tracked) -> _Subject:
     shape = _standing(snapshot.region_at(scene, effect, strip, index, frames), here)
-    return _Subject(partial(tracking.follow, shape), lambda: motions.offsets(shape.unmoved(here.frame)))
+    return _Subject(partial(tracking.follow, shape), lambda: motions.offsets(shape.drawings.at(here.frame)))
 
 
 def _camera(scene, effect, strip, _index, frames, here: Tracked) -> _Subject:

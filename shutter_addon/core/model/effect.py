@@ -6,7 +6,7 @@ of whoever made it: a recipe's count from 1, Blender's are the edit's timeline f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -24,19 +24,16 @@ _TOO_MANY = 'region "{name}": more than {most} points with those before it'
 _FAR = 'region "{name}": a point of its strokes is nowhere near the picture'
 
 
-class FarStrokeError(ValueError):
-    """A point of a stroke is farther from the picture than any effect has it (limits.MAX_DISTANCE)."""
-
-
 @dataclass(frozen=True)
 class Drawings:
     """A region's strokes over time, before it is moved: drawings at ascending frames, each a list of strokes (n, 2); in
     between every stroke goes from one drawing to the next with the ease of the span.
 
-    aspect: the picture's width over its height
+    name: the region's; aspect: the picture's width over its height
     placement: channel of the matrix (3, 3) from the strokes' space to fractions of the picture, or of None where they
     are not on it; without one, strokes are fractions of the picture"""
 
+    name: str
     frames: tuple[float, ...]
     strokes: tuple
     eases: tuple[keyframes.Ease, ...]
@@ -49,7 +46,7 @@ class Drawings:
         return len(self.frames) < 2 and (self.placement is None or keyframes.are_still(self.placement))
 
     def at(self, frame: float) -> list[np.ndarray]:
-        """Strokes (n, 2) in fractions of the picture. FarStrokeError: a point is nowhere near it."""
+        """Strokes (n, 2) in fractions of the picture. EffectError: a point is nowhere near it (limits.MAX_DISTANCE)."""
         placement = self.placement.at(frame) if self.placement else None
         if not self.frames or (self.placement and placement is None):
             return []
@@ -65,19 +62,59 @@ class Drawings:
     def _on_picture(self, index: int, placement: np.ndarray | None) -> list[np.ndarray]:
         if placement is None:
             return self.strokes[index]
-        placed = [points @ placement[:2, :2].T + placement[:2, 2] for points in self.strokes[index]]
+        placed = [scribbles.mapped(placement, points) for points in self.strokes[index]]
         if not all((np.abs(points) <= limits.MAX_DISTANCE).all() for points in placed):
-            raise FarStrokeError
+            raise EffectError(_FAR, name=self.name)
         return placed
 
 
 @dataclass(frozen=True)
-class Region:
+class Moves:
+    """Channel of where something lies in the picture.
+
+    location: (2,) fractions of the picture; rotation: degrees counter-clockwise; scale: about its centre"""
+
+    location: Channel = field(default=keyframes.Constant((0.0, 0.0)))
+    rotation: Channel = field(default=keyframes.Constant(0.0))
+    scale: Channel = field(default=keyframes.Constant(1.0))
+
+    @property
+    def is_still(self) -> bool:
+        """Whether it is known to lie there at every frame."""
+        return keyframes.are_still(self.location, self.rotation, self.scale)
+
+    def at(self, frame: float) -> Placement:
+        x, y = (float(number) for number in self.location.at(frame))
+        return Placement((x, y), float(self.rotation.at(frame)), float(self.scale.at(frame)))
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What the exposure of a shutter may follow: a part of the picture that moves, or all of it."""
+
+    moves: Moves
+
+    def placement(self, frame: float) -> Placement:
+        """Its keyed numbers at a frame."""
+        return self.moves.at(frame)
+
+    def centre(self, frame: float) -> np.ndarray | None:
+        """The point (2,) about which it is turned and scaled, in fractions of the picture; None: nothing is drawn.
+        EffectError: its strokes are nowhere near the picture."""
+        return np.array([0.5, 0.5])
+
+    def corners(self, frame: float) -> np.ndarray:
+        """Those (4, 2) of the box around it as it lies at a frame, in fractions of the picture; (0, 2): nothing is
+        drawn. EffectError: its strokes are nowhere near the picture."""
+        return motions.PICTURE
+
+
+@dataclass(frozen=True)
+class Region(Subject):
     """A scribble of a shutter that moves.
 
     shutter: index of the shutter; kind: "line" or "lasso", and
     width: of its lines, fraction of the picture's height
-    location: (2,) fractions of the picture; rotation: degrees counter-clockwise; scale: about the shape's centre
     opacity: 0 to 1 (scribbles.layers)"""
 
     name: str
@@ -85,60 +122,33 @@ class Region:
     kind: Channel
     width: Channel
     drawings: Drawings
-    location: Channel
-    rotation: Channel
-    scale: Channel
     opacity: Channel = field(default=keyframes.Constant(1.0))
 
     @property
     def is_still(self) -> bool:
         """Whether it is known to be the same at every frame."""
-        return keyframes.are_still(
-            self.drawings, self.kind, self.width, self.location, self.rotation, self.scale, self.opacity
-        )
+        return keyframes.are_still(self.drawings, self.kind, self.width, self.moves, self.opacity)
 
     def at(self, frame: float) -> scribbles.Shape:
-        location, rotation, scale = (channel.at(frame) for channel in (self.location, self.rotation, self.scale))
-        moved = scribbles.transform(self.unmoved(frame), location, rotation, scale, self.drawings.aspect)
+        placed, strokes = self.placement(frame), self.drawings.at(frame)
+        aspect = self.drawings.aspect
+        moved = scribbles.transform(strokes, placed.location, placed.rotation, placed.scale, aspect)
         kind, width, opacity = (channel.at(frame) for channel in (self.kind, self.width, self.opacity))
         return scribbles.Shape(shutter=self.shutter, kind=kind, width=width, strokes=moved, opacity=float(opacity))
 
-    def placement(self, frame: float) -> Placement:
-        """Its keyed numbers at a frame."""
-        return _placement(self, frame)
-
     def centre(self, frame: float) -> np.ndarray | None:
-        """The point (2,) about which it is turned and scaled, in fractions of the picture; None: nothing is drawn.
-        EffectError: its strokes are nowhere near the picture."""
-        strokes = self.unmoved(frame)
+        strokes = self.drawings.at(frame)
         return motions.centre(strokes) if strokes else None
 
     def corners(self, frame: float) -> np.ndarray:
-        """Those (4, 2) of the box around it as it lies at a frame, in fractions of the picture; (0, 2): nothing is
-        drawn. EffectError: its strokes are nowhere near the picture."""
         strokes = self.at(frame).strokes
         return motions.corners(strokes) if strokes else np.empty((0, 2))
 
-    def unmoved(self, frame: float) -> list[np.ndarray]:
-        """The strokes (n, 2) on the picture at a frame, as they are drawn. EffectError: they are nowhere near it."""
-        return self._near(lambda: self.drawings.at(frame))
-
-    def drawing(self, index: int, frame: float) -> list[np.ndarray]:
-        """The strokes (n, 2) of one of the drawings as they lie on the picture at a frame, not moved yet. EffectError:
-        they are nowhere near it."""
-        return self._near(lambda: self.drawings.drawing(index, frame))
-
-    def _near(self, strokes: Callable[[], list[np.ndarray]]) -> list[np.ndarray]:
-        try:
-            return strokes()
-        except FarStrokeError:
-            raise EffectError(_FAR, name=self.name) from None
-
 
 @dataclass(frozen=True)
-class MatteRegion:
-    """A region whose shutter gets coefficients by a matte. Its numbers are as a Region's, about the picture's centre:
-    they place a ramp, and say of any other matte how what it covers moves.
+class MatteRegion(Subject):
+    """A region whose shutter gets coefficients by a matte. It moves about the picture's centre: that places a ramp, and
+    says of any other matte how what it covers moves.
 
     content: channel of mattes.Content; feather: of mattes.Matte, as blend, invert and opacity"""
 
@@ -149,9 +159,6 @@ class MatteRegion:
     invert: bool
     opacity: Channel
     feather: Channel
-    location: Channel
-    rotation: Channel
-    scale: Channel
 
     @property
     def is_still(self) -> bool:
@@ -170,71 +177,34 @@ class MatteRegion:
             invert=self.invert,
         )
 
-    def placement(self, frame: float) -> Placement:
-        """Its keyed numbers at a frame."""
-        return _placement(self, frame)
-
-    def centre(self, _frame: float) -> np.ndarray:
-        """The picture's (2,), in fractions of it."""
-        return np.array([0.5, 0.5])
-
-    def corners(self, _frame: float) -> np.ndarray:
-        """The picture's (4, 2), in fractions of it."""
-        return motions.PICTURE
-
 
 @dataclass(frozen=True)
 class PlacedRamp:
     """Channel of a ramp (mattes.Ramp) that is moved by keys."""
 
     kind: mattes.RampKind
-    location: Channel
-    rotation: Channel
-    scale: Channel
+    moves: Moves
 
     @property
     def is_still(self) -> bool:
         """Whether it is known to be the same at every frame."""
-        return keyframes.are_still(self.location, self.rotation, self.scale)
+        return self.moves.is_still
 
     def at(self, frame: float) -> mattes.Ramp:
-        placed = _placement(self, frame)
+        placed = self.moves.at(frame)
         return mattes.Ramp(kind=self.kind, location=placed.location, rotation=placed.rotation, scale=placed.scale)
 
 
 @dataclass(frozen=True)
-class Camera:
-    """How what the camera sees moves in the picture, about the picture's centre; its numbers are as a Region's.
+class Camera(Subject):
+    """How what the camera sees moves in the picture, about the picture's centre.
 
     influence: 0 to 1, what is left of the exposure that follows it: at 0 the shown frame alone"""
 
-    location: Channel
-    rotation: Channel
-    scale: Channel
     influence: Channel = field(default=keyframes.Constant(1.0))
 
-    def placement(self, frame: float) -> Placement:
-        """Its keyed numbers at a frame."""
-        return _placement(self, frame)
 
-    def centre(self, _frame: float) -> np.ndarray:
-        """The point (2,) about which it is turned and scaled, in fractions of the picture."""
-        return np.array([0.5, 0.5])
-
-    def corners(self, _frame: float) -> np.ndarray:
-        """The picture's (4, 2), in fractions of it."""
-        return motions.PICTURE
-
-
-STILL_CAMERA = Camera(
-    location=keyframes.Constant((0.0, 0.0)), rotation=keyframes.Constant(0.0), scale=keyframes.Constant(1.0)
-)
-Subject = Region | MatteRegion | Camera  # what the exposure of a shutter may follow
-
-
-def _placement(moving: Region | MatteRegion | PlacedRamp | Camera, frame: float) -> Placement:
-    x, y = (float(number) for number in moving.location.at(frame))
-    return Placement((x, y), float(moving.rotation.at(frame)), float(moving.scale.at(frame)))
+STILL_CAMERA = Camera(Moves())
 
 
 @dataclass(frozen=True)

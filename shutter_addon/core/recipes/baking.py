@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..model import keyframes, limits
-from ..model.effect import Camera, Effect, MatteRegion, Region, Shutter
+from ..model.effect import Effect, MatteRegion, Region, Shutter, Subject
 from ..model.frame_state import Interpolation
 from ..model.keyframes import Channel, Ease, Samples
 from . import recipe, recipe_file
@@ -208,16 +208,17 @@ def _matte(
     )
 
 
-def _camera(moving: Camera | MatteRegion, shown: range) -> list[recipe.CameraKey]:
+def _camera(moving: Subject, shown: range) -> list[recipe.CameraKey]:
     keys = _move_keys(moving, {}, shown)
     return [recipe.CameraKey(ease=ease, **_placed(moving, frame, shown)) for frame, ease in keys]
 
 
-def _move_keys(moving: Region | MatteRegion | Camera, words: Mapping[float, Ease], shown: range) -> _Eased:
+def _move_keys(moving: Subject, words: Mapping[float, Ease], shown: range) -> _Eased:
     """Frames and eases of the keys of location, rotation and scale; words: see _keys."""
-    moves = [channel for channel in (moving.location, moving.rotation, moving.scale) if isinstance(channel, Samples)]
+    moves = moving.moves.location, moving.moves.rotation, moving.moves.scale
+    sampled = [channel for channel in moves if isinstance(channel, Samples)]
     eases: dict[float, Ease] = {}
-    for channel in moves:
+    for channel in sampled:
         eases = dict(channel.keys) | eases
     frames = eases.keys() | words.keys()
 
@@ -236,15 +237,15 @@ def _move_keys(moving: Region | MatteRegion | Camera, words: Mapping[float, Ease
     def still(frame: float, held: float) -> bool:
         return fits(held, held, frame, 0)
 
-    return _keys(fits, still, eases.items(), sorted(frames), words, shown) if frames or moves else []
+    return _keys(fits, still, eases.items(), sorted(frames), words, shown) if frames or sampled else []
 
 
-def _place(moving: Region | MatteRegion | Camera, frame: float) -> np.ndarray:
-    (x, y), rotation, scale = (channel.at(frame) for channel in (moving.location, moving.rotation, moving.scale))
-    return np.array([x, y, rotation, scale])
+def _place(moving: Subject, frame: float) -> np.ndarray:
+    placed = moving.placement(frame)
+    return np.array([*placed.location, placed.rotation, placed.scale])
 
 
-def _placed(moving: Region | MatteRegion | Camera, frame: float, shown: range) -> dict[str, Any]:
+def _placed(moving: Subject, frame: float, shown: range) -> dict[str, Any]:
     """The frame, location, rotation and scale of a key, as a recipe has them."""
     x, y, rotation, scale = _place(moving, frame)
     location, degrees = (_short(x), _short(y)), _short_degrees(rotation)
@@ -255,7 +256,7 @@ def _drawings(region: Region, frame: float) -> dict[float, list[recipe.Stroke]]:
     """A region's strokes by the frames they were drawn at, from the first that has any, as they lie at a frame."""
     result: dict[float, list[recipe.Stroke]] = {}
     for index, number in enumerate(region.drawings.frames):
-        strokes = region.drawing(index, frame)
+        strokes = region.drawings.drawing(index, frame)
         if strokes or result:
             result[number] = [[(x, y) for x, y in np.round(points, 6).tolist()] for points in strokes]
     return result

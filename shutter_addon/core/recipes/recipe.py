@@ -116,13 +116,11 @@ class CameraKey:
     ease: Ease = "linear"
 
 
-def _moves(keys: list[RegionKey] | list[CameraKey]) -> dict[str, keyframes.Channel]:
-    """Channels of location, rotation and scale."""
-    names = "location", "rotation", "scale"
+def _moves(keys: list[RegionKey] | list[CameraKey]) -> effect.Moves:
     if not keys:
-        return dict(zip(names, map(keyframes.Constant, ((0.0, 0.0), 0.0, 1.0)), strict=True))
-    frames, eases, *moves = _columns(keys, "frame", "ease", *names)
-    return {name: keyframes.Keys(frames, values, eases) for name, values in zip(names, moves, strict=True)}
+        return effect.Moves()
+    frames, eases, *numbers = _columns(keys, "frame", "ease", "location", "rotation", "scale")
+    return effect.Moves(*(keyframes.Keys(frames, values, eases) for values in numbers))
 
 
 @dataclass(frozen=True)
@@ -150,6 +148,7 @@ class Region:
         """As plain data, for a picture of width / height = aspect; shutter: the index of its shutter."""
         drawn = self.drawings()
         drawings = effect.Drawings(
+            name=self.name,
             frames=tuple(key.frame if key else 0.0 for key, _ in drawn),
             strokes=tuple([np.asarray(stroke, float) for stroke in strokes] for _, strokes in drawn),
             eases=tuple(key.ease if key else "linear" for key, _ in drawn),
@@ -161,8 +160,8 @@ class Region:
             kind=keyframes.Constant(self.kind),
             width=keyframes.Constant(self.width),
             drawings=drawings,
+            moves=_moves(self.keys),
             opacity=_numbers(self.opacity),
-            **_moves(self.keys),
         )
 
 
@@ -215,7 +214,7 @@ class RampRegion:
         """As plain data; shutter: the index of its shutter, file: the source's luminance."""
         if self.ramp == "luminance":
             return _matte(self, shutter, mattes.FileFrames(file=file))
-        return _matte(self, shutter, effect.PlacedRamp(kind=self.ramp, **_moves(self.keys)))
+        return _matte(self, shutter, effect.PlacedRamp(self.ramp, _moves(self.keys)))
 
 
 def _matte(region: MatteRegion | RampRegion, shutter: int, content: keyframes.Channel) -> effect.MatteRegion:
@@ -227,7 +226,7 @@ def _matte(region: MatteRegion | RampRegion, shutter: int, content: keyframes.Ch
         invert=region.invert,
         opacity=_numbers(region.opacity),
         feather=_numbers(region.width),
-        **_moves(region.keys),
+        moves=_moves(region.keys),
     )
 
 
@@ -284,7 +283,7 @@ class Recipe:
             else region.over_time(order[region.shutter], files(region))
             for region in self.regions
         )
-        camera = effect.Camera(influence=_numbers(self.camera_influence), **_moves(self.camera))
+        camera = effect.Camera(_moves(self.camera), _numbers(self.camera_influence))
         followed: dict[str | None, effect.Subject | None] = {region.name: region for region in regions}
         followed |= {CAMERA: camera, None: None}
         return effect.Effect(
