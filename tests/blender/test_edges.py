@@ -3,6 +3,7 @@
 import json
 
 import cv2
+import exact_diffusion
 import numpy as np
 import pytest
 from standin import between
@@ -11,7 +12,7 @@ from support import picture_of, read_picture, recipe, request, state, write_fram
 from shutter_addon.compute.guide import Guides, guiding
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import scribbles
-from shutter_addon.core.pixels import compositor, exact_diffusion
+from shutter_addon.core.pixels import compositor
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import MediaError, inbetween, open_source
 

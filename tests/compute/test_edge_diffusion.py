@@ -4,12 +4,12 @@ from pathlib import Path
 
 import av
 import cv2
+import exact_diffusion
 import numpy as np
 import pytest
 
 from shutter_addon.compute import cpu, edge_diffusion, gpu
 from shutter_addon.core.model.scribbles import Shape, rasterise
-from shutter_addon.core.pixels import exact_diffusion
 
 LEVEL = 1 / 255
 ASSETS = Path(__file__).parents[2] / "assets"

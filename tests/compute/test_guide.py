@@ -1,5 +1,6 @@
 """Guides of edge-aware diffusion, and what a renderer reads and keeps for them."""
 
+import exact_diffusion
 import numpy as np
 import pytest
 from scipy import ndimage
@@ -14,7 +15,7 @@ from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.core.model.scribbles import Shape
-from shutter_addon.core.pixels import compositor, exact_diffusion
+from shutter_addon.core.pixels import compositor
 from shutter_addon.media import MediaError
 from shutter_addon.media.cuts import ShotSource
 

@@ -2,10 +2,10 @@
 
 import math
 
+import exact_diffusion
 import numpy as np
 import pytest
 
-from shutter_addon.core.pixels import exact_diffusion
 from shutter_addon.core.pixels.conductances import conductances, resistances
 
 

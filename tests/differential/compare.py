@@ -93,8 +93,9 @@ def matte_file(folder: Path, source, region):
 def exact_coefficients(case: Case, source, footage, index: int) -> np.ndarray:
     """The reference's; along edges the core's own, of the guide that the product has, as that is no matter of
     precision."""
+    import exact_diffusion
+
     from shutter_addon.compute.guide import Guides, guiding
-    from shutter_addon.core.pixels import exact_diffusion
 
     recipe, size = json.loads(case.recipe), (source.width, source.height)
     strength = number_at(recipe.get("edge_aware", 0), case.frame)
@@ -242,5 +243,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(ROOT))
+    sys.path[:0] = str(ROOT), str(ROOT / "tests")
     sys.exit(main())

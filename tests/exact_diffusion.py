@@ -1,10 +1,12 @@
-"""The coefficients that every solver is compared with: one sparse direct solve, in float64. It needs SciPy."""
+"""The coefficients that every solver is compared with: one sparse direct solve, in float64."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import coo_matrix, diags
+from scipy.sparse.linalg import splu
 
-from .conductances import conductances
+from shutter_addon.core.pixels.conductances import conductances
 
 
 def solve(labels: np.ndarray, count: int, guide: np.ndarray | None = None, strength: float = 0.0) -> np.ndarray:
@@ -13,9 +15,6 @@ def solve(labels: np.ndarray, count: int, guide: np.ndarray | None = None, stren
     guide, strength: as for core.pixels.conductances; without a guide all conductances are 1
     Labels without any scribble give the first shutter everywhere.
     """
-    from scipy.sparse import coo_matrix, diags
-    from scipy.sparse.linalg import splu
-
     free = (labels == 0).ravel()
     values = (labels.ravel()[:, None] == np.arange(1, count + 1)).astype(float)
     if free.all():
