@@ -83,7 +83,7 @@ def test_every_key_is_kept_on_demand_and_only_in_those_frames(track, film, tmp_p
     assert {key.scale for key in found} == {1.0}
     # at frame 6, and at those that were not tracked, it is where the keys had put it
     before, after = (
-        recipe_file.load(tmp_path / name).effect(WIDTH / HEIGHT).regions[1].location
+        recipe_file.load(tmp_path / name).effect(WIDTH / HEIGHT).regions[1].moves.location
         for name in ("recipe.json", "t.json")
     )
     for frame in (1, 2, 3, 6, 9, 10, 11, 12):

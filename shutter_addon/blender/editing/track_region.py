@@ -256,17 +256,12 @@ def _camera(scene, effect, strip, _index, frames, here: Tracked) -> _Subject:
 
 def _standing(moving: Region | Camera, here: Tracked) -> Region | Camera:
     """A region or the camera, which is where the editor has put it, keyed or not."""
-    x, y = here.placement.location
-    values = {"location": (x, y), "rotation": here.placement.rotation, "scale": here.placement.scale}
-    channels = {name: getattr(moving, name) for name in values}
-    return replace(
-        moving,
-        **{
-            name: replace(channel, values=channel.values | {here.frame: values[name]})
-            for name, channel in channels.items()
-            if isinstance(channel, Samples)
-        },
-    )
+    sampled = {
+        name: replace(channel, values=channel.values | {here.frame: getattr(here.placement, name)})
+        for name, channel in vars(moving.moves).items()
+        if isinstance(channel, Samples)
+    }
+    return replace(moving, moves=replace(moving.moves, **sampled))
 
 
 def _followed(follow: Callable, patience: float | None) -> Iterator[Tracked | None]:
