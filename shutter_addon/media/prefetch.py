@@ -37,11 +37,6 @@ class PrefetchSource(SourceWrapper):
             self._drop()
             self._wake()
 
-    def ready(self, indices: Iterable[int]) -> bool:
-        """Whether all these frames are decoded, so that `read` does not wait."""
-        with self._changed:
-            return self._done.keys() >= set(indices)
-
     def read(self, index: int) -> np.ndarray:
         """The source's frame, read-only. One that is not decoded yet is decoded next, before all wanted ones.
 

@@ -171,10 +171,3 @@ def test_between_drawings_of_other_point_counts():
     first, alone = scribbles.between_strokes([[[0, 0]], [[0.3, 0.3]]], [[[1, 1]]], 0.25)
     assert first[0] == pytest.approx([0.25, 0.25])
     assert alone[0] == pytest.approx([0.3, 0.3])
-
-
-def test_constraints():
-    mask, values = scribbles.constraints(np.array([[0, 1], [3, 0]], dtype=np.uint16), 3)
-    assert mask.tolist() == [[False, True], [True, False]]
-    assert values[:, 0, 1].tolist() == [1, 0, 0]
-    assert values[:, 1, 0].tolist() == [0, 0, 1]

@@ -119,12 +119,6 @@ def rasterise(shapes: Iterable[Shape], width: int, height: int, *, border: bool 
     return labels
 
 
-def constraints(labels: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Mask (H, W) bool of the fixed pixels, and their values (count, H, W) float32: 1 for the own shutter."""
-    values = (labels[None] == np.arange(1, count + 1, dtype=labels.dtype)[:, None, None]).astype(np.float32)
-    return labels != FREE, values
-
-
 def _draw(labels: np.ndarray, points: np.ndarray, radius: float, label: int) -> None:
     """Labels the pixels within `radius` of a polyline in pixels, y down."""
     radius = max(radius, _MIN_RADIUS)
