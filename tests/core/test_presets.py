@@ -36,8 +36,11 @@ def test_gaussian_and_trail_by_their_definitions():
     assert t[25] == pytest.approx(np.exp(-1))
 
 
-def test_parameters_override_the_presets_own():
+def test_presets_have_parameters_of_their_own():
     assert presets.bars("STUTTER", 6).tolist() == [1, 0, 0, 0, 1, 0]
-    assert presets.bars("STUTTER", 6, every=2).tolist() == [1, 0, 1, 0, 1, 0]
+    assert presets.bars("CUTS", 8).tolist() == [1, 0, 1, 0, 1, 0, 1, 0]
+    assert presets.bars("ANGLE_90", 8).tolist() == [1, 1, 0, 0, 0, 0, 0, 0]
+    assert presets.bars("FIRST", 3).tolist() == [1, 0, 0]
+    assert presets.bars("LAST", 3).tolist() == [0, 0, 1]
     with pytest.raises(KeyError):
         presets.bars("NOPE", 6)

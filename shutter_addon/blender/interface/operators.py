@@ -195,7 +195,7 @@ def _presets(_self, _context):
     """With icons, which exist only once the extension is registered; Blender needs the list kept."""
     _preset_items[:] = [
         (name, label, description, icons.of(name), i)
-        for i, (name, (label, description, _make, _defaults)) in enumerate(presets.PRESETS.items())
+        for i, (name, (label, description, _make)) in enumerate(presets.PRESETS.items())
     ]
     return _preset_items
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -58,38 +59,29 @@ def stutter(window: int, every: int = 4) -> np.ndarray:
     return (np.arange(window) % every == 0).astype(float)
 
 
-def first(window: int) -> np.ndarray:
-    """The first frame: with `last` along two edges, a rolling shutter (paper Figure 11)."""
-    return still(window, 0)
-
-
-def last(window: int) -> np.ndarray:
-    """The last frame of the window."""
-    return still(window, window - 1)
-
-
-# name: (label, description, function, parameters). "Custom" is no preset: it is whatever the bars are.
-PRESETS: dict[str, tuple[str, str, Callable[..., np.ndarray], dict[str, float]]] = {
-    "STILL": ("Still Frame", "One sharp frame", still, {}),
-    "ANGLE_45": ("45°", "Open for an eighth of the frames", angle, {"degrees": 45.0}),
-    "ANGLE_90": ("90°", "Open for a quarter of the frames", angle, {"degrees": 90.0}),
-    "ANGLE_180": ("180°", "Open for half of the frames, as film cameras are", angle, {"degrees": 180.0}),
-    "ANGLE_270": ("270°", "Open for three quarters of the frames", angle, {"degrees": 270.0}),
-    "ANGLE_360": ("360°", "Open for all frames", angle, {"degrees": 360.0}),
-    "TWO_CUTS": ("Two Cuts", "Two frames on top of each other", cuts, {"count": 2}),
-    "CUTS": ("Four Cuts", "Four frames on top of each other", cuts, {"count": 4}),
-    "RAMP_UP": ("Ramp Up", "Opens from frame to frame: a trail with a sharp end", ramp_up, {}),
-    "RAMP_DOWN": ("Ramp Down", "Closes from frame to frame: a trail with a sharp start", ramp_down, {}),
-    "TRIANGLE": ("Triangle", "Opens to the middle frame and closes again", triangle, {}),
-    "GAUSSIAN": ("Gaussian", "A bell curve around the middle frame", gaussian, {}),
-    "TRAIL": ("Exponential Trail", "Fades quickly at first and slowly later on", trail, {}),
-    "STUTTER": ("Stutter", "Every fourth frame, as a strobe lights them", stutter, {"every": 4}),
-    "FIRST": ("First Frame", "The first of the frames alone", first, {}),
-    "LAST": ("Last Frame", "The last of the frames alone", last, {}),
+# name: (label, description, bars of a window). "Custom" is no preset: it is whatever the bars are.
+PRESETS: dict[str, tuple[str, str, Callable[[int], np.ndarray]]] = {
+    "STILL": ("Still Frame", "One sharp frame", still),
+    "ANGLE_45": ("45°", "Open for an eighth of the frames", partial(angle, degrees=45.0)),
+    "ANGLE_90": ("90°", "Open for a quarter of the frames", partial(angle, degrees=90.0)),
+    "ANGLE_180": ("180°", "Open for half of the frames, as film cameras are", angle),
+    "ANGLE_270": ("270°", "Open for three quarters of the frames", partial(angle, degrees=270.0)),
+    "ANGLE_360": ("360°", "Open for all frames", partial(angle, degrees=360.0)),
+    "TWO_CUTS": ("Two Cuts", "Two frames on top of each other", cuts),
+    "CUTS": ("Four Cuts", "Four frames on top of each other", partial(cuts, count=4)),
+    "RAMP_UP": ("Ramp Up", "Opens from frame to frame: a trail with a sharp end", ramp_up),
+    "RAMP_DOWN": ("Ramp Down", "Closes from frame to frame: a trail with a sharp start", ramp_down),
+    "TRIANGLE": ("Triangle", "Opens to the middle frame and closes again", triangle),
+    "GAUSSIAN": ("Gaussian", "A bell curve around the middle frame", gaussian),
+    "TRAIL": ("Exponential Trail", "Fades quickly at first and slowly later on", trail),
+    "STUTTER": ("Stutter", "Every fourth frame, as a strobe lights them", stutter),
+    # Along two edges, these are a rolling shutter (paper Figure 11).
+    "FIRST": ("First Frame", "The first of the frames alone", still),
+    "LAST": ("Last Frame", "The last of the frames alone", lambda window: still(window, window - 1)),
 }
 
 
-def bars(name: str, window: int, **parameters: float) -> np.ndarray:
-    """Bars (L,) of the preset `name`, its own parameters overridden by `parameters`. KeyError: no such preset."""
-    *_words, make, defaults = PRESETS[name]
-    return make(window, **(defaults | parameters))
+def bars(name: str, window: int) -> np.ndarray:
+    """Bars (L,) of the preset `name`. KeyError: no such preset."""
+    _label, _description, make = PRESETS[name]
+    return make(window)
