@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 from support import Like, write_frames
 
-from shutter_addon.core.masks.mask import coverage
-
 AVERAGE = 0.5  # what a picture may differ by, in 8-bit levels: Blender cuts off fractions
 ASTRAY = 0.001  # share of pixels that may differ by more than 8 levels
 FRAMES = 1, 11, 21, 31, 41
@@ -33,7 +31,7 @@ def assert_as_the_strip(bpy, edit, render):
         edit.sequence_editor.strips.new_mask("mask", mask, 1, 1)
         shown = render(edit, frames)
         edit.frame_set(77)
-        found = {f: 255 * coverage(mask_reading.mask_at(mask, mask.frame_start + f - 1), *size) for f in frames}
+        found = {f: 255 * mask_reading.mask_at(mask, mask.frame_start + f - 1).values(*size) for f in frames}
         assert edit.frame_current == 77
         differences = np.array([np.abs(found[f] - shown[f][..., 0]) for f in frames])
         print(f"{differences.mean((1, 2)).max():.3f} on average, {differences.max():.0f} at most")

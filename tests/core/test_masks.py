@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shutter_addon.core.masks import mask_filling, mask_handles
-from shutter_addon.core.masks.mask import MaskLayer, MaskShape, MaskSpline, coverage
+from shutter_addon.core.masks.mask import MaskLayer, MaskShape, MaskSpline
 
 SIZES = [(96, 54), (54, 96), (61, 61)]
 RECTANGLE = ((0.25, 0.35), (0.25, 0.65), (0.75, 0.65), (0.75, 0.35))
@@ -25,7 +25,7 @@ def straight(corners, weight=0.0, **options):
 
 
 def covered(splines, size, **layer):
-    return coverage(MaskShape((MaskLayer(tuple(splines), **layer),)), *size)
+    return MaskShape((MaskLayer(tuple(splines), **layer),)).values(*size)
 
 
 def places(size):
@@ -205,7 +205,7 @@ EVERYWHERE = straight([(-1, -1), (2, -1), (2, 2), (-1, 2)])
 )
 def test_layers_are_blended(blend, value):
     below, above = MaskLayer((EVERYWHERE,), alpha=0.5), MaskLayer((EVERYWHERE,), alpha=0.4, blend=blend)
-    assert coverage(MaskShape((below, above)), 5, 4) == pytest.approx(np.full((4, 5), value), abs=1e-6)
+    assert MaskShape((below, above)).values(5, 4) == pytest.approx(np.full((4, 5), value), abs=1e-6)
 
 
 def test_an_inverted_layer_covers_what_it_did_not():
@@ -217,8 +217,8 @@ def test_an_inverted_layer_covers_what_it_did_not():
 
 def test_sums_stay_between_0_and_1():
     layers = tuple(MaskLayer((EVERYWHERE,), blend=blend) for blend in ("ADD", "ADD", "SUBTRACT"))
-    assert np.array_equal(coverage(MaskShape(layers[:2]), 3, 2), np.ones((2, 3)))
-    assert np.array_equal(coverage(MaskShape(layers), 3, 2), np.zeros((2, 3)))
+    assert np.array_equal(MaskShape(layers[:2]).values(3, 2), np.ones((2, 3)))
+    assert np.array_equal(MaskShape(layers).values(3, 2), np.zeros((2, 3)))
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])

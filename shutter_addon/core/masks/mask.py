@@ -80,16 +80,11 @@ class MaskShape:
     layers: tuple[MaskLayer, ...]
 
     def values(self, width: int, height: int) -> np.ndarray:
-        """As `coverage`."""
-        return coverage(self, width, height)
-
-
-def coverage(mask: MaskShape, width: int, height: int) -> np.ndarray:
-    """What a mask covers of a picture: (height, width) float32, 0 to 1, the top row first."""
-    value = np.zeros((height, width), np.float32)
-    for layer in mask.layers:
-        value = _blend(layer, value, _layer_value(layer, width, height))
-    return np.ascontiguousarray(value[::-1])
+        """What it covers of a picture: (height, width) float32, 0 to 1, the top row first."""
+        value = np.zeros((height, width), np.float32)
+        for layer in self.layers:
+            value = _blend(layer, value, _layer_value(layer, width, height))
+        return np.ascontiguousarray(value[::-1])
 
 
 def _blend(layer: MaskLayer, below: np.ndarray, value: np.ndarray) -> np.ndarray:
