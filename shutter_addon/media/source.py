@@ -12,7 +12,7 @@ from ..core.frames.planes import Planes
 class _Forwarded:
     """An attribute of the wrapped source, unless the wrapper sets its own."""
 
-    def __set_name__(self, _owner: type, name: str) -> None:
+    def __init__(self, name: str):
         self._name = name
 
     def __get__(self, wrapper: "SourceWrapper | None", _owner: type | None = None) -> Any:
@@ -20,23 +20,7 @@ class _Forwarded:
 
 
 class SourceWrapper(FrameSource):
-    """A source around another one. It has the other's attributes and frames, but for those that a subclass sets."""
-
-    path = _Forwarded()
-    files = _Forwarded()
-    width = _Forwarded()
-    height = _Forwarded()
-    count = _Forwarded()
-    fps = _Forwarded()
-    dtype = _Forwarded()
-    transfer = _Forwarded()
-    alpha = _Forwarded()
-    options = _Forwarded()
-    has_audio = _Forwarded()
-    left_out = _Forwarded()
-    step = _Forwarded()
-    shots = _Forwarded()
-    from_proxy = _Forwarded()
+    """A source around another one. It has all attributes and frames of that one, but for those that a subclass sets."""
 
     def __init__(self, source: FrameSource):
         self._source = source
@@ -58,3 +42,7 @@ class SourceWrapper(FrameSource):
 
     def close(self) -> None:
         self._source.close()
+
+
+for _name in (*FrameSource.__annotations__, "files"):
+    setattr(SourceWrapper, _name, _Forwarded(_name))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path
@@ -35,7 +35,7 @@ class ShotFinder(Protocol):
         """Frees the frames that wait for `read`."""
 
 
-class FrameSource(Protocol):
+class FrameSource(ABC):
     """The frames of a movie or of an image sequence; close it, or use it in a `with`.
 
     path: the movie, or the first file of the sequence
@@ -98,6 +98,7 @@ class FrameSource(Protocol):
 
     def close(self) -> None:
         """Closes the file; a later read opens it again."""
+        return
 
     def __enter__(self) -> Self:
         return self
