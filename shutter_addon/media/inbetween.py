@@ -20,7 +20,7 @@ import numpy as np
 from ..core import stopping
 from ..core.farm.claims import Claims
 from ..core.frames.frame_source import FrameSource
-from . import cuts
+from . import cuts, flow
 from .completeness import why_short
 from .errors import MediaError, NotBuiltError
 from .files import check_index
@@ -120,10 +120,7 @@ def build(
             f"in-between frames need the Python package {package}; "
             "install the zip of Virtual Shutter that is made for your system"
         )
-    if between is None:
-        from . import flow
-
-        between = flow.between
+    between = between or flow.between
     cache = InbetweenCache(source, folder, factor, method)
     pairs = _pairs(source, frames) if pairs is None else pairs
     cache.prepare()
@@ -176,10 +173,7 @@ def cost(source: FrameSource, pair: int, method: str, between: Between | None = 
     """About what in-between frames of a source cost, by two that are made of one pair, and written: several pairs at a
     time take hardly less each, as one has all processors already. between: as for `build`. MediaError: they cannot be
     made."""
-    if between is None:
-        from . import flow
-
-        between = flow.between
+    between = between or flow.between
     when = [time.perf_counter()]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "picture.png" if source.dtype.kind == "u" else "picture.exr")

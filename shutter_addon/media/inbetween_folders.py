@@ -33,13 +33,8 @@ from .inbetween_cache import (
 
 READERS = 4  # threads that check pictures before they are removed
 
-
 _KEPT = 64  # folders of which the following is remembered
-
-
 _finished: dict[Path, tuple] = {}  # {folder: (stamp, finished pairs)}
-
-
 _sizes: dict[Path, tuple] = {}  # {folder: (stamp, bytes)}
 
 
