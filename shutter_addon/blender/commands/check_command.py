@@ -24,28 +24,28 @@ from ..output.edit_check import EffectCheck
 from ..output.output_space import Need, in_units
 from ..rendering import render_settings
 from . import command_line
+from .command_line import place
 
 
 def add(commands) -> None:
     parser = commands.add_parser("check", help="find out whether an edit can be rendered here, and what that will take")
-    parser.add_argument("edit", metavar="FILE.blend", type=command_line.place, help="a saved edit")
-    parser.add_argument("--frames", metavar="A:B", help="timeline frames A to B (default: all of the edit)")
-    parser.add_argument(
-        "--output", type=command_line.place, metavar="DIR", help="where the frames are to go: it gets the job's file"
-    )
-    parser.add_argument("--format", choices=tuple(film_output.FORMATS), help="of the frames (default: png)")
-    parser.add_argument("--resume", action="store_true", help="the frames will be rendered with --resume")
-    parser.add_argument(
+    option = parser.add_argument
+    option("edit", metavar="FILE.blend", type=place, help="a saved edit")
+    option("--frames", metavar="A:B", help="timeline frames A to B (default: all of the edit)")
+    option("--output", type=place, metavar="DIR", help="where the frames are to go: it gets the job's file")
+    option("--format", choices=tuple(film_output.FORMATS), help="of the frames (default: png)")
+    option("--resume", action="store_true", help="the frames will be rendered with --resume")
+    option(
         "--movie",
-        type=command_line.place,
+        type=place,
         metavar="FILE",
         help=f"what the frames will be joined to ({', '.join(film_output.MOVIES)})",
     )
-    parser.add_argument(
+    option(
         "--inbetweens-later", action="store_true", help="in-between frames may be missing: they are built after this"
     )
     command_line.add_device(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    option("--json", action="store_true", help="print one JSON object")
     parser.set_defaults(run=run)
 
 

@@ -8,21 +8,21 @@ from ..editing import new_edit, saved_edit
 from ..output import film_output
 from ..rendering import job_snapshots, render_context, render_settings
 from . import command_line
+from .command_line import place
 
 
 def add(commands) -> None:
     parser = commands.add_parser("inbetween", help="build a source's in-between frames, or those that an edit needs")
-    parser.add_argument(
-        "source", type=command_line.place, help="a movie, the first file of an image sequence, or a saved edit (.blend)"
-    )
-    parser.add_argument("--factor", type=int, choices=command_line.FACTORS[1:], help="how many times the source's rate")
-    parser.add_argument("--method", choices=command_line.METHODS, help="of optical flow (default: quick)")
-    parser.add_argument(
+    option = parser.add_argument
+    option("source", type=place, help="a movie, the first file of an image sequence, or a saved edit (.blend)")
+    option("--factor", type=int, choices=command_line.FACTORS[1:], help="how many times the source's rate")
+    option("--method", choices=command_line.METHODS, help="of optical flow (default: quick)")
+    option(
         "--frames",
         metavar="A:B",
         help="source frames A to B, and up to the one behind; 1 is the first; of an edit: its timeline frames",
     )
-    parser.add_argument("--cache", type=command_line.place, metavar="DIR", help="where in-between frames shall lie")
+    option("--cache", type=place, metavar="DIR", help="where in-between frames shall lie")
     parser.set_defaults(run=run)
 
 

@@ -5,18 +5,16 @@ from ..data import missing_media, versions
 from ..editing import saved_edit
 from ..output import film_join, film_output
 from . import command_line
+from .command_line import place
 
 
 def add(commands) -> None:
     parser = commands.add_parser("join", help="make a movie of rendered frames, with the edit's sound and settings")
-    parser.add_argument("folder", metavar="FRAMES", type=command_line.place, help="the folder of the frames")
-    parser.add_argument(
-        "--edit", type=command_line.place, required=True, metavar="FILE.blend", help="what they were rendered from"
-    )
-    parser.add_argument(
-        "--output", type=command_line.place, required=True, help=f"a movie ({', '.join(film_output.MOVIES)})"
-    )
-    parser.add_argument("--frames", metavar="A:B", help="timeline frames A to B (default: all of the edit)")
+    option = parser.add_argument
+    option("folder", metavar="FRAMES", type=place, help="the folder of the frames")
+    option("--edit", type=place, required=True, metavar="FILE.blend", help="what they were rendered from")
+    option("--output", type=place, required=True, help=f"a movie ({', '.join(film_output.MOVIES)})")
+    option("--frames", metavar="A:B", help="timeline frames A to B (default: all of the edit)")
     parser.set_defaults(run=run)
 
 

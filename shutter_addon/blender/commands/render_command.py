@@ -16,38 +16,28 @@ from ..editing import new_edit, saved_edit
 from ..output import film_output, shared_frames
 from ..rendering import render_settings
 from . import command_line, inbetween_command
+from .command_line import place
 
 
 def add(commands) -> None:
     parser = commands.add_parser("render", help="render a source through a recipe, or a saved edit")
-    parser.add_argument(
-        "source", type=command_line.place, help="a movie, the first file of an image sequence, or a saved edit (.blend)"
-    )
-    parser.add_argument("--recipe", type=command_line.place, help="the effect, a JSON file; of a saved edit none")
-    parser.add_argument(
-        "--output", type=command_line.place, help=f"a folder, or a movie ({', '.join(film_output.MOVIES)})"
-    )
-    parser.add_argument(
-        "--format", choices=tuple(film_output.FORMATS), help="of the pictures in a folder: 16-bit png, float exr"
-    )
-    parser.add_argument("--frames", metavar="A:B", help="timeline frames A to B; 1 is the strip's first")
-    parser.add_argument(
-        "--resume",
-        action="store_true",
-        help="of a saved edit: only what is missing, shared with other machines",
-    )
+    option = parser.add_argument
+    option("source", type=place, help="a movie, the first file of an image sequence, or a saved edit (.blend)")
+    option("--recipe", type=place, help="the effect, a JSON file; of a saved edit none")
+    option("--output", type=place, help=f"a folder, or a movie ({', '.join(film_output.MOVIES)})")
+    option("--format", choices=tuple(film_output.FORMATS), help="of the pictures in a folder: 16-bit png, float exr")
+    option("--frames", metavar="A:B", help="timeline frames A to B; 1 is the strip's first")
+    option("--resume", action="store_true", help="of a saved edit: only what is missing, shared with other machines")
     command_line.add_device(parser)
-    parser.add_argument(
-        "--weights", type=command_line.place, metavar="DIR", help="also write the mattes of the shutters, as float EXR"
-    )
-    parser.add_argument("--save", type=command_line.place, metavar="FILE.blend", help="keep the edit")
-    parser.add_argument(
+    option("--weights", type=place, metavar="DIR", help="also write the mattes of the shutters, as float EXR")
+    option("--save", type=place, metavar="FILE.blend", help="keep the edit")
+    option(
         "--inbetween", type=int, choices=command_line.FACTORS, help="in-between frames, in place of the recipe's factor"
     )
-    parser.add_argument("--inbetween-method", choices=command_line.METHODS, help="in place of the recipe's")
-    parser.add_argument(
+    option("--inbetween-method", choices=command_line.METHODS, help="in place of the recipe's")
+    option(
         "--cache",
-        type=command_line.place,
+        type=place,
         metavar="DIR",
         help="where in-between frames lie"
         f' (default: "{inbetween_settings.FOLDER}" beside the output, or beside FILE.blend)',
@@ -119,8 +109,7 @@ def _render_source(arguments) -> None:
         if folder:
             inbetween_command.build_lacking(scene)
         if output and arguments.weights:
-            arguments.weights.mkdir(parents=True, exist_ok=True)
-            atomic_write.clear_up(arguments.weights)
+            film_output.prepare(arguments.weights)
         if output:
             film_output.film(scene, output)
 
@@ -169,8 +158,7 @@ def _save(scene, path: Path) -> None:
     """Saves the edit, its paths relative to the file: it may be opened on another machine. OutputError: it cannot be
     saved whole; what stood there stays."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        atomic_write.clear_up(path.parent)
+        film_output.prepare(path.parent)
         _save_whole(scene, path)
     except OSError as error:
         raise film_output.OutputError(f"{path}: {error.strerror or error}") from None

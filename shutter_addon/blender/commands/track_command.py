@@ -16,33 +16,25 @@ from ...media.footage import Footage
 from ..editing import new_edit
 from ..output import film_output
 from . import command_line
+from .command_line import place
 
 
 def add(commands) -> None:
     parser = commands.add_parser("track", help="follow what a region covers, or the camera")
-    parser.add_argument("source", type=command_line.place, help="a movie, or the first file of an image sequence")
-    parser.add_argument("--recipe", type=command_line.place, required=True, help="the effect, a JSON file")
-    parser.add_argument("--region", metavar="NAME", help="the region that is to follow")
-    parser.add_argument(
-        "--camera", action="store_true", help="in its place: the camera, by all that regions leave free"
-    )
-    parser.add_argument("--frame", type=int, required=True, metavar="F", help="the frame at which it lies right")
-    parser.add_argument(
-        "--frames", metavar="A:B", help="timeline frames A to B, both ways from F; 1 is the strip's first"
-    )
-    parser.add_argument(
-        "--motion", choices=registration.MOTIONS, default="scale", help="location; rotation too; or scale as well"
-    )
-    parser.add_argument("--all-keys", action="store_true", help="a key at every frame, needed or not")
-    parser.add_argument(
+    option = parser.add_argument
+    option("source", type=place, help="a movie, or the first file of an image sequence")
+    option("--recipe", type=place, required=True, help="the effect, a JSON file")
+    option("--region", metavar="NAME", help="the region that is to follow")
+    option("--camera", action="store_true", help="in its place: the camera, by all that regions leave free")
+    option("--frame", type=int, required=True, metavar="F", help="the frame at which it lies right")
+    option("--frames", metavar="A:B", help="timeline frames A to B, both ways from F; 1 is the strip's first")
+    option("--motion", choices=registration.MOTIONS, default="scale", help="location; rotation too; or scale as well")
+    option("--all-keys", action="store_true", help="a key at every frame, needed or not")
+    option(
         "--hold", action="store_true", help="all of it counts where its track has ended, too: its opacity gets no keys"
     )
-    parser.add_argument(
-        "--output", type=command_line.place, required=True, metavar="R2.json", help="the recipe with the keys"
-    )
-    parser.add_argument(
-        "--report", type=command_line.place, metavar="FILE.json", help="how sure each frame is, and where it ended"
-    )
+    option("--output", type=place, required=True, metavar="R2.json", help="the recipe with the keys")
+    option("--report", type=place, metavar="FILE.json", help="how sure each frame is, and where it ended")
     parser.set_defaults(run=run)
 
 
@@ -156,8 +148,7 @@ def _write_track(arguments, result, tracked: dict, stops: list) -> None:
         "stops": [{"frame": stop.frame, "reason": stop.fault} for stop in stops],
     }
     for path in filter(None, (arguments.output, arguments.report)):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        atomic_write.clear_up(path.parent)
+        film_output.prepare(path.parent)
     with atomic_write.writing(arguments.output) as part:
         moved = recipe.moved(result, arguments.recipe.parent, arguments.output.parent)
         part.write_text(recipe_file.dump(moved), encoding="utf-8")
