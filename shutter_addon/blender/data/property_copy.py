@@ -1,4 +1,8 @@
-"""Property groups as they are stored, enum numbers without an item included."""
+"""Property groups as they are stored, enum numbers without an item included; and values that they have for a while."""
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
 
 from bpy.types import PropertyGroup
 
@@ -36,3 +40,17 @@ def store(group, name: str, value) -> None:
         group.bl_system_properties_get(do_create=True)[name] = value
     else:
         setattr(group, name, value)
+
+
+@contextmanager
+def for_a_while(changes: Iterable[tuple[Any, str, Any]]) -> Iterator[None]:
+    """Inside, attributes have other values. changes: owner, name and value of each."""
+    changes = list(changes)
+    before = [(owner, name, getattr(owner, name)) for owner, name, _ in changes]
+    try:
+        for change in changes:
+            setattr(*change)
+        yield
+    finally:
+        for change in before:
+            setattr(*change)

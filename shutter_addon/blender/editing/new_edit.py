@@ -2,12 +2,13 @@
 
 import math
 import os
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 
 import bpy
 
 from ..data import recipe_import
+from ..data.property_copy import for_a_while
 from . import add_effect
 
 _PATHS = {"MOVIE": "filepath", "IMAGE": "directory", "SOUND": "filepath"}  # the property of a strip of that type
@@ -64,7 +65,6 @@ def _add_source(editor, path: Path, medium):
     return strip
 
 
-@contextmanager
 def paths_relative(scene, folder: Path):
     """Inside, the edit's paths are relative to the folder that it is saved in, as far as there is such a path."""
     owners = [(scene.render, "filepath")]
@@ -72,14 +72,10 @@ def paths_relative(scene, folder: Path):
         if strip.type in _PATHS:
             owners.append((strip.sound if strip.type == "SOUND" else strip, _PATHS[strip.type]))
     owners += [(image, "filepath") for image in bpy.data.images]  # mattes
-    before = [(owner, name, getattr(owner, name)) for owner, name in owners]
-    for owner, name, path in before:
-        if path:
+    relative = []
+    for owner, name in owners:
+        if path := getattr(owner, name):
             with suppress(ValueError):  # another drive
-                # relpath leaves out the slash behind a folder
-                setattr(owner, name, bpy.path.relpath(path, start=str(folder)) + ("/" if path.endswith(os.sep) else ""))
-    try:
-        yield
-    finally:
-        for owner, name, path in before:
-            setattr(owner, name, path)
+                end = "/" if path.endswith(os.sep) else ""  # which relpath leaves out behind a folder
+                relative.append((owner, name, bpy.path.relpath(path, start=str(folder)) + end))
+    return for_a_while(relative)

@@ -15,6 +15,7 @@ from ...core import atomic_write
 from ...core.messages import UserError, of_file
 from ...media.completeness import is_whole_movie, is_whole_picture, whole_pictures, why_short
 from ..data import strips
+from ..data.property_copy import for_a_while
 from ..rendering import render_job
 from . import movie_feed
 
@@ -242,8 +243,7 @@ def whole(path: Path | None):
     if path is None:
         yield None
         return
-    path.parent.mkdir(parents=True, exist_ok=True)
-    atomic_write.clear_up(path.parent)
+    prepare(path.parent)
     with atomic_write.writing(path) as part:
         yield part
 
@@ -339,34 +339,17 @@ def stoppable():
             signal.signal(number, handler or signal.SIG_DFL)  # None: Blender's own, which Python cannot put back
 
 
-@contextmanager
 def _uncached(scene):
     """Each frame is rendered once: those that Blender would keep would fill gigabytes."""
-    editor = scene.sequence_editor
-    if editor is None:
-        yield
-        return
-    kept = editor.use_cache_raw, editor.use_cache_final
-    editor.use_cache_raw = editor.use_cache_final = False
-    try:
-        yield
-    finally:
-        editor.use_cache_raw, editor.use_cache_final = kept
+    names = ("use_cache_raw", "use_cache_final") if scene.sequence_editor else ()
+    return for_a_while((scene.sequence_editor, name, False) for name in names)
 
 
-@contextmanager
 def _without_sources(scene):
     """Spares Blender what no frame shows: the source lies wholly below its effect, but Blender takes any Scene strip
     for transparent: it would decode the source and blend the two, 2/5 of all its work."""
     sources = [scene.sequence_editor.strips_all[name] for name in strips.shown_sources(scene)]
-    shown = [strip for strip in sources if not strip.mute]
-    for strip in shown:
-        strip.mute = True
-    try:
-        yield
-    finally:
-        for strip in shown:
-            strip.mute = False
+    return for_a_while((strip, "mute", True) for strip in sources)
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum
 from types import FrameType
@@ -18,6 +18,7 @@ from typing import Any
 import bpy
 
 from ...core.messages import sentence, signed
+from ..data.property_copy import for_a_while
 from ..data.strips import ENGINE
 
 BAD_INPUT = 2
@@ -139,14 +140,9 @@ def operators_running() -> set[str]:
     return {operator.bl_idname for window in windows for operator in window.modal_operators}
 
 
-@contextmanager
-def telling(to: Callable[[str], None]) -> Iterator[None]:
+def telling(to: Callable[[str], None]) -> AbstractContextManager[None]:
     """Inside, the sentence that ends a render in the background goes there in place of stderr."""
-    before, _job.tell = _job.tell, to
-    try:
-        yield
-    finally:
-        _job.tell = before
+    return for_a_while([(_job, "tell", to)])
 
 
 @contextmanager
