@@ -10,7 +10,6 @@ import bpy
 from bpy.props import (
     BoolProperty,
     CollectionProperty,
-    EnumProperty,
     FloatProperty,
     FloatVectorProperty,
     IntProperty,
@@ -20,12 +19,7 @@ from bpy.props import (
 from bpy.types import PropertyGroup
 
 from ...core import revision
-from ...core.model.limits import (
-    MAX_BAR,
-    MAX_DISTANCE,
-    MAX_FRAME,
-    MAX_SMOOTH,
-)
+from ...core.model.limits import MAX_BAR, MAX_DISTANCE, MAX_FRAME, MAX_SMOOTH
 from ...core.model.shutters import MAX_WINDOW
 from . import consistency, selection, validation
 from .choices import (
@@ -45,7 +39,7 @@ from .choices import (
     UNKEYED,
 )
 from .consistency import changed
-from .region_properties import ShutterCamera, ShutterRegion, TrackStop
+from .region_properties import KEYED, ShutterCamera, ShutterRegion, TrackStop, choice, share
 
 
 def _renamed(shutter, new: str, old: str, _is_set) -> str:
@@ -115,24 +109,12 @@ class Shutter(PropertyGroup):
         options=UNKEYED,
     )
     bars: CollectionProperty(type=ShutterBar)
-    follow: EnumProperty(
-        name="Move With",
-        description="What the exposure moves with",
-        items=FOLLOWS,
-        update=changed,
-        options=UNKEYED,
-    )
+    follow: choice("Move With", "What the exposure moves with", FOLLOWS)
     follow_region: StringProperty(
         name="Moved With", description="Name of the region that the exposure moves with", update=changed
     )
-    follow_motion: EnumProperty(
-        name="Motion",
-        description="What of its motion is followed",
-        items=MOTIONS,
-        default="SCALE",
-        update=changed,
-        options=UNKEYED,
-        translation_context=CONTEXT,
+    follow_motion: choice(
+        "Motion", "What of its motion is followed", MOTIONS, default="SCALE", translation_context=CONTEXT
     )
     follow_smooth: IntProperty(
         name="Smoothness",
@@ -144,13 +126,7 @@ class Shutter(PropertyGroup):
         update=changed,
         options=UNKEYED,
     )
-    length: EnumProperty(
-        name="Length",
-        description="What says how long the exposure is",
-        items=LENGTHS,
-        update=changed,
-        options=UNKEYED,
-    )
+    length: choice("Length", "What says how long the exposure is", LENGTHS)
     trail: FloatProperty(
         name="Trail Length",
         description="How far what is followed moves while the shutter is open, as a fraction of the picture's height",
@@ -179,40 +155,27 @@ class ShutterEffect(PropertyGroup):
         options=UNKEYED,
         translation_context=CONTEXT,
     )
-    position: EnumProperty(
-        name="Position",
-        description="Where the frames that are exposed lie around the shown one",
-        items=POSITIONS,
-        update=changed,
+    position: choice("Position", "Where the frames that are exposed lie around the shown one", POSITIONS, options=KEYED)
+    interpolation: choice(
+        "Interpolation", "How shutters blend, in the picture and between keyframes", INTERPOLATIONS, options=KEYED
     )
-    interpolation: EnumProperty(
-        name="Interpolation",
-        description="How shutters blend, in the picture and between keyframes",
-        items=INTERPOLATIONS,
-        update=changed,
-    )
-    light: EnumProperty(
-        name="Light", description="How the frames that are exposed are summed", items=LIGHTS, update=changed
-    )
-    exposure: EnumProperty(
-        name="Exposure",
-        description="How bright shutters are that are open for different times",
-        items=EXPOSURES,
-        update=changed,
+    light: choice("Light", "How the frames that are exposed are summed", LIGHTS, options=KEYED)
+    exposure: choice(
+        "Exposure",
+        "How bright shutters are that are open for different times",
+        EXPOSURES,
+        options=KEYED,
         translation_context=CONTEXT,
     )
-    edges: EnumProperty(
-        name="Clip Ends",
-        description="What an exposure gets that reaches beyond the ends of the clip, or of the shot",
-        items=EDGES,
-        update=changed,
+    edges: choice(
+        "Clip Ends",
+        "What an exposure gets that reaches beyond the ends of the clip, or of the shot",
+        EDGES,
+        options=KEYED,
         translation_context=CONTEXT,
     )
-    aggregate: EnumProperty(
-        name="Matte Resolution",
-        description="Pixels that share a shutter (larger blocks are quicker)",
-        items=AGGREGATES,
-        update=changed,
+    aggregate: choice(
+        "Matte Resolution", "Pixels that share a shutter (larger blocks are quicker)", AGGREGATES, options=KEYED
     )
     stop_at_cuts: BoolProperty(
         name="Stop at Cuts",
@@ -225,13 +188,10 @@ class ShutterEffect(PropertyGroup):
         description="Make the picture's edge a scribble of the default shutter, so that a stroke alone acts locally",
         update=changed,
     )
-    edge_aware: FloatProperty(
-        name="Follow Edges",
-        description="How much shutters keep to the edges of the shown frame: at 1 a scribble fills what it lies in",
-        subtype="FACTOR",
-        min=0.0,
-        max=1.0,
-        update=changed,
+    edge_aware: share(
+        "Follow Edges",
+        "How much shutters keep to the edges of the shown frame: at 1 a scribble fills what it lies in",
+        0,
     )
     camera: PointerProperty(name="Camera", description="How what the camera sees moves", type=ShutterCamera)
     bars_per_frame: IntProperty(
@@ -240,20 +200,15 @@ class ShutterEffect(PropertyGroup):
         default=1,
         options={"HIDDEN"},
     )
-    inbetween: EnumProperty(
-        name="In-Between Frames",
-        description="Frames between those of the source, by optical flow: bars count them all, "
+    inbetween: choice(
+        "In-Between Frames",
+        "Frames between those of the source, by optical flow: bars count them all, "
         "and a still frame becomes as many equal bars",
-        items=INBETWEENS,
+        INBETWEENS,
         update=_multiplied,
-        options=UNKEYED,
     )
-    inbetween_method: EnumProperty(
-        name="Method", description="How in-between frames are made", items=METHODS, update=changed, options=UNKEYED
-    )
-    inbetween_place: EnumProperty(
-        name="Place", description="Where in-between frames lie", items=PLACES, update=changed, options=UNKEYED
-    )
+    inbetween_method: choice("Method", "How in-between frames are made", METHODS)
+    inbetween_place: choice("Place", "Where in-between frames lie", PLACES)
     use_source_time: BoolProperty(
         name="Use Source Time",
         description="Show the source at the time that is set here, in place of the strip's own timing",

@@ -15,28 +15,12 @@ from bpy.props import (
 )
 from bpy.types import PropertyGroup
 
-from ...core.model.limits import (
-    MAX_CHANNEL,
-    MAX_DEGREES,
-    MAX_DISTANCE,
-    MAX_FRAME,
-    MAX_NAME,
-    MAX_SCALE,
-)
+from ...core.model.limits import MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE
 from . import consistency, matte_strips, selection
-from .choices import (
-    BLENDS,
-    CHANNELS,
-    CONTEXT,
-    FOLLOWED,
-    KINDS,
-    MATTE_SOURCES,
-    MOTIONS,
-    RAMPS,
-    TIMINGS,
-    UNKEYED,
-)
+from .choices import BLENDS, CHANNELS, CONTEXT, FOLLOWED, KINDS, MATTE_SOURCES, MOTIONS, RAMPS, TIMINGS, UNKEYED
 from .consistency import changed
+
+KEYED = {"ANIMATABLE"}  # as properties are where nothing else is said
 
 
 def _shortened(region, new: str, old: str, is_set) -> str:
@@ -48,6 +32,17 @@ def _shortened(region, new: str, old: str, is_set) -> str:
     if is_set and any(shutter.follow_region == old for effect in effects for shutter in effect.shutters):
         consistency.rename_followed(selection.effect_of_item(region), old, new)
     return new
+
+
+def choice(name: str, description: str, items, *, update=changed, options=UNKEYED, **more):
+    """An enum; as most are, of what pictures are made by, and without keys."""
+    return EnumProperty(name=name, description=description, items=items, update=update, options=options, **more)
+
+
+def share(name: str, description: str, default: float):
+    """0 to 1, of what pictures are made by."""
+    words = {"name": name, "description": description, "subtype": "FACTOR"}
+    return FloatProperty(**words, default=default, min=0.0, max=1.0, update=changed)
 
 
 class TrackStop(PropertyGroup):
@@ -72,12 +67,12 @@ class _Tracked:
         max=100.0,
     )
     stops: CollectionProperty(type=TrackStop)
-    motion: EnumProperty(
-        name="Motion",
-        description="Which channels Track and Follow key",
-        items=MOTIONS,
+    motion: choice(
+        "Motion",
+        "Which channels Track and Follow key",
+        MOTIONS,
+        update=None,
         default="SCALE",
-        options=UNKEYED,
         translation_context=CONTEXT,
     )
     track_until: IntProperty(
@@ -134,17 +129,8 @@ class ShutterRegion(_Tracked, PropertyGroup):
     name: StringProperty(name="Name", description="Name of the region", default="Region", set_transform=_shortened)
     shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=changed)
     layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=changed)
-    kind: EnumProperty(
-        name="Type",
-        description="What says where the shutter holds",
-        items=KINDS,
-        update=changed,
-        options=UNKEYED,
-        translation_context=CONTEXT,
-    )
-    matte: EnumProperty(
-        name="From", description="What the matte is", items=MATTE_SOURCES, update=changed, options=UNKEYED
-    )
+    kind: choice("Type", "What says where the shutter holds", KINDS, translation_context=CONTEXT)
+    matte: choice("From", "What the matte is", MATTE_SOURCES)
     image: PointerProperty(
         name="File",
         description="Movie, image sequence or picture that is the matte",
@@ -160,26 +146,14 @@ class ShutterRegion(_Tracked, PropertyGroup):
         options={"SKIP_SAVE"},
     )
     mask: PointerProperty(name="Mask", description="Mask that is the matte", type=bpy.types.Mask, update=changed)
-    channel: EnumProperty(
-        name="Channel",
-        description="What of the matte says how much of the shutter a pixel gets",
-        items=CHANNELS,
-        update=changed,
-        options=UNKEYED,
-    )
+    channel: choice("Channel", "What of the matte says how much of the shutter a pixel gets", CHANNELS)
     channel_name: StringProperty(
         name="Channel Name", description="Name of the channel in the EXR file", maxlen=MAX_CHANNEL, update=changed
     )
     invert: BoolProperty(
         name="Invert", description="The shutter gets what the matte leaves", update=changed, options=UNKEYED
     )
-    timing: EnumProperty(
-        name="Frames Of",
-        description="What the matte's frames belong to",
-        items=TIMINGS,
-        update=changed,
-        options=UNKEYED,
-    )
+    timing: choice("Frames Of", "What the matte's frames belong to", TIMINGS)
     offset: IntProperty(
         name="Offset",
         description="Frames by which the matte is ahead",
@@ -188,23 +162,8 @@ class ShutterRegion(_Tracked, PropertyGroup):
         update=changed,
         options=UNKEYED,
     )
-    blend: EnumProperty(
-        name="Blend",
-        description="How the matte lies over other regions",
-        items=BLENDS,
-        update=changed,
-        options=UNKEYED,
-        translation_context=CONTEXT,
-    )
-    opacity: FloatProperty(
-        name="Opacity",
-        description="How much of the region counts: at 0 the picture is as without it",
-        subtype="FACTOR",
-        default=1.0,
-        min=0.0,
-        max=1.0,
-        update=changed,
-    )
+    blend: choice("Blend", "How the matte lies over other regions", BLENDS, translation_context=CONTEXT)
+    opacity: share("Opacity", "How much of the region counts: at 0 the picture is as without it", 1)
     feather: FloatProperty(
         name="Feather",
         description="How wide a hard edge of the matte becomes, as a fraction of the picture's height",
@@ -216,7 +175,7 @@ class ShutterRegion(_Tracked, PropertyGroup):
         update=changed,
         translation_context=CONTEXT,
     )
-    ramp: EnumProperty(name="Ramp", description="How the ramp runs", items=RAMPS, update=changed, options=UNKEYED)
+    ramp: choice("Ramp", "How the ramp runs", RAMPS)
     width: FloatProperty(
         name="Width",
         description="Width of the lines as a fraction of the picture's height",
@@ -229,9 +188,7 @@ class ShutterRegion(_Tracked, PropertyGroup):
     location: _location("Distance from where the region was drawn, as a fraction of the picture")
     rotation: _rotation("Rotation about the region's center")
     scale: _scale("Scale about the region's center")
-    follow_kind: EnumProperty(
-        name="Follow Track", description="What the region follows", items=FOLLOWED, default="TRACK", options=UNKEYED
-    )
+    follow_kind: choice("Follow Track", "What the region follows", FOLLOWED, update=None, default="TRACK")
     follow_object: StringProperty(
         name="Object", description="Tracking object that has the tracks; without one, the camera"
     )
@@ -244,15 +201,7 @@ class ShutterRegion(_Tracked, PropertyGroup):
 
 class ShutterCamera(_Tracked, PropertyGroup):
     name: StringProperty(name="Name", description="Name of the camera's animation channels", default="Camera")
-    influence: FloatProperty(
-        name="Influence",
-        description="How much is left of exposures that follow the camera: at 0 the shown frame alone",
-        subtype="FACTOR",
-        default=1.0,
-        min=0.0,
-        max=1.0,
-        update=changed,
-    )
+    influence: share("Influence", "How much is left of exposures that follow the camera: at 0 the shown frame alone", 1)
     location: _location("Where what the camera sees has moved to, as a fraction of the picture")
     rotation: _rotation("Rotation of what the camera sees, about the picture's center")
     scale: _scale("Scale of what the camera sees, about the picture's center")

@@ -5,9 +5,7 @@ from bpy.props import EnumProperty
 
 from ...core.recipes import recipe
 from ..data import selection, strips, validation
-from ..editing import (
-    collection_edits,
-)
+from ..editing import collection_edits
 
 UNDOABLE = {"REGISTER", "UNDO"}
 

@@ -13,16 +13,7 @@ import numpy as np
 from ...core import revision
 from ...core.messages import EffectError
 from ...media import MediaError
-from ..data import (
-    fcurves,
-    geometry,
-    mask_reading,
-    matte_content,
-    matte_strips,
-    snapshot,
-    source_media,
-    strips,
-)
+from ..data import fcurves, geometry, mask_reading, matte_content, matte_strips, snapshot, source_media, strips
 from ..data.snapshot import Snapshot, SourceFiles
 from . import render_job, render_settings
 
