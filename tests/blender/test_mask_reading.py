@@ -281,7 +281,7 @@ def test_reading_leaves_the_mask_as_it_is(bpy, mask, mask_editor, clip, edit):
 def test_another_blender_is_refused(bpy, mask, mask_editor, clip):
     """As if what lies behind a layer's name lay farther on."""
     from shutter_addon.blender.data import mask_reading
-    from shutter_addon.blender.data.validation import EffectError
+    from shutter_addon.core.messages import EffectError
 
     layer = mask.layers.new(name="L")
     draw(layer, blob(random.Random(2), 5))
@@ -294,7 +294,7 @@ def test_another_blender_is_refused(bpy, mask, mask_editor, clip):
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 1e20])
 def test_numbers_that_are_none_are_refused(bpy, mask, value):
     from shutter_addon.blender.data import mask_reading
-    from shutter_addon.blender.data.validation import EffectError
+    from shutter_addon.core.messages import EffectError
 
     layer = mask.layers.new(name="L")
     spline = draw(layer, blob(random.Random(2), 5))

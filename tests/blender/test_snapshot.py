@@ -72,7 +72,7 @@ def test_many_frames_are_those_of_each(found):
 
 def test_what_is_wrong_at_one_frame_is_told_there(found):
     from shutter_addon.blender.data import fcurves, snapshot
-    from shutter_addon.blender.data.validation import EffectError
+    from shutter_addon.core.messages import EffectError
 
     edit, effect, _ = found
     path = f"{effect.path_from_id()}.shutters[0].bars"

@@ -54,7 +54,7 @@ def test_keys_out_of_order(bpy):
 def test_another_layout_is_said(bpy, edit, tmp_path):
     """As if the numbers lay four bytes farther on."""
     from shutter_addon.blender.data import strip_timing
-    from shutter_addon.blender.data.validation import EffectError
+    from shutter_addon.core.messages import EffectError
 
     first = write_frames(tmp_path / "in", np.zeros((20, 8, 8, 3), dtype=np.uint8))
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)

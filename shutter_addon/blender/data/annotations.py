@@ -5,8 +5,8 @@ import numpy as np
 from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core.messages import EffectError
 from . import geometry
-from .validation import EffectError
 
 # Pixels of a strip's side on the image, below which nobody sees where its scribbles are.
 _SMALLEST = 4

@@ -3,6 +3,7 @@
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core.messages import EffectError
 from ...core.model import limits, shutters
 from . import fcurves, inbetween_settings, strips, validation
 from .annotations import layer_of
@@ -108,7 +109,7 @@ def fit_factor(effect) -> None:
         effect.inbetween = str(effect.bars_per_frame)
         count = effect.window * factor // effect.bars_per_frame
         sentence = rpt_("{factor}× in-between frames take {count} bars; a shutter has {most} at most")
-        raise validation.EffectError(sentence.format(factor=factor, count=count, most=shutters.MAX_WINDOW)) from None
+        raise EffectError(sentence.format(factor=factor, count=count, most=shutters.MAX_WINDOW)) from None
     for index in range(len(effect.shutters)):
         _change_bars(effect, index, multiplied)
     effect.bars_per_frame, effect.window = factor, window

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core.messages import EffectError
 from ...media import inbetween_cache
 from . import validation
 
@@ -29,11 +30,11 @@ def folder(effect) -> Path:
         try:
             return Path(bpy.utils.extension_path_user(package, path=FOLDER))
         except ValueError:
-            raise validation.EffectError(rpt_("only an installed extension has a folder of its own")) from None
+            raise EffectError(rpt_("only an installed extension has a folder of its own")) from None
     library = effect.id_data.library
     file = bpy.path.abspath(library.filepath) if library else bpy.data.filepath
     if not file:
-        raise validation.EffectError(rpt_("in-between frames lie beside the .blend file: save it first"))
+        raise EffectError(rpt_("in-between frames lie beside the .blend file: save it first"))
     return Path(file).parent / FOLDER
 
 

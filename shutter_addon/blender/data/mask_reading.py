@@ -15,8 +15,8 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.masks import mask_handles, mask_outlines
 from ...core.masks.mask import MaskLayer, MaskShape, MaskSpline
+from ...core.messages import EffectError
 from . import fcurves
-from .validation import EffectError
 
 # Coordinates that are farther off are no mask of any picture.
 _FARTHEST = 1e4

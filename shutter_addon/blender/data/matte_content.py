@@ -10,6 +10,7 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.frames import retiming
+from ...core.messages import EffectError
 from ...core.model import keyframes, mattes
 from ...core.model.effect import PlacedRamp
 from ...media import MediaError
@@ -17,7 +18,6 @@ from ...media.files import stamp
 from ...media.matte_files import MatteFile
 from ...media.sequence import ImageFiles
 from . import inbetween_settings, mask_reading, matte_strips, source_media, strip_timing, strips, validation
-from .validation import EffectError
 
 
 def content(effect, strip, region, moves, frames, time: keyframes.Channel | None) -> keyframes.Channel:

@@ -4,8 +4,8 @@ import uuid
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core.messages import EffectError
 from . import strips, validation
-from .validation import EffectError
 
 
 def strip_name(region) -> str:

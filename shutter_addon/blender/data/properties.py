@@ -19,9 +19,15 @@ from bpy.props import (
 from bpy.types import PropertyGroup
 
 from ...core import revision
-from ...core.model.limits import MAX_BAR, MAX_DISTANCE, MAX_FRAME, MAX_SMOOTH
+from ...core.messages import EffectError
+from ...core.model.limits import (
+    MAX_BAR,
+    MAX_DISTANCE,
+    MAX_FRAME,
+    MAX_SMOOTH,
+)
 from ...core.model.shutters import MAX_WINDOW
-from . import consistency, selection, validation
+from . import consistency, selection
 from .choices import (
     AGGREGATES,
     CONTEXT,
@@ -64,7 +70,7 @@ def _fit(change, effect, context):
     """What a change of a property asks for; why it cannot be would only be printed from here."""
     try:
         change(effect)
-    except validation.EffectError as error:
+    except EffectError as error:
         sentence = str(error)
         if bpy.app.background:
             print(sentence, file=sys.stderr)

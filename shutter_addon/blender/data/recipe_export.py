@@ -2,11 +2,10 @@
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core.messages import translated
+from ...core.messages import EffectError, translated
 from ...core.model import limits
 from ...core.recipes import baking, recipe
 from . import annotations, fcurves, inbetween_settings, snapshot, strips, validation
-from .validation import EffectError
 
 
 def recipe_of(scene, effect, strip, mattes=()) -> recipe.Recipe:

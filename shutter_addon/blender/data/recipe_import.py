@@ -9,6 +9,7 @@ import numpy as np
 from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core.messages import EffectError
 from ...core.model import limits
 from ...core.model.scribbles import mapped
 from ...core.recipes import recipe
@@ -19,7 +20,6 @@ from ...media.sequence import IMAGE_SUFFIXES
 from . import fcurves, geometry, strips
 from .annotations import annotation, picture_size
 from .snapshot import OPTIONS
-from .validation import EffectError
 
 
 def apply(scene, effect, strip, source: recipe.Recipe, folder: Path = Path()) -> None:

@@ -5,8 +5,8 @@ import ctypes
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.frames.retiming import RetimingKey, StripTiming, are_retiming_keys
+from ...core.messages import EffectError
 from . import source_media
-from .validation import EffectError
 
 _FIELDS = (
     *("name", "content_start", "content_end", "content_trim_start", "content_trim_end", "left_handle"),

@@ -10,12 +10,12 @@ from collections.abc import Callable
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core.messages import EffectError
 from ...core.model import motions
 from ...core.model.motions import Similarity
 from ...core.model.stabilization import Settings, Stabilization, Track, laid
 from ...core.recipes import region_keys
 from ..data import annotations, fcurves, snapshot, validation
-from ..data.validation import EffectError
 from . import follow_track, motion_keys
 from .motion_keys import MotionKeys
 

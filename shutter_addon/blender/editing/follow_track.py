@@ -13,11 +13,10 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core import revision
-from ...core.messages import translated
+from ...core.messages import EffectError, translated
 from ...core.model import motions
 from ...core.model.motions import Placement, Similarity
 from ..data import annotations, snapshot, source_media, strips, validation
-from ..data.validation import EffectError
 from ..rendering import effect_source
 from . import motion_keys
 from .motion_keys import MotionKeys

@@ -18,10 +18,10 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core.messages import EffectError
 from ...core.model import presence
 from ...core.model.motions import Placement
 from ..data import fcurves, selection, validation
-from ..data.validation import EffectError
 
 MADE = "GENERATED"
 _MADE = bpy.types.Keyframe.bl_rna.properties["type"].enum_items[MADE].value

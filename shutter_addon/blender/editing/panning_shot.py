@@ -2,8 +2,8 @@
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core.messages import EffectError
 from ..data import consistency, snapshot
-from ..data.validation import EffectError
 from . import shutter_edits
 from .motion_keys import MotionKeys
 

@@ -17,7 +17,7 @@ from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core import revision, stopping
-from ...core.messages import translated
+from ...core.messages import EffectError, translated
 from ...core.model import limits, motions, presence
 from ...core.model.effect import Camera, Region
 from ...core.model.frame_state import Options
@@ -27,7 +27,6 @@ from ...media import camera_tracking, pursuit, tracking
 from ...media.footage import Footage
 from ...media.tracking import Tracked
 from ..data import annotations, inbetween_settings, selection, snapshot, strips, validation
-from ..data.validation import EffectError
 from ..rendering import effect_source
 from . import motion_keys
 from .motion_keys import MotionKeys, placement_now

@@ -8,8 +8,8 @@ from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Gizmo, GizmoGroup
 
+from ...core.messages import EffectError
 from ..data import consistency, selection
-from ..data.validation import EffectError
 from ..editing import bar_edits, track_region
 from . import drawing, gizmo_keymaps
 

@@ -10,7 +10,8 @@ from bpy.props import EnumProperty
 from bpy.types import Operator
 
 from ...core import messages
-from ..data import inbetween_settings, selection, strips, validation
+from ...core.messages import EffectError
+from ..data import inbetween_settings, selection, strips
 from ..data.choices import INBETWEENS
 from ..rendering import inbetween_build, strobing
 from ..rendering.effect_source import FAULTS
@@ -99,7 +100,7 @@ class _OfInbetweens(OfEffect):
             return refused(cls, rpt_(_RUNS))
         try:
             inbetween_settings.settings(effect)
-        except validation.EffectError as error:
+        except EffectError as error:
             return refused(cls, str(error))
         return True
 

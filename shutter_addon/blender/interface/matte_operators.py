@@ -7,10 +7,11 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy.types import Operator
 from bpy_extras.io_utils import ImportHelper
 
+from ...core.messages import EffectError
 from ...core.model.limits import MAX_CHANNEL
 from ...core.recipes.recipe import RecipeError
 from ...media import MediaError
-from ..data import matte_strips, recipe_import, selection, strips, validation
+from ..data import matte_strips, recipe_import, selection, strips
 from ..data.choices import RAMPS
 from ..editing import region_edits, time_map
 from .operator_bases import OfShutter, chosen_file, has_room, refused
@@ -46,7 +47,7 @@ class SHUTTER_OT_matte_add(_AddsRegion, ImportHelper, Operator):
         try:
             image = recipe_import.matte_image(bpy.path.abspath(chosen_file(self)), name or "luminance")
         except (MediaError, RecipeError) as error:
-            raise validation.EffectError(str(error)) from None
+            raise EffectError(str(error)) from None
         channel = {"channel": "NAMED", "channel_name": name} if name else {}
         region_edits.add_matte(effect, selection.active_shutter(effect), name=image.name, image=image, **channel)
 

@@ -3,9 +3,12 @@
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
 
+from ...core.messages import EffectError
 from ...core.recipes import recipe
-from ..data import selection, strips, validation
-from ..editing import collection_edits
+from ..data import selection, strips
+from ..editing import (
+    collection_edits,
+)
 
 UNDOABLE = {"REGISTER", "UNDO"}
 
@@ -48,7 +51,7 @@ class OfEffect:
     def execute(self, context):
         try:
             result = self.change(context, selection.active(context)[1])
-        except validation.EffectError as error:
+        except EffectError as error:
             self.report({"ERROR"}, str(error))
             result = {"CANCELLED"}
         redraw(context)

@@ -7,6 +7,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 from bpy.types import Operator
 
+from ...core.messages import EffectError
 from ...core.model import presets
 from ..data import annotations, consistency, preview_areas, selection, strips, validation
 from ..data.choices import CONTEXT, STROKES
@@ -254,7 +255,7 @@ class SHUTTER_OT_bar_set(OfShutter, Operator):
             self.bar = place + 1
         try:
             bars = bar_edits.bars_now(effect, effect.active_shutter)
-        except validation.EffectError as error:
+        except EffectError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         self.weight = bars[min(self.bar, len(bars)) - 1]
@@ -317,7 +318,7 @@ class SHUTTER_OT_draw(OfShutter, Operator):
         region = selection.active_region(effect)
         if self.new or region is None or region.kind in strips.MATTES:
             if sentence := collection_edits.why_full(effect, "regions"):  # poll() does not know what `new` is
-                raise validation.EffectError(sentence)
+                raise EffectError(sentence)
             region = region_edits.first_drawn(effect, selection.active_shutter(effect), self.kind)
         if not drawing_tool(context, effect, region, "builtin.annotate"):
             self.report({"INFO"}, "Open a sequencer with a preview to draw")

@@ -4,7 +4,8 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Menu, Panel, UIList
 
-from ..data import annotations, selection, strips, validation
+from ...core.messages import EffectError
+from ..data import annotations, selection, strips
 from ..editing import bar_edits, match_source
 from ..rendering import inbetween_build, strobing
 from . import inbetween_operators
@@ -148,7 +149,7 @@ def _draw_bars(layout, active) -> None:
     effect = active[1]
     try:
         bars = bar_edits.shown(effect, effect.active_shutter).bars
-    except validation.EffectError as error:
+    except EffectError as error:
         sentence(layout, str(error), "ERROR")
         return
     is_open = bars.any()

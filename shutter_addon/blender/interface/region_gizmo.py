@@ -9,6 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Gizmo, GizmoGroup
 
 from ...core import revision
+from ...core.messages import EffectError
 from ...core.model import scribbles
 from ...core.model.scribbles import mapped
 from ..data import annotations, geometry, selection, snapshot, validation
@@ -62,7 +63,7 @@ def place(context) -> Place | None:
     try:
         strokes = _strokes_now(scene, effect, strip)
         validation.check_region(region)
-    except validation.EffectError:  # panels and the live preview tell it
+    except EffectError:  # panels and the live preview tell it
         return None
     if not strokes:
         return None
@@ -177,7 +178,7 @@ def _key(context, effect, index: int) -> None:
     """Keys the region, or says why it cannot be: gizmos have no reports."""
     try:
         region_edits.key_region(effect, index)
-    except validation.EffectError as error:
+    except EffectError as error:
         sentence, show = str(error), context.window_manager.popup_menu
         show(lambda menu, _context: menu.layout.label(text=sentence, translate=False), icon="ERROR")
 

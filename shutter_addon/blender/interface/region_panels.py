@@ -4,6 +4,7 @@ import math
 
 from bpy.app.translations import pgettext_iface as iface_
 
+from ...core.messages import EffectError
 from ...media.pursuit import SURE
 from ..data import matte_look, selection, strips, validation
 from ..data.choices import CONTEXT
@@ -34,7 +35,7 @@ class Regions(WithEffect):
             return
         try:
             validation.check_region(region)
-        except validation.EffectError as error:
+        except EffectError as error:
             sentence(layout, str(error), "ERROR")
         layout.prop(region, "kind")
         if region.kind == "LINE":

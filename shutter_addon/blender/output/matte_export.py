@@ -11,7 +11,7 @@ from pathlib import Path
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core import atomic_write
-from ...core.messages import translated
+from ...core.messages import EffectError, translated
 from ...core.model import mattes
 from ...core.recipes import recipe
 from ...media.image_writing import write_grey
@@ -69,7 +69,7 @@ def _spare(folders: list[Path | None], read: Iterator[Path]) -> None:
     for folder in folders:
         if folder is not None and folder.resolve() in taken:
             sentence = rpt_("{folder}: its pictures are read by the effect; choose another name for the recipe")
-            raise validation.EffectError(sentence.format(folder=folder))
+            raise EffectError(sentence.format(folder=folder))
 
 
 def _words(scene, effect, strip, region, folder: Path | None, path: Path) -> recipe.MatteRegion | recipe.RampRegion:
