@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support import state
 
-from shutter_addon.blender.data import annotations, consistency, selection
+from shutter_addon.blender.data import annotations, consistency, fcurves, selection
 from shutter_addon.blender.editing import bar_edits, region_edits, shutter_edits
 
 RNG = np.random.default_rng(5)
@@ -165,6 +165,15 @@ def test_a_removed_shutter_takes_its_keys_regions_and_layers_along(three):
     assert three.active_shutter == three.active_region == 0
     assert curves(three, "") == {}
     assert layers(three) == []
+
+
+def test_a_curve_that_goes_by_a_name_stays(three):
+    """Scripts make such curves, which are in the way of no shutter that goes."""
+    path = f'{three.path_from_id()}.shutters["C"].trail'
+    fcurves.new_curve(three.id_data, path)
+    shutter_edits.remove_shutter(three, 0)
+    assert [shutter.name for shutter in three.shutters] == ["B", "C"]
+    assert fcurves.find_curve(three.id_data, path) is not None
 
 
 @pytest.mark.parametrize(("index", "to", "order"), [(0, 2, "BCA"), (2, 0, "CAB"), (1, 1, "ABC"), (1, 2, "ACB")])

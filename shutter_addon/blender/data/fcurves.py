@@ -5,15 +5,17 @@ The engine is called with the effect scene's depsgraph, which knows nothing of o
 
 import re
 from itertools import pairwise
+from typing import Any
 
 import bpy
 import numpy as np
 from bpy_extras import anim_utils
 
+from ...core.model.keyframes import Ease
 from . import validation
 
 # Keyframe.interpolation as a number.
-_EASES = {0: "constant", 1: "linear", 2: "bezier"}
+_EASES: dict[int, Ease] = {0: "constant", 1: "linear", 2: "bezier"}
 
 
 class Curves:
@@ -43,10 +45,10 @@ class Curves:
         all_curves = (self.find(f"{path}.{name}", index) for index in range(max(length, 1)))
         return [curve for curve in all_curves if curve is not None]
 
-    def keys(self, curves: list) -> tuple[tuple[float, str], ...]:
+    def keys(self, curves: list) -> tuple[tuple[float, Ease], ...]:
         """Frames with a key on any of these curves, ascending, and the recipe's words for their eases: of the first
         curve that has a key there."""
-        eases: dict[float, str] = {}
+        eases: dict[float, Ease] = {}
         for curve in curves:
             frames = self._frames[curve].tolist()
             if not eases.keys() >= set(frames):
@@ -75,7 +77,7 @@ def points_of(curve) -> np.ndarray:
     return points.reshape(-1, 2)
 
 
-def _eases(curve) -> list[str]:
+def _eases(curve) -> list[Ease]:
     """The recipe's words for the eases of an F-curve's keys: those that it does not know are "bezier"."""
     numbers = np.empty(len(curve.keyframe_points), np.int32)
     curve.keyframe_points.foreach_get("interpolation", numbers)
@@ -88,7 +90,7 @@ def key_frames(curves) -> list[float]:
     return np.unique(np.concatenate([np.empty(0, np.float32), *frames])).tolist()
 
 
-def leading(curves, start: float, end: float):
+def leading(curves, start: float, end: float) -> tuple[Any, float, float]:
     """Of F-curves, the one that changes most between two frames, and its values at them: its easing is that of all."""
     ends = [(curve, curve.evaluate(start), curve.evaluate(end)) for curve in curves]
     return max(ends, key=lambda end: abs(end[2] - end[1]))
@@ -175,7 +177,8 @@ def reindex(scene, path: str, places: dict[int, int | None]) -> None:
     """
     item = re.compile(re.escape(path) + r"\[(\d+)\]")
     for curve in curves_under(scene, f"{path}["):
-        match = item.match(curve.data_path)
+        if (match := item.match(curve.data_path)) is None:  # a script's: it goes by the item's name
+            continue
         index = int(match[1])
         place = places.get(index, index)
         if place is None:
