@@ -44,10 +44,10 @@ _modules = (
     probe_gizmo,
     handlers,
 )
-_commands = []
+_commands: list = []
 
 
-def register():
+def register() -> None:
     """Registers everything with Blender, the command included."""
     import bpy
 
@@ -56,7 +56,7 @@ def register():
     _commands.append(bpy.utils.register_cli_command("shutter", _run))
 
 
-def unregister():
+def unregister() -> None:
     """Leaves nothing behind."""
     import bpy
 
@@ -65,7 +65,7 @@ def unregister():
         module.unregister()
 
 
-def _run(argv):
+def _run(argv: list[str]) -> int:
     from .command import main
 
     return main(argv)

@@ -31,7 +31,7 @@ def main(argv: list[str]) -> int:
                 check_name(path)
         arguments.run(arguments)
     except SystemExit as stop:  # argparse: --help, or what it has said on stderr
-        return stop.code
+        return int(stop.code or 0)
     except KeyboardInterrupt:  # while in-between frames are built; those that are finished stay
         return film_output.INTERRUPTED
     except film_output.InterruptedRenderError as stopped:
@@ -47,8 +47,8 @@ def main(argv: list[str]) -> int:
     except RuntimeError as error:  # from Blender
         return _refuse(film_output.message(error))
     except Exception as error:
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        return _refuse(f"internal error: {error!r} in {Path(place.filename).name}, line {place.lineno}")
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        return _refuse(f"internal error: {error!r} in {Path(last.filename).name}, line {last.lineno}")
     return 0
 
 

@@ -50,8 +50,8 @@ def _before_save(*_):
 @persistent
 def _update(scene=None, depsgraph=None):
     revision.changed()
-    if render_job.runs() and bpy.app.is_job_running("RENDER"):
-        job_snapshots.look(render_job.film())
+    if (film := render_job.film()) is not None and bpy.app.is_job_running("RENDER"):
+        job_snapshots.look(film)
     if not render_job.cancelling():
         lifecycle.update(scene)
     # Blender itself draws previews again for most of what changes, but not for a mask. And it may crash where one is

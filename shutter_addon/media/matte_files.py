@@ -27,7 +27,7 @@ class MatteFile:
 
     path: Path
     channel: str = "luminance"
-    files: tuple[str, ...] | None = None
+    files: tuple[str | Path, ...] | None = None
     stream: int = 0
     stamp: Hashable = None
 
@@ -49,7 +49,7 @@ class MatteSource:
     step = 1  # it has no in-between frames
 
     def __init__(
-        self, path: str | Path, channel: str = "luminance", *, files: Sequence[str] | None = None, stream: int = 0
+        self, path: Path, channel: str = "luminance", *, files: Sequence[str | Path] | None = None, stream: int = 0
     ):
         """As MatteFile has them."""
         self._frames = open_channel(path, channel, files=files, stream=stream)

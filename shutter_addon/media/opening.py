@@ -24,7 +24,7 @@ def open_source(
     *,
     stream: int = 0,
     fps: Fraction | None = None,
-    files: Sequence[str] | None = None,
+    files: Sequence[str | Path] | None = None,
     colorspace: str | None = None,
     config: str | Path | None = None,
     alpha: str | None = None,
@@ -74,7 +74,7 @@ def with_proxy(source: FrameSource, path: str | Path, **options: Any) -> FrameSo
 
 
 def open_channel(
-    path: str | Path, channel: str, *, files: Sequence[str] | None = None, stream: int = 0
+    path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None, stream: int = 0
 ) -> SequenceChannel | MovieChannel:
     """Opens what `open_source` opens, for one channel alone. MediaError: it cannot be read, or has no such channel.
 
@@ -85,7 +85,7 @@ def open_channel(
     return SequenceChannel(path, channel, files=files)
 
 
-def _is_movie(path: Path, files: Sequence[str] | None) -> bool:
+def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:
     return files is None and path.suffix.lower() not in IMAGE_SUFFIXES
 
 

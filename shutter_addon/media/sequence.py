@@ -47,7 +47,7 @@ class ImageFiles:
     path: the first file; files: those there are, in order; count: of frames
     """
 
-    def __init__(self, path: str | Path, files: Sequence[str] | None = None):
+    def __init__(self, path: str | Path, files: Sequence[str | Path] | None = None):
         """MediaError: there is no first file, or its folder cannot be listed."""
         path = Path(path)
         self.left_out = ""
@@ -82,7 +82,7 @@ class SequenceSource(FrameSource):
         self,
         path: str | Path,
         *,
-        files: Sequence[str] | None = None,
+        files: Sequence[str | Path] | None = None,
         fps: Fraction | None = None,
         alpha: str | None = None,
     ):
@@ -149,7 +149,7 @@ class SequenceChannel:
 
     fps = None
 
-    def __init__(self, path: str | Path, channel: str, *, files: Sequence[str] | None = None):
+    def __init__(self, path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None):
         """channel: one of CHANNELS, or the name of one of the files' own. MediaError: they have none of that name."""
         self._files = ImageFiles(path, files)
         self.path, self.count = self._files.path, self._files.count

@@ -7,11 +7,12 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.messages import EffectError
+from ...core.recipes.recipe import Method
 from ...media import inbetween_cache
 from . import validation
 
 FOLDER = "virtual_shutter_inbetween"
-METHODS = {"QUICK": "quick", "GOOD": "good"}
+METHODS: dict[str, Method] = {"QUICK": "quick", "GOOD": "good"}
 
 
 class Settings(NamedTuple):
@@ -19,7 +20,7 @@ class Settings(NamedTuple):
 
     folder: Path
     factor: int
-    method: str
+    method: Method
 
 
 def folder(effect) -> Path:
@@ -44,7 +45,7 @@ def factor(effect) -> int:
     return int(validation.word(effect, "inbetween"))
 
 
-def method(effect) -> str:
+def method(effect) -> Method:
     """One of media.flow.METHODS."""
     return METHODS[validation.word(effect, "inbetween_method")]
 

@@ -161,7 +161,7 @@ def _keyed_points(mask, layer, frame: float) -> np.ndarray | None:
     shapes = _shapes(mask, layer)
     if not shapes:
         return None
-    place = np.searchsorted([shape.frame for shape in shapes], frame, side="right")
+    place = bisect_right([shape.frame for shape in shapes], frame)
     before, after = shapes[max(place - 1, 0)], shapes[min(place, len(shapes) - 1)]
     count = sum(len(spline.points) for spline in layer.splines)
     if before.points != count or after.points != count:

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 from contextlib import closing
+from dataclasses import dataclass
+from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -64,7 +65,7 @@ def image_file(region) -> MatteFile:
     path = image_path(region)
     files = (path,) if region.image.source == "FILE" else None
     folder = path.parent if region.image.source == "SEQUENCE" else path
-    stamps = stamp(path), stamp(folder)
+    stamps: tuple = stamp(path), stamp(folder)
     if region.image.source == "SEQUENCE":
         listed = _listed(path, stamps)
         stamps = *stamps, source_media.between((region.image.session_uid,), len(listed), listed.__getitem__)
@@ -109,31 +110,29 @@ def shown_frame(scene, effect, strip, time: keyframes.Channel | None) -> Callabl
     return shown
 
 
-class _Medium(NamedTuple):
+@dataclass
+class _Medium:
     """A source's length and rate, for core.frames.retiming."""
 
     filmed: int
     step: int
-    fps: float
+    count: int
+    fps: Fraction | None
 
     @classmethod
     def of(cls, source, step: int) -> "_Medium":
         """MediaError: it cannot be read."""
         spec = source_media.spec(source)
-        filmed, fps = (len(spec.files), 0.0) if spec.files else _movie(spec)
-        return cls(filmed, step, fps * step)
-
-    @property
-    def count(self) -> int:
-        return (self.filmed - 1) * self.step + 1
+        filmed, fps = (len(spec.files), None) if spec.files else _movie(spec)
+        return cls(filmed=filmed, step=step, count=(filmed - 1) * step + 1, fps=fps and fps * step)
 
 
 @lru_cache(64)
-def _movie(spec: source_media.SourceSpec) -> tuple[int, float]:
+def _movie(spec: source_media.SourceSpec) -> tuple[int, Fraction | None]:
     """Length and rate of a movie. A strip tells how long it is itself, which is another length once it is retimed.
     MediaError: it cannot be read."""
     with closing(spec.open()) as movie:
-        return movie.count, float(movie.fps)
+        return movie.count, movie.fps
 
 
 def _tried(function, *arguments):

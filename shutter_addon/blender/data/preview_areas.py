@@ -65,10 +65,10 @@ def shown(context) -> Shown | None:
     scene, space = selection.scene_of(context), context.space_data
     if space.display_mode != "IMAGE" or space.display_channel or (seen := selection.seen(scene)) is None:
         return None
-    above = any(other.channel > seen[2].channel for other in selection.visible(scene))
-    return Shown(
-        *seen, above, tuple(annotations.is_hidden(seen[1], region) for region in strips.drawn_regions(seen[1]))
-    )
+    _, effect, strip = seen
+    above = any(other.channel > strip.channel for other in selection.visible(scene))
+    hidden = tuple(annotations.is_hidden(effect, region) for region in strips.drawn_regions(effect))
+    return Shown(scene=scene, effect=effect, strip=strip, strips_above=above, hides_strokes=hidden)
 
 
 def look(context, scene, effect, strip) -> Look:
@@ -79,7 +79,7 @@ def look(context, scene, effect, strip) -> Look:
     is_plain = _is_plain(scene, strip) and all(_has(area.spaces.active, _PLAIN_SPACE) for area in areas)
     if not scales:
         return Look(None, None, is_plain)
-    space = max(scales, key=scales.get)
+    space = max(scales, key=scales.__getitem__)
     return Look(scales[space], _proxy(scene, effect, strip, space), is_plain)
 
 

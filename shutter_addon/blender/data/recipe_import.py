@@ -108,7 +108,7 @@ def _check_keys(source: recipe.Recipe, first: float) -> None:
     mattes = [region for region in source.regions if not isinstance(region, recipe.Region)]
     numbers = [source.edge_aware, source.camera_influence, *(shutter.trail for shutter in source.shutters)]
     numbers += [*(region.opacity for region in source.regions), *(region.width for region in mattes)]
-    keyed = [source.time, source.camera, *(number for number in numbers if isinstance(number, list))]
+    keyed: list = [source.time, source.camera, *(number for number in numbers if isinstance(number, list))]
     for keys in (*keyed, *(part.keys for part in (*source.shutters, *source.regions))):
         frames = np.array([key.frame + first for key in keys], dtype=np.float32)
         if (wrong := np.flatnonzero(np.abs(frames) > limits.MAX_FRAME)).size:

@@ -5,10 +5,10 @@ change when the scene does. Channels are sampled at the frames that are asked fo
 Blender itself. Drivers, NLA strips and further layers of an action do not count (docs/manual.md).
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
@@ -24,6 +24,7 @@ from . import annotations, geometry, inbetween_settings, matte_content, source_m
 from .fcurves import Curves, leading, progress
 from .strip_timing import timing_of
 
+Frames = Collection[float]  # of the timeline
 OPTIONS = ("position", "interpolation", "light", "exposure", "edges")
 # Sentences of core/model/effect.py and core/frames/retiming.py, which are looked up where they are passed on.
 _CORE = (
@@ -78,7 +79,7 @@ def source_files(effect, source, folder: Path | None = None) -> SourceFiles:
 
 
 def take(
-    scene, effect, strip, frames, *, folder: Path | None = None, files: dict[str, SourceFiles] | None = None
+    scene, effect, strip, frames: Frames, *, folder: Path | None = None, files: dict[str, SourceFiles] | None = None
 ) -> Snapshot:
     """The snapshot of an effect strip at timeline frames; folder: see source_files; files: what that
     returned, by source strip.
@@ -99,7 +100,7 @@ def take(
     )
 
 
-def read(scene, effect, strip, frames, *, thorough: bool = False) -> model.Effect:
+def read(scene, effect, strip, frames: Frames, *, thorough: bool = False) -> model.Effect:
     """An effect, its channels sampled at timeline frames; strip: the effect strip that shows it. EffectError: it has no
     shutter, or more of anything than an effect has. What is wrong at one frame is told at that frame.
 
@@ -132,7 +133,7 @@ def read(scene, effect, strip, frames, *, thorough: bool = False) -> model.Effec
     )
 
 
-def _around(effect, frames):
+def _around(effect, frames: Frames) -> Frames:
     """The frames at which motions are asked for: where a shutter follows something, those around these frames too."""
     if all(shutter.follow == "NOTHING" for shutter in effect.shutters):
         return frames
@@ -141,7 +142,7 @@ def _around(effect, frames):
     return np.unique(np.add.outer(sorted(frames), np.arange(-reach, reach + 1))).tolist()
 
 
-def _followed(shutter, regions, camera: model.Camera) -> model.Region | model.Camera | None:
+def _followed(shutter, regions: tuple, camera: model.Camera) -> model.Region | model.Camera | None:
     """What a shutter follows. EffectError: there is no such region."""
     follow = validation.word(shutter, "follow")
     if follow == "NOTHING":
@@ -173,9 +174,9 @@ def strokes_at(scene, effect, strip, index: int, frame: float) -> list[np.ndarra
         return region_at(scene, effect, strip, index, (frame,)).drawings.at(frame)
 
 
-def region_at(scene, effect, strip, index: int, frames) -> model.Region | model.MatteRegion:
-    """A region as plain data, its channels sampled at timeline frames. What is wrong at one frame is told at that
-    frame."""
+def region_at(scene, effect, strip, index: int, frames: Frames) -> Any:
+    """A region as plain data, by its kind a Region or a MatteRegion, its channels sampled at timeline frames. What is
+    wrong at one frame is told at that frame."""
     return _any_region(_Sampling.of(Curves(scene), effect, strip, frames), index, 0)
 
 
@@ -190,7 +191,7 @@ def last_shown(scene, effect, strip) -> float:
     return max(map(matte_content.shown_frame(scene, effect, strip, time), frames))
 
 
-def camera_at(scene, effect, frames) -> model.Camera:
+def camera_at(scene, effect, frames: Frames) -> model.Camera:
     """The camera as plain data, its channels sampled at timeline frames; as region_at."""
     return _camera(Curves(scene), effect, frames)
 
@@ -215,7 +216,7 @@ def _tried(function, *arguments):
         return error
 
 
-def _channel(curves: Curves, owner, path: str, name: str, frames, change=lambda value: value) -> keyframes.Channel:
+def _channel(curves: Curves, owner, path: str, name: str, frames: Frames, change=lambda v: v) -> keyframes.Channel:
     """A float property or a vector, each value changed by a function."""
 
     def at(frame):
@@ -230,7 +231,7 @@ def _channel(curves: Curves, owner, path: str, name: str, frames, change=lambda 
     return keyframes.Samples({frame: _tried(at, frame) for frame in frames}, curves.keys(keyed))
 
 
-def _options(curves: Curves, path: str, effect, frames) -> keyframes.Channel:
+def _options(curves: Curves, path: str, effect, frames: Frames) -> keyframes.Channel:
     names = (*OPTIONS, "aggregate", "border", "stop_at_cuts")
     option_curves = {name: _tried(curves.find, f"{path}.{name}") for name in names}
     if error := next((error for error in option_curves.values() if isinstance(error, EffectError)), None):
@@ -295,7 +296,7 @@ def _bars(curves: Curves, path: str, shutter, options: keyframes.Channel, frames
         validation.check(shutter.bars, "weight", bars)
         return bars
 
-    ways = {frame: state.interpolation for frame, state in chosen.items()}
+    ways: dict[float, str] = {frame: state.interpolation for frame, state in chosen.items()}
     if thorough:  # whatever the options are there
         ways = dict.fromkeys(frames, "displacement") | ways
     if not keyed:
@@ -346,9 +347,9 @@ class _Sampling:
     placement: of the strip's picture (_placement); time: of the source, None where its strip says that"""
 
     curves: Curves
-    effect: object
-    strip: object
-    frames: Iterable[float]
+    effect: Any
+    strip: Any
+    frames: Frames
     placement: keyframes.Channel
     time: keyframes.Channel | None
 
@@ -459,7 +460,7 @@ class _Evaluated:
         self.at = function
 
 
-def _source_time(curves: Curves, path: str, effect, frames) -> keyframes.Channel:
+def _source_time(curves: Curves, path: str, effect, frames: Frames) -> keyframes.Channel:
     def value(frame):
         return curves.value(effect, path, "source_time", frame)
 

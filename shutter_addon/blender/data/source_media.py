@@ -7,11 +7,11 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core.frames.frame_source import FrameSource
 from ...media import MediaError, open_source
 from ...media.files import stamp
 from ...media.opening import with_proxy
 from ...media.sequence import by_number
-from ...media.source import FrameSource
 from . import strip_proxies
 
 _AT_ONCE = 100  # files of a sequence, which may be long, that one look asks, beside the first and the last
@@ -133,7 +133,7 @@ class SourceSpec:
         if proxy is None:
             return medium
         space = self.options["colorspace"]
-        if not proxy.of_images:
+        if not (proxy.of_images and self.files):
             return with_proxy(medium, proxy.path, colorspace=space, config=self.options["config"])
         files = [strip_proxies.of_image(proxy.path, file) for file in self.files]
         # Blender has converted them to the sequencer's colour space, but for data.

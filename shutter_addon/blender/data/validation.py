@@ -6,6 +6,7 @@ that, and "not a number" past every range.
 
 import math
 import re
+from typing import Any
 
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
@@ -30,6 +31,7 @@ def place(group) -> str:
         words = _PLACES["camera"]
         return rpt_(words).format(name=group.id_data.path_resolve(path.removesuffix(".camera")).name)
     match = re.match(r".*?effects\[\d+\](?:\.(shutters|regions)\[\d+\])?", path)
+    assert match  # all but the camera are an effect, or lie in one
     words = rpt_(_PLACES[match[1] or ""]).format(name=group.id_data.path_resolve(match[0]).name)
     bar = re.search(r"\.bars\[(\d+)\]$", path)
     return rpt_("{shutter}, bar {number}").format(shutter=words, number=int(bar[1]) + 1) if bar else words
@@ -78,7 +80,7 @@ def check_placement(moving) -> None:
             number(moving, name, float(value))
 
 
-def word(group, name: str, value: float | None = None) -> str:
+def word(group, name: str, value: float | None = None) -> Any:
     """The identifier of an enum as the property has it; or of the item with the number `value`. EffectError: it has
     none of its items."""
     prop = group.bl_rna.properties[name]

@@ -35,9 +35,9 @@ def choose(wanted: str, *, window_waits: bool = False) -> tuple[str, str | None]
         return "cpu", None
     lacking = []
     if wanted != "blender":
-        if opengl().lacking is None:
+        if (why := opengl().lacking) is None:
             return "opengl", None
-        lacking.append(opengl().lacking)
+        lacking.append(why)
     if wanted != "opengl":
         if window_waits:
             lacking.append(
@@ -68,7 +68,7 @@ def is_known(wanted: str) -> bool:
 class OpenGL(NamedTuple):
     """The name of an OpenGL 4.3 context's renderer and the bytes that its textures may take, or why there is none."""
 
-    name: str | None = None
+    name: str = ""
     memory: int | None = None
     lacking: str | None = None
 

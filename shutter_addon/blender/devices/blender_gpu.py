@@ -14,6 +14,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import bpy
 import gpu
@@ -137,7 +138,7 @@ class BlenderDevice(PagedDevice):
     def _free(self, own: gpu.types.GPUTexture) -> None:
         free(own)
 
-    def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
+    def write(self, texture: Any, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
         height, width = array.shape[:2]
         _, sent_format, packing = _exchanged(texture)
         if texture.kind == "rgba8" and opaque:
@@ -148,7 +149,7 @@ class BlenderDevice(PagedDevice):
             sent = (width, len(strip)), sent_format, _buffer("FLOAT", _packed(strip, packing))
             self._send(texture.gpu, unpacking(texture.kind, packing), sent, top, layer)
 
-    def send(self, texture: Texture, frame: np.ndarray) -> Texture:
+    def send(self, texture: Any, frame: np.ndarray) -> Any:
         """See Device. Numbers are what is sent anyway."""
         height, width = frame.shape[:2]
         if width * height * TEXEL_BYTES["r32f"] > _SENT_BYTES:
@@ -162,7 +163,7 @@ class BlenderDevice(PagedDevice):
         constants = {"size": size, "top": top, "layer": layer}
         BlenderDevice._dispatch(self, program, program.groups(size), textures, {"stored": stored}, {}, constants)
 
-    def read(self, texture: Texture) -> np.ndarray:
+    def read(self, texture: Any) -> np.ndarray:
         """See Device."""
         width, height, layers = texture.size
         dtype, _, packing = _exchanged(texture)
@@ -195,7 +196,7 @@ class BlenderDevice(PagedDevice):
             constants,
         )
 
-    def _dispatch(self, program: Pass, groups: tuple[int, int, int], textures, images, blocks, constants) -> None:
+    def _dispatch(self, program: Pass, groups: tuple[int, ...], textures, images, blocks, constants) -> None:
         shader = self._shaders.get(program)
         if shader is None:
             shader = self._shaders[program] = _compiled(program)

@@ -143,7 +143,7 @@ def _finish_some() -> None:
 
 def _called(function) -> Future:
     """The function, called on the main thread after all calls before."""
-    done = Future()
+    done: Future = Future()
     _calls.put((done, function))
     _keep_looking()
     with _lock:
