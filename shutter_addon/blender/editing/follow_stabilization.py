@@ -6,6 +6,7 @@ tracks and settings, as Blender does.
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -85,7 +86,8 @@ def _stabilization(clip, aspect: float) -> Stabilization:
         markers = dict(zip(frames[shown].tolist(), (places @ (1, 1j)).tolist(), strict=True))
         location, turn = (track.name in names for names in used)
         if location or turn:
-            tracks.append(Track(markers, lambda frame, t=track: value(t, "weight_stab", frame), location, turn))
+            weight = partial(value, track, "weight_stab")
+            tracks.append(Track(markers=markers, weight=weight, location=location, turn=turn))
     turned = settings.use_stabilize_rotation
     return Stabilization(tracks, settings.anchor_frame, turned=turned, scaled=turned and settings.use_stabilize_scale)
 

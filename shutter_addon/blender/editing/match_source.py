@@ -189,7 +189,7 @@ def _goals(effect, pairs) -> list[_Goal]:
         left, right = min(s.left_handle for s in own[part.name]), max(s.right_handle for s in own[part.name])
         left = part.left_handle if any(p.left_handle < part.left_handle for p in beside) else left
         right = part.right_handle if any(p.right_handle > part.right_handle for p in beside) else right
-        goals.append(_with_room(_Goal(part, source, left, right)))
+        goals.append(_with_room(_Goal(part=part, source=source, left=left, right=right)))
     return goals
 
 

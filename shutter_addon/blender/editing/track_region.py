@@ -132,7 +132,7 @@ def track(
     start, keys = scene.frame_current, MotionKeys(effect, index, motion)
     # Those beyond the frames that are tracked tell how the subject looks as well.
     anchors = [frame for frame in keys.edited(range(strip.left_handle, strip.right_handle)) if frame != start]
-    here, known = Tracked(start, placement_now(moving), 1.0), sorted({*frames, *anchors})
+    here, known = Tracked(frame=start, placement=placement_now(moving), confidence=1.0), sorted({*frames, *anchors})
     subject = (_camera if index is None else _region)(scene, effect, strip, index, known, here)
     tracked, stops = {start: here}, []
     reach = (
@@ -213,7 +213,7 @@ def key_ends(effect, index: int | None) -> None:
 def _reach(effect) -> int:
     """The frames over which the camera's influence fades: so no exposure reaches one whose motion nobody knows."""
     window, position = validation.number(effect, "window"), validation.word(effect, "position").lower()
-    return max(Options(window, position, step=inbetween_settings.factor(effect)).reach, presence.FADE)
+    return max(Options(window=window, position=position, step=inbetween_settings.factor(effect)).reach, presence.FADE)
 
 
 def confidence_at(effect, index: int | None, frame: float) -> float | None:

@@ -53,7 +53,7 @@ def layout(width: float, bars, unit: float) -> Layout:
     width = max(min(max(len(bars) * _BAR, 200) * unit, width - 2 * margin), 4 * pad)
     frame = margin, margin, margin + width, margin + _HEIGHT * unit
     box = frame[0] + pad, frame[1] + pad, frame[2] - pad, frame[3] - _HEADER * unit
-    return Layout(frame, box, len(bars), max(1.0, float(np.max(bars, initial=0.0))))
+    return Layout(frame=frame, box=box, count=len(bars), top=max(1.0, float(np.max(bars, initial=0.0))))
 
 
 def _layout(context, bars) -> Layout:

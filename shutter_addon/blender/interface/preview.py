@@ -303,7 +303,7 @@ def _show_source(quad, shown: Shown, renderer, request, right: float) -> None:
     # The shown frame lies where it is for all that move. Without a motion, other frames would have to be read for it.
     following = request.state.following
     moving = following and following.of([following.moving()[0]])
-    plain = replace(request, state=FrameState(options, still, following=moving), levels=True)
+    plain = replace(request, state=FrameState(options=options, bars=still, following=moving), levels=True)
     texture = renderer.draw(plain)
     quad.draw("PICTURE", {"picture": texture}, 0.0, right, opacity=shown.strip.blend_alpha)
 

@@ -93,7 +93,7 @@ def _shown_effects(film, frames: range) -> Iterator[tuple]:
 def _effect(session: RenderSession, shown: tuple, compositor, find_cuts: bool) -> EffectCheck:
     """shown: of _shown_effects"""
     scene, effect, strip, frames = shown
-    check = EffectCheck(scene, strip.name, frames, len(effect.shutters))
+    check = EffectCheck(scene=scene, name=strip.name, frames=frames, shutters=len(effect.shutters))
     if not _look_at_footage(check, effect, strip):
         return check
     try:
@@ -117,7 +117,8 @@ def _effect(session: RenderSession, shown: tuple, compositor, find_cuts: bool) -
 
 def _requests(session: RenderSession, taken, check: EffectCheck) -> dict[float, Request]:
     """What each frame asks for, where it can be shown; faults of others are noted, each at the first of its frames."""
-    requests, faults, context = {}, {}, RenderContext(session, RenderSettings())
+    requests, context = {}, RenderContext(session=session, settings=RenderSettings())
+    faults: dict[str, list[str]] = {}
     for frame in sorted(taken.frames):
         try:
             requests[frame] = session.request(taken, frame, context)
@@ -164,7 +165,8 @@ def _look_at_frames(check: EffectCheck, renderer: Renderer, requests: dict[float
     for frame in lacking if find_cuts else ():  # beyond a cut none is needed
         with suppress(UserError):  # a file that cannot be read has been told
             needed[frame] = renderer.needed(requests[frame], known=False)
-            source.shots.release()
+            if source.shots is not None:
+                source.shots.release()
     between = {index for indices in needed.values() for index in indices if index % source.step}
     check.pairs = len({index // source.step for index in between})
     gone = {index for index in between if not source.has(index)}
@@ -216,7 +218,7 @@ def _notes(check: EffectCheck, requests: dict[float, Request]) -> list[str]:
     notes = []
     if (package := cuts.missing_package()) and any(each.state.options.stop_at_cuts for each in requests.values()):
         notes.append(f"no cuts are found, and exposures run across them: the Python package {package} is missing")
-    if check.needs.sends:
+    if check.needs and check.needs.sends:
         notes.append("the GPU has no room for all frames of an exposure: every picture sends them anew, which is slow")
     return notes
 

@@ -146,7 +146,8 @@ def say_what_is_left_out(folder: Path, frames: tuple[int, int]) -> None:
 def _common(paths: list[Path], looked, size: tuple[int, int], key: str) -> RenderedPicture:
     """What all pictures are; looked: called after each. OutputError: one is broken, unlike the first, or of another
     edit than that of `key`."""
-    first, pool = None, ThreadPoolExecutor()
+    pool = ThreadPoolExecutor()
+    first: RenderedPicture | None = None
     try:
         for path, picture in zip(paths, pool.map(rendered_pictures.read, paths), strict=True):
             if picture is None:
@@ -157,6 +158,7 @@ def _common(paths: list[Path], looked, size: tuple[int, int], key: str) -> Rende
             looked()
     finally:
         pool.shutdown(cancel_futures=True)
+    assert first is not None  # an edit has a frame
     if first.size != size:
         raise OutputError(f"{paths[0]}: is {_by(first.size)}, but the edit's frames are {_by(size)}")
     if first.edit not in (None, key):

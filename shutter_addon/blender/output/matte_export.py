@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
@@ -35,8 +36,8 @@ def recipe_for(scene, effect, strip, path: Path) -> recipe.Recipe:
 
 
 def _ramp(region) -> recipe.RampRegion:
-    kind = validation.word(region, "ramp") if region.kind == "RAMP" else "LINEAR"
-    return recipe.RampRegion(region.shutter, "ramp", kind.lower())
+    ramp: Any = validation.word(region, "ramp").lower() if region.kind == "RAMP" else "linear"
+    return recipe.RampRegion(shutter=region.shutter, kind="ramp", ramp=ramp)
 
 
 def _folder(region, path: Path, number: int) -> Path | None:
@@ -76,13 +77,13 @@ def _words(scene, effect, strip, region, folder: Path | None, path: Path) -> rec
     if region.kind == "RAMP":
         return _ramp(region)
     if folder is not None:
-        first = _write(scene, effect, strip, region, folder)
-        return recipe.MatteRegion(region.shutter, "matte", recipe.relative(first, path.parent), timing="timeline")
+        first = recipe.relative(_write(scene, effect, strip, region, folder), path.parent)
+        return recipe.MatteRegion(shutter=region.shutter, kind="matte", path=first, timing="timeline")
     file, channel = matte_content.image_path(region), matte_content.channel(region)
     # A recipe's timeline begins with the strip, trimmed as it is.
     offset = region.offset + (strips.skipped(strip) if region.timing == "TIMELINE" else 0)
     words = {"channel": channel, "offset": offset, "timing": region.timing.lower()}
-    return recipe.MatteRegion(region.shutter, "matte", recipe.relative(file, path.parent), **words)
+    return recipe.MatteRegion(shutter=region.shutter, kind="matte", path=recipe.relative(file, path.parent), **words)
 
 
 def _write(scene, effect, strip, region, folder: Path) -> Path:
@@ -112,7 +113,7 @@ def _write_frames(scene, effect, strip, region, folder: Path) -> list:
     with closing(effect_source.open_source(shown)) as source, closing(MatteValues.of(source)) as values:
         for number, frame in enumerate(frames, 1):
             with translated(rpt_):
-                matte = mattes.Matte(0, content.at(frame))
+                matte = mattes.Matte(shutter=0, content=content.at(frame))
             ((key, array),) = values.values((matte,), effect_source.source_index(shown, frame, source)[0], 1)
             keys.append(key)
             write_grey(folder / _name(number), array)

@@ -17,6 +17,7 @@ from ..data import versions
 from . import film_output
 
 RUN = 8  # frames that are claimed at once
+Stamps = dict[Path, tuple | None]  # rendered_pictures.stamp of pictures
 _PAUSE = 1.0  # seconds between two looks at what others have finished
 
 
@@ -40,11 +41,11 @@ def check_resumable(scene) -> None:
 
 
 @contextmanager
-def of_same_footage(scene) -> Iterator[dict[Path, tuple]]:
+def of_same_footage(scene) -> Iterator[Stamps]:
     """Gives a dictionary for the pictures that are rendered inside, with their stamps. They are removed if the footage
     is written to meanwhile: they carry the key of what it was, and would count as finished. Pictures that others have
     put in their places stay. OutputError: it was written to."""
-    before, rendered = versions.stamps(scene), {}
+    before, rendered = versions.stamps(scene), Stamps()
     try:
         yield rendered
     finally:
@@ -56,9 +57,7 @@ def of_same_footage(scene) -> Iterator[dict[Path, tuple]]:
             raise film_output.OutputError(f"{changed[0]}: was written to while frames were rendered from it")
 
 
-def render(
-    scene, folder: Path, file_format: str, version: EditVersion, rendered: dict[Path, tuple], *, resume: bool
-) -> None:
+def render(scene, folder: Path, file_format: str, version: EditVersion, rendered: Stamps, *, resume: bool) -> None:
     """Renders the edit's frames, from its first to its last, to pictures that carry the key of its version.
 
     rendered: gets each picture with its stamp, as it is written
@@ -142,7 +141,7 @@ def _name(picture: Path) -> str:
     return f"{picture.stem}_{picture.suffix[1:]}"
 
 
-def _is_finished(size: tuple[int, int], samples: str, key: str, rejected: dict[Path, tuple], picture: Path) -> bool:
+def _is_finished(size: tuple[int, int], samples: str, key: str, rejected: Stamps, picture: Path) -> bool:
     """Whether a picture is sound, and of this version of the edit.
 
     rejected: the stamps of pictures that were not, which are read no second time; it gets more of them"""
