@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import queue
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TypeVar
@@ -43,7 +43,7 @@ def check() -> None:
         raise StoppedError
 
 
-def beside(steps: Iterable[T], patience: float | None) -> Iterator[T | None]:
+def beside(steps: Iterable[T], patience: float | None) -> Generator[T | None, None, None]:
     """What an iterable gives, found by a thread of its own, which goes ahead.
 
     patience: seconds after which it gives None where nothing was found yet; None: it waits. Closed early, it has the

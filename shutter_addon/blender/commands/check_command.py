@@ -16,6 +16,7 @@ from ...core.frames import frame_ranges
 from ...core.messages import UserError, signed
 from ...devices.budget import machine_memory
 from ...devices.device import NoDeviceError
+from ...media.files import stamp
 from ..data import missing_media, versions
 from ..devices import machine
 from ..editing import saved_edit
@@ -50,7 +51,7 @@ def add(commands) -> None:
 
 
 def run(arguments) -> None:
-    opened = versions.stamp(arguments.edit)
+    opened = stamp(arguments.edit)
     scene = saved_edit.open_edit(arguments.edit)
     first, last = command_line.frames(arguments.frames, (scene.frame_start, scene.frame_end), "edit")
     frames = range(first, last + 1)

@@ -1,6 +1,7 @@
 """The command `join`: rendered frames, and the sound of their edit, as a movie."""
 
 from ...core.farm import job_file
+from ...media.files import stamp
 from ..data import missing_media, versions
 from ..editing import saved_edit
 from ..output import film_join, film_output
@@ -19,7 +20,7 @@ def add(commands) -> None:
 
 
 def run(arguments) -> None:
-    opened = versions.stamp(arguments.edit)
+    opened = stamp(arguments.edit)
     scene = saved_edit.open_edit(arguments.edit)
     whole = scene.frame_start, scene.frame_end
     frames = command_line.frames(arguments.frames, whole, "edit")

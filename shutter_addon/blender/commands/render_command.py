@@ -9,6 +9,7 @@ from ...core import atomic_write
 from ...core.farm import job_file
 from ...core.recipes import recipe, recipe_file
 from ...media.completeness import is_whole_blend, why_short
+from ...media.files import stamp
 from ...media.matte_files import MatteFile
 from ..data import inbetween_settings, missing_media, preferences, versions
 from ..devices import available
@@ -61,7 +62,7 @@ def _render_edit(arguments) -> None:
     source, output, file_format = arguments.source, arguments.output, arguments.format or "png"
     if output is None:
         raise film_output.OutputError("nothing to do: give --output")
-    opened = versions.stamp(source)
+    opened = stamp(source)
     scene = saved_edit.open_edit(source)
     whole = scene.frame_start, scene.frame_end
     scene.frame_start, scene.frame_end = frames = command_line.frames(arguments.frames, whole, "edit")

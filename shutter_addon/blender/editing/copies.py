@@ -4,6 +4,8 @@ Blender copies a Scene strip, or the whole edit, but not the scene that it shows
 original's effect, at the original's place in time. Parts of a cut strip have the same origin, and share.
 """
 
+from typing import Any
+
 import bpy
 
 from ...core.model.limits import MAX_FRAME
@@ -40,7 +42,7 @@ def _groups(scene) -> dict:
     return groups
 
 
-def _original(scene, effect_scene):
+def _original(scene, effect_scene) -> tuple[Any, str] | None:
     """Scene and path of the effect that a copied effect scene was made for; those of its own scene first."""
     for other in sorted(bpy.data.scenes, key=lambda other: other != scene):
         for effect in other.virtual_shutter.effects:

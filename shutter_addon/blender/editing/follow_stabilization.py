@@ -62,10 +62,13 @@ def unstabilized(clip, size) -> Callable[[float], Similarity]:
 
     def at(frame: int) -> Similarity:
         x, y = (value(settings, "target_position", frame, axis) for axis in (0, 1))
-        influence = [value(settings, f"influence_{name}", frame) for name in ("location", "rotation", "scale")]
+        taken = {name: value(settings, f"influence_{name}", frame) for name in ("location", "rotation", "scale")}
         target = complex(x * size[0] / size[1], y)
         angle, scale = value(settings, "target_rotation", frame), value(settings, "target_scale", frame)
-        return _in_pixels(laid(stabilization.at(frame), Settings(*influence, target, angle, scale)), size).inverse()
+        wanted = Settings(**taken, target=target, target_angle=angle, target_scale=scale)
+        measured = stabilization.at(frame)
+        assert measured is not None  # as there are frames
+        return _in_pixels(laid(measured, wanted), size).inverse()
 
     def between(time: float) -> Similarity:
         first, second, share = at(math.floor(time)), at(math.ceil(time)), time - math.floor(time)

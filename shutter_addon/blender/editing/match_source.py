@@ -8,7 +8,7 @@ Scribbles stay where they lie on the picture.
 from collections import Counter
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import bpy
 import mathutils
@@ -172,11 +172,11 @@ def _range(strip) -> tuple[int, int]:
 class _Goal:
     """The handles that a part of an effect would have from its source; neighbor: what stops it short of them."""
 
-    part: object
-    source: object
+    part: Any
+    source: Any
     left: int
     right: int
-    neighbor: object = None
+    neighbor: Any = None
 
 
 def _goals(effect, pairs) -> list[_Goal]:

@@ -28,7 +28,7 @@ _MADE = bpy.types.Keyframe.bl_rna.properties["type"].enum_items[MADE].value
 # What Blender gives each key as the overshoot of the ease Back, which linear keys have no use for: a made key keeps
 # there the value that it was made with, so that one which the editor has moved is told from it. Keys that the editor
 # has set keep what was tracked there before.
-NOTHING_KEPT = np.float32(1.70158)
+NOTHING_KEPT = float(np.float32(1.70158))
 # The channels, and how many of their components a motion has.
 _COMPONENTS = (("location", 0), ("location", 1), ("rotation", 0), ("scale", 0))
 CHANNELS = ("location", "rotation", "scale")
@@ -239,7 +239,7 @@ def _replace(curve, values: dict[int, float], tracked: Iterable[int]) -> None:
     curve.update()
 
 
-def _insert(curve, frame: int, value: float, ease: str = "LINEAR") -> None:
+def _insert(curve, frame: float, value: float, ease: str = "LINEAR") -> None:
     key = curve.keyframe_points.insert(frame, value, options={"FAST"}, keyframe_type=MADE)
     key.interpolation, key.back = ease, key.co[1]
 

@@ -6,6 +6,7 @@ import bpy
 
 from ...core.farm.edit_version import EditVersion
 from ...core.messages import UserError, sentence
+from ...media.files import stamp
 from ..data import used_data, versions
 from ..output import film_output
 
@@ -51,10 +52,10 @@ def open_edit(path: Path):
 def version(scene, path: Path, opened: tuple[int, int] | None) -> EditVersion:
     """The version of an edit that was opened from a file.
 
-    opened: the file's stamp before (versions.stamp). SavedEditError: it was saved over since, so that its key would be
+    opened: its stamp before (media.files.stamp). SavedEditError: it was saved over since, so that its key would be
     that of another edit; OSError: it is gone"""
     current = versions.of_edit(scene)
-    if versions.stamp(path) != opened:
+    if stamp(path) != opened:
         raise SavedEditError(f"{path}: was saved over while it was opened; start again")
     return current
 

@@ -7,9 +7,9 @@ can go along; at the end they are thinned to those that the motion needs within 
 import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
@@ -19,7 +19,6 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...core import revision, stopping
 from ...core.messages import EffectError, translated
 from ...core.model import limits, motions, presence
-from ...core.model.effect import Camera, Region
 from ...core.model.frame_state import Options
 from ...core.model.keyframes import Samples
 from ...core.recipes import region_keys
@@ -54,7 +53,8 @@ def data_replaced() -> None:
     _replaced.changed()
 
 
-class Target(NamedTuple):
+@dataclass(frozen=True)
+class Target:
     """What is tracked: found again before each step, as anything may happen to Blender's data in between.
 
     scene: session_uid of the effect's scene; known: what would change if another region took its place"""
@@ -239,7 +239,7 @@ def unsure_among(effect, index: int | None, frames) -> int:
     return int((np.isin(known, list(frames)) & (confidence < pursuit.SURE)).sum())
 
 
-def _region(scene, effect, strip, index: int, frames, here: Tracked) -> _Subject:
+def _region(scene, effect, strip, index, frames, here: Tracked) -> _Subject:
     shape = _standing(snapshot.region_at(scene, effect, strip, index, frames), here)
     return _Subject(partial(tracking.follow, shape), lambda: motions.offsets(shape.drawings.at(here.frame)))
 
@@ -253,7 +253,7 @@ def _camera(scene, effect, strip, _index, frames, here: Tracked) -> _Subject:
     return _Subject(follow, lambda: region_keys.CORNERS, region_keys.STEADY)
 
 
-def _standing(moving: Region | Camera, here: Tracked) -> Region | Camera:
+def _standing(moving: Any, here: Tracked) -> Any:
     """A region or the camera, which is where the editor has put it, keyed or not."""
     sampled = {
         name: replace(channel, values=channel.values | {here.frame: getattr(here.placement, name)})

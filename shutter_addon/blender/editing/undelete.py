@@ -3,6 +3,8 @@
 Blender's clipboard holds a Scene strip without its scene, and outlives the file that the strip was cut from.
 """
 
+from typing import Any
+
 import bpy
 
 from ..data import annotations, fcurves, property_copy
@@ -61,7 +63,7 @@ def restore(scene, identity: str):
 
 def _plain(struct) -> dict:
     """A struct of Blender's with all that is in it as plain data; of what it points to, the session_uid."""
-    plain = {}
+    plain: dict[str, Any] = {}
     for prop in struct.bl_rna.properties:
         name = prop.identifier
         if prop.type == "COLLECTION":
