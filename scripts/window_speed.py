@@ -78,7 +78,7 @@ def add_effect(edit, source):
     add_effect, recipe_import = (
         import_module(f"{layer}.{name}") for name in ("editing.add_effect", "data.recipe_import")
     )
-    recipe_file = import_module(f"{layer.rpartition('.')[0]}.core.recipes.recipe")
+    recipe_file = import_module(f"{layer.rpartition('.')[0]}.core.recipes.recipe_file")
     presets = import_module(f"{layer.rpartition('.')[0]}.core.model.presets")
     strip, effect = add_effect.add_effect(edit, source)
     lines = {"Sharp": [[0.3, 0.2], [0.5, 0.8]], "Ramp": [[0.7, 0.2], [0.7, 0.8]]}
