@@ -8,7 +8,7 @@ from pathlib import Path
 import frame_trace
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(1, str(ROOT / "scripts"))
+sys.path.append(str(ROOT / "scripts"))  # at the end: gallery is a package, and a script there
 frame_way = importlib.import_module("frame_way")
 
 RECIPE = {

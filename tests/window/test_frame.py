@@ -5,7 +5,7 @@ import sys
 
 from telling import ROOT, linked, needs_window, tell
 
-sys.path.insert(1, str(ROOT / "scripts"))
+sys.path.append(str(ROOT / "scripts"))  # at the end: gallery is a package, and a script there
 frame_way = importlib.import_module("frame_way")
 
 pytestmark = needs_window
