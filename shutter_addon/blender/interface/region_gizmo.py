@@ -81,8 +81,8 @@ def place(context) -> Place | None:
         width / height,
     )
     to_region = geometry.picture_to_region(strip, (width, height), context.region)
-    ends = mapped(to_region, np.stack([middle + np.array(region.location), moved]))
-    return Place(*ends, to_region, width / height)
+    centre, corner = mapped(to_region, np.stack([middle + np.array(region.location), moved]))
+    return Place(centre=centre, corner=corner, to_region=to_region, aspect=width / height)
 
 
 def outline(context, where: Place) -> list[np.ndarray]:
@@ -127,13 +127,15 @@ class SHUTTER_GT_region(Gizmo):
         return 0 if np.hypot(*(handle - location)) <= drawing.ui_scale() * _RADIUS * 1.5 else -1
 
     def invoke(self, context, event):
+        if (where := place(context)) is None:  # while it plays, it may just have gone
+            return {"CANCELLED"}
         effect = selection.active(context)[1]
         region = selection.active_region(effect)
         # While it plays, another effect may come into the picture.
         self.target = track_region.Target.of(effect, effect.active_region)
         self.before = tuple(region.location), region.rotation, region.scale
         self.grabbed = event.mouse_region_x, event.mouse_region_y
-        self.where = place(context)
+        self.where = where
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event, tweak):
