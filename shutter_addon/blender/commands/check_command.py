@@ -66,7 +66,8 @@ def run(arguments) -> None:
 
 def _report(arguments, scene, frames: range, version: EditVersion) -> dict:
     """What is found, as JSON has it (docs/command.md)."""
-    faults, notes = [*_version_faults(scene), *_setting_faults(arguments, scene, frames)], []
+    faults = [*_version_faults(scene), *_setting_faults(arguments, scene, frames)]
+    notes: list[str] = []
     device, checks, limit = _on_device(scene, frames, faults, notes, find_cuts=not arguments.inbetweens_later)
     build = _builds(arguments.edit, scene, frames, checks)
     for check in checks:
@@ -79,8 +80,8 @@ def _report(arguments, scene, frames: range, version: EditVersion) -> dict:
     faults += missing_media.faults(scene, frames, sources=False)  # of these the effects' own say more
     faults += missing_media.sound_faults(scene, frames)
     memory = _memory(checks, limit)
-    if memory["host"] > (machine_memory() or memory["host"]):
-        words = f"{in_units(memory['host'])} of memory, the machine has {in_units(machine_memory())}"
+    if (most := machine_memory()) and memory["host"] > most:
+        words = f"{in_units(memory['host'])} of memory, the machine has {in_units(most)}"
         faults.append(f"a frame needs {words}")
     disk = _disk(arguments, scene, frames, checks, faults)
     report = {
@@ -169,10 +170,10 @@ def _on_device(
 
 def _memory(checks: list[EffectCheck], limit: int | None) -> dict:
     """Bytes that a frame needs at most, where several effects are shown in it of all of them."""
-    shown = [each for each in checks if each.needs]
-    frames = set().union(*(each.frames for each in shown))
-    gpu = max((sum(each.needs.gpu for each in shown if frame in each.frames) for frame in frames), default=0)
-    host = max((sum(each.needs.host for each in shown if frame in each.frames) for frame in frames), default=0)
+    shown = [(each.frames, each.needs) for each in checks if each.needs]
+    all_frames = set().union(*(frames for frames, _ in shown))
+    gpu = max((sum(needs.gpu for frames, needs in shown if frame in frames) for frame in all_frames), default=0)
+    host = max((sum(needs.host for frames, needs in shown if frame in frames) for frame in all_frames), default=0)
     return {"gpu": min(gpu, limit or gpu), "gpu_limit": limit, "host": host}
 
 
@@ -187,7 +188,7 @@ def _disk(arguments, scene, frames: range, checks: list[EffectCheck], faults: li
         needs.append(Need(output, left * frame, f"{left} frames"))
     if arguments.movie:
         needs.append(Need(arguments.movie.parent, 0, "the movie"))
-    needs += [Need(each.folder, each.bytes, "in-between frames") for each in checks if each.missing]
+    needs += [Need(each.folder, each.bytes, "in-between frames") for each in checks if each.folder and each.missing]
     faults += output_space.faults(needs)
     return {
         "format": file_format,

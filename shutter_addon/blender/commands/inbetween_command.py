@@ -1,6 +1,7 @@
 """The command `inbetween`: a source's in-between frames alone, or all that a saved edit needs."""
 
 from pathlib import Path
+from typing import Any
 
 from ...media import inbetween
 from ..data import inbetween_settings, requirements, snapshot, source_media
@@ -69,26 +70,30 @@ def build_lacking(film) -> None:
         if scene == film:
             frames = {frame for frame in frames if film.frame_start - 1 < frame <= film.frame_end}
         needing = snapshot.take(scene, effect, shown[0], frames, folder=render_settings.settings().inbetween)
+        assert needing.inbetween is not None  # by its factor
         with needing.source.open() as medium:
-            _build(medium, *needing.inbetween, sorted(needed_pairs(needing)))
+            _build(medium, *needing.inbetween, pairs=sorted(needed_pairs(needing)))
 
 
 def needed_pairs(shown: snapshot.Snapshot) -> set[int]:
     """The pairs of neighbouring source frames whose in-betweens are needed to show an effect strip at the snapshot's
     frames, each by its first. It reads what it must to find cuts. One of FAULTS: they cannot be shown."""
-    context, factor, pairs = render_context.of_render(), shown.inbetween.factor, set()
+    context = render_context.of_render()
+    pairs: set[int] = set()
     for frame in sorted(shown.frames):
         request = context.request(shown, frame)
         renderer = context.renderer(request)
-        pairs |= {index // factor for index in renderer.needed(request, known=False) if index % factor}
-        renderer.source.release()  # what it read is not shown here
+        source: Any = renderer.source
+        needed = renderer.needed(request, known=False)
+        pairs |= {index // source.step for index in needed if index % source.step}
+        source.release()  # what it read is not shown here
     return pairs
 
 
 def _build(medium, folder: Path, factor: int, method: str, pairs) -> None:
     """Builds the in-betweens of these pairs of source frames, each given by its first, in ascending order."""
     with film_output.stoppable() as stopped, film_output.progress(len(pairs), "pair") as moved:
-        told = {"update": lambda *_: moved(), "cancelled": lambda: bool(stopped)}
+        told: dict = {"update": lambda *_: moved(), "cancelled": lambda: bool(stopped)}
         inbetween.build(medium, folder, factor, method, **told, pairs=pairs)
     if stopped:
         raise film_output.InterruptedRenderError(f"{folder}: stopped; what is finished stays")

@@ -60,7 +60,7 @@ class Target:
     scene: session_uid of the effect's scene; known: what would change if another region took its place"""
 
     scene: int
-    index: int | None
+    index: Any  # as for selection.moving
     known: tuple
 
     @classmethod

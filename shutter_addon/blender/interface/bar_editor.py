@@ -110,11 +110,11 @@ class SHUTTER_GT_bars(Gizmo):
     def draw(self, context):
         if (seen := selection.in_picture(context)) is None:
             return
-        effect = seen[1]
+        scene, effect, strip = seen
         if (shown := _shown(effect)) is None:
             return
         shutter = selection.active_shutter(effect)
-        words = bar_edits.open_for(*seen, effect.active_shutter) or bar_edits.summary(shown.bars)
+        words = bar_edits.open_for(scene, effect, strip, effect.active_shutter) or bar_edits.summary(shown.bars)
         _draw(_layout(context, shown.bars), shutter.color, f"{shutter.name}   {words}", *shown)
 
     def test_select(self, context, location):

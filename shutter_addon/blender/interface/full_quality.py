@@ -64,7 +64,9 @@ def _shown(context):
 def _begin(window, area) -> None:
     global _before
     space, region = area.spaces.active, preview_areas.preview_region(area)
-    _before = _View(area.as_pointer(), space.proxy_render_size, space.use_proxies, *_view_of(region))
+    rows, centre = _view_of(region)
+    size, proxies = space.proxy_render_size, space.use_proxies
+    _before = _View(area=area.as_pointer(), size=size, proxies=proxies, rows=rows, centre=centre)
     space.proxy_render_size, space.use_proxies = "SCENE", False
     _zoom(window, area, region.height)
     bpy.app.timers.register(_end_when_over, first_interval=_TICK)
@@ -84,8 +86,9 @@ def _end() -> None:
     """Has the view as before: what of it the user has not changed since."""
     global _before
     before, _before = _before, None
-    areas = [pair for pair in preview_areas.previews(bpy.context) if before and pair[1].as_pointer() == before.area]
-    for window, area in areas:
+    for window, area in list(preview_areas.previews(bpy.context)):
+        if before is None or area.as_pointer() != before.area:
+            continue
         space, region = area.spaces.active, preview_areas.preview_region(area)
         if (space.proxy_render_size, space.use_proxies) == ("SCENE", False):
             space.proxy_render_size, space.use_proxies = before.size, before.proxies

@@ -61,7 +61,7 @@ def redraw_panels(context) -> None:
                     region.tag_redraw()
 
 
-def size_in_words(size: int) -> str:
+def size_in_words(size: float) -> str:
     """Bytes as "340 MB", say."""
     return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.0f} MB" if size >= 1e6 else f"{size / 1e3:.0f} kB"
 
@@ -76,7 +76,7 @@ def time_in_words(seconds: float) -> str:
 def strobing_in_words(exposure: strobing.Strobing) -> str:
     """That an exposure has too few frames, and what it takes to have more."""
     sentence = rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{exposure.step:.0f}")
-    if exposure.seconds is None:
+    if exposure.seconds is None or exposure.size is None:
         return sentence
     size, time = size_in_words(exposure.size), time_in_words(exposure.seconds)
     return rpt_("{sentence}. In-between frames take about {time}, {size}").format(
@@ -86,7 +86,7 @@ def strobing_in_words(exposure: strobing.Strobing) -> str:
 
 def smoothing_in_words(exposure: strobing.Strobing) -> str | None:
     """What helps against that; None: nothing does."""
-    return exposure.factor and iface_("{factor}× In-Between Frames").format(factor=exposure.factor)
+    return iface_("{factor}× In-Between Frames").format(factor=exposure.factor) if exposure.factor else None
 
 
 class _OfInbetweens(OfEffect):
@@ -108,7 +108,7 @@ class _OfInbetweens(OfEffect):
 class _Building(_OfInbetweens):
     """Builds, and shows how far it is."""
 
-    _wanted = None  # factor of what the strip needs; None: all of the source's, of the effect's own
+    _wanted: int | None = None  # factor of what the strip needs; None: all of the source's, of the effect's own
 
     def invoke(self, context, _event):
         if bpy.app.background:
@@ -125,8 +125,9 @@ class _Building(_OfInbetweens):
         return self._finish(context)
 
     def _begin(self, context) -> bool:
+        scene, effect, strip = selection.active(context)
         try:
-            self._build = inbetween_build.start(*selection.active(context), self._wanted)
+            self._build = inbetween_build.start(scene, effect, strip, self._wanted)
         except FAULTS as error:
             self.report({"ERROR"}, str(error))
             return False

@@ -52,7 +52,7 @@ class SHUTTER_OT_matte_add(_AddsRegion, ImportHelper, Operator):
         region_edits.add_matte(effect, selection.active_shutter(effect), name=image.name, image=image, **channel)
 
 
-_strip_items = []
+_strip_items: list = []
 
 
 def _strips(_self, context):
@@ -75,7 +75,7 @@ class SHUTTER_OT_matte_strip(_AddsRegion, Operator):
         matte_strips.choose_strip(region, self.strip)
 
 
-_mask_items = []
+_mask_items: list = []
 
 
 def _masks(_self, _context):

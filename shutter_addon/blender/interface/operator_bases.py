@@ -1,15 +1,16 @@
 """What operators of an effect, a shutter or a region have in common."""
 
+from typing import Any
+
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
 
 from ...core.messages import EffectError
 from ...core.recipes import recipe
 from ..data import selection, strips
-from ..editing import (
-    collection_edits,
-)
+from ..editing import collection_edits
 
+Mixin: Any = object  # for what is mixed into Blender's classes: mypy takes it to have what these have
 UNDOABLE = {"REGISTER", "UNDO"}
 
 
@@ -27,7 +28,7 @@ def redraw(context) -> None:
                 area.tag_redraw()
 
 
-class OfEffect:
+class OfEffect(Mixin):
     """Works on the effect that is seen, or where none is, on that of the active strip."""
 
     bl_options = UNDOABLE

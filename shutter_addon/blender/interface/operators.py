@@ -189,7 +189,7 @@ class SHUTTER_OT_shutter_move(Move, OfShutter, Operator):
         return None
 
 
-_preset_items = []
+_preset_items: list = []
 
 
 def _presets(_self, _context):
@@ -353,7 +353,7 @@ def drawing_tool(context, effect, region, tool: str) -> bool:
     return has_preview
 
 
-_layer_items = []
+_layer_items: list = []
 
 
 def _layers(_self, context):
@@ -396,7 +396,7 @@ class SHUTTER_OT_region_take(OfShutter, Operator):
             shown_annotations.give(area.spaces.active, effect.scene.annotation)
 
 
-_shutter_items = []
+_shutter_items: list = []
 
 
 def _shutters(_self, context):

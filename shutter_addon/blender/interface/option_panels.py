@@ -69,17 +69,18 @@ class Inbetween(WithEffect):
         layout = self.layout
         scene, effect, strip = selection.active(context)
         build = inbetween_build.running()
-        is_built = build is not None and build.scene == effect.scene.session_uid
+        if build is not None and build.scene != effect.scene.session_uid:
+            build = None  # of another effect
         column = layout.column()
         column.use_property_split = True
-        column.enabled = not is_built
+        column.enabled = build is None
         column.prop(effect, "inbetween", text="Factor")
         column = column.column()
         is_on = effect.inbetween != "1"
         column.active = is_on
         column.prop(effect, "inbetween_method")
         column.prop(effect, "inbetween_place")
-        if is_built:
+        if build is not None:
             progress = iface_("{done} of {total}").format(done=build.done, total=build.total)
             layout.progress(factor=build.done / max(build.total, 1), text=progress, translate=False)
         elif is_on:

@@ -4,6 +4,7 @@ import bpy
 
 from ..data import selection
 from . import drawing
+from .operator_bases import Mixin
 
 # Units of the interface beside a sentence in a panel: margins and the tabs of a sidebar; its icon.
 _MARGIN, _ICON = 64, 20
@@ -46,7 +47,7 @@ def draw_list(layout, effect, kind: str, items, menu: str | None = None) -> None
         column.operator(f"shutter.{kind}_move", text="", icon="TRIA_DOWN").direction = "DOWN"
 
 
-class WithEffect:
+class WithEffect(Mixin):
     @classmethod
     def poll(cls, context):
         return super().poll(context) and selection.active(context) is not None

@@ -9,6 +9,7 @@ from ..data import annotations, selection, strips
 from ..editing import bar_edits, match_source
 from ..rendering import inbetween_build, strobing
 from . import inbetween_operators
+from .operator_bases import Mixin
 from .option_panels import TIMERS, Inbetween, Options
 from .panel_parts import WithEffect, draw_list, sentence
 from .region_panels import Camera, Follow, Regions, Track, Transform, draw_followed_motion, draw_tracked, draw_tracking
@@ -91,7 +92,7 @@ class SHUTTER_MT_shutters(Menu):
         layout.operator("shutter.recipe_export", icon="EXPORT")
 
 
-class _Shutters:
+class _Shutters(Mixin):
     """What an editor needs first, from the top down: it shows without scrolling in Blender's own layout."""
 
     bl_label = "Shutter"
@@ -146,15 +147,15 @@ def _draw_tools(layout, effect) -> None:
 
 def _draw_bars(layout, active) -> None:
     """What the active shutter's bars come to."""
-    effect = active[1]
+    scene, effect, strip = active
     try:
         bars = bar_edits.shown(effect, effect.active_shutter).bars
     except EffectError as error:
         sentence(layout, str(error), "ERROR")
         return
-    is_open = bars.any()
+    is_open = bool(bars.any())
     sentence(layout, bar_edits.summary(bars), "NONE" if is_open else "ERROR", is_quiet=is_open)
-    if words := bar_edits.open_for(*active, effect.active_shutter):
+    if words := bar_edits.open_for(scene, effect, strip, effect.active_shutter):
         sentence(layout, words, is_quiet=True)
 
 

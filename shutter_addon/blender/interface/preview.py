@@ -60,7 +60,8 @@ def _redraw_when_still() -> float | None:
     """Blender does not draw again where the playhead is let go, or tracking ends."""
     if previews.is_going(bpy.context):
         return _SOON
-    return _redraw_once()
+    _redraw_once()
+    return None
 
 
 def _follow_once() -> None:
@@ -248,7 +249,7 @@ def _redraw_panels() -> None:
 
 def _smoothing(known: strobing.Strobing) -> Button | None:
     label = inbetween_operators.smoothing_in_words(known)
-    return label and Button("shutter.smooth_streaks", label, {"factor": str(known.factor)})
+    return Button("shutter.smooth_streaks", label, {"factor": str(known.factor)}) if label else None
 
 
 def _measure() -> float | None:

@@ -3,6 +3,7 @@ those that make a panning shot of that, or a tripod."""
 
 import math
 import time
+from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -13,7 +14,7 @@ from ..data import selection, validation
 from ..data.choices import CONTEXT
 from ..editing import bar_edits, follow_stabilization, follow_track, panning_shot, track_region, tripod
 from ..rendering.effect_source import FAULTS
-from .operator_bases import OfEffect, OfRegion, OfShutter, OfStrokes, redraw, refused
+from .operator_bases import Mixin, OfEffect, OfRegion, OfShutter, OfStrokes, redraw, refused
 
 # Seconds of work from one look at the window to the next, at least and at most, and between two looks at its thread.
 _TICK, _MOST, _PATIENCE = 0.05, 0.1, 0.02
@@ -36,7 +37,7 @@ _DIRECTION = EnumProperty(
 )
 
 
-class _Tracks:
+class _Tracks(Mixin):
     """Tracks what has an `index`, as for selection.moving, from the current frame in a `direction` of DIRECTIONS."""
 
     bl_options = {"UNDO"}
@@ -117,9 +118,10 @@ class _Tracks:
         scene, effect, strip = selection.active(context)
         index = self.index(effect)
         moving = selection.moving(effect, index)
-        self._target, self._start, self._done = track_region.Target.of(effect, index), scene.frame_current, set()
+        self._target, self._start = track_region.Target.of(effect, index), scene.frame_current
+        self._done: set[int] = set()
+        self._steps: Any = iter(())
         if self.is_ready(scene, effect, strip):
-            self._steps = iter(())
             return
         self._frames = track_region.frames_to_track(scene, strip, self.direction, moving.track_until)
         motion, all_keys = validation.word(moving, "motion"), moving.track_all_keys
@@ -225,7 +227,7 @@ class SHUTTER_OT_tripod(_OfCamera, _Tracks, OfShutter, Operator):
         tripod.set_up(self._target.effect(), bar_edits.auto_key(context))
 
 
-class _Looks:
+class _Looks(Mixin):
     """Goes to a frame at which tracking of what has an `index` is not sure."""
 
     bl_options = {"REGISTER"}
@@ -266,7 +268,7 @@ class SHUTTER_OT_track_camera_look(_OfCamera, _Looks, OfEffect, Operator):
     bl_label = "Next Unsure Frame"
 
 
-class _Follows:
+class _Follows(Mixin):
     """Keys a region or the camera by what it is set to follow."""
 
     def change(self, context, effect):
