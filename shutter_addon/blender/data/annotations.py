@@ -19,7 +19,7 @@ def picture_size(effect) -> tuple[int, int]:
     return effect.scene.render.resolution_x, effect.scene.render.resolution_y
 
 
-def image_to_picture(strip, size, **moved) -> np.ndarray | None:
+def image_to_picture(strip, size: tuple[int, int], **moved: float) -> np.ndarray | None:
     """Matrix (3, 3) from the sequencer's image to fractions of the strip's picture; None where the strip is scaled to
     nothing that can be seen. size, moved: as geometry.picture_to_image has them. EffectError: its transform is none."""
     matrix = geometry.picture_to_image(strip, size, **moved)

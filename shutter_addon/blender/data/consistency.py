@@ -1,5 +1,7 @@
 """What changes along with a property of an effect: bars with the window, regions with names, scribbles with colors."""
 
+from collections.abc import Callable, Container
+
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
@@ -34,7 +36,7 @@ def aim_pen(effect) -> None:
         layers.active_index = next(i for i, other in enumerate(layers) if other == layer)
 
 
-def unique(name: str, taken) -> str:
+def unique(name: str, taken: Container[str]) -> str:
     """The name, as long as a recipe has it, with a number behind it where it is taken, as Blender names things."""
     number, wanted = 0, name[: limits.MAX_NAME]
     while wanted in taken:
@@ -100,7 +102,7 @@ def fit_factor(effect) -> None:
     if factor == effect.bars_per_frame:
         return
 
-    def multiplied(old):
+    def multiplied(old: np.ndarray):
         return shutters.multiplied(old, effect.bars_per_frame, factor, position)
 
     try:
@@ -115,7 +117,7 @@ def fit_factor(effect) -> None:
     effect.bars_per_frame, effect.window = factor, window
 
 
-def _change_bars(effect, index: int, change) -> None:
+def _change_bars(effect, index: int, change: Callable[[np.ndarray], np.ndarray]) -> None:
     """Gives a shutter other bars, and as many, at all its keys: those that `change` makes of the old ones."""
     shutter = effect.shutters[index]
     scene, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
@@ -132,7 +134,7 @@ def _change_bars(effect, index: int, change) -> None:
             fcurves.set_keys(scene, f"{path}[{k}].weight", 0, [(frame, bar[k], ease) for frame, bar, ease in keys])
 
 
-def _bars_keyed(old, keyed, frame: float) -> np.ndarray:
+def _bars_keyed(old: np.ndarray, keyed: dict, frame: float) -> np.ndarray:
     """The bars at a frame, where some have F-curves."""
     weights = old.copy()
     weights[list(keyed)] = [max(curve.evaluate(frame), 0.0) for curve in keyed.values()]

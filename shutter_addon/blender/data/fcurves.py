@@ -4,6 +4,7 @@ The engine is called with the effect scene's depsgraph, which knows nothing of o
 """
 
 import re
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -63,7 +64,7 @@ class Curves:
             return self._component(owner, path, name, 0, frame, value)
         return [self._component(owner, path, name, i, frame, v) for i, v in enumerate(value)]
 
-    def _component(self, owner, path, name, index, frame, value):
+    def _component(self, owner, path: str, name: str, index: int, frame: float, value: float):
         curve = self.find(f"{path}.{name}", index)
         if curve is None:
             return validation.number(owner, name, value)
@@ -103,7 +104,7 @@ def progress(curve, first: float, last: float, frame: float) -> float:
     return min(max((curve.evaluate(frame) - first) / (last - first), 0.0), 1.0)
 
 
-def set_keys(scene, path: str, index: int, keys, group: str = "") -> None:
+def set_keys(scene, path: str, index: int, keys: Sequence[tuple[float, float, Ease]], group: str = "") -> None:
     """Replaces a property's F-curve by keys (frame, value, ease of the span that follows)."""
     points = new_curve(scene, path, index, group).keyframe_points
     points.add(len(keys))

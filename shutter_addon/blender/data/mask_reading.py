@@ -6,7 +6,7 @@ from Blender's memory, and checked against what the API has.
 
 import ctypes
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import chain, pairwise
 
 import bpy
@@ -235,7 +235,7 @@ def _parent_matrix(parent, raw: _Parent, frame: float) -> np.ndarray:
     return to_mask @ mask_handles.homography(np.reshape(raw.corners, (4, 2)), now) @ np.linalg.inv(to_mask)
 
 
-def _between_markers(track, name: str, size: int, frame: float, find) -> np.ndarray:
+def _between_markers(track, name: str, size: int, frame: float, find: Callable) -> np.ndarray:
     """A property (size,) of a track's marker at a frame of the clip: what lies between those of two consecutive frames,
     elsewhere that of the one which `find` finds."""
     frames, values = _markers(track, name, size)

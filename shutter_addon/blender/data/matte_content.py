@@ -1,6 +1,6 @@
 """What the mattes and ramps of an effect show, as plain data (core.model.mattes.Content)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import closing
 from dataclasses import dataclass
 from fractions import Fraction
@@ -13,7 +13,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...core.frames import retiming
 from ...core.messages import EffectError
 from ...core.model import keyframes, mattes
-from ...core.model.effect import PlacedRamp
+from ...core.model.effect import Moves, PlacedRamp
 from ...media import MediaError
 from ...media.files import stamp
 from ...media.matte_files import MatteFile
@@ -21,7 +21,7 @@ from ...media.sequence import ImageFiles
 from . import inbetween_settings, mask_reading, matte_strips, source_media, strip_timing, strips, validation
 
 
-def content(effect, strip, region, moves, frames, time: keyframes.Channel | None) -> keyframes.Channel:
+def content(effect, strip, region, moves: Moves, frames, time: keyframes.Channel | None) -> keyframes.Channel:
     """The channel of a matte or a ramp, sampled at timeline frames; strip: the effect strip that shows it, moves:
     the region's, time: see core.model.effect.Effect. EffectError, MediaError: there is none."""
     scene = effect.id_data
@@ -81,7 +81,7 @@ def _listed(path: Path, _stamp) -> list[Path]:
         return []
 
 
-def _mask_shapes(scene, effect, strip, region, frames, time) -> keyframes.Channel:
+def _mask_shapes(scene, effect, strip, region, frames, time: keyframes.Channel | None) -> keyframes.Channel:
     """A mask's shapes at the source's frames, of which the first is the mask's start, as a Mask strip on it has it."""
     mask = region.mask
     if mask is None:
@@ -135,7 +135,7 @@ def _movie(spec: source_media.SourceSpec) -> tuple[int, Fraction | None]:
         return movie.count, movie.fps
 
 
-def _tried(function, *arguments):
+def _tried(function: Callable, *arguments):
     """The result, or the EffectError in its place, which is raised where the value is asked for."""
     try:
         return function(*arguments)
@@ -143,7 +143,7 @@ def _tried(function, *arguments):
         return error
 
 
-def _strip_frames(strip, region, frames) -> keyframes.Channel:
+def _strip_frames(strip, region, frames: Collection[float]) -> keyframes.Channel:
     parts, word = matte_strips.parts_for(region, strip), channel(region)
     shown = {
         part.name: mattes.FileFrames(file=_of_strip(part, word), timing=strip_timing.timing_of(part)) for part in parts

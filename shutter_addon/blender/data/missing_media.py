@@ -1,6 +1,6 @@
 """Media of an edit that are not there, or cannot be read."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import bpy
 
@@ -64,14 +64,14 @@ def _of_strip(strip, frames: range) -> Iterator[str]:
         yield from _of_item(strip.sound, check_sound) if strip.sound else ["it has no sound"]
 
 
-def _of_item(item, check=check_file) -> Iterator[str]:
+def _of_item(item, check: Callable = check_file) -> Iterator[str]:
     """Of a sound, a library, an image or the like; of a sequence its first file. check: raises MediaError for a
     file."""
     for path in external_files.named(item):
         yield from _fault(check, path)
 
 
-def _fault(function, *arguments) -> Iterator[str]:
+def _fault(function: Callable, *arguments) -> Iterator[str]:
     try:
         function(*arguments)
     except MediaError as error:

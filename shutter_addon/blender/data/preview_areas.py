@@ -123,7 +123,7 @@ def _scale(context, scene, strip, area) -> float:
     return min(scale, _pixel(geometry.picture_to_region(strip, size, region), size))
 
 
-def _pixel(matrix, size) -> float:
+def _pixel(matrix: np.ndarray, size: tuple[int, int]) -> float:
     """The larger side of a picture's pixel after a matrix (3, 3) from fractions of the picture."""
     return float(np.max(np.hypot(*matrix[:2, :2]) / size))
 

@@ -1,5 +1,7 @@
 """The recipe of an effect: the inverse of recipe_import.apply."""
 
+from collections.abc import Sequence
+
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.messages import EffectError, translated
@@ -8,7 +10,7 @@ from ...core.recipes import baking, recipe
 from . import annotations, fcurves, inbetween_settings, snapshot, strips, validation
 
 
-def recipe_of(scene, effect, strip, mattes=()) -> recipe.Recipe:
+def recipe_of(scene, effect, strip, mattes: Sequence = ()) -> recipe.Recipe:
     """The effect as a recipe, whose frame 1 is the strip's first; left out is what baking.baked leaves out, and regions
     without a shutter. mattes: see baking.baked. EffectError: it cannot be rendered as it stands."""
     snapshot.check_counts(effect)

@@ -1,6 +1,7 @@
 """A recipe into Blender's data: shutters, regions, strokes, keys and options."""
 
 import os
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -149,7 +150,7 @@ def _add_shutter(scene, effect, path: str, source: recipe.Shutter, first: float)
             fcurves.set_keys(scene, f"{path}.bars[{k}].weight", 0, keys)
 
 
-def _add_region(scene, effect, strip, source: recipe.Region, color, first: float) -> None:
+def _add_region(scene, effect, strip, source: recipe.Region, color: Sequence[float], first: float) -> None:
     region = effect.regions.add()
     region.name, region.shutter, region.width = source.name, source.shutter, source.width
     region.kind = source.kind.upper()
@@ -196,7 +197,7 @@ def _set_moves(scene, moving, path: str, keys: list, first: float, **curve) -> N
         fcurves.set_keys(scene, f"{path}.{name}", index, numbers, **curve)
 
 
-def _draw(effect, strip, source: recipe.Region, color, first: float) -> str:
+def _draw(effect, strip, source: recipe.Region, color: Sequence[float], first: float) -> str:
     """Draws a region's strokes on an annotation layer of its own, a frame per drawing; the layer's name."""
     layer = annotation(effect).layers.new(source.name or data_("Region"), set_active=False)
     layer.color = color

@@ -23,7 +23,7 @@ from .consistency import changed
 KEYED = {"ANIMATABLE"}  # as properties are where nothing else is said
 
 
-def _shortened(region, new: str, old: str, is_set) -> str:
+def _shortened(region, new: str, old: str, is_set: bool) -> str:
     """As recipes have names. Blender's own `maxlen` counts bytes, of which a character takes up to four."""
     new = new[:MAX_NAME]
     # Blender takes long to find an item's place among many: only where the name counts. The default name of a region

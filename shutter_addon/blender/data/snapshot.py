@@ -5,7 +5,7 @@ change when the scene does. Channels are sampled at the frames that are asked fo
 Blender itself. Drivers, NLA strips and further layers of an action do not count (docs/manual.md).
 """
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -208,7 +208,7 @@ def check_counts(effect) -> None:
             raise EffectError(sentence.format(place=validation.place(effect), count=len(items), most=most))
 
 
-def _tried(function, *arguments):
+def _tried(function: Callable, *arguments):
     """The result, or the UserError in its place, which is raised where the value is asked for."""
     try:
         return function(*arguments)
@@ -264,7 +264,7 @@ def _options_at(effect, curves: dict, frame: float) -> Options:
 
 
 def _shutter(
-    curves: Curves, effect, index: int, options: keyframes.Channel, frames, thorough: bool = False
+    curves: Curves, effect, index: int, options: keyframes.Channel, frames: Frames, thorough: bool = False
 ) -> model.Shutter:
     """A shutter, but for what it follows."""
     path, shutter = f"{effect.path_from_id()}.shutters[{index}]", effect.shutters[index]
@@ -307,7 +307,7 @@ def _bars(curves: Curves, path: str, shutter, options: keyframes.Channel, frames
     return _keyed_bars(keys, list(keyed.values()), at, ways, thorough)
 
 
-def _keyed_bars(keys, curves: list, at, frames: dict[float, str], thorough: bool) -> keyframes.Bars:
+def _keyed_bars(keys, curves: list, at: Callable, frames: dict[float, str], thorough: bool) -> keyframes.Bars:
     """Bars sampled where they are needed: at keys; between them the way that the curve has gone which changes most, or
     the bars, where they are not displaced. frames: by frame the interpolation."""
     numbers, values, shares, leaders = [frame for frame, _ in keys], {}, {}, {}
@@ -354,7 +354,7 @@ class _Sampling:
     time: keyframes.Channel | None
 
     @staticmethod
-    def of(curves: Curves, effect, strip, frames) -> "_Sampling":
+    def of(curves: Curves, effect, strip, frames: Frames) -> "_Sampling":
         time = _source_time(curves, effect.path_from_id(), effect, frames) if effect.use_source_time else None
         return _Sampling(
             curves=curves,
@@ -403,13 +403,13 @@ def _region(sampling: _Sampling, path: str, region, shutter: int) -> model.Regio
     )
 
 
-def _camera(curves: Curves, effect, frames) -> model.Camera:
+def _camera(curves: Curves, effect, frames: Frames) -> model.Camera:
     path = effect.camera.path_from_id()
     influence = _channel(curves, effect.camera, path, "influence", frames)
     return model.Camera(_moves(curves, effect.camera, path, frames), influence)
 
 
-def _moves(curves: Curves, moving, path: str, frames) -> model.Moves:
+def _moves(curves: Curves, moving, path: str, frames: Frames) -> model.Moves:
     """Of a region or of the camera."""
     return model.Moves(
         location=_channel(curves, moving, path, "location", frames),
@@ -418,7 +418,7 @@ def _moves(curves: Curves, moving, path: str, frames) -> model.Moves:
     )
 
 
-def _drawings(curves: Curves, path: str, effect, region, placement, frames) -> model.Drawings:
+def _drawings(curves: Curves, path: str, effect, region, placement, frames: Frames) -> model.Drawings:
     """A region's drawings: between two of them with the ease of its location's keys. Only those that the frames need
     are read."""
     width, height = annotations.picture_size(effect)
@@ -439,7 +439,7 @@ def _drawings(curves: Curves, path: str, effect, region, placement, frames) -> m
     )
 
 
-def _placement(curves: Curves, effect, strip, frames) -> keyframes.Channel:
+def _placement(curves: Curves, effect, strip, frames: Frames) -> keyframes.Channel:
     """The matrix from the sequencer's image to the strip's picture, which may be keyed."""
     size, path = annotations.picture_size(effect), f"{strip.path_from_id()}.transform"
     keyed = {name: curve for name in geometry.TRANSFORM if (curve := _tried(curves.find, f"{path}.{name}"))}
@@ -456,7 +456,7 @@ def _placement(curves: Curves, effect, strip, frames) -> keyframes.Channel:
 class _Evaluated:
     """Channel of a number that Blender evaluates: for sampling alone."""
 
-    def __init__(self, function):
+    def __init__(self, function: Callable):
         self.at = function
 
 

@@ -1,6 +1,7 @@
 """The medium of a source strip: what it is, opened as shutter_addon.media has it."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -69,7 +70,7 @@ def forget() -> None:
     _specs.clear()
 
 
-def between(place: tuple, count: int, path) -> int:
+def between(place: tuple, count: int, path: Callable[[int], Path]) -> int:
     """A number that changes when a file of a sequence is found replaced. One that is gone is not: what was made of it
     still holds, and whoever needs the file itself is told.
 

@@ -37,7 +37,7 @@ def place(group) -> str:
     return rpt_("{shutter}, bar {number}").format(shutter=words, number=int(bar[1]) + 1) if bar else words
 
 
-def number(group, name: str, value=None):
+def number(group, name: str, value: float | None = None):
     """A number, or one of a vector's, as the property has it; or `value`, which it would be. EffectError: it is outside
     of the property's range."""
     value, prop = getattr(group, name) if value is None else value, group.bl_rna.properties[name]

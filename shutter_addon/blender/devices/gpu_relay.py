@@ -75,7 +75,7 @@ class RelayedDevice(BlenderDevice):
     def _read(self, texture: list, *arguments) -> None:
         self._wait_for(lambda: BlenderDevice._read(self, *texture, *arguments))
 
-    def _dispatch(self, program: Pass, groups, textures: dict, images: dict, *arguments) -> None:
+    def _dispatch(self, program: Pass, groups: tuple[int, ...], textures: dict, images: dict, *arguments) -> None:
         def dispatch():
             bound = ({name: own[0] for name, own in kind.items()} for kind in (textures, images))
             BlenderDevice._dispatch(self, program, groups, *bound, *arguments)
@@ -87,7 +87,7 @@ class RelayedDevice(BlenderDevice):
     def release(self) -> None:
         self._wait_for(lambda: BlenderDevice.release(self))
 
-    def _wait_for(self, function):
+    def _wait_for(self, function: Callable):
         """What the function gives on the main thread, after all passes."""
         result = _called(function).result()
         passes, self._passes = self._passes, []
@@ -141,7 +141,7 @@ def _finish_some() -> None:
         _main.unfinished, _main.batch = 0, max(1, int(_main.batch * min(max(quick, 0.5), 2.0)))
 
 
-def _called(function) -> Future:
+def _called(function: Callable) -> Future:
     """The function, called on the main thread after all calls before."""
     done: Future = Future()
     _calls.put((done, function))

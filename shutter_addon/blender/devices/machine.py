@@ -8,7 +8,7 @@ import gpu
 import numpy as np
 
 from ...compute.benchmark import processor
-from ...devices.budget import machine_memory
+from ...devices.budget import Budget, machine_memory
 from ..data import preferences, versions
 from . import available
 from .blender_gpu import BlenderDevice
@@ -16,7 +16,7 @@ from .blender_gpu import BlenderDevice
 BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal", "NONE": "nothing", "UNKNOWN": "unknown"}
 
 
-def open_device(wanted: str | None, *memory):
+def open_device(wanted: str | None, *memory: Budget):
     """A compositor, and why it is a lesser one, or None. NoDeviceError: there is none as it is wanted.
 
     wanted: one of available.CHOICES; None: as the user prefers; memory: a Budget, in place of the device's own"""

@@ -16,6 +16,7 @@ from ...compute.request import Request
 from ...core.farm.chunks import LEAST, chunk_size
 from ...core.frames import frame_ranges
 from ...core.messages import UserError
+from ...core.model.frame_state import FrameState
 from ...core.model.mattes import FileFrame
 from ...media import MediaError, cuts
 from ...media.files import check_file
@@ -115,7 +116,7 @@ def _effect(session: RenderSession, shown: tuple, compositor, find_cuts: bool) -
     return check
 
 
-def _requests(session: RenderSession, taken, check: EffectCheck) -> dict[float, Request]:
+def _requests(session: RenderSession, taken: snapshot.Snapshot, check: EffectCheck) -> dict[float, Request]:
     """What each frame asks for, where it can be shown; faults of others are noted, each at the first of its frames."""
     requests, context = {}, RenderContext(session=session, settings=RenderSettings())
     faults: dict[str, list[str]] = {}
@@ -236,7 +237,7 @@ def _needs(source, requests: dict[float, Request], compositor) -> memory_needs.N
     return most._replace(host=most.host + decoding_ahead.decoded_bytes(source, window))
 
 
-def _kind(state) -> tuple[int, bool, int]:
+def _kind(state: FrameState) -> tuple[int, bool, int]:
     """Frames of a window, whether exposures of it follow something, and the number of shutters."""
     return state.options.window, state.following is not None, len(state.bars)
 

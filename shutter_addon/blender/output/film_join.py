@@ -3,6 +3,7 @@
 import re
 import sys
 import tempfile
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -143,7 +144,7 @@ def say_what_is_left_out(folder: Path, frames: tuple[int, int]) -> None:
         print(signed(f"{folder}: {_are(others)} not of the edit, and left out"), file=sys.stderr)
 
 
-def _common(paths: list[Path], looked, size: tuple[int, int], key: str) -> RenderedPicture:
+def _common(paths: list[Path], looked: Callable, size: tuple[int, int], key: str) -> RenderedPicture:
     """What all pictures are; looked: called after each. OutputError: one is broken, unlike the first, or of another
     edit than that of `key`."""
     pool = ThreadPoolExecutor()

@@ -4,7 +4,7 @@ import itertools
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -68,7 +68,7 @@ def size(scene) -> tuple[int, int]:
     return tuple(n * render.resolution_percentage // 100 for n in (render.resolution_x, render.resolution_y))
 
 
-def check(path: Path, file_format: str | None, size) -> None:
+def check(path: Path, file_format: str | None, size: tuple[int, int]) -> None:
     """OutputError: Blender cannot write a film of this size there. A new folder is made on the way."""
     width, height = size
     if width < 4 or height < 4:
@@ -90,7 +90,7 @@ def check_folder(path: Path, file_format: str | None) -> None:
         raise OutputError(f"{path}: neither a folder nor one of {', '.join(MOVIES)}")
 
 
-def spare(written, read) -> None:
+def spare(written: Iterable[Path], read: Collection[Path]) -> None:
     """OutputError: a file that would be written is one that is read, whatever link leads to it, or is written twice."""
     taken = {os.path.realpath(path): path for path in read}
     taken |= {identity: path for path in read if (identity := _identity(path)) is not None}
@@ -104,7 +104,7 @@ def spare(written, read) -> None:
             raise OutputError(f"{path}: would be written over {other}, which is read; choose another place")
 
 
-def _identity(path):
+def _identity(path: Path):
     """Equal for all paths of a file; None: there is none."""
     try:
         status = os.stat(path)
@@ -298,7 +298,7 @@ def _moved(part: Path, output: Path, scene, update: Callable[[], None], move: Ca
         yield missing
 
 
-def in_words(error: Exception, place) -> str:
+def in_words(error: Exception, place: Path | str) -> str:
     """A fault as a sentence, the place first. place: where there is none in an OSError."""
     if isinstance(error, OSError):
         return of_file(error, place)

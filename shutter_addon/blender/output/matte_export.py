@@ -54,7 +54,7 @@ def _is_one_of_many(region) -> bool:
     return region.image.source == "FILE" and path.exists() and ImageFiles(path).count > 1
 
 
-def _read(scene, effect, strip, regions) -> Iterator[Path]:
+def _read(scene, effect, strip, regions: list) -> Iterator[Path]:
     """A file of each medium that is read while mattes are written, or by those that are not."""
     yield source_media.spec(strips.source_of(scene, effect, strip)).path
     for region in regions:

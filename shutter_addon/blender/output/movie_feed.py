@@ -44,7 +44,7 @@ def feeding(scene):
 
 
 @contextmanager
-def _fed(scene, picture):
+def _fed(scene, picture: "LevelsFile"):
     effect_strip = strips.effect_strips(scene)[0]
     strip = _above(effect_strip, picture.path)
     filled = partial(fill, effect_strip, picture, [])
@@ -65,7 +65,7 @@ def _above(effect_strip, path: Path):
     return strip
 
 
-def fill(effect_strip, picture, film: list, scene, *_) -> None:
+def fill(effect_strip, picture: "LevelsFile", film: list, scene, *_) -> None:
     """Fills the file with the picture of the frame that is rendered next. film: the snapshot of all its frames, once it
     is read."""
     if not render_job.is_film(scene) or render_job.stopping():

@@ -2,7 +2,7 @@
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -111,7 +111,7 @@ def _render_missing(scene, folder: Path, pictures: dict[int, Path], is_finished,
         claims.clear(map(_name, pictures.values()))
 
 
-def _claim_run(claims: Claims, missing: dict[int, Path], is_finished) -> dict[int, Path]:
+def _claim_run(claims: Claims, missing: dict[int, Path], is_finished: Callable) -> dict[int, Path]:
     """The first frames of those missing, without a gap, that nobody has claimed; none: others have them all."""
     run: dict[int, Path] = {}
     for frame, picture in missing.items():
@@ -127,7 +127,7 @@ def _claim_run(claims: Claims, missing: dict[int, Path], is_finished) -> dict[in
     return run
 
 
-def _render_run(scene, claims: Claims, run: dict[int, Path], write) -> None:
+def _render_run(scene, claims: Claims, run: dict[int, Path], write: Callable) -> None:
     scene.frame_start, scene.frame_end = min(run), max(run)
     try:
         write()
