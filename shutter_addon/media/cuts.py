@@ -251,12 +251,8 @@ class ShotSource(SourceWrapper):
         return self._source.decoded(index) if frame is None else frame
 
     def around(self, index: int, low: int, high: int, *, known: bool = False) -> range:
-        """The frames of the shot around frame `index`, for a window of the frames from `low` to `high`.
-
-        Ends that lie beyond these are not looked for: the clip's take their place. It reads what has no signature yet,
-        upwards, as decoders like it: the window's frames up to the first cut behind `index`, and where there may be a
-        cut up to NEIGHBOURS frames on each side. known: it reads nothing, and where it does not know there is no cut.
-        """
+        """As ShotFinder has it. It reads what has no signature yet, upwards, as decoders like it: the window's frames
+        up to the first cut behind `index`, and where there may be a cut up to NEIGHBOURS frames on each side."""
         if known:
             return self._shot(index, low, high, self._cuts.get)
         shot = self._shot(index, low, high, self._is_cut)

@@ -69,9 +69,7 @@ class InbetweenSource(SourceWrapper):
             raise NotBuiltError(sentence, self.factor)
 
     def read(self, index: int) -> np.ndarray:
-        """The frame as a new array (height, width, 4), RGBA, top row first.
-
-        MediaError: an in-between frame is not built, or damaged. And what the source's `read` raises."""
+        """MediaError: an in-between frame is not built, or damaged; or what the source's `read` raises."""
         check_index(self, index)
         self.check(index)
         real = self._real(index)

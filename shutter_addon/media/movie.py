@@ -93,9 +93,6 @@ class MovieSource(FrameSource):
         self._size, self._scaler = (size, REDUCER) if in_conversion else (filmed, SCALER)
 
     def read(self, index: int) -> np.ndarray:
-        """The frame as a new array (height, width, 4), RGBA, top row first.
-
-        Raises MediaError for a frame that is damaged or cut off, IndexError outside 0 … count-1."""
         with self._named(index):
             return self._pixels(self._frame(index))
 

@@ -103,9 +103,7 @@ class SequenceSource(FrameSource):
         return [self._files[index] for index in range(self.count)]
 
     def read(self, index: int) -> np.ndarray:
-        """The frame as a new array (height, width, 4), RGBA, top row first.
-
-        Raises MediaError for a file that is missing, damaged or unlike the first, IndexError outside 0 … count-1."""
+        """MediaError: the file is missing, damaged or unlike the first."""
         check_index(self, index)
         path = check_file(self._files[index])
         with _opened(path) as (image, spec, layer):

@@ -74,10 +74,7 @@ class EditVersion:
         """What `as_data` gave. KeyError, TypeError, ValueError: it gave no such thing."""
         footage = tuple(
             Footage(
-                name=str(one["name"]),
-                files=int(one["files"]),
-                content=str(one["content"]),
-                missing=str(one["missing"]),
+                name=str(one["name"]), files=int(one["files"]), content=str(one["content"]), missing=str(one["missing"])
             )
             for one in data["footage"]
         )

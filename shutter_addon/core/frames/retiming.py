@@ -153,11 +153,7 @@ def _speed(first: RetimingKey, second: RetimingKey) -> np.float32:
 
 
 def _arc(
-    first: RetimingKey,
-    speed_in: np.float32,
-    second: RetimingKey,
-    speed_out: np.float32,
-    position: float | np.float32,
+    first: RetimingKey, speed_in: np.float32, second: RetimingKey, speed_out: np.float32, position: float | np.float32
 ) -> np.float32:
     """The circle that leaves the first key with one slope and reaches the second with the other."""
     # Its centre lies on both normals: x + slope·y is the same there as at the key.

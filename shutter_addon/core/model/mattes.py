@@ -67,9 +67,9 @@ class FileFrame:
         ends. EffectError: how the strip is retimed cannot be known."""
         if self.time is None:
             return shown + self.offset
-        return (
-            math.floor(self.time) + self.offset if self.timing is None else source_frame(self.timing, self.time, source)
-        )
+        if self.timing is None:
+            return math.floor(self.time) + self.offset
+        return source_frame(self.timing, self.time, source)
 
 
 @dataclass(frozen=True)

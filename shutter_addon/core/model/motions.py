@@ -17,6 +17,7 @@ _DIRECTIONS = np.exp(1j * np.linspace(0, 2 * np.pi, 32, endpoint=False))
 # What of a motion counts beside the location.
 Motion = Literal["location", "rotation", "scale"]
 
+Size = tuple[int, int]  # width and height of a picture in pixels
 Points = TypeVar("Points", complex, np.ndarray)
 
 # From a pixel's corner to its middle.
@@ -32,6 +33,9 @@ class Placement:
     location: tuple[float, float] = (0.0, 0.0)
     rotation: float = 0.0
     scale: float = 1.0
+
+
+Placements = Mapping[int, Placement]  # by frame
 
 
 @dataclass(frozen=True)
@@ -80,24 +84,22 @@ def _points(strokes: Iterable) -> np.ndarray:
     return np.concatenate([np.asarray(stroke, dtype=np.float64) for stroke in strokes])
 
 
-def pixel(place: Sequence[float] | np.ndarray, size: tuple[int, int]) -> complex:
+def pixel(place: Sequence[float] | np.ndarray, size: Size) -> complex:
     """A place in fractions of the picture, y up, in pixels of a size as Similarity counts them."""
     return complex(place[0] * size[0], (1 - place[1]) * size[1]) - _CORNER
 
 
-def fractions(pixel: complex, size: tuple[int, int]) -> tuple[float, float]:
+def fractions(pixel: complex, size: Size) -> tuple[float, float]:
     """The place in fractions of the picture, y up, that is at a pixel."""
     corner = pixel + _CORNER
     return corner.real / size[0], 1 - corner.imag / size[1]
 
 
-def carried(
-    placement: Placement, motion: Similarity, before: np.ndarray, after: np.ndarray, size: tuple[int, int]
-) -> Placement:
+def carried(placement: Placement, motion: Similarity, before: np.ndarray, after: np.ndarray, size: Size) -> Placement:
     """The placement of a shape after a motion of the picture.
 
     before, after: centres (2,) of the shape as it is drawn when the motion begins and when it ends, fractions
-    size: width and height of the picture whose pixels the motion counts"""
+    size: of the picture whose pixels the motion counts"""
     x, y = fractions(motion(pixel(np.add(before, placement.location), size)), size)
     location = x - float(after[0]), y - float(after[1])
     rotation = placement.rotation - math.degrees(cmath.phase(motion.turn))
@@ -105,7 +107,7 @@ def carried(
 
 
 def motion_between(
-    first: Placement, second: Placement, before: np.ndarray, after: np.ndarray, size: tuple[int, int]
+    first: Placement, second: Placement, before: np.ndarray, after: np.ndarray, size: Size
 ) -> Similarity:
     """The motion of the picture that takes a shape from one placement to another; arguments like those of `carried`."""
     angle = math.radians(first.rotation - second.rotation)
@@ -140,18 +142,14 @@ def averaged(placements: Sequence[Placement], weights: np.ndarray) -> Placement:
 
 
 def thinned(
-    placements: Mapping[int, Placement],
-    points: np.ndarray,
-    size: tuple[int, int],
-    kept: Collection[float] = (),
-    tolerance: float = 1.0,
+    placements: Placements, points: np.ndarray, size: Size, kept: Collection[float] = (), tolerance: float = 1.0
 ) -> list[int]:
     """The frames, ascending, whose keys say the motion: with linear eases between these, no point of the shape is
     farther than the tolerance from where it was.
 
     Ramer, Douglas and Peucker's: where a span is off, it is split at the frame that is off most.
-    placements: by frame; points: (n, 2) of the shape from its centre on (offsets)
-    size: width and height of the picture in pixels, which the tolerance counts; kept: frames that stay in any case"""
+    points: (n, 2) of the shape from its centre on (offsets)
+    size: of the picture whose pixels the tolerance counts; kept: frames that stay in any case"""
     frames = sorted(placements)
     if len(frames) < 3:
         return frames
@@ -186,7 +184,7 @@ def _farthest(points: np.ndarray) -> np.ndarray:
     return plane[np.unique((plane[:, None] * _DIRECTIONS.conj()).real.argmax(axis=0))]
 
 
-def _distances(frames: np.ndarray, numbers: np.ndarray, points: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+def _distances(frames: np.ndarray, numbers: np.ndarray, points: np.ndarray, size: Size) -> np.ndarray:
     """How far in pixels a shape's points lie at most, at each frame, from where linear keys at the first and the last
     frame put them."""
     share = ((frames - frames[0]) / (frames[-1] - frames[0]))[:, None]

@@ -44,13 +44,7 @@ class Measured(NamedTuple):
     log_scale: float
 
     def between(self, other: Measured, share: float) -> Measured:
-        rest = 1 - share
-        return Measured(
-            shift=rest * self.shift + share * other.shift,
-            pivot=rest * self.pivot + share * other.pivot,
-            angle=rest * self.angle + share * other.angle,
-            log_scale=rest * self.log_scale + share * other.log_scale,
-        )
+        return Measured._make((1 - share) * here + share * there for here, there in zip(self, other, strict=True))
 
 
 class Base(NamedTuple):

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
 
 from ..model import effect, keyframes, motions, presence
-from ..model.motions import Placement
+from ..model.motions import Placement, Placements, Size
 from .recipe import CameraKey, Keyable, Recipe, Region, RegionKey, ValueKey
 
 _DIGITS = 6  # of what was measured: far below a pixel
@@ -20,18 +20,13 @@ CORNERS = motions.offsets([motions.PICTURE])
 
 
 def with_placements(
-    region: Region,
-    placements: Mapping[int, Placement],
-    exact: Collection[int],
-    size: tuple[int, int],
-    *,
-    thin: bool = True,
+    region: Region, placements: Placements, exact: Collection[int], size: Size, *, thin: bool = True
 ) -> Region:
     """The region with these placements as its keys, in place of those that it has from the first of these frames to the
     last. At whole frames beyond these it stays where its keys put it, and its drawings stay where and as they are.
 
-    placements: by frame; exact: those frames among them whose keys are kept in any case, and as they are given
-    size: width and height of the picture; thin: no more keys than the motion needs within a pixel"""
+    exact: those frames among them whose keys are kept in any case, and as they are given
+    size: of the picture; thin: no more keys than the motion needs within a pixel"""
     drawn = {key.frame if key else None: strokes for key, strokes in region.drawings()}
     eases = {key.frame: key.ease for key in region.keys if key.frame in drawn and len(drawn) > 1}
     chosen = sorted(placements)
@@ -47,12 +42,7 @@ def with_placements(
 
 
 def with_camera(
-    source: Recipe,
-    placements: Mapping[int, Placement],
-    exact: Collection[int],
-    size: tuple[int, int],
-    *,
-    thin: bool = True,
+    source: Recipe, placements: Placements, exact: Collection[int], size: Size, *, thin: bool = True
 ) -> Recipe:
     """The recipe whose camera has these placements as its keys; arguments like those of with_placements. Thinned keys
     are within a quarter of a pixel of the placements, everywhere in the picture."""
@@ -64,8 +54,8 @@ def with_camera(
 def _keys(
     kind: type[RegionKey | CameraKey],
     keys: list,
-    moving: effect.Region | effect.Camera,
-    placements: Mapping[int, Placement],
+    moving: effect.Subject,
+    placements: Placements,
     exact: Collection[int],
     chosen: list[int],
 ) -> list:
