@@ -5,11 +5,13 @@ from .data import preferences, properties
 from .interface import (
     bar_editor,
     full_quality,
+    gizmo_keymaps,
     icons,
     inbetween_operators,
     matte_operators,
     note_buttons,
     operators,
+    option_panels,
     panels,
     preview,
     probe_gizmo,
@@ -22,6 +24,7 @@ from .interface import (
 )
 from .rendering import engine
 
+# Blender gets the `classes` of each, and loses its `TIMERS`; all else that it gets, `register` and `unregister` know.
 _modules = (
     translations,
     preferences,
@@ -36,8 +39,10 @@ _modules = (
     matte_operators,
     recipe_operators,
     full_quality,
+    option_panels,
     panels,
     note_buttons,
+    gizmo_keymaps,
     bar_editor,
     region_gizmo,
     split_gizmo,
@@ -52,7 +57,10 @@ def register() -> None:
     import bpy
 
     for module in _modules:
-        module.register()
+        for cls in getattr(module, "classes", ()):
+            bpy.utils.register_class(cls)
+        if hasattr(module, "register"):
+            module.register()
     _commands.append(bpy.utils.register_cli_command("shutter", _run))
 
 
@@ -62,7 +70,12 @@ def unregister() -> None:
 
     bpy.utils.unregister_cli_command(_commands.pop())
     for module in reversed(_modules):
-        module.unregister()
+        if hasattr(module, "unregister"):
+            module.unregister()
+        for timer in filter(bpy.app.timers.is_registered, getattr(module, "TIMERS", ())):
+            bpy.app.timers.unregister(timer)
+        for cls in reversed(getattr(module, "classes", ())):
+            bpy.utils.unregister_class(cls)
 
 
 def _run(argv: list[str]) -> int:

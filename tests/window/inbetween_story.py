@@ -48,9 +48,8 @@ def prepared():
     part("media.flow").between = slow_blend
     cuts = part("media.cuts")  # as optical flow, they need OpenCV; there are none in this film
     cuts.missing_package, cuts.may_be_cut, cuts.is_cut = lambda: None, lambda *_: False, lambda *_: False
-    panels = part("blender.interface.panels")
     for name, closed in (("regions", True), ("options", True), ("inbetween", False)):
-        panel = getattr(panels, f"SEQUENCER_PT_shutter_{name}")
+        panel = getattr(bpy.types, f"SEQUENCER_PT_shutter_{name}")
         bpy.utils.unregister_class(panel)
         panel.bl_options = {"DEFAULT_CLOSED"} if closed else set()
         bpy.utils.register_class(panel)

@@ -57,13 +57,3 @@ def _preferences() -> ShutterPreferences | None:
 
 
 classes = (ShutterPreferences,)
-
-
-def register():
-    for cls in classes:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)

@@ -249,8 +249,6 @@ classes = (ShutterBar, Shutter, TrackStop, ShutterRegion, ShutterCamera, Shutter
 
 
 def register():
-    for cls in classes:
-        bpy.utils.register_class(cls)
     bpy.types.Scene.virtual_shutter = PointerProperty(type=ShutterScene)
     # A strip cannot be pointed to and may be renamed: the source strip carries the identity that effects look for.
     bpy.types.Strip.virtual_shutter_source = StringProperty(options={"HIDDEN"})
@@ -270,5 +268,3 @@ def unregister():
         delattr(bpy.types.Strip, f"virtual_shutter_{name}")
     del bpy.types.ID.virtual_shutter_made
     del bpy.types.Scene.virtual_shutter
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)

@@ -215,14 +215,3 @@ class SHUTTER_GGT_bars(GizmoGroup):
 
 
 classes = (SHUTTER_GT_bars, SHUTTER_GGT_bars)
-
-
-def register():
-    for cls in classes:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)
-    gizmo_keymaps.remove(SHUTTER_GGT_bars)

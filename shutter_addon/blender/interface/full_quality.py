@@ -128,16 +128,8 @@ def forget() -> None:
 
 
 classes = (SHUTTER_OT_full_quality,)
-
-
-def register():
-    for cls in classes:
-        bpy.utils.register_class(cls)
+TIMERS = (_end_when_over,)
 
 
 def unregister():
     forget()
-    if bpy.app.timers.is_registered(_end_when_over):
-        bpy.app.timers.unregister(_end_when_over)
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)

@@ -2,15 +2,18 @@
 
 import bpy
 
+_made: set[str] = set()  # of which groups
+
 
 def new(group, keyconfig):
     """An empty keymap for a gizmo group."""
+    _made.add(group.bl_idname)
     return keyconfig.keymaps.new(group.bl_idname, space_type=group.bl_space_type, region_type="WINDOW")
 
 
-def remove(group) -> None:
-    """Removes a gizmo group's keymap, once the group is gone."""
+def unregister():
+    """Once the groups are gone."""
     keyconfigs = bpy.context.window_manager.keyconfigs
-    for keyconfig in (keyconfigs.default, keyconfigs.user):
-        if keyconfig is not None and (keymap := keyconfig.keymaps.get(group.bl_idname)) is not None:
+    for keyconfig in filter(None, (keyconfigs.default, keyconfigs.user)):
+        for keymap in [keymap for keymap in keyconfig.keymaps if keymap.name in _made]:
             keyconfig.keymaps.remove(keymap)

@@ -250,12 +250,5 @@ class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
 classes = (SHUTTER_OT_inbetween_build, SHUTTER_OT_smooth_streaks, SHUTTER_OT_inbetween_purge)
 
 
-def register():
-    for cls in classes:
-        bpy.utils.register_class(cls)
-
-
 def unregister():
     stop()
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)

@@ -138,13 +138,3 @@ classes = (
     SHUTTER_OT_ramp_add,
     SHUTTER_OT_time_map,
 )
-
-
-def register():
-    for cls in classes:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)

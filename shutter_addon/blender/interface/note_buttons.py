@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field
 
-import bpy
 from bpy.types import Gizmo, GizmoGroup
 
 from ..data import preview_areas
@@ -92,12 +91,5 @@ class SHUTTER_GGT_note_buttons(GizmoGroup):
 classes = (SHUTTER_GT_note_button, SHUTTER_GGT_note_buttons)
 
 
-def register():
-    for cls in classes:
-        bpy.utils.register_class(cls)
-
-
 def unregister():
     places.clear()
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)

@@ -473,15 +473,4 @@ classes = (
     SHUTTER_OT_region_move,
     SHUTTER_OT_region_key,
 )
-
-
-def register():
-    for cls in classes:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    if bpy.app.timers.is_registered(_choose_tab):
-        bpy.app.timers.unregister(_choose_tab)
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)
+TIMERS = (_choose_tab,)

@@ -10,7 +10,7 @@ from ..editing import bar_edits, match_source
 from ..rendering import inbetween_build, strobing
 from . import inbetween_operators
 from .operator_bases import Mixin
-from .option_panels import TIMERS, Inbetween, Options
+from .option_panels import Inbetween, Options
 from .panel_parts import WithEffect, draw_list, sentence
 from .region_panels import Camera, Follow, Regions, Track, Transform, draw_followed_motion, draw_tracked, draw_tracking
 
@@ -263,84 +263,26 @@ class _InSidebar:
         return selection.active_strip(context) is not None or selection.active(context) is not None
 
 
-class STRIP_PT_shutter(_Shutters, _InProperties, Panel):
-    pass
+# By the end of its name, what each panel draws, and in which other one it lies.
+_PANELS = {
+    "": (_Shutters, None),
+    "_move": (_Move, ""),
+    "_regions": (Regions, ""),
+    "_transform": (Transform, "_regions"),
+    "_track": (Track, "_regions"),
+    "_follow": (Follow, "_regions"),
+    "_camera": (Camera, ""),
+    "_bars": (_Bars, ""),
+    "_options": (Options, ""),
+    "_inbetween": (Inbetween, ""),
+}
 
 
-class STRIP_PT_shutter_move(_Move, _InProperties, Panel):
-    bl_parent_id = "STRIP_PT_shutter"
-
-
-class STRIP_PT_shutter_regions(Regions, _InProperties, Panel):
-    bl_parent_id = "STRIP_PT_shutter"
-
-
-class STRIP_PT_shutter_transform(Transform, _InProperties, Panel):
-    bl_parent_id = "STRIP_PT_shutter_regions"
-
-
-class STRIP_PT_shutter_track(Track, _InProperties, Panel):
-    bl_parent_id = "STRIP_PT_shutter_regions"
-
-
-class STRIP_PT_shutter_follow(Follow, _InProperties, Panel):
-    bl_parent_id = "STRIP_PT_shutter_regions"
-
-
-class STRIP_PT_shutter_camera(Camera, _InProperties, Panel):
-    bl_parent_id = "STRIP_PT_shutter"
-
-
-class STRIP_PT_shutter_bars(_Bars, _InProperties, Panel):
-    bl_parent_id = "STRIP_PT_shutter"
-
-
-class STRIP_PT_shutter_options(Options, _InProperties, Panel):
-    bl_parent_id = "STRIP_PT_shutter"
-
-
-class STRIP_PT_shutter_inbetween(Inbetween, _InProperties, Panel):
-    bl_parent_id = "STRIP_PT_shutter"
-
-
-class SEQUENCER_PT_shutter(_Shutters, _InSidebar, Panel):
-    pass
-
-
-class SEQUENCER_PT_shutter_move(_Move, _InSidebar, Panel):
-    bl_parent_id = "SEQUENCER_PT_shutter"
-
-
-class SEQUENCER_PT_shutter_regions(Regions, _InSidebar, Panel):
-    bl_parent_id = "SEQUENCER_PT_shutter"
-
-
-class SEQUENCER_PT_shutter_transform(Transform, _InSidebar, Panel):
-    bl_parent_id = "SEQUENCER_PT_shutter_regions"
-
-
-class SEQUENCER_PT_shutter_track(Track, _InSidebar, Panel):
-    bl_parent_id = "SEQUENCER_PT_shutter_regions"
-
-
-class SEQUENCER_PT_shutter_follow(Follow, _InSidebar, Panel):
-    bl_parent_id = "SEQUENCER_PT_shutter_regions"
-
-
-class SEQUENCER_PT_shutter_camera(Camera, _InSidebar, Panel):
-    bl_parent_id = "SEQUENCER_PT_shutter"
-
-
-class SEQUENCER_PT_shutter_bars(_Bars, _InSidebar, Panel):
-    bl_parent_id = "SEQUENCER_PT_shutter"
-
-
-class SEQUENCER_PT_shutter_options(Options, _InSidebar, Panel):
-    bl_parent_id = "SEQUENCER_PT_shutter"
-
-
-class SEQUENCER_PT_shutter_inbetween(Inbetween, _InSidebar, Panel):
-    bl_parent_id = "SEQUENCER_PT_shutter"
+def _panels(start: str, place: type) -> list[type]:
+    return [
+        type(start + end, (drawn, place, Panel), {} if within is None else {"bl_parent_id": start + within})
+        for end, (drawn, within) in _PANELS.items()
+    ]
 
 
 def _add_entry(self, _context):
@@ -368,32 +310,12 @@ classes = (
     SHUTTER_MT_presets,
     SHUTTER_MT_regions,
     SHUTTER_MT_shutters,
-    STRIP_PT_shutter,
-    STRIP_PT_shutter_move,
-    STRIP_PT_shutter_regions,
-    STRIP_PT_shutter_transform,
-    STRIP_PT_shutter_track,
-    STRIP_PT_shutter_follow,
-    STRIP_PT_shutter_camera,
-    STRIP_PT_shutter_bars,
-    STRIP_PT_shutter_options,
-    STRIP_PT_shutter_inbetween,
-    SEQUENCER_PT_shutter,
-    SEQUENCER_PT_shutter_move,
-    SEQUENCER_PT_shutter_regions,
-    SEQUENCER_PT_shutter_transform,
-    SEQUENCER_PT_shutter_track,
-    SEQUENCER_PT_shutter_follow,
-    SEQUENCER_PT_shutter_camera,
-    SEQUENCER_PT_shutter_bars,
-    SEQUENCER_PT_shutter_options,
-    SEQUENCER_PT_shutter_inbetween,
+    *_panels("STRIP_PT_shutter", _InProperties),
+    *_panels("SEQUENCER_PT_shutter", _InSidebar),
 )
 
 
 def register():
-    for cls in classes:
-        bpy.utils.register_class(cls)
     for menu, entry in MENUS.items():
         getattr(bpy.types, menu).append(entry)
 
@@ -401,8 +323,3 @@ def register():
 def unregister():
     for menu, entry in MENUS.items():
         getattr(bpy.types, menu).remove(entry)
-    for timer in TIMERS:
-        if bpy.app.timers.is_registered(timer):
-            bpy.app.timers.unregister(timer)
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)

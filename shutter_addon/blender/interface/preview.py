@@ -372,13 +372,12 @@ class _Notes:
 
 
 classes = (ShutterPreview,)
+TIMERS = _redraw_once, _redraw_when_still, _follow_once, _redraw_panels, _measure
 _handler = None
 
 
 def register():
     global _handler
-    for cls in classes:
-        bpy.utils.register_class(cls)
     bpy.types.WindowManager.virtual_shutter = PointerProperty(type=ShutterPreview)
     # After the sequencer's picture and before annotations and gizmos, which stay visible.
     _handler = bpy.types.SpaceSequenceEditor.draw_handler_add(_draw, (), "PREVIEW", "POST_VIEW")
@@ -388,10 +387,5 @@ def unregister():
     global _handler
     bpy.types.SpaceSequenceEditor.draw_handler_remove(_handler, "PREVIEW")
     _handler = None
-    for timer in (_redraw_once, _redraw_when_still, _follow_once, _redraw_panels, _measure):
-        if bpy.app.timers.is_registered(timer):
-            bpy.app.timers.unregister(timer)
     preview_quad.free()
     del bpy.types.WindowManager.virtual_shutter
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)

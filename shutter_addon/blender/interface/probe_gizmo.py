@@ -126,13 +126,3 @@ class SHUTTER_GGT_probe(GizmoGroup):
 
 
 classes = (SHUTTER_GT_probe, SHUTTER_GGT_probe)
-
-
-def register():
-    for cls in classes:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)

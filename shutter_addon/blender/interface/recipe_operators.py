@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import StringProperty
 from bpy.types import Operator
@@ -60,13 +59,3 @@ class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
 
 
 classes = SHUTTER_OT_recipe_import, SHUTTER_OT_recipe_export
-
-
-def register():
-    for cls in classes:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)

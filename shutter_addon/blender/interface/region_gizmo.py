@@ -219,14 +219,3 @@ class SHUTTER_GGT_region(GizmoGroup):
 
 
 classes = (SHUTTER_GT_region, SHUTTER_GGT_region)
-
-
-def register():
-    for cls in classes:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)
-    gizmo_keymaps.remove(SHUTTER_GGT_region)

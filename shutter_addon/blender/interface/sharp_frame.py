@@ -79,7 +79,7 @@ def _give_back() -> None:
 
 
 _OWNER = object()  # of what Blender tells of tools
-_TIMERS = (_show, _give_back)
+TIMERS = (_show, _give_back)
 
 
 def _soon(change) -> None:
@@ -101,6 +101,3 @@ def register():
 def unregister():
     bpy.msgbus.clear_by_owner(_OWNER)
     give_back(bpy.context)
-    for timer in _TIMERS:
-        if bpy.app.timers.is_registered(timer):
-            bpy.app.timers.unregister(timer)

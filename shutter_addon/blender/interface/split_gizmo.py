@@ -1,6 +1,5 @@
 """The handle of the live preview's split view."""
 
-import bpy
 import numpy as np
 from bpy.types import Gizmo, GizmoGroup
 
@@ -83,13 +82,3 @@ class SHUTTER_GGT_split(GizmoGroup):
 
 
 classes = (SHUTTER_GT_split, SHUTTER_GGT_split)
-
-
-def register():
-    for cls in classes:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)

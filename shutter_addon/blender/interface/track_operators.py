@@ -338,13 +338,3 @@ classes = (
     SHUTTER_OT_follow_update,
     SHUTTER_OT_follow_stabilization,
 )
-
-
-def register():
-    for cls in classes:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)

@@ -103,13 +103,3 @@ def fail(engine: Any, sentence: str) -> None:
 
 
 classes = (VirtualShutterEngine,)
-
-
-def register() -> None:
-    for cls in classes:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)
