@@ -61,7 +61,8 @@ def _of_class(cls):
         yield "*", rna.description
     ours = [base for base in cls.__mro__ if base.__module__.startswith(blender.__name__)]
     properties = {prop.identifier: prop for prop in rna.properties}  # a group's own "name" comes after Blender's
-    for prop in (properties[name] for base in ours for name in inspect.get_annotations(base)):
+    declared = [name for base in ours for name in inspect.get_annotations(base)]
+    for prop in (properties[name] for name in declared if name in properties):  # what is none is a plain attribute
         if prop.name != prop.identifier:  # which is what Blender takes where there is no name
             yield prop.translation_context, prop.name
             yield "*", prop.description
