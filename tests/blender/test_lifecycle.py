@@ -51,6 +51,12 @@ def update(bpy):
     bpy.context.view_layer.update()
 
 
+def drawings(edit):
+    """Per effect, its layers' frames that have drawings."""
+    scenes = [effect.scene for effect in edit.virtual_shutter.effects]
+    return [[[f.frame_number for f in layer.frames] for layer in s.annotation.layers] for s in scenes if s.annotation]
+
+
 def census(bpy):
     """How many there are of all that an effect needs."""
     return {name: len(getattr(bpy.data, name)) for name in ("scenes", "cameras", "objects", "annotations", "actions")}
@@ -168,6 +174,51 @@ def test_undo_brings_an_effect_back_and_redo_removes_it_again(bpy, edit, add, re
         update(bpy)
         assert [effect.start for effect in edit.virtual_shutter.effects] == [101]
         assert census(bpy) == {"scenes": 2, "cameras": 1, "objects": 1, "annotations": 1, "actions": 1}
+
+
+def _delete(edit):
+    edit.sequence_editor.strips.remove(scene_strips(edit)[0])
+
+
+def _move(edit):
+    for strip in [s for s in edit.sequence_editor.strips if s.left_handle < 50]:
+        strip.content_start += 7
+
+
+def _copy(edit):
+    strip = scene_strips(edit)[0]
+    edit.sequence_editor.strips.new_scene("Copy", strip.scene, 9, 300)
+
+
+@pytest.mark.parametrize("change", [_delete, _move, _copy])
+def test_undo_takes_back_what_handlers_did_after_the_step_before(bpy, edit, add, change):
+    """Blender's undo keeps data that is equal in both steps as it is now: keys and drawings that a handler changed."""
+    from shutter_addon.blender import handlers
+
+    add(1), add(101, recipe(4, {101: [0, 1, 0, 0], 111: [0, 0, 1, 0]}))
+    update(bpy)
+    known = curves(edit), drawings(edit), [effect.start for effect in edit.virtual_shutter.effects]
+    for frame_end in (400, 401):  # steps that leave keys alone
+        edit.frame_end = frame_end
+        bpy.context.view_layer.update()
+        bpy.ops.ed.undo_push(message="other")
+    handler = handlers.HANDLERS["depsgraph_update_post"]
+    bpy.app.handlers.depsgraph_update_post.remove(handler)
+    change(edit)
+    bpy.ops.ed.undo_push(message="change")
+    bpy.app.handlers.depsgraph_update_post.append(handler)
+    handler()
+    done = curves(edit), drawings(edit), [effect.start for effect in edit.virtual_shutter.effects]
+    assert done != known
+    for _ in range(2):
+        bpy.ops.ed.undo()
+        edit = bpy.context.scene
+        update(bpy)
+        assert (curves(edit), drawings(edit), [effect.start for effect in edit.virtual_shutter.effects]) == known
+        bpy.ops.ed.redo()
+        edit = bpy.context.scene
+        update(bpy)
+        assert (curves(edit), drawings(edit), [effect.start for effect in edit.virtual_shutter.effects]) == done
 
 
 @pytest.mark.parametrize("cut", [True, False])

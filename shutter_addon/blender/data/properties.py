@@ -261,10 +261,13 @@ def register():
     # Of annotations and cameras that were made for an effect: its scene's identity. They go with it.
     # annotations.USERS: the user's own.
     bpy.types.ID.virtual_shutter_made = StringProperty(options={"HIDDEN"})
+    # The effect's start that an annotation's drawings are for.
+    bpy.types.Annotation.virtual_shutter_start = FloatProperty(options={"HIDDEN"})
 
 
 def unregister():
     for name in ("source", "matte", "effect", "muted"):
         delattr(bpy.types.Strip, f"virtual_shutter_{name}")
     del bpy.types.ID.virtual_shutter_made
+    del bpy.types.Annotation.virtual_shutter_start
     del bpy.types.Scene.virtual_shutter

@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from ...core.model.limits import MAX_FRAME
-from ..data import fcurves, strips
+from ..data import fcurves, strips, undo
 from ..data.property_copy import copy_properties
 
 
@@ -57,6 +57,7 @@ def _settle(scene, effect, parts: dict) -> None:
     start = effect.start if effect.start in parts else min(parts)
     if not abs(effect.start) <= 2 * MAX_FRAME:  # no frame: its keys are where they are
         effect.start = start
+    _move_drawings(effect)
     if start != effect.start:
         _move(scene, effect, path, start - effect.start)
     for origin in sorted(parts.keys() - {start}):  # after the first no effect is where it was
@@ -74,16 +75,31 @@ def _duplicate(old_scene, path: str, scene, parts, origin: float, effect_scene) 
     for strip in parts:
         strip.scene = effect_scene
     new_path = new.path_from_id()
+    undo.renew_action(scene)
     fcurves.copy_curves(old_scene, path + ".", scene, new_path + ".")
     _move(scene, new, new_path, origin - old.start)
 
 
 def _move(scene, effect, path: str, frames: float) -> None:
+    undo.renew_action(scene)
     fcurves.move_curves(scene, path + ".", frames)
-    for layer in effect.scene.annotation.layers if effect.scene.annotation else ():
-        for drawing in layer.frames:
-            drawing.frame_number += round(frames)
     effect.start += frames
+    _move_drawings(effect)
+
+
+def _move_drawings(effect) -> None:
+    """Drawings follow the effect's start, by that which the annotation says they are for: undo may bring the effect's
+    back and leave the annotation, which a handler moved, as it is."""
+    annotation = effect.scene.annotation
+    if annotation is None or annotation.library is not None:
+        return
+    frames = effect.start - annotation.virtual_shutter_start
+    if not (annotation.is_property_set("virtual_shutter_start") and abs(frames) <= 4 * MAX_FRAME):  # or it is no frame
+        annotation.virtual_shutter_start = effect.start
+    elif frames:
+        for drawing in [drawing for layer in annotation.layers for drawing in layer.frames]:
+            drawing.frame_number += round(frames)
+        annotation.virtual_shutter_start = effect.start
 
 
 def _copied(scene):

@@ -4,7 +4,7 @@ import uuid
 
 import bpy
 
-from ..data import annotations, fcurves, requirements, strips
+from ..data import annotations, fcurves, requirements, strips, undo
 from ..rendering import invalidation, render_job, sessions
 from . import copies, match_source, shown_annotations, undelete
 from .add_effect import add_camera
@@ -145,6 +145,7 @@ def _remove_effects(scene) -> None:
     for i in reversed([i for i, stays in enumerate(stay) if not stays]):
         undelete.keep(scene, effects[i])
         effects.remove(i)
+    undo.renew_action(scene)
     fcurves.reindex(scene, EFFECTS, places)
 
 
