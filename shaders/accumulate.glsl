@@ -1,10 +1,10 @@
 // Adds a frame to the running sums, or takes it away: from the layer `known` to the layer `next`.
 // The frame: the one that was sent, in the light that is summed, `whole` for white,
-// its colours with NUMBERS in one of 0 to 2²⁴ − 1, R + 256 G + 65536 B;
+// with COVER weighted, its colours with NUMBERS in one of 0 to 2²⁴ − 1, R + 256 G + 65536 B;
 // with PLANES by the whole numbers of libswscale (core/frames/planes.py) from samples of luma and chroma;
 // or with AGAIN one that the sums hold already, between the layers `before` and `after`.
 layout(local_size_x = 8, local_size_y = 16) in;  // a tile
-layout(rgba16ui) uniform uimage2DArray sums;
+layout(STORED) uniform uimage2DArray sums;
 uniform ivec2 size;
 uniform int known, next;
 #if AGAIN
@@ -12,6 +12,9 @@ uniform int before, after;
 #else
 uniform int top;
 uniform float whole;
+#  if COVER
+uniform sampler2DArray weights;
+#  endif
 #  if PLANES
 layout(r32ui) uniform readonly uimage2DArray luma, chroma;  // a software renderer's texelFetch takes longer
 uniform ivec2 chroma_step, luma_of, green_of;
@@ -47,7 +50,7 @@ void main() {
   }
   ivec3 place = place_of_sums(pixel);
 #if AGAIN
-  uvec2 light = minus(sum_at(place, after), sum_at(place, before));
+  SUM light = minus(sum_at(place, after), sum_at(place, before));
 #else
 #  if PLANES
   vec3 color = color_at(pixel + ivec2(0, top));
@@ -60,8 +63,19 @@ void main() {
   vec3 color = sent.rgb;
 #    endif
 #  endif
+#  if COVER
+  float weight = texelFetch(weights, ivec3(pixel + ivec2(0, top), 0), 0).r;
+  vec4 weighted = vec4(decoded(color) * weight, COVER == 2 ? 1.0 - weight : weight);
+  uvec4 light = uvec4(ivec4(weighted * whole + 0.5));
+#  else
   uvec2 light = packed_light(uvec3(ivec3(decoded(color) * whole + 0.5)));
+#  endif
 #endif
-  uvec2 sum = sum_at(place, known);
-  imageStore(sums, place_in_layer(place, next), halves_of(BACK != 0 ? minus(sum, light) : plus(sum, light)));
+  SUM sum = sum_at(place, known);
+  sum = BACK != 0 ? minus(sum, light) : plus(sum, light);
+#if COVER
+  imageStore(sums, place_in_layer(place, next), sum);
+#else
+  imageStore(sums, place_in_layer(place, next), halves_of(sum));
+#endif
 }

@@ -6,7 +6,7 @@
 // backwards with BACK. (Of time nothing but whole frames depends on where the sums begin: pictures must not.)
 layout(local_size_x = 64, local_size_y = 2) in;
 layout(rgba32f) uniform readonly image2DArray coefficients;
-layout(rgba16ui) uniform readonly uimage2DArray sums;
+layout(STORED) uniform readonly uimage2DArray sums;
 layout(std140) uniform table_block { vec4 table[TABLE]; };
 uniform ivec2 size;
 uniform int top, block_bits, origin, layers, first_layer, held;
@@ -23,7 +23,7 @@ uniform float unit;
 
 vec4 c[PIXELS * GROUPS];
 ivec3 place[PIXELS];  // of a pixel's sums
-vec3 total[PIXELS];
+LIGHT total[PIXELS];
 vec4 starts[GROUPS];
 vec4 ends[GROUPS];
 float exposure;
@@ -45,15 +45,15 @@ void start_pixel(int k) {
     c[k * GROUPS + g] *= 1.0 / sum;
   }
   place[k] = place_of_sums(pixel_at(k));
-  total[k] = vec3(0.0);
+  total[k] = LIGHT(0.0);
 }
 
-uvec2 sum_until(int k, int time) {
+SUM sum_until(int k, int time) {
   int layer = clamp(BACK != 0 ? origin - time : origin + time, 0, held) + first_layer;
   return sum_at(place[k], layer < layers ? layer : layer - layers);
 }
 
-vec3 light_between(uvec2 early, uvec2 late) {
+LIGHT light_between(SUM early, SUM late) {
   return unpacked_light(BACK != 0 ? minus(early, late) : minus(late, early));
 }
 
@@ -66,24 +66,32 @@ void add_piece(int k) {
   }
   int first = int(start);
   int last = int(end);
-  uvec2 early = sum_until(k, first);
-  uvec2 late = sum_until(k, last);
-  vec3 light = light_between(early, late) + (end - float(last)) * light_between(late, sum_until(k, last + 1)) -
+  SUM early = sum_until(k, first);
+  SUM late = sum_until(k, last);
+  LIGHT light = light_between(early, late) + (end - float(last)) * light_between(late, sum_until(k, last + 1)) -
                (start - float(first)) * light_between(early, sum_until(k, first + 1));
   total[k] += light * (exposure / max(end - start, 1e-7));
 }
 
 void finish_pixel(int k) {
   ivec2 pixel = pixel_at(k);
-  vec3 light = total[k] * unit;
-#if ENCODED
-  light = to_linear_exact(light);
+#if COVER
+  vec4 color = covered(total[k] * unit);
+#  if ENCODED
+  color.rgb = to_linear_exact(straight(color)) * color.a;
+#  endif
+#else
+  vec4 color = vec4(total[k] * unit, 1.0);
+#  if ENCODED
+  color.rgb = to_linear_exact(color.rgb);
+#  endif
 #endif
   float gain = 0.0;
   for (int g = 0; g < GROUPS; g++) {
     gain += dot(starts[g], c[k * GROUPS + g]);
   }
-  finish(pixel + ivec2(0, top), vec4(light * gain, 1.0));
+  color.rgb *= gain;
+  finish(pixel + ivec2(0, top), color);
 }
 
 void main() {

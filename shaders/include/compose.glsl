@@ -23,7 +23,7 @@ uniform int count;
 #  endif
 #endif
 #if SUMS
-layout(rgba16ui) uniform readonly uimage2DArray sums;
+layout(STORED) uniform readonly uimage2DArray sums;
 uniform int held;
 uniform float unit;
 #elif !PACKED
@@ -54,8 +54,8 @@ ivec3 corner_place;  // of the corner's sums
 #endif
 mat4 c[QUADS * GROUPS];
 #if SUMS
-uvec2 sum_before[4 * QUADS];  // of each pixel, the sum at the frame's start
-vec3 total[4 * QUADS];
+SUM sum_before[4 * QUADS];  // of each pixel, the sum at the frame's start
+LIGHT total[4 * QUADS];
 #else
 mat4 total[QUADS];
 #endif
@@ -99,7 +99,7 @@ int start_of(int frame) {
   return layer_at(origin + direction * frame + (direction < 0 ? 1 : 0));
 }
 
-vec3 light_between(uvec2 start, uvec2 end) {
+LIGHT light_between(SUM start, SUM end) {
   return unpacked_light(direction < 0 ? minus(start, end) : minus(end, start));
 }
 
@@ -107,7 +107,7 @@ void start_light(int quad) {
   int layer = start_of(first);
   for (int pixel = 0; pixel < 4; pixel++) {
     sum_before[4 * quad + pixel] = sum_at(place_of_light(quad, pixel), layer);
-    total[4 * quad + pixel] = vec3(0.0);
+    total[4 * quad + pixel] = LIGHT(0.0);
   }
 }
 #else
@@ -202,7 +202,7 @@ void expose(int quad, int frame, vec4 weight) {
 #if SUMS
   int end = start_of(frame + 1);
   for (int pixel = 0; pixel < 4; pixel++) {
-    uvec2 sum = sum_at(place_of_light(quad, pixel), end);
+    SUM sum = sum_at(place_of_light(quad, pixel), end);
     total[4 * quad + pixel] += weight[pixel] * light_between(sum_before[4 * quad + pixel], sum);
     sum_before[4 * quad + pixel] = sum;
   }
@@ -221,8 +221,12 @@ vec4 nearest_light(int quad, int pixel, int frame) {
 #if SUMS
   int position = clamp(origin + direction * frame, 0, count - 1);
   ivec3 place = place_of_light(quad, pixel);
-  uvec2 sum = minus(sum_at(place, layer_at(position + 1)), sum_at(place, layer_at(position)));
+  SUM sum = minus(sum_at(place, layer_at(position + 1)), sum_at(place, layer_at(position)));
+#if COVER
+  return covered(unit * unpacked_light(sum));
+#else
   return vec4(unit * unpacked_light(sum), 1.0);
+#endif
 #else
   return frame_light(pixel_at(quad, pixel), layer_of(frame));
 #endif
@@ -235,7 +239,9 @@ void store(int quad, int pixel, float gain) {
   if (at.y >= size.y) {
     return;
   }
-#if SUMS
+#if SUMS && COVER
+  vec4 color = covered(unit * total[4 * quad + pixel] / max(share[quad][pixel], 1e-6));
+#elif SUMS
   vec4 color = vec4(unit * total[4 * quad + pixel], share[quad][pixel]) / max(share[quad][pixel], 1e-6);
 #else
   vec4 color = total[quad][pixel] / max(share[quad][pixel], 1e-6);

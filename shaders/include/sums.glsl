@@ -1,6 +1,30 @@
 // Running sums along time: a pixel's sum at position p is the light of all frames before p, three fields of 21 bits in
-// one word of 64. Only differences are taken, which are exact however often the sums have wrapped around.
+// one word of 64; with COVER, of a layer (core/pixels/layering.py), four of 32 bits: weighted light, then with 1 the
+// weights, with 2 what they leave. Only differences are taken, which are exact however often the sums have wrapped around.
+#if COVER
+#define SUM uvec4
+#define LIGHT vec4
+
+uvec4 minus(uvec4 a, uvec4 b) {
+  return a - b;
+}
+
+uvec4 plus(uvec4 a, uvec4 b) {
+  return a + b;
+}
+
+vec4 unpacked_light(uvec4 difference) {
+  return vec4(ivec4(difference));
+}
+
+// A layer's light in a fraction of the window, and its alpha.
+vec4 covered(vec4 light) {
+  return vec4(light.rgb, COVER == 2 ? 1.0 - light.a : light.a);
+}
+#else
 #include "halves.glsl"
+#define SUM uvec2
+#define LIGHT vec3
 
 const uint FIELD = 0x1FFFFFu;
 
@@ -22,6 +46,7 @@ vec3 unpacked_light(uvec2 difference) {
   uint green = (difference.x >> 21) | (difference.y << 11);
   return vec3(ivec3(difference.x & FIELD, green & FIELD, difference.y >> 10));
 }
+#endif
 
 // Where a pixel's sums begin. TILED: those of a tile of 8 × 16 pixels lie behind one another in a row of texels, a layer
 // of texels holds a row of tiles.
@@ -42,6 +67,10 @@ ivec3 place_in_layer(ivec3 place, int layer) {
 }
 
 // imageLoad: a software renderer's texelFetch of whole numbers takes three times as long.
-uvec2 sum_at(ivec3 place, int layer) {
+SUM sum_at(ivec3 place, int layer) {
+#if COVER
+  return imageLoad(sums, place_in_layer(place, layer));
+#else
   return words_of(imageLoad(sums, place_in_layer(place, layer)));
+#endif
 }

@@ -11,7 +11,7 @@ import numpy as np
 from ..core.model.frame_state import Options
 from ..devices.llvmpipe import MOST_ITERATIONS
 from ..devices.passes import Pass, read_pass
-from .window import BLOCK, Sums
+from .window import BLOCK, STORED_SUMS, Sums
 
 # Rows of pixels that one invocation of compose_sums composes.
 PAIR = 2
@@ -33,12 +33,14 @@ class LightFormat:
     decode: a number of window.decoding
     premultiplied: whether the frames' colours are
     encoded: whether the sums are of encoded light (Options.light)
-    levels: whether the picture is of levels, not scene-linear"""
+    levels: whether the picture is of levels, not scene-linear
+    cover: of window.WeightedSums"""
 
     decode: int
     premultiplied: bool
     encoded: bool
     levels: bool
+    cover: int = 0
 
 
 @dataclass(frozen=True)
@@ -118,8 +120,8 @@ def composition_of_moved(way: str, moved: Moved, light: LightFormat) -> Pass:
     )
 
 
-def _light(light: LightFormat) -> dict[str, int]:
-    return {name.upper(): int(value) for name, value in vars(light).items()}
+def _light(light: LightFormat) -> dict[str, int | str]:
+    return {name.upper(): int(value) for name, value in vars(light).items()} | {"STORED": STORED_SUMS[light.cover]}
 
 
 def lines_of(way: str) -> int:

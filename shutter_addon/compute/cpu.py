@@ -20,10 +20,11 @@ from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.model import mattes, shutters
 from ..core.model.frame_state import Options
-from ..core.pixels import compositor
+from ..core.pixels import compositor, layering
 from .cpu_window import Tile, TiledFrames, TiledSums
 from .diffusion import diffuse
 from .edge_diffusion import diffuse_along_edges, follows_edges
+from .laying import Behind, Exposure
 from .request import Coefficients, Request
 
 # Pieces of a quantile that are computed in one step.
@@ -103,6 +104,34 @@ class Mixing:
         pass
 
 
+class Laying:
+    """core.pixels.layering, with the methods of compute.laying.Laying."""
+
+    def least(self, exposed: Exposure) -> np.ndarray:
+        return exposed.share[..., 3]
+
+    def shares(self, exposed: Exposure) -> np.ndarray:
+        return exposed.share[..., 3]
+
+    def around(self, exposed: Exposure) -> np.ndarray:
+        return layering.with_plate(exposed.color, exposed.share[..., 3], None)
+
+    def plate(self, picture: np.ndarray) -> np.ndarray:
+        return picture
+
+    def lay(self, behind: Behind, layers: Sequence[Exposure], levels: bool) -> np.ndarray:
+        color, share = behind.exposed
+        picture = layering.with_plate(color, share[..., 3], behind.plate)
+        if behind.plain is not None:
+            picture = np.where((share[..., 3] > layering.UNCOVERED)[..., None], behind.plain, picture)
+        for layer in layers:
+            picture = layering.laid_over(picture, layer.color, layer.share[..., 3])
+        return CPUCompositor().over_black(picture) if levels else picture
+
+    def release(self) -> None:
+        pass
+
+
 class CPUCompositor:
     """Composes with NumPy; the same methods as GPUCompositor."""
 
@@ -128,6 +157,9 @@ class CPUCompositor:
 
     def mixing(self) -> Mixing:
         return Mixing()
+
+    def laying(self) -> Laying:
+        return Laying()
 
     def constant(self, values: np.ndarray) -> np.ndarray:
         return np.asarray(values, dtype=np.float32)[:, None, None]

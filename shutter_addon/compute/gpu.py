@@ -29,6 +29,7 @@ from .composition_passes import (
 from .diffusion_gpu import Diffusion
 from .edge_diffusion import follows_edges
 from .edge_diffusion_gpu import EdgeDiffusion
+from .laying import Laying
 from .matting import Matting
 from .mixing import Mixing
 from .request import Coefficients, Request
@@ -50,7 +51,13 @@ def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int) 
     filled = np.zeros((1 + rows, *values.shape[1:]), np.float32)
     filled[: len(values)] = values
     back = request.direction < 0
-    light = LightFormat(decode=0, premultiplied=False, encoded=state.options.light == "encoded", levels=request.levels)
+    light = LightFormat(
+        decode=0,
+        premultiplied=False,
+        encoded=state.options.light == "encoded",
+        levels=request.levels,
+        cover=window.cover,
+    )
     return composition_of_sums(rows, -(-len(state.bars) // 4), back, window.tiled, light), {
         "images": {},
         "blocks": {"table": filled.reshape(-1, 4)},
@@ -84,7 +91,13 @@ def _from_frames(
     # In these shaders, frame 0 is the shot's first.
     given |= {"count": len(window.shot), "origin": origin - window.shot.start, "lowest": lowest - window.shot.start}
     stored = "frames" if not summed else "tiles" if window.tiled else "sums"
-    light = LightFormat(decode, source.alpha == "premultiplied", options.light == "encoded", request.levels)
+    light = LightFormat(
+        decode=decode,
+        premultiplied=source.alpha == "premultiplied",
+        encoded=options.light == "encoded",
+        levels=request.levels,
+        cover=window.cover if summed else 0,
+    )
     return composition(way, -(-len(state.bars) // 4), stored, edges, light), given
 
 
@@ -188,6 +201,10 @@ class GPUCompositor:
     def mixing(self) -> Mixing:
         """What adds up shares of coefficients. What it gives is valid until its next sum."""
         return Mixing(self.device)
+
+    def laying(self) -> Laying:
+        """What lays layers over one another. What it gives is valid until its next."""
+        return Laying(self.device)
 
     def constant(self, values: np.ndarray) -> Texture:
         """Coefficients (N,) of the whole picture, as a texture of one texel. Valid until the next call."""

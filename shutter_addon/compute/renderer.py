@@ -3,6 +3,7 @@ coefficients, composition."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -10,11 +11,13 @@ import numpy as np
 
 from ..core.frames.frame_source import FrameSource
 from ..core.memo import Memo
+from ..core.model.frame_state import FrameState
 from ..core.model.mattes import MatteReader
 from ..devices.device import NoDeviceError
 from . import decoding_ahead, guide, window_frames
 from .cpu import CPUCompositor
 from .labelling import LabelLayer, grid, labelled, sole_of
+from .layered_renderer import LayeredRenderer
 from .request import Coefficients, Request
 
 if TYPE_CHECKING:
@@ -55,6 +58,8 @@ class Renderer:
         self.compositor, self.source, self._mattes = compositor, source, mattes
         self._solver, self._matting, self._mixing = compositor.solver(), compositor.matting(), compositor.mixing()
         self._guides = guide.Guides(source)
+        self._layered: LayeredRenderer | None = None
+        self._scribbles: Renderer | None = None  # of layers
         self._window: Any = None
         self._kind: tuple[int, bool, int] | None = None
         self.shortages: set[str] = set()
@@ -71,20 +76,55 @@ class Renderer:
     def draw(self, request: Request) -> Any:
         """The picture on the device (GPUCompositor.draw); with NumPy an array, like `picture`'s. It is valid until the
         next picture of this renderer, and composed only if it is not the last one."""
-        if self._window is None or not self._window.is_open:
+        if request.state.layers is None and (self._window is None or not self._window.is_open):
             self._kept_picture.clear()
         with self.compositor.current():
             return self._kept_picture.get(request.key, lambda: self._composed(request), quick=request.quick)
 
     def _composed(self, request: Request) -> Any:
         wanted_later = self._want(request)
+        drawn = self._with_layers(request) if request.state.layers else self._plain(request)
+        self.source.want(wanted_later)
+        return drawn
+
+    def _plain(self, request: Request) -> Any:
         labels = self.labels(request)
         # Before coefficients are solved for: the window reads the frames that guide the diffusion.
         window = self._loaded_window(request, labels)
         coefficients = self._coefficients(request, labels)
-        drawn = self.compositor.draw(window, self._exposing(request, labels), coefficients)
-        self.source.want(wanted_later)
-        return drawn
+        return self.compositor.draw(window, self._exposing(request, labels), coefficients)
+
+    def _with_layers(self, request: Request) -> Any:
+        """The picture with what lies behind its layers, and each of them, exposed by itself."""
+        behind = replace(request, state=replace(request.state, layers=None), levels=False)
+        labels, shot = self.labels(behind), self.shot(request)
+        self._keep_guides(request)
+        positions = window_frames.positions(request, shot)
+        return self._layering().draw(
+            request,
+            self._exposing(behind, labels),
+            self._coefficients(behind, labels),
+            positions,
+            shot,
+            lambda: self._plain(behind),
+        )
+
+    def _layering(self) -> LayeredRenderer:
+        if self._layered is None:
+            self._layered = LayeredRenderer(
+                self.compositor,
+                self.source,
+                lambda source: guide.NotedSource(source, self._guides),
+                self._mattes and self._mattes.another(),
+                self._solved_apart,
+            )
+        return self._layered
+
+    def _solved_apart(self, source: Any, state: FrameState, index: int) -> np.ndarray:
+        """Coefficients (N, h, w) float32 of another state, at another frame: of layers."""
+        if self._scribbles is None:
+            self._scribbles = Renderer(self.compositor, source)
+        return self._scribbles.coefficients(Request(index, state))
 
     def coefficients(self, request: Request) -> np.ndarray:
         """Coefficients (N, h, w) float32 of `picture`, for each pixel, or for each block of Options.aggregate pixels a
@@ -130,7 +170,11 @@ class Renderer:
     def missing(self, request: Request) -> set[int]:
         """The source frames that `draw` would read: needed ones that are not loaded, and those in which it looks for
         cuts."""
-        held = self._window.held if self._window and self._kind == self._kind_for(request) else ()
+        held: Collection[int] = ()
+        if request.state.layers is not None:
+            held = self._layered.held if self._layered else ()
+        elif self._window and self._kind == self._kind_for(request):
+            held = self._window.held
         unread, handed = window_frames.looked_for_cuts(request, self.source, self._beside(request))
         shot = self.shot(request, known=True)
         missing = window_frames.exposed_frames(request, shot).difference(held)
@@ -192,7 +236,7 @@ class Renderer:
     def _window_for(self, request: Request) -> Any:
         kind = self._kind_for(request)
         if self._window is None or self._kind != kind or not self._window.is_open:
-            self.release_window()
+            self._drop_window()
             self._kind = kind
             self._window = self.compositor.window(guide.NotedSource(self.source, self._guides), *kind)
         return self._window
@@ -258,14 +302,20 @@ class Renderer:
     def release_window(self) -> None:
         """Frees the window's frames, and those that the search for cuts has read. The next picture reads them again."""
         with self.compositor.freeing():
-            if self._window is not None:
-                self._window.release()
-                self._window = None
-                self._note_shortage("window", False)
+            self._drop_window()
+            if self._layered is not None:
+                self._layered.release_windows()
                 self._kept_picture.clear()
             self._guides.keep(())
         if self.source.shots is not None:
             self.source.shots.release()
+
+    def _drop_window(self) -> None:
+        if self._window is not None:
+            self._window.release()
+            self._window = None
+            self._note_shortage("window", False)
+            self._kept_picture.clear()
 
     def _note_shortage(self, what: str, is_short: bool) -> None:
         (self.shortages.add if is_short else self.shortages.discard)(what)
@@ -277,14 +327,18 @@ class Renderer:
             self._solver.release()
             self._matting.release()
             self._mixing.release()
+            for part in (self._layered, self._scribbles):
+                if part is not None:
+                    part.release()
         self._kept_diffusion.clear()
         self._kept_mattes.clear()
 
     def close(self) -> None:
         """Frees what the renderer has on the device, and closes the source."""
         self.release()
-        if self._mattes is not None:
-            self._mattes.close()
+        for reader in (self._mattes, self._layered):
+            if reader is not None:
+                reader.close()
         self.source.close()
 
 

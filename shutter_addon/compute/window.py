@@ -14,7 +14,9 @@ from ..core.model.frame_state import Light, Options
 from ..core.pixels import compositor
 from ..devices import llvmpipe
 from ..devices.device import Device, NoDeviceError, Texture
+from ..devices.paging import TEXEL_BYTES
 from ..devices.passes import Pass, read_pass
+from .layer_frames import WeightedFrames
 from .running_sums import RunningSums, summable
 
 # Bytes of a texture array, at most.
@@ -36,6 +38,8 @@ def open_window(device: Device, source: FrameSource, capacity: int, moved: bool,
     """The fastest window of `capacity` frames: running sums if the source is `summable` and the device has room for
     them, else the frames. moved: what is seen of a frame lies elsewhere in it, so it has to be whole. shutters: those
     whose coefficients have to have room beside it."""
+    if isinstance(source, WeightedFrames):
+        return _of_weighted(device, source, capacity, moved, shutters)
     if moved:
         return (PackedFrames if summable(source) else WholeFrames)(device, source, capacity, shutters)
     if summable(source):
@@ -44,6 +48,15 @@ def open_window(device: Device, source: FrameSource, capacity: int, moved: bool,
         except NoDeviceError:
             pass
     return Frames(device, source, capacity, shutters)
+
+
+def _of_weighted(device: Device, source: WeightedFrames, capacity: int, moved: bool, shutters: int) -> Window:
+    if not moved and source.is_summable:
+        try:
+            return WeightedSums(device, source, capacity, shutters)
+        except NoDeviceError:
+            pass
+    return (WholeFrames if moved else Frames)(device, source, capacity, shutters)  # type: ignore[arg-type]
 
 
 def beside(source: FrameSource, shutters: int) -> int:
@@ -341,7 +354,11 @@ def _in_tiles(width: int, height: int, layers: int) -> tuple[int, int, int]:
     return across * down * layers, -(-width // across), -(-height // down)
 
 
-def accumulation(decode: int, sent: str, back: bool, tiled: bool) -> Pass:
+# What running sums are stored as, by COVER of shaders/include/sums.glsl.
+STORED_SUMS = ("rgba16ui", "rgba32ui", "rgba32ui")
+
+
+def accumulation(decode: int, sent: str, back: bool, tiled: bool, cover: int = 0) -> Pass:
     """The pass that makes a layer of sums from its neighbour: with the frame between the two added, or subtracted.
 
     decode: of `decoding`
@@ -349,6 +366,7 @@ def accumulation(decode: int, sent: str, back: bool, tiled: bool) -> Pass:
     difference of two layers that hold it already
     back: it is subtracted
     tiled: the sums are stored in tiles
+    cover: of WeightedSums
     """
     return read_pass(
         "accumulate",
@@ -358,6 +376,8 @@ def accumulation(decode: int, sent: str, back: bool, tiled: bool) -> Pass:
         TILED=int(tiled),
         NUMBERS=int(sent == "numbers"),
         PLANES=int(sent == "planes"),
+        COVER=cover,
+        STORED=STORED_SUMS[cover],
     )
 
 
@@ -373,7 +393,10 @@ class Sums(RunningSums, Window):
 
     whole: what white is in a field
     tiled: whether pixels are stored tile by tile, in TILE
+    cover: COVER of the shaders: 0, these are no layer's
     """
+
+    cover = 0
 
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1):
         Window.__init__(self, device, source, capacity, shutters)
@@ -384,7 +407,7 @@ class Sums(RunningSums, Window):
         texels, _, tiles = _in_tiles(source.width, source.height, self.layers)
         self.tiled = stores_rows(device) and texels <= device.max_size and tiles <= device.max_layers
         self._sent: dict[str, Texture] = {}
-        self._allocate("rgba16ui", 8)
+        self._allocate(STORED_SUMS[self.cover], TEXEL_BYTES[STORED_SUMS[self.cover]])
         try:
             self._hold("frame")
         except NoDeviceError:
@@ -449,7 +472,7 @@ class Sums(RunningSums, Window):
             sent = "before"
             given |= {"before": same % self.layers, "after": (same + 1) % self.layers}
         decode = decoding(self.source.transfer, light)
-        program = accumulation(decode, sent, next_ < known, self.tiled)
+        program = accumulation(decode, sent, next_ < known, self.tiled, self.cover)
         for top, height, sums in self.bands():
             size = self.source.width, height
             self.device.run(program, size, images=images | {"sums": sums}, size=size, top=top, **given)
@@ -458,3 +481,33 @@ class Sums(RunningSums, Window):
         RunningSums.release(self)
         Window.release(self)
         self._free_sent()
+
+
+class WeightedSums(Sums):
+    """A window of running sums of opaque 8-bit frames that are weighted pixel by pixel, and of their weights, in
+    textures rgba32ui: four fields of 32 bits. Where the weights are 1, its pictures have the bits of Sums."""
+
+    def __init__(self, device: Device, source: WeightedFrames, capacity: int, shutters: int = 1):
+        self.cover, self._weight = 2 if source.rest else 1, source.weight
+        self._weights: Texture | None = None
+        super().__init__(device, source.base, capacity, shutters)
+        try:
+            self._weights = device.texture(source.width, source.height, 1, "r32f")
+        except NoDeviceError:
+            self.release()
+            raise
+
+    def _send(self, index: int) -> tuple[str, dict[str, Any]]:
+        if self._weights is None:
+            raise ValueError("the window was released")
+        weight = self._weight(index)
+        self.device.write(self._weights, np.ascontiguousarray(weight[..., None]))
+        sent, given = super()._send(index)
+        given["textures"] = given.get("textures", {}) | {"weights": self._weights}
+        return sent, given
+
+    def release(self) -> None:
+        super().release()
+        if self._weights is not None:
+            self._weights.release()
+            self._weights = None

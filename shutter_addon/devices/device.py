@@ -60,14 +60,15 @@ class Device(Protocol):
     def texture(self, width: int, height: int, layers: int, kind: str) -> Texture:
         """A texture array of undefined content. NoDeviceError: the device has no room for it.
 
-        kind: the format as in GLSL: rgba8, rgba16, rgba16f, rgba16ui, rgba32f, r32f or r32ui. Passes read rgba8 and
-        rgba16 as 0 … 1, all others as they are, and none with filtering."""
+        kind: the format as in GLSL: rgba8, rgba16, rgba16f, rgba16ui, rgba32ui, rgba32f, r32f or r32ui. Passes read
+        rgba8 and rgba16 as 0 … 1, all others as they are, and none with filtering."""
 
     def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
         """Fills a layer, or its first rows, with a C-contiguous array (rows, width[, components]) of the format's type.
 
         opaque: every alpha in the array is full; a device may then send the colours alone.
-        TypeError: the device neither writes nor reads this format, only passes do (rgba16ui on Blender's GPU)."""
+        TypeError: the device neither writes nor reads this format, only passes do (rgba16ui and rgba32ui on Blender's
+        GPU)."""
 
     def send(self, texture: Texture, frame: np.ndarray) -> Texture:
         """Sends an opaque 8-bit frame (rows, width, 4) for the pass that is run next. It returns what that binds:

@@ -30,6 +30,7 @@ FORMATS = {
     "r32f": (1, "f4", np.float32),
     "r32ui": (1, "u4", np.uint32),
     "rgba16ui": (4, "u2", np.uint16),
+    "rgba32ui": (4, "u4", np.uint32),
 }
 # Of GL_NVX_gpu_memory_info, which Mesa's drivers have as well: all memory of the GPU, in kB.
 _TOTAL_MEMORY = 0x9048

@@ -21,6 +21,7 @@ TEXEL_BYTES = {
     "rgba16": 8,
     "rgba16f": 8,
     "rgba16ui": 8,
+    "rgba32ui": 16,
     "rgba32f": 16,
     "r32f": 4,
     "r32ui": 4,

@@ -10,6 +10,9 @@ from ..core.model.mattes import Content, FileFrame, Matte, MatteFile, MatteSourc
 from ..core.pixels.matte_grid import block_means, feathered, fitted
 from .cuts import ShotSource
 
+# Files that stay open though the last mattes were of others.
+_MOST_OPEN = 16
+
 
 class MatteValues:
     """A core.model.mattes.MatteReader for pictures of one size.
@@ -21,6 +24,10 @@ class MatteValues:
         self._sources: dict[MatteFile, MatteSource] = {}
         self._made: list[tuple[Hashable, np.ndarray]] = []
 
+    def another(self) -> MatteValues:
+        """See MatteReader."""
+        return MatteValues(*self._size, self._step)
+
     @classmethod
     def of(cls, source: ShotSource) -> MatteValues:
         """For the pictures of a source, as core.model.mattes has them."""
@@ -29,8 +36,9 @@ class MatteValues:
     def values(self, mattes: tuple[Matte, ...], index: int, block: int) -> list[tuple[Hashable, np.ndarray]]:
         """As MatteReader.values. EffectError, MediaError: those of a file cannot be had."""
         files = {matte.content.file for matte in mattes if isinstance(matte.content, FileFrame)}
-        for file in self._sources.keys() - files:
-            self._sources.pop(file).close()
+        if len(self._sources.keys() | files) > _MOST_OPEN:
+            for file in self._sources.keys() - files:
+                self._sources.pop(file).close()
         known, self._made = dict(self._made), []
         for matte in mattes:
             key = self._content_key(matte.content, index), matte.feather, matte.invert, block

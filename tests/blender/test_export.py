@@ -54,7 +54,8 @@ def regions(draw, names):
         drawn = draw(strokes) if redrawn and i and draw(st.booleans()) else None
         keys.append(recipes.RegionKey(frame, location, rotation, draw(numbers(-50, 50)), drawn, draw(eases)))
     kind, width = draw(st.sampled_from(["line", "lasso"])), draw(numbers(0, 10))
-    return recipes.Region(draw(st.sampled_from(names)), draw(text), kind, width, draw(strokes), keys)
+    named = draw(st.sampled_from(names)), draw(text)
+    return recipes.Region(*named, kind, width, draw(strokes), keys, layer=draw(st.booleans()))
 
 
 @st.composite
@@ -80,6 +81,7 @@ def valid_recipes(draw, longest=6):
         draw(st.booleans()),
         draw(st.booleans()),
         draw(numbers(0, 1) | value_keys(0, 1)),
+        draw(st.integers(0, 500)),
         draw(st.sampled_from([1, 2, 4, 8, 16])),
         draw(st.sampled_from(["quick", "good"])),
         draw(st.just([]) | value_keys(-10, 10000)),
@@ -100,6 +102,7 @@ def camera_keys(draw):
 def mattes(draw, names):
     """A matte, of the footage's own file, or a ramp."""
     fields = {"shutter": draw(st.sampled_from(names)), "name": draw(text), "invert": draw(st.booleans())}
+    fields |= {"layer": draw(st.booleans())}
     fields |= {"blend": draw(st.sampled_from(["over", "add"])), "keys": draw(st.just([]) | camera_keys())}
     fields |= {"opacity": draw(numbers(0, 1) | value_keys(0, 1)), "width": draw(numbers(0, 1) | value_keys(0, 1))}
     if draw(st.booleans()):

@@ -24,6 +24,7 @@ from ...core.model.limits import (
     MAX_BAR,
     MAX_DISTANCE,
     MAX_FRAME,
+    MAX_PLATE_REACH,
     MAX_SMOOTH,
 )
 from ...core.model.shutters import MAX_WINDOW
@@ -188,6 +189,17 @@ class ShutterEffect(PropertyGroup):
         description="Exposures end at the source's cuts as they do at the clip's ends",
         default=True,
         update=changed,
+    )
+    plate_reach: IntProperty(
+        name="Clean Plate",
+        description="Frames before and after the shown one in which what lies behind layers is looked for, "
+        "where no exposed frame shows it",
+        default=48,
+        min=0,
+        max=MAX_PLATE_REACH,
+        soft_max=120,
+        update=changed,
+        options=UNKEYED,
     )
     border: BoolProperty(
         name="Default at Edge",

@@ -39,7 +39,7 @@ def apply(scene, effect, strip, source: recipe.Recipe, folder: Path = Path()) ->
     for name in OPTIONS:
         setattr(effect, name, getattr(source, name).upper())
     effect.aggregate, effect.border = str(source.aggregate), source.border
-    effect.stop_at_cuts = source.stop_at_cuts
+    effect.stop_at_cuts, effect.plate_reach = source.stop_at_cuts, source.plate_reach
     path = effect.path_from_id()
     effect.use_source_time = bool(source.time)
     if source.time:
@@ -153,7 +153,7 @@ def _add_shutter(scene, effect, path: str, source: recipe.Shutter, first: float)
 def _add_region(scene, effect, strip, source: recipe.Region, color: Sequence[float], first: float) -> None:
     region = effect.regions.add()
     region.name, region.shutter, region.width = source.name, source.shutter, source.width
-    region.kind = source.kind.upper()
+    region.kind, region.is_layer = source.kind.upper(), source.layer
     region.layer = _draw(effect, strip, source, color, first)
     path = region.path_from_id()
     _set_number(scene, region, path, "opacity", source.opacity, first)
@@ -163,7 +163,7 @@ def _add_region(scene, effect, strip, source: recipe.Region, color: Sequence[flo
 def _add_matte(scene, effect, strip, source: recipe.MatteRegion | recipe.RampRegion, images, first: float) -> None:
     region = effect.regions.add()
     region.name, region.shutter, region.kind = source.name, source.shutter, source.kind.upper()
-    region.invert, region.blend = source.invert, source.blend.upper()
+    region.invert, region.blend, region.is_layer = source.invert, source.blend.upper(), source.layer
     if isinstance(source, recipe.RampRegion):
         region.ramp = source.ramp.upper()
     else:

@@ -163,6 +163,12 @@ class ShutterRegion(_Tracked, PropertyGroup):
         options=UNKEYED,
     )
     blend: choice("Blend", "How the matte lies over other regions", BLENDS, translation_context=CONTEXT)
+    is_layer: BoolProperty(
+        name="Layer",
+        description="Expose the region by itself, before all else, which is exposed without it: it leaves no ghost",
+        update=changed,
+        options=UNKEYED,
+    )
     opacity: share("Opacity", "How much of the region counts: at 0 the picture is as without it", 1)
     feather: FloatProperty(
         name="Feather",

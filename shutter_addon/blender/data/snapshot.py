@@ -110,6 +110,9 @@ def read(scene, effect, strip, frames: Frames, *, thorough: bool = False) -> mod
     options = _options(curves, path, effect, frames)
     names = [shutter.name for shutter in effect.shutters]
     followed = {shutter.follow_region for shutter in effect.shutters if shutter.follow == "REGION"}
+    layers = any(region.is_layer for region in effect.regions)
+    if layers:  # then every one says where they are, in all frames around
+        followed = {region.name for region in effect.regions}
     around = _around(effect, frames)
     sampling = _Sampling.of(curves, effect, strip, around)
     regions = tuple(
@@ -128,17 +131,21 @@ def read(scene, effect, strip, frames: Frames, *, thorough: bool = False) -> mod
         regions=regions,
         options=options,
         time=sampling.time,
-        edge_aware=_channel(curves, effect, path, "edge_aware", frames),
+        edge_aware=_channel(curves, effect, path, "edge_aware", around if layers else frames),
         camera=camera,
     )
 
 
 def _around(effect, frames: Frames) -> Frames:
-    """The frames at which motions are asked for: where a shutter follows something, those around these frames too."""
-    if all(shutter.follow == "NOTHING" for shutter in effect.shutters):
+    """The frames at which motions are asked for: where a shutter follows something, or a region is a layer, those
+    around these frames too."""
+    has_layers = any(region.is_layer for region in effect.regions)
+    if not has_layers and all(shutter.follow == "NOTHING" for shutter in effect.shutters):
         return frames
     smooth = max(validation.number(shutter, "follow_smooth") for shutter in effect.shutters)
     reach = following.reach(validation.number(effect, "window")) + smooth
+    if has_layers:
+        reach += validation.number(effect, "plate_reach") + 1
     return np.unique(np.add.outer(sorted(frames), np.arange(-reach, reach + 1))).tolist()
 
 
@@ -259,6 +266,7 @@ def _options_at(effect, curves: dict, frame: float) -> Options:
         aggregate=int(at("aggregate")),
         border=at("border"),
         stop_at_cuts=at("stop_at_cuts"),
+        plate_reach=validation.number(effect, "plate_reach"),
         step=inbetween_settings.factor(effect),
     )
 
@@ -387,6 +395,7 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
         opacity=opacity,
         feather=feather,
         moves=moves,
+        layer=region.is_layer,
     )
 
 
@@ -400,6 +409,7 @@ def _region(sampling: _Sampling, path: str, region, shutter: int) -> model.Regio
         drawings=_drawings(curves, path, sampling.effect, region, sampling.placement, frames),
         moves=_moves(curves, region, path, frames),
         opacity=_channel(curves, region, path, "opacity", frames),
+        layer=region.is_layer,
     )
 
 

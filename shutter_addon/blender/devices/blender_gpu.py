@@ -38,7 +38,9 @@ FORMATS = {
     "rgba32f": (np.float32, "RGBA32F", _AS_IT_IS),
     "r32f": (np.float32, "R32F", _AS_IT_IS),
     "r32ui": (np.uint32, "R32F", _WHOLE),
-    "rgba16ui": None,  # of passes alone: floats do not hold it, and Blender reads whole numbers of one component only
+    # Of passes alone: floats do not hold them, and Blender reads whole numbers of one component only.
+    "rgba16ui": None,
+    "rgba32ui": None,
 }
 # Bytes of the float texture by which something is sent, at most: larger arrays are sent by strips of rows.
 _SENT_BYTES = 16 << 20

@@ -16,7 +16,7 @@ from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core.messages import translated
 from ...core.model.frame_state import FrameState
-from ...core.pixels import following
+from ...core.pixels import following, layering
 from ...core.stopping import never
 from ...devices.device import NoDeviceError
 from ...media.matte_values import MatteValues
@@ -97,9 +97,12 @@ class RenderSession:
             index, backward = source_index(snapshot, frame, source)
             direction = -1 if backward else 1
             shown = following.Shown(frame, index, direction)
-            state = following.followed(
-                snapshot.effect, state, shown, source, lambda other: source_index(snapshot, other, source)[0]
-            )
+
+            def shown_at(other: float) -> int:
+                return source_index(snapshot, other, source)[0]
+
+            state = following.followed(snapshot.effect, state, shown, source, shown_at)
+            state = layering.layered(snapshot.effect, state, shown, source, shown_at)
         request = Request(index=index, state=state, direction=direction, source=key, levels=context.levels)
         self._requests[snapshot.scene] = snapshot, frame, request
         return request

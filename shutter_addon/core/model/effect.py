@@ -20,7 +20,7 @@ from .keyframes import Bars, Channel
 from .motions import Placement
 
 _CLOSED = 'shutter "{name}" at frame {frame}: {fault}'
-_TOO_MANY = 'region "{name}": more than {most} points with those before it'
+TOO_MANY_POINTS = 'region "{name}": more than {most} points with those before it'
 _FAR = 'region "{name}": a point of its strokes is nowhere near the picture'
 
 
@@ -115,7 +115,8 @@ class Region(Subject):
 
     shutter: index of the shutter; kind: "line" or "lasso", and
     width: of its lines, fraction of the picture's height
-    opacity: 0 to 1 (scribbles.layers)"""
+    opacity: 0 to 1 (scribbles.layers)
+    layer: whether it is exposed by itself (core.pixels.layering)"""
 
     name: str
     shutter: int
@@ -123,6 +124,7 @@ class Region(Subject):
     width: Channel
     drawings: Drawings
     opacity: Channel = field(default=keyframes.Constant(1.0))
+    layer: bool = False
 
     @property
     def is_still(self) -> bool:
@@ -150,7 +152,8 @@ class MatteRegion(Subject):
     """A region whose shutter gets coefficients by a matte. It moves about the picture's centre: that places a ramp, and
     says of any other matte how what it covers moves.
 
-    content: channel of mattes.Content; feather: of mattes.Matte, as blend, invert and opacity"""
+    content: channel of mattes.Content; feather: of mattes.Matte, as blend, invert and opacity
+    layer: as a Region's"""
 
     name: str
     shutter: int
@@ -159,6 +162,7 @@ class MatteRegion(Subject):
     invert: bool
     opacity: Channel
     feather: Channel
+    layer: bool = False
 
     @property
     def is_still(self) -> bool:
@@ -263,19 +267,20 @@ class Effect:
     def _state(self, frame: float) -> FrameState:
         options = replace(self.options.at(frame), edge_aware=float(self.edge_aware.at(frame)))
         bars = [self.bars_at(index, frame) for index in range(len(self.shutters))]
-        laid = [region.at(frame) for region in self.regions if isinstance(region, MatteRegion)]
+        mattes_ = [each for each in self.regions if isinstance(each, MatteRegion) and not each.layer]
+        laid = [region.at(frame) for region in mattes_]
         seen = tuple(matte for matte in laid if matte.opacity > 0)
         return FrameState(options=options, bars=np.stack(bars), shapes=tuple(self._shapes_at(frame)), mattes=seen)
 
     def _shapes_at(self, frame: float) -> Iterator[scribbles.Shape]:
         room = limits.MAX_POINTS
         for region in self.regions:
-            if isinstance(region, MatteRegion):
+            if isinstance(region, MatteRegion) or region.layer:
                 continue
             shape = region.at(frame)
             room -= sum(map(len, shape.strokes))
             if room < 0:
-                raise EffectError(_TOO_MANY, name=region.name, most=limits.MAX_POINTS)
+                raise EffectError(TOO_MANY_POINTS, name=region.name, most=limits.MAX_POINTS)
             yield shape
 
     def bars_at(self, index: int, frame: float) -> np.ndarray:

@@ -26,6 +26,7 @@ class Options:
 
     window: L, its length in frames, in-between frames included
     edge_aware: 0 to 1, how much coefficients stop at the edges of the shown frame (core.pixels.conductances)
+    plate_reach: how many frames before and after the shown one are looked through for what lies behind layers
     step: frames for each filmed one: 1, or the factor of in-between frames
     """
 
@@ -39,6 +40,7 @@ class Options:
     border: bool = False
     stop_at_cuts: bool = True
     edge_aware: float = 0.0
+    plate_reach: int = 48
     step: int = 1
 
     @property
@@ -90,6 +92,44 @@ class Following:
 
 
 @dataclass(frozen=True)
+class Layers:
+    """The regions that are exposed by themselves, the first farthest (core.pixels.layering), with their mattes in the
+    source's frames around the shown one.
+
+    shutters: (n,) indices; opacities: (n,) 0 to 1
+    first: the source frame that comes first
+    scribbles: a state for each frame from there on: of its coefficients, 1 + i are the matte of layer i, if that is
+    drawn, and 0 what is none's; None: no layer is drawn
+    mattes: for each frame the mattes (n,) of layers; None: of one that is drawn
+    camera: where what the camera sees moves, of one shutter; None: that is not known, or nowhere
+    """
+
+    shutters: tuple[int, ...]
+    opacities: tuple[float, ...]
+    first: int
+    scribbles: tuple[FrameState | None, ...]
+    mattes: tuple[tuple[Matte | None, ...], ...]
+    camera: Following | None = None
+
+    @property
+    def frames(self) -> range:
+        """The source frames in which their mattes are known."""
+        return range(self.first, self.first + len(self.mattes))
+
+    def key_at(self, frame: int) -> tuple:
+        """Hashable, and equal for equal mattes in a source frame."""
+        place = frame - self.first
+        drawn = self.scribbles[place]
+        return self.opacities, self.mattes[place], drawn and drawn.key
+
+    @cached_property
+    def key(self) -> tuple:
+        """Hashable, and equal for layers that give the same picture of the same frames."""
+        camera = self.camera and self.camera.key
+        return self.shutters, self.first, camera, tuple(map(self.key_at, self.frames))
+
+
+@dataclass(frozen=True)
 class FrameState:
     """The effect at one frame.
 
@@ -98,6 +138,7 @@ class FrameState:
     reference: the exposure (sum of bars) of full brightness where exposure is "weighted"; None: the default shutter's
     following: what exposures follow; None: nothing that moves
     mattes: laid over what the scribbles give, the later over the earlier
+    layers: regions before what all these make; None: there are none
     open_for: by shutter whose trail has a length, the frames from its first open time to its last: for who is told of
     it, as its bars say what is exposed
     """
@@ -108,6 +149,7 @@ class FrameState:
     reference: float | None = None
     following: Following | None = None
     mattes: tuple[Matte, ...] = ()
+    layers: Layers | None = None
     open_for: dict[int, float] = field(default_factory=dict)
 
     @property
@@ -130,7 +172,8 @@ class FrameState:
         """Hashable, and equal for states that give the same picture of the same frames."""
         bars = self.bars.shape, self.bars.tobytes()
         following = self.following and self.following.key
-        return self.options, *bars, self.reference, following, self.mattes, self.shapes_key
+        layers = self.layers and self.layers.key
+        return self.options, *bars, self.reference, following, self.mattes, layers, self.shapes_key
 
     @cached_property
     def shapes_key(self) -> tuple:

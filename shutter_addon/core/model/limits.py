@@ -19,6 +19,8 @@ MAX_POINTS = 100_000
 MAX_KEYS = 100_000
 # Frames before and after each over which a motion is averaged: each of them is asked for its keys.
 MAX_SMOOTH = 250
+# Frames before and after the shown one in which what lies behind layers is looked for: each has mattes to be made.
+MAX_PLATE_REACH = 500
 # In characters: as long as Blender's own, and the channels of an EXR file.
 MAX_NAME = 63
 # In characters: the path of a file, as long as Blender's own, and the name of a channel in it.

@@ -156,6 +156,9 @@ class MatteReader(Protocol):
         """Of each matte, at a frame of the source, its values (h, w) float32, 0 to 1, of pixels, or of blocks of block
         × block pixels, without its opacity; and a key that is equal for equal values. One of UserError."""
 
+    def another(self) -> MatteReader:
+        """A new one for the same pictures."""
+
     def close(self) -> None:
         """Closes the files; they are opened again when they are needed."""
 

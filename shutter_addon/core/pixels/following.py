@@ -17,7 +17,7 @@ import numpy as np
 
 from ..frames.frame_source import FrameSource
 from ..model import motions
-from ..model.effect import Camera, Effect, Shutter, Subject
+from ..model.effect import Camera, Effect, Subject
 from ..model.frame_state import Following, FrameState, Options
 from ..model.motions import Placement, Similarity
 from . import compositor, trails
@@ -39,13 +39,13 @@ def smoothing(smooth: int) -> np.ndarray:
     return bell / bell.sum()
 
 
-class _Followed:
+class Followed:
     """What a shutter follows of a region or the camera, asked as these are: its location alone, perhaps, and averaged
     over time. It depends on keys around a frame, and on no other picture."""
 
-    def __init__(self, shutter: Shutter, subject: Subject):
-        self._subject, self._motion, self._smooth = subject, shutter.motion, shutter.smooth
-        self._weights = smoothing(shutter.smooth)
+    def __init__(self, motion: motions.Motion, smooth: int, subject: Subject):
+        self._subject, self._motion, self._smooth = subject, motion, smooth
+        self._weights = smoothing(smooth)
         self._own: dict[float, tuple[Placement, np.ndarray | None]] = {}
         self._averaged: dict[float, tuple[Placement, np.ndarray | None]] = {}
 
@@ -88,16 +88,16 @@ def followed(
     if not any(subjects):
         return state
     frame, index, direction = at
-    frames = _seen(state.options, index, direction, source.count)
-    times = _times(shown, frame, index, frames, reach(state.options.window))
+    frames = seen(state.options, index, direction, source.count)
+    times = times_of(shown, frame, index, frames, reach(state.options.window))
     turns = np.ones((len(frames), len(subjects)), np.complex128)
     shifts = np.zeros_like(turns)
     ways = [(id(shutter.follow), shutter.motion, shutter.smooth) for shutter in effect.shutters]
     for way, shutter in dict(zip(ways, effect.shutters, strict=True)).items():
         if shutter.follow is None:
             continue
-        subject = _Followed(shutter, shutter.follow)
-        moves = [_motion(subject, frame, time, (source.width, source.height)) for time in times]
+        subject = Followed(shutter.motion, shutter.smooth, shutter.follow)
+        moves = [motion_to(subject, frame, time, (source.width, source.height)) for time in times]
         followers = [other == way for other in ways]
         turns[:, followers] = np.array([motion.turn for motion in moves])[:, None]
         shifts[:, followers] = np.array([motion.shift for motion in moves])[:, None]
@@ -130,7 +130,7 @@ def _with_trails(
     return bars, open_for
 
 
-def _seen(options: Options, index: int, direction: int, count: int) -> range:
+def seen(options: Options, index: int, direction: int, count: int) -> range:
     """The source frames that a window may show, wherever its shot ends."""
     positions = compositor.window_positions(options, index, direction)
     beyond = options.window if options.edges == "mirror" else 0
@@ -138,7 +138,7 @@ def _seen(options: Options, index: int, direction: int, count: int) -> range:
     return range(max(int(low), 0), min(int(high), count - 1) + 1)
 
 
-def _times(shown: Callable[[float], int], frame: float, index: int, wanted: range, reach: int) -> list[float]:
+def times_of(shown: Callable[[float], int], frame: float, index: int, wanted: range, reach: int) -> list[float]:
     """The time on the timeline, nearest to a frame, at which each of the wanted source frames is shown."""
     times, last = {index: frame}, {1: index, -1: index}
     for distance in range(1, reach + 1):
@@ -156,7 +156,7 @@ def _times(shown: Callable[[float], int], frame: float, index: int, wanted: rang
     return [times[source] for source in nearest.tolist()]
 
 
-def _motion(subject: _Followed, frame: float, time: float, size: tuple[int, int]) -> Similarity:
+def motion_to(subject: Followed, frame: float, time: float, size: tuple[int, int]) -> Similarity:
     """The motion of the picture from a timeline frame to a time that may lie between two; none where nothing is drawn
     that could be followed."""
     whole = frame + math.floor(time - frame)

@@ -190,6 +190,7 @@ def _region(region: Region, name: str, shutter: str, shown: range) -> recipe.Reg
             for frame, ease in keys
         ],
         opacity=_number(region.opacity, shown),
+        layer=region.layer,
     )
 
 
@@ -205,6 +206,7 @@ def _matte(
         keys=_camera(region, shown),
         opacity=_number(region.opacity, shown),
         width=_number(region.feather, shown),
+        layer=region.layer,
     )
 
 

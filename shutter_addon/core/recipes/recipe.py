@@ -126,7 +126,9 @@ def _moves(keys: list[RegionKey] | list[CameraKey]) -> effect.Moves:
 @dataclass(frozen=True)
 class Region:
     """A scribble of a shutter. Redrawn shapes follow one another between the keys that carry strokes; a first key
-    without any carries the region's own."""
+    without any carries the region's own.
+
+    layer: whether it is exposed by itself, before what the others make (core.pixels.layering)"""
 
     shutter: str
     name: str = ""
@@ -135,6 +137,7 @@ class Region:
     strokes: list[Stroke] = field(default_factory=list)
     keys: list[RegionKey] = field(default_factory=list)
     opacity: Keyable = 1.0
+    layer: bool = False
 
     def drawings(self) -> list[tuple[RegionKey | None, list[Stroke]]]:
         """The key that starts each drawing, and its strokes, in time."""
@@ -162,6 +165,7 @@ class Region:
             drawings=drawings,
             moves=_moves(self.keys),
             opacity=_numbers(self.opacity),
+            layer=self.layer,
         )
 
 
@@ -174,7 +178,8 @@ class MatteRegion:
     timing: whose frames show the matte's, frame by frame: those of the source, or of the timeline
     offset: the matte's frame, from 0, that belongs to the first of these
     blend, opacity: as core.model.mattes.Matte has them; width: its feather
-    keys: how what it covers moves; the matte itself is not moved"""
+    keys: how what it covers moves; the matte itself is not moved
+    layer: as a Region's; then blend counts nothing"""
 
     shutter: str
     kind: Literal["matte"]
@@ -188,6 +193,7 @@ class MatteRegion:
     opacity: Keyable = 1.0
     width: Keyable = 0.0
     keys: list[CameraKey] = field(default_factory=list)
+    layer: bool = False
 
     def over_time(self, shutter: int, file: mattes.MatteFile) -> effect.MatteRegion:
         """As plain data; shutter: the index of its shutter, file: what is at its path."""
@@ -209,6 +215,7 @@ class RampRegion:
     opacity: Keyable = 1.0
     width: Keyable = 0.0
     keys: list[CameraKey] = field(default_factory=list)
+    layer: bool = False
 
     def over_time(self, shutter: int, file: mattes.MatteFile) -> effect.MatteRegion:
         """As plain data; shutter: the index of its shutter, file: the source's luminance."""
@@ -227,6 +234,7 @@ def _matte(region: MatteRegion | RampRegion, shutter: int, content: keyframes.Ch
         opacity=_numbers(region.opacity),
         feather=_numbers(region.width),
         moves=_moves(region.keys),
+        layer=region.layer,
     )
 
 
@@ -260,6 +268,7 @@ class Recipe:
     border: bool = False
     stop_at_cuts: bool = True
     edge_aware: Keyable = 0.0
+    plate_reach: int = 48
     inbetween: Factor = 1
     inbetween_method: Method = "quick"
     time: list[ValueKey] = field(default_factory=list)

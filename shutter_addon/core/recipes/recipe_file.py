@@ -328,6 +328,7 @@ def _check(recipe: Recipe) -> None:
     for k, key in enumerate(recipe.camera):
         _check_placement(key, f"camera[{k}]")
     _check_number(recipe.edge_aware, "edge_aware", 1)
+    _require_within(recipe.plate_reach, limits.MAX_PLATE_REACH, "plate_reach", 0)
     _check_number(recipe.camera_influence, "camera_influence", 1)
     for i, region in enumerate(recipe.regions):
         there_is_none = f"there is no shutter {_shown(region.shutter)}"

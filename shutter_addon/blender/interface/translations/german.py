@@ -611,6 +611,16 @@ MESSAGES = {
     ("*", "Blocks of 2×2 pixels share a shutter"): "Blöcke von 2×2 Pixeln teilen sich einen Verschluss",
     ("*", "Quarter"): "Viertel",
     ("*", "Blocks of 4×4 pixels share a shutter"): "Blöcke von 4×4 Pixeln teilen sich einen Verschluss",
+    (
+        "*",
+        "Expose the region by itself, before all else, which is exposed without it: it leaves no ghost",
+    ): "Die Region für sich belichten, vor allem anderen, das ohne sie belichtet wird: kein Geisterbild bleibt",
+    ("*", "Clean Plate"): "Leerer Hintergrund",
+    (
+        "*",
+        "Frames before and after the shown one in which what lies behind layers is looked for, "
+        "where no exposed frame shows it",
+    ): "Frames vor und nach dem gezeigten, die nach dem abgesucht werden, was Ebenen verdecken",
     ("*", "Stop at Cuts"): "An Schnitten enden",
     (
         "*",

@@ -1,0 +1,78 @@
+// Layers laid over what lies behind them; core/pixels/layering.py is the reference. All pictures are rgba32f, bottom row
+// first, as the passes that compose leave them.
+#ifdef LEAST
+// The least alpha of a block of 16 × 16 pixels: how much of what lies behind was seen.
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(r32f) uniform writeonly image2DArray least;
+uniform sampler2DArray clear;
+uniform ivec2 size;
+
+void main() {
+  ivec2 block = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(block, (size + 15) / 16))) {
+    return;
+  }
+  float lowest = 1.0;
+  for (int y = 16 * block.y; y < min(16 * block.y + 16, size.y); y++) {
+    for (int x = 16 * block.x; x < min(16 * block.x + 16, size.x); x++) {
+      lowest = min(lowest, texelFetch(clear, ivec3(x, y, 0), 0).a);
+    }
+  }
+  imageStore(least, ivec3(block, 0), vec4(lowest));
+}
+#else
+// BEGINS: `under` has Σ qₖ hₖ Vₖ, and `clear` in its alpha Σ qₖ hₖ; else it is a picture that a layer is laid over.
+// PLAIN: `plain` is the picture without layers, which stays where none is. PLATE: what lies behind.
+// color, share: a layer's F, and in its alpha A. ENDS: the picture is finished; else another layer follows.
+layout(local_size_x = 64) in;
+uniform sampler2DArray under, color, share;
+#if BEGINS
+uniform sampler2DArray clear;
+#  if PLAIN
+uniform sampler2DArray plain;
+#  endif
+#  if PLATE
+uniform sampler2DArray plate;
+#  endif
+#endif
+#include "light.glsl"
+uniform ivec2 size;
+#if ENDS
+#  include "finish.glsl"
+#else
+layout(rgba32f) uniform writeonly image2DArray picture;
+#endif
+
+// Of Σ qₖ hₖ, what must have been seen; and from where on none of a layer was in the way, but for rounding.
+const float CLEAR = 1.0 / 16.0;
+const float UNCOVERED = 1.0 - 2e-5;
+
+void main() {
+  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(pixel, size))) {
+    return;
+  }
+  ivec3 place = ivec3(pixel, 0);
+  vec4 light = texelFetch(under, place, 0);
+#if BEGINS
+  float seen = texelFetch(clear, place, 0).a;
+#  if PLATE
+  float lacking = max(CLEAR - seen, 0.0);
+  light = (light + lacking * texelFetch(plate, place, 0)) / max(seen, CLEAR);
+#  else
+  light /= max(seen, 1e-6);
+#  endif
+#  if PLAIN
+  if (seen > UNCOVERED) {
+    light = texelFetch(plain, place, 0);
+  }
+#  endif
+#endif
+  light = texelFetch(color, place, 0) + (1.0 - texelFetch(share, place, 0).a) * light;
+#if ENDS
+  finish(ivec2(pixel.x, size.y - 1 - pixel.y), light);
+#else
+  imageStore(picture, place, light);
+#endif
+}
+#endif

@@ -1,0 +1,98 @@
+"""What the windows of layers read: frames weighted, pixel by pixel, by a layer's matte or by what it leaves."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+
+from ..core.frames import light
+from ..core.frames.frame_source import FrameSource
+from ..core.frames.planes import Planes
+
+# Bytes of frames that are kept as they were read, for all windows and mattes that need them.
+RECENT_BYTES = 256 << 20
+
+
+class RecentFrames:
+    """A source that keeps the frames which were read last: each window of a layer reads all of them."""
+
+    def __init__(self, source: FrameSource):
+        self.base = source
+        self.most = max(8, RECENT_BYTES // (4 * source.width * source.height * np.dtype(source.dtype).itemsize))
+        self._kept: OrderedDict[tuple[str, int], Any] = OrderedDict()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.base, name)
+
+    def read(self, index: int) -> np.ndarray:
+        return self._get("read", index)
+
+    def decoded(self, index: int) -> np.ndarray | Planes:
+        return self._get("decoded", index)
+
+    def want(self, indices: Iterable[int]) -> None:
+        """Who reads through this says nothing of what comes next: the renderer does."""
+
+    def _get(self, way: str, index: int) -> Any:
+        key = way, index
+        if key not in self._kept:
+            self._kept[key] = getattr(self.base, way)(index)
+            while len(self._kept) > self.most:
+                self._kept.popitem(last=False)
+        self._kept.move_to_end(key)
+        return self._kept[key]
+
+    def clear(self) -> None:
+        """Forgets all frames."""
+        self._kept.clear()
+
+
+class WeightedFrames:
+    """A FrameSource of frames that are premultiplied by weights, in linear light.
+
+    source: the frames; opaque 8-bit ones become halves, all others float32
+    weight: gives the weights (H, W) float32, 0 to 1, of a frame
+    rest: whether the weights are what layers leave: then running sums hold what these take
+    alone: the weights themselves, as alpha, without any colour
+    is_summable: whether running sums can be made of them (window.WeightedSums)
+    """
+
+    alpha, transfer = "premultiplied", "linear"
+
+    def __init__(self, source: Any, weight: Callable[[int], np.ndarray], *, rest: bool = False, alone: bool = False):
+        self.base, self.weight, self.rest, self.alone = source, weight, rest, alone
+        is_short = np.dtype(source.dtype) == np.uint8 and source.alpha == "opaque"
+        self.is_summable, self.dtype = is_short and not alone, np.dtype(np.float16 if is_short else np.float32)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.base, name)
+
+    def read(self, index: int) -> np.ndarray:
+        weight = self.weight(index)
+        if self.alone:
+            result = np.zeros((*weight.shape, 4), self.dtype)
+            result[..., 3] = weight
+            return result
+        return (linear(self.base.read(index), self.base) * weight[..., None]).astype(self.dtype)
+
+    decoded = read
+
+
+def linear(frame: np.ndarray, source: Any) -> np.ndarray:
+    """A source's frame (H, W, 4) in linear light, premultiplied, float32."""
+    if frame.dtype.kind == "u":
+        most = np.iinfo(frame.dtype).max
+        if source.alpha != "premultiplied":
+            curve = np.arange(most + 1, dtype=np.float32) / np.float32(most)
+            curve = light.to_linear(curve) if source.transfer == "srgb" else curve
+            alpha = frame[..., 3:].astype(np.float32) / np.float32(most)
+            colors = curve.take(frame[..., :3])
+            return np.concatenate([colors if source.alpha == "opaque" else colors * alpha, alpha], axis=-1)
+        frame = frame / np.float32(most)
+    frame = frame.astype(np.float32)
+    if source.alpha == "premultiplied":
+        return light.linearised(frame) if source.transfer == "srgb" else frame
+    return light.premultiplied(frame, light.to_linear if source.transfer == "srgb" else None)

@@ -1,0 +1,94 @@
+"""Mattes of layers in source frames: each is made once, and kept within a budget."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+
+import numpy as np
+
+from ..core.model.frame_state import FrameState, Layers
+from ..core.model.mattes import FileFrame, Matte, MatteReader
+from ..core.pixels import layering
+
+# Bytes of mattes that are kept, at most, beyond those of the window.
+KEPT_BYTES = 512 << 20
+_WHOLE = 65535
+
+
+class LayerMattes:
+    """The mattes of a source's layers, and what they leave of what lies behind.
+
+    size: (w, h) of the pictures
+    solve: gives coefficients (N, h, w) float32 of a state (Layers.scribbles) at a source frame
+    reader: what makes the values of mattes; None: there are none
+    """
+
+    def __init__(
+        self,
+        size: tuple[int, int],
+        solve: Callable[[FrameState, int], np.ndarray],
+        reader: MatteReader | None,
+    ):
+        self._size, self._solve, self._reader = size, solve, reader
+        self._kept: OrderedDict[Hashable, np.ndarray] = OrderedDict()
+
+    def of(self, layers: Layers, frame: int) -> list[np.ndarray]:
+        """The mattes (H, W) float32, 0 to 1, of all layers in a source frame, with their opacities."""
+        place = min(max(frame - layers.first, 0), len(layers.mattes) - 1)
+        drawn, values = layers.scribbles[place], []
+        for i, matte in enumerate(layers.mattes[place]):
+            if matte is not None:
+                value = self._read(matte, frame)
+            elif drawn is not None:
+                value = self._drawn(drawn, frame, i)
+            values.append(value.astype(np.float32) * np.float32(layers.opacities[i] / _WHOLE))
+        return values
+
+    def behind(self, layers: Layers, frame: int) -> np.ndarray:
+        """How much (H, W) float32 of what lies behind all layers is seen in a source frame."""
+        return layering.behind(self.of(layers, frame))
+
+    def _read(self, matte: Matte, frame: int) -> np.ndarray:
+        if self._reader is None:
+            raise ValueError("nobody reads mattes")
+        reader = self._reader
+        moves = frame if isinstance(matte.content, FileFrame) else None
+        key = matte.content, matte.feather, matte.invert, moves
+        return self._get(key, lambda: reader.values((matte,), frame, 1)[0][1])
+
+    def _drawn(self, state: FrameState, frame: int, layer: int) -> np.ndarray:
+        """Of a layer that is drawn. Where no edges are followed, it is the same whatever the frame shows."""
+        key = state.key, frame if state.options.edge_aware else None
+        if (key, layer) not in self._kept:
+            coefficients = self._solve(state, frame)
+            for i, values in enumerate(coefficients[1:]):
+                self._keep((key, i), self._in_pixels(layering.matte_of(values), state.options.aggregate))
+        return self._get((key, layer), lambda: np.zeros(self._size[::-1]))
+
+    def _in_pixels(self, values: np.ndarray, block: int) -> np.ndarray:
+        if block > 1:
+            values = values.repeat(block, 0).repeat(block, 1)
+        return values[: self._size[1], : self._size[0]]
+
+    def _get(self, key: Hashable, make: Callable[[], np.ndarray]) -> np.ndarray:
+        if key not in self._kept:
+            self._keep(key, make())
+        self._kept.move_to_end(key)
+        return self._kept[key]
+
+    def _keep(self, key: Hashable, values: np.ndarray) -> None:
+        self._kept[key] = np.rint(values * np.float32(_WHOLE)).astype(np.uint16)
+        most = max(KEPT_BYTES // (2 * self._size[0] * self._size[1]), 16)
+        while len(self._kept) > most:
+            self._kept.popitem(last=False)
+
+    def clear(self) -> None:
+        """Forgets all mattes."""
+        self._kept.clear()
+
+    def close(self) -> None:
+        """Forgets all mattes, and closes their files."""
+        self.clear()
+        if self._reader is not None:
+            self._reader.close()

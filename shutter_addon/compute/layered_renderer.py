@@ -1,0 +1,186 @@
+"""Pictures with layers: what lies behind them and each of them is composed from a window of its own, then laid over one
+another (core.pixels.layering)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..core.frames.frame_source import FrameSource
+from ..core.model.frame_state import FrameState, Layers
+from ..core.model.mattes import MatteReader
+from ..core.pixels import compositor as reference
+from ..core.pixels import layering
+from . import plates
+from .layer_frames import RecentFrames, WeightedFrames, linear
+from .layer_mattes import LayerMattes
+from .laying import Behind, Exposure
+from .request import Coefficients, Request
+
+# Frames that every window loads before any goes on: no more than RecentFrames keeps.
+_TOGETHER = 8
+
+
+class LayeredRenderer:
+    """The windows of what is exposed by itself, and the mattes that weigh their frames.
+
+    solve: gives coefficients (N, h, w) float32 of a state (Layers.scribbles) at a frame of a source
+    noted: the source for windows, which are noted for the guides of the diffusion
+    kinds: of the last picture's pixels (plates), where some lacked what lies behind
+    """
+
+    def __init__(
+        self,
+        compositor: Any,
+        source: FrameSource,
+        noted: Callable[[Any], Any],
+        mattes: MatteReader | None,
+        solve: Callable[[Any, FrameState, int], np.ndarray],
+    ):
+        self._compositor, self._source = compositor, source
+        self._recent = RecentFrames(source)
+        self._noted = noted(self._recent)
+        size = source.width, source.height
+        self._mattes = LayerMattes(size, lambda state, frame: solve(self._recent, state, frame), mattes)
+        self._laying = compositor.laying()
+        self._layers: Layers | None = None
+        self._windows: dict[tuple, Any] = {}
+        self._loaded: dict[int, tuple] = {}  # by source frame in the windows: Layers.key_at
+        self.kinds: np.ndarray | None = None
+
+    @property
+    def held(self) -> Collection[int]:
+        """The source frames that all windows have."""
+        held = [set(window.held) for window in self._windows.values()]
+        return set.intersection(*held) if held else ()
+
+    def draw(
+        self,
+        request: Request,
+        behind: Request,
+        coefficients: Coefficients,
+        positions: np.ndarray,
+        shot: range,
+        plain: Callable[[], Any],
+    ) -> Any:
+        """The picture, as the compositor's `draw` gives it.
+
+        behind: of what lies behind, without layers, and its coefficients
+        positions, shot: what windows load
+        plain: gives the picture without layers"""
+        layers = request.state.layers
+        if layers is None:
+            raise ValueError("there are no layers")
+        parts = self._parts(request, behind)
+        self._forget_changed(layers, parts)
+        self._layers = layers
+        windows = {name: self._window(name, part, len(request.state.bars)) for name, part in parts.items()}
+        self._load(windows, positions, request, shot)
+        whole = Coefficients(self._compositor.constant(np.ones(1)), max(self._source.width, self._source.height))
+        drawn = {
+            name: self._compositor.draw(
+                windows[name], replace(part, levels=False), whole if name[0] >= 0 else coefficients
+            )
+            for name, part in parts.items()
+        }
+        exposed = [
+            Exposure(drawn[i, False], drawn.get((i, True), drawn[i, False])) for i in range(-1, len(layers.shutters))
+        ]
+        # Running sums have the bits of the picture without layers where none is.
+        same = getattr(windows[-1, False], "cover", 0)
+        bottom = Behind(exposed[0], None if same else plain(), self._plate(request, exposed[0], shot))
+        return self._laying.lay(bottom, exposed[1:], request.levels)
+
+    def _parts(self, request: Request, behind: Request) -> dict[tuple[int, bool], Request]:
+        """What is composed, by layer, −1 for what lies behind, and whether it is of the weights alone."""
+        layers = request.state.layers
+        states = [behind.state, *(request.state.alone(shutter) for shutter in (layers.shutters if layers else ()))]
+        parts = {(i, False): replace(behind, state=state) for i, state in enumerate(states, -1)}
+        if self._source.alpha != "opaque":
+            for i, state in enumerate(states, -1):
+                options = replace(state.options, light="linear", exposure="normalized")
+                parts[i, True] = replace(behind, state=replace(state, options=options))
+        return parts
+
+    def _window(self, name: tuple[int, bool], part: Request, shutters: int) -> Any:
+        (layer, alone), moved = name, part.state.following is not None
+        key = layer, alone, moved, part.state.options.window
+        window = self._windows.get(key)
+        if window is None or not window.is_open:
+            for other in [other for other in self._windows if other[:2] == name]:
+                self._windows.pop(other).release()
+            weighted = WeightedFrames(self._noted, self._weight(layer), rest=layer < 0, alone=alone)
+            window = self._windows[key] = self._compositor.window(weighted, part.state.options.window, moved, shutters)
+        return window
+
+    def _weight(self, layer: int) -> Callable[[int], np.ndarray]:
+        def weight(frame: int) -> np.ndarray:
+            if self._layers is None:
+                raise ValueError("there are no layers")
+            if layer < 0:
+                return self._mattes.behind(self._layers, frame)
+            return self._mattes.of(self._layers, frame)[layer]
+
+        return weight
+
+    def _load(self, windows: dict, positions: np.ndarray, request: Request, shot: range) -> None:
+        """Loads all windows. Where many frames lack, they are loaded a few at a time: each is read once for all."""
+        options, ordered = request.state.options, np.sort(positions)
+        lacking = set(reference.source_frames(options, ordered, shot).tolist()).difference(self.held)
+        step = len(ordered) if len(lacking) <= self._recent.most else _TOGETHER
+        for end in range(step, len(ordered) + step, step):
+            for window in windows.values():
+                window.load(ordered[:end], options, shot)
+
+    def _forget_changed(self, layers: Layers, parts: dict) -> None:
+        """Windows are loaded anew where the mattes of a frame that they hold are others now, or other layers are."""
+        keys = {frame: layers.key_at(frame) for frame in layers.frames}
+        changed = any(self._loaded.get(frame, keys[frame]) != keys[frame] for frame in self.held if frame in keys)
+        count = max(name[0] for name in parts) + 1
+        if changed or (self._layers is not None and len(self._layers.shutters) != count):
+            self.release_windows()
+        self._loaded |= keys
+        for frame in [frame for frame in self._loaded if abs(frame - layers.first) > 4096]:
+            del self._loaded[frame]
+
+    def _plate(self, request: Request, bottom: Exposure, shot: range) -> Any:
+        """See Behind.plate."""
+        layers, options = request.state.layers, request.state.options
+        if layers is None or (self._laying.least(bottom) >= layering.CLEAR).all():
+            self.kinds = None
+            return None
+        holes = self._laying.shares(bottom) < layering.CLEAR
+        reach = options.plate_reach
+        near = range(max(request.index - reach, shot.start), min(request.index + reach + 1, shot.stop))
+        picture, self.kinds = plates.plate(
+            holes,
+            plates.nearest_frames(request.index, near),
+            lambda frame: linear(self._recent.read(frame), self._source),
+            lambda frame: self._mattes.behind(layers, frame),
+            layers.camera,
+        )
+        if (self.kinds == plates.FILLED).any():
+            around = self._laying.around(bottom)
+            known = self.kinds != plates.FILLED
+            picture = plates.filled(np.where((self.kinds == plates.OPEN)[..., None], around, picture), known)
+        return self._laying.plate(picture)
+
+    def release_windows(self) -> None:
+        """Frees the windows' frames. The next picture reads them again."""
+        for window in self._windows.values():
+            window.release()
+        self._windows.clear()
+        self._loaded.clear()
+
+    def release(self) -> None:
+        """Frees what it has on the device, and what it keeps of frames."""
+        self.release_windows()
+        self._laying.release()
+        self._recent.clear()
+
+    def close(self) -> None:
+        """Forgets all, and closes the files of mattes."""
+        self._mattes.close()

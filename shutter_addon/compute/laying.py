@@ -1,0 +1,108 @@
+"""Layers laid over what lies behind them, on a device (core.pixels.layering)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..devices.device import Device, Texture
+from ..devices.passes import Pass, read_pass
+
+# Pixels along a side of the blocks whose least share is looked at.
+BLOCK = 16
+LEAST = read_pass("layer", "LEAST")
+
+
+class Exposure(NamedTuple):
+    """What a layer's frames, or those behind all layers, were composed to: a picture, and one whose alpha is the share
+    of the exposure that fell on them. Of opaque frames it is the same picture."""
+
+    color: Any
+    share: Any
+
+
+class Behind(NamedTuple):
+    """What lies behind layers.
+
+    exposed: by its weights
+    plain: the picture without layers; None: where there are none, `exposed` has the same bits
+    plate: what lies there where too little of it is exposed; None: nowhere"""
+
+    exposed: Exposure
+    plain: Any = None
+    plate: Any = None
+
+
+def laying_pass(begins: bool, ends: bool, plain: bool, plate: bool, levels: bool) -> Pass:
+    """Lays a layer over a picture, or over the first of all."""
+    return read_pass(
+        "layer",
+        BEGINS=int(begins),
+        ENDS=int(ends),
+        PLAIN=int(plain and begins),
+        PLATE=int(plate and begins),
+        LEVELS=int(levels and ends),
+    )
+
+
+class Laying:
+    """Lays layers over one another. What it gives is valid until its next."""
+
+    def __init__(self, device: Device):
+        self._device = device
+        self._textures: dict[str, Texture] = {}
+
+    def least(self, exposed: Exposure) -> np.ndarray:
+        """The least share (h, w) in blocks of BLOCK × BLOCK pixels, bottom row first."""
+        width, height, _ = exposed.share.size
+        least = self._texture("least", -(-width // BLOCK), -(-height // BLOCK), "r32f")
+        textures = {"clear": exposed.share}
+        self._device.run(LEAST, least.size[:2], textures=textures, images={"least": least}, size=(width, height))
+        return self._device.read(least)[0, ..., 0]
+
+    def shares(self, exposed: Exposure) -> np.ndarray:
+        """The shares (H, W), top row first."""
+        return self._device.read(exposed.share)[0, ::-1, :, 3]
+
+    def around(self, exposed: Exposure) -> np.ndarray:
+        """What was exposed (H, W, 4), not weighted any more, top row first."""
+        color = self._device.read(exposed.color)[0, ::-1]
+        return color / np.maximum(self.shares(exposed), 1e-6)[..., None]
+
+    def plate(self, picture: np.ndarray) -> Texture:
+        """A picture (H, W, 4) float32 for Behind.plate."""
+        height, width, _ = picture.shape
+        plate = self._texture("plate", width, height, "rgba32f")
+        self._device.write(plate, np.ascontiguousarray(picture[::-1], np.float32))
+        return plate
+
+    def lay(self, behind: Behind, layers: Sequence[Exposure], levels: bool) -> Texture:
+        """The picture, as GPUCompositor.draw gives it."""
+        under = behind.exposed.color
+        width, height, _ = under.size
+        for k, layer in enumerate(layers):
+            ends = k == len(layers) - 1
+            name = ("levels" if levels else "picture") if ends else f"part {k % 2}"
+            picture = self._texture(name, width, height, "rgba8" if levels and ends else "rgba32f")
+            program = laying_pass(not k, ends, behind.plain is not None, behind.plate is not None, levels)
+            textures = {"under": under, "color": layer.color, "share": layer.share, "clear": behind.exposed.share}
+            textures |= {"plain": behind.plain, "plate": behind.plate}
+            size = width, height
+            self._device.run(program, size, textures=textures, images={"picture": picture}, size=size, height=height)
+            under = picture
+        return under
+
+    def _texture(self, name: str, width: int, height: int, kind: str) -> Texture:
+        texture = self._textures.get(name)
+        if texture is None or texture.size != (width, height, 1):
+            if texture is not None:
+                texture.release()
+            texture = self._textures[name] = self._device.texture(width, height, 1, kind)
+        return texture
+
+    def release(self) -> None:
+        for texture in self._textures.values():
+            texture.release()
+        self._textures.clear()

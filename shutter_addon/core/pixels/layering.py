@@ -1,0 +1,183 @@
+"""Layers: regions that are exposed by themselves, each by its own shutter, before what lies behind all of them.
+
+With mₖ the matte of a layer in source frame k, hₖ = Π (1 − mₖ) over all layers, q a pixel's shutter by the other
+regions and s the layer's own, both normalised:
+
+    B = Σ qₖ hₖ Vₖ / Σ qₖ hₖ    what lies behind, exposed without them
+    F = Σ sₖ mₖ Vₖ              the layer, premultiplied by A = Σ sₖ mₖ
+    F + (1 − A) B               the picture, layer by layer, the first farthest
+
+So no layer leaves its ghost beside it. The sums are made in the light of Options.light, laid over one another in linear
+light. Where Σ qₖ hₖ is less than CLEAR, too little of B was seen: a plate takes the place of what lacks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..frames.frame_source import FrameSource
+from ..messages import EffectError
+from ..model import limits, scribbles
+from ..model.effect import TOO_MANY_POINTS, Camera, Effect, MatteRegion, Region
+from ..model.frame_state import Following, FrameState, Layers
+from ..model.mattes import Matte
+from . import compositor, following
+
+# The share of the exposure that must have fallen on what lies behind layers.
+CLEAR = 1 / 16
+# The share from where on no layer was in the way, but for rounding: there the picture is that without layers.
+UNCOVERED = 1 - 2e-5
+# Diffused coefficients that are no matte yet, and those that are a whole one: they are nowhere quite 0 or 1.
+NONE, WHOLE = 0.1, 0.9
+
+Moves = tuple[np.ndarray, np.ndarray]
+
+
+def reach(state: FrameState) -> int:
+    """How many timeline frames before and after the shown one say where layers lie in the frames around it."""
+    return following.reach(state.options.window) + state.options.plate_reach
+
+
+def layered(
+    effect: Effect, state: FrameState, at: following.Shown, source: FrameSource, shown: Callable[[float], int]
+) -> FrameState:
+    """The effect's state at a timeline frame, with its layers; arguments as for following.followed, `shown` as far as
+    `reach`. EffectError: a layer lies nowhere."""
+    present = [(region, float(region.opacity.at(at.frame))) for region in effect.regions if region.layer]
+    present = [(region, opacity) for region, opacity in present if opacity > 0]
+    if not present:
+        return state
+    regions, opacities = zip(*present, strict=True)
+    seen = following.seen(state.options, at.source_frame, at.direction, source.count)
+    beyond = state.options.plate_reach
+    frames = range(max(seen.start - beyond, 0), min(seen.stop + beyond, source.count))
+    times = following.times_of(shown, at.frame, at.source_frame, frames, reach(state))
+    drawn = [region for region in regions if isinstance(region, Region)]
+    moments = [(at.frame + math.floor(time - at.frame), (time - at.frame) % 1.0) for time in times]
+    return replace(
+        state,
+        layers=Layers(
+            shutters=tuple(region.shutter for region in regions),
+            opacities=opacities,
+            first=frames.start,
+            scribbles=tuple(_scribbles(effect, state, regions, drawn, *moment) for moment in moments),
+            mattes=tuple(tuple(_matte(region, *moment) for region in regions) for moment in moments),
+            camera=_camera_motion(effect.camera, at, times, frames, source),
+        ),
+    )
+
+
+def _matte(region: Region | MatteRegion, frame: float, share: float) -> Matte | None:
+    """Its matte at a time between a timeline frame and the next: that of the nearer one."""
+    return region.at(frame + round(share)) if isinstance(region, MatteRegion) else None
+
+
+def _scribbles(
+    effect: Effect, state: FrameState, regions: Sequence, drawn: list[Region], frame: float, share: float
+) -> FrameState | None:
+    """Layers.scribbles at a time between a timeline frame and the next."""
+    if not drawn:
+        return None
+    others = [region for region in effect.regions if isinstance(region, Region) and region not in drawn]
+    room, shapes = limits.MAX_POINTS, []
+    for region in (*others, *drawn):
+        shape = _between(region, frame, share)
+        room -= sum(map(len, shape.strokes))
+        if room < 0:
+            raise EffectError(TOO_MANY_POINTS, name=region.name, most=limits.MAX_POINTS)
+        if shape.opacity > 0:
+            number = 1 + regions.index(region) if region in drawn else 0
+            shapes.append(replace(shape, shutter=number, opacity=1.0))
+    options = replace(state.options, edge_aware=float(effect.edge_aware.at(frame + round(share))))
+    return FrameState(options=options, bars=np.ones((1 + len(regions), options.window)), shapes=tuple(shapes))
+
+
+def _between(region: Region, frame: float, share: float) -> scribbles.Shape:
+    before = region.at(frame)
+    if not share:
+        return before
+    after = region.at(frame + 1)
+    strokes = scribbles.between_strokes(before.strokes, after.strokes, share, region.drawings.aspect)
+    return replace(before, strokes=tuple(strokes), width=(1 - share) * before.width + share * after.width)
+
+
+def _camera_motion(
+    camera: Camera, at: following.Shown, times: list[float], frames: range, source: FrameSource
+) -> Following | None:
+    """Layers.camera, for all the frames."""
+    if camera.moves.is_still:
+        return None
+    size = source.width, source.height
+    subject = following.Followed("scale", 0, camera)
+    moves = [following.motion_to(subject, at.frame, time, size) for time in times]
+    turns, shifts = (np.array([[getattr(move, name)] for move in moves]) for name in ("turn", "shift"))
+    return Following(frames.start, turns.astype(np.complex128), shifts.astype(np.complex128)).of(slice(None))
+
+
+def matte_of(coefficients: ArrayLike) -> np.ndarray:
+    """The matte of a layer that is drawn, of its coefficients."""
+    values = (np.asarray(coefficients) - NONE) / (WHOLE - NONE)
+    return np.clip(values, 0, 1)
+
+
+def behind(mattes: Sequence[np.ndarray]) -> np.ndarray:
+    """How much of what lies behind layers with these mattes (h, w) is seen: Π (1 − m)."""
+    clear = 1 - mattes[0]
+    for matte in mattes[1:]:
+        clear = clear * (1 - matte)
+    return clear
+
+
+def laid_over(under: np.ndarray, color: np.ndarray, cover: np.ndarray) -> np.ndarray:
+    """A layer's F (H, W, 4), premultiplied, with its A (H, W), over a picture (H, W, 4)."""
+    return color + (1 - cover[..., None]) * under
+
+
+def with_plate(sums: np.ndarray, clear: np.ndarray, plate: np.ndarray | None) -> np.ndarray:
+    """B (H, W, 4) of its sums Σ qₖ hₖ Vₖ (H, W, 4) and Σ qₖ hₖ (H, W); plate: what lies behind where that is little."""
+    if plate is None:
+        return sums / np.maximum(clear, 1e-6)[..., None]
+    lacking = np.maximum(CLEAR - clear, 0)[..., None]
+    return (sums + lacking * plate) / np.maximum(clear, CLEAR)[..., None]
+
+
+def compose(
+    state: FrameState,
+    frames: Sequence[np.ndarray],
+    present: ArrayLike,
+    coefficients: ArrayLike,
+    mattes: np.ndarray,
+    moves: Moves | None = None,
+    plate: np.ndarray | None = None,
+) -> np.ndarray:
+    """The picture (H, W, 4) float64 of a state with layers; arguments as for compositor.compose.
+
+    moves: for all shutters
+    mattes: (n, L, H, W) of the layers in the window's frames; plate: (H, W, 4), None: nothing lacks"""
+    if state.layers is None:
+        raise ValueError("there are no layers")
+    clear = np.stack([behind(list(of_frame)) for of_frame in np.swapaxes(mattes, 0, 1)])
+
+    def exposed(
+        part: FrameState, weights: np.ndarray, c: ArrayLike, moved: Moves | None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        colors = [frame * weight[..., None] for frame, weight in zip(frames, weights, strict=True)]
+        shares = [np.stack([weight] * 4, axis=-1) for weight in weights]
+        plain = replace(part, options=replace(part.options, light="linear", exposure="normalized"))
+        color = compositor.compose(part, colors, present, c, moved)
+        return color, compositor.compose(plain, shares, present, c, moved)[..., 3]
+
+    behind_them = replace(state, layers=None)
+    sums, share = exposed(behind_them, clear, coefficients, moves)
+    plain = compositor.compose(behind_them, frames, present, coefficients, moves)
+    picture = np.where((share > UNCOVERED)[..., None], plain, with_plate(sums, share, plate))
+    whole = np.ones((1, *np.shape(coefficients)[1:]))
+    for i, shutter in enumerate(state.layers.shutters):
+        moved = moves and (moves[0][:, [shutter]], moves[1][:, [shutter]])
+        picture = laid_over(picture, *exposed(state.alone(shutter), mattes[i], whole, moved))
+    return picture
