@@ -13,7 +13,8 @@ matte_blend: and what lays them once they are on the device, so that the rest is
 copy: a gigabyte moved from one buffer of the device to another, read and written counting as half of it each.
 Methods: ours; paper: its Appendix A with search bounds (scripts/benchmark/appendix_a.glsl); average: the plain mean of
 the window's frames in the same light; edges: coefficients that follow a guide's edges; follow: ours, where the last
-shutter follows a subject that moves, turns and grows. Times are medians in milliseconds.
+shutter follows a subject that moves, turns and grows; layer: ours with a layer, a soft disc that moves, of the second
+shutter. Times are medians in milliseconds.
 Frames are random noise. Errors are the largest over random pixels of the picture (--pixels) in 8-bit levels against
 the float64 reference; those of diffusion over all coefficients, times 255, against twelve cycles with cells
 everywhere on all grids; those along edges against eight more cycles; those of coefficients with a matte, times 255,
@@ -32,7 +33,7 @@ import tempfile
 import time
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from unittest import mock
 
@@ -52,18 +53,20 @@ from shutter_addon.compute import (
 )
 from shutter_addon.compute.benchmark import BARS, Noise, bars, levels_apart, reference, shapes
 from shutter_addon.compute.gpu import GPUCompositor
+from shutter_addon.compute.layer_frames import WeightedFrames
+from shutter_addon.compute.laying import Behind, Exposure
 from shutter_addon.compute.request import Coefficients, Request
 from shutter_addon.compute.tables import table as table_of
 from shutter_addon.compute.window import Frames
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import mattes, scribbles, shutters
-from shutter_addon.core.model.frame_state import Following, FrameState, Options
-from shutter_addon.core.pixels import compositor
+from shutter_addon.core.model.frame_state import Following, FrameState, Layers, Options
+from shutter_addon.core.pixels import compositor, layering
 from shutter_addon.devices.gl import GLDevice
 from shutter_addon.devices.passes import Pass, read_pass
 
 HERE = Path(__file__).resolve().with_suffix("")
-METHODS = ("ours", "paper", "average", "edges", "follow")
+METHODS = ("ours", "layer", "paper", "average", "edges", "follow")
 MATTES = ("matte", "matte_images", "matte_read", "matte_images_read", "matte_blend")
 PASSES = ("compose", "accumulate", "diffuse", "diffuse_moved", "readback", "frame", *MATTES)
 MATTE_FRAMES = 24
@@ -129,6 +132,48 @@ def write_mattes(folder: Path, width: int, height: int) -> dict[str, mattes.Matt
     return {"matte": MatteFile(folder / "matte.mp4"), "matte_images": MatteFile(folder / "0000.png")}
 
 
+class LayerCase:
+    """A soft disc that is exposed by itself, by a shutter alone, before what the others make."""
+
+    def __init__(self, compositor, source, state: FrameState, shutter: int):
+        self._compositor, self._source, self._state = compositor, source, state
+        self._own, self._laying = state.alone(shutter), compositor.laying()
+        window, shutters = state.options.window, len(state.bars)
+        behind = WeightedFrames(source, lambda index: 1 - self.matte(index), rest=True)
+        self.windows = [
+            compositor.window(f, window, False, shutters) for f in (behind, WeightedFrames(source, self.matte))
+        ]
+
+    @cache  # noqa: B019 – of a case, which goes with it
+    def matte(self, index: int) -> np.ndarray:
+        height, width = self._source.height, self._source.width
+        y, x = np.ogrid[:height, :width]
+        away = np.hypot(x - (width / 4 + 4 * index % (width / 2)), y - height / 2)
+        return np.clip((height / 5 - away) / 8 + 0.5, 0, 1).astype(np.float32)
+
+    def draw(self, index: int, coefficients: Coefficients):
+        """The picture of frame `index`, of loaded windows."""
+        whole = Coefficients(self._compositor.constant(np.ones(1)), max(self._source.width, self._source.height))
+        behind = self._compositor.draw(self.windows[0], Request(index, self._state), coefficients)
+        own = self._compositor.draw(self.windows[1], Request(index, self._own), whole)
+        exposures = Exposure(behind, behind), Exposure(own, own)
+        self._laying.least(exposures[0])
+        return self._laying.lay(Behind(exposures[0]), exposures[1:], False)
+
+    def expected(self, frames, y, x, coefficients: np.ndarray) -> np.ndarray:
+        """float64 colours (P, 3) of pixels; frames: the source's in the window; coefficients: (N, P)."""
+        colors = [light.premultiplied(self._source.read(int(k))[y, x] / 255.0, light.to_linear)[None] for k in frames]
+        mattes_ = np.stack([self.matte(int(k))[y, x].astype(np.float64)[None] for k in frames])[None]
+        layers = Layers(shutters=(1,), opacities=(1.0,), first=0, scribbles=(), mattes=())
+        state, present = replace(self._state, layers=layers), np.ones(len(colors), bool)
+        return layering.compose(state, colors, present, coefficients[:, None].astype(np.float64), mattes_)[0, :, :3]
+
+    def release(self) -> None:
+        for window in self.windows:
+            window.release()
+        self._laying.release()
+
+
 class MatteCase:
     """Mattes of both kinds for one case, a frame further with each."""
 
@@ -175,6 +220,13 @@ class Case:
         self.edge_solver = self.compositor.solver()
         self.matting, self.layers = self.compositor.matting(), None
 
+    @cached_property
+    def layer(self) -> LayerCase:
+        """Opened when it is first measured."""
+        opened = LayerCase(self.compositor, self.source, self.state, 1)
+        self.load(*opened.windows)
+        return opened
+
     def _open(self, window: int) -> None:
         self.compositor = GPUCompositor(self.device)
         self.window = self.compositor.window(self.source, window)
@@ -195,7 +247,7 @@ class Case:
             window.load(self._wanted, self.state.options, range(self.source.count))
 
     def compose(self, method: str) -> None:
-        if method in ("ours", "follow"):
+        if method in ("ours", "follow", "layer"):
             self.drawn = self._drawn(method)
             return
         self.drawn, block = self.window.picture, self.state.options.aggregate if method == "paper" else 1
@@ -216,6 +268,9 @@ class Case:
 
     def _drawn(self, method: str):
         block = self.state.options.aggregate
+        if method == "layer":
+            self.load(*self.layer.windows)
+            return self.layer.draw(self.index, Coefficients(self.handle, block))
         if method == "ours":
             return self.compositor.draw(self.window, Request(self.index, self.state), Coefficients(self.handle, block))
         moved = replace(self.followed.following, first=self.index)
@@ -224,7 +279,8 @@ class Case:
 
     def accumulate(self, method: str) -> None:
         self.index += 1
-        self.load(self.window if method == "ours" else self.frames)
+        windows = {"ours": [self.window], "layer": self.layer.windows if method == "layer" else ()}
+        self.load(*windows.get(method, [self.frames]))
 
     def diffuse(self, method: str) -> None:
         if method == "edges":
@@ -297,6 +353,10 @@ class Case:
         rng = np.random.default_rng(self.index)
         y, x = rng.integers(0, self.source.height, pixels), rng.integers(0, self.source.width, pixels)
         picture = self.readback(method)[y, x, :3].astype(np.float64)
+        if method == "layer":
+            block = self.state.options.aggregate
+            c = self.compositor.coefficients(self.handle, len(self.state.bars))[:, y // block, x // block]
+            return levels_apart(picture, self.layer.expected(self._wanted, y, x, c))
         expected = self._followed(y, x) if method == "follow" else self._reference(y, x, method)
         return levels_apart(picture, expected)
 
@@ -354,7 +414,7 @@ class Case:
         return float(np.abs(self.compositor.coefficients(self.edges, count) - got).max() * 255)
 
     def release(self) -> None:
-        for window in filter(None, (self.window, self.frames, self.whole)):
+        for window in filter(None, (self.window, self.frames, self.whole, self.__dict__.get("layer"))):
             window.release()
         self.solver.release()
         self.edge_solver.release()
@@ -396,7 +456,7 @@ class HostCase(Case):
         self.whole = self.frames = cpu_window.TiledFrames(self.source, window)
 
     def compose(self, method: str) -> None:
-        if method in ("ours", "follow"):
+        if method in ("ours", "follow", "layer"):
             self.drawn = self._drawn(method)
             return
         encoded = self.state.options.light == "encoded"
@@ -466,6 +526,7 @@ def jobs(case: Case, passes, methods):
     for name, method in itertools.product(passes, methods):
         has = {
             "ours": PASSES,
+            "layer": ("compose", "accumulate", "frame") if len(case.state.bars) > 1 else (),
             "paper": ("compose",),
             "average": ("compose", "accumulate", "frame"),
             "edges": ("diffuse",),

@@ -4,7 +4,7 @@
 // The least alpha of a block of 16 × 16 pixels: how much of what lies behind was seen.
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(r32f) uniform writeonly image2DArray least;
-uniform sampler2DArray clear;
+layout(rgba32f) uniform readonly image2DArray clear;  // a software renderer's texelFetch takes longer
 uniform ivec2 size;
 
 void main() {
@@ -15,7 +15,7 @@ void main() {
   float lowest = 1.0;
   for (int y = 16 * block.y; y < min(16 * block.y + 16, size.y); y++) {
     for (int x = 16 * block.x; x < min(16 * block.x + 16, size.x); x++) {
-      lowest = min(lowest, texelFetch(clear, ivec3(x, y, 0), 0).a);
+      lowest = min(lowest, imageLoad(clear, ivec3(x, y, 0)).a);
     }
   }
   imageStore(least, ivec3(block, 0), vec4(lowest));
@@ -23,11 +23,17 @@ void main() {
 #else
 // BEGINS: `under` has Σ qₖ hₖ Vₖ, and `clear` in its alpha Σ qₖ hₖ; else it is a picture that a layer is laid over.
 // PLAIN: `plain` is the picture without layers, which stays where none is. PLATE: what lies behind.
-// color, share: a layer's F, and in its alpha A. ENDS: the picture is finished; else another layer follows.
+// exposed, share: a layer's F, and in its alpha A. ENDS: the picture is finished; else another layer follows.
+// OPAQUE: the alphas of `under` and `exposed` are these shares.
 layout(local_size_x = 64) in;
-uniform sampler2DArray under, color, share;
+layout(rgba32f) uniform readonly image2DArray under, exposed;
+#if !OPAQUE
+uniform sampler2DArray share;
+#endif
 #if BEGINS
+#  if !OPAQUE
 uniform sampler2DArray clear;
+#  endif
 #  if PLAIN
 uniform sampler2DArray plain;
 #  endif
@@ -53,9 +59,19 @@ void main() {
     return;
   }
   ivec3 place = ivec3(pixel, 0);
-  vec4 light = texelFetch(under, place, 0);
+  vec4 light = imageLoad(under, place);
+  vec4 own = imageLoad(exposed, place);
+#if OPAQUE
+  float covered = own.a;
+#else
+  float covered = texelFetch(share, place, 0).a;
+#endif
 #if BEGINS
+#  if OPAQUE
+  float seen = light.a;
+#  else
   float seen = texelFetch(clear, place, 0).a;
+#  endif
 #  if PLATE
   float lacking = max(CLEAR - seen, 0.0);
   light = (light + lacking * texelFetch(plate, place, 0)) / max(seen, CLEAR);
@@ -68,7 +84,7 @@ void main() {
   }
 #  endif
 #endif
-  light = texelFetch(color, place, 0) + (1.0 - texelFetch(share, place, 0).a) * light;
+  light = own + (1.0 - covered) * light;
 #if ENDS
   finish(ivec2(pixel.x, size.y - 1 - pixel.y), light);
 #else

@@ -28,7 +28,8 @@ class LayeredRenderer:
     """The windows of what is exposed by itself, and the mattes that weigh their frames.
 
     solve: gives coefficients (N, h, w) float32 of a state (Layers.scribbles) at a frame of a source
-    noted: the source for windows, which are noted for the guides of the diffusion
+    noted: gives a source whose frames are noted for the guides of the diffusion
+    recent: the source, of which it keeps the frames that were read last
     kinds: of the last picture's pixels (plates), where some lacked what lies behind
     """
 
@@ -41,10 +42,10 @@ class LayeredRenderer:
         solve: Callable[[Any, FrameState, int], np.ndarray],
     ):
         self._compositor, self._source = compositor, source
-        self._recent = RecentFrames(source)
-        self._noted = noted(self._recent)
+        self.recent = RecentFrames(source)
+        self._noted = noted(self.recent)
         size = source.width, source.height
-        self._mattes = LayerMattes(size, lambda state, frame: solve(self._recent, state, frame), mattes)
+        self._mattes = LayerMattes(size, lambda state, frame: solve(self.recent, state, frame), mattes)
         self._laying = compositor.laying()
         self._layers: Layers | None = None
         self._windows: dict[tuple, Any] = {}
@@ -91,7 +92,8 @@ class LayeredRenderer:
         ]
         # Running sums have the bits of the picture without layers where none is.
         same = getattr(windows[-1, False], "cover", 0)
-        bottom = Behind(exposed[0], None if same else plain(), self._plate(request, exposed[0], shot))
+        plate = self._plate(request, exposed[0], shot, lambda: self._gain(behind.state, coefficients))
+        bottom = Behind(exposed[0], None if same else plain(), plate)
         return self._laying.lay(bottom, exposed[1:], request.levels)
 
     def _parts(self, request: Request, behind: Request) -> dict[tuple[int, bool], Request]:
@@ -130,7 +132,7 @@ class LayeredRenderer:
         """Loads all windows. Where many frames lack, they are loaded a few at a time: each is read once for all."""
         options, ordered = request.state.options, np.sort(positions)
         lacking = set(reference.source_frames(options, ordered, shot).tolist()).difference(self.held)
-        step = len(ordered) if len(lacking) <= self._recent.most else _TOGETHER
+        step = len(ordered) if len(lacking) <= self.recent.most else _TOGETHER
         for end in range(step, len(ordered) + step, step):
             for window in windows.values():
                 window.load(ordered[:end], options, shot)
@@ -146,8 +148,8 @@ class LayeredRenderer:
         for frame in [frame for frame in self._loaded if abs(frame - layers.first) > 4096]:
             del self._loaded[frame]
 
-    def _plate(self, request: Request, bottom: Exposure, shot: range) -> Any:
-        """See Behind.plate."""
+    def _plate(self, request: Request, bottom: Exposure, shot: range, gain: Callable[[], np.ndarray]) -> Any:
+        """See Behind.plate; gain: gives how bright (H, W) its pixels are."""
         layers, options = request.state.layers, request.state.options
         if layers is None or (self._laying.least(bottom) >= layering.CLEAR).all():
             self.kinds = None
@@ -158,15 +160,25 @@ class LayeredRenderer:
         picture, self.kinds = plates.plate(
             holes,
             plates.nearest_frames(request.index, near),
-            lambda frame: linear(self._recent.read(frame), self._source),
+            lambda frame: linear(self.recent.read(frame), self._source),
             lambda frame: self._mattes.behind(layers, frame),
             layers.camera,
         )
+        picture[..., :3] *= gain()[..., None]
         if (self.kinds == plates.FILLED).any():
             around = self._laying.around(bottom)
             known = self.kinds != plates.FILLED
             picture = plates.filled(np.where((self.kinds == plates.OPEN)[..., None], around, picture), known)
         return self._laying.plate(picture)
+
+    def _gain(self, state: FrameState, coefficients: Coefficients) -> np.ndarray:
+        """The brightness (H, W) or (1, 1) of what lies behind."""
+        if (state.gains == 1).all():
+            return np.ones((1, 1))
+        values = np.maximum(self._compositor.coefficients(coefficients.handle, len(state.bars)), 0)
+        gains = np.einsum("n,nhw->hw", state.gains, values) / values.sum(axis=0)
+        whole = gains.repeat(coefficients.block, 0).repeat(coefficients.block, 1) if gains.size > 1 else gains
+        return whole[: self._source.height, : self._source.width]
 
     def release_windows(self) -> None:
         """Frees the windows' frames. The next picture reads them again."""
@@ -179,7 +191,7 @@ class LayeredRenderer:
         """Frees what it has on the device, and what it keeps of frames."""
         self.release_windows()
         self._laying.release()
-        self._recent.clear()
+        self.recent.clear()
 
     def close(self) -> None:
         """Forgets all, and closes the files of mattes."""

@@ -35,12 +35,13 @@ class Behind(NamedTuple):
     plate: Any = None
 
 
-def laying_pass(begins: bool, ends: bool, plain: bool, plate: bool, levels: bool) -> Pass:
-    """Lays a layer over a picture, or over the first of all."""
+def laying_pass(begins: bool, ends: bool, opaque: bool, plain: bool, plate: bool, levels: bool) -> Pass:
+    """Lays a layer over a picture, or over what lies behind all; see shaders/layer.glsl."""
     return read_pass(
         "layer",
         BEGINS=int(begins),
         ENDS=int(ends),
+        OPAQUE=int(opaque),
         PLAIN=int(plain and begins),
         PLATE=int(plate and begins),
         LEVELS=int(levels and ends),
@@ -58,8 +59,8 @@ class Laying:
         """The least share (h, w) in blocks of BLOCK × BLOCK pixels, bottom row first."""
         width, height, _ = exposed.share.size
         least = self._texture("least", -(-width // BLOCK), -(-height // BLOCK), "r32f")
-        textures = {"clear": exposed.share}
-        self._device.run(LEAST, least.size[:2], textures=textures, images={"least": least}, size=(width, height))
+        images = {"clear": exposed.share, "least": least}
+        self._device.run(LEAST, least.size[:2], images=images, size=(width, height))
         return self._device.read(least)[0, ..., 0]
 
     def shares(self, exposed: Exposure) -> np.ndarray:
@@ -86,11 +87,18 @@ class Laying:
             ends = k == len(layers) - 1
             name = ("levels" if levels else "picture") if ends else f"part {k % 2}"
             picture = self._texture(name, width, height, "rgba8" if levels and ends else "rgba32f")
-            program = laying_pass(not k, ends, behind.plain is not None, behind.plate is not None, levels)
-            textures = {"under": under, "color": layer.color, "share": layer.share, "clear": behind.exposed.share}
+            program = laying_pass(
+                begins=not k,
+                ends=ends,
+                opaque=layer.color is layer.share,
+                plain=behind.plain is not None,
+                plate=behind.plate is not None,
+                levels=levels,
+            )
+            textures = {"share": layer.share, "clear": behind.exposed.share}
             textures |= {"plain": behind.plain, "plate": behind.plate}
-            size = width, height
-            self._device.run(program, size, textures=textures, images={"picture": picture}, size=size, height=height)
+            images, size = {"under": under, "exposed": layer.color, "picture": picture}, (width, height)
+            self._device.run(program, size, textures=textures, images=images, size=size, height=height)
             under = picture
         return under
 

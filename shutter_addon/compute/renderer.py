@@ -181,6 +181,12 @@ class Renderer:
         missing |= self._guides.lacking(self._guiding(request, shot))
         return (missing | unread) - handed
 
+    @property
+    def holes(self) -> np.ndarray | None:
+        """Of the last picture that had layers, the kinds (H, W) uint8 of its pixels (compute.plates), top row first;
+        None: what lies behind its layers was exposed everywhere."""
+        return self._layered.kinds if self._layered else None
+
     def check(self, request: Request) -> None:
         """MediaError: an in-between frame that the picture needs is missing. No frame is read."""
         if self.source.step > 1:
@@ -238,7 +244,8 @@ class Renderer:
         if self._window is None or self._kind != kind or not self._window.is_open:
             self._drop_window()
             self._kind = kind
-            self._window = self.compositor.window(guide.NotedSource(self.source, self._guides), *kind)
+            source: Any = self._layered.recent if self._layered else self.source  # whose windows read the same frames
+            self._window = self.compositor.window(guide.NotedSource(source, self._guides), *kind)
         return self._window
 
     def _keep_guides(self, request: Request) -> None:

@@ -5,7 +5,7 @@ import itertools
 
 import pytest
 
-from shutter_addon.compute import composition_passes, diffusion_gpu, edge_diffusion_gpu, matting, mixing, window
+from shutter_addon.compute import composition_passes, diffusion_gpu, edge_diffusion_gpu, laying, matting, mixing, window
 from shutter_addon.compute.composition_passes import (
     LightFormat,
     Moved,
@@ -19,7 +19,7 @@ _WAYS = ("frames", "search", "value")
 
 
 def _declared():
-    for module in (diffusion_gpu, edge_diffusion_gpu, composition_passes):
+    for module in (diffusion_gpu, edge_diffusion_gpu, composition_passes, laying):
         yield from (value for value in vars(module).values() if isinstance(value, Pass))
     for ties in ("LABELS", "LINKS", "STENCIL"):
         yield from diffusion_gpu.operators(ties).values()
@@ -48,6 +48,18 @@ def _composing():
         )
 
 
+def _layers():
+    for cover, levels in itertools.product((1, 2), (True, False)):
+        light = LightFormat(0, False, True, levels, cover)
+        yield composition_of_sums(4, 2, levels, levels, light)
+        for way, stored in itertools.product(_WAYS, ("sums", "tiles")):
+            yield composition(way, 3, stored, 2, light)
+        for sent in ("colours", "planes", "before"):
+            yield window.accumulation(1, sent, levels, levels, cover)
+    for begins, ends, opaque, more in itertools.product((True, False), repeat=4):
+        yield laying.laying_pass(begins, ends, opaque, plain=more, plate=more, levels=ends and more)
+
+
 def _filling():
     for tiled, sent in itertools.product((True, False), ("colours", "numbers", "planes", "before")):
         yield window.accumulation(1, sent, tiled, tiled)
@@ -68,5 +80,5 @@ def _unpacking():
         yield blender_gpu.LETTING_GO
 
 
-PASSES = list(dict.fromkeys((*_declared(), *_composing(), *_filling(), *_unpacking())))
+PASSES = list(dict.fromkeys((*_declared(), *_composing(), *_layers(), *_filling(), *_unpacking())))
 each_pass = pytest.mark.parametrize("program", PASSES, ids=lambda program: f"{program.file}-{program.step}".strip("-"))

@@ -1,0 +1,339 @@
+"""Layers on all devices, against their formula in float64."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from test_composition import LEVEL, device, footage, state  # noqa: F401 – a fixture
+
+from shutter_addon.compute import layer_frames, layer_mattes, window
+from shutter_addon.compute.renderer import Renderer
+from shutter_addon.compute.request import Request
+from shutter_addon.core.frames import light
+from shutter_addon.core.model.frame_state import Following, FrameState, Layers, Options
+from shutter_addon.core.model.mattes import FileFrame, Matte
+from shutter_addon.core.model.scribbles import Shape
+from shutter_addon.core.pixels import compositor, layering
+from shutter_addon.media.matte_values import MatteValues
+
+SIZE, COUNT, SHOWN = (37, 23), 20, 9
+
+
+class Values:
+    """A matte file in memory, which counts what is read."""
+
+    def __init__(self, values):
+        self.values, self.reads = values, []
+        self.count, self.height, self.width = values.shape
+        self.fps = None
+
+    def open(self):
+        return self
+
+    def close(self):
+        pass
+
+    def read(self, index):
+        self.reads.append(index)
+        return self.values[index].astype(np.float32)
+
+
+def discs(speed=1.5, radius=5.0, soft=3.0, top=0.5):
+    """Mattes (COUNT, H, W) of a disc that moves to the right, its edge `soft` pixels wide."""
+    y, x = np.mgrid[: SIZE[1], : SIZE[0]]
+    away = [np.hypot(x - 4 - speed * k, y - top * SIZE[1]) for k in range(COUNT)]
+    values = np.clip((radius - np.stack(away)) / soft + 0.5, 0, 1)
+    return np.rint(values * 65535) / 65535
+
+
+def with_layers(moment, *mattes, opacities=None, camera=None):
+    """A state with a layer of shutters 2, 0 … for each of the mattes, and their files."""
+    files = [Values(each) for each in mattes]
+    of_frame = tuple(Matte(shutter=0, content=FileFrame(file=file)) for file in files)
+    layers = Layers(
+        shutters=(2, 0, 1)[: len(mattes)],
+        opacities=opacities or (1.0,) * len(mattes),
+        first=0,
+        scribbles=(None,) * COUNT,
+        mattes=(of_frame,) * COUNT,
+        camera=camera,
+    )
+    return dataclasses.replace(moment, layers=layers), files
+
+
+def drawn(device, source, moment, index=SHOWN, direction=1, **asked):  # noqa: F811
+    renderer = Renderer(device, source, MatteValues(source.width, source.height))
+    picture = renderer.picture(Request(index, moment, direction, **asked))
+    return renderer, picture
+
+
+def plain(moment):
+    return dataclasses.replace(moment, layers=None)
+
+
+def formula(device, source, moment, mattes, index=SHOWN, direction=1):  # noqa: F811
+    """The picture by the formula, frame after frame, and where what lies behind is seen enough, and at all covered."""
+    c = Renderer(device, source).coefficients(Request(index, plain(moment), direction))
+    block = moment.options.aggregate
+    c = c.repeat(block, 1).repeat(block, 2)[:, : source.height, : source.width].astype(np.float64)
+    c /= c.sum(axis=0)
+    indices = compositor.window_indices(moment.options, index, range(source.count), direction)
+    there = indices >= 0
+    frames, encoded = source.linear(), moment.options.light == "encoded"
+    if encoded:
+        frames = light.premultiplied(light.straight(frames), light.to_encoded)
+    normalised = moment.bars / moment.bars.sum(axis=1, keepdims=True)
+    q = compositor.mixed_shutter(dataclasses.replace(moment, bars=normalised), np.moveaxis(c, 0, -1)) * there
+    q /= q.sum(axis=-1, keepdims=True)
+    opacities = moment.layers.opacities
+    m = np.stack([opacity * matte[np.maximum(indices, 0)] for opacity, matte in zip(opacities, mattes, strict=True)])
+
+    def total(weights, of=frames):
+        return np.einsum("khw,khwc->hwc", weights, of[np.maximum(indices, 0)])
+
+    def linear(part):
+        return light.premultiplied(light.straight(part), light.to_linear) if encoded else part
+
+    seen = np.moveaxis(q, -1, 0) * (1 - m).prod(axis=0)
+    gain = np.einsum("n,nhw->hw", moment.gains, c)[..., None] ** [1, 1, 1, 0]
+    # Mean first: of encoded light only that has a linear one.
+    picture = gain * linear(total(seen / np.maximum(seen.sum(axis=0), 1e-9)))
+    for shutter, matte in zip(moment.layers.shutters, m, strict=True):
+        s = normalised[shutter] * there
+        weights = (s / s.sum())[:, None, None] * matte
+        cover = weights.sum(axis=0)
+        of_layer = linear(total(weights / np.maximum(cover, 1e-9))) * (moment.gains[shutter] ** np.array([1, 1, 1, 0]))
+        picture = cover[..., None] * of_layer + (1 - cover[..., None]) * picture
+    return picture, seen.sum(axis=0) >= layering.CLEAR, (m[:, there] > 0).any(axis=(0, 1))
+
+
+def assert_near(picture, expected, where=...):
+    difference = np.abs(light.to_encoded(picture.astype(np.float64)) - light.to_encoded(expected))
+    assert (difference / np.maximum(1, np.abs(expected)))[where].max() <= LEVEL
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"interpolation": "value"},
+        {"light": "encoded"},
+        {"exposure": "weighted"},
+        {"edges": "shorten", "window": 16},
+        {"edges": "mirror", "window": 16},
+        {"aggregate": 2},
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("count", [1, 2])
+def test_the_formula(device, options, direction, count):  # noqa: F811
+    rng, mattes = np.random.default_rng(1), [discs(), discs(-1.0, top=0.3) * 0.9][:count]
+    source = footage(rng, COUNT, SIZE)
+    moment, _ = with_layers(state(rng, **{"window": 6} | options), *mattes, opacities=(1.0, 0.7)[:count])
+    _, picture = drawn(device, source, moment, direction=direction)
+    expected, enough, covered = formula(device, source, moment, mattes, direction=direction)
+    assert_near(picture, expected, enough)
+    without = Renderer(device, source).picture(Request(SHOWN, plain(moment), direction))
+    assert 0.1 < (~covered).mean() < 0.9
+    assert np.array_equal(picture[~covered], without[~covered])  # to the bit
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        {"alpha": "straight"},
+        {"alpha": "premultiplied", "dtype": np.float32, "transfer": "linear"},
+        {"dtype": np.float16, "transfer": "linear"},
+        {"dtype": np.uint16},
+        {"alpha": "straight", "dtype": np.uint16},
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("light_", ["linear", "encoded"])
+def test_alpha_and_bright_light(device, kind, light_):  # noqa: F811
+    rng, mattes = np.random.default_rng(2), [discs(), discs(-1.0, top=0.3)]
+    source = footage(rng, COUNT, SIZE, **kind)
+    moment, _ = with_layers(state(rng, window=6, light=light_), *mattes)
+    _, picture = drawn(device, source, moment)
+    expected, enough, covered = formula(device, source, moment, mattes)
+    assert_near(picture, expected, enough)
+    without = Renderer(device, source).picture(Request(SHOWN, plain(moment)))
+    assert np.array_equal(picture[~covered], without[~covered])
+
+
+@pytest.mark.parametrize("alpha", ["opaque", "straight"])
+@pytest.mark.parametrize("interpolation", ["displacement", "value"])
+def test_layers_and_what_lies_behind_follow(device, alpha, interpolation):  # noqa: F811
+    """The reference resamples weighted frames as devices do."""
+    rng, mattes = np.random.default_rng(3), [discs(0.5)]
+    source, apart = footage(rng, COUNT, SIZE, alpha=alpha), np.arange(COUNT) - SHOWN
+    turns = np.exp(0.01j * apart)[:, None] ** [1, 0, 1]
+    following = Following(0, turns, (apart * (0.6 + 0.2j))[:, None] * [1, 0, 1])
+    moment, _ = with_layers(state(rng, window=6, interpolation=interpolation), *mattes)
+    moment = dataclasses.replace(moment, following=following)
+    renderer, picture = drawn(device, source, moment)
+    indices = compositor.window_indices(moment.options, SHOWN, range(COUNT))
+    c = renderer.coefficients(Request(SHOWN, plain(moment))).astype(np.float64)
+    frames, of_frames, moves = (
+        source.linear()[indices],
+        np.stack([each[indices] for each in mattes]),
+        following.at(indices),
+    )
+    expected = layering.compose(moment, frames, indices >= 0, c / c.sum(axis=0), of_frames, moves)
+    seen = np.ones(SIZE[::-1], bool) if renderer.holes is None else renderer.holes == 0
+    assert seen.mean() > 0.5
+    assert_near(picture, expected, seen)
+
+
+def test_levels_are_those_of_the_picture(device):  # noqa: F811
+    rng = np.random.default_rng(4)
+    source = footage(rng, COUNT, SIZE)
+    moment, _ = with_layers(state(rng, window=6), discs())
+    _, picture = drawn(device, source, moment)
+    _, levels = drawn(device, source, moment, levels=True)
+    expected = light.to_encoded(picture[..., :3].astype(np.float64)) * 255
+    assert levels.dtype == np.uint8
+    assert np.abs(levels[..., :3] - expected).max() <= 0.51
+
+
+def test_running_sums_do_not_depend_on_where_the_window_was(device):  # noqa: F811
+    rng = np.random.default_rng(5)
+    source = footage(rng, COUNT, SIZE)
+    moment, _ = with_layers(state(rng, window=6), discs())
+    renderer = Renderer(device, source, MatteValues(*SIZE))
+    passed = [renderer.picture(Request(index, moment)) for index in (3, 4, 5, 9, 8)]
+    for index, picture in zip((3, 4, 5, 9, 8), passed, strict=True):
+        assert np.array_equal(picture, drawn(device, source, moment, index)[1])
+
+
+def test_a_played_frame_costs_one_new_matte_and_a_scrub_back_none(device):  # noqa: F811
+    rng = np.random.default_rng(6)
+    source = footage(rng, COUNT, SIZE)
+    moment, (file,) = with_layers(state(rng, window=6, plate_reach=0), discs())
+    renderer = Renderer(device, source, MatteValues(*SIZE))
+    renderer.picture(Request(4, moment))
+    assert sorted(file.reads) == [4, 5, 6, 7, 8, 9]
+    file.reads.clear(), source.reads.clear()
+    renderer.picture(Request(5, moment))
+    assert (file.reads, source.reads) == ([10], [10])
+    file.reads.clear()
+    renderer.picture(Request(4, moment))
+    assert file.reads == []
+
+
+def test_other_mattes_are_loaded_anew(device):  # noqa: F811
+    rng = np.random.default_rng(7)
+    source, base = footage(rng, COUNT, SIZE), state(rng, window=6)
+    first, other = (with_layers(base, discs(top=top))[0] for top in (0.5, 0.8))
+    renderer = Renderer(device, source, MatteValues(*SIZE))
+    for moment in (first, other, plain(first), first):
+        picture = renderer.picture(Request(SHOWN, moment))
+        assert np.array_equal(picture, drawn(device, source, moment)[1])
+
+
+def test_of_strokes_the_matte_is_solved_in_every_source_frame(device):  # noqa: F811
+    """A stroke that moves, against mattes made of the coefficients that it has as a scribble."""
+    rng = np.random.default_rng(8)
+    source, base = footage(rng, COUNT, SIZE), state(rng, window=4, border=True, plate_reach=0)
+
+    def shapes(k):
+        return (Shape(1, "line", 0.2, (np.array([[0.2 + 0.02 * k, 0.4], [0.3 + 0.02 * k, 0.6]]),)),)
+
+    scribbles = tuple(FrameState(base.options, np.ones((2, 4)), shapes(k)) for k in range(COUNT))
+    layers = Layers(shutters=(2,), opacities=(1.0,), first=0, scribbles=scribbles, mattes=((None,),) * COUNT)
+    base = dataclasses.replace(base, shapes=())
+    _, picture = drawn(device, source, dataclasses.replace(base, layers=layers))
+    solved = [Renderer(device, source).coefficients(Request(k, scribbles[k]))[1] for k in range(COUNT)]
+    mattes = [np.rint(layering.matte_of(np.stack(solved)) * 65535) / 65535]
+    expected, enough, _ = formula(device, source, dataclasses.replace(base, layers=layers), mattes)
+    assert enough.mean() > 0.5
+    assert_near(picture, expected, enough)
+
+
+def test_what_was_not_exposed_comes_from_the_nearest_clear_frame(device):  # noqa: F811
+    """A camera that stands still, before it a subject that moves on: its place shows what is behind it later."""
+    rng = np.random.default_rng(9)
+    frames = footage(rng, 1, SIZE).frames.repeat(COUNT, 0)
+    source, matte = footage(rng, COUNT, SIZE), np.zeros((COUNT, *SIZE[::-1]))
+    matte[: SHOWN + 6, 5:15, 5:20] = 1
+    source.frames[:] = frames
+    source.frames[matte > 0] = [255, 0, 0, 255]
+    bars = np.eye(3, 4)[[0, 0, 0]]
+    moment, _ = with_layers(FrameState(Options(4), bars), matte, opacities=(1.0,))
+    moment = dataclasses.replace(moment, layers=dataclasses.replace(moment.layers, shutters=(2,)))
+    renderer = Renderer(device, source, MatteValues(*SIZE))
+    picture = renderer.picture(Request(SHOWN, moment))
+    inside = matte[SHOWN] > 0
+    assert np.array_equal(renderer.holes == 1, inside)
+    assert_near(picture, source.linear()[SHOWN])
+    # Of what is not quite covered, the plate makes up what lacks.
+    half = dataclasses.replace(moment, layers=dataclasses.replace(moment.layers, opacities=(0.99,)))
+    picture = renderer.picture(Request(SHOWN, half))
+    behind = (0.01 * source.linear()[SHOWN] + (layering.CLEAR - 0.01) * source.linear()[-1]) / layering.CLEAR
+    expected = 0.99 * source.linear()[SHOWN] + 0.01 * behind
+    assert_near(picture, np.where(inside[..., None], expected, source.linear()[SHOWN]))
+
+
+def test_nothing_clear_within_reach_is_filled_smoothly(device):  # noqa: F811
+    rng = np.random.default_rng(10)
+    source = footage(rng, COUNT, SIZE)
+    source.frames[:] = [200, 100, 50, 255]
+    matte = np.zeros((COUNT, *SIZE[::-1]))
+    matte[:, 5:15, 5:20] = 1
+    source.frames[matte > 0] = [0, 0, 255, 255]
+    moment, _ = with_layers(FrameState(Options(4), np.ones((3, 4))), matte, opacities=(0.95,))
+    renderer = Renderer(device, source, MatteValues(*SIZE))
+    picture = renderer.picture(Request(SHOWN, dataclasses.replace(moment, options=Options(4, plate_reach=3))))
+    assert np.array_equal(renderer.holes == 2, matte[SHOWN] > 0)
+    around = source.linear()[0, 0, 0]
+    behind = (0.05 * source.linear()[SHOWN] + (layering.CLEAR - 0.05) * around) / layering.CLEAR
+    expected = np.where(matte[SHOWN][..., None] > 0, 0.95 * source.linear()[SHOWN] + 0.05 * behind, around)
+    assert_near(picture, expected)
+
+
+def test_a_plate_is_laid_by_the_cameras_motion(device):  # noqa: F811
+    """The camera pans by two pixels a frame; the subject stays in the picture's middle."""
+    rng = np.random.default_rng(11)
+    wide = rng.integers(0, 256, (SIZE[1], SIZE[0] + 2 * COUNT, 4), dtype=np.uint8)
+    wide[..., 3] = 255
+    source, matte = footage(rng, COUNT, SIZE), np.zeros((COUNT, *SIZE[::-1]))
+    source.frames[:] = [wide[:, 2 * k : 2 * k + SIZE[0]] for k in range(COUNT)]
+    matte[:, 8:15, 15:20] = 1
+    apart = np.arange(COUNT) - SHOWN
+    camera = Following(0, np.ones((COUNT, 1), complex), -2.0 * apart[:, None] + 0j)
+    bars = np.eye(3, 4)[[0, 0, 0]]
+    moment, _ = with_layers(FrameState(Options(4), bars), matte, opacities=(0.999,), camera=camera)
+    renderer = Renderer(device, source, MatteValues(*SIZE))
+    picture = renderer.picture(Request(SHOWN, moment))
+    assert np.array_equal(renderer.holes == 1, matte[SHOWN] > 0)
+    assert_near(picture, source.linear()[SHOWN])  # what lies behind is what the frame shows, for no subject is painted
+
+
+def test_without_room_for_sums_the_frames_are_read(device, monkeypatch):  # noqa: F811
+    monkeypatch.setattr(window, "WeightedSums", _no_room)
+    rng, matte = np.random.default_rng(12), discs()
+    source = footage(rng, COUNT, SIZE)
+    moment, _ = with_layers(state(rng, window=6), matte)
+    _, picture = drawn(device, source, moment)
+    expected, enough, covered = formula(device, source, moment, [matte])
+    assert_near(picture, expected, enough)
+    without = Renderer(device, source).picture(Request(SHOWN, plain(moment)))
+    assert np.array_equal(picture[~covered], without[~covered])
+
+
+def _no_room(*_):
+    raise window.NoDeviceError("no room")
+
+
+def test_mattes_and_frames_are_kept_within_their_budgets(monkeypatch):
+    monkeypatch.setattr(layer_mattes, "KEPT_BYTES", 0)
+    monkeypatch.setattr(layer_frames, "RECENT_BYTES", 0)
+    kept = layer_mattes.LayerMattes(SIZE, lambda state_, frame: np.zeros((2, *SIZE[::-1])), MatteValues(*SIZE))
+    moment, _ = with_layers(FrameState(Options(4), np.ones((3, 4))), discs())
+    source = layer_frames.RecentFrames(footage(np.random.default_rng(0), COUNT, SIZE))
+    for frame in range(COUNT):
+        kept.of(moment.layers, frame)
+        source.read(frame)
+    assert len(kept._kept) == 16  # what is left cannot be seen from outside
+    assert len(source._kept) == 8
