@@ -45,7 +45,7 @@ class LayeredRenderer:
         self.recent = RecentFrames(source)
         self._noted = noted(self.recent)
         size = source.width, source.height
-        self._mattes = LayerMattes(size, lambda state, frame: solve(self.recent, state, frame), mattes)
+        self.mattes = LayerMattes(size, lambda state, frame: solve(self.recent, state, frame), mattes)
         self._laying = compositor.laying()
         self._layers: Layers | None = None
         self._windows: dict[tuple, Any] = {}
@@ -123,8 +123,8 @@ class LayeredRenderer:
             if self._layers is None:
                 raise ValueError("there are no layers")
             if layer < 0:
-                return self._mattes.behind(self._layers, frame)
-            return self._mattes.of(self._layers, frame)[layer]
+                return self.mattes.behind(self._layers, frame)
+            return self.mattes.of(self._layers, frame)[layer]
 
         return weight
 
@@ -161,7 +161,7 @@ class LayeredRenderer:
             holes,
             plates.nearest_frames(request.index, near),
             lambda frame: linear(self.recent.read(frame), self._source),
-            lambda frame: self._mattes.behind(layers, frame),
+            lambda frame: self.mattes.behind(layers, frame),
             layers.camera,
         )
         picture[..., :3] *= gain()[..., None]
@@ -195,4 +195,4 @@ class LayeredRenderer:
 
     def close(self) -> None:
         """Forgets all, and closes the files of mattes."""
-        self._mattes.close()
+        self.mattes.close()

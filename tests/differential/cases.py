@@ -88,13 +88,14 @@ def make(seed: int) -> Case:
     frame = int(rng.integers(1, count + 1))
     add_motion(np.random.default_rng([seed, 1]), recipe, count)
     mattes = add_mattes(np.random.default_rng([seed, 2]), recipe, (count, height, width))
+    add_layers(np.random.default_rng([seed, 3]), recipe)
     if "time" in recipe:
         # Halfway between two source frames nobody can tell which is shown.
         last = max(count, int(recipe["time"][-1]["frame"]))
-        is_clear = {f: abs(time_at(recipe, f) % 1 - 0.5) > 1e-3 for f in range(1 - 4 * 24, last + 4 * 24 + 1)}
+        is_clear = {f: abs(time_at(recipe, f) % 1 - 0.5) > 1e-3 for f in range(1 - 5 * 24, last + 5 * 24 + 1)}
         clear = [f for f in range(1, last + 1) if is_clear[f]]
-        if follows(recipe):
-            reach = 4 * recipe["window"]
+        if follows(recipe) or "plate_reach" in recipe:
+            reach = 4 * recipe["window"] + recipe.get("plate_reach", 0)
             clear = [f for f in clear if all(is_clear[g] for g in range(f - reach, f + reach + 1))]
         frame = int(rng.choice(clear))
     uncovered = recipe["light"] == "linear"
@@ -152,6 +153,15 @@ def add_mattes(rng, recipe: dict, shape) -> dict[str, np.ndarray]:
         if rng.random() < 0.2:
             choose(rng, *recipe["shutters"]).update(follow=region["name"])
     return found
+
+
+def add_layers(rng, recipe: dict) -> None:
+    """Some regions are exposed by themselves, in two of five recipes."""
+    if rng.random() < 0.55 or not recipe["regions"]:  # there may be no region
+        return
+    for _ in range(int(choose(rng, 1, 1, 2))):
+        choose(rng, *recipe["regions"])["layer"] = True
+    recipe["plate_reach"] = int(choose(rng, 0, 1, 4))
 
 
 def random_matte(rng, number: int, shape) -> tuple[str, np.ndarray]:

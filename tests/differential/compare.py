@@ -19,10 +19,25 @@ from pathlib import Path
 import numpy as np
 from cases import Case, make, write, write_image
 from OpenImageIO import ImageBuf
-from reference import coefficients, labels_at, laid, number_at, picture, showing, shown, time_at, to_encoded
+from reference import (
+    coefficients,
+    has_strokes,
+    labels_at,
+    laid,
+    layer_mattes,
+    layers_at,
+    number_at,
+    picture,
+    showing,
+    shown,
+    solved,
+    time_at,
+    to_encoded,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
 PICTURE, COEFFICIENTS = 0.5 / 255, 1 / 255
+LAYERS = COEFFICIENTS / 0.8 + 1 / 65535  # their contrast is higher, and they are kept as 16 bits
 AMPLIFIED = 64
 
 
@@ -51,7 +66,7 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
     in the folder."""
     from shutter_addon.compute.renderer import Renderer
     from shutter_addon.compute.request import Request
-    from shutter_addon.core.pixels import following
+    from shutter_addon.core.pixels import following, layering
     from shutter_addon.core.recipes import recipe_file
     from shutter_addon.media import open_source
     from shutter_addon.media.matte_values import MatteValues
@@ -69,16 +84,42 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
         state = following.followed(
             effect, effect.at(case.frame), following.Shown(case.frame, index, direction), source, shows
         )
+        state = layering.layered(effect, state, following.Shown(case.frame, index, direction), source, shows)
         exact = exact_coefficients(case, source, footage, index)
+        layers = exact_layers(case, source, footage, index, direction)
         for name, device in devices.items():
             renderer = Renderer(device, source, MatteValues(source.width, source.height))
             asked = Request(index, state, direction)
             made, mix = renderer.picture(asked), renderer.coefficients(asked)
+            own = {frame: renderer.layer_mattes(asked, frame) for frame in layers}
             with device.current():
                 renderer.release_window()
-            right = picture(recipe, case.frame, footage, index, direction, mix)
+            right = picture(recipe, case.frame, footage, index, direction, mix, layers=own)
             found[name] = judge(case, name, folder, made, right, mix, exact)
+            for frame, values in layers.items():
+                ours, right = (np.stack(mattes, axis=-1) for mattes in (own[frame], values))
+                within(LAYERS, np.abs(ours - right), case, f"{name}-layers", folder, ours, right)
     return found
+
+
+def exact_layers(case: Case, source, footage, index: int, direction: int) -> dict:
+    """The reference's mattes of layers, by source frame, where there are any; along edges as exact_coefficients."""
+    import exact_diffusion
+
+    from shutter_addon.compute.guide import Guides, guiding
+
+    recipe = json.loads(case.recipe)
+
+    def solve(labels, count, frame, time):
+        strength = number_at(recipe.get("edge_aware", 0), time)
+        if not strength:
+            return solved(labels, count)
+        guide = Guides(source).guide(guiding(frame, 1, range(source.count)), recipe["aggregate"])
+        return exact_diffusion.solve(labels + 1, count, guide, strength)
+
+    if not layers_at(recipe, case.frame):
+        return {}
+    return layer_mattes(recipe, case.frame, footage, index, direction, case.matte_samples(), solve)
 
 
 def matte_file(folder: Path, source, region):
@@ -124,7 +165,7 @@ def check_films(cases: list[Case], folder: Path) -> tuple[dict, list[DifferenceE
             made = np.stack([made.get(name, np.ones_like(made["R"])) for name in "RGBA"], axis=-1)
             mix = np.stack([mix[shutter["name"]] for shutter in recipe["shutters"]])
             index, direction = shown(recipe, case.frame, len(footage.samples))
-            right = picture(recipe, case.frame, footage, index, direction, mix)
+            right = picture(recipe, case.frame, footage, index, direction, mix, case.matte_samples())
             try:
                 with open_source(Path(footage_path)) as source:
                     exact = exact_coefficients(case, source, footage, index)
@@ -135,8 +176,11 @@ def check_films(cases: list[Case], folder: Path) -> tuple[dict, list[DifferenceE
 
 
 def can_be_a_film(case: Case) -> bool:
-    """Blender renders no picture smaller than 4×4. And of lossy footage, what was decoded is not known here."""
-    return min(case.stored.shape[1:3]) >= 4 and not case.kind.is_lossy
+    """Blender renders no picture smaller than 4×4. And of lossy footage, what was decoded is not known here, nor the
+    mattes that were solved for: layers amplify what they may be off."""
+    recipe = json.loads(case.recipe)
+    solves = any(has_strokes(region) for region, _ in layers_at(recipe, case.frame))
+    return min(case.stored.shape[1:3]) >= 4 and not case.kind.is_lossy and not solves
 
 
 def film(case: Case, place: Path) -> list[str]:

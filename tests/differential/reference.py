@@ -17,6 +17,9 @@ What neither the paper nor the manual says is taken from the product; these are 
 - a frame that is never shown within four windows lies as the nearest of those that the window may show, the earlier of
   two; of two times that are as near, the later counts;
 - a trail's length is that of the fastest corner of what is followed; a bar has half of the ways to the frames beside;
+- almost nothing of a scribble's coefficients is nothing of a layer's matte, almost all is all of it; the sums of layers
+  are laid over one another in linear light; weighted frames are seen linearly between pixels; where no layer is in the
+  way, all is as without them;
 - mattes lie over what scribbles give, whichever comes first in the list; a ramp at rest runs from one corner of the
   picture to the opposite one; a feather is a Gaussian of a quarter of its width, of which a pixel has what it covers;
 - a premultiplied colour without cover (alpha 0) is light that is added to what lies below (as in Blender). What it is
@@ -48,10 +51,13 @@ DEFAULTS = {
     "edges": "hold",
     "aggregate": 1,
     "border": False,
+    "plate_reach": 48,
 }
 LEAST_RADIUS = 0.7072
 NOTHING = 1e-6  # less of an exposure than this is nothing
 EARLIER = 1e-3  # by so much of a frame an earlier one is preferred
+CLEAR = 1 / 16  # less than this of what lies behind layers is too little
+UNCOVERED = 1 - 2e-5  # where more of it is seen, no layer is in the way
 ROUNDING = 1e-5  # in float32, of weights and times
 HALVINGS = 44  # of the bisection: what is left is far below what float32 holds
 
@@ -188,6 +194,14 @@ def at_equal_lengths(stroke, count):
 
 def labels_at(recipe, frame, width, height):
     """Labels (h, w) of the pixels, or of the blocks that share a shutter: −1 free, otherwise the shutter's number."""
+    names = [shutter["name"] for shutter in recipe["shutters"]]
+    regions = [region for region in recipe.get("regions", []) if has_strokes(region) and not region.get("layer")]
+    drawn = [(region, strokes_at(region, frame, width / height), names.index(region["shutter"])) for region in regions]
+    return painted(recipe, drawn, width, height)
+
+
+def painted(recipe, drawn, width, height):
+    """As labels_at, of regions with their strokes and numbers."""
     block = option(recipe, "aggregate")
     w, h = -(-width // block), -(-height // block)
     # A centre as a fraction of the grid's height and width, whose pixels need not be square.
@@ -197,10 +211,9 @@ def labels_at(recipe, frame, width, height):
         inner = np.zeros((h, w), bool)
         inner[1:-1, 1:-1] = True
         labels[~inner] = 0
-    names = [shutter["name"] for shutter in recipe["shutters"]]
-    for region in filter(has_strokes, recipe.get("regions", [])):
-        lines, own = region.get("kind", "line") == "line", names.index(region["shutter"])
-        for stroke in strokes_at(region, frame, width / height):
+    for region, strokes, own in drawn:
+        lines = region.get("kind", "line") == "line"
+        for stroke in strokes:
             points = stroke.real * (height / width) * w + 1j * stroke.imag * h
             centres = x * w + 1j * y * h
             radius = region.get("width", 0.02) * h / 2 if lines else 0
@@ -223,22 +236,10 @@ def laid(recipe, frame, index, mix, footage, mattes):
     """Coefficients (N, h, w) with the mattes of a recipe laid over them, at a timeline frame that shows the source
     frame `index`. mattes: {path: samples (count, H, W, 4), 0 … 1}"""
     result, names = mix.astype(float), [shutter["name"] for shutter in recipe["shutters"]]
-    _, height, width, _ = footage.samples.shape
     for region in recipe["regions"]:
-        if has_strokes(region):
+        if has_strokes(region) or region.get("layer"):
             continue
-        if region["kind"] == "ramp" and region["ramp"] != "luminance":
-            value = ramp(region, frame, width, height)
-        elif region["kind"] == "ramp":
-            value = channel_of(footage.samples[index], "luminance")
-        else:
-            shown_frames, first = mattes[region["path"]], region.get("offset", 0)
-            place = first + (frame - 1 if region.get("timing") == "timeline" else index)
-            value = channel_of(
-                shown_frames[min(max(place, 0), len(shown_frames) - 1)], region.get("channel", "luminance")
-            )
-        value = softened(value, number_at(region.get("width", 0), frame) * height / 4)
-        value = block_means(1 - value if region.get("invert") else value, option(recipe, "aggregate"))
+        value = block_means(values_of(region, frame, index, footage, mattes), option(recipe, "aggregate"))
         value = value * number_at(region.get("opacity", 1), frame)
         own = np.zeros((len(names), 1, 1))
         own[names.index(region["shutter"])] = 1
@@ -249,6 +250,21 @@ def laid(recipe, frame, index, mix, footage, mattes):
         else:
             result = (1 - value) * result + value * own
     return result
+
+
+def values_of(region, frame, index, footage, mattes):
+    """The values (H, W) of a matte or a ramp, without its opacity; arguments as for `laid`."""
+    _, height, width, _ = footage.samples.shape
+    if region["kind"] == "ramp" and region["ramp"] != "luminance":
+        value = ramp(region, frame, width, height)
+    elif region["kind"] == "ramp":
+        value = channel_of(footage.samples[index], "luminance")
+    else:
+        shown_frames, first = mattes[region["path"]], region.get("offset", 0)
+        place = first + (frame - 1 if region.get("timing") == "timeline" else index)
+        value = channel_of(shown_frames[min(max(place, 0), len(shown_frames) - 1)], region.get("channel", "luminance"))
+    value = softened(value, number_at(region.get("width", 0), frame) * height / 4)
+    return 1 - value if region.get("invert") else value
 
 
 def channel_of(samples, channel):
@@ -310,8 +326,12 @@ def enclosed(places, points):
 
 def coefficients(recipe, frame, width, height):
     """The exact coefficients at a frame, for a picture of that size: scribbles are fixed, edges are free."""
-    labels = labels_at(recipe, frame, width, height)
-    count = len(recipe["shutters"])
+    return solved(labels_at(recipe, frame, width, height), len(recipe["shutters"]))
+
+
+def solved(labels, count):
+    """The coefficients (N, h, w) of labels (h, w)."""
+    labels = labels.copy()
     if (labels < 0).all():
         labels[:] = 0
     values = (labels.ravel() == np.arange(count)[:, None]).astype(float)
@@ -320,8 +340,7 @@ def coefficients(recipe, frame, width, height):
         h, w = labels.shape
         equations = (kron(eye_array(h), differences(w)) + kron(differences(h), eye_array(w))).tocsr()[free]
         right = -(equations[:, ~free] @ values[:, ~free].T)
-        solved = spsolve(equations[:, free].tocsc(), right)
-        values[:, free] = solved.reshape(-1, count).T
+        values[:, free] = spsolve(equations[:, free].tocsc(), right).reshape(-1, count).T
     return values.reshape(count, *labels.shape)
 
 
@@ -368,10 +387,11 @@ def showing(recipe, frame, index, direction, count):
     return lambda other: min(max(index + direction * int(other - frame), 0), count - 1)
 
 
-def shown_times(recipe, frame, index, direction, count):
-    """When the source frames that a window may show are shown, the nearest time to a timeline frame: {source: time}."""
-    where, reach = positions(recipe, index, direction), 4 * recipe["window"]
-    beyond = recipe["window"] if option(recipe, "edges") == "mirror" else 0
+def shown_times(recipe, frame, index, direction, count, more=0):
+    """When the source frames that a window may show, and `more` beside it, are shown, the nearest time to a timeline
+    frame: {source: time}."""
+    where, reach = positions(recipe, index, direction), 4 * recipe["window"] + more
+    beyond = more + (recipe["window"] if option(recipe, "edges") == "mirror" else 0)
     wanted = range(max(min(*where, index) - beyond, 0), min(max(*where, index) + beyond, count - 1) + 1)
     shows, found = showing(recipe, frame, index, direction, count), [(0.0, 0.0, index)]
     for start in range(frame - reach, frame + reach):
@@ -565,12 +585,83 @@ def summed(footage, index, light):
     return np.concatenate([colour * cover, alpha], axis=-1)
 
 
-def picture(recipe, frame, footage, index, direction, given=None, mattes=None):
-    """The picture at a timeline frame that shows the source frame `index`, as a Result. given: coefficients to compose
-    with, in place of the exact ones; mattes: as for `laid`."""
+def layers_at(recipe, frame):
+    """The regions that are layers, and their opacities."""
+    opacities = [(region, number_at(region.get("opacity", 1), frame)) for region in recipe.get("regions", [])]
+    return [(region, opacity) for region, opacity in opacities if region.get("layer") and opacity > 0]
+
+
+def layer_mattes(recipe, frame, footage, index, direction, mattes, solve=None):
+    """The mattes (H, W) of all layers in each source frame that the window shows: {source: list}.
+
+    mattes: as for `laid`
+    solve: gives the coefficients of labels, their number and of a source frame at a time; None: the exact ones."""
     count, height, width, _ = footage.samples.shape
+    layers, block = layers_at(recipe, frame), option(recipe, "aggregate")
+    times = shown_times(recipe, frame, index, direction, count, option(recipe, "plate_reach"))
+    frames = {at_edges(option(recipe, "edges"), place, count) for place in positions(recipe, index, direction)}
+    others = [region for region in recipe["regions"] if has_strokes(region) and region not in [r for r, _ in layers]]
+
+    def of(source):
+        low = int(np.floor(times[source]))
+        share = times[source] - low
+        near, values = low + (1 if share > 0.5 else 0), []
+        drawn = [(region, 0) for region in others if number_at(region.get("opacity", 1), low) > 0]
+        drawn += [(region, 1 + i) for i, (region, _) in enumerate(layers) if has_strokes(region)]
+        strokes = [(region, strokes_between(region, low, share, width / height), own) for region, own in drawn]
+        labels = painted(recipe, strokes, width, height)
+        mix = (solve or (lambda *given: solved(*given[:2])))(labels, 1 + len(layers), source, near)
+        for i, (region, opacity) in enumerate(layers):
+            if has_strokes(region):
+                own = mix[1 + i].repeat(block, 0).repeat(block, 1)[:height, :width]
+                values.append(opacity * np.clip((own - 0.1) / 0.8, 0, 1))
+            else:
+                values.append(opacity * values_of(region, near, source, footage, mattes))
+        return values
+
+    return {source: of(source) for source in frames if source is not None}
+
+
+def strokes_between(region, frame, share, aspect):
+    """A region's strokes at a time between two timeline frames."""
+    before = strokes_at(region, frame, aspect)
+    if not share:
+        return before
+    after = strokes_at(region, frame + 1, aspect)
+    return [moved(stroke, after[i], share) if i < len(after) else stroke for i, stroke in enumerate(before)]
+
+
+def picture(recipe, frame, footage, index, direction, given=None, mattes=None, layers=None):
+    """The picture at a timeline frame that shows the source frame `index`, as a Result. given: coefficients to compose
+    with, in place of the exact ones; mattes: as for `laid`; layers: as of layer_mattes, in place of the exact ones.
+
+    Where too little of what lies behind layers is seen, it is doubtful: something else takes its place."""
+    _, height, width, _ = footage.samples.shape
     if given is None:
         given = laid(recipe, frame, index, coefficients(recipe, frame, width, height), footage, mattes)
+    asked = recipe, frame, footage, index, direction
+    plain, own = exposed(*asked, given), layers_at(recipe, frame)
+    if not own:
+        return Result(plain[0], plain[2])
+    layers = layers or layer_mattes(*asked, mattes)
+    clear = {source: np.prod([1 - value for value in values], axis=0) for source, values in layers.items()}
+    sums, share, doubtful = exposed(*asked, given, clear)
+    result = np.where((share > UNCOVERED)[..., None], plain[0], sums / np.maximum(share, 1e-9)[..., None])
+    doubtful = doubtful | plain[2] | (share < CLEAR + ROUNDING) | (np.abs(share - UNCOVERED) < ROUNDING)
+    names = [shutter["name"] for shutter in recipe["shutters"]]
+    for i, (region, _) in enumerate(own):
+        alone = np.zeros_like(given)
+        alone[names.index(region["shutter"])] = 1
+        colour, cover, unsure = exposed(*asked, alone, {source: values[i] for source, values in layers.items()})
+        result = colour + (1 - cover[..., None]) * result
+        doubtful = doubtful | unsure
+    return Result(result, doubtful)
+
+
+def exposed(recipe, frame, footage, index, direction, given, weights=None):
+    """What coefficients expose (H, W, 4), with frames weighted by weights {source: (H, W)}; the share (H, W) of the
+    exposure that these leave; and where it is doubtful."""
+    count, height, width, _ = footage.samples.shape
     mix = np.asarray(given, float)
     mix = mix / mix.sum(axis=0)
     blocks, aspect = mix.shape[1:], width / height
@@ -609,19 +700,23 @@ def picture(recipe, frame, footage, index, direction, given=None, mattes=None):
             return moves[0, i, k] * own + moves[1, i, k]
         return sum(of_pixels(c) * (turn * own + shift) for c, turn, shift in zip(mix, *moves[:, :, k], strict=True))
 
-    total = np.zeros((height, width, 4))
+    total, left = np.zeros((height, width, 4)), np.zeros((height, width))
     for k, seen in enumerate(frames):
         if seen is None:
             continue
         light = summed(footage, seen, option(recipe, "light"))
-        for i, weights in enumerate(parts):
-            if weights[k].any():
-                there = light if moves is None else sampled(light, place(i, k), footage.alpha == "opaque")
-                total += of_pixels(weights[k])[..., None] * there
+        weight = np.ones((height, width)) if weights is None else weights[seen]
+        light, sharp = light * weight[..., None], footage.alpha == "opaque" and weights is None
+        for i, own_weights in enumerate(parts):
+            if own_weights[k].any():
+                both = np.concatenate([light, weight[..., None]], axis=-1)
+                there = both if moves is None else sampled(both, place(i, k), sharp)
+                total += of_pixels(own_weights[k])[..., None] * there[..., :4]
+                left += of_pixels(own_weights[k]) * there[..., 4]
     colour, alpha = total[..., :3], total[..., 3:]
     if option(recipe, "light") == "encoded":
         colour = to_linear(colour / covering(alpha)) * covering(alpha)
-    return Result(np.concatenate([colour * of_pixels(gain)[..., None], alpha], axis=-1), of_pixels(doubtful))
+    return np.concatenate([colour * of_pixels(gain)[..., None], alpha], axis=-1), left, of_pixels(doubtful)
 
 
 def shortened(parts, frames, mix):
