@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..core.frames.frame_source import FrameSource
 from ..devices.budget import Budget
 from ..devices.device import Device, Holder, NoDeviceError
 from ..devices.paging import TEXEL_BYTES
 from . import cpu_window
+from .layer_frames import WeightedFrames
 from .window import beside, open_window
 
 
@@ -49,18 +50,42 @@ class _CountingDevice:
     forget = use
 
 
-def of_window(device: Device, source: FrameSource, capacity: int, moved: bool, shutters: int) -> Needs:
-    """What a window on a GPU needs, with all that is made beside it; arguments like those of open_window.
+def of_window(device: Device, source: FrameSource, capacity: int, moved: bool, shutters: int, layers: int = 0) -> Needs:
+    """What a window on a GPU needs, with all that is made beside it; arguments like those of open_window. layers: those
+    of the picture, of which each has a window, as has what lies behind them.
 
     NoDeviceError: not even a picture has room on the device."""
     counting = _CountingDevice(device)
-    window = open_window(counting, source, capacity, moved, shutters)  # type: ignore[arg-type]  # it makes textures alone
+    windows = [
+        open_window(counting, frames, capacity, moved, shutters)  # type: ignore[arg-type]  # it makes textures alone
+        for frames in _read(source, layers)
+    ]
     gpu = min(counting.budget.used + beside(source, shutters), counting.budget.limit)
-    return Needs(gpu, capacity * frame_bytes(source) if window.sends else 0, window.sends)
+    host = sum(capacity * frame_bytes(window.source) for window in windows if window.sends)
+    return Needs(gpu, host, any(window.sends for window in windows))
 
 
-def of_numpy_window(source: FrameSource, capacity: int, moved: bool) -> Needs:
-    """What a window needs with NumPy."""
+def _read(source: FrameSource, layers: int) -> list[FrameSource]:
+    """What the windows of a picture read."""
+    if not layers:
+        return [source]
+    weighted: list[Any] = [
+        WeightedFrames(source, _no_weight, rest=i < 0, alone=alone)
+        for i in range(-1, layers)
+        for alone in ((False,) if source.alpha == "opaque" else (False, True))
+    ]
+    return weighted if weighted[0].is_summable else [source, *weighted]
+
+
+def _no_weight(_frame: int) -> Any:
+    raise NotImplementedError("nothing is read")
+
+
+def of_numpy_window(source: FrameSource, capacity: int, moved: bool, layers: int = 0) -> Needs:
+    """What a window needs with NumPy; layers: as for of_window."""
+    if layers:
+        frames = {id(read): read for read in (source, *_read(source, layers))}
+        return Needs(0, sum(capacity * frame_bytes(read) for read in frames.values()), False)
     if cpu_window.TiledSums.fit(source, capacity) and not moved:
         return Needs(0, 12 * source.width * source.height * (capacity + 1), False)
     return Needs(0, capacity * frame_bytes(source), False)

@@ -336,4 +336,4 @@ def test_mattes_and_frames_are_kept_within_their_budgets(monkeypatch):
         kept.of(moment.layers, frame)
         source.read(frame)
     assert len(kept._kept) == 16  # what is left cannot be seen from outside
-    assert len(source._kept) == 8
+    assert len(source._kept) == 8  # likewise

@@ -8,6 +8,7 @@ import pytest
 
 from shutter_addon.compute import memory_needs
 from shutter_addon.compute.cpu import CPUCompositor
+from shutter_addon.compute.layer_frames import WeightedFrames
 from shutter_addon.compute.renderer import open_gl
 from shutter_addon.compute.window import beside, open_window
 from shutter_addon.core.model.frame_state import Options
@@ -41,6 +42,24 @@ def test_on_a_gpu(device, dtype, alpha, moved):
         window.release()
     needs = memory_needs.of_window(device, source(dtype, alpha), WINDOW, moved, SHUTTERS)
     assert needs == (taken + beside(source(dtype, alpha), SHUTTERS), 0, False)
+
+
+@pytest.mark.parametrize(("dtype", "alpha"), [(np.uint8, "opaque"), (np.uint16, "straight")])
+def test_of_layers_on_a_gpu(dtype, alpha):
+    """A window for each and for what lies behind; of colours with an alpha, their shares have some of their own, and
+    without running sums the picture without layers is composed as well."""
+    pictures = source(dtype, alpha)
+    weighted = [WeightedFrames(pictures, None, rest=rest) for rest in (True, False, False)]
+    if alpha != "opaque":
+        weighted += [WeightedFrames(pictures, None, alone=True) for _ in range(3)] + [pictures]
+    with open_gl(Budget(1 << 30)).current() as roomy:
+        windows = [open_window(roomy, frames, WINDOW, False, SHUTTERS) for frames in weighted]
+        taken = roomy.budget.used
+        for window in windows:
+            window.release()
+    needs = memory_needs.of_window(roomy, pictures, WINDOW, False, SHUTTERS, 2)
+    roomy.release()
+    assert needs == (taken + beside(pictures, SHUTTERS), 0, False)
 
 
 def test_without_room_the_frames_stay_on_the_host(device):

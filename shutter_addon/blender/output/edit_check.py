@@ -227,19 +227,20 @@ def _notes(check: EffectCheck, requests: dict[float, Request]) -> list[str]:
 def _needs(source, requests: dict[float, Request], compositor) -> memory_needs.Needs:
     """The most that one of the windows needs, decoded frames included."""
     device, most = getattr(compositor, "device", None), memory_needs.Needs(0, 0, False)
-    for window, moved, shutters in {_kind(request.state) for request in requests.values()}:
+    for window, moved, shutters, layers in {_kind(request.state) for request in requests.values()}:
         if device is None:
-            needs = memory_needs.of_numpy_window(source, window, moved)
+            needs = memory_needs.of_numpy_window(source, window, moved, layers)
         else:
-            needs = memory_needs.of_window(device, source, window, moved, shutters)
+            needs = memory_needs.of_window(device, source, window, moved, shutters, layers)
         most = max(most, needs)
     window = max(request.state.options.window for request in requests.values())
     return most._replace(host=most.host + decoding_ahead.decoded_bytes(source, window))
 
 
-def _kind(state: FrameState) -> tuple[int, bool, int]:
-    """Frames of a window, whether exposures of it follow something, and the number of shutters."""
-    return state.options.window, state.following is not None, len(state.bars)
+def _kind(state: FrameState) -> tuple[int, bool, int, int]:
+    """Frames of a window, whether exposures of it follow something, and the numbers of shutters and of layers."""
+    layers = len(state.layers.shutters) if state.layers else 0
+    return state.options.window, state.following is not None, len(state.bars), layers
 
 
 def left_out(scene, frames: range) -> list[str]:
