@@ -50,6 +50,21 @@ class RecentFrames:
         self._kept.clear()
 
 
+class SeparatedFrames:
+    """An opaque source whose mixed pixels have the colours of a layer, or of what lies behind it.
+
+    source: what is read; frame: gives a frame (H, W, 4) of these, in the source's samples"""
+
+    def __init__(self, source: Any, frame: Callable[[int], np.ndarray]):
+        self.base, self.read = source, frame
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.base, name)
+
+    def decoded(self, index: int) -> np.ndarray:
+        return self.read(index)
+
+
 class WeightedFrames:
     """A FrameSource of frames that are premultiplied by weights, in linear light.
 
@@ -96,3 +111,14 @@ def linear(frame: np.ndarray, source: Any) -> np.ndarray:
     if source.alpha == "premultiplied":
         return light.linearised(frame) if source.transfer == "srgb" else frame
     return light.premultiplied(frame, light.to_linear if source.transfer == "srgb" else None)
+
+
+def with_colors(frame: np.ndarray, colors: np.ndarray, where: np.ndarray, source: Any) -> np.ndarray:
+    """An opaque source's frame (H, W, 4) with other colours (H, W, 3), in linear light, where (H, W) bool."""
+    result, own = frame.copy(), colors[where]
+    own = light.to_encoded(own) if source.transfer == "srgb" else own
+    if frame.dtype.kind == "u":
+        most = np.iinfo(frame.dtype).max
+        own = np.rint(own.clip(0, 1) * most)
+    result[where, :3] = own.astype(frame.dtype)
+    return result

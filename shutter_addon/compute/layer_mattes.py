@@ -8,7 +8,7 @@ from collections.abc import Callable, Hashable
 import numpy as np
 
 from ..core.model.frame_state import FrameState, Layers
-from ..core.model.mattes import FileFrame, Matte, MatteReader
+from ..core.model.mattes import FileFrame, Matte, MatteReader, Ramp
 from ..core.pixels import layering
 
 # Bytes of mattes that are kept, at most, beyond those of the window.
@@ -35,14 +35,30 @@ class LayerMattes:
 
     def of(self, layers: Layers, frame: int) -> list[np.ndarray]:
         """The mattes (H, W) float32, 0 to 1, of all layers in a source frame, with their opacities."""
-        place = min(max(frame - layers.first, 0), len(layers.mattes) - 1)
+        whole = self._whole(layers, frame)
+        return [values * np.float32(opacity) for values, opacity in zip(whole, layers.opacities, strict=True)]
+
+    def edges(self, layers: Layers, frame: int) -> list[np.ndarray]:
+        """The mattes that say which pixels hold some of a subject and some of what lies behind it: without opacities,
+        and nothing of ramps, which are no pictures of a subject."""
+        whole, shown = self._whole(layers, frame), layers.mattes[self._place(layers, frame)]
+        ramps = [matte is not None and isinstance(matte.content, Ramp) for matte in shown]
+        return [np.zeros_like(values) if is_ramp else values for values, is_ramp in zip(whole, ramps, strict=True)]
+
+    @staticmethod
+    def _place(layers: Layers, frame: int) -> int:
+        return min(max(frame - layers.first, 0), len(layers.mattes) - 1)
+
+    def _whole(self, layers: Layers, frame: int) -> list[np.ndarray]:
+        """The mattes without their opacities."""
+        place = self._place(layers, frame)
         drawn, values = layers.scribbles[place], []
         for i, matte in enumerate(layers.mattes[place]):
             if matte is not None:
                 value = self._read(matte, frame)
             elif drawn is not None:
                 value = self._drawn(drawn, frame, i)
-            values.append(value.astype(np.float32) * np.float32(layers.opacities[i] / _WHOLE))
+            values.append(value.astype(np.float32) / np.float32(_WHOLE))
         return values
 
     def behind(self, layers: Layers, frame: int) -> np.ndarray:

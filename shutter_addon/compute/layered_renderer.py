@@ -10,18 +10,20 @@ from typing import Any
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
+from ..core.frames.planes import Planes, as_rgba
 from ..core.model.frame_state import FrameState, Layers
 from ..core.model.mattes import MatteReader
 from ..core.pixels import compositor as reference
 from ..core.pixels import layering
+from ..core.pixels.decontamination import separated
 from . import plates
-from .layer_frames import RecentFrames, WeightedFrames, linear
+from .layer_frames import RecentFrames, SeparatedFrames, WeightedFrames, linear, with_colors
 from .layer_mattes import LayerMattes
 from .laying import Behind, Exposure
 from .request import Coefficients, Request
 
-# Frames that every window loads before any goes on: no more than RecentFrames keeps.
-_TOGETHER = 8
+# Frames that every window loads before any goes on: no more than RecentFrames keeps, nor are separated at a time.
+_TOGETHER = 4
 
 
 class LayeredRenderer:
@@ -50,6 +52,7 @@ class LayeredRenderer:
         self._layers: Layers | None = None
         self._windows: dict[tuple, Any] = {}
         self._loaded: dict[int, tuple] = {}  # by source frame in the windows: Layers.key_at
+        self._separations: dict[int, dict] = {}
         self.kinds: np.ndarray | None = None
 
     @property
@@ -109,14 +112,41 @@ class LayeredRenderer:
 
     def _window(self, name: tuple[int, bool], part: Request, shutters: int) -> Any:
         (layer, alone), moved = name, part.state.following is not None
-        key = layer, alone, moved, part.state.options.window
+        key = layer, alone, moved, part.state.options.window, part.state.options.decontaminate
         window = self._windows.get(key)
         if window is None or not window.is_open:
             for other in [other for other in self._windows if other[:2] == name]:
                 self._windows.pop(other).release()
-            weighted = WeightedFrames(self._noted, self._weight(layer), rest=layer < 0, alone=alone)
+            weighted = WeightedFrames(self._colors(layer, part), self._weight(layer), rest=layer < 0, alone=alone)
             window = self._windows[key] = self._compositor.window(weighted, part.state.options.window, moved, shutters)
         return window
+
+    def _colors(self, layer: int, part: Request) -> Any:
+        """The source whose frames are weighted: as it is, or with a layer's own colours, or those behind all."""
+        if not part.state.options.decontaminate or self._source.alpha != "opaque":
+            return self._noted
+        return SeparatedFrames(self._noted, lambda frame: self._separated(frame, layer)[layer < 0])
+
+    def _separated(self, frame: int, layer: int) -> tuple[np.ndarray, np.ndarray]:
+        """A frame with a layer's own colours, and with those behind it; −1: behind all layers."""
+        if self._layers is None:
+            raise ValueError("there are no layers")
+        number = 0 if len(self._layers.shutters) == 1 else layer  # behind it is behind all
+        memo = self._separations.setdefault(frame % _TOGETHER, {})
+        key = self._layers.key_at(frame), frame, number
+        if key not in memo:
+            memo.clear()
+            mattes = self.mattes.edges(self._layers, frame)
+            matte = 1 - layering.behind(mattes) if number < 0 else mattes[number]
+            memo[key] = self._separate(frame, matte)
+        return memo[key]
+
+    def _separate(self, frame: int, matte: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        read = self._noted.decoded(frame)
+        picture = as_rgba(read) if isinstance(read, Planes) else read
+        colors, mixed = linear(picture, self._source)[..., :3], (matte > 0) & (matte < 1)
+        own, behind = (with_colors(picture, c, mixed, self._source) for c in separated(colors, matte))
+        return own, behind
 
     def _weight(self, layer: int) -> Callable[[int], np.ndarray]:
         def weight(frame: int) -> np.ndarray:
@@ -132,7 +162,7 @@ class LayeredRenderer:
         """Loads all windows. Where many frames lack, they are loaded a few at a time: each is read once for all."""
         options, ordered = request.state.options, np.sort(positions)
         lacking = set(reference.source_frames(options, ordered, shot).tolist()).difference(self.held)
-        step = len(ordered) if len(lacking) <= self.recent.most else _TOGETHER
+        step = _TOGETHER if len(lacking) > 1 else len(ordered)
         for end in range(step, len(ordered) + step, step):
             for window in windows.values():
                 window.load(ordered[:end], options, shot)
@@ -192,6 +222,7 @@ class LayeredRenderer:
         self.release_windows()
         self._laying.release()
         self.recent.clear()
+        self._separations.clear()
 
     def close(self) -> None:
         """Forgets all, and closes the files of mattes."""

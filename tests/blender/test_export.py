@@ -82,6 +82,7 @@ def valid_recipes(draw, longest=6):
         draw(st.booleans()),
         draw(numbers(0, 1) | value_keys(0, 1)),
         draw(st.integers(0, 500)),
+        draw(st.booleans()),
         draw(st.sampled_from([1, 2, 4, 8, 16])),
         draw(st.sampled_from(["quick", "good"])),
         draw(st.just([]) | value_keys(-10, 10000)),

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from test_composition import LEVEL, device, footage, state  # noqa: F401 – a fixture
+from test_composition import LEVEL, Footage, device, footage, state  # noqa: F401 – a fixture
 
 from shutter_addon.compute import layer_frames, layer_mattes, window
 from shutter_addon.compute.renderer import Renderer
@@ -14,6 +14,7 @@ from shutter_addon.core.model.frame_state import Following, FrameState, Layers, 
 from shutter_addon.core.model.mattes import FileFrame, Matte
 from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.core.pixels import compositor, layering
+from shutter_addon.core.pixels.decontamination import separated
 from shutter_addon.media.matte_values import MatteValues
 
 SIZE, COUNT, SHOWN = (37, 23), 20, 9
@@ -46,6 +47,11 @@ def discs(speed=1.5, radius=5.0, soft=3.0, top=0.5):
     return np.rint(values * 65535) / 65535
 
 
+def drawn_state(rng, **options):
+    """Without decontamination, which is an estimate: what is left is a formula."""
+    return state(rng, **{"decontaminate": False} | options)
+
+
 def with_layers(moment, *mattes, opacities=None, camera=None):
     """A state with a layer of shutters 2, 0 … for each of the mattes, and their files."""
     files = [Values(each) for each in mattes]
@@ -71,24 +77,28 @@ def plain(moment):
     return dataclasses.replace(moment, layers=None)
 
 
-def formula(device, source, moment, mattes, index=SHOWN, direction=1):  # noqa: F811
-    """The picture by the formula, frame after frame, and where what lies behind is seen enough, and at all covered."""
+def formula(device, sources, moment, mattes, index=SHOWN, direction=1):  # noqa: F811
+    """The picture by the formula, frame after frame, and where what lies behind is seen enough, and at all covered.
+
+    sources: the source, or one for what lies behind and for each layer"""
+    sources = sources if isinstance(sources, list) else [sources] * (1 + len(mattes))
+    source = sources[0]
     c = Renderer(device, source).coefficients(Request(index, plain(moment), direction))
     block = moment.options.aggregate
     c = c.repeat(block, 1).repeat(block, 2)[:, : source.height, : source.width].astype(np.float64)
     c /= c.sum(axis=0)
     indices = compositor.window_indices(moment.options, index, range(source.count), direction)
     there = indices >= 0
-    frames, encoded = source.linear(), moment.options.light == "encoded"
+    parts, encoded = [each.linear() for each in sources], moment.options.light == "encoded"
     if encoded:
-        frames = light.premultiplied(light.straight(frames), light.to_encoded)
+        parts = [light.premultiplied(light.straight(frames), light.to_encoded) for frames in parts]
     normalised = moment.bars / moment.bars.sum(axis=1, keepdims=True)
     q = compositor.mixed_shutter(dataclasses.replace(moment, bars=normalised), np.moveaxis(c, 0, -1)) * there
     q /= q.sum(axis=-1, keepdims=True)
     opacities = moment.layers.opacities
     m = np.stack([opacity * matte[np.maximum(indices, 0)] for opacity, matte in zip(opacities, mattes, strict=True)])
 
-    def total(weights, of=frames):
+    def total(weights, of):
         return np.einsum("khw,khwc->hwc", weights, of[np.maximum(indices, 0)])
 
     def linear(part):
@@ -97,12 +107,14 @@ def formula(device, source, moment, mattes, index=SHOWN, direction=1):  # noqa: 
     seen = np.moveaxis(q, -1, 0) * (1 - m).prod(axis=0)
     gain = np.einsum("n,nhw->hw", moment.gains, c)[..., None] ** [1, 1, 1, 0]
     # Mean first: of encoded light only that has a linear one.
-    picture = gain * linear(total(seen / np.maximum(seen.sum(axis=0), 1e-9)))
-    for shutter, matte in zip(moment.layers.shutters, m, strict=True):
+    picture = gain * linear(total(seen / np.maximum(seen.sum(axis=0), 1e-9), parts[0]))
+    for shutter, matte, frames in zip(moment.layers.shutters, m, parts[1:], strict=True):
         s = normalised[shutter] * there
         weights = (s / s.sum())[:, None, None] * matte
         cover = weights.sum(axis=0)
-        of_layer = linear(total(weights / np.maximum(cover, 1e-9))) * (moment.gains[shutter] ** np.array([1, 1, 1, 0]))
+        of_layer = linear(total(weights / np.maximum(cover, 1e-9), frames)) * (
+            moment.gains[shutter] ** np.array([1, 1, 1, 0])
+        )
         picture = cover[..., None] * of_layer + (1 - cover[..., None]) * picture
     return picture, seen.sum(axis=0) >= layering.CLEAR, (m[:, there] > 0).any(axis=(0, 1))
 
@@ -130,7 +142,7 @@ def assert_near(picture, expected, where=...):
 def test_the_formula(device, options, direction, count):  # noqa: F811
     rng, mattes = np.random.default_rng(1), [discs(), discs(-1.0, top=0.3) * 0.9][:count]
     source = footage(rng, COUNT, SIZE)
-    moment, _ = with_layers(state(rng, **{"window": 6} | options), *mattes, opacities=(1.0, 0.7)[:count])
+    moment, _ = with_layers(drawn_state(rng, **{"window": 6} | options), *mattes, opacities=(1.0, 0.7)[:count])
     _, picture = drawn(device, source, moment, direction=direction)
     expected, enough, covered = formula(device, source, moment, mattes, direction=direction)
     assert_near(picture, expected, enough)
@@ -154,7 +166,7 @@ def test_the_formula(device, options, direction, count):  # noqa: F811
 def test_alpha_and_bright_light(device, kind, light_):  # noqa: F811
     rng, mattes = np.random.default_rng(2), [discs(), discs(-1.0, top=0.3)]
     source = footage(rng, COUNT, SIZE, **kind)
-    moment, _ = with_layers(state(rng, window=6, light=light_), *mattes)
+    moment, _ = with_layers(drawn_state(rng, window=6, light=light_), *mattes)
     _, picture = drawn(device, source, moment)
     expected, enough, covered = formula(device, source, moment, mattes)
     assert_near(picture, expected, enough)
@@ -170,7 +182,7 @@ def test_layers_and_what_lies_behind_follow(device, alpha, interpolation):  # no
     source, apart = footage(rng, COUNT, SIZE, alpha=alpha), np.arange(COUNT) - SHOWN
     turns = np.exp(0.01j * apart)[:, None] ** [1, 0, 1]
     following = Following(0, turns, (apart * (0.6 + 0.2j))[:, None] * [1, 0, 1])
-    moment, _ = with_layers(state(rng, window=6, interpolation=interpolation), *mattes)
+    moment, _ = with_layers(drawn_state(rng, window=6, interpolation=interpolation), *mattes)
     moment = dataclasses.replace(moment, following=following)
     renderer, picture = drawn(device, source, moment)
     indices = compositor.window_indices(moment.options, SHOWN, range(COUNT))
@@ -189,7 +201,7 @@ def test_layers_and_what_lies_behind_follow(device, alpha, interpolation):  # no
 def test_levels_are_those_of_the_picture(device):  # noqa: F811
     rng = np.random.default_rng(4)
     source = footage(rng, COUNT, SIZE)
-    moment, _ = with_layers(state(rng, window=6), discs())
+    moment, _ = with_layers(drawn_state(rng, window=6), discs())
     _, picture = drawn(device, source, moment)
     _, levels = drawn(device, source, moment, levels=True)
     expected = light.to_encoded(picture[..., :3].astype(np.float64)) * 255
@@ -200,7 +212,7 @@ def test_levels_are_those_of_the_picture(device):  # noqa: F811
 def test_running_sums_do_not_depend_on_where_the_window_was(device):  # noqa: F811
     rng = np.random.default_rng(5)
     source = footage(rng, COUNT, SIZE)
-    moment, _ = with_layers(state(rng, window=6), discs())
+    moment, _ = with_layers(drawn_state(rng, window=6), discs())
     renderer = Renderer(device, source, MatteValues(*SIZE))
     passed = [renderer.picture(Request(index, moment)) for index in (3, 4, 5, 9, 8)]
     for index, picture in zip((3, 4, 5, 9, 8), passed, strict=True):
@@ -210,7 +222,7 @@ def test_running_sums_do_not_depend_on_where_the_window_was(device):  # noqa: F8
 def test_a_played_frame_costs_one_new_matte_and_a_scrub_back_none(device):  # noqa: F811
     rng = np.random.default_rng(6)
     source = footage(rng, COUNT, SIZE)
-    moment, (file,) = with_layers(state(rng, window=6, plate_reach=0), discs())
+    moment, (file,) = with_layers(drawn_state(rng, window=6, plate_reach=0), discs())
     renderer = Renderer(device, source, MatteValues(*SIZE))
     renderer.picture(Request(4, moment))
     assert sorted(file.reads) == [4, 5, 6, 7, 8, 9]
@@ -224,7 +236,7 @@ def test_a_played_frame_costs_one_new_matte_and_a_scrub_back_none(device):  # no
 
 def test_other_mattes_are_loaded_anew(device):  # noqa: F811
     rng = np.random.default_rng(7)
-    source, base = footage(rng, COUNT, SIZE), state(rng, window=6)
+    source, base = footage(rng, COUNT, SIZE), drawn_state(rng, window=6)
     first, other = (with_layers(base, discs(top=top))[0] for top in (0.5, 0.8))
     renderer = Renderer(device, source, MatteValues(*SIZE))
     for moment in (first, other, plain(first), first):
@@ -235,7 +247,7 @@ def test_other_mattes_are_loaded_anew(device):  # noqa: F811
 def test_of_strokes_the_matte_is_solved_in_every_source_frame(device):  # noqa: F811
     """A stroke that moves, against mattes made of the coefficients that it has as a scribble."""
     rng = np.random.default_rng(8)
-    source, base = footage(rng, COUNT, SIZE), state(rng, window=4, border=True, plate_reach=0)
+    source, base = footage(rng, COUNT, SIZE), drawn_state(rng, window=4, border=True, plate_reach=0)
 
     def shapes(k):
         return (Shape(1, "line", 0.2, (np.array([[0.2 + 0.02 * k, 0.4], [0.3 + 0.02 * k, 0.6]]),)),)
@@ -314,7 +326,7 @@ def test_without_room_for_sums_the_frames_are_read(device, monkeypatch):  # noqa
     monkeypatch.setattr(window, "WeightedSums", _no_room)
     rng, matte = np.random.default_rng(12), discs()
     source = footage(rng, COUNT, SIZE)
-    moment, _ = with_layers(state(rng, window=6), matte)
+    moment, _ = with_layers(drawn_state(rng, window=6), matte)
     _, picture = drawn(device, source, moment)
     expected, enough, covered = formula(device, source, moment, [matte])
     assert_near(picture, expected, enough)
@@ -337,3 +349,31 @@ def test_mattes_and_frames_are_kept_within_their_budgets(monkeypatch):
         source.read(frame)
     assert len(kept._kept) == 16  # what is left cannot be seen from outside
     assert len(source._kept) == 8  # likewise
+
+
+@pytest.mark.parametrize("kind", [{}, {"dtype": np.float16, "transfer": "linear"}], ids=str)
+@pytest.mark.parametrize("count", [1, 2])
+def test_mixed_pixels_have_the_colours_of_their_own(device, kind, count):  # noqa: F811
+    """The frames that are weighted are separated ones; elsewhere nothing changes, to the bit."""
+    rng, mattes = np.random.default_rng(13), [discs(), discs(-1.0, top=0.3)][:count]
+    source = footage(rng, COUNT, SIZE, **kind)
+    moment, _ = with_layers(state(rng, window=6), *mattes)
+    _, picture = drawn(device, source, moment)
+    weighted, behind = source.linear()[..., :3].astype(np.float32), 1 - (1 - np.stack(mattes)).prod(axis=0)
+    frames = [np.stack([separated(*each)[0] for each in zip(weighted, m, strict=True)]) for m in mattes]
+    frames.insert(0, np.stack([separated(*each)[1] for each in zip(weighted, behind, strict=True)]))
+    plain_moment = dataclasses.replace(moment, options=dataclasses.replace(moment.options, decontaminate=False))
+    # As the formula has it, with frames of its own for each part.
+    parts = [Footage(_encoded(each, source), source.transfer) for each in frames]
+    expected, enough, covered = formula(device, parts, plain_moment, mattes)
+    assert_near(picture, expected, enough)
+    without = Renderer(device, source).picture(Request(SHOWN, plain(moment)))
+    assert np.array_equal(picture[~covered], without[~covered])
+
+
+def _encoded(colors, source):
+    """Frames (COUNT, H, W, 4) of a source's samples, of linear colours."""
+    whole = np.concatenate([colors, np.ones_like(colors[..., :1])], axis=-1)
+    if source.dtype.kind == "f":
+        return whole.astype(source.dtype)
+    return np.rint(light.to_encoded(whole).clip(0, 1) * 255).astype(np.uint8)

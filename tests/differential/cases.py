@@ -162,6 +162,7 @@ def add_layers(rng, recipe: dict) -> None:
     for _ in range(int(choose(rng, 1, 1, 2))):
         choose(rng, *recipe["regions"])["layer"] = True
     recipe["plate_reach"] = int(choose(rng, 0, 1, 4))
+    recipe["decontaminate"] = False  # an estimate, which has a test of its own
 
 
 def random_matte(rng, number: int, shape) -> tuple[str, np.ndarray]:

@@ -201,6 +201,12 @@ class ShutterEffect(PropertyGroup):
         update=changed,
         options=UNKEYED,
     )
+    decontaminate: BoolProperty(
+        name="Decontaminate",
+        description="Give layers, and what lies behind them, their own colors in the mixed pixels at their edges",
+        default=True,
+        update=changed,
+    )
     border: BoolProperty(
         name="Default at Edge",
         description="Make the picture's edge a scribble of the default shutter, so that a stroke alone acts locally",

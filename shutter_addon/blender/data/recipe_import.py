@@ -39,7 +39,8 @@ def apply(scene, effect, strip, source: recipe.Recipe, folder: Path = Path()) ->
     for name in OPTIONS:
         setattr(effect, name, getattr(source, name).upper())
     effect.aggregate, effect.border = str(source.aggregate), source.border
-    effect.stop_at_cuts, effect.plate_reach = source.stop_at_cuts, source.plate_reach
+    for name in ("stop_at_cuts", "plate_reach", "decontaminate"):
+        setattr(effect, name, getattr(source, name))
     path = effect.path_from_id()
     effect.use_source_time = bool(source.time)
     if source.time:

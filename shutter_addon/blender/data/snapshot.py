@@ -239,7 +239,7 @@ def _channel(curves: Curves, owner, path: str, name: str, frames: Frames, change
 
 
 def _options(curves: Curves, path: str, effect, frames: Frames) -> keyframes.Channel:
-    names = (*OPTIONS, "aggregate", "border", "stop_at_cuts")
+    names = (*OPTIONS, "aggregate", "border", "stop_at_cuts", "decontaminate")
     option_curves = {name: _tried(curves.find, f"{path}.{name}") for name in names}
     if error := next((error for error in option_curves.values() if isinstance(error, EffectError)), None):
         return keyframes.Constant(error)
@@ -266,6 +266,7 @@ def _options_at(effect, curves: dict, frame: float) -> Options:
         aggregate=int(at("aggregate")),
         border=at("border"),
         stop_at_cuts=at("stop_at_cuts"),
+        decontaminate=at("decontaminate"),
         plate_reach=validation.number(effect, "plate_reach"),
         step=inbetween_settings.factor(effect),
     )

@@ -27,6 +27,7 @@ class Options:
     window: L, its length in frames, in-between frames included
     edge_aware: 0 to 1, how much coefficients stop at the edges of the shown frame (core.pixels.conductances)
     plate_reach: how many frames before and after the shown one are looked through for what lies behind layers
+    decontaminate: whether layers, and what lies behind them, have their own colours in the mixed pixels at their edges
     step: frames for each filmed one: 1, or the factor of in-between frames
     """
 
@@ -41,6 +42,7 @@ class Options:
     stop_at_cuts: bool = True
     edge_aware: float = 0.0
     plate_reach: int = 48
+    decontaminate: bool = True
     step: int = 1
 
     @property

@@ -269,6 +269,7 @@ class Recipe:
     stop_at_cuts: bool = True
     edge_aware: Keyable = 0.0
     plate_reach: int = 48
+    decontaminate: bool = True
     inbetween: Factor = 1
     inbetween_method: Method = "quick"
     time: list[ValueKey] = field(default_factory=list)

@@ -615,6 +615,11 @@ MESSAGES = {
         "*",
         "Expose the region by itself, before all else, which is exposed without it: it leaves no ghost",
     ): "Die Region für sich belichten, vor allem anderen, das ohne sie belichtet wird: kein Geisterbild bleibt",
+    ("*", "Decontaminate"): "Farben trennen",
+    (
+        "*",
+        "Give layers, and what lies behind them, their own colors in the mixed pixels at their edges",
+    ): "Ebenen und was hinter ihnen liegt behalten in den gemischten Pixeln an ihren Rändern ihre eigenen Farben",
     ("*", "Clean Plate"): "Leerer Hintergrund",
     (
         "*",
