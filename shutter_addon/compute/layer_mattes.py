@@ -40,10 +40,10 @@ class LayerMattes:
 
     def edges(self, layers: Layers, frame: int) -> list[np.ndarray]:
         """The mattes that say which pixels hold some of a subject and some of what lies behind it: without opacities,
-        and nothing of ramps, which are no pictures of a subject."""
+        and nothing of ramps and of what is drawn, whose soft edges are none of the picture's."""
         whole, shown = self._whole(layers, frame), layers.mattes[self._place(layers, frame)]
-        ramps = [matte is not None and isinstance(matte.content, Ramp) for matte in shown]
-        return [np.zeros_like(values) if is_ramp else values for values, is_ramp in zip(whole, ramps, strict=True)]
+        tell = [matte is not None and not isinstance(matte.content, Ramp) for matte in shown]
+        return [values if tells else np.zeros_like(values) for values, tells in zip(whole, tell, strict=True)]
 
     @staticmethod
     def _place(layers: Layers, frame: int) -> int:

@@ -1,4 +1,4 @@
-"""The button Panning Shot: tracks what was not tracked, and has the whole picture's exposure follow it."""
+"""The button Panning Shot: tracks what was not tracked, which is sharp before all else, whose exposure follows it."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def everything(bpy):
     """All that the button changes."""
     effect = active(bpy)[1]
     shutters = [(s.name, s.follow, s.follow_region, [bar.weight for bar in s.bars]) for s in effect.shutters]
-    names = [(region.name, region.shutter) for region in effect.regions]
+    names = [(region.name, region.shutter, region.is_layer) for region in effect.regions]
     return shutters, names, effect.position, [keys(bpy, channel) for channel in ("location", "rotation", "confidence")]
 
 
@@ -52,9 +52,9 @@ def test_one_click_tracks_and_follows_and_one_undo_takes_it_back(bpy, region):
     before = everything(bpy)
     assert call(bpy, "panning_shot") == {"FINISHED"}
     shutters, names, position, _curves = after = everything(bpy)
-    assert shutters[0] == ("Sharp", "REGION", "Sharp", [1.0] * 8), "the region's shutter is the default"
-    assert shutters[1][:2] == ("Long", "NOTHING")
-    assert (names, position) == ([("Sharp", "Sharp")], "CENTER")
+    assert shutters[0] == ("Long", "REGION", "Sharp", [1.0] * 8), "all else follows the region"
+    assert shutters[1] == ("Sharp", "NOTHING", "", [0, 0, 0, 1.0, 0, 0, 0, 0]), "which is sharp in the shown frame"
+    assert (names, position) == ([("Sharp", "Sharp", True)], "CENTER")
     assert len(keys(bpy, "confidence")[0]) == COUNT, "all of the strip is tracked"
     moving = request(*active(bpy), FRAME).state.following
     assert (moving.turns == 1).all(), "the subject turns and grows, and nothing turns with it"
@@ -69,12 +69,15 @@ def test_the_subject_is_sharp_and_all_behind_it_streaks(bpy, region):
     call(bpy, "panning_shot")
     bpy.context.scene.frame_set(FRAME)
     subject, behind = levels_off(bpy, FRAME)
-    assert subject < 12
+    assert subject < 3
     assert behind > 60
     active(bpy)[1].shutters[0].follow = "NOTHING"
     subject, behind = levels_off(bpy, FRAME)
-    assert subject > 60
+    assert subject < 3
     assert behind <= 1
+    active(bpy)[1].regions[0].is_layer = False
+    active(bpy)[1].regions[0].shutter = "Long"
+    assert levels_off(bpy, FRAME)[0] > 60
 
 
 def test_keys_of_motion_are_kept(bpy, region):
@@ -100,7 +103,9 @@ def test_with_auto_keying_the_bars_are_keyed(bpy, edit, region):
     call(bpy, "panning_shot")
     edit.tool_settings.use_keyframe_insert_auto = False
     weights = edit.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
-    assert sum(curve.data_path.startswith("virtual_shutter.effects[0].shutters[0].bars") for curve in weights) == 8
+    for shutter in range(2):
+        path = f"virtual_shutter.effects[0].shutters[{shutter}].bars"
+        assert sum(curve.data_path.startswith(path) for curve in weights) == 8
 
 
 def test_other_shutters_keep_their_regions_and_a_name_is_one_regions(bpy, region):
@@ -112,10 +117,10 @@ def test_other_shutters_keep_their_regions_and_a_name_is_one_regions(bpy, region
     for frame, index in ((11, 0), (30, 19)):
         move(bpy, frame, index)
     call(bpy, "panning_shot")
-    assert [shutter.name for shutter in effect.shutters] == ["Sharp", "Long", "Other"]
+    assert [shutter.name for shutter in effect.shutters] == ["Long", "Sharp", "Other"]
     assert [(other.name, other.shutter) for other in effect.regions] == [("Sharp.001", "Sharp"), ("Sharp", "Other")]
     assert effect.shutters[0].follow_region == "Sharp.001"
-    assert (effect.active_shutter, effect.active_region) == (0, 0)
+    assert (effect.active_shutter, effect.active_region) == (1, 0)
 
 
 def test_what_cannot_be_followed_is_said(bpy, edit, region):

@@ -74,7 +74,7 @@ def snapshot(bpy):
                     )
                     for s in e.shutters
                 ],
-                [(r.name, r.shutter, r.layer) for r in e.regions],
+                [(r.name, r.shutter, r.layer, r.is_layer) for r in e.regions],
                 [
                     (y.info, [(f.frame_number, [[tuple(p.co) for p in s.points] for s in f.strokes]) for f in y.frames])
                     for y in layers(e)
@@ -258,6 +258,15 @@ class Work(RuleBasedStateMachine):
         # There may be no region, or nothing to track.
         with self.step(late), contextlib.suppress(RuntimeError), sequencer(self.bpy):
             getattr(self.bpy.ops.shutter, name)()
+
+    @rule(data=st.data(), late=st.booleans(), name=st.sampled_from(["sharp_subject", "clean_trail"]))
+    def make_layer(self, data, late, name):
+        from shutter_addon.blender.editing import layer_presets
+
+        edit = data.draw(st.sampled_from(edits(self.bpy)))
+        if effects := [e for e in edit.virtual_shutter.effects if e.regions]:
+            with self.step(late):
+                getattr(layer_presets, name)(data.draw(st.sampled_from(effects)), 0)
 
     @rule(data=st.data(), late=st.booleans())
     def change_window(self, data, late):

@@ -24,6 +24,10 @@ class Options(WithEffect):
         layout.use_property_split = True
         for name in ("position", "interpolation", "light", "exposure", "edges", "stop_at_cuts", "aggregate", "border"):
             layout.prop(effect, name)
+        column = layout.column()
+        column.active = any(region.is_layer for region in effect.regions)
+        for name in ("decontaminate", "plate_reach"):
+            column.prop(effect, name)
         package = effect.stop_at_cuts and cuts.missing_package()
         if package:
             text = iface_("Cuts are not found: the Python package {package} is missing").format(package=package)

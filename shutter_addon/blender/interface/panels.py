@@ -39,6 +39,9 @@ class SHUTTER_UL_regions(UIList):
         row = layout.row(align=True)
         row.label(text="", icon=_ICONS.get(region.kind, "ERROR"))
         row.prop(region, "name", text="", emboss=False)
+        switch = row.row(align=True)
+        switch.active = region.is_layer
+        switch.prop(region, "is_layer", text="", icon="RENDERLAYERS", emboss=False)
         if region.kind in strips.MATTES:
             return
         layer = annotations.layer_of(effect, region)
@@ -137,6 +140,9 @@ def _draw_tools(layout, effect) -> None:
     row = layout.row(align=True)
     row.operator("shutter.panning_shot", icon="CON_FOLLOWTRACK")
     row.operator("shutter.tripod", icon="CON_CAMERASOLVER")
+    row = layout.row(align=True)
+    row.operator("shutter.sharp_subject", icon="RENDERLAYERS")
+    row.operator("shutter.clean_trail", icon="CURVE_PATH")
     if (region := selection.active_region(effect)) is not None:
         row = layout.split(factor=0.4)
         label = row.row()

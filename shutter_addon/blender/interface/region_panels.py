@@ -38,6 +38,7 @@ class Regions(WithEffect):
         except EffectError as error:
             sentence(layout, str(error), "ERROR")
         layout.prop(region, "kind")
+        layout.prop(region, "is_layer")
         if region.kind == "LINE":
             layout.prop(region, "width")
         elif region.kind == "RAMP":
@@ -75,7 +76,9 @@ def _draw_matte(layout, look, region) -> None:
 def _draw_blend(layout, region) -> None:
     """How a matte or a ramp lies over what is beneath."""
     for name in ("invert", "blend", "opacity", "feather"):
-        layout.prop(region, name)
+        row = layout.row()
+        row.active = name != "blend" or not region.is_layer  # a layer lies before all of them
+        row.prop(region, name)
 
 
 def draw_tracking(layout, index: int | None) -> None:

@@ -12,7 +12,15 @@ from bpy.types import Operator
 
 from ..data import selection, validation
 from ..data.choices import CONTEXT
-from ..editing import bar_edits, follow_stabilization, follow_track, panning_shot, track_region, tripod
+from ..editing import (
+    bar_edits,
+    follow_stabilization,
+    follow_track,
+    layer_presets,
+    panning_shot,
+    track_region,
+    tripod,
+)
 from ..rendering.effect_source import FAULTS
 from .operator_bases import Mixin, OfEffect, OfRegion, OfShutter, OfStrokes, redraw, refused
 
@@ -198,7 +206,7 @@ class SHUTTER_OT_track_camera(_OfCamera, _Tracks, OfEffect, Operator):
 
 
 class SHUTTER_OT_panning_shot(_Tracks, OfStrokes, Operator):
-    """Keep what the active region moves with sharp while all else streaks (tracks the region unless it has keys)"""
+    """Keep the active region sharp while all else streaks past it (tracks the region unless it has keys)"""
 
     bl_idname = "shutter.panning_shot"
     bl_label = "Panning Shot"
@@ -209,7 +217,7 @@ class SHUTTER_OT_panning_shot(_Tracks, OfStrokes, Operator):
         return panning_shot.is_ready(scene, effect, strip, effect.active_region)
 
     def ended(self, context):
-        panning_shot.set_up(self._target.effect(), self._target.index, bar_edits.auto_key(context))
+        layer_presets.panning_shot(self._target.effect(), self._target.index, bar_edits.auto_key(context))
 
 
 class SHUTTER_OT_tripod(_OfCamera, _Tracks, OfShutter, Operator):

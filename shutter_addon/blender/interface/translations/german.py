@@ -932,9 +932,20 @@ MESSAGES = {
     ("Operator", "Panning Shot"): "Mitzieher",
     (
         "*",
-        "Keep what the active region moves with sharp while all else streaks (tracks the region unless it has keys)",
-    ): "Scharf halten, womit sich die aktive Region bewegt, und alles andere verwischen "
+        "Keep the active region sharp while all else streaks past it (tracks the region unless it has keys)",
+    ): "Die aktive Region scharf halten, während alles andere an ihr vorbei verwischt "
     "(verfolgt die Region, falls sie keine Schlüsselbilder hat)",
+    ("Operator", "Sharp Subject"): "Scharfes Motiv",
+    (
+        "*",
+        "Keep the active region sharp before all else, which is exposed for long and without it",
+    ): "Die aktive Region scharf vor alles andere stellen, das lange und ohne sie belichtet wird",
+    ("Operator", "Clean Trail"): "Saubere Spur",
+    (
+        "*",
+        "Have the active region leave a trail before all else, which stays sharp",
+    ): "Die aktive Region eine Spur ziehen lassen, vor allem anderen, das scharf bleibt",
+    ("*", "Subject"): "Motiv",
     ("*", "Nothing"): "Nichts",
     ("*", "Camera"): "Kamera",
     ("*", "What the exposure moves with"): "Womit sich die Belichtung mitbewegt",

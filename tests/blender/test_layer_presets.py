@@ -1,0 +1,92 @@
+"""One click makes a layer of a region: a sharp subject, or one that leaves a trail."""
+
+import numpy as np
+import pytest
+from support import request, write_frames
+from test_region_tracking import active, call, drawn, new_source, picture
+
+from shutter_addon.blender.editing import region_edits, shutter_edits
+from shutter_addon.blender.rendering import sessions
+
+COUNT = 24
+
+
+@pytest.fixture
+def region(bpy, edit, tmp_path):
+    frames = write_frames(tmp_path / "passing", [picture(i) for i in range(COUNT)])
+    yield drawn(edit, new_source(edit, frames))
+    sessions.forget()
+
+
+def bars(effect):
+    return {shutter.name: [bar.weight for bar in shutter.bars] for shutter in effect.shutters}
+
+
+STILL, LONG = [0, 0, 0, 1, 0, 0, 0, 0], [1] * 8
+
+
+@pytest.mark.parametrize(("name", "own", "rest"), [("sharp_subject", STILL, LONG), ("clean_trail", LONG, STILL)])
+def test_one_click_and_one_undo(bpy, region, name, own, rest):
+    bpy.ops.ed.undo_push(message="before")
+    before = bars(active(bpy)[1])
+    assert call(bpy, name) == {"FINISHED"}
+    effect = active(bpy)[1]
+    assert effect.regions[0].is_layer
+    assert bars(effect) == {"Long": rest, "Sharp": own}
+    assert effect.position == "CENTER"
+    bpy.ops.ed.undo()
+    effect = active(bpy)[1]
+    assert (bars(effect), effect.regions[0].is_layer) == (before, False)
+
+
+def test_a_region_of_the_default_shutter_gets_one_of_its_own(bpy, region):
+    effect = active(bpy)[1]
+    region_edits.assign_region(effect, 0, effect.shutters[0])
+    call(bpy, "sharp_subject")
+    assert effect.regions[0].shutter == "Subject"
+    assert bars(effect)["Subject"] == STILL
+    assert bars(effect)["Long"] == LONG
+
+
+def test_another_region_keeps_its_shutter(bpy, region):
+    effect = active(bpy)[1]
+    region_edits.add_region(effect, effect.shutters["Sharp"], name="Other")
+    effect.active_shutter, effect.active_region = 1, 0
+    call(bpy, "clean_trail")
+    assert [each.shutter for each in effect.regions] == ["Subject", "Sharp"]
+    assert bars(effect)["Sharp"] == [1] + [0] * 7
+
+
+def test_what_followed_follows_no_more(bpy, region):
+    effect = active(bpy)[1]
+    shutter_edits.follow(effect, 0, "REGION", False)
+    effect.shutters[0].follow_region = effect.regions[0].name
+    call(bpy, "sharp_subject")
+    assert effect.shutters[0].follow == "NOTHING"
+
+
+def test_a_still_frame_has_its_in_between_frames(bpy, region):
+    effect = active(bpy)[1]
+    effect.inbetween = "2"
+    call(bpy, "sharp_subject")
+    weights = bars(effect)["Sharp"]
+    assert np.flatnonzero(weights).tolist() == [6, 7]
+    assert len(weights) == 16
+
+
+def test_a_layer_is_rendered(bpy, edit, region):
+    """The state has it, in all frames around; without the switch it has none."""
+    call(bpy, "sharp_subject")
+    edit.frame_set(20)
+    layers = request(*active(bpy), 20).state.layers
+    assert layers.shutters == (1,)
+    assert {len(state.shapes) for state in layers.scribbles} == {1}
+    active(bpy)[1].regions[0].is_layer = False
+    assert request(*active(bpy), 20).state.layers is None
+
+
+def test_without_a_region_there_is_no_subject(bpy, edit, region):
+    region_edits.remove_region(active(bpy)[1], 0)
+    for name in ("sharp_subject", "clean_trail"):
+        with pytest.raises(RuntimeError, match="The shutter has no region: draw one"):
+            call(bpy, name)
