@@ -153,6 +153,14 @@ class Renderer:
             labels = self.compositor.labels(self.labels(request)[0].labels)
             return labels, request.state.options.aggregate
 
+    def drawn_holes(self, request: Request) -> tuple[object, int]:
+        """The picture's holes on the device, a GPU, like drawn_labels; 0 where there is none."""
+        with self.compositor.current():
+            self.draw(request)
+            if self.holes is None or request.state.layers is None:
+                return self.compositor.labels(np.zeros((1, 1), np.uint16)), self._everywhere
+            return self.compositor.labels(self.holes), 1
+
     def labels(self, request: Request) -> list[LabelLayer]:
         """Labels of the request's scribbles, of each of scribbles.layers."""
         state, size = request.state, grid(self.source, request.state)

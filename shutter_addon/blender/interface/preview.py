@@ -39,6 +39,12 @@ VIEWS = (
     ("SPLIT", "Split", "The source on the left of the handle, the result on its right"),
     ("SCRIBBLES", "Scribbles", "The source, and where each shutter is scribbled"),
     ("COEFFICIENTS", "Mattes", "How much of each shutter a pixel gets, in the shutters' colors"),
+    (
+        "HOLES",
+        "Holes",
+        "The result, and where no exposed frame shows what lies behind layers: orange is taken from another frame, "
+        "purple is filled from what is around",
+    ),
 )
 
 
@@ -68,6 +74,7 @@ def _follow_once() -> None:
     shown_annotations.follow()
 
 
+_HOLES = (1.0, 0.55, 0.0), (0.75, 0.2, 0.9)  # the colours of compute.plates.TAKEN and FILLED
 _NAVIGATION = 56  # units at the right of a preview, where Blender's own buttons lie
 _STILL = 0.4  # seconds after which a frame that is shown stays
 _SOON = 0.1  # seconds
@@ -158,7 +165,7 @@ def _show(context, shown: Shown, decision: Decision | None, say) -> None:
                 _show_picture(context, quad, shown, wanted, say)
         except stopping.StoppedError:
             say(rpt_("Composing…"))
-            _show_strokes(context, quad, shown, wanted.request)
+            _show_strokes(context, quad, shown, wanted)
             bpy.app.timers.register(_redraw_once)
     except effect_source.FAULTS as error:
         _tell_fault(error, say)
@@ -194,7 +201,9 @@ def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> No
     elif settings.view == "COEFFICIENTS":
         _show_coefficients(quad, shown.effect, renderer, request)
     else:
-        _show_strokes(context, quad, shown, request)
+        if settings.view == "HOLES":
+            _show_holes(quad, renderer, request)
+        _show_strokes(context, quad, shown, wanted)
     previews.was_drawn()
     for sentence in pictures.shortages(renderer, request):
         say(sentence)
@@ -283,12 +292,13 @@ def _tell_fault(error: Exception, say) -> None:
         say(rpt_("Shutter: {fault}").format(fault=error))
 
 
-def _show_strokes(context, quad, shown: Shown, request) -> None:
+def _show_strokes(context, quad, shown: Shown, wanted: Drawing) -> None:
     """The scribbles where they are by now; Blender's own annotations show where they were drawn."""
     space = context.space_data
     if not (space.show_overlays and space.preview_overlay.show_annotation):
         return
-    for is_hidden, shape in zip(shown.hides_strokes, request.state.shapes, strict=True):
+    shapes = wanted.decision.snapshot.effect.drawn_at(shown.scene.frame_current)
+    for is_hidden, shape in zip(shown.hides_strokes, shapes, strict=True):
         if is_hidden:
             continue
         color = (*shown.effect.shutters[shape.shutter].color, shape.opacity)
@@ -320,6 +330,12 @@ def _show_scribbles(quad, effect, renderer, request) -> None:
     )
 
 
+def _show_holes(quad, renderer, request) -> None:
+    kinds, block = renderer.drawn_holes(replace(request, quick=True, levels=True))
+    textures = {"labels": kinds, "palette": _texture(_HOLES)}
+    quad.draw("SCRIBBLES", textures, opacity=0.7, block=block, size=_size(renderer))
+
+
 def _show_coefficients(quad, effect, renderer, request) -> None:
     coefficients, block = renderer.drawn_coefficients(replace(request, quick=True))
     count = len(request.state.bars)
@@ -333,8 +349,13 @@ def _size(renderer) -> tuple[int, int]:
 
 def _palette(effect) -> Texture:
     """The shutters' colours, display code values, side by side."""
-    colors = np.ones((len(effect.shutters), 4), dtype=np.float32)
-    colors[:, :3] = [shutter.color for shutter in effect.shutters]
+    return _texture([shutter.color for shutter in effect.shutters])
+
+
+def _texture(palette) -> Texture:
+    """Colours, display code values, side by side."""
+    colors = np.ones((len(palette), 4), dtype=np.float32)
+    colors[:, :3] = palette
     size = len(colors), 1
     data = gpu.types.Buffer("FLOAT", colors.size, colors.reshape(-1))
     return Texture(gpu.types.GPUTexture(size, layers=1, format="RGBA32F", data=data), (*size, 1), "rgba32f")

@@ -4,8 +4,10 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Gizmo, GizmoGroup
 
+from ...compute import plates
 from ...core.model.scribbles import mapped
 from ..data import annotations, geometry, preview_areas
 from ..rendering import effect_source, previews, probe, render_context
@@ -71,7 +73,8 @@ class SHUTTER_GT_probe(Gizmo):
         except effect_source.FAULTS:  # which the live preview tells
             return
         if probed is not None:
-            _draw(context.region, mapped(matrix, np.array([at]))[0], shown.effect.shutters, probed)
+            point = mapped(matrix, np.array([at]))[0]
+            _draw(context.region, point, shown.effect.shutters, probed, _of_layers(shown, probed))
 
     def test_select(self, context, location):
         """Blender asks whenever the pointer moves: nothing else tells of it without taking events from others."""
@@ -82,9 +85,17 @@ class SHUTTER_GT_probe(Gizmo):
         return -1
 
 
-def _draw(region, point, shutters, probed: probe.Probed) -> None:
+def _of_layers(shown, probed: probe.Probed) -> list[tuple[str, str]]:
+    """Of each layer its name and how much of it covers the pixel; and what takes the place of what lies behind."""
+    regions = [region for region in shown.effect.regions if region.is_layer and region.opacity > 0]
+    lines = [(region.name, f"{share:.1%}") for region, share in zip(regions, probed.layers, strict=False)]
+    words = {plates.TAKEN: iface_("Behind: another frame"), plates.FILLED: iface_("Behind: filled")}
+    return [*lines, (words[probed.hole], "")] if probed.hole in words else lines
+
+
+def _draw(region, point, shutters, probed: probe.Probed, of_layers: list[tuple[str, str]]) -> None:
     unit = drawing.ui_scale()
-    place = layout(point, (region.width, region.height), len(shutters), unit)
+    place = layout(point, (region.width, region.height), len(shutters) + len(of_layers), unit)
     colors = np.array([shutter.color for shutter in shutters])
     (x, y), arm = point, 6 * unit
     drawing.lines([(x - arm, y), (x + arm, y)], _MARK, width=1)
@@ -92,7 +103,10 @@ def _draw(region, point, shutters, probed: probe.Probed) -> None:
     drawing.rectangles([place.frame], [_BACK])
     _draw_bars(place.bars, probed.bars, (*(probed.coefficients @ colors), 0.95))
     left, _, right, _ = place.bars
-    for bottom, shutter, share in zip(place.lines, shutters, probed.coefficients, strict=True):
+    for bottom, (name, share) in zip(place.lines[len(shutters) :], of_layers, strict=True):
+        drawing.text(left, bottom, name, until=right - 44 * unit)
+        drawing.text(right - 38 * unit, bottom, share)
+    for bottom, shutter, share in zip(place.lines, shutters, probed.coefficients, strict=False):
         drawing.rectangles([(left, bottom, left + 10 * unit, bottom + 10 * unit)], [(*shutter.color, 1.0)])
         drawing.text(left + 16 * unit, bottom, shutter.name, until=right - 44 * unit)
         drawing.text(right - 38 * unit, bottom, f"{share:.1%}")

@@ -203,7 +203,9 @@ def _unreadable(source, indices: set[int], step: int = 1) -> list[str]:
 def _look_at_mattes(check: EffectCheck, source, requests: dict[float, Request]) -> None:
     shown: dict = {}
     for request in requests.values():
-        for matte in request.state.mattes:
+        layers = request.state.layers
+        of_layers = layers.mattes[request.index - layers.first] if layers else ()
+        for matte in (*request.state.mattes, *filter(None, of_layers)):
             if isinstance(matte.content, FileFrame):
                 shown.setdefault(matte.content.file, {})[matte.content] = request.index // source.step
     for file, contents in shown.items():

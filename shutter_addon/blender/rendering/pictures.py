@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import OpenImageIO
@@ -14,6 +15,7 @@ from ...core.stopping import StoppedError
 from ...devices.budget import MEGABYTE
 from ...media import cuts
 from ...media.image_writing import write_exr
+from ..data import consistency
 from ..data.snapshot import Snapshot
 from . import render_settings
 from .effect_source import FULL, Detail
@@ -33,13 +35,24 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
     if request.state.options.stop_at_cuts:
         _say_of_cuts(context.say)
     if (weights := context.settings.weights) is not None:
-        names = [shutter.name for shutter in snapshot.effect.shutters]
         place = weights / f"{round(frame - snapshot.first + 1):04d}.exr"
-        write_exr(place, np.moveaxis(session.coefficients(request, context.stopped), 0, -1), names)
+        _write_weights(place, snapshot, frame, session.weights(request, context.stopped))
     made = session.picture(request, context.stopped)
     for sentence in shortages(renderer, request):
         _say_once(sentence, context.say)
     return made
+
+
+def _write_weights(place: Path, snapshot: Snapshot, frame: float, weights: list[np.ndarray]) -> None:
+    """Writes a channel for each shutter, and behind these one for each layer, named after its region; empty where there
+    is none at this frame. A name that is taken gets a number."""
+    effect = snapshot.effect
+    names = [shutter.name for shutter in effect.shutters]
+    there, shown, channels = effect.layers_at(frame), iter(weights[len(names) :]), weights[: len(names)]
+    for region in [region for region in effect.regions if region.layer]:
+        names.append(consistency.unique(region.name or "Region", names))
+        channels.append(next(shown) if region in there else np.zeros_like(weights[0]))
+    write_exr(place, np.stack(channels, axis=-1), names)
 
 
 def _say_once(sentence: str, say: Callable[[str], None]) -> None:

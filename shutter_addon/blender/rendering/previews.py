@@ -35,7 +35,7 @@ _MOMENT = 0.3  # seconds
 _SLICE = 0.2  # seconds
 _READING_TOOL = "builtin.sample"  # reads once before it is one of those that run
 DRAFT_ROWS = 270  # blocks along the shorter side of a draft in which shutters follow edges
-RESULTS = "RESULT", "SPLIT"  # views of the live preview that show the result
+RESULTS = "RESULT", "SPLIT", "HOLES"  # views of the live preview that show the result
 
 
 @dataclass

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...compute import plates
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core.pixels import compositor
@@ -13,10 +14,14 @@ from ..devices import blender_gpu
 
 @dataclass(frozen=True)
 class Probed:
-    """A pixel's coefficients (N,), which sum to 1, and its shutter's bars (L,)."""
+    """A pixel's coefficients (N,), which sum to 1, and its shutter's bars (L,).
+
+    layers: how much of each layer covers it; hole: of compute.plates, how it gets what lies behind these"""
 
     coefficients: np.ndarray
     bars: np.ndarray
+    layers: tuple[float, ...] = ()
+    hole: int = plates.OPEN
 
 
 def at(renderer: Renderer, request: Request, point: Sequence[float]) -> Probed | None:
@@ -33,4 +38,10 @@ def at(renderer: Renderer, request: Request, point: Sequence[float]) -> Probed |
         np.float64
     )
     coefficients = values / values.sum()
-    return Probed(coefficients, compositor.mixed_shutter(request.state, coefficients))
+    holes = renderer.holes if request.state.layers else None
+    return Probed(
+        coefficients=coefficients,
+        bars=compositor.mixed_shutter(request.state, coefficients),
+        layers=tuple(float(matte[row, column]) for matte in renderer.layer_mattes(request)),
+        hole=plates.OPEN if holes is None else int(holes[row, column]),
+    )

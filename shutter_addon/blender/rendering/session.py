@@ -17,6 +17,7 @@ from ...compute.request import Request
 from ...core.messages import translated
 from ...core.model.frame_state import FrameState
 from ...core.pixels import following, layering
+from ...core.pixels.matte_grid import block_means
 from ...core.stopping import never
 from ...devices.device import NoDeviceError
 from ...media.matte_values import MatteValues
@@ -135,6 +136,16 @@ class RenderSession:
     def coefficients(self, request: Request, stopped: Callable[[], bool] = never) -> np.ndarray:
         """See Renderer.coefficients."""
         return self.run(self.renderer(request.source).coefficients, request, stopped=stopped)
+
+    def weights(self, request: Request, stopped: Callable[[], bool] = never) -> list[np.ndarray]:
+        """Coefficients (h, w) of all shutters, and then the mattes of all layers, in blocks as large."""
+        return self.run(self._weights, request, stopped=stopped)
+
+    def _weights(self, request: Request) -> list[np.ndarray]:
+        renderer = self.renderer(request.source)
+        block = request.state.options.aggregate
+        mattes = [block_means(matte, block) for matte in renderer.layer_mattes(request)]
+        return [*renderer.coefficients(request), *mattes]
 
     def renderer(
         self, key: SourceKey, say: Callable[[str], None] = print, stopped: Callable[[], bool] = never

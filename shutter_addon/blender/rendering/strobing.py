@@ -141,7 +141,7 @@ def _seen(state: FrameState) -> set[int]:
     drawn = {shape.shutter for shape in state.shapes if len(shape.strokes)}
     if state.options.border or not drawn:
         drawn.add(0)
-    return drawn | {matte.shutter for matte in state.mattes}
+    return drawn | {matte.shutter for matte in state.mattes} | set(state.layers.shutters if state.layers else ())
 
 
 def _way(state: FrameState, shutter: int, frame: int, height: int) -> Similarity:

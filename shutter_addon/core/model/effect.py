@@ -272,6 +272,14 @@ class Effect:
         seen = tuple(matte for matte in laid if matte.opacity > 0)
         return FrameState(options=options, bars=np.stack(bars), shapes=tuple(self._shapes_at(frame)), mattes=seen)
 
+    def layers_at(self, frame: float) -> list[Region | MatteRegion]:
+        """The layers that there are at a frame, the first farthest."""
+        return [region for region in self.regions if region.layer and region.opacity.at(frame) > 0]
+
+    def drawn_at(self, frame: float) -> list[scribbles.Shape]:
+        """All that is drawn, layers as well, where it is at a frame. EffectError: it lies nowhere."""
+        return [region.at(frame) for region in self.regions if isinstance(region, Region)]
+
     def _shapes_at(self, frame: float) -> Iterator[scribbles.Shape]:
         room = limits.MAX_POINTS
         for region in self.regions:

@@ -48,11 +48,8 @@ def layered(
 ) -> FrameState:
     """The effect's state at a timeline frame, with its layers; arguments as for following.followed, `shown` as far as
     `reach`. EffectError: a layer lies nowhere."""
-    present = [(region, float(region.opacity.at(at.frame))) for region in effect.regions if region.layer]
-    present = [(region, opacity) for region, opacity in present if opacity > 0]
-    if not present:
+    if not (regions := effect.layers_at(at.frame)):
         return state
-    regions, opacities = zip(*present, strict=True)
     seen = following.seen(state.options, at.source_frame, at.direction, source.count)
     beyond = state.options.plate_reach
     frames = range(max(seen.start - beyond, 0), min(seen.stop + beyond, source.count))
@@ -63,7 +60,7 @@ def layered(
         state,
         layers=Layers(
             shutters=tuple(region.shutter for region in regions),
-            opacities=opacities,
+            opacities=tuple(float(region.opacity.at(at.frame)) for region in regions),
             first=frames.start,
             scribbles=tuple(_scribbles(effect, state, regions, drawn, *moment) for moment in moments),
             mattes=tuple(tuple(_matte(region, *moment) for region in regions) for moment in moments),

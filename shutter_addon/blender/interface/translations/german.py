@@ -946,6 +946,15 @@ MESSAGES = {
         "Have the active region leave a trail before all else, which stays sharp",
     ): "Die aktive Region eine Spur ziehen lassen, vor allem anderen, das scharf bleibt",
     ("*", "Subject"): "Motiv",
+    ("Virtual Shutter", "Holes"): "Löcher",
+    (
+        "*",
+        "The result, and where no exposed frame shows what lies behind layers: orange is taken from another frame, "
+        "purple is filled from what is around",
+    ): "Das Ergebnis, und wo kein belichteter Frame zeigt, was hinter Ebenen liegt: Orange stammt aus einem anderen "
+    "Frame, Violett ist aus der Umgebung gefüllt",
+    ("*", "Behind: another frame"): "Dahinter: ein anderer Frame",
+    ("*", "Behind: filled"): "Dahinter: gefüllt",
     ("*", "Nothing"): "Nichts",
     ("*", "Camera"): "Kamera",
     ("*", "What the exposure moves with"): "Womit sich die Belichtung mitbewegt",
