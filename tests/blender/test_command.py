@@ -144,12 +144,34 @@ def test_random_bars_equal_the_reference(command, noise, tmp_path, same_pixels, 
     same_pixels(read_picture(tmp_path / "out" / "0002.png"), levels(expected[..., :3]), 1)
 
 
-def test_chunks_and_order_change_no_bit(command, noise, tmp_path):
+def test_weights_have_a_channel_for_each_layer(command, noise, tmp_path):
+    first, _ = noise
+    ramp = {"kind": "ramp", "ramp": "linear", "shutter": "S1", "layer": True}
+    ends = [{"frame": 1, "value": 0.5, "ease": "constant"}, {"frame": 3, "value": 0}]
+    regions = [ramp | {"name": "S0"}, ramp | {"name": "Gone", "opacity": ends}]
+    data = recipe(4, [1] * 4, [1, 0, 0, 0], aggregate=2, regions=regions)
+    command(first, "--output", tmp_path / "out", "--weights", tmp_path / "w", "--frames", "2:3", recipe=data)
+    images = [OpenImageIO.ImageBuf(str(tmp_path / "w" / f"000{frame}.exr")) for frame in (2, 3)]
+    there, gone = (
+        dict(zip(image.spec().channelnames, np.moveaxis(image.get_pixels(), -1, 0), strict=True)) for image in images
+    )
+    assert there.keys() == gone.keys() == {"S0", "S1", "S0.001", "Gone"}
+    expected = np.broadcast_to((np.arange(32) * 2 + 1) / 64, (24, 32))
+    assert np.abs(there["S0.001"] - expected).max() < 1e-4
+    assert np.abs(there["Gone"] - expected / 2).max() < 1e-4
+    assert np.array_equal(gone["S0.001"], there["S0.001"])
+    assert not gone["Gone"].any()
+    assert (there["S0"] == 1).all()
+
+
+@pytest.mark.parametrize("layer", [False, True])
+def test_chunks_and_order_change_no_bit(command, noise, tmp_path, layer):
     first, _ = noise
     rng = np.random.default_rng(2)
     moving = line("S1", (0.2, 0.2), (0.4, 0.6), width=0.1)
-    moving["keys"] = [{"frame": 1}, {"frame": 12, "location": [0.4, 0.1], "rotation": 40}]
-    data = recipe(6, *rng.random((2, 6)), regions=[line("S0", (0.9, 0.1), (0.9, 0.9)), moving])
+    moving |= {"keys": [{"frame": 1}, {"frame": 12, "location": [0.4, 0.1], "rotation": 40}], "layer": layer}
+    edges = {"edge_aware": 1.0, "border": True} if layer else {}
+    data = recipe(6, *rng.random((2, 6)), regions=[line("S0", (0.9, 0.1), (0.9, 0.9)), moving], **edges)
     command(first, "--output", tmp_path / "whole", recipe=data)
     for chunk in ("9:12", "5:8", "3", "1:2", "4"):
         command(first, "--output", tmp_path / "parts", "--frames", chunk, recipe=data)

@@ -67,3 +67,28 @@ def test_a_texel_is_that_of_the_whole_texture(blender_device):
         blender_device.write(texture, values[layer], layer)
     for x, y in ((0, 0), (6, 4), (2, 3)):
         assert texel(texture, x, y).tolist() == values[:, y, x].reshape(-1).tolist()
+
+
+def test_layers_and_what_takes_the_place_of_what_lies_behind(blender_device):
+    from test_layers import COUNT, SHOWN, SIZE, with_layers
+
+    from shutter_addon.blender.rendering import probe
+    from shutter_addon.compute import plates
+    from shutter_addon.media.matte_values import MatteValues
+
+    rng, matte = np.random.default_rng(4), np.zeros((COUNT, *SIZE[::-1]))
+    matte[: SHOWN + 8, :12] = 1
+    moment, _ = with_layers(state(rng, window=4, shapes=()), matte, opacities=(0.97,))
+    renderer = Renderer(GPUCompositor(blender_device), footage(rng, COUNT, SIZE), MatteValues(*SIZE))
+    request = Request(SHOWN, moment)
+    renderer.picture(request)
+    behind, before = (probe.at(renderer, request, (0.5, y)) for y in (0.2, 0.8))
+    assert (behind.layers, behind.hole) == ((0.0,), plates.OPEN)
+    assert (before.layers, before.hole) == ((pytest.approx(0.97, abs=1e-4),), plates.TAKEN)
+    with renderer.compositor.current():
+        texture, block = renderer.drawn_holes(request)
+        assert np.array_equal(renderer.compositor.device.read(texture)[0, ..., 0], renderer.holes)
+    assert block == 1
+    without = Request(SHOWN, state(rng, window=4, shapes=()))
+    texture, block = renderer.drawn_holes(without)
+    assert (texture.size[:2], block) == ((1, 1), max(SIZE))
