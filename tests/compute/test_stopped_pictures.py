@@ -1,5 +1,7 @@
 """Pictures that are broken off between two passes, at any of them: those that come after are the right ones."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from test_composition import SHAPES, device, few_pieces, footage, state  # noqa: F401
@@ -10,6 +12,7 @@ from shutter_addon.compute import window
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
 from shutter_addon.core import stopping
+from shutter_addon.core.model.frame_state import FrameState, Layers, Options
 from shutter_addon.core.model.scribbles import Shape
 
 FIRST, SECOND = 3, 21  # their windows have no frame in common
@@ -33,6 +36,16 @@ def with_mattes(rng, _source, shapes):
     return type(moment)(moment.options, moment.bars, moment.shapes, mattes=mattes(np.random.default_rng(5), 2))
 
 
+def layered(rng, source, shapes):
+    """Its mattes are solved for in every source frame, and there are holes."""
+    moment = few_pieces(rng, 6, shapes=shapes[1:])
+    drawn = FrameState(Options(6), np.ones((2, 6)), (dataclasses.replace(shapes[0], shutter=1),))
+    layers = Layers(
+        shutters=(1,), opacities=(0.99,), first=0, scribbles=(drawn,) * source.count, mattes=((None,),) * source.count
+    )
+    return dataclasses.replace(moment, layers=layers)
+
+
 def counted(most=None):
     """What stops after so many looks, and the looks that it had."""
     looks = []
@@ -44,7 +57,7 @@ def counted(most=None):
     return stopped, looks
 
 
-@pytest.mark.parametrize("kind", [plain, along_edges, followed, with_mattes])
+@pytest.mark.parametrize("kind", [plain, along_edges, followed, with_mattes, layered])
 @pytest.mark.parametrize("dtype", [np.uint8, np.float16])
 def test_what_comes_after_is_whole(device, kind, dtype, monkeypatch):  # noqa: F811
     monkeypatch.setattr(window, "BAND_BYTES", 60_000)  # pictures take several passes
@@ -56,7 +69,8 @@ def test_what_comes_after_is_whole(device, kind, dtype, monkeypatch):  # noqa: F
     expected = [Renderer(device, source, values).picture(Request(*one)) for one in asked]
     renderer = Renderer(device, source, values)
     stopped, looks = counted()
-    renderer.picture(Request(*asked[0]))
+    for one in (*asked, asked[0]):  # mattes of layers are kept: they are solved for once
+        renderer.picture(Request(*one))
     with stopping.once(stopped):
         renderer.picture(Request(*asked[1]))
     assert len(looks) > 2

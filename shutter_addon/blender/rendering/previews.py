@@ -239,7 +239,7 @@ def draft(request: Request, source: FrameSource) -> Request:
     block = options.aggregate
     while min(source.width, source.height) > block * DRAFT_ROWS:
         block *= 2
-    return replace(request, state=replace(request.state, options=replace(options, aggregate=block)))
+    return replace(request, state=request.state.in_blocks(block))
 
 
 def _is_rendered(shown: Shown) -> bool:

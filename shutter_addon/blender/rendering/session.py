@@ -6,7 +6,6 @@ import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -251,4 +250,4 @@ def _in_blocks(state: FrameState, divisor: int) -> FrameState:
     options = state.options
     if divisor == 1 or options.aggregate == 1:
         return state
-    return replace(state, options=replace(options, aggregate=max(options.aggregate // divisor, 1)))
+    return state.in_blocks(max(options.aggregate // divisor, 1))

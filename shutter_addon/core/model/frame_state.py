@@ -184,6 +184,14 @@ class FrameState:
             (s.shutter, s.kind, s.width, s.opacity, *(stroke.tobytes() for stroke in s.strokes)) for s in self.shapes
         )
 
+    def in_blocks(self, aggregate: int) -> FrameState:
+        """The state with blocks of another size, those of what is drawn of layers as well."""
+        layers = self.layers
+        if layers is not None:
+            drawn = tuple(state and state.in_blocks(aggregate) for state in layers.scribbles)
+            layers = replace(layers, scribbles=drawn)
+        return replace(self, options=replace(self.options, aggregate=aggregate), layers=layers)
+
     def alone(self, chosen: int) -> FrameState:
         """The state of a picture in which one shutter, `chosen`, is everywhere."""
         options = replace(self.options, edge_aware=0.0)  # there is nothing to diffuse
