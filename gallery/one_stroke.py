@@ -1,4 +1,4 @@
-"""One stroke, tracked, with Follow Edges: a woman stays sharp as she walks, and no halo of the street with her.
+"""One stroke, tracked, with Follow Edges: a woman stays sharp as she walks, as a layer, and beside that without it.
 
 The stroke was drawn at frame 22; the recipe has the keys that Track made of it:
 `shutter track walkers.mp4 --recipe R.json --region woman --frame 22 --frames 1:36 --output one_stroke.json`
@@ -19,12 +19,13 @@ def footage(_folder):
 
 
 def still(shots):
-    (shot,) = shots
+    shot, plain = shots
     return stills.sheet(
         row(shot.source, *(f"Frame {frame}" for frame in FRAMES)),
         row(shot.scribbles, "One stroke, tracked"),
         row(shot.coefficients, "How much of each shutter"),
-        row(shot.result, "Twelve frames, and she is sharp"),
+        row(plain.result, "Twelve frames, no layer: she is sharp in her own ghost"),
+        row(shot.result, "A layer: all else is exposed without her"),
         caption=ITEM.caption,
     )
 
@@ -38,9 +39,9 @@ def row(shown, *words):
 ITEM = Item(
     name="one_stroke",
     figure=None,
-    title="one stroke, tracked, finds the edges of a woman who walks",
+    title="one stroke, tracked, finds the edges of a woman who walks, and as a layer she leaves no ghost",
     footage=footage,
-    recipes=("one_stroke.json",),
+    recipes=("one_stroke.json", "one_stroke-plain.json"),
     frames=(1, 34),
     still=still,
     caption="Footage: vtest.avi of OpenCV's samples, Apache-2.0",

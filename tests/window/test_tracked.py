@@ -122,7 +122,8 @@ def test_a_panning_shot(tmp_path, backend):
     seen, console = tell("panning_story.py", backend, linked(tmp_path), **given)
     assert "Traceback" not in console
     facts = {name: entry[name] for entry in seen for name in entry}
-    assert facts["panned"] == [["Sharp", "REGION", "Sharp", [1] * 8], ["Long", "NOTHING", "", [1] * 8]]
+    still = [0, 0, 0, 1, 0, 0, 0, 0]
+    assert facts["panned"] == [["Long", "REGION", "Sharp", [1] * 8], ["Sharp", "NOTHING", "", still]]
     assert facts["way"] == ["LOCATION", 6]
     steps = {entry["step"]: crop(tmp_path, entry) for entry in seen if "step" in entry}
     height = steps["2_tracked"].shape[0]
@@ -136,6 +137,28 @@ def test_a_panning_shot(tmp_path, backend):
     row, column = round((1 - y) * apart.shape[0]), round(x * apart.shape[1])
     assert apart[row - 2 : row + 3, column - 2 : column + 3].max() <= 40
     assert apart[:60].max() > 120
+
+
+def test_a_layer(tmp_path):
+    """A walker is a layer by one click: she is sharp, and no ghost of her stands beside her, in the preview and in what
+    is rendered."""
+    given = {"footage": shutil.copy(ROOT / "assets" / "walkers.mp4", tmp_path)}
+    given["packages"] = packages(tmp_path / "packages")
+    seen, console = tell("layer_story.py", "opengl", linked(tmp_path), **given)
+    assert "Traceback" not in console
+    facts = {name: entry[name] for entry in seen for name in entry}
+    assert facts["bars"] == {"Long": [1] * 8, "Sharp": [0, 0, 0, 1, 0, 0, 0, 0]}
+    steps = {entry["step"]: crop(tmp_path, entry) for entry in seen if "step" in entry}
+    height = steps["2_tracked"].shape[0]
+    above = {name: picture[: height * 3 // 4] for name, picture in steps.items()}  # the bar editor
+    assert_alike(above["5_again"], above["3_layer"], tmp_path / "again_difference.png")
+    assert_alike(above["4_undone"], above["2_tracked"], tmp_path / "undone_difference.png")
+    assert np.abs(above["3_layer"] - above["2_tracked"]).max() > 60
+    with open_source(given["footage"]) as source:
+        apart = np.abs(pixels(tmp_path / "final_0070.png") - source.read(69)[..., :3])
+    x, y = facts["stroke"]
+    row, column = round((1 - y) * apart.shape[0]), round(x * apart.shape[1])
+    assert apart[row - 2 : row + 3, column - 2 : column + 3].max() <= 6
 
 
 @pytest.mark.parametrize("backend", ["opengl", "vulkan"])

@@ -1,0 +1,310 @@
+"""How close pictures with layers come to the truth, beside pictures without the switch.
+
+    python scripts/layer_truth.py [--output DIR] [--json FILE] [--size 320x180] [--samples 32]
+
+Blender renders a subject and what lies behind it apart, once: of these the footage is made, the subject over what lies
+behind, as 8-bit sRGB; and the truth, each exposed apart by its own shutter and laid over one another in linear light.
+The subject's matte is its alpha (16 bits), or comes from one stroke through it that moves as it does, along edges.
+What is compared are 8-bit sRGB codes (PSNR, in decibels): in the ring, which is where the subject is in any exposed
+frame and eight pixels around that; and of what was not exposed, but is seen in a frame within reach. Elsewhere,
+pictures have to have the bits that they have without the switch. Needs Blender as a library (bpy).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import dataclass, replace
+from math import cos, pi, sin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from gallery import stills
+from shutter_addon.compute.renderer import Renderer, open_compositor
+from shutter_addon.compute.request import Request
+from shutter_addon.core.frames import light
+from shutter_addon.core.frames.frame_source import FrameSource
+from shutter_addon.core.pixels import following, layering
+from shutter_addon.core.recipes import recipe
+from shutter_addon.media import open_source
+from shutter_addon.media.matte_values import MatteValues
+
+ROOT = Path(__file__).resolve().parents[1]
+COUNT, WINDOW, SHOWN = 33, 13, 16  # frames of the footage, of an exposure, and the shown one, from 0
+WIDE = 16.0  # units of the scene in the picture's width
+RING = 8
+# By the true matte or a stroke, and whether that is a layer.
+WAYS = {"without the switch": (True, False), "layer, true matte": (True, True), "layer, one stroke": (False, True)}
+STROKE = [(-1.1, 0.0), (1.1, 0.0)]  # through the subject, in its own units
+
+
+@dataclass(frozen=True)
+class Scene:
+    """name; pan: how far the camera moves in a frame, speed: the subject in the picture, in units
+    edge: pixels over which the renderer filters; hair: whether the outline has spikes
+    slow: the subject hardly moves, and uncovers what is behind it after the window's end"""
+
+    name: str
+    pan: float = 0.0
+    speed: float = 0.25
+    edge: float = 1.5
+    hair: bool = False
+    slow: bool = False
+
+    def subject(self, frame: int) -> tuple[float, float]:
+        """Where the subject is in the picture."""
+        apart = frame - SHOWN
+        if self.slow:
+            return (0.3 * (apart - WINDOW // 2) if apart > WINDOW // 2 else 0.0), 0.0
+        return self.speed * apart, 0.5 * sin(apart / 4)
+
+
+SCENES = (
+    Scene("still camera, hard edges"),
+    Scene("still camera, soft edges", edge=6.0),
+    Scene("still camera, hair", hair=True),
+    Scene("panning camera, hard edges", pan=0.12),
+    Scene("panning camera, soft edges", pan=0.12, edge=6.0),
+    Scene("panning camera, hair", pan=0.12, hair=True),
+    Scene("still camera, seen once", slow=True),
+)
+
+
+class Memory(FrameSource):
+    """Frames (count, H, W, 4) uint8 in memory."""
+
+    def __init__(self, frames: np.ndarray):
+        self.frames, self.dtype, self.transfer, self.alpha = frames, frames.dtype, "srgb", "opaque"
+        self.count, self.height, self.width = frames.shape[:3]
+
+    def read(self, index: int) -> np.ndarray:
+        return self.frames[index]
+
+
+class MemoryMatte:
+    """Values (count, H, W) in memory, as a file of mattes."""
+
+    fps = None
+
+    def __init__(self, values: np.ndarray):
+        self.values = values
+        self.count, self.height, self.width = values.shape
+
+    def open(self) -> MemoryMatte:
+        return self
+
+    def read(self, index: int) -> np.ndarray:
+        return self.values[min(max(index, 0), self.count - 1)].astype(np.float32)
+
+    def close(self) -> None:
+        pass
+
+
+def render(scene: Scene, folder: Path, size: tuple[int, int], samples: int) -> dict[str, np.ndarray]:
+    """The frames of "subject" and "ground" (COUNT, H, W, 4) float, scene-linear and premultiplied."""
+    from gallery import scenes
+
+    for part in ("subject", "ground"):
+        if not scenes.complete(folder / part, COUNT, ".exr"):
+            _render_part(scenes, scene, part, folder / part, size, samples)
+    return {part: _read(folder / part) for part in ("subject", "ground")}
+
+
+def _read(folder: Path) -> np.ndarray:
+    with open_source(folder / "0001.exr") as source:
+        return np.stack([source.read(index) for index in range(COUNT)]).astype(np.float64)
+
+
+def _render_part(scenes: Any, scene: Scene, part: str, folder: Path, size: tuple[int, int], samples: int) -> None:
+    import bpy
+
+    made = scenes.begin("#000000", 0.0, samples)
+    made.render.resolution_x, made.render.resolution_y = size
+    made.cycles.use_denoising, made.cycles.filter_width = False, scene.edge
+    made.render.film_transparent = True
+    scenes.camera((0, 0, 10), (0, 0, 0), 50)
+    made.camera.data.type, made.camera.data.ortho_scale = "ORTHO", WIDE
+    if part == "ground":
+        ground = scenes.mesh(
+            [(-30, -30, 0), (30, -30, 0), (30, 30, 0), (-30, 30, 0)],
+            [range(4)],
+            (0, 0, 0),
+            _textured("#20406a", "#e8d9a0", 3),
+        )
+        scenes.animate(ground, COUNT, location=lambda frame: (-scene.pan * (frame - 1 - SHOWN), 0, 0))
+    else:
+        points = [(*point, 0.0) for point in _outline(scene.hair)]
+        board = scenes.mesh(points, [range(len(points))], (0, 0, 1), _textured("#c03020", "#f0f0e0", 5))
+        scenes.animate(board, COUNT, location=lambda frame: (*scene.subject(frame - 1), 1))
+    settings = made.render.image_settings
+    folder.mkdir(parents=True, exist_ok=True)
+    settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGBA", "32"
+    for frame in range(1, COUNT + 1):
+        made.frame_set(frame)
+        bpy.ops.render.render()
+        bpy.data.images["Render Result"].save_render(str(folder / f"{frame:04}.exr"), scene=made)
+
+
+def _outline(hair: bool) -> list[tuple[float, float]]:
+    points = []
+    for i in range(360):
+        angle = i * pi / 180
+        reach = 1.9 * (1 + 0.12 * cos(3 * angle)) + (0.5 if hair and i % 6 < 2 else 0.0)
+        points.append((reach * cos(angle), 1.1 * reach * sin(angle)))
+    return points
+
+
+def _textured(dark: str, bright: str, scale: float):
+    """A material that shines by a pattern, and so has no shadow, and throws none."""
+    import bpy
+
+    from gallery import scenes
+
+    material = scenes.glow(dark, 1.0)
+    tree = material.node_tree
+    noise, ramp, place = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("TexNoise", "ValToRGB", "TexCoord"))
+    noise.inputs["Scale"].default_value, noise.inputs["Detail"].default_value = scale, 4.0
+    for element, color, position in zip(ramp.color_ramp.elements, (dark, bright), (0.4, 0.6), strict=True):
+        element.color, element.position = scenes.linear(color), position
+    emission = next(node for node in tree.nodes if isinstance(node, bpy.types.ShaderNodeEmission))
+    tree.links.new(place.outputs["Object"], noise.inputs["Vector"])
+    tree.links.new(noise.outputs[0], ramp.inputs[0])
+    tree.links.new(ramp.outputs[0], emission.inputs["Color"])
+    return material
+
+
+def measure(scene: Scene, parts: dict[str, np.ndarray], folder: Path) -> list[dict]:
+    """A row for each way to take its picture, with the pictures in the folder."""
+    alphas = [parts["subject"][..., 3].clip(0, 1)]
+    grounds = parts["ground"][..., :3]
+    footage = parts["subject"][..., :3] + (1 - alphas[0])[..., None] * grounds
+    frames = np.rint(255 * light.to_encoded(np.concatenate([footage, np.ones_like(footage[..., :1])], -1).clip(0, 1)))
+    source = Memory(frames.astype(np.uint8))
+    true = MemoryMatte(np.rint(alphas[0] * 65535) / 65535)
+    ring = near((alphas[0][window()] > 0).any(axis=0), RING)
+    still, long = np.eye(WINDOW)[WINDOW // 2], np.ones(WINDOW)
+    rows = []
+    for kind, own, rest in (("sharp subject", still, long), ("clean trail", long, still)):
+        truth = exposed(parts["subject"], parts["ground"], own, rest)
+        clear, strips = alphas[0][window()][rest > 0].min(axis=0) < 1 - layering.CLEAR, [truth]
+        for way, (is_true, layer) in WAYS.items():
+            moment = made(scene, source, own, rest, is_true, layer)
+            picture = shown(source, moment, true)
+            strips.append(picture)
+            row = {"scene": scene.name, "picture": kind, "way": way, "ring": decibels(picture, truth, ring & clear)}
+            hidden = ring & ~clear
+            row["plate"] = decibels(picture, truth, hidden) if hidden.sum() > 50 else None
+            if way == "layer, true matte":
+                row["same bits elsewhere"] = bool(np.array_equal(picture[~ring], without_region(source, rest)[~ring]))
+            rows.append(row)
+        sheet = np.concatenate([codes(strip) for strip in strips], axis=1)
+        stills.save(np.rint(sheet).astype(np.uint8), folder / f"{scene.name}, {kind}.png")
+    return rows
+
+
+def window() -> slice:
+    return slice(SHOWN - WINDOW // 2, SHOWN + WINDOW // 2 + 1)
+
+
+def exposed(subject: np.ndarray, ground: np.ndarray, own: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """The truth (H, W, 3), scene-linear: both exposed apart, one over the other."""
+    front = np.einsum("k,khwc->hwc", own / own.sum(), subject[window()])
+    behind = np.einsum("k,khwc->hwc", rest / rest.sum(), ground[window()])
+    return front[..., :3] + (1 - front[..., 3:]) * behind[..., :3]
+
+
+def made(scene: Scene, source: Memory, own, rest, is_true: bool, layer: bool) -> recipe.Recipe:
+    """The recipe of a picture: by the true matte, or by a stroke that moves as the subject does."""
+    shutters = [recipe.Shutter("Rest", bars=list(rest)), recipe.Shutter("Subject", bars=list(own))]
+    common = {"name": "Subject", "shutter": "Subject", "layer": layer}
+    if is_true:
+        region: recipe.AnyRegion = recipe.MatteRegion(**common, kind="matte", path="true")
+    else:
+        high = WIDE * source.height / source.width
+        keys = [
+            recipe.RegionKey(frame=frame + 1.0, location=(x / WIDE, y / high))
+            for frame in range(source.count)
+            for x, y in [scene.subject(frame)]
+        ]
+        stroke = [(0.5 + x / WIDE, 0.5 + y / high) for x, y in STROKE]
+        region = recipe.Region(**common, kind="line", width=0.08, strokes=[stroke], keys=keys)
+    edges = 0.0 if is_true else 1.0
+    return recipe.Recipe(1, WINDOW, shutters, [region], position="center", border=True, edge_aware=edges)
+
+
+def shown(source: Memory, given: recipe.Recipe, matte: MemoryMatte | None) -> np.ndarray:
+    """The picture (H, W, 3), scene-linear, of the shown frame."""
+    effect = given.effect(source.width / source.height, lambda _region: matte)
+    at = following.Shown(SHOWN + 1.0, SHOWN)
+    state = replace(effect.at(at.frame), layers=None)
+
+    def other(frame: float) -> int:
+        return min(max(int(frame) - 1, 0), source.count - 1)
+
+    state = layering.layered(effect, state, at, source, other)
+    renderer = Renderer(open_compositor(), source, MatteValues(source.width, source.height))
+    try:
+        return renderer.picture(Request(SHOWN, state))[..., :3].copy()
+    finally:
+        renderer.close()
+
+
+def without_region(source: Memory, rest: np.ndarray) -> np.ndarray:
+    bare = recipe.Recipe(1, WINDOW, [recipe.Shutter("Rest", bars=list(rest))], position="center")
+    return shown(source, bare, None)
+
+
+def near(mask: np.ndarray, reach: int) -> np.ndarray:
+    """A mask (H, W) and all within so many pixels of it, along rows and columns."""
+    for axis in (0, 1):
+        padded = np.pad(mask, [(reach, reach) if a == axis else (0, 0) for a in (0, 1)])
+        mask = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=axis).any(axis=-1)
+    return mask
+
+
+def codes(picture: np.ndarray) -> np.ndarray:
+    """8-bit sRGB codes, not rounded."""
+    return 255 * light.to_encoded(picture.astype(np.float64).clip(0, 1))
+
+
+def decibels(picture: np.ndarray, truth: np.ndarray, where: np.ndarray) -> float:
+    error = np.rint(codes(picture))[where] - codes(truth)[where]
+    return float(10 * np.log10(255**2 / max((error**2).mean(), 1e-9)))
+
+
+def table(rows: list[dict]) -> str:
+    lines = [
+        "| scene | picture | way | ring, dB | not exposed, dB | same bits elsewhere |",
+        "|---|---|---|--:|--:|---|",
+    ]
+    for row in rows:
+        plate = "" if row["plate"] is None else f"{row['plate']:.1f}"
+        same = {None: "", True: "yes", False: "NO"}[row.get("same bits elsewhere")]
+        lines.append(f"| {row['scene']} | {row['picture']} | {row['way']} | {row['ring']:.1f} | {plate} | {same} |")
+    return "\n".join(lines)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser("layer_truth", description="Layers beside the truth.")
+    parser.add_argument("--output", type=Path, default=ROOT / "out" / "layer_truth", metavar="DIR")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
+    parser.add_argument("--size", default="320x180", help="of the pictures")
+    parser.add_argument("--samples", type=int, default=32, help="of each pixel")
+    arguments = parser.parse_args()
+    size, rows = tuple(map(int, arguments.size.split("x"))), []
+    for number, scene in enumerate(SCENES):
+        parts = render(scene, arguments.output / str(number), size, arguments.samples)
+        rows += measure(scene, parts, arguments.output)
+        print("\n".join(table(rows).splitlines()[-6:]), flush=True)
+    if arguments.json:
+        arguments.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
