@@ -11,7 +11,7 @@ from ..core.pixels.matte_grid import block_means, feathered, fitted
 from .cuts import ShotSource
 
 # Files that stay open though the last mattes were of others.
-_MOST_OPEN = 16
+MOST_OPEN = 16
 
 
 class MatteValues:
@@ -36,7 +36,7 @@ class MatteValues:
     def values(self, mattes: tuple[Matte, ...], index: int, block: int) -> list[tuple[Hashable, np.ndarray]]:
         """As MatteReader.values. EffectError, MediaError: those of a file cannot be had."""
         files = {matte.content.file for matte in mattes if isinstance(matte.content, FileFrame)}
-        if len(self._sources.keys() | files) > _MOST_OPEN:
+        if len(self._sources.keys() | files) > MOST_OPEN:
             for file in self._sources.keys() - files:
                 self._sources.pop(file).close()
         known, self._made = dict(self._made), []

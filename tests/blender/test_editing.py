@@ -522,6 +522,7 @@ def test_only_what_renders_by_its_keys_can_be_keyed(effect):
         *(("ShutterRegion", name) for name in ("location", "rotation", "scale", "confidence")),
         *(("ShutterEffect", name) for name in ("position", "interpolation", "light", "exposure", "edges")),
         *(("ShutterEffect", name) for name in ("aggregate", "border", "stop_at_cuts", "edge_aware", "source_time")),
+        ("ShutterEffect", "decontaminate"),
         *(("ShutterCamera", name) for name in ("location", "rotation", "scale", "influence", "confidence")),
     }
 

@@ -49,15 +49,16 @@ def _composing():
 
 
 def _layers():
-    for cover, levels in itertools.product((1, 2), (True, False)):
-        light = LightFormat(0, False, True, levels, cover)
-        yield composition_of_sums(4, 2, levels, levels, light)
-        for way, stored in itertools.product(_WAYS, ("sums", "tiles")):
+    for cover, stored in ((1, "sums"), (2, "tiles")):
+        light = LightFormat(0, False, True, cover == 2, cover)
+        yield composition_of_sums(4, 2, cover == 1, cover == 2, light)
+        for way in _WAYS:
             yield composition(way, 3, stored, 2, light)
         for sent in ("colours", "planes", "before"):
-            yield window.accumulation(1, sent, levels, levels, cover)
-    for begins, ends, opaque, more in itertools.product((True, False), repeat=4):
-        yield laying.laying_pass(begins, ends, opaque, plain=more, plate=more, levels=ends and more)
+            yield window.accumulation(1, sent, cover == 1, cover == 2, cover)
+    for ends, opaque in itertools.product((True, False), repeat=2):
+        yield laying.laying_pass(True, ends, opaque, plain=not opaque, plate=ends, levels=ends)
+        yield laying.laying_pass(False, ends, opaque, plain=False, plate=False, levels=opaque)
 
 
 def _filling():

@@ -70,7 +70,7 @@ def test_a_texel_is_that_of_the_whole_texture(blender_device):
 
 
 def test_layers_and_what_takes_the_place_of_what_lies_behind(blender_device):
-    from test_layers import COUNT, SHOWN, SIZE, with_layers
+    from test_layered import COUNT, SHOWN, SIZE, with_layers
 
     from shutter_addon.blender.rendering import probe
     from shutter_addon.compute import plates

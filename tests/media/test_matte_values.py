@@ -7,6 +7,7 @@ import pytest
 
 from shutter_addon.core.frames.retiming import StripTiming
 from shutter_addon.core.model.mattes import FileFrame, FileFrames, Matte, Ramp
+from shutter_addon.media import matte_values
 from shutter_addon.media.errors import MediaError
 from shutter_addon.media.matte_values import MatteValues
 
@@ -60,7 +61,8 @@ def test_what_a_strip_of_the_edit_shows():
         assert np.unique(shown(MatteValues(WIDTH, HEIGHT), content.at(frame))[0]) == pytest.approx(expected / 10)
 
 
-def test_what_did_not_change_is_not_made_again():
+def test_what_did_not_change_is_not_made_again(monkeypatch):
+    monkeypatch.setattr(matte_values, "MOST_OPEN", 1)
     values, first, second = MatteValues(WIDTH, HEIGHT), File("a"), File("b")
     kept = shown(values, FileFrame(first), Ramp("radial"), index=2)
     again = shown(values, Ramp("radial"), FileFrame(first), FileFrame(second), index=2)

@@ -15,7 +15,7 @@ from one_stroke_story import FRAME, TRACK, sidebar
 from panning_story import played
 
 SHOWN = range(60, 82)
-SHARP_SUBJECT = TRACK + 52  # where it stands in the sidebar, in pixels below its upper edge
+SHARP_SUBJECT = TRACK + 80  # where it stands in the sidebar, in pixels below its upper edge
 
 
 def clicked():

@@ -140,15 +140,15 @@ def _draw_tools(layout, effect) -> None:
     row = layout.row(align=True)
     row.operator("shutter.panning_shot", icon="CON_FOLLOWTRACK")
     row.operator("shutter.tripod", icon="CON_CAMERASOLVER")
-    row = layout.row(align=True)
-    row.operator("shutter.sharp_subject", icon="RENDERLAYERS")
-    row.operator("shutter.clean_trail", icon="CURVE_PATH")
     if (region := selection.active_region(effect)) is not None:
         row = layout.split(factor=0.4)
         label = row.row()
         label.alignment = "RIGHT"
         label.label(text="Shutter")
         row.operator_menu_enum("shutter.region_assign", "shutter", text=region.shutter, translate=False)
+    row = layout.row(align=True)
+    row.operator("shutter.sharp_subject", icon="RENDERLAYERS")
+    row.operator("shutter.clean_trail", icon="CURVE_PATH")
 
 
 def _draw_bars(layout, active) -> None:

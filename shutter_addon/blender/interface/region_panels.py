@@ -38,7 +38,6 @@ class Regions(WithEffect):
         except EffectError as error:
             sentence(layout, str(error), "ERROR")
         layout.prop(region, "kind")
-        layout.prop(region, "is_layer")
         if region.kind == "LINE":
             layout.prop(region, "width")
         elif region.kind == "RAMP":
