@@ -22,10 +22,10 @@ def still(shots):
     shot, plain = shots
     return stills.sheet(
         row(shot.source, *(f"Frame {frame}" for frame in FRAMES)),
-        row(shot.scribbles, "One stroke, tracked"),
-        row(shot.coefficients, "How much of each shutter"),
-        row(plain.result, "Twelve frames, no layer: she is sharp in her own ghost"),
-        row(shot.result, "A layer: all else is exposed without her"),
+        row(plain.scribbles, "One stroke, tracked"),
+        row(plain.coefficients, "How much of each shutter"),
+        row(plain.result, "Twelve frames"),
+        row(shot.result, "The same, she is a layer"),
         caption=ITEM.caption,
     )
 

@@ -17,7 +17,11 @@ RECENT_BYTES = 256 << 20
 
 
 class RecentFrames:
-    """A source that keeps the frames which were read last: each window of a layer reads all of them."""
+    """A source that keeps the frames which were read last: each window of a layer reads all of them.
+
+    windows: how many of them there are, that have to have room beside one another"""
+
+    windows = 1
 
     def __init__(self, source: FrameSource):
         self.base = source

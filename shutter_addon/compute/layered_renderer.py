@@ -21,9 +21,14 @@ from .layer_frames import RecentFrames, SeparatedFrames, WeightedFrames, linear,
 from .layer_mattes import LayerMattes
 from .laying import Behind, Exposure
 from .request import Coefficients, Request
+from .running_sums import summable
 
 # Frames that every window loads before any goes on: no more than RecentFrames keeps, nor are separated at a time.
 _TOGETHER = 4
+# How often windows are made smaller that have freed one another.
+_TRIES = 4
+# How much of what lies behind layers has to be seen for a plate to be looked for.
+_SEEN = 1 / 1024
 
 
 class LayeredRenderer:
@@ -53,6 +58,7 @@ class LayeredRenderer:
         self._windows: dict[tuple, Any] = {}
         self._loaded: dict[int, tuple] = {}  # by source frame in the windows: Layers.key_at
         self._separations: dict[int, dict] = {}
+        self._crowd = 1  # by how much more room windows have to leave than what they are said to need
         self.kinds: np.ndarray | None = None
 
     @property
@@ -81,6 +87,34 @@ class LayeredRenderer:
         parts = self._parts(request, behind)
         self._forget_changed(layers, parts)
         self._layers = layers
+
+        def composed() -> Any:
+            return self._composed(request, parts, coefficients, positions, shot, plain)
+
+        for _ in range(_TRIES):
+            try:
+                return composed()
+            except ValueError:
+                if all(window.is_open for window in self._windows.values()):
+                    raise
+            # They were freed to make room for one another: smaller ones, or frames that are sent, have room.
+            self.release_windows()
+            self._crowd *= 2
+        return composed()
+
+    def _composed(
+        self,
+        request: Request,
+        parts: dict[tuple[int, bool], Request],
+        coefficients: Coefficients,
+        positions: np.ndarray,
+        shot: range,
+        plain: Callable[[], Any],
+    ) -> Any:
+        count = max(layer for layer, _ in parts) + 1
+        # Where there are no running sums, the picture without layers is composed as well.
+        moves = any(part.state.following is not None for part in parts.values())
+        self.recent.windows = self._crowd * (len(parts) + (1 if moves or not summable(self._source) else 0))
         windows = {name: self._window(name, part, len(request.state.bars)) for name, part in parts.items()}
         self._load(windows, positions, request, shot)
         whole = Coefficients(self._compositor.constant(np.ones(1)), max(self._source.width, self._source.height))
@@ -90,12 +124,10 @@ class LayeredRenderer:
             )
             for name, part in parts.items()
         }
-        exposed = [
-            Exposure(drawn[i, False], drawn.get((i, True), drawn[i, False])) for i in range(-1, len(layers.shutters))
-        ]
+        exposed = [Exposure(drawn[i, False], drawn.get((i, True), drawn[i, False])) for i in range(-1, count)]
         # Running sums have the bits of the picture without layers where none is.
         same = getattr(windows[-1, False], "cover", 0)
-        plate = self._plate(request, exposed[0], shot, lambda: self._gain(behind.state, coefficients))
+        plate = self._plate(request, exposed, shot, lambda: self._gain(parts[-1, False].state, coefficients))
         bottom = Behind(exposed[0], None if same else plain(), plate)
         return self._laying.lay(bottom, exposed[1:], request.levels)
 
@@ -178,14 +210,13 @@ class LayeredRenderer:
         for frame in [frame for frame in self._loaded if abs(frame - layers.first) > 4096]:
             del self._loaded[frame]
 
-    def _plate(self, request: Request, bottom: Exposure, shot: range, gain: Callable[[], np.ndarray]) -> Any:
+    def _plate(self, request: Request, exposed: list[Exposure], shot: range, gain: Callable[[], np.ndarray]) -> Any:
         """See Behind.plate; gain: gives how bright (H, W) its pixels are."""
-        layers, options = request.state.layers, request.state.options
-        if layers is None or (self._laying.least(bottom) >= layering.CLEAR).all():
-            self.kinds = None
+        layers, (bottom, *_) = request.state.layers, exposed
+        self.kinds = None
+        if layers is None or (holes := self._holes(exposed)) is None:
             return None
-        holes = self._laying.shares(bottom) < layering.CLEAR
-        reach = options.plate_reach
+        reach = request.state.options.plate_reach
         near = range(max(request.index - reach, shot.start), min(request.index + reach + 1, shot.stop))
         picture, self.kinds = plates.plate(
             holes,
@@ -200,6 +231,15 @@ class LayeredRenderer:
             known = self.kinds != plates.FILLED
             picture = plates.filled(np.where((self.kinds == plates.OPEN)[..., None], around, picture), known)
         return self._laying.plate(picture)
+
+    def _holes(self, exposed: list[Exposure]) -> np.ndarray | None:
+        """Where (H, W) too little of what lies behind is exposed, and it is seen; None: nowhere."""
+        bottom, *own = exposed
+        if (self._laying.least(bottom) >= layering.CLEAR).all():
+            return None
+        holes = self._laying.shares(bottom) < layering.CLEAR
+        holes &= layering.behind([self._laying.shares(layer) for layer in own]) > _SEEN
+        return holes if holes.any() else None
 
     def _gain(self, state: FrameState, coefficients: Coefficients) -> np.ndarray:
         """The brightness (H, W) or (1, 1) of what lies behind."""

@@ -115,7 +115,9 @@ class Window:
         self.tops = range(0, self.source.height, self.rows)
 
     def _check(self, size: int) -> None:
-        """NoDeviceError: a window of so many bytes leaves too little of the device's memory."""
+        """NoDeviceError: a window of so many bytes, with as large ones of the same picture, leaves too little of the
+        device's memory."""
+        size *= getattr(self.source, "windows", 1)
         if size + beside(self.source, self.shutters) > self.device.budget.limit:
             raise NoDeviceError("over the budget")
 

@@ -7,7 +7,8 @@ import pytest
 from test_composition import LEVEL, Footage, device, footage, state  # noqa: F401 – a fixture
 
 from shutter_addon.compute import layer_frames, layer_mattes, window
-from shutter_addon.compute.renderer import Renderer
+from shutter_addon.compute.gpu import GPUCompositor
+from shutter_addon.compute.renderer import Renderer, open_compositor, open_gl
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.model.frame_state import Following, FrameState, Layers, Options
@@ -15,6 +16,7 @@ from shutter_addon.core.model.mattes import FileFrame, Matte
 from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.core.pixels import compositor, layering
 from shutter_addon.core.pixels.decontamination import separated
+from shutter_addon.devices.budget import Budget
 from shutter_addon.media.matte_values import MatteValues
 
 SIZE, COUNT, SHOWN = (37, 23), 20, 9
@@ -277,11 +279,12 @@ def test_what_was_not_exposed_comes_from_the_nearest_clear_frame(device):  # noq
     renderer = Renderer(device, source, MatteValues(*SIZE))
     picture = renderer.picture(Request(SHOWN, moment))
     inside = matte[SHOWN] > 0
-    assert np.array_equal(renderer.holes == 1, inside)
+    assert renderer.holes is None  # nothing is seen of them
     assert_near(picture, source.linear()[SHOWN])
     # Of what is not quite covered, the plate makes up what lacks.
     half = dataclasses.replace(moment, layers=dataclasses.replace(moment.layers, opacities=(0.99,)))
     picture = renderer.picture(Request(SHOWN, half))
+    assert np.array_equal(renderer.holes == 1, inside)
     behind = (0.01 * source.linear()[SHOWN] + (layering.CLEAR - 0.01) * source.linear()[-1]) / layering.CLEAR
     expected = 0.99 * source.linear()[SHOWN] + 0.01 * behind
     assert_near(picture, np.where(inside[..., None], expected, source.linear()[SHOWN]))
@@ -315,7 +318,7 @@ def test_a_plate_is_laid_by_the_cameras_motion(device):  # noqa: F811
     apart = np.arange(COUNT) - SHOWN
     camera = Following(0, np.ones((COUNT, 1), complex), -2.0 * apart[:, None] + 0j)
     bars = np.eye(3, 4)[[0, 0, 0]]
-    moment, _ = with_layers(FrameState(Options(4), bars), matte, opacities=(0.999,), camera=camera)
+    moment, _ = with_layers(FrameState(Options(4), bars), matte, opacities=(0.99,), camera=camera)
     renderer = Renderer(device, source, MatteValues(*SIZE))
     picture = renderer.picture(Request(SHOWN, moment))
     assert np.array_equal(renderer.holes == 1, matte[SHOWN] > 0)
@@ -332,6 +335,27 @@ def test_without_room_for_sums_the_frames_are_read(device, monkeypatch):  # noqa
     assert_near(picture, expected, enough)
     without = Renderer(device, source).picture(Request(SHOWN, plain(moment)))
     assert np.array_equal(picture[~covered], without[~covered])
+
+
+@pytest.mark.parametrize("kilobytes", [150, 220, 260, 300, 400, 2000])
+@pytest.mark.parametrize("follows", [False, True])
+def test_windows_have_room_beside_one_another_or_frames_are_sent(kilobytes, follows):
+    """Each of them alone would fit."""
+    compositor = GPUCompositor(open_gl(Budget(kilobytes << 10)))
+    rng, matte = np.random.default_rng(14), discs()
+    source, moment = footage(rng, COUNT, SIZE), drawn_state(rng, window=6)
+    if follows:
+        shifts = (np.arange(COUNT) - SHOWN + 0j)[:, None] * [1, 0, 0]
+        moment = dataclasses.replace(moment, following=Following(0, np.ones((COUNT, 3), complex), shifts))
+    moment, _ = with_layers(moment, matte)
+    renderer = Renderer(compositor, source, MatteValues(*SIZE))
+    roomy = Renderer(open_compositor(), source, MatteValues(*SIZE))
+    for index in (SHOWN, SHOWN + 1, SHOWN):
+        picture, expected = (each.picture(Request(index, moment)) for each in (renderer, roomy))
+        assert_near(picture, expected.astype(float))
+    renderer.close()
+    roomy.close()
+    compositor.release()
 
 
 def _no_room(*_):
