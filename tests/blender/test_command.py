@@ -170,7 +170,7 @@ def test_chunks_and_order_change_no_bit(command, noise, tmp_path, layer):
     rng = np.random.default_rng(2)
     moving = line("S1", (0.2, 0.2), (0.4, 0.6), width=0.1)
     moving |= {"keys": [{"frame": 1}, {"frame": 12, "location": [0.4, 0.1], "rotation": 40}], "layer": layer}
-    edges = {"edge_aware": 1.0, "border": True} if layer else {}
+    edges = {"edge_aware": 1.0, "border": True, "aggregate": 4} if layer else {}
     data = recipe(6, *rng.random((2, 6)), regions=[line("S0", (0.9, 0.1), (0.9, 0.9)), moving], **edges)
     command(first, "--output", tmp_path / "whole", recipe=data)
     for chunk in ("9:12", "5:8", "3", "1:2", "4"):
