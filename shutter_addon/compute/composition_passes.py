@@ -34,7 +34,7 @@ class LightFormat:
     premultiplied: whether the frames' colours are
     encoded: whether the sums are of encoded light (Options.light)
     levels: whether the picture is of levels, not scene-linear
-    cover: of window.WeightedSums"""
+    cover: of weighted_window.WeightedSums"""
 
     decode: int
     premultiplied: bool

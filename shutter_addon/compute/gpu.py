@@ -34,7 +34,8 @@ from .matting import Matting
 from .mixing import Mixing
 from .request import Coefficients, Request
 from .tables import moved_tables, padded, table
-from .window import BLOCK, PackedFrames, Sums, WholeFrames, Window, decoding, open_window
+from .weighted_window import open_any
+from .window import BLOCK, PackedFrames, Sums, WholeFrames, Window, decoding
 
 
 def _extent(window: Sums) -> dict[str, Any]:
@@ -188,7 +189,7 @@ class GPUCompositor:
     def window(self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4) -> Window:
         """A window of `capacity` frames on the device; moved: pictures of it have FrameState.following; shutters: of
         these pictures."""
-        return open_window(self.device, source, capacity, moved, shutters)
+        return open_any(self.device, source, capacity, moved, shutters)
 
     def solver(self) -> Solver:
         """A new solver. Its solution is valid until its next solve."""

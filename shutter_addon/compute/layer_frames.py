@@ -76,7 +76,7 @@ class WeightedFrames:
     weight: gives the weights (H, W) float32, 0 to 1, of a frame
     rest: whether the weights are what layers leave: then running sums hold what these take
     alone: the weights themselves, as alpha, without any colour
-    is_summable: whether running sums can be made of them (window.WeightedSums)
+    is_summable: whether running sums can be made of them (weighted_window.WeightedSums)
     """
 
     alpha, transfer = "premultiplied", "linear"

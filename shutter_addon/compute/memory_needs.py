@@ -10,7 +10,8 @@ from ..devices.device import Device, Holder, NoDeviceError
 from ..devices.paging import TEXEL_BYTES
 from . import cpu_window
 from .layer_frames import WeightedFrames
-from .window import beside, open_window
+from .weighted_window import open_any
+from .window import beside
 
 
 class Needs(NamedTuple):
@@ -57,7 +58,7 @@ def of_window(device: Device, source: FrameSource, capacity: int, moved: bool, s
     NoDeviceError: not even a picture has room on the device."""
     counting = _CountingDevice(device)
     windows = [
-        open_window(counting, frames, capacity, moved, shutters)  # type: ignore[arg-type]  # it makes textures alone
+        open_any(counting, frames, capacity, moved, shutters)  # type: ignore[arg-type]  # it makes textures alone
         for frames in _read(source, layers)
     ]
     gpu = min(counting.budget.used + beside(source, shutters), counting.budget.limit)

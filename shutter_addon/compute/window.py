@@ -16,7 +16,6 @@ from ..devices import llvmpipe
 from ..devices.device import Device, NoDeviceError, Texture
 from ..devices.paging import TEXEL_BYTES
 from ..devices.passes import Pass, read_pass
-from .layer_frames import WeightedFrames
 from .running_sums import RunningSums, summable
 
 # Bytes of a texture array, at most.
@@ -38,8 +37,6 @@ def open_window(device: Device, source: FrameSource, capacity: int, moved: bool,
     """The fastest window of `capacity` frames: running sums if the source is `summable` and the device has room for
     them, else the frames. moved: what is seen of a frame lies elsewhere in it, so it has to be whole. shutters: those
     whose coefficients have to have room beside it."""
-    if isinstance(source, WeightedFrames):
-        return _of_weighted(device, source, capacity, moved, shutters)
     if moved:
         return (PackedFrames if summable(source) else WholeFrames)(device, source, capacity, shutters)
     if summable(source):
@@ -48,15 +45,6 @@ def open_window(device: Device, source: FrameSource, capacity: int, moved: bool,
         except NoDeviceError:
             pass
     return Frames(device, source, capacity, shutters)
-
-
-def _of_weighted(device: Device, source: WeightedFrames, capacity: int, moved: bool, shutters: int) -> Window:
-    if not moved and source.is_summable:
-        try:
-            return WeightedSums(device, source, capacity, shutters)
-        except NoDeviceError:
-            pass
-    return (WholeFrames if moved else Frames)(device, source, capacity, shutters)  # type: ignore[arg-type]
 
 
 def beside(source: FrameSource, shutters: int) -> int:
@@ -483,33 +471,3 @@ class Sums(RunningSums, Window):
         RunningSums.release(self)
         Window.release(self)
         self._free_sent()
-
-
-class WeightedSums(Sums):
-    """A window of running sums of opaque 8-bit frames that are weighted pixel by pixel, and of their weights, in
-    textures rgba32ui: four fields of 32 bits. Where the weights are 1, its pictures have the bits of Sums."""
-
-    def __init__(self, device: Device, source: WeightedFrames, capacity: int, shutters: int = 1):
-        self.cover, self._weight = 2 if source.rest else 1, source.weight
-        self._weights: Texture | None = None
-        super().__init__(device, source.base, capacity, shutters)
-        try:
-            self._weights = device.texture(source.width, source.height, 1, "r32f")
-        except NoDeviceError:
-            self.release()
-            raise
-
-    def _send(self, index: int) -> tuple[str, dict[str, Any]]:
-        if self._weights is None:
-            raise ValueError("the window was released")
-        weight = self._weight(index)
-        self.device.write(self._weights, np.ascontiguousarray(weight[..., None]))
-        sent, given = super()._send(index)
-        given["textures"] = given.get("textures", {}) | {"weights": self._weights}
-        return sent, given
-
-    def release(self) -> None:
-        super().release()
-        if self._weights is not None:
-            self._weights.release()
-            self._weights = None

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from test_composition import LEVEL, Footage, device, footage, state  # noqa: F401 – a fixture
 
-from shutter_addon.compute import layer_frames, layer_mattes, window
+from shutter_addon.compute import layer_frames, layer_mattes, weighted_window
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor, open_gl
 from shutter_addon.compute.request import Request
@@ -17,6 +17,7 @@ from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.core.pixels import compositor, layering
 from shutter_addon.core.pixels.decontamination import separated
 from shutter_addon.devices.budget import Budget
+from shutter_addon.devices.device import NoDeviceError
 from shutter_addon.media.matte_values import MatteValues
 
 SIZE, COUNT, SHOWN = (37, 23), 20, 9
@@ -326,7 +327,7 @@ def test_a_plate_is_laid_by_the_cameras_motion(device):  # noqa: F811
 
 
 def test_without_room_for_sums_the_frames_are_read(device, monkeypatch):  # noqa: F811
-    monkeypatch.setattr(window, "WeightedSums", _no_room)
+    monkeypatch.setattr(weighted_window, "WeightedSums", _no_room)
     rng, matte = np.random.default_rng(12), discs()
     source = footage(rng, COUNT, SIZE)
     moment, _ = with_layers(drawn_state(rng, window=6), matte)
@@ -359,7 +360,7 @@ def test_windows_have_room_beside_one_another_or_frames_are_sent(kilobytes, foll
 
 
 def _no_room(*_):
-    raise window.NoDeviceError("no room")
+    raise NoDeviceError("no room")
 
 
 def test_mattes_and_frames_are_kept_within_their_budgets(monkeypatch):

@@ -10,6 +10,7 @@ from shutter_addon.compute import memory_needs
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.layer_frames import WeightedFrames
 from shutter_addon.compute.renderer import open_gl
+from shutter_addon.compute.weighted_window import open_any
 from shutter_addon.compute.window import beside, open_window
 from shutter_addon.core.model.frame_state import Options
 from shutter_addon.devices.budget import Budget
@@ -53,7 +54,7 @@ def test_of_layers_on_a_gpu(dtype, alpha):
     if alpha != "opaque":
         weighted += [WeightedFrames(pictures, None, alone=True) for _ in range(3)] + [pictures]
     with open_gl(Budget(1 << 30)).current() as roomy:
-        windows = [open_window(roomy, frames, WINDOW, False, SHUTTERS) for frames in weighted]
+        windows = [open_any(roomy, frames, WINDOW, False, SHUTTERS) for frames in weighted]
         taken = roomy.budget.used
         for window in windows:
             window.release()
