@@ -72,8 +72,7 @@ def mask(folder: Path) -> Path:
 
 
 def drawn() -> recipe.Recipe:
-    """One stroke on the scooter at the shown frame, and one shutter that follows it: what Panning Shot sets up, before
-    it tracks."""
+    """One stroke on the scooter at the shown frame, not tracked yet, and a shutter that follows it; no layer."""
     return recipe.Recipe(
         1,
         WINDOW,
