@@ -221,6 +221,32 @@ def test_undo_takes_back_what_handlers_did_after_the_step_before(bpy, edit, add,
         assert (curves(edit), drawings(edit), [effect.start for effect in edit.virtual_shutter.effects]) == done
 
 
+def test_a_renamed_drawing_stays_its_regions_when_steps_are_undone(bpy, edit, add):
+    """Blender comes to handlers after the undo push: the step of the rename has the region's old name for it."""
+    from shutter_addon.blender import handlers
+
+    add(1)
+    update(bpy)
+    layer = edit.virtual_shutter.effects[0].scene.annotation.layers[0]
+    old = layer.info
+    bpy.ops.ed.undo_push(message="add")
+    handler = handlers.HANDLERS["depsgraph_update_post"]
+    bpy.app.handlers.depsgraph_update_post.remove(handler)
+    layer.info = "Renamed"
+    bpy.ops.ed.undo_push(message="rename")
+    bpy.app.handlers.depsgraph_update_post.append(handler)
+    handler()
+    edit.frame_end = 400
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="other")
+    new = "Renamed"
+    for step, name in [("undo", new), ("undo", old), ("redo", new), ("redo", new), ("undo", new)]:
+        getattr(bpy.ops.ed, step)()
+        update(bpy)
+        effect = bpy.context.scene.virtual_shutter.effects[0]
+        assert (effect.regions[0].layer, effect.scene.annotation.layers[0].info) == (name, name), step
+
+
 @pytest.mark.parametrize("cut", [True, False])
 def test_pasted_strips_have_their_effect(bpy, edit, add, images, render, cut):
     """Blender's clipboard does not hold the scenes that strips show."""

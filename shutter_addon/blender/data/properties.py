@@ -281,6 +281,8 @@ def register():
     bpy.types.ID.virtual_shutter_made = StringProperty(options={"HIDDEN"})
     # The effect's start that an annotation's drawings are for.
     bpy.types.Annotation.virtual_shutter_start = FloatProperty(options={"HIDDEN"})
+    # The names of its drawings that regions go by, a line each.
+    bpy.types.Annotation.virtual_shutter_names = StringProperty(options={"HIDDEN"})
 
 
 def unregister():
@@ -288,4 +290,5 @@ def unregister():
         delattr(bpy.types.Strip, f"virtual_shutter_{name}")
     del bpy.types.ID.virtual_shutter_made
     del bpy.types.Annotation.virtual_shutter_start
+    del bpy.types.Annotation.virtual_shutter_names
     del bpy.types.Scene.virtual_shutter

@@ -6,13 +6,11 @@ import bpy
 
 from ..data import annotations, fcurves, requirements, strips, undo
 from ..rendering import invalidation, render_job, sessions
-from . import copies, match_source, shown_annotations, undelete
+from . import copies, match_source, renamed_drawings, shown_annotations, undelete
 from .add_effect import add_camera
 
 EFFECTS = "virtual_shutter.effects"
 _OLDER_NAMES = "Shutter ", "Scribbles ", "Verschluss ", "Markierungen "  # of annotations made for effects
-
-_layer_names: dict[int, list[str]] = {}  # by session_uid of an annotation, as they were at the last update
 
 
 def update(updated=None) -> None:
@@ -30,7 +28,8 @@ def update(updated=None) -> None:
     for scene in scenes:
         _remove_effects(scene)
         _unmute_sources(scene)
-    _follow_layers(scenes)
+    for scene in scenes:
+        renamed_drawings.follow(scene)
     _remove_scenes(updated)
     _identify()
     _remove_left()
@@ -91,7 +90,7 @@ def follow_sources() -> None:
 
 def forget() -> None:
     """Forgets what the annotations and the media of a file were, before another one is loaded."""
-    _layer_names.clear()
+    renamed_drawings.forget()
     match_source.forget()
     shown_annotations.forget()
 
@@ -231,21 +230,3 @@ def _claim(made, identity: str) -> None:
     """What was made for an effect, and copied with it, is marked as its own."""
     if made is not None and made.library is None and made.virtual_shutter_made not in ("", annotations.USERS, identity):
         made.virtual_shutter_made = identity
-
-
-def _follow_layers(scenes) -> None:
-    """Regions keep their layer when it is renamed: one name among the same number of layers is another."""
-    known = dict(_layer_names)
-    _layer_names.clear()  # of annotations that are gone
-    for effect in [effect for scene in scenes for effect in scene.virtual_shutter.effects]:
-        annotation = effect.scene.annotation
-        if annotation is None:
-            continue
-        names = [layer.info for layer in annotation.layers]
-        before = known.get(annotation.session_uid, names)
-        _layer_names[annotation.session_uid] = names
-        changed = [(old, new) for old, new in zip(before, names, strict=False) if old != new]
-        if len(before) == len(names) and len(changed) == 1:
-            for region in effect.regions:
-                if region.layer == changed[0][0]:
-                    region.layer = changed[0][1]
