@@ -68,6 +68,7 @@ def _before_undo(*_):
 @persistent
 def _after_undo(*_):
     revision.changed()
+    lifecycle.find_scenes()
     track_region.data_replaced()
     _drop_frames()
     sessions.drop_removed()

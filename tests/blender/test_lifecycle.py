@@ -10,7 +10,7 @@ from shutter_addon.core.recipes import recipe_file
 
 REGION = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
 MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
-REMEMBER = "lifecycle", "invalidation"  # what modules know of an effect's annotation, and of its scene
+REMEMBER = "renamed_drawings", "invalidation"  # what modules know of an effect's annotation, and of its scene
 KEYED = recipe(4, {1: [1, 0, 0, 0], 9: [0, 0, 0, 1]}, [1, 1, 1, 1], regions=[MOVED])
 
 
@@ -219,6 +219,26 @@ def test_undo_takes_back_what_handlers_did_after_the_step_before(bpy, edit, add,
         edit = bpy.context.scene
         update(bpy)
         assert (curves(edit), drawings(edit), [effect.start for effect in edit.virtual_shutter.effects]) == done
+
+
+def test_effects_find_their_scene_when_undo_gives_them_another(bpy, edit, add, tmp_path):
+    """Blender does, now and then, if the scene had been removed: of the pointer's old address by chance."""
+    add(1)
+    path = str(tmp_path / "edit.blend")
+    for _ in range(40):
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+        update(bpy)
+        bpy.ops.ed.undo_push(message="before")
+        edit = bpy.context.scene
+        edit.sequence_editor.strips.remove(scene_strips(edit)[0])
+        update(bpy)
+        bpy.ops.ed.undo_push(message="delete")
+        assert not edit.virtual_shutter.effects
+        bpy.ops.ed.undo()
+        update(bpy)
+        edit = bpy.context.scene
+        assert [effect.scene for effect in edit.virtual_shutter.effects] == [scene_strips(edit)[0].scene]
 
 
 def test_a_renamed_drawing_stays_its_regions_when_steps_are_undone(bpy, edit, add):
@@ -449,7 +469,7 @@ def test_the_extension_leaves_nothing_kept(bpy, edit, add):
     undelete.keep(edit, edit.virtual_shutter.effects[0])
     update(bpy)
     annotation, identity = scene.annotation.session_uid, scene.virtual_shutter.identity
-    assert "lifecycle" in remembering(annotation)
+    assert "renamed_drawings" in remembering(annotation)
     assert undelete.restore(edit, identity) is not None
     handlers.unregister()
     try:

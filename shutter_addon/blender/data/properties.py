@@ -150,6 +150,8 @@ class Shutter(PropertyGroup):
 class ShutterEffect(PropertyGroup):
     name: StringProperty(name="Name", description="Name of the effect", default="Shutter")
     scene: PointerProperty(name="Scene", description="Scene that the effect's strips show", type=bpy.types.Scene)
+    # Its scene's. Undo may bring the effect back with a pointer to another scene, if its own had been removed.
+    identity: StringProperty(options={"HIDDEN"})
     source: StringProperty(name="Source", description="Identity of the source strip")
     start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts", options=UNKEYED)
     window: IntProperty(

@@ -42,7 +42,7 @@ def add_effect(scene, source):
         source.virtual_shutter_source,
         origin(strip),
     )
-    strip.virtual_shutter_effect = effect_scene.virtual_shutter.identity
+    strip.virtual_shutter_effect = effect.identity = effect_scene.virtual_shutter.identity
     scene.render.sequencer_gl_preview = "RENDERED"  # or the preview shows the effect's empty scene
     strip.color_tag = _COLOR
     connect(scene, [strip, source, *source.connections])

@@ -20,6 +20,7 @@ def update(updated=None) -> None:
     if bpy.app.is_job_running("RENDER"):
         return
     scenes = _local_scenes()
+    find_scenes()
     for scene in scenes:
         _reconnect(scene)
     mend()
@@ -28,8 +29,7 @@ def update(updated=None) -> None:
     for scene in scenes:
         _remove_effects(scene)
         _unmute_sources(scene)
-    for scene in scenes:
-        renamed_drawings.follow(scene)
+    renamed_drawings.follow(scenes)
     _remove_scenes(updated)
     _identify()
     _remove_left()
@@ -37,6 +37,15 @@ def update(updated=None) -> None:
         follow_sources()
     for scene in _local_scenes():
         invalidation.invalidate_changed(scene)
+
+
+def find_scenes() -> None:
+    """Gives effects their own scene again that undo brought back with another one."""
+    for effect in [effect for scene in _local_scenes() for effect in scene.virtual_shutter.effects]:
+        if effect.identity and (effect.scene is None or effect.scene.virtual_shutter.identity != effect.identity):
+            own = _scene_of(effect.identity)
+            if own is not None:
+                effect.scene = own
 
 
 def mend() -> None:
@@ -213,7 +222,7 @@ def _left(collection, used) -> list:
 
 
 def _identify() -> None:
-    """Every effect scene has an identity of its own, and its strips carry it."""
+    """Every effect scene has an identity of its own, and its strips and its effect carry it."""
     taken = set()
     for effect_scene in _effect_scenes():
         if effect_scene.virtual_shutter.identity in taken:
@@ -224,6 +233,9 @@ def _identify() -> None:
         for strip in strips.effect_strips(scene):
             if strip.virtual_shutter_effect != strip.scene.virtual_shutter.identity:
                 strip.virtual_shutter_effect = strip.scene.virtual_shutter.identity
+        for effect in scene.virtual_shutter.effects:
+            if effect.scene is not None and effect.identity != effect.scene.virtual_shutter.identity:
+                effect.identity = effect.scene.virtual_shutter.identity
 
 
 def _claim(made, identity: str) -> None:

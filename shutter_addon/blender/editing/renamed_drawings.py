@@ -3,20 +3,22 @@
 _names: dict[int, list[str]] = {}  # of layers, by session_uid of their annotation, as they were at the last update
 
 
-def follow(scene) -> None:
-    """Gives the regions of a scene's effects the new names of their drawings.
+def follow(scenes) -> None:
+    """Gives the regions of effects in all these scenes the new names of their drawings.
 
     Handlers come after the undo push of the user's step. Undoing the step after a rename brings back a region with
     the old name and an annotation that has the new one: so the annotation carries the names that its regions go by.
     Undoing the rename itself leaves the region as it is now: that the names before were others is told by memory.
     """
-    for effect in scene.virtual_shutter.effects:
+    before = dict(_names)
+    _names.clear()  # of annotations that are gone
+    for effect in [effect for scene in scenes for effect in scene.virtual_shutter.effects]:
         annotation = effect.scene.annotation
         if annotation is None or annotation.library is not None:
             continue
         names = [layer.info for layer in annotation.layers]
         _rename(effect, annotation.virtual_shutter_names.splitlines(), names)
-        _rename(effect, _names.get(annotation.session_uid, names), names)
+        _rename(effect, before.get(annotation.session_uid, names), names)
         _names[annotation.session_uid] = names
         if annotation.virtual_shutter_names != (known := "\n".join(names)):
             annotation.virtual_shutter_names = known
