@@ -9,7 +9,7 @@ from bpy.app.handlers import persistent
 
 from ..core import revision
 from .data import inbetween_settings, preview_areas, source_media, strips, versions
-from .editing import copies, lifecycle, shown_annotations, track_region, undelete
+from .editing import copies, lifecycle, shown_annotations, track_region, undelete, undo_repair
 from .interface import inbetween_operators, sharp_frame
 from .rendering import invalidation, job_snapshots, render_job, sessions
 from .rendering.render_job import Where
@@ -68,7 +68,7 @@ def _before_undo(*_):
 @persistent
 def _after_undo(*_):
     revision.changed()
-    lifecycle.find_scenes()
+    undo_repair.find_lost()
     track_region.data_replaced()
     _drop_frames()
     sessions.drop_removed()

@@ -20,7 +20,6 @@ def update(updated=None) -> None:
     if bpy.app.is_job_running("RENDER"):
         return
     scenes = _local_scenes()
-    find_scenes()
     for scene in scenes:
         _reconnect(scene)
     mend()
@@ -37,15 +36,6 @@ def update(updated=None) -> None:
         follow_sources()
     for scene in _local_scenes():
         invalidation.invalidate_changed(scene)
-
-
-def find_scenes() -> None:
-    """Gives effects their own scene again that undo brought back with another one."""
-    for effect in [effect for scene in _local_scenes() for effect in scene.virtual_shutter.effects]:
-        if effect.identity and (effect.scene is None or effect.scene.virtual_shutter.identity != effect.identity):
-            own = _scene_of(effect.identity)
-            if own is not None:
-                effect.scene = own
 
 
 def mend() -> None:
