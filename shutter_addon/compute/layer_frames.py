@@ -54,10 +54,10 @@ class RecentFrames:
         self._kept.clear()
 
 
-class SeparatedFrames:
-    """An opaque source whose mixed pixels have the colours of a layer, or of what lies behind it.
+class LayerFrames:
+    """A source of what its frames show of a layer, or of what lies behind all.
 
-    source: what is read; frame: gives a frame (H, W, 4) of these, in the source's samples"""
+    frame: gives a frame (H, W, 4), in the source's samples"""
 
     def __init__(self, source: Any, frame: Callable[[int], np.ndarray]):
         self.base, self.read = source, frame

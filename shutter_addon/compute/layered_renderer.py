@@ -10,21 +10,18 @@ from typing import Any
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import Planes, as_rgba
 from ..core.model.frame_state import FrameState, Layers
 from ..core.model.mattes import MatteReader
 from ..core.pixels import compositor as reference
 from ..core.pixels import layering
-from ..core.pixels.decontamination import separated
 from . import plates
-from .layer_frames import RecentFrames, SeparatedFrames, WeightedFrames, linear, with_colors
+from .layer_colors import TOGETHER, LayerColors
+from .layer_frames import RecentFrames, WeightedFrames
 from .layer_mattes import LayerMattes
 from .laying import Behind, Exposure
 from .request import Coefficients, Request
 from .running_sums import summable
 
-# Frames that every window loads before any goes on: no more than RecentFrames keeps, nor are separated at a time.
-_TOGETHER = 4
 # How often windows are made smaller that have freed one another.
 _TRIES = 4
 # How much of what lies behind layers has to be seen for a plate to be looked for.
@@ -37,7 +34,6 @@ class LayeredRenderer:
     solve: gives coefficients (N, h, w) float32 of a state (Layers.scribbles) at a frame of a source
     noted: gives a source whose frames are noted for the guides of the diffusion
     recent: the source, of which it keeps the frames that were read last
-    kinds: of the last picture's pixels (plates), where some lacked what lies behind
     """
 
     def __init__(
@@ -53,13 +49,27 @@ class LayeredRenderer:
         self._noted = noted(self.recent)
         size = source.width, source.height
         self.mattes = LayerMattes(size, lambda state, frame: solve(self.recent, state, frame), mattes)
+        self._colors = LayerColors(self._noted, self.recent, self.mattes)
         self._laying = compositor.laying()
         self._layers: Layers | None = None
         self._windows: dict[tuple, Any] = {}
         self._loaded: dict[int, tuple] = {}  # by source frame in the windows: Layers.key_at
-        self._separations: dict[int, dict] = {}
         self._crowd = 1  # by how much more room windows have to leave than what they are said to need
-        self.kinds: np.ndarray | None = None
+        self._kinds: np.ndarray | None = None  # of the last picture's pixels, where some lacked what lies behind
+        self._exposed: list[Exposure] = []
+
+    @property
+    def holes(self) -> np.ndarray | None:
+        """Of the last picture, the kinds (H, W) uint8 of its pixels (plates); None: all behind layers was exposed."""
+        layers = self._layers
+        if not self._exposed or layers is None or layers.camera is None:
+            return self._kinds
+        # Exposed frames have been given what they lack; how much tells what it counts less.
+        lacking = (1 - layering.CLEAR) * (1 - plates.TAKEN_SHARE)
+        taken = self._lacks(self._exposed, 1 - lacking)
+        if taken is None or self._kinds is None:
+            return None if taken is None else np.where(taken, plates.TAKEN, plates.OPEN).astype(np.uint8)
+        return np.where(taken & (self._kinds == plates.OPEN), np.uint8(plates.TAKEN), self._kinds)
 
     @property
     def held(self) -> Collection[int]:
@@ -85,6 +95,7 @@ class LayeredRenderer:
         if layers is None:
             raise ValueError("there are no layers")
         parts = self._parts(request, behind)
+        self._colors.begin(layers, behind.state.options, shot)
         self._forget_changed(layers, parts)
         self._layers = layers
 
@@ -127,6 +138,7 @@ class LayeredRenderer:
         exposed = [Exposure(drawn[i, False], drawn.get((i, True), drawn[i, False])) for i in range(-1, count)]
         # Running sums have the bits of the picture without layers where none is.
         same = getattr(windows[-1, False], "cover", 0)
+        self._exposed = exposed
         plate = self._plate(request, exposed, shot, lambda: self._gain(parts[-1, False].state, coefficients))
         bottom = Behind(exposed[0], None if same else plain(), plate)
         return self._laying.lay(bottom, exposed[1:], request.levels)
@@ -143,58 +155,23 @@ class LayeredRenderer:
         return parts
 
     def _window(self, name: tuple[int, bool], part: Request, shutters: int) -> Any:
-        (layer, alone), moved = name, part.state.following is not None
-        key = layer, alone, moved, part.state.options.window, part.state.options.decontaminate
+        (layer, alone), moved, options = name, part.state.following is not None, part.state.options
+        key = layer, alone, moved, options.window, self._colors.changes(layer)
         window = self._windows.get(key)
         if window is None or not window.is_open:
             for other in [other for other in self._windows if other[:2] == name]:
                 self._windows.pop(other).release()
-            weighted = WeightedFrames(self._colors(layer, part), self._weight(layer), rest=layer < 0, alone=alone)
-            window = self._windows[key] = self._compositor.window(weighted, part.state.options.window, moved, shutters)
+            weighted = WeightedFrames(
+                self._colors.frames(layer), self._colors.weights(layer), rest=layer < 0, alone=alone
+            )
+            window = self._windows[key] = self._compositor.window(weighted, options.window, moved, shutters)
         return window
-
-    def _colors(self, layer: int, part: Request) -> Any:
-        """The source whose frames are weighted: as it is, or with a layer's own colours, or those behind all."""
-        if not part.state.options.decontaminate or self._source.alpha != "opaque":
-            return self._noted
-        return SeparatedFrames(self._noted, lambda frame: self._separated(frame, layer)[layer < 0])
-
-    def _separated(self, frame: int, layer: int) -> tuple[np.ndarray, np.ndarray]:
-        """A frame with a layer's own colours, and with those behind it; −1: behind all layers."""
-        if self._layers is None:
-            raise ValueError("there are no layers")
-        number = 0 if len(self._layers.shutters) == 1 else layer  # behind it is behind all
-        memo = self._separations.setdefault(frame % _TOGETHER, {})
-        key = self._layers.key_at(frame), frame, number
-        if key not in memo:
-            memo.clear()
-            mattes = self.mattes.edges(self._layers, frame)
-            matte = 1 - layering.behind(mattes) if number < 0 else mattes[number]
-            memo[key] = self._separate(frame, matte)
-        return memo[key]
-
-    def _separate(self, frame: int, matte: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        read = self._noted.decoded(frame)
-        picture = as_rgba(read) if isinstance(read, Planes) else read
-        colors, mixed = linear(picture, self._source)[..., :3], (matte > 0) & (matte < 1)
-        own, behind = (with_colors(picture, c, mixed, self._source) for c in separated(colors, matte))
-        return own, behind
-
-    def _weight(self, layer: int) -> Callable[[int], np.ndarray]:
-        def weight(frame: int) -> np.ndarray:
-            if self._layers is None:
-                raise ValueError("there are no layers")
-            if layer < 0:
-                return self.mattes.behind(self._layers, frame)
-            return self.mattes.of(self._layers, frame)[layer]
-
-        return weight
 
     def _load(self, windows: dict, positions: np.ndarray, request: Request, shot: range) -> None:
         """Loads all windows. Where many frames lack, they are loaded a few at a time: each is read once for all."""
         options, ordered = request.state.options, np.sort(positions)
         lacking = set(reference.source_frames(options, ordered, shot).tolist()).difference(self.held)
-        step = _TOGETHER if len(lacking) > 1 else len(ordered)
+        step = TOGETHER if len(lacking) > 1 else len(ordered)
         for end in range(step, len(ordered) + step, step):
             for window in windows.values():
                 window.load(ordered[:end], options, shot)
@@ -202,42 +179,54 @@ class LayeredRenderer:
     def _forget_changed(self, layers: Layers, parts: dict) -> None:
         """Windows are loaded anew where the mattes of a frame that they hold are others now, or other layers are."""
         keys = {frame: layers.key_at(frame) for frame in layers.frames}
-        changed = any(self._loaded.get(frame, keys[frame]) != keys[frame] for frame in self.held if frame in keys)
         count = max(name[0] for name in parts) + 1
-        if changed or (self._layers is not None and len(self._layers.shutters) != count):
+        if self._has_changed(keys) or (self._layers is not None and len(self._layers.shutters) != count):
             self.release_windows()
         self._loaded |= keys
         for frame in [frame for frame in self._loaded if abs(frame - layers.first) > 4096]:
             del self._loaded[frame]
 
+    def _has_changed(self, keys: dict[int, tuple]) -> bool:
+        """Whether mattes of frames in the windows have, or of those that these are taken from, or how the camera moves.
+
+        keys: by source frame: Layers.key_at"""
+        for frame in self.held:
+            asked = self._colors.asked.get(frame, {})
+            if any(self._loaded.get(each, keys[each]) != keys[each] for each in (frame, *asked) if each in keys):
+                return True
+            known = [other for other in asked if frame in keys and other in keys]
+            if any(self._colors.motion(frame, other) != asked[other] for other in known):
+                return True
+        return False
+
     def _plate(self, request: Request, exposed: list[Exposure], shot: range, gain: Callable[[], np.ndarray]) -> Any:
         """See Behind.plate; gain: gives how bright (H, W) its pixels are."""
         layers, (bottom, *_) = request.state.layers, exposed
-        self.kinds = None
-        if layers is None or (holes := self._holes(exposed)) is None:
+        self._kinds = None
+        if layers is None or (holes := self._lacks(exposed, layering.CLEAR)) is None:
             return None
         reach = request.state.options.plate_reach
         near = range(max(request.index - reach, shot.start), min(request.index + reach + 1, shot.stop))
-        picture, self.kinds = plates.plate(
+        picture, self._kinds = plates.plate(
             holes,
             plates.nearest_frames(request.index, near),
-            lambda frame: linear(self.recent.read(frame), self._source),
+            self._colors.linear_part,
             lambda frame: self.mattes.behind(layers, frame),
-            layers.camera,
+            lambda frame: self._colors.motion(request.index, frame),
         )
         picture[..., :3] *= gain()[..., None]
-        if (self.kinds == plates.FILLED).any():
+        if (self._kinds == plates.FILLED).any():
             around = self._laying.around(bottom)
-            known = self.kinds != plates.FILLED
-            picture = plates.filled(np.where((self.kinds == plates.OPEN)[..., None], around, picture), known)
+            known = self._kinds != plates.FILLED
+            picture = plates.filled(np.where((self._kinds == plates.OPEN)[..., None], around, picture), known)
         return self._laying.plate(picture)
 
-    def _holes(self, exposed: list[Exposure]) -> np.ndarray | None:
-        """Where (H, W) too little of what lies behind is exposed, and it is seen; None: nowhere."""
+    def _lacks(self, exposed: list[Exposure], least: float) -> np.ndarray | None:
+        """Where (H, W) less than that of what lies behind is exposed, and it is seen; None: nowhere."""
         bottom, *own = exposed
-        if (self._laying.least(bottom) >= layering.CLEAR).all():
+        if (self._laying.least(bottom) >= least).all():
             return None
-        holes = self._laying.shares(bottom) < layering.CLEAR
+        holes = self._laying.shares(bottom) < least
         holes &= layering.behind([self._laying.shares(layer) for layer in own]) > _SEEN
         return holes if holes.any() else None
 
@@ -256,13 +245,15 @@ class LayeredRenderer:
             window.release()
         self._windows.clear()
         self._loaded.clear()
+        self._colors.asked.clear()
+        self._exposed = []
 
     def release(self) -> None:
         """Frees what it has on the device, and what it keeps of frames."""
         self.release_windows()
         self._laying.release()
         self.recent.clear()
-        self._separations.clear()
+        self._colors.clear()
 
     def close(self) -> None:
         """Forgets all, and closes the files of mattes."""

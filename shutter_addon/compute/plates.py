@@ -1,4 +1,4 @@
-"""Plates: what lies behind layers where the window never saw it, from frames further away, or from what is around."""
+"""Plates: what lies behind layers where a frame does not show it, from other frames, or from what is around."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from ..core.model.frame_state import Following
 from ..core.pixels import compositor
 
 # How much of what lies behind has to be seen of a pixel that a plate is taken from.
 SEEN = 0.9
+# How much of an exposed frame counts that is taken from others: a little less than all of it, which would say that no
+# layer was in the way (layering.UNCOVERED).
+TAKEN_SHARE = 1 - 1 / 64
 # Kinds of pixels: seen, taken from another frame, filled from what is around.
 OPEN, TAKEN, FILLED = 0, 1, 2
 
@@ -24,35 +26,46 @@ def nearest_frames(index: int, frames: range) -> Iterable[int]:
 def plate(
     holes: np.ndarray,
     frames: Iterable[int],
-    read: Callable[[int], np.ndarray],
+    read: Callable[[int, tuple[slice, slice]], np.ndarray],
     clear: Callable[[int], np.ndarray],
-    camera: Following | None = None,
+    motion: Callable[[int], tuple[complex, complex]],
 ) -> tuple[np.ndarray, np.ndarray]:
     """What lies behind layers in the pixels `holes` (H, W) bool: a picture (H, W, 4) float32, scene-linear and
     premultiplied, and the kinds (H, W) uint8 of its pixels.
 
     frames: source frames, the first is asked first
-    read, clear: a frame's picture, and how much (H, W) of what lies behind is seen in it
-    camera: how what the camera sees moves; None: it stands still"""
+    read: gives rows and columns of a frame's picture; clear: how much (H, W) of what lies behind is seen in it
+    motion: where a point z of this picture lies in a frame: turn · z + shift"""
     height, width = holes.shape
     picture, kinds = np.zeros((height, width, 4), np.float32), np.where(holes, FILLED, OPEN).astype(np.uint8)
     rows, columns = np.nonzero(holes)
     for frame in frames:
         if not rows.size:
             break
-        seen, places = clear(frame), columns + 1j * rows
-        if camera is not None:
-            turns, shifts = camera.at([frame])
-            places = turns[0, 0] * places + shifts[0, 0]
+        seen, (turn, shift) = clear(frame), motion(frame)
+        places = turn * (columns + 1j * rows) + shift
         x, y = np.rint(places.real).astype(int), np.rint(places.imag).astype(int)
         inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
         found = inside & (seen[y.clip(0, height - 1), x.clip(0, width - 1)] >= SEEN)
         if found.any():
             at = rows[found], columns[found]
-            picture[at] = compositor.seen(read(frame), places[found], sharp=False)
+            top, left = max(y[found].min() - 2, 0), max(x[found].min() - 2, 0)
+            part = read(frame, (slice(top, y[found].max() + 3), slice(left, x[found].max() + 3)))
+            picture[at] = compositor.seen(part, places[found] - (left + 1j * top), sharp=False)
             kinds[at] = TAKEN
             rows, columns = rows[~found], columns[~found]
     return picture, kinds
+
+
+def uncovered(colors: np.ndarray, seen: np.ndarray, plate: np.ndarray, kinds: np.ndarray) -> tuple[np.ndarray, ...]:
+    """What lies behind layers in a frame, of which it shows `seen` (H, W), with the rest from a plate: colours
+    (H, W, 3), scene-linear, and how much (H, W) float32 they count.
+
+    colors: (H, W, 3) what it shows; plate, kinds: as from `plate`, with holes where it does not show all"""
+    taken = kinds == TAKEN
+    mixed = seen[..., None] * colors + (1 - seen)[..., None] * plate[..., :3]
+    share = np.where(taken, seen + (1 - seen) * np.float32(TAKEN_SHARE), seen)
+    return np.where(taken[..., None], mixed, colors), share.astype(np.float32)
 
 
 def filled(picture: np.ndarray, known: np.ndarray) -> np.ndarray:

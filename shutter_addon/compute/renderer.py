@@ -201,7 +201,8 @@ class Renderer:
     def holes(self) -> np.ndarray | None:
         """Of the last picture that had layers, the kinds (H, W) uint8 of its pixels (compute.plates), top row first;
         None: what lies behind its layers was exposed everywhere."""
-        return self._layered.kinds if self._layered else None
+        with self.compositor.current():
+            return self._layered.holes if self._layered else None
 
     def check(self, request: Request) -> None:
         """MediaError: an in-between frame that the picture needs is missing. No frame is read."""

@@ -1,12 +1,13 @@
 """Layers on all devices, against their formula in float64."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
 from test_composition import LEVEL, Footage, device, footage, state  # noqa: F401 – a fixture
 
-from shutter_addon.compute import layer_frames, layer_mattes, weighted_window
+from shutter_addon.compute import layer_colors, layer_frames, layer_mattes, weighted_window
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor, open_gl
 from shutter_addon.compute.request import Request
@@ -324,6 +325,84 @@ def test_a_plate_is_laid_by_the_cameras_motion(device):  # noqa: F811
     picture = renderer.picture(Request(SHOWN, moment))
     assert np.array_equal(renderer.holes == 1, matte[SHOWN] > 0)
     assert_near(picture, source.linear()[SHOWN])  # what lies behind is what the frame shows, for no subject is painted
+
+
+@pytest.mark.parametrize("kind", [{}, {"dtype": np.float32, "transfer": "linear"}], ids=str)
+@pytest.mark.parametrize("follows", [False, True])
+def test_what_a_panning_camera_sees_is_exposed_where_it_is_covered(device, kind, follows):  # noqa: F811
+    """Against an exposure of frames without the subject. The camera pans by two pixels a frame, the subject by one."""
+    rng = np.random.default_rng(15)
+    wide = footage(rng, 1, (SIZE[0] + 2 * COUNT, SIZE[1]), **kind).frames[0]
+    source, bare = (footage(rng, COUNT, SIZE, **kind) for _ in range(2))
+    matte, apart = np.zeros((COUNT, *SIZE[::-1])), np.arange(COUNT) - SHOWN
+    bare.frames[:] = source.frames[:] = [wide[:, 2 * k : 2 * k + SIZE[0]] for k in range(COUNT)]
+    for k in range(COUNT):
+        matte[k, 8:15, 6 + k : 14 + k] = 1
+    source.frames[matte > 0] = source.frames[0, 0, 0]
+    camera = Following(0, np.ones((COUNT, 1), complex), -2.0 * apart[:, None] + 0j)
+    bars = np.array([[1.0] * 8, [1] * 8, [0, 0, 0, 1, 0, 0, 0, 0]])
+    moment, _ = with_layers(FrameState(Options(8, position="center"), bars), matte, camera=camera)
+    if follows:
+        moment = dataclasses.replace(
+            moment, following=Following(0, np.ones((COUNT, 3), complex), apart[:, None] * [1j, 0, 0])
+        )
+    _, picture = drawn(device, source, moment)
+    expected = Renderer(device, bare).picture(Request(SHOWN, plain(moment)))
+    expected[matte[SHOWN] > 0] = source.linear()[SHOWN][matte[SHOWN] > 0]
+    difference = np.abs(light.to_encoded(picture) - light.to_encoded(expected))
+    # Nothing beyond the picture's right edge is seen before.
+    assert difference[:, :-8].max() <= (2 if follows else 1) / 255
+
+
+def test_frames_are_uncovered_anew_where_others_change_that_they_are_taken_from(device):  # noqa: F811
+    rng = np.random.default_rng(16)
+    source, apart = footage(rng, COUNT, SIZE), np.arange(COUNT) - SHOWN
+    matte = np.zeros((COUNT, *SIZE[::-1]))
+    matte[SHOWN - 5 : SHOWN + 6, 8:15, 6:14] = 0.5
+    further = matte.copy()
+    further[SHOWN + 6 : SHOWN + 8, 8:15, 6:14] = 0.5  # not exposed
+    still, pans = (Following(0, np.ones((COUNT, 1), complex), v * apart[:, None] + 0j) for v in (1e-3, -0.7))
+    moment, other = (with_layers(drawn_state(rng, window=4), each)[0] for each in (matte, further))
+    near = moment.layers.mattes
+    far = (*near[: SHOWN + 6], *other.layers.mattes[SHOWN + 6 :])
+    moments = [
+        dataclasses.replace(moment, layers=dataclasses.replace(moment.layers, mattes=mattes, camera=camera))
+        for mattes, camera in [(near, still), (far, still), (far, pans), (near, None), (near, still)]
+    ]
+    renderer, pictures = Renderer(device, source, MatteValues(*SIZE)), []
+    for moment in moments:
+        pictures.append(renderer.picture(Request(SHOWN, moment)))
+        assert np.array_equal(pictures[-1], drawn(device, source, moment)[1])
+    assert [np.array_equal(*pair) for pair in itertools.pairwise(pictures)] == [False] * 4
+
+
+def test_a_played_frame_uncovers_one(monkeypatch):
+    """Of those whose covered places are taken from others, while the camera's keys and mattes stay."""
+    uncovered, done = layer_colors.plates.uncovered, []
+
+    def counted(*given):
+        done.append(given)
+        return uncovered(*given)
+
+    monkeypatch.setattr(layer_colors.plates, "uncovered", counted)
+    rng = np.random.default_rng(17)
+    source, matte = footage(rng, 60, SIZE), np.zeros((60, *SIZE[::-1]))
+    matte[:, 8:15, 6:14] = 0.5
+    moment, _ = with_layers(drawn_state(rng, window=6, plate_reach=3), matte)
+    renderer, counts = Renderer(open_compositor(), source, MatteValues(*SIZE)), []
+    for shown in (20, 21, 22, 21):
+        frames = range(shown - 3, shown + 9)
+        layers = dataclasses.replace(
+            moment.layers,
+            first=frames.start,
+            scribbles=(None,) * len(frames),
+            mattes=moment.layers.mattes[:1] * len(frames),
+            camera=Following(frames.start, np.ones((12, 1), complex), -0.7 * (np.array(frames)[:, None] - shown) + 0j),
+        )
+        done.clear()
+        renderer.picture(Request(shown, dataclasses.replace(moment, layers=layers)))
+        counts.append(len(done))
+    assert counts == [6, 1, 1, 1]
 
 
 def test_without_room_for_sums_the_frames_are_read(device, monkeypatch):  # noqa: F811

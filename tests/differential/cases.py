@@ -67,7 +67,8 @@ class Case:
         """As the reference has it."""
         stored = self.stored if stored is None else stored
         scale = np.iinfo(stored.dtype).max if stored.dtype.kind == "u" else 1
-        return Footage(stored.astype(float) / scale, self.kind.transfer, self.kind.alpha)
+        levels = scale if stored.dtype.kind == "u" else None
+        return Footage(stored.astype(float) / scale, self.kind.transfer, self.kind.alpha, levels)
 
     def matte_samples(self) -> dict[str, np.ndarray]:
         """As the reference has them: 0 … 1."""

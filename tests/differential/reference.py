@@ -20,6 +20,8 @@ What neither the paper nor the manual says is taken from the product; these are 
 - almost nothing of a scribble's coefficients is nothing of a layer's matte, almost all is all of it; the sums of layers
   are laid over one another in linear light; weighted frames are seen linearly between pixels; where no layer is in the
   way, all is as without them;
+- where the camera has keys that move, what layers cover of opaque footage is, in each exposed frame, that of the
+  nearest frame which shows nine tenths of it, the earlier of two, and counts by a 64th less than what is seen;
 - mattes lie over what scribbles give, whichever comes first in the list; a ramp at rest runs from one corner of the
   picture to the opposite one; a feather is a Gaussian of a quarter of its width, of which a pixel has what it covers;
 - a premultiplied colour without cover (alpha 0) is light that is added to what lies below (as in Blender). What it is
@@ -38,8 +40,9 @@ from scipy.sparse.linalg import spsolve
 from scipy.special import erf
 
 # samples: (count, H, W, 4) float64, 0 … 1 for whole numbers, the top row first; transfer: "srgb" | "linear"; alpha:
-# "opaque" | "straight" | "premultiplied".
-Footage = namedtuple("Footage", "samples transfer alpha")
+# "opaque" | "straight" | "premultiplied"; levels: into how many steps samples are rounded, None: these are no whole
+# numbers.
+Footage = namedtuple("Footage", "samples transfer alpha levels", defaults=[None])
 # doubtful: (H, W) bool, where float32 cannot tell whether anything is left of a shutter, or which frame is the nearest.
 Result = namedtuple("Result", "picture doubtful")
 
@@ -58,6 +61,7 @@ NOTHING = 1e-6  # less of an exposure than this is nothing
 EARLIER = 1e-3  # by so much of a frame an earlier one is preferred
 CLEAR = 1 / 16  # less than this of what lies behind layers is too little
 UNCOVERED = 1 - 2e-5  # where more of it is seen, no layer is in the way
+SEEN, BORROWED = 0.9, 63 / 64  # what another frame has to show to be taken, and how much that counts
 ROUNDING = 1e-5  # in float32, of weights and times
 HALVINGS = 44  # of the bisection: what is left is far below what float32 holds
 
@@ -592,14 +596,18 @@ def layers_at(recipe, frame):
 
 
 def layer_mattes(recipe, frame, footage, index, direction, mattes, solve=None):
-    """The mattes (H, W) of all layers in each source frame that the window shows: {source: list}.
+    """The mattes (H, W) of all layers in each source frame that the window shows, and in those that show what they
+    cover: {source: list}.
 
     mattes: as for `laid`
     solve: gives the coefficients of labels, their number and of a source frame at a time; None: the exact ones."""
     count, height, width, _ = footage.samples.shape
     layers, block = layers_at(recipe, frame), option(recipe, "aggregate")
     times = shown_times(recipe, frame, index, direction, count, option(recipe, "plate_reach"))
-    frames = {at_edges(option(recipe, "edges"), place, count) for place in positions(recipe, index, direction)}
+    frames = window_frames(recipe, index, direction, count)
+    if layers and camera_moves(recipe, frame, times, width / height):
+        reach = option(recipe, "plate_reach")
+        frames = {other for other in times if min(abs(other - source) for source in frames) <= reach}
     others = [region for region in recipe["regions"] if has_strokes(region) and region not in [r for r, _ in layers]]
 
     def of(source):
@@ -619,7 +627,60 @@ def layer_mattes(recipe, frame, footage, index, direction, mattes, solve=None):
                 values.append(opacity * values_of(region, near, source, footage, mattes))
         return values
 
-    return {source: of(source) for source in frames if source is not None}
+    return {source: of(source) for source in frames}
+
+
+def window_frames(recipe, index, direction, count):
+    """The source frames that the window shows."""
+    seen = {at_edges(option(recipe, "edges"), place, count) for place in positions(recipe, index, direction)}
+    return seen - {None}
+
+
+def camera_moves(recipe, frame, times, aspect):
+    """By which turn and shift source frames show what the picture shows, {source: (turn, shift)}; none: it stands
+    still."""
+    found = {source: motion(subject(recipe, "camera"), frame, time, aspect) for source, time in times.items()}
+    return found if any(turn != 1 or shift for turn, shift in found.values()) else {}
+
+
+def uncovered(recipe, frame, footage, index, direction, layers):
+    """Footage whose frames show what lies behind layers; how much it counts, and where that is doubtful, both
+    {source: (H, W)}. layers: as of layer_mattes."""
+    count, height, width, _ = footage.samples.shape
+    clear = {source: np.prod([1 - value for value in values], axis=0) for source, values in layers.items()}
+    times = shown_times(recipe, frame, index, direction, count, option(recipe, "plate_reach"))
+    moves = camera_moves(recipe, frame, times, width / height)
+    doubtful = {source: np.zeros((height, width)) for source in layers}
+    if not moves or footage.alpha != "opaque":
+        return footage, clear, doubtful
+    samples, counts = footage.samples.copy(), dict(clear)
+    rows, columns = np.mgrid[:height, :width] + 0.5
+    for source in window_frames(recipe, index, direction, count):
+        light, lacks = summed(footage, source, "linear"), clear[source] < UNCOVERED
+        mixed, share = light.copy(), clear[source].copy()
+        near = [other for other in clear if 0 < abs(other - source) <= option(recipe, "plate_reach")]
+        for other in sorted(near, key=lambda other: (abs(other - source), other)):
+            turn = moves[other][0] / moves[source][0]
+            places = turn * (columns + 1j * (height - rows)) / height + moves[other][1] - turn * moves[source][1]
+            x, y = places.real * height - 0.5, height - places.imag * height - 0.5
+            column, row = np.rint(x).astype(int), np.rint(y).astype(int)
+            inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+            shows = clear[other][row.clip(0, height - 1), column.clip(0, width - 1)]
+            tie = np.minimum(np.abs(x % 1 - 0.5), np.abs(y % 1 - 0.5)) < 1e-4
+            doubtful[source] += lacks & (tie | (np.abs(shows - SEEN) < 1e-4))
+            found = lacks & inside & (shows >= SEEN)
+            seen = clear[source]
+            plate = sampled(summed(footage, other, "linear"), places, False)
+            mixed[found] = (seen[..., None] * light + (1 - seen[..., None]) * plate)[found]
+            share[found] = (seen + (1 - seen) * BORROWED)[found]
+            lacks = lacks & ~found
+        colour = to_encoded(mixed[..., :3]) if footage.transfer == "srgb" else mixed[..., :3]
+        if footage.levels:
+            colour = np.rint(colour.clip(0, 1) * footage.levels) / footage.levels
+        changed = share != clear[source]
+        samples[source][changed, :3] = colour[changed]
+        counts[source] = share
+    return footage._replace(samples=samples), counts, doubtful
 
 
 def strokes_between(region, frame, share, aspect):
@@ -644,8 +705,9 @@ def picture(recipe, frame, footage, index, direction, given=None, mattes=None, l
     if not own:
         return Result(plain[0], plain[2])
     layers = layers or layer_mattes(*asked, mattes)
-    clear = {source: np.prod([1 - value for value in values], axis=0) for source, values in layers.items()}
-    sums, share, doubtful = exposed(*asked, given, clear)
+    behind, clear, unsure = uncovered(*asked, layers)
+    sums, share, doubtful = exposed(recipe, frame, behind, index, direction, given, clear)
+    doubtful = doubtful | (exposed(*asked, given, unsure)[1] > 0)
     result = np.where((share > UNCOVERED)[..., None], plain[0], sums / np.maximum(share, 1e-9)[..., None])
     doubtful = doubtful | plain[2] | (share < CLEAR + ROUNDING) | (np.abs(share - UNCOVERED) < ROUNDING)
     names = [shutter["name"] for shutter in recipe["shutters"]]

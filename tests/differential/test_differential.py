@@ -12,7 +12,7 @@ from cases import KINDS, make
 from compare import PICTURE, DifferenceError, can_be_a_film, check, check_films, open_devices, within
 from reference import DEFAULTS, layers_at, picture, shown
 
-from shutter_addon.compute import cpu, cpu_window
+from shutter_addon.compute import cpu, cpu_window, plates
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import keyframes, mattes, scribbles, shutters
 from shutter_addon.core.pixels import compositor, following, layering, trails
@@ -131,6 +131,7 @@ FAULTS = {
         lambda ramp, *size: ramp_values(replace(ramp, rotation=0), *size),
     ),
     "ghosts": (layering, "behind", lambda values: np.ones_like(values[0])),
+    "what a camera pans over": (plates, "uncovered", lambda colors, seen, *_: (colors, seen)),
     "soft scribbles": (layering, "matte_of", lambda values: values),
     "not normalised": (compositor, "source_frames", lambda options, places, shot: places.clip(0, shot.stop - 1)),
 }

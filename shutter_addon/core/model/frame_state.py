@@ -78,6 +78,14 @@ class Following:
         rows = np.clip(np.asarray(frames) - self.first, 0, len(self.turns) - 1)
         return self.turns[rows], self.shifts[rows]
 
+    def between(self, start: int, end: int) -> tuple[complex, complex]:
+        """The turn and shift of the first shutter from what one source frame shows to another.
+
+        Rounded, so that they do not depend on which picture is shown: ties between pixels would tell."""
+        (before, after), (from_, to) = (values[:, 0] for values in self.at([start, end]))
+        turn = after / before
+        return tuple(complex(np.round(v * 2**32) / 2**32) for v in (turn, to - turn * from_))  # type: ignore[return-value]
+
     @property
     def key(self) -> tuple:
         """Hashable, and equal for equal motions."""
