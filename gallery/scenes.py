@@ -44,16 +44,16 @@ def begin(sky: str, strength: float = 1.0, samples: int = 4, motion_blur: float 
     return scene
 
 
-def render_frames(folder: Path, count: int, file_format: str = "PNG", first: int = 1) -> Path:
+def render_frames(folder: Path, count: int, file_format: str = "PNG", first: int = 1, mode: str = "RGB") -> Path:
     """Renders the scene's frames from the first to count that the folder does not have yet; the first one's path.
 
-    file_format: PNG (8 bits) or OPEN_EXR (half float, scene-linear)
+    file_format: PNG (8 bits) or OPEN_EXR (half float, scene-linear); mode: RGB or RGBA
     """
     folder.mkdir(parents=True, exist_ok=True)
     scene = bpy.context.scene
     settings = scene.render.image_settings
     settings.file_format = file_format
-    settings.color_mode = "RGB"
+    settings.color_mode = mode
     settings.color_depth = "8" if file_format == "PNG" else "16"
     ending = scene.render.file_extension
     paths = [folder / f"{frame:04}{ending}" for frame in range(first, count + 1)]

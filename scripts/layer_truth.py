@@ -4,7 +4,9 @@
 
 Blender renders a subject and what lies behind it apart, once: of these the footage is made, the subject over what lies
 behind, as 8-bit sRGB; and the truth, each exposed apart by its own shutter and laid over one another in linear light.
-The subject's matte is its alpha (16 bits), or comes from one stroke through it that moves as it does, along edges.
+The subject's matte is its alpha (16 bits), what Cryptomatte says of both rendered together, or comes from one stroke
+through it that moves as it does, along edges. Of two subjects that cross, a matte is what the nearer one leaves. The
+last scene is the moving one of one_stroke.py, and its stroke is tracked by the command.
 What is compared are 8-bit sRGB codes (PSNR, in decibels): in the ring, which is where the subject is in any exposed
 frame and eight pixels around that; and of what was not exposed, but is seen in a frame within reach. Elsewhere,
 pictures have to have the bits that they have without the switch. Needs Blender as a library (bpy).
@@ -15,7 +17,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from math import cos, pi, sin
 from pathlib import Path
 from typing import Any
@@ -32,14 +35,20 @@ from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.core.pixels import following, layering
 from shutter_addon.core.recipes import recipe
 from shutter_addon.media import open_source
+from shutter_addon.media.matte_files import MatteFile
 from shutter_addon.media.matte_values import MatteValues
 
 ROOT = Path(__file__).resolve().parents[1]
 COUNT, WINDOW, SHOWN = 33, 13, 16  # frames of the footage, of an exposure, and the shown one, from 0
 WIDE = 16.0  # units of the scene in the picture's width
 RING = 8
-# By the true matte or a stroke, and whether that is a layer.
-WAYS = {"without the switch": (True, False), "layer, true matte": (True, True), "layer, one stroke": (False, True)}
+# What its matte comes from, and whether that is a layer.
+WAYS = {
+    "without the switch": ("true", False),
+    "layer, true matte": ("true", True),
+    "layer, Cryptomatte": ("cryptomatte", True),
+    "layer, one stroke": ("stroke", True),
+}
 STROKE = [(-1.1, 0.0), (1.1, 0.0)]  # through the subject, in its own units
 
 
@@ -47,7 +56,8 @@ STROKE = [(-1.1, 0.0), (1.1, 0.0)]  # through the subject, in its own units
 class Scene:
     """name; pan: how far the camera moves in a frame, speed: the subject in the picture, in units
     edge: pixels over which the renderer filters; hair: whether the outline has spikes
-    slow: the subject hardly moves, and uncovers what is behind it after the window's end"""
+    slow: the subject hardly moves, and uncovers what is behind it after the window's end
+    crossed: another one crosses it, behind it"""
 
     name: str
     pan: float = 0.0
@@ -55,10 +65,18 @@ class Scene:
     edge: float = 1.5
     hair: bool = False
     slow: bool = False
+    crossed: bool = False
 
-    def subject(self, frame: int) -> tuple[float, float]:
-        """Where the subject is in the picture."""
+    @property
+    def subjects(self) -> list[str]:
+        """The farthest first."""
+        return ["other", "subject"] if self.crossed else ["subject"]
+
+    def place(self, subject: str, frame: int) -> tuple[float, float]:
+        """Where a subject is in the picture."""
         apart = frame - SHOWN
+        if subject == "other":
+            return 1.5 - 0.3 * apart, 0.2 * apart
         if self.slow:
             return (0.3 * (apart - WINDOW // 2) if apart > WINDOW // 2 else 0.0), 0.0
         return self.speed * apart, 0.5 * sin(apart / 4)
@@ -72,7 +90,25 @@ SCENES = (
     Scene("panning camera, soft edges", pan=0.12, edge=6.0),
     Scene("panning camera, hair", pan=0.12, hair=True),
     Scene("still camera, seen once", slow=True),
+    Scene("still camera, two that cross", crossed=True),
 )
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is measured of a scene.
+
+    parts: frames (count, H, W, 4) float of "ground" and of each subject, scene-linear and premultiplied
+    subjects: the farthest first
+    regions: gives them as regions of a recipe, by what their matte comes from and whether they are layers
+    cryptomatte: files by subject; camera: its keys"""
+
+    name: str
+    parts: dict[str, np.ndarray]
+    subjects: list[str]
+    regions: Callable[[str, bool], list[recipe.AnyRegion]]
+    cryptomatte: dict[str, MatteFile] = field(default_factory=dict)
+    camera: list[recipe.CameraKey] = field(default_factory=list)
 
 
 class Memory(FrameSource):
@@ -105,49 +141,96 @@ class MemoryMatte:
         pass
 
 
-def render(scene: Scene, folder: Path, size: tuple[int, int], samples: int) -> dict[str, np.ndarray]:
-    """The frames of "subject" and "ground" (COUNT, H, W, 4) float, scene-linear and premultiplied."""
+def render(scene: Scene, folder: Path, size: tuple[int, int], samples: int) -> Case:
+    """A scene, rendered once into the folder."""
     from gallery import scenes
 
-    for part in ("subject", "ground"):
+    for part in ("ground", *scene.subjects):
         if not scenes.complete(folder / part, COUNT, ".exr"):
-            _render_part(scenes, scene, part, folder / part, size, samples)
-    return {part: _read(folder / part) for part in ("subject", "ground")}
+            _begin(scenes, scene, [part], size, samples)
+            _render_frames(folder / part)
+    for subject in scene.subjects:
+        mattes = folder / f"cryptomatte {subject}"
+        if not scenes.complete(mattes, COUNT, ".exr"):
+            _begin(scenes, scene, ["ground", *scene.subjects], size, samples)
+            scenes.write_matte(mattes, subject, subject)
+            _render_frames(None)
+    return Case(
+        name=scene.name,
+        parts={part: _read(folder / part) for part in ("ground", *scene.subjects)},
+        subjects=scene.subjects,
+        regions=lambda matte, layer: [_region(scene, size, subject, matte, layer) for subject in scene.subjects],
+        cryptomatte={s: MatteFile(folder / f"cryptomatte {s}" / "0001.exr", f"{s}.V") for s in scene.subjects},
+        camera=camera(scene),
+    )
+
+
+def tracked_board(folder: Path) -> Case:
+    """The moving scene of one_stroke.py, with the stroke that the command tracks."""
+    import one_stroke
+    import one_stroke_scenes
+
+    scene = one_stroke_scenes.SCENES[0]
+    one_stroke_scenes.render_apart(scene, folder)
+    parts = {"ground": _read(folder / "ground"), "board": _read(folder / "board")}
+    _, footage = mattes(["board"], parts)
+    for number, picture in enumerate(footage, start=1):
+        stills.save(np.rint(codes(picture)).astype(np.uint8), folder / "footage" / f"{number:04}.png")
+    (stroke,) = one_stroke.tracked(scene, folder)["thinned"].regions
+    common = {"name": "board", "shutter": "Subject"}
+
+    def regions(matte: str, layer: bool) -> list[recipe.AnyRegion]:
+        if matte == "stroke":
+            return [replace(stroke, **common, layer=layer)]
+        return [recipe.MatteRegion(**common, kind="matte", path="board", layer=layer)]
+
+    return Case(f"one stroke, {scene.name}", parts, ["board"], regions)
 
 
 def _read(folder: Path) -> np.ndarray:
     with open_source(folder / "0001.exr") as source:
-        return np.stack([source.read(index) for index in range(COUNT)]).astype(np.float64)
+        return np.stack([source.read(index) for index in range(source.count)]).astype(np.float64)
 
 
-def _render_part(scenes: Any, scene: Scene, part: str, folder: Path, size: tuple[int, int], samples: int) -> None:
-    import bpy
-
+def _begin(scenes: Any, scene: Scene, parts: list[str], size: tuple[int, int], samples: int) -> None:
     made = scenes.begin("#000000", 0.0, samples)
     made.render.resolution_x, made.render.resolution_y = size
     made.cycles.use_denoising, made.cycles.filter_width = False, scene.edge
     made.render.film_transparent = True
     scenes.camera((0, 0, 10), (0, 0, 0), 50)
     made.camera.data.type, made.camera.data.ortho_scale = "ORTHO", WIDE
-    if part == "ground":
-        ground = scenes.mesh(
-            [(-30, -30, 0), (30, -30, 0), (30, 30, 0), (-30, 30, 0)],
-            [range(4)],
-            (0, 0, 0),
-            _textured("#20406a", "#e8d9a0", 3),
-        )
-        scenes.animate(ground, COUNT, location=lambda frame: (-scene.pan * (frame - 1 - SHOWN), 0, 0))
-    else:
-        points = [(*point, 0.0) for point in _outline(scene.hair)]
-        board = scenes.mesh(points, [range(len(points))], (0, 0, 1), _textured("#c03020", "#f0f0e0", 5))
-        scenes.animate(board, COUNT, location=lambda frame: (*scene.subject(frame - 1), 1))
+    for part in parts:
+        (_ground if part == "ground" else _subject)(scenes, scene, part)
+
+
+def _ground(scenes: Any, scene: Scene, part: str) -> None:
+    corners = [(-30, -30, 0), (30, -30, 0), (30, 30, 0), (-30, 30, 0)]
+    ground = scenes.mesh(corners, [range(4)], (0, 0, 0), _textured("#20406a", "#e8d9a0", 3))
+    ground.name = part
+    scenes.animate(ground, COUNT, location=lambda frame: (-scene.pan * (frame - 1 - SHOWN), 0, 0))
+
+
+def _subject(scenes: Any, scene: Scene, part: str) -> None:
+    points = [(*point, 0.0) for point in _outline(scene.hair)]
+    dark, high = ("#c03020", 2) if part == "subject" else ("#208040", 1)
+    board = scenes.mesh(points, [range(len(points))], (0, 0, high), _textured(dark, "#f0f0e0", 5))
+    board.name = part
+    scenes.animate(board, COUNT, location=lambda frame: (*scene.place(part, frame - 1), high))
+
+
+def _render_frames(folder: Path | None) -> None:
+    """None: what is written are mattes alone."""
+    import bpy
+
+    made = bpy.context.scene
     settings = made.render.image_settings
-    folder.mkdir(parents=True, exist_ok=True)
     settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGBA", "32"
     for frame in range(1, COUNT + 1):
         made.frame_set(frame)
         bpy.ops.render.render()
-        bpy.data.images["Render Result"].save_render(str(folder / f"{frame:04}.exr"), scene=made)
+        if folder is not None:
+            folder.mkdir(parents=True, exist_ok=True)
+            bpy.data.images["Render Result"].save_render(str(folder / f"{frame:04}.exr"), scene=made)
 
 
 def _outline(hair: bool) -> list[tuple[float, float]]:
@@ -178,68 +261,100 @@ def _textured(dark: str, bright: str, scale: float):
     return material
 
 
-def measure(scene: Scene, parts: dict[str, np.ndarray], folder: Path) -> list[dict]:
+def measure(case: Case, folder: Path) -> list[dict]:
     """A row for each way to take its picture, with the pictures in the folder."""
-    alphas = [parts["subject"][..., 3].clip(0, 1)]
-    grounds = parts["ground"][..., :3]
-    footage = parts["subject"][..., :3] + (1 - alphas[0])[..., None] * grounds
+    seen, footage = mattes(case.subjects, case.parts)
     frames = np.rint(255 * light.to_encoded(np.concatenate([footage, np.ones_like(footage[..., :1])], -1).clip(0, 1)))
     source = Memory(frames.astype(np.uint8))
-    true = MemoryMatte(np.rint(alphas[0] * 65535) / 65535)
-    ring = near((alphas[0][window()] > 0).any(axis=0), RING)
+    true = {subject: MemoryMatte(np.rint(values * 65535) / 65535) for subject, values in seen.items()}
+    files = {"true": true, "cryptomatte": case.cryptomatte, "stroke": {}}
+    covered = 1 - np.prod([1 - values for values in seen.values()], axis=0)
+    ring = near((covered[window()] > 0).any(axis=0), RING)
     still, long = np.eye(WINDOW)[WINDOW // 2], np.ones(WINDOW)
     rows = []
     for kind, own, rest in (("sharp subject", still, long), ("clean trail", long, still)):
-        truth = exposed(parts["subject"], parts["ground"], own, rest)
-        clear, strips = alphas[0][window()][rest > 0].min(axis=0) < 1 - layering.CLEAR, [truth]
-        for way, (is_true, layer) in WAYS.items():
-            moment = made(scene, source, own, rest, is_true, layer)
-            picture = shown(source, moment, true)
+        truth = exposed([case.parts[subject] for subject in case.subjects], case.parts["ground"], own, rest)
+        clear, strips = covered[window()][rest > 0].min(axis=0) < 1 - layering.CLEAR, [truth]
+        for way, (matte, layer) in WAYS.items():
+            if matte == "cryptomatte" and not case.cryptomatte:
+                continue
+            picture = shown(source, made(case, (own, rest), matte, layer), files[matte])
             strips.append(picture)
-            row = {"scene": scene.name, "picture": kind, "way": way, "ring": decibels(picture, truth, ring & clear)}
+            row = {"scene": case.name, "picture": kind, "way": way, "ring": decibels(picture, truth, ring & clear)}
             hidden = ring & ~clear
             row["plate"] = decibels(picture, truth, hidden) if hidden.sum() > 50 else None
             if way == "layer, true matte":
                 row["same bits elsewhere"] = bool(np.array_equal(picture[~ring], without_region(source, rest)[~ring]))
             rows.append(row)
         sheet = np.concatenate([codes(strip) for strip in strips], axis=1)
-        stills.save(np.rint(sheet).astype(np.uint8), folder / f"{scene.name}, {kind}.png")
+        stills.save(np.rint(sheet).astype(np.uint8), folder / f"{case.name}, {kind}.png")
     return rows
+
+
+def mattes(subjects: list[str], parts: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """How much (count, H, W) of each subject is seen, and the footage (count, H, W, 3): each over those before."""
+    footage, seen = parts["ground"][..., :3], {}
+    for subject in subjects:
+        alpha = parts[subject][..., 3].clip(0, 1)
+        seen = {other: values * (1 - alpha) for other, values in seen.items()} | {subject: alpha}
+        footage = parts[subject][..., :3] + (1 - alpha[..., None]) * footage
+    return seen, footage
 
 
 def window() -> slice:
     return slice(SHOWN - WINDOW // 2, SHOWN + WINDOW // 2 + 1)
 
 
-def exposed(subject: np.ndarray, ground: np.ndarray, own: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """The truth (H, W, 3), scene-linear: both exposed apart, one over the other."""
-    front = np.einsum("k,khwc->hwc", own / own.sum(), subject[window()])
-    behind = np.einsum("k,khwc->hwc", rest / rest.sum(), ground[window()])
-    return front[..., :3] + (1 - front[..., 3:]) * behind[..., :3]
+def exposed(subjects: list[np.ndarray], ground: np.ndarray, own: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """The truth (H, W, 3), scene-linear: all exposed apart, one over the other."""
+    picture = np.einsum("k,khwc->hwc", rest / rest.sum(), ground[window()])[..., :3]
+    for subject in subjects:
+        front = np.einsum("k,khwc->hwc", own / own.sum(), subject[window()])
+        picture = front[..., :3] + (1 - front[..., 3:]) * picture
+    return picture
 
 
-def made(scene: Scene, source: Memory, own, rest, is_true: bool, layer: bool) -> recipe.Recipe:
-    """The recipe of a picture: by the true matte, or by a stroke that moves as the subject does."""
-    shutters = [recipe.Shutter("Rest", bars=list(rest)), recipe.Shutter("Subject", bars=list(own))]
-    common = {"name": "Subject", "shutter": "Subject", "layer": layer}
-    if is_true:
-        region: recipe.AnyRegion = recipe.MatteRegion(**common, kind="matte", path="true")
-    else:
-        high = WIDE * source.height / source.width
-        keys = [
-            recipe.RegionKey(frame=frame + 1.0, location=(x / WIDE, y / high))
-            for frame in range(source.count)
-            for x, y in [scene.subject(frame)]
-        ]
-        stroke = [(0.5 + x / WIDE, 0.5 + y / high) for x, y in STROKE]
-        region = recipe.Region(**common, kind="line", width=0.08, strokes=[stroke], keys=keys)
-    edges = 0.0 if is_true else 1.0
-    return recipe.Recipe(1, WINDOW, shutters, [region], position="center", border=True, edge_aware=edges)
+def made(case: Case, bars: tuple, matte: str, layer: bool) -> recipe.Recipe:
+    """The recipe of a picture. bars: of the subjects, and of all else; matte, layer: see WAYS"""
+    own, rest = bars
+    return recipe.Recipe(
+        1,
+        WINDOW,
+        [recipe.Shutter("Rest", bars=list(rest)), recipe.Shutter("Subject", bars=list(own))],
+        case.regions(matte, layer),
+        position="center",
+        border=True,
+        edge_aware=1.0 if matte == "stroke" else 0.0,
+        camera=case.camera,
+    )
 
 
-def shown(source: Memory, given: recipe.Recipe, matte: MemoryMatte | None) -> np.ndarray:
-    """The picture (H, W, 3), scene-linear, of the shown frame."""
-    effect = given.effect(source.width / source.height, lambda _region: matte)
+def _region(scene: Scene, size: tuple[int, int], subject: str, matte: str, layer: bool) -> recipe.AnyRegion:
+    """A subject by a matte, or by a stroke that moves as it does."""
+    common = {"name": subject, "shutter": "Subject", "layer": layer}
+    if matte != "stroke":
+        return recipe.MatteRegion(**common, kind="matte", path=subject)
+    high = WIDE * size[1] / size[0]
+    keys = [
+        recipe.RegionKey(frame=frame + 1.0, location=(x / WIDE, y / high))
+        for frame in range(COUNT)
+        for x, y in [scene.place(subject, frame)]
+    ]
+    stroke = [(0.5 + x / WIDE, 0.5 + y / high) for x, y in STROKE]
+    return recipe.Region(**common, kind="line", width=0.08, strokes=[stroke], keys=keys)
+
+
+def camera(scene: Scene) -> list[recipe.CameraKey]:
+    """The keys of a camera that pans: where what it sees lies."""
+    if not scene.pan:
+        return []
+    places = [-scene.pan * (frame - SHOWN) / WIDE for frame in range(COUNT)]
+    return [recipe.CameraKey(frame=frame + 1.0, location=(x, 0.0)) for frame, x in enumerate(places)]
+
+
+def shown(source: Memory, given: recipe.Recipe, files: dict) -> np.ndarray:
+    """The picture (H, W, 3), scene-linear, of the shown frame. files: of mattes, by subject"""
+    effect = given.effect(source.width / source.height, lambda region: files[region.path])
     at = following.Shown(SHOWN + 1.0, SHOWN)
     state = replace(effect.at(at.frame), layers=None)
 
@@ -256,7 +371,7 @@ def shown(source: Memory, given: recipe.Recipe, matte: MemoryMatte | None) -> np
 
 def without_region(source: Memory, rest: np.ndarray) -> np.ndarray:
     bare = recipe.Recipe(1, WINDOW, [recipe.Shutter("Rest", bars=list(rest))], position="center")
-    return shown(source, bare, None)
+    return shown(source, bare, {})
 
 
 def near(mask: np.ndarray, reach: int) -> np.ndarray:
@@ -297,10 +412,13 @@ def main() -> int:
     parser.add_argument("--samples", type=int, default=32, help="of each pixel")
     arguments = parser.parse_args()
     size, rows = tuple(map(int, arguments.size.split("x"))), []
-    for number, scene in enumerate(SCENES):
-        parts = render(scene, arguments.output / str(number), size, arguments.samples)
-        rows += measure(scene, parts, arguments.output)
-        print("\n".join(table(rows).splitlines()[-6:]), flush=True)
+    for number in range(len(SCENES) + 1):
+        folder = arguments.output / str(number)
+        is_tracked = number == len(SCENES)
+        case = tracked_board(folder) if is_tracked else render(SCENES[number], folder, size, arguments.samples)
+        found = measure(case, arguments.output)
+        print("\n".join(table(found).splitlines()[0 if not number else 2 :]), flush=True)
+        rows += found
     if arguments.json:
         arguments.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     return 0

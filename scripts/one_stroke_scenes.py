@@ -89,6 +89,24 @@ def render(scene: Scene, folder: Path, size=(640, 360), count: int = COUNT, samp
         scenes.render_frames(folder / "mask", count)
 
 
+def render_apart(scene: Scene, folder: Path, size=(640, 360), count: int = COUNT, samples: int = 16) -> None:
+    """Writes the board, and the ground with the board's shadow: board/0001.exr …, ground/0001.exr …, scene-linear and
+    premultiplied. What is there already stays."""
+    scenes.SIZE = size
+    for part in ("board", "ground"):
+        if scenes.complete(folder / part, count, ".exr"):
+            continue
+        _build(scene, count, samples)
+        bpy.context.scene.render.film_transparent = True
+        for thing in bpy.data.objects:
+            thing.hide_render = thing.type != "CAMERA" and (_is_board(thing) != (part == "board"))
+        scenes.render_frames(folder / part, count, "OPEN_EXR", mode="RGBA")
+
+
+def _is_board(thing) -> bool:
+    return thing.parent is not None and not thing.name.startswith("Shadow")
+
+
 def place(scene: Scene, frame: float, size) -> tuple[float, float, float, float]:
     """Where the board's centre lies in the picture: x, y in fractions, y up; its turn in radians; and its scale, with
     which a unit is 1/16 of the width where it is 1."""
@@ -176,7 +194,8 @@ def _shadow(parent) -> None:
     reach = np.hypot(x, y) - 2.1 * (1 + 0.16 * np.cos(3 * np.arctan2(y, x)) + 0.07 * np.sin(5 * np.arctan2(y, x)))
     passed = 1 - 0.55 / (1 + np.exp(8 * reach))
     _textured(tree, np.repeat(passed[..., None], 3, axis=-1), "Transparent BSDF")
-    _sheet((6, 6, 0.05), material, parent).location = 0.15, -0.15, 0.05
+    sheet = _sheet((6, 6, 0.05), material, parent)
+    sheet.name, sheet.location = "Shadow", (0.15, -0.15, 0.05)
 
 
 def _camera(scene: Scene, count: int) -> None:
