@@ -175,7 +175,7 @@ def tracked_board(folder: Path) -> Case:
     parts = {"ground": _read(folder / "ground"), "board": _read(folder / "board")}
     _, footage = mattes(["board"], parts)
     for number, picture in enumerate(footage, start=1):
-        stills.save(np.rint(codes(picture)).astype(np.uint8), folder / "footage" / f"{number:04}.png")
+        stills.save(codes(picture) / 255, folder / "footage" / f"{number:04}.png")
     (stroke,) = one_stroke.tracked(scene, folder)["thinned"].regions
     common = {"name": "board", "shutter": "Subject"}
 
@@ -287,7 +287,7 @@ def measure(case: Case, folder: Path) -> list[dict]:
                 row["same bits elsewhere"] = bool(np.array_equal(picture[~ring], without_region(source, rest)[~ring]))
             rows.append(row)
         sheet = np.concatenate([codes(strip) for strip in strips], axis=1)
-        stills.save(np.rint(sheet).astype(np.uint8), folder / f"{case.name}, {kind}.png")
+        stills.save(sheet / 255, folder / f"{case.name}, {kind}.png")
     return rows
 
 
