@@ -1,7 +1,7 @@
 """An object of a 3D scene gets a shutter of its own, by the matte that Blender renders beside its picture.
 
-One plane of a fairground's ride is sharp, and all others trail. Its matte is Cryptomatte's, motion blur and all: how
-much of a pixel it covers.
+One plane of a fairground's ride is sharp, and all others trail. It is a layer, and leaves no trail of its own. Its
+matte is Cryptomatte's, motion blur and all: how much of a pixel it covers.
 """
 
 from __future__ import annotations
@@ -135,15 +135,15 @@ def _plane(scenes, name: str, color: str, start: float) -> None:
 
 
 def still(shots):
-    (shot,) = shots
+    shot, plain = shots
     return stills.sheet(
         stills.row(
-            Panel(shot.result(FRAME)[CROP], f"One frame for the red plane, {WINDOW} for all else"),
-            Panel(shot.everywhere(FRAME, "Long")[CROP], f"{WINDOW} frames everywhere"),
+            Panel(shot.result(FRAME)[CROP], f"One frame for the red plane, a layer; {WINDOW} for all else"),
+            Panel(plain.result(FRAME)[CROP], "The same, if it is no layer"),
         ),
         stills.row(
             Panel(shot.source(FRAME)[CROP], "A frame as Blender renders it"),
-            Panel(shot.coefficients(FRAME)[CROP], "The matte beside it, by Cryptomatte"),
+            Panel(plain.coefficients(FRAME)[CROP], "The matte beside it, by Cryptomatte"),
         ),
     )
 
@@ -153,7 +153,7 @@ ITEM = Item(
     figure=None,
     title="one object of a 3D scene is sharp, by its Cryptomatte",
     footage=footage,
-    recipes=("object_matte.json",),
+    recipes=("object_matte.json", "object_matte-plain.json"),
     frames=(WINDOW // 2, COUNT - WINDOW // 2),
     still=still,
 )

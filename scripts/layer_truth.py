@@ -174,6 +174,7 @@ def tracked_board(folder: Path) -> Case:
     one_stroke_scenes.render_apart(scene, folder)
     parts = {"ground": _read(folder / "ground"), "board": _read(folder / "board")}
     _, footage = mattes(["board"], parts)
+    (folder / "footage").mkdir(exist_ok=True)
     for number, picture in enumerate(footage, start=1):
         stills.save(codes(picture) / 255, folder / "footage" / f"{number:04}.png")
     (stroke,) = one_stroke.tracked(scene, folder)["thinned"].regions

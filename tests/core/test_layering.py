@@ -113,4 +113,4 @@ def test_too_many_points_are_refused():
 
 
 def test_almost_nothing_of_a_scribble_is_nothing_and_almost_all_is_all():
-    assert layering.matte_of([0.0, 0.05, 0.1, 0.5, 0.9, 0.99, 1.0]) == pytest.approx([0, 0, 0, 0.5, 1, 1, 1])
+    assert layering.matte_of([0.0, 0.2, 0.3, 0.4, 0.5, 0.9, 1.0]) == pytest.approx([0, 0, 0, 0.5, 1, 1, 1])

@@ -37,7 +37,7 @@ from reference import (
 
 ROOT = Path(__file__).resolve().parents[2]
 PICTURE, COEFFICIENTS = 0.5 / 255, 1 / 255
-LAYERS = COEFFICIENTS / 0.8 + 1 / 65535  # their contrast is higher, and they are kept as 16 bits
+LAYERS = COEFFICIENTS / 0.2 + 1 / 65535  # their contrast is higher, and they are kept as 16 bits
 AMPLIFIED = 64
 
 

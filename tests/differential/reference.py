@@ -17,7 +17,7 @@ What neither the paper nor the manual says is taken from the product; these are 
 - a frame that is never shown within four windows lies as the nearest of those that the window may show, the earlier of
   two; of two times that are as near, the later counts;
 - a trail's length is that of the fastest corner of what is followed; a bar has half of the ways to the frames beside;
-- almost nothing of a scribble's coefficients is nothing of a layer's matte, almost all is all of it; the sums of layers
+- three tenths of a scribble's coefficients are nothing of a layer's matte, half is all of it; the sums of layers
   are laid over one another in linear light; weighted frames are seen linearly between pixels; where no layer is in the
   way, all is as without them;
 - where the camera has keys that move, what layers cover of opaque footage is, in each exposed frame, that of the
@@ -622,7 +622,7 @@ def layer_mattes(recipe, frame, footage, index, direction, mattes, solve=None):
         for i, (region, opacity) in enumerate(layers):
             if has_strokes(region):
                 own = mix[1 + i].repeat(block, 0).repeat(block, 1)[:height, :width]
-                values.append(opacity * np.clip((own - 0.1) / 0.8, 0, 1))
+                values.append(opacity * np.clip((own - 0.3) / 0.2, 0, 1))
             else:
                 values.append(opacity * values_of(region, near, source, footage, mattes))
         return values

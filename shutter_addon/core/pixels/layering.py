@@ -32,8 +32,9 @@ from . import compositor, following
 CLEAR = 1 / 16
 # The share from where on no layer was in the way, but for rounding: there the picture is that without layers.
 UNCOVERED = 1 - 2e-5
-# Diffused coefficients that are no matte yet, and those that are a whole one: they are nowhere quite 0 or 1.
-NONE, WHOLE = 0.1, 0.9
+# Diffused coefficients that are no matte yet, and those that are a whole one: far from its stroke a subject has little
+# more than half of its shutter, and what is around has a little of it (scripts/layer_truth.py).
+NONE, WHOLE = 0.3, 0.5
 
 Moves = tuple[np.ndarray, np.ndarray]
 
