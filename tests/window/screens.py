@@ -27,3 +27,15 @@ def assert_alike(picture, expected, keep, tolerance=TOLERANCE):
 def crop(folder, entry):
     left, top, width, height = entry["crop"]
     return pixels(folder / f"{entry['step']}.png", (left, top, left + width, top + height))
+
+
+def apart_on_screen(screen, frame):
+    """By how many levels the middle of a frame differs at most from where a screen shows it, pixel for pixel."""
+    import cv2
+
+    height, width = frame.shape[:2]
+    middle = frame[height // 4 : 3 * height // 4, width // 4 : 3 * width // 4].astype(np.uint8)
+    near = cv2.matchTemplate(screen.astype(np.uint8), middle, cv2.TM_SQDIFF)
+    top, left = np.unravel_index(near.argmin(), near.shape)
+    shown = screen[top : top + middle.shape[0], left : left + middle.shape[1]]
+    return np.abs(shown - middle).max()

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import OpenImageIO
 import pytest
-from screens import TOLERANCE, assert_alike, pixels
+from screens import TOLERANCE, apart_on_screen, assert_alike, pixels
 from telling import ROOT, linked, needs_window, tell
 
 from shutter_addon.media.completeness import whole_pictures
@@ -161,18 +161,6 @@ def test_esc_ends_a_render_between_two_passes(backend, hidden, tmp_path):
     assert min(apart_on_screen(screen, pixels(frame)) for frame in written) <= TOLERANCE
     for frame in (tmp_path / "after").iterdir():
         assert np.array_equal(pixels(frame), pixels(tmp_path / "film" / frame.name))
-
-
-def apart_on_screen(screen, frame):
-    """By how many levels the middle of a frame differs at most from where a screen shows it, pixel for pixel."""
-    import cv2
-
-    height, width = frame.shape[:2]
-    middle = frame[height // 4 : 3 * height // 4, width // 4 : 3 * width // 4].astype(np.uint8)
-    near = cv2.matchTemplate(screen.astype(np.uint8), middle, cv2.TM_SQDIFF)
-    top, left = np.unravel_index(near.argmin(), near.shape)
-    shown = screen[top : top + middle.shape[0], left : left + middle.shape[1]]
-    return np.abs(shown - middle).max()
 
 
 @pytest.mark.parametrize(("backend", "hidden"), [("opengl", "moderngl"), ("vulkan", "")])

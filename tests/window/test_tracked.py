@@ -6,7 +6,7 @@ import av
 import cv2
 import numpy as np
 import pytest
-from screens import assert_alike, crop, pixels
+from screens import apart_on_screen, assert_alike, crop, pixels
 from telling import ROOT, linked, needs_window, packages, tell
 
 from shutter_addon.media import open_source
@@ -159,6 +159,7 @@ def test_a_layer(tmp_path):
     x, y = facts["stroke"]
     row, column = round((1 - y) * apart.shape[0]), round(x * apart.shape[1])
     assert apart[row - 2 : row + 3, column - 2 : column + 3].max() <= 6
+    assert apart_on_screen(pixels(tmp_path / "7_full_quality.png"), pixels(tmp_path / "final_0070.png")) <= 1
 
 
 @pytest.mark.parametrize("backend", ["opengl", "vulkan"])
