@@ -164,6 +164,9 @@ class CPUCompositor:
     def constant(self, values: np.ndarray) -> np.ndarray:
         return np.asarray(values, dtype=np.float32)[:, None, None]
 
+    def uploaded(self, values: np.ndarray) -> np.ndarray:
+        return values
+
     def coefficients(self, handle: np.ndarray, count: int) -> np.ndarray:
         return handle[:count]
 

@@ -211,6 +211,11 @@ class GPUCompositor:
         """Coefficients (N,) of the whole picture, as a texture of one texel. Valid until the next call."""
         return self._filled("constant", padded(values).astype(np.float32)[:, None, None, :], "rgba32f")
 
+    def uploaded(self, values: np.ndarray) -> Texture:
+        """Coefficients (N, h, w) as a texture, as a solver has them. Valid until the next call."""
+        planes = np.moveaxis(padded(np.moveaxis(values, 0, -1)), 2, 0)
+        return self._filled("uploaded", planes.astype(np.float32), "rgba32f")
+
     def labels(self, values: np.ndarray) -> Texture:
         """Labels (H, W) uint16 as a texture r32ui. Valid until the next call."""
         return self._filled("labels", values.astype(np.uint32)[None, ..., None], "r32ui")

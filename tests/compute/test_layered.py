@@ -202,6 +202,28 @@ def test_layers_and_what_lies_behind_follow(device, alpha, interpolation):  # no
     assert_near(picture, expected, seen)
 
 
+@pytest.mark.parametrize("aggregate", [1, 2])
+def test_mattes_are_shown_with_those_of_layers(device, aggregate):  # noqa: F811
+    rng, mattes = np.random.default_rng(18), [discs(), discs(-1.0, top=0.3)]
+    source = footage(rng, COUNT, SIZE)
+    moment, _ = with_layers(drawn_state(rng, window=6, aggregate=aggregate), *mattes, opacities=(1.0, 0.7))
+    renderer = Renderer(device, source, MatteValues(*SIZE))
+    shown = renderer.drawn_with_layers(Request(SHOWN, moment))
+    with device.current():
+        found = device.coefficients(shown.handle, 3)
+    expected = renderer.coefficients(Request(SHOWN, plain(moment))).repeat(aggregate, 1).repeat(aggregate, 2)
+    expected = expected[:, : SIZE[1], : SIZE[0]].astype(np.float64)
+    expected /= expected.sum(axis=0)
+    for shutter, matte in ((2, mattes[0][SHOWN]), (0, 0.7 * mattes[1][SHOWN])):
+        expected *= 1 - matte
+        expected[shutter] += matte
+    assert shown.block == 1
+    assert np.abs(found - expected).max() < 1e-5
+    without, block = renderer.drawn_with_layers(Request(SHOWN, plain(moment)))
+    with device.current():
+        assert device.coefficients(without, 3).shape[1] == -(-SIZE[1] // block)
+
+
 def test_levels_are_those_of_the_picture(device):  # noqa: F811
     rng = np.random.default_rng(4)
     source = footage(rng, COUNT, SIZE)

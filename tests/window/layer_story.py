@@ -37,6 +37,8 @@ def clicked():
 def holes():
     bpy.context.window_manager.virtual_shutter.view = "HOLES"
     yield from story.seen("6_holes")
+    bpy.context.window_manager.virtual_shutter.view = "COEFFICIENTS"
+    yield from story.seen("6_mattes")
     bpy.context.window_manager.virtual_shutter.view = "RESULT"
     yield
 

@@ -337,7 +337,7 @@ def _show_holes(quad, renderer, request) -> None:
 
 
 def _show_coefficients(quad, effect, renderer, request) -> None:
-    coefficients, block = renderer.drawn_coefficients(replace(request, quick=True))
+    coefficients, block = renderer.drawn_with_layers(replace(request, quick=True))
     count = len(request.state.bars)
     textures = {"coefficients": coefficients, "palette": _palette(effect)}
     quad.draw("COEFFICIENTS", textures, opacity=0.75, block=block, count=count, size=_size(renderer))
