@@ -245,7 +245,7 @@ class LayeredRenderer:
             window.release()
         self._windows.clear()
         self._loaded.clear()
-        self._colors.asked.clear()
+        self._colors.clear()
         self._exposed = []
 
     def release(self) -> None:
@@ -253,7 +253,6 @@ class LayeredRenderer:
         self.release_windows()
         self._laying.release()
         self.recent.clear()
-        self._colors.clear()
 
     def close(self) -> None:
         """Forgets all, and closes the files of mattes."""
