@@ -13,7 +13,9 @@ from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import scribbles
+from shutter_addon.core.model.effect import Effect
 from shutter_addon.core.model.frame_state import FrameState
+from shutter_addon.core.pixels import following, layering
 from shutter_addon.core.recipes import recipe, recipe_file
 from shutter_addon.media import open_source
 from shutter_addon.media.matte_files import MatteFile
@@ -76,18 +78,18 @@ class Shot:
 
     def scribbles(self, frame: int, dim: float = 0.6) -> np.ndarray:
         """The scribbles in their shutters' colours, a little transparent, over the darkened footage."""
-        moment, picture = self._at(frame), self.source(frame) * np.float32(dim)
+        picture = self.source(frame) * np.float32(dim)
         height, width = picture.shape[:2]
-        labels = scribbles.rasterise(moment.shapes, width, height, border=moment.options.border)
+        labels = scribbles.rasterise(self.effect.drawn_at(frame), width, height, border=self.contents.options.border)
         picture[labels > 0] = 0.25 * picture[labels > 0] + 0.75 * self._colors[labels[labels > 0] - 1]
         return picture
 
     def coefficients(self, frame: int) -> np.ndarray:
         """How much of each shutter a pixel gets, in the shutters' colours."""
-        moment = self._at(frame)
-        mixed = np.tensordot(self._renderer.coefficients(Request(frame - 1, moment)), self._colors, axes=(0, 0))
-        block = moment.options.aggregate
-        return mixed.repeat(block, 0).repeat(block, 1)[: self._source.height, : self._source.width]
+        at = following.Shown(frame, frame - 1)
+        state = layering.layered(self.effect, self._at(frame), at, self._source, self._shown_at)
+        values = self._renderer.coefficients_with_layers(Request(frame - 1, state))
+        return np.tensordot(values, self._colors, axes=(0, 0))
 
     def bars(self, frame: int, shutter: str) -> tuple[np.ndarray, np.ndarray]:
         """A shutter's bars (L,) at a frame, and its colour (3,)."""
@@ -95,8 +97,12 @@ class Shot:
         return self._at(frame).bars[index], self._colors[index]
 
     @cached_property
-    def effect(self) -> recipe.Recipe:
+    def contents(self) -> recipe.Recipe:
         return recipe_file.load(self.recipe)
+
+    @cached_property
+    def effect(self) -> Effect:
+        return self.contents.effect(self._source.width / self._source.height, self._matte)
 
     @cached_property
     def _source(self):
@@ -113,13 +119,17 @@ class Shot:
 
     @property
     def _colors(self) -> np.ndarray:
-        return np.array([shutter.color for shutter in self.effect.shutters], dtype=np.float32)
+        return np.array([shutter.color for shutter in self.contents.shutters], dtype=np.float32)
 
     def _index(self, shutter: str) -> int:
-        return [each.name for each in self.effect.shutters].index(shutter)
+        return [each.name for each in self.contents.shutters].index(shutter)
 
     def _at(self, frame: int) -> FrameState:
-        return self.effect.at(frame, self._source.width / self._source.height, self._matte)
+        return self.effect.at(frame)
+
+    def _shown_at(self, frame: float) -> int:
+        """The source frame that is shown at a timeline frame."""
+        return min(max(int(frame) - 1, 0), self._source.count - 1)
 
     def _matte(self, region: recipe.MatteRegion | recipe.RampRegion) -> MatteFile:
         """What a matte is read from: its file, or for a ramp of luminance the footage."""

@@ -146,19 +146,25 @@ class Renderer:
                 return Coefficients(constant, self._everywhere)
             return Coefficients(self._with_mattes(request, labels), request.state.options.aggregate)
 
-    def drawn_with_layers(self, request: Request) -> Coefficients:
-        """As drawn_coefficients; where layers are, of their shutters."""
-        layers, block = request.state.layers, request.state.options.aggregate
-        if layers is None:
-            return self.drawn_coefficients(request)
+    def coefficients_with_layers(self, request: Request) -> np.ndarray:
+        """As `coefficients`, of each pixel (N, H, W); where layers are, of their shutters."""
+        block = request.state.options.aggregate
         whole = self.coefficients(request).repeat(block, 1).repeat(block, 2)
         values = np.maximum(whole[:, : self.source.height, : self.source.width], 0)
         values = values / values.sum(axis=0)
-        for shutter, matte in zip(layers.shutters, self.layer_mattes(request), strict=True):
+        layers = request.state.layers
+        for shutter, matte in zip(layers.shutters if layers else (), self.layer_mattes(request), strict=True):
             values = (1 - matte) * values
             values[shutter] += matte
+        return values.astype(np.float32)
+
+    def drawn_with_layers(self, request: Request) -> Coefficients:
+        """As drawn_coefficients; where layers are, of their shutters."""
+        if request.state.layers is None:
+            return self.drawn_coefficients(request)
+        values = self.coefficients_with_layers(request)
         with self.compositor.current():
-            return Coefficients(self.compositor.uploaded(values.astype(np.float32)), 1)
+            return Coefficients(self.compositor.uploaded(values), 1)
 
     def drawn_labels(self, request: Request) -> tuple[object, int]:
         """Labels of the first layer on the device, a GPU: (texture array r32ui, block), top row first, each texel for
