@@ -111,7 +111,7 @@ def compose(found, plan: dict, folder):
     from shutter_addon.media.matte_values import MatteValues
 
     def file(region):
-        if region.kind == "ramp":
+        if region.kind != "matte":
             return MatteFile(folder / "in" / "f0001.png")
         return MatteFile(folder / region.path, region.channel)
 

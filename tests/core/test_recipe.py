@@ -141,7 +141,10 @@ def broken(change):
         (lambda d: d["shutters"][1]["keys"][0].update(ease="in"), 'shutters[1].keys[0].ease: "in" is none of'),
         (lambda d: d["regions"][0].update(shutter="X"), 'regions[0].shutter: there is no shutter "X"'),
         (lambda d: d["regions"][0].update(width=-1), "regions[0].width: -1.0 is negative"),
-        (lambda d: d["regions"][0].update(kind="blob"), 'regions[0].kind: "blob" is none of line, lasso, matte, ramp'),
+        (
+            lambda d: d["regions"][0].update(kind="blob"),
+            'regions[0].kind: "blob" is none of line, lasso, outline, matte, ramp',
+        ),
         (lambda d: d["regions"].append(MATTE | {"path": ""}), "regions[1].path: empty"),
         (lambda d: d["regions"].append(MATTE | {"path": "a\0b"}), "regions[1].path: U+0000 is no character of a name"),
         (lambda d: d["regions"].append(MATTE | {"strokes": []}), "regions[1]: unknown field strokes"),

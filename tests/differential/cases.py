@@ -90,6 +90,7 @@ def make(seed: int) -> Case:
     add_motion(np.random.default_rng([seed, 1]), recipe, count)
     mattes = add_mattes(np.random.default_rng([seed, 2]), recipe, (count, height, width))
     add_layers(np.random.default_rng([seed, 3]), recipe)
+    add_outlines(np.random.default_rng([seed, 4]), recipe, count)
     if "time" in recipe:
         # Halfway between two source frames nobody can tell which is shown.
         last = max(count, int(recipe["time"][-1]["frame"]))
@@ -164,6 +165,24 @@ def add_layers(rng, recipe: dict) -> None:
         choose(rng, *recipe["regions"])["layer"] = True
     recipe["plate_reach"] = int(choose(rng, 0, 1, 4))
     recipe["decontaminate"] = False  # an estimate, which has a test of its own
+
+
+def add_outlines(rng, recipe: dict, count: int) -> None:
+    """What curves enclose, which go straight from drawing to drawing, in a quarter of the recipes."""
+    if rng.random() < 0.75:
+        return
+    region = {"name": "O", "shutter": choose(rng, *recipe["shutters"])["name"], "kind": "outline"}
+    region |= {"between": "straight", "strokes": random_strokes(rng, "lasso")}
+    if rng.random() < 0.6:
+        region["keys"] = [random_key(rng, "lasso", frame) for frame in frames(rng, count, 3)]
+    region |= {"blend": choose(rng, "over", "add"), "invert": choose(rng, False, True)}
+    region["opacity"] = choose(rng, 1, round(rng.random(), 3), random_numbers(rng, count, 1))
+    region["width"] = choose(rng, 0, 0, round(rng.uniform(0, 0.3), 3))
+    if "plate_reach" in recipe:  # others are layers
+        region["layer"] = choose(rng, False, True)
+    recipe["regions"].insert(int(rng.integers(len(recipe["regions"]) + 1)), region)
+    if rng.random() < 0.2:
+        choose(rng, *recipe["shutters"]).update(follow="O")
 
 
 def random_matte(rng, number: int, shape) -> tuple[str, np.ndarray]:

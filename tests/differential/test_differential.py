@@ -97,7 +97,7 @@ def test_recipes_have_all_that_a_recipe_may_have():
         seen.update([("layer", is_layered)])
         doubtful[is_layered].append(found.doubtful.mean())
     values = {"position": 3, "interpolation": 2, "light": 2, "exposure": 2, "edges": 3, "aggregate": 3, "border": 2}
-    values |= {"ease": 4, "redrawn": 2, "kind": 4, "shutters": 6, "time": 2, "direction": 2, "footage": len(KINDS)}
+    values |= {"ease": 4, "redrawn": 2, "kind": 5, "shutters": 6, "time": 2, "direction": 2, "footage": len(KINDS)}
     values |= {"ramp": 4, "blend": 2, "timing": 2, "channel": 4}
     values |= {"follow": 2, "trail": 2, "edge_aware": 3, "layer": 2, "plate_reach": 4}
     assert Counter(name for name, _ in seen) == values
@@ -125,6 +125,7 @@ FAULTS = {
     "edges passed over": (cpu.Solver, "solve", lambda solver, labels, count, *_, warm: solve(solver, labels, count)),
     "mattes in another order": (mattes, "blended", lambda c, shown, values: blended(c, shown[::-1], values[::-1])),
     "hard mattes": (matte_values, "feathered", lambda values, width: values),
+    "outlines of hard edges": (mattes, "coverage", lambda *given: np.round(coverage(*given))),
     "a ramp that is not turned": (
         mattes.Ramp,
         "values",
@@ -136,7 +137,7 @@ FAULTS = {
     "not normalised": (compositor, "source_frames", lambda options, places, shot: places.clip(0, shot.stop - 1)),
 }
 eased, source_frames, solve = keyframes.eased, compositor.source_frames, cpu.Solver.solve
-blended, ramp_values = mattes.blended, mattes.Ramp.values
+blended, ramp_values, coverage = mattes.blended, mattes.Ramp.values, mattes.coverage
 rasterise, resampled = scribbles.rasterise, cpu_window.resampled
 
 

@@ -75,10 +75,22 @@ STROKES = (
 )
 
 
-KINDS = (
+DRAWN = (
     *STROKES,
+    ("OUTLINE", "Outline", "What closed curves enclose, to the pixel: a matte that is drawn"),
+)
+
+
+KINDS = (
+    *DRAWN,
     ("MATTE", "Matte", "What a file, a strip or a mask says for every pixel"),
     ("RAMP", "Ramp", "From none of the shutter to all of it, across the picture"),
+)
+
+
+BETWEEN = (
+    ("CARRIED", "Carried", "The footage's own motion carries the outline from both drawings"),
+    ("STRAIGHT", "Straight", "Curves go straight from one drawing to the next"),
 )
 
 

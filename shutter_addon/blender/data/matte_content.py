@@ -12,9 +12,10 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.frames import retiming
 from ...core.messages import EffectError
-from ...core.model import keyframes, mattes
+from ...core.model import keyframes, mattes, outlines
 from ...core.model.effect import Moves, PlacedRamp
 from ...media import MediaError
+from ...media.carried_mattes import FOLDER, CarriedFile
 from ...media.files import stamp
 from ...media.matte_files import MatteFile
 from ...media.sequence import ImageFiles
@@ -37,6 +38,14 @@ def content(effect, strip, region, moves: Moves, frames, time: keyframes.Channel
         return _mask_shapes(scene, effect, strip, region, frames, time)
     first = strips.origin(strip) if validation.word(region, "timing") == "TIMELINE" else None
     return mattes.FileFrames(file=image_file(region), offset=validation.number(region, "offset"), first=first)
+
+
+def carried_file(effect, strip, drawn: dict[int, outlines.Curves]) -> CarriedFile:
+    """What gives the mattes of an outline in the frames of the source, by the curves at some of them. EffectError,
+    MediaError: there is no source."""
+    spec = source_media.spec(strips.source_of(effect.id_data, effect, strip))
+    folder = Path(bpy.data.filepath).parent / FOLDER if bpy.data.filepath else None
+    return CarriedFile(footage=spec, drawings=tuple(sorted(drawn.items())), folder=folder)
 
 
 def channel(region) -> str:

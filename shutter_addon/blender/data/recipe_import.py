@@ -55,6 +55,8 @@ def apply(scene, effect, strip, source: recipe.Recipe, folder: Path = Path()) ->
     for region in source.regions:
         if isinstance(region, recipe.Region):
             _add_region(scene, effect, strip, region, colors[region.shutter], first)
+        elif isinstance(region, recipe.OutlineRegion):
+            _add_outline(scene, effect, strip, region, colors[region.shutter], first)
         else:
             _add_matte(scene, effect, strip, region, images, first)
 
@@ -161,10 +163,15 @@ def _add_region(scene, effect, strip, source: recipe.Region, color: Sequence[flo
     _set_moves(scene, region, path, source.keys, first)
 
 
+def _add_outline(scene, effect, strip, source: recipe.OutlineRegion, color: Sequence[float], first: float) -> None:
+    region = _new_matte(effect, source)
+    region.between = source.between.upper()
+    region.layer = _draw(effect, strip, source, color, first)
+    _set_numbers(scene, region, source, first)
+
+
 def _add_matte(scene, effect, strip, source: recipe.MatteRegion | recipe.RampRegion, images, first: float) -> None:
-    region = effect.regions.add()
-    region.name, region.shutter, region.kind = source.name, source.shutter, source.kind.upper()
-    region.invert, region.blend, region.is_layer = source.invert, source.blend.upper(), source.layer
+    region = _new_matte(effect, source)
     if isinstance(source, recipe.RampRegion):
         region.ramp = source.ramp.upper()
     else:
@@ -175,6 +182,18 @@ def _add_matte(scene, effect, strip, source: recipe.MatteRegion | recipe.RampReg
         is_named = source.channel not in recipe.CHANNELS
         region.channel = "NAMED" if is_named else source.channel.upper()
         region.channel_name = source.channel if is_named else ""
+    _set_numbers(scene, region, source, first)
+
+
+def _new_matte(effect, source: recipe.OutlineRegion | recipe.MatteRegion | recipe.RampRegion):
+    region = effect.regions.add()
+    region.name, region.shutter, region.kind = source.name, source.shutter, source.kind.upper()
+    region.invert, region.blend, region.is_layer = source.invert, source.blend.upper(), source.layer
+    return region
+
+
+def _set_numbers(scene, region, source, first: float) -> None:
+    """Numbers of a matte, and their keys."""
     path = region.path_from_id()
     _set_number(scene, region, path, "opacity", source.opacity, first)
     _set_number(scene, region, path, "feather", source.width, first)
@@ -198,7 +217,7 @@ def _set_moves(scene, moving, path: str, keys: list, first: float, **curve) -> N
         fcurves.set_keys(scene, f"{path}.{name}", index, numbers, **curve)
 
 
-def _draw(effect, strip, source: recipe.Region, color: Sequence[float], first: float) -> str:
+def _draw(effect, strip, source: recipe.Region | recipe.OutlineRegion, color: Sequence[float], first: float) -> str:
     """Draws a region's strokes on an annotation layer of its own, a frame per drawing; the layer's name."""
     layer = annotation(effect).layers.new(source.name or data_("Region"), set_active=False)
     layer.color = color

@@ -17,7 +17,19 @@ from bpy.types import PropertyGroup
 
 from ...core.model.limits import MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE
 from . import consistency, matte_strips, selection
-from .choices import BLENDS, CHANNELS, CONTEXT, FOLLOWED, KINDS, MATTE_SOURCES, MOTIONS, RAMPS, TIMINGS, UNKEYED
+from .choices import (
+    BETWEEN,
+    BLENDS,
+    CHANNELS,
+    CONTEXT,
+    FOLLOWED,
+    KINDS,
+    MATTE_SOURCES,
+    MOTIONS,
+    RAMPS,
+    TIMINGS,
+    UNKEYED,
+)
 from .consistency import changed
 
 KEYED = {"ANIMATABLE"}  # as properties are where nothing else is said
@@ -130,6 +142,7 @@ class ShutterRegion(_Tracked, PropertyGroup):
     shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=changed)
     layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=changed)
     kind: choice("Type", "What says where the shutter holds", KINDS, translation_context=CONTEXT)
+    between: choice("Between", "What gives the matte between two drawings", BETWEEN)
     matte: choice("From", "What the matte is", MATTE_SOURCES)
     image: PointerProperty(
         name="File",

@@ -5,7 +5,7 @@ change when the scene does. Channels are sampled at the frames that are asked fo
 Blender itself. Drivers, NLA strips and further layers of an action do not count (docs/manual.md).
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,14 +17,14 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...core.frames.retiming import StripTiming
 from ...core.messages import EffectError, UserError, translated
 from ...core.model import effect as model
-from ...core.model import keyframes, limits
+from ...core.model import keyframes, limits, mattes, outlines
 from ...core.model.frame_state import Options
 from ...core.pixels import following
-from . import annotations, geometry, inbetween_settings, matte_content, source_media, strips, validation
+from . import inbetween_settings, matte_content, sampled, source_media, strips, validation
 from .fcurves import Curves, leading, progress
+from .sampled import Frames
 from .strip_timing import timing_of
 
-Frames = Collection[float]  # of the timeline
 OPTIONS = ("position", "interpolation", "light", "exposure", "edges")
 # Sentences of core/model/effect.py and core/frames/retiming.py, which are looked up where they are passed on.
 _CORE = (
@@ -131,7 +131,7 @@ def read(scene, effect, strip, frames: Frames, *, thorough: bool = False) -> mod
         regions=regions,
         options=options,
         time=sampling.time,
-        edge_aware=_channel(curves, effect, path, "edge_aware", around if layers else frames),
+        edge_aware=sampled.channel(curves, effect, path, "edge_aware", around if layers else frames),
         camera=camera,
     )
 
@@ -182,8 +182,11 @@ def strokes_at(scene, effect, strip, index: int, frame: float) -> list[np.ndarra
 
 
 def region_at(scene, effect, strip, index: int, frames: Frames) -> Any:
-    """A region as plain data, by its kind a Region or a MatteRegion, its channels sampled at timeline frames. What is
-    wrong at one frame is told at that frame."""
+    """A region as plain data, by its kind a Region or a MatteRegion, its channels sampled at timeline frames; an
+    outline is the Region that its curves would be as a lasso. What is wrong at one frame is told at that frame."""
+    if effect.regions[index].kind == "OUTLINE":
+        path = f"{effect.path_from_id()}.regions[{index}]"
+        return _region(_Sampling.of(Curves(scene), effect, strip, frames), path, effect.regions[index], 0)
     return _any_region(_Sampling.of(Curves(scene), effect, strip, frames), index, 0)
 
 
@@ -194,7 +197,7 @@ def last_shown(scene, effect, strip) -> float:
     frames, time = (first, last), None
     if effect.use_source_time:
         frames = *range(first, last, max(1, (last - first) // 100)), last
-        time = _source_time(Curves(scene), effect.path_from_id(), effect, frames)
+        time = sampled.source_time(Curves(scene), effect.path_from_id(), effect, frames)
     return max(map(matte_content.shown_frame(scene, effect, strip, time), frames))
 
 
@@ -215,37 +218,14 @@ def check_counts(effect) -> None:
             raise EffectError(sentence.format(place=validation.place(effect), count=len(items), most=most))
 
 
-def _tried(function: Callable, *arguments):
-    """The result, or the UserError in its place, which is raised where the value is asked for."""
-    try:
-        return function(*arguments)
-    except UserError as error:
-        return error
-
-
-def _channel(curves: Curves, owner, path: str, name: str, frames: Frames, change=lambda v: v) -> keyframes.Channel:
-    """A float property or a vector, each value changed by a function."""
-
-    def at(frame):
-        return change(curves.value(owner, path, name, frame))
-
-    try:
-        keyed = curves.of(owner, path, name)
-    except EffectError as error:
-        return keyframes.Constant(error)
-    if not keyed:
-        return keyframes.Constant(_tried(at, 0.0))
-    return keyframes.Samples({frame: _tried(at, frame) for frame in frames}, curves.keys(keyed))
-
-
 def _options(curves: Curves, path: str, effect, frames: Frames) -> keyframes.Channel:
     names = (*OPTIONS, "aggregate", "border", "stop_at_cuts", "decontaminate")
-    option_curves = {name: _tried(curves.find, f"{path}.{name}") for name in names}
+    option_curves = {name: sampled.tried(curves.find, f"{path}.{name}") for name in names}
     if error := next((error for error in option_curves.values() if isinstance(error, EffectError)), None):
         return keyframes.Constant(error)
     if not any(option_curves.values()):
-        return keyframes.Constant(_tried(_options_at, effect, option_curves, 0.0))
-    return keyframes.Samples({frame: _tried(_options_at, effect, option_curves, frame) for frame in frames})
+        return keyframes.Constant(sampled.tried(_options_at, effect, option_curves, 0.0))
+    return keyframes.Samples({frame: sampled.tried(_options_at, effect, option_curves, frame) for frame in frames})
 
 
 def _options_at(effect, curves: dict, frame: float) -> Options:
@@ -277,12 +257,12 @@ def _shutter(
 ) -> model.Shutter:
     """A shutter, but for what it follows."""
     path, shutter = f"{effect.path_from_id()}.shutters[{index}]", effect.shutters[index]
-    bars = _tried(_bars, curves, path, shutter, options, frames, thorough)
+    bars = sampled.tried(_bars, curves, path, shutter, options, frames, thorough)
     if isinstance(bars, EffectError):
         bars = keyframes.Bars(keyframes.Constant(bars))
     follows = validation.word(shutter, "follow") != "NOTHING"
     is_trail = follows and validation.word(shutter, "length") == "MOTION"
-    trail = _channel(curves, shutter, path, "trail", frames) if is_trail else None
+    trail = sampled.channel(curves, shutter, path, "trail", frames) if is_trail else None
     motion = validation.word(shutter, "follow_motion").lower()
     smooth = validation.number(shutter, "follow_smooth")
     return model.Shutter(
@@ -294,7 +274,7 @@ def _bars(curves: Curves, path: str, shutter, options: keyframes.Channel, frames
     """EffectError: they are not as many as the window is long."""
     stored = np.array([bar.weight for bar in shutter.bars])
     keyed = {i: curve for i in range(len(stored)) if (curve := curves.find(f"{path}.bars[{i}].weight"))}
-    chosen = {frame: state for frame in frames if isinstance(state := _tried(options.at, frame), Options)}
+    chosen = {frame: state for frame in frames if isinstance(state := sampled.tried(options.at, frame), Options)}
     for window in {state.window for state in chosen.values()}:
         check_bar_count(shutter, window)
 
@@ -309,10 +289,10 @@ def _bars(curves: Curves, path: str, shutter, options: keyframes.Channel, frames
     if thorough:  # whatever the options are there
         ways = dict.fromkeys(frames, "displacement") | ways
     if not keyed:
-        return keyframes.Bars(keyframes.Constant(_tried(at, 0.0) if len(stored) else stored))
+        return keyframes.Bars(keyframes.Constant(sampled.tried(at, 0.0) if len(stored) else stored))
     keys = curves.keys(list(keyed.values()))
     if not keys:  # curves of samples or of modifiers alone
-        return keyframes.Bars(keyframes.Samples({frame: _tried(at, frame) for frame in frames}))
+        return keyframes.Bars(keyframes.Samples({frame: sampled.tried(at, frame) for frame in frames}))
     return _keyed_bars(keys, list(keyed.values()), at, ways, thorough)
 
 
@@ -321,19 +301,19 @@ def _keyed_bars(keys, curves: list, at: Callable, frames: dict[float, str], thor
     the bars, where they are not displaced. frames: by frame the interpolation."""
     numbers, values, shares, leaders = [frame for frame, _ in keys], {}, {}, {}
 
-    def sampled(frame):
+    def sample(frame):
         if frame not in values:
-            values[frame] = _tried(at, frame)
+            values[frame] = sampled.tried(at, frame)
         return values[frame]
 
     for frame, interpolation in frames.items():
         before, after, _ = keyframes.span(numbers, frame)
-        ends = [sampled(numbers[index]) for index in (before, after)]
+        ends = [sample(numbers[index]) for index in (before, after)]
         if before == after:
             continue
         displaced = interpolation != "value" and all(isinstance(bars, np.ndarray) and bars.any() for bars in ends)
         if thorough or not displaced:
-            sampled(frame)
+            sample(frame)
         if thorough or displaced:
             if before not in leaders:
                 leaders[before] = leading(curves, numbers[before], numbers[after])
@@ -353,7 +333,7 @@ class _Sampling:
     """What the regions of an effect are read from.
 
     frames: the timeline frames at which channels are sampled
-    placement: of the strip's picture (_placement); time: of the source, None where its strip says that"""
+    placement: of the strip's picture (sampled.placement); time: of the source, None where its strip says that"""
 
     curves: Curves
     effect: Any
@@ -364,13 +344,13 @@ class _Sampling:
 
     @staticmethod
     def of(curves: Curves, effect, strip, frames: Frames) -> "_Sampling":
-        time = _source_time(curves, effect.path_from_id(), effect, frames) if effect.use_source_time else None
+        time = sampled.source_time(curves, effect.path_from_id(), effect, frames) if effect.use_source_time else None
         return _Sampling(
             curves=curves,
             effect=effect,
             strip=strip,
             frames=frames,
-            placement=_placement(curves, effect, strip, frames),
+            placement=sampled.placement(curves, effect, strip, frames),
             time=time,
         )
 
@@ -379,15 +359,21 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
     """The region of that index; shutter: the index of its shutter."""
     effect, curves, frames = sampling.effect, sampling.curves, sampling.frames
     region, path = effect.regions[index], f"{effect.path_from_id()}.regions[{index}]"
-    if region.kind not in strips.MATTES:
+    if region.kind not in strips.LAID:
         return _region(sampling, path, region, shutter)
-    moves = _moves(curves, region, path, frames)
-    content = _tried(matte_content.content, effect, sampling.strip, region, moves, frames, sampling.time)
-    blend = _tried(validation.word, region, "blend")
+    moves = sampled.moves(curves, region, path, frames)
+    kind: type[model.MatteRegion] = model.MatteRegion
+    drawn: dict[str, Any] = {}
+    if region.kind == "OUTLINE":
+        kind, drawn = model.OutlineRegion, _outlined(sampling, path, region)
+        content = sampled.tried(_outlines, sampling, region, *drawn.values())
+    else:
+        content = sampled.tried(matte_content.content, effect, sampling.strip, region, moves, frames, sampling.time)
+    blend = sampled.tried(validation.word, region, "blend")
     if faults := [value for value in (content, blend) if isinstance(value, UserError)]:
         content, blend = keyframes.Constant(faults[0]), "OVER"
-    opacity, feather = (_channel(curves, region, path, name, frames) for name in ("opacity", "feather"))
-    return model.MatteRegion(
+    opacity, feather = (sampled.channel(curves, region, path, name, frames) for name in ("opacity", "feather"))
+    return kind(
         name=region.name,
         shutter=shutter,
         content=content,
@@ -397,7 +383,28 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
         feather=feather,
         moves=moves,
         layer=region.is_layer,
+        **drawn,
     )
+
+
+def _outlined(sampling: _Sampling, path: str, region) -> dict[str, Any]:
+    """What an outline has besides what all mattes have: all of its drawings, and what is between them."""
+    between = sampled.tried(validation.word, region, "between")
+    drawings = sampled.drawings(sampling.curves, path, sampling.effect, region, sampling.placement, None)
+    return {"drawings": drawings, "between": "straight" if between == "STRAIGHT" else "carried"}
+
+
+def _outlines(sampling: _Sampling, region, drawings: model.Drawings, between: str) -> keyframes.Channel:
+    """The content of an outline. EffectError, MediaError: there is no source."""
+    validation.word(region, "between")
+    if between == "straight":
+        return model.DrawnOutlines(drawings)
+    numbers, effect, strip = drawings.frames, sampling.effect, sampling.strip
+    there = _Sampling.of(sampling.curves, effect, strip, numbers)
+    placed = replace(drawings, placement=there.placement)
+    shown = matte_content.shown_frame(effect.id_data, effect, strip, there.time)
+    drawn = {int(shown(frame)): outlines.curves(placed.drawing(i, frame)) for i, frame in enumerate(numbers)}
+    return mattes.FileFrames(file=matte_content.carried_file(effect, strip, drawn))
 
 
 def _region(sampling: _Sampling, path: str, region, shutter: int) -> model.Region:
@@ -405,81 +412,21 @@ def _region(sampling: _Sampling, path: str, region, shutter: int) -> model.Regio
     return model.Region(
         name=region.name,
         shutter=shutter,
-        kind=keyframes.Constant(_tried(lambda: validation.word(region, "kind").lower())),
-        width=_channel(curves, region, path, "width", frames),
-        drawings=_drawings(curves, path, sampling.effect, region, sampling.placement, frames),
-        moves=_moves(curves, region, path, frames),
-        opacity=_channel(curves, region, path, "opacity", frames),
+        kind=keyframes.Constant(sampled.tried(_word_of_kind, region)),
+        width=sampled.channel(curves, region, path, "width", frames),
+        drawings=sampled.drawings(curves, path, sampling.effect, region, sampling.placement, frames),
+        moves=sampled.moves(curves, region, path, frames),
+        opacity=sampled.channel(curves, region, path, "opacity", frames),
         layer=region.is_layer,
     )
 
 
+def _word_of_kind(region) -> str:
+    word = validation.word(region, "kind").lower()
+    return "lasso" if word == "outline" else word
+
+
 def _camera(curves: Curves, effect, frames: Frames) -> model.Camera:
     path = effect.camera.path_from_id()
-    influence = _channel(curves, effect.camera, path, "influence", frames)
-    return model.Camera(_moves(curves, effect.camera, path, frames), influence)
-
-
-def _moves(curves: Curves, moving, path: str, frames: Frames) -> model.Moves:
-    """Of a region or of the camera."""
-    return model.Moves(
-        location=_channel(curves, moving, path, "location", frames),
-        rotation=_channel(curves, moving, path, "rotation", frames, np.degrees),
-        scale=_channel(curves, moving, path, "scale", frames),
-    )
-
-
-def _drawings(curves: Curves, path: str, effect, region, placement, frames: Frames) -> model.Drawings:
-    """A region's drawings: between two of them with the ease of its location's keys. Only those that the frames need
-    are read."""
-    width, height = annotations.picture_size(effect)
-    layer = annotations.layer_of(effect, region)
-    drawings = sorted(layer.frames, key=lambda drawing: drawing.frame_number) if layer else []
-    numbers = tuple(drawing.frame_number for drawing in drawings)
-    needed = {index for frame in frames for index in keyframes.span(numbers, frame)[:2]} if drawings else ()
-    timing = _tried(curves.find, f"{path}.location")
-    is_curve = timing is not None and not isinstance(timing, EffectError)
-    eases = dict(curves.keys([timing])) if is_curve and len(numbers) > 1 else {}
-    return model.Drawings(
-        name=region.name,
-        frames=numbers,
-        strokes=tuple(annotations.strokes_of(drawing) if i in needed else None for i, drawing in enumerate(drawings)),
-        eases=tuple(eases.get(number, "linear") for number in numbers),
-        aspect=width / height,
-        placement=placement,
-    )
-
-
-def _placement(curves: Curves, effect, strip, frames: Frames) -> keyframes.Channel:
-    """The matrix from the sequencer's image to the strip's picture, which may be keyed."""
-    size, path = annotations.picture_size(effect), f"{strip.path_from_id()}.transform"
-    keyed = {name: curve for name in geometry.TRANSFORM if (curve := _tried(curves.find, f"{path}.{name}"))}
-
-    def at(frame):
-        moved = {name: curve.evaluate(frame) for name, curve in keyed.items() if not isinstance(curve, EffectError)}
-        return annotations.image_to_picture(strip, size, **moved)
-
-    if not keyed:
-        return keyframes.Constant(_tried(at, 0.0))
-    return keyframes.Samples({frame: _tried(at, frame) for frame in frames})
-
-
-class _Evaluated:
-    """Channel of a number that Blender evaluates: for sampling alone."""
-
-    def __init__(self, function: Callable):
-        self.at = function
-
-
-def _source_time(curves: Curves, path: str, effect, frames: Frames) -> keyframes.Channel:
-    def value(frame):
-        return curves.value(effect, path, "source_time", frame)
-
-    keyed = _tried(curves.of, effect, path, "source_time")
-    if isinstance(keyed, EffectError):
-        return keyframes.Constant(keyed)
-    keys = curves.keys(keyed)
-    time = keyframes.SourceTime(_Evaluated(value), keys)
-    if not keyed:
-        return keyframes.Constant(_tried(time.at, 0.0))
-    return keyframes.Samples({frame: _tried(time.at, frame) for frame in frames}, keys)
+    influence = sampled.channel(curves, effect.camera, path, "influence", frames)
+    return model.Camera(sampled.moves(curves, effect.camera, path, frames), influence)

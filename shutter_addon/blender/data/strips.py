@@ -12,6 +12,7 @@ from ...core.messages import EffectError
 ENGINE = "VIRTUAL_SHUTTER"
 SOURCES = ("MOVIE", "IMAGE", "MOVIECLIP")
 MATTES = ("MATTE", "RAMP")  # kinds of regions that have no strokes
+LAID = ("OUTLINE", *MATTES)  # kinds of mattes, which are laid over what scribbles give
 
 
 def effect_strips(scene) -> list:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..data import strips
 from ..data.annotations import annotation, layer_of
 from ..data.consistency import bars, choose_region, color_layers, forget_followed, unique
 from . import collection_edits, motion_keys
@@ -21,7 +22,8 @@ def first_drawn(effect, shutter, kind: str):
     """Appends a region for strokes, as add_region does. The first of an effect, of a shutter that is sharp, follows
     edges, unless the editor has said how much: a subject is meant, and no spot of it."""
     is_sharp = np.count_nonzero(bars(shutter)) <= effect.bars_per_frame
-    if is_sharp and not effect.regions and not effect.is_property_set("edge_aware"):
+    is_scribble = kind not in strips.LAID
+    if is_scribble and is_sharp and not effect.regions and not effect.is_property_set("edge_aware"):
         effect.edge_aware = 1.0
     return add_region(effect, shutter, kind)
 

@@ -10,7 +10,7 @@ from bpy.types import Operator
 from ...core.messages import EffectError
 from ...core.model import presets
 from ..data import annotations, consistency, preview_areas, selection, strips, validation
-from ..data.choices import CONTEXT, STROKES
+from ..data.choices import CONTEXT, DRAWN
 from ..editing import (
     add_effect,
     bar_edits,
@@ -292,7 +292,7 @@ class SHUTTER_OT_draw(OfShutter, Operator):
     kind: EnumProperty(
         name="Type",
         description="How the strokes cover the picture",
-        items=STROKES,
+        items=DRAWN,
         translation_context=CONTEXT,
         options={"SKIP_SAVE"},
     )

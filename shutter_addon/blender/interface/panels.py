@@ -31,7 +31,13 @@ class SHUTTER_UL_shutters(UIList):
             hint.label(text="default")
 
 
-_ICONS = {"LINE": "IPO_LINEAR", "LASSO": "MESH_CIRCLE", "MATTE": "MOD_MASK", "RAMP": "IPO_EASE_IN_OUT"}
+_ICONS = {
+    "LINE": "IPO_LINEAR",
+    "LASSO": "MESH_CIRCLE",
+    "OUTLINE": "CURVE_BEZCIRCLE",
+    "MATTE": "MOD_MASK",
+    "RAMP": "IPO_EASE_IN_OUT",
+}
 
 
 class SHUTTER_UL_regions(UIList):

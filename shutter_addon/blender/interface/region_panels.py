@@ -40,11 +40,13 @@ class Regions(WithEffect):
         layout.prop(region, "kind")
         if region.kind == "LINE":
             layout.prop(region, "width")
+        elif region.kind == "OUTLINE":
+            layout.prop(region, "between")
         elif region.kind == "RAMP":
             layout.prop(region, "ramp")
         elif region.kind == "MATTE":
             _draw_matte(layout, matte_look.look(scene, effect, strip, region), region)
-        if region.kind not in strips.MATTES:
+        if region.kind not in strips.LAID:
             layout.prop(region, "opacity")
         else:
             _draw_blend(layout, region)

@@ -10,11 +10,12 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
 from ..messages import EffectError
-from . import keyframes, limits, mattes, motions, scribbles, shutters
+from . import keyframes, limits, mattes, motions, outlines, scribbles, shutters
 from .frame_state import FrameState
 from .keyframes import Bars, Channel
 from .motions import Placement
@@ -182,6 +183,48 @@ class MatteRegion(Subject):
         )
 
 
+@dataclass(frozen=True, kw_only=True)
+class OutlineRegion(MatteRegion):
+    """A region whose matte is what closed curves enclose. It moves about their centre, which says how what they enclose
+    moves, and does not move them.
+
+    between: what gives the matte between two drawings: "carried", the footage's own motion, or "straight", curves that
+    go from one to the next; content: a channel of mattes.FileFrame or of mattes.Outline"""
+
+    drawings: Drawings
+    between: Literal["carried", "straight"] = "carried"
+
+    def drawn_at(self, frame: float) -> scribbles.Shape:
+        """The curves at a frame, as a lasso. EffectError: they are nowhere near the picture."""
+        strokes = tuple(self.drawings.at(frame))
+        return scribbles.Shape(shutter=self.shutter, kind="lasso", width=0.0, strokes=strokes)
+
+    def centre(self, frame: float) -> np.ndarray | None:
+        strokes = self.drawings.at(frame)
+        return motions.centre(strokes) if strokes else None
+
+    def corners(self, frame: float) -> np.ndarray:
+        placed, strokes = self.placement(frame), self.drawings.at(frame)
+        aspect = self.drawings.aspect
+        moved = scribbles.transform(strokes, placed.location, placed.rotation, placed.scale, aspect)
+        return motions.corners(moved) if strokes else np.empty((0, 2))
+
+
+@dataclass(frozen=True)
+class DrawnOutlines:
+    """Channel of outlines (mattes.Outline) that go straight from one drawing to the next."""
+
+    drawings: Drawings
+
+    @property
+    def is_still(self) -> bool:
+        """Whether it is known to be the same at every frame."""
+        return self.drawings.is_still
+
+    def at(self, frame: float) -> mattes.Outline:
+        return mattes.Outline(outlines.curves(self.drawings.at(frame)))
+
+
 @dataclass(frozen=True)
 class PlacedRamp:
     """Channel of a ramp (mattes.Ramp) that is moved by keys."""
@@ -278,7 +321,8 @@ class Effect:
 
     def drawn_at(self, frame: float) -> list[scribbles.Shape]:
         """All that is drawn, layers as well, where it is at a frame. EffectError: it lies nowhere."""
-        return [region.at(frame) for region in self.regions if isinstance(region, Region)]
+        outlined = [each.drawn_at(frame) for each in self.regions if isinstance(each, OutlineRegion)]
+        return [region.at(frame) for region in self.regions if isinstance(region, Region)] + outlined
 
     def _shapes_at(self, frame: float) -> Iterator[scribbles.Shape]:
         room = limits.MAX_POINTS

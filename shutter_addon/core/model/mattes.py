@@ -13,6 +13,7 @@ from typing import Literal, Protocol
 import numpy as np
 
 from ..frames.retiming import Medium, StripTiming, source_frame
+from .outlines import Curves, coverage
 
 Blend = Literal["over", "add"]
 RampKind = Literal["linear", "radial", "angle"]
@@ -121,6 +122,17 @@ class Ramp:
         return np.clip(values, 0, 1).astype(np.float32)
 
 
+@dataclass(frozen=True)
+class Outline:
+    """What closed curves enclose (core.model.outlines)."""
+
+    curves: Curves
+
+    def values(self, width: int, height: int) -> np.ndarray:
+        """As Ramp.values."""
+        return coverage(self.curves, width, height)
+
+
 class MaskShape(Hashable, Protocol):
     """A mask at one frame (core.masks.mask)."""
 
@@ -128,7 +140,7 @@ class MaskShape(Hashable, Protocol):
         """As Ramp.values."""
 
 
-Content = FileFrame | Ramp | MaskShape
+Content = FileFrame | Ramp | Outline | MaskShape
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..model import keyframes, limits
-from ..model.effect import Effect, MatteRegion, Region, Shutter, Subject
+from ..model.effect import Effect, MatteRegion, OutlineRegion, Region, Shutter, Subject
 from ..model.frame_state import Interpolation
 from ..model.keyframes import Channel, Ease, Samples
 from . import recipe, recipe_file
@@ -48,9 +48,9 @@ def baked(
     called = _region_names(effect)
     words = iter(mattes)
     regions = [
-        _matte(region, next(words), name, names[region.shutter], shown)
-        if isinstance(region, MatteRegion)
-        else _region(region, name, names[region.shutter], shown)
+        _drawn(region, name, names[region.shutter], shown)
+        if isinstance(region, Region | OutlineRegion)
+        else _matte(region, next(words), name, names[region.shutter], shown)
         for region, name in zip(effect.regions, called, strict=True)
     ]
     # A region without strokes says nothing of how anything moves.
@@ -170,7 +170,9 @@ def _value_keys(at: Callable[[float], float], channel: Channel, shown: range) ->
     return [recipe.ValueKey(_frame(frame, shown), _short(at(frame)), ease) for frame, ease in keys]
 
 
-def _region(region: Region, name: str, shutter: str, shown: range) -> recipe.Region | None:
+def _drawn(
+    region: Region | OutlineRegion, name: str, shutter: str, shown: range
+) -> recipe.Region | recipe.OutlineRegion | None:
     drawings = _drawings(region, shown.start)
     if not drawings:
         return None
@@ -179,19 +181,22 @@ def _region(region: Region, name: str, shutter: str, shown: range) -> recipe.Reg
     words = {number: words[number] for number in drawings if words}
     keys = _move_keys(region, words, shown)
     redrawn = {number: strokes for number, strokes in drawings.items() if words and number != keys[0][0]}
-    return recipe.Region(
-        shutter=shutter,
-        name=name,
-        kind=region.kind.at(shown.start),
-        width=_short(region.width.at(shown.start)),
-        strokes=drawings[min(drawings)],
-        keys=[
+    said: dict[str, Any] = {
+        "shutter": shutter,
+        "name": name,
+        "strokes": drawings[min(drawings)],
+        "keys": [
             recipe.RegionKey(strokes=redrawn.get(frame), ease=ease, **_placed(region, frame, shown))
             for frame, ease in keys
         ],
-        opacity=_number(region.opacity, shown),
-        layer=region.layer,
-    )
+        "opacity": _number(region.opacity, shown),
+        "layer": region.layer,
+    }
+    if isinstance(region, OutlineRegion):
+        width = _number(region.feather, shown)
+        kinds: dict[str, Any] = {"between": region.between, "invert": region.invert, "blend": region.blend}
+        return recipe.OutlineRegion(kind="outline", width=width, **kinds, **said)
+    return recipe.Region(kind=region.kind.at(shown.start), width=_short(region.width.at(shown.start)), **said)
 
 
 def _matte(
@@ -254,7 +259,7 @@ def _placed(moving: Subject, frame: float, shown: range) -> dict[str, Any]:
     return {"frame": _frame(frame, shown), "location": location, "rotation": degrees, "scale": _short(scale)}
 
 
-def _drawings(region: Region, frame: float) -> dict[float, list[recipe.Stroke]]:
+def _drawings(region: Region | OutlineRegion, frame: float) -> dict[float, list[recipe.Stroke]]:
     """A region's strokes by the frames they were drawn at, from the first that has any, as they lie at a frame."""
     result: dict[float, list[recipe.Stroke]] = {}
     for index, number in enumerate(region.drawings.frames):

@@ -141,32 +141,81 @@ class Region:
 
     def drawings(self) -> list[tuple[RegionKey | None, list[Stroke]]]:
         """The key that starts each drawing, and its strokes, in time."""
-        drawn: list[tuple[RegionKey | None, list[Stroke]]]
-        drawn = [(key, key.strokes) for key in self.keys if key.strokes is not None]
-        if not drawn or self.keys[0].strokes is None:
-            drawn.insert(0, (self.keys[0] if self.keys else None, self.strokes))
-        return drawn
+        return _drawings(self)
 
     def over_time(self, shutter: int, aspect: float) -> effect.Region:
         """As plain data, for a picture of width / height = aspect; shutter: the index of its shutter."""
-        drawn = self.drawings()
-        drawings = effect.Drawings(
-            name=self.name,
-            frames=tuple(key.frame if key else 0.0 for key, _ in drawn),
-            strokes=tuple([np.asarray(stroke, float) for stroke in strokes] for _, strokes in drawn),
-            eases=tuple(key.ease if key else "linear" for key, _ in drawn),
-            aspect=aspect,
-        )
         return effect.Region(
             name=self.name,
             shutter=shutter,
             kind=keyframes.Constant(self.kind),
             width=keyframes.Constant(self.width),
-            drawings=drawings,
+            drawings=_drawings_over_time(self, aspect),
             moves=_moves(self.keys),
             opacity=_numbers(self.opacity),
             layer=self.layer,
         )
+
+
+@dataclass(frozen=True)
+class OutlineRegion:
+    """A region by outlines: its shutter's coefficients are 1 in what closed curves enclose, and 0 elsewhere. Drawings
+    are as a Region's.
+
+    between: what gives the matte between two drawings, as effect.OutlineRegion has it
+    width, invert, blend, opacity, layer: as a MatteRegion's; keys: likewise, and drawings"""
+
+    shutter: str
+    kind: Literal["outline"]
+    name: str = ""
+    strokes: list[Stroke] = field(default_factory=list)
+    between: Literal["carried", "straight"] = "carried"
+    invert: bool = False
+    blend: mattes.Blend = "over"
+    opacity: Keyable = 1.0
+    width: Keyable = 0.0
+    keys: list[RegionKey] = field(default_factory=list)
+    layer: bool = False
+
+    def drawings(self) -> list[tuple[RegionKey | None, list[Stroke]]]:
+        """As Region.drawings."""
+        return _drawings(self)
+
+    def over_time(self, shutter: int, aspect: float, file: mattes.MatteFile) -> effect.OutlineRegion:
+        """As Region.over_time; file: what carried mattes are read from."""
+        drawings, straight = _drawings_over_time(self, aspect), self.between == "straight"
+        return effect.OutlineRegion(
+            name=self.name,
+            shutter=shutter,
+            content=effect.DrawnOutlines(drawings) if straight else mattes.FileFrames(file=file),
+            blend=self.blend,
+            invert=self.invert,
+            opacity=_numbers(self.opacity),
+            feather=_numbers(self.width),
+            moves=_moves(self.keys),
+            layer=self.layer,
+            drawings=drawings,
+            between=self.between,
+        )
+
+
+def _drawings(region: Region | OutlineRegion) -> list[tuple[RegionKey | None, list[Stroke]]]:
+    drawn: list[tuple[RegionKey | None, list[Stroke]]]
+    drawn = [(key, key.strokes) for key in region.keys if key.strokes is not None]
+    if not drawn or region.keys[0].strokes is None:
+        drawn.insert(0, (region.keys[0] if region.keys else None, region.strokes))
+    return drawn
+
+
+def _drawings_over_time(region: Region | OutlineRegion, aspect: float) -> effect.Drawings:
+    drawn = _drawings(region)
+    return effect.Drawings(
+        name=region.name,
+        frames=tuple(key.frame if key else 0.0 for key, _ in drawn),
+        strokes=tuple([np.asarray(stroke, float) for stroke in strokes] for _, strokes in drawn),
+        eases=tuple(key.ease if key else "linear" for key, _ in drawn),
+        aspect=aspect,
+    )
 
 
 @dataclass(frozen=True)
@@ -239,16 +288,16 @@ def _matte(region: MatteRegion | RampRegion, shutter: int, content: keyframes.Ch
 
 
 CHANNELS = ("luminance", "red", "green", "blue", "alpha")
-AnyRegion = Region | MatteRegion | RampRegion
-# What gives the file of a matte, or for a ramp the source's luminance.
-MatteFiles = Callable[[MatteRegion | RampRegion], mattes.MatteFile]
+AnyRegion = Region | OutlineRegion | MatteRegion | RampRegion
+# What gives the file of a matte, for a ramp the source's luminance, and for an outline its carried mattes.
+MatteFiles = Callable[[OutlineRegion | MatteRegion | RampRegion], mattes.MatteFile]
 
 
-def _no_file(_region: MatteRegion | RampRegion) -> mattes.MatteFile:
+def _no_file(_region: OutlineRegion | MatteRegion | RampRegion) -> mattes.MatteFile:
     return mattes.NoFile()
 
 
-KINDS = {"line": Region, "lasso": Region, "matte": MatteRegion, "ramp": RampRegion}
+KINDS = {"line": Region, "lasso": Region, "outline": OutlineRegion, "matte": MatteRegion, "ramp": RampRegion}
 
 
 @dataclass(frozen=True)
@@ -287,12 +336,7 @@ class Recipe:
 
         files: without it, nobody may ask for values of mattes"""
         order = {shutter.name: i for i, shutter in enumerate(self.shutters)}
-        regions = tuple(
-            region.over_time(order[region.shutter], aspect)
-            if isinstance(region, Region)
-            else region.over_time(order[region.shutter], files(region))
-            for region in self.regions
-        )
+        regions = tuple(_over_time(region, order[region.shutter], aspect, files) for region in self.regions)
         camera = effect.Camera(_moves(self.camera), _numbers(self.camera_influence))
         followed: dict[str | None, effect.Subject | None] = {region.name: region for region in regions}
         followed |= {CAMERA: camera, None: None}
@@ -319,6 +363,15 @@ class Recipe:
         """The source frame that is shown at a timeline frame, 1 is the first; None: the strip's timing says that."""
         time = self._source_time()
         return None if time is None else time.at(frame)[0]
+
+
+def _over_time(region: AnyRegion, shutter: int, aspect: float, files: MatteFiles) -> effect.Region | effect.MatteRegion:
+    if isinstance(region, Region):
+        return region.over_time(shutter, aspect)
+    if isinstance(region, OutlineRegion):
+        file = files(region) if region.between == "carried" else mattes.NoFile()
+        return region.over_time(shutter, aspect, file)
+    return region.over_time(shutter, files(region))
 
 
 def _numbers(value: Keyable) -> keyframes.Channel:

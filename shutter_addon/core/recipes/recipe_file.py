@@ -22,6 +22,7 @@ from .recipe import (
     CameraKey,
     Keyable,
     MatteRegion,
+    OutlineRegion,
     RampRegion,
     Recipe,
     RecipeError,
@@ -333,11 +334,12 @@ def _check(recipe: Recipe) -> None:
     for i, region in enumerate(recipe.regions):
         there_is_none = f"there is no shutter {_shown(region.shutter)}"
         _require(region.shutter in places, f"regions[{i}].shutter", there_is_none)
-        if isinstance(region, Region):
-            _check_region(region, f"regions[{i}]")
-        else:
+        if isinstance(region, MatteRegion | RampRegion):
             _check_matte(region, f"regions[{i}]")
-    points = sum(_most_points(region) for region in recipe.regions if isinstance(region, Region))
+        else:
+            _check_region(region, f"regions[{i}]")
+    drawn = [region for region in recipe.regions if isinstance(region, Region | OutlineRegion)]
+    points = sum(map(_most_points, drawn))
     _require(points <= limits.MAX_POINTS, "regions", f"{points} points at once, the most are {limits.MAX_POINTS}")
 
 
@@ -377,10 +379,13 @@ def _check_placement(key: RegionKey | CameraKey, place: str) -> None:
     _require_within(key.scale, limits.MAX_SCALE, f"{place}.scale")
 
 
-def _check_region(region: Region, place: str) -> None:
+def _check_region(region: Region | OutlineRegion, place: str) -> None:
     _check_name(region.name, f"{place}.name")
-    _require(region.width >= 0, f"{place}.width", f"{region.width} is negative")
-    _require_within(region.width, limits.MAX_DISTANCE, f"{place}.width", 0)
+    if isinstance(region, OutlineRegion):
+        _check_number(region.width, f"{place}.width", limits.MAX_DISTANCE)
+    else:
+        _require(region.width >= 0, f"{place}.width", f"{region.width} is negative")
+        _require_within(region.width, limits.MAX_DISTANCE, f"{place}.width", 0)
     _check_number(region.opacity, f"{place}.opacity", 1)
     _require(region.drawings()[0][1], f"{place}.strokes", "empty: nothing is drawn")
     _check_frames(region.keys, f"{place}.keys")
@@ -418,7 +423,7 @@ def _check_strokes(strokes: list[Stroke], place: str) -> None:
                     _require_within(value, limits.MAX_DISTANCE, f"{place}[{j}][{n}][{axis}]")
 
 
-def _most_points(region: Region) -> int:
+def _most_points(region: Region | OutlineRegion) -> int:
     """The points of the region's drawing that has the most."""
     return max(sum(map(len, strokes)) for _, strokes in region.drawings())
 

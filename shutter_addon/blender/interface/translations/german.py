@@ -368,6 +368,23 @@ MESSAGES = {
     ): "Die Striche selbst, so breit wie die Breite der Region",
     ("Virtual Shutter", "Lasso"): "Lasso",
     ("*", "All that the strokes enclose"): "Alles, was die Striche umschließen",
+    ("Virtual Shutter", "Outline"): "Umriss",
+    (
+        "*",
+        "What closed curves enclose, to the pixel: a matte that is drawn",
+    ): "Was geschlossene Kurven umschließen, auf den Pixel genau: eine gezeichnete Matte",
+    ("*", "Between"): "Dazwischen",
+    ("*", "What gives the matte between two drawings"): "Woraus die Matte zwischen zwei Zeichnungen entsteht",
+    ("*", "Carried"): "Mitgeführt",
+    (
+        "*",
+        "The footage's own motion carries the outline from both drawings",
+    ): "Die Bewegung im Material selbst führt den Umriss von beiden Zeichnungen mit",
+    ("*", "Straight"): "Gerade",
+    (
+        "*",
+        "Curves go straight from one drawing to the next",
+    ): "Kurven gehen gerade von einer Zeichnung zur nächsten",
     ("*", "Width"): "Breite",
     ("*", "Width of the lines as a fraction of the picture's height"): "Breite der Linien als Bruchteil der Bildhöhe",
     ("*", "Location"): "Position",

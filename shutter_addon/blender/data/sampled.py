@@ -1,0 +1,102 @@
+"""What of Blender's data has F-curves, as channels that are sampled at timeline frames. On Blender's main thread."""
+
+from collections.abc import Callable, Collection
+
+import numpy as np
+
+from ...core.messages import EffectError, UserError
+from ...core.model import effect as model
+from ...core.model import keyframes
+from . import annotations, geometry
+from .fcurves import Curves
+
+Frames = Collection[float]  # of the timeline
+
+
+def tried(function: Callable, *arguments):
+    """The result, or the UserError in its place, which is raised where the value is asked for."""
+    try:
+        return function(*arguments)
+    except UserError as error:
+        return error
+
+
+def channel(curves: Curves, owner, path: str, name: str, frames: Frames, change=lambda v: v) -> keyframes.Channel:
+    """A float property or a vector, each value changed by a function."""
+
+    def at(frame):
+        return change(curves.value(owner, path, name, frame))
+
+    try:
+        keyed = curves.of(owner, path, name)
+    except EffectError as error:
+        return keyframes.Constant(error)
+    if not keyed:
+        return keyframes.Constant(tried(at, 0.0))
+    return keyframes.Samples({frame: tried(at, frame) for frame in frames}, curves.keys(keyed))
+
+
+def moves(curves: Curves, moving, path: str, frames: Frames) -> model.Moves:
+    """Of a region or of the camera."""
+    return model.Moves(
+        location=channel(curves, moving, path, "location", frames),
+        rotation=channel(curves, moving, path, "rotation", frames, np.degrees),
+        scale=channel(curves, moving, path, "scale", frames),
+    )
+
+
+def drawings(curves: Curves, path: str, effect, region, placement, frames: Frames | None) -> model.Drawings:
+    """A region's drawings: between two of them with the ease of its location's keys. Only those that the frames need
+    are read; None: all."""
+    width, height = annotations.picture_size(effect)
+    layer = annotations.layer_of(effect, region)
+    drawings = sorted(layer.frames, key=lambda drawing: drawing.frame_number) if layer else []
+    numbers = tuple(drawing.frame_number for drawing in drawings)
+    frames = numbers if frames is None else frames
+    needed = {index for frame in frames for index in keyframes.span(numbers, frame)[:2]} if drawings else ()
+    timing = tried(curves.find, f"{path}.location")
+    is_curve = timing is not None and not isinstance(timing, EffectError)
+    eases = dict(curves.keys([timing])) if is_curve and len(numbers) > 1 else {}
+    return model.Drawings(
+        name=region.name,
+        frames=numbers,
+        strokes=tuple(annotations.strokes_of(drawing) if i in needed else None for i, drawing in enumerate(drawings)),
+        eases=tuple(eases.get(number, "linear") for number in numbers),
+        aspect=width / height,
+        placement=placement,
+    )
+
+
+def placement(curves: Curves, effect, strip, frames: Frames) -> keyframes.Channel:
+    """The matrix from the sequencer's image to the strip's picture, which may be keyed."""
+    size, path = annotations.picture_size(effect), f"{strip.path_from_id()}.transform"
+    keyed = {name: curve for name in geometry.TRANSFORM if (curve := tried(curves.find, f"{path}.{name}"))}
+
+    def at(frame):
+        moved = {name: curve.evaluate(frame) for name, curve in keyed.items() if not isinstance(curve, EffectError)}
+        return annotations.image_to_picture(strip, size, **moved)
+
+    if not keyed:
+        return keyframes.Constant(tried(at, 0.0))
+    return keyframes.Samples({frame: tried(at, frame) for frame in frames})
+
+
+class _Evaluated:
+    """Channel of a number that Blender evaluates: for sampling alone."""
+
+    def __init__(self, function: Callable):
+        self.at = function
+
+
+def source_time(curves: Curves, path: str, effect, frames: Frames) -> keyframes.Channel:
+    def value(frame):
+        return curves.value(effect, path, "source_time", frame)
+
+    keyed = tried(curves.of, effect, path, "source_time")
+    if isinstance(keyed, EffectError):
+        return keyframes.Constant(keyed)
+    keys = curves.keys(keyed)
+    time = keyframes.SourceTime(_Evaluated(value), keys)
+    if not keyed:
+        return keyframes.Constant(tried(time.at, 0.0))
+    return keyframes.Samples({frame: tried(time.at, frame) for frame in frames}, keys)

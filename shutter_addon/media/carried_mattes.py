@@ -1,0 +1,197 @@
+"""The mattes of an outline in all frames of its footage: carried from its drawings when they are asked for, and kept as
+files. What a file is made of is in its name: a drawing that changes leaves those alone that do not depend on it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tempfile
+from bisect import bisect_left, bisect_right
+from collections.abc import Hashable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from OpenImageIO import ImageBuf
+
+from ..core import atomic_write
+from ..core.frames.frame_source import FrameSource
+from ..core.model import outlines
+from . import carrying, flow
+from .cuts import ShotSource
+from .errors import MediaError
+from .files import check_name
+from .inbetween_cache import identity
+
+FOLDER = "virtual_shutter_mattes"
+VERSION = 1  # raise it when mattes of the same drawings change
+TRUSTED = 0.5  # agreement below which a drawing is carried no farther
+FADE = 4  # frames in which it fades there
+BLOCK = 20  # frames beyond a drawing that are carried together
+
+_elsewhere: list[tempfile.TemporaryDirectory] = []  # where mattes are kept that have no folder, until this program ends
+
+
+class Footage(Hashable, Protocol):
+    """What opens the source; equal where it gives the same frames."""
+
+    def open(self) -> FrameSource: ...
+
+
+@dataclass(frozen=True)
+class CarriedFile:
+    """A core.model.mattes.MatteFile of an outline.
+
+    drawings: by ascending source frame, the curves of each (core.model.outlines)
+    folder: where mattes are kept; None: for as long as this program runs"""
+
+    footage: Footage
+    drawings: tuple[tuple[int, outlines.Curves], ...]
+    folder: Path | None = None
+
+    def open(self) -> CarriedMattes:
+        """MediaError: the footage cannot be read, or OpenCV is missing."""
+        if not carrying.is_possible():
+            raise MediaError(
+                "outlines are carried by the Python package opencv-contrib-python-headless; "
+                "install the zip of Virtual Shutter that is made for your system"
+            )
+        return CarriedMattes(self.footage.open(), self.drawings, self.folder)
+
+
+class CarriedMattes:
+    """The mattes, a core.model.mattes.MatteSource; close it. Its frames are the source's filmed ones."""
+
+    step = 1
+
+    def __init__(
+        self, source: FrameSource, drawings: tuple[tuple[int, outlines.Curves], ...], folder: Path | None = None
+    ):
+        self._source = source if isinstance(source, ShotSource) else ShotSource(source)
+        self.width, self.height = source.width, source.height
+        self.count = self.filmed = source.count
+        self.fps: Fraction | None = source.fps
+        self._drawings = {frame: curves for frame, curves in drawings if 0 <= frame < self.count}
+        self._frames = sorted(self._drawings)
+        self._parent = folder
+
+    def read(self, index: int) -> np.ndarray:
+        """The values (height, width) float32, 0 to 1, of a frame; those around it are carried with it. MediaError: a
+        frame cannot be read, or the folder cannot be written to."""
+        index = min(max(index, 0), self.count - 1)
+        near = self._near(index)
+        if near == (None, None):
+            return self._nothing()
+        if (matte := self._kept(self._path(index, *near))) is None:
+            for made, values in self._made(index, *self._in_shot(index, *near)):
+                self._keep(self._path(made, *near), values)
+                if made == index:
+                    matte = values
+        return self._nothing() if matte is None else matte / np.float32(255)
+
+    def close(self) -> None:
+        """Closes the footage; a later read opens it again."""
+        self._source.close()
+
+    def _near(self, index: int) -> tuple[int | None, int | None]:
+        """The drawings before and behind a frame that are near enough; twice its own."""
+        before, behind = bisect_right(self._frames, index) - 1, bisect_left(self._frames, index)
+        first = self._frames[before] if before >= 0 else None
+        last = self._frames[behind] if behind < len(self._frames) else None
+        first = first if first is not None and index - first <= carrying.FARTHEST else None
+        last = last if last is not None and last - index <= carrying.FARTHEST else None
+        return first, last
+
+    def _in_shot(self, index: int, first: int | None, last: int | None) -> tuple[int | None, int | None]:
+        """Those of them that lie in the frame's shot."""
+        if first == last:
+            return first, last
+        shot = self._source.around(index, *(index if end is None else end for end in (first, last)))
+        self._source.release()
+        return (first if first in shot else None), (last if last in shot else None)
+
+    def _made(self, index: int, first: int | None, last: int | None) -> Iterator[tuple[int, np.ndarray]]:
+        """Mattes (H, W) uint8 by frame: of all between two drawings, or of those beyond one as far as a frame."""
+        if first is None and last is None:
+            return
+        if first == last and first is not None:
+            yield first, carrying.drawn(self._picture(first), self._drawing(first).cover)
+            return
+        before, behind = (None if frame is None else self._drawing(frame) for frame in (first, last))
+        carried = carrying.carried(self._picture, before, behind, self._span(index, first, last))
+        if before and behind:
+            yield from ((each.frame, each.matte) for each in carried)
+        else:
+            yield from self._fading(list(carried) if before else list(carried)[::-1])
+
+    def _span(self, index: int, first: int | None, last: int | None) -> range:
+        """The frames that are carried together with one: all between two drawings, or some beyond one, in its shot."""
+        if first is not None and last is not None:
+            return range(first + 1, last)
+        if first is not None:
+            end = min(first + min(-(-(index - first) // BLOCK) * BLOCK, carrying.FARTHEST), self.count - 1)
+            return range(first + 1, min(end + 1, self._source.around(index, first, end).stop))
+        assert last is not None
+        start = max(last - min(-(-(last - index) // BLOCK) * BLOCK, carrying.FARTHEST), 0)
+        return range(max(start, self._source.around(index, start, last).start), last)
+
+    def _fading(self, carried: list[carrying.Carried]) -> Iterator[tuple[int, np.ndarray]]:
+        """Mattes away from their only drawing, which fade where it can be trusted no longer."""
+        share = 1.0
+        for each in carried:
+            if share < 1 or each.agreement < TRUSTED:
+                share = max(share - 1 / FADE, 0.0)
+            yield each.frame, each.matte if share == 1 else np.rint(each.matte * share).astype(np.uint8)
+
+    def _picture(self, frame: int) -> np.ndarray:
+        return flow.displayed(self._source.read(frame), self._source.transfer, self._source.alpha)
+
+    def _drawing(self, frame: int) -> carrying.Drawing:
+        size = carrying.working_size(self.width, self.height)
+        return carrying.Drawing(frame, outlines.coverage(self._drawings[frame], *size))
+
+    def _nothing(self) -> np.ndarray:
+        return np.zeros((self.height, self.width), np.float32)
+
+    def _path(self, index: int, first: int | None, last: int | None) -> Path:
+        """The file of a frame's matte, made of these drawings."""
+        made_of = [VERSION, index, [(frame, self._drawings[frame]) for frame in (first, last) if frame is not None]]
+        digest = hashlib.sha256(json.dumps(made_of).encode()).hexdigest()[:16]
+        return self._folder / f"{index:08d}-{digest}.png"
+
+    @cached_property
+    def _folder(self) -> Path:
+        """The folder of this footage."""
+        parent = self._parent
+        if parent is None:
+            if not _elsewhere:
+                _elsewhere.append(tempfile.TemporaryDirectory(prefix=FOLDER))
+            parent = Path(_elsewhere[0].name)
+        digest = hashlib.sha256(json.dumps(identity(self._source), sort_keys=True).encode()).hexdigest()[:16]
+        return parent / f"{self._source.path.stem[:40]}-{digest}"
+
+    def _kept(self, path: Path) -> np.ndarray | None:
+        """The matte (H, W) uint8 of a file; None: there is none, or it is damaged."""
+        if not path.is_file():
+            return None
+        image = ImageBuf(check_name(path))
+        spec = image.spec()
+        if image.has_error or (spec.width, spec.height, spec.nchannels) != (self.width, self.height, 1):
+            return None
+        samples = image.get_pixels("uint8")
+        return None if samples is None or image.has_error else samples[..., 0]
+
+    def _keep(self, path: Path, matte: np.ndarray) -> None:
+        """Writes a matte whole or not at all. MediaError: it cannot be written."""
+        image = ImageBuf(np.ascontiguousarray(matte[..., None]))
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with atomic_write.writing(path) as part:
+                if not image.write(check_name(part)):
+                    raise MediaError(f"{path.parent}: a matte could not be written ({image.geterror()})")
+        except OSError as error:
+            raise MediaError(f"{path.parent}: mattes cannot be written there ({error.strerror or error})") from None

@@ -1,0 +1,285 @@
+"""Mattes of the frames between two drawings of an outline, carried there by the footage's own motion.
+
+Dense flow, joined from frame to frame, says where in each drawing's frame lies what a pixel shows. Where flow between
+the two frames alone, or the motion of the camera or of the subject, leads to what is more alike, that is believed. Any
+of them errs by a few pixels, so everything within REACH of that place votes, a vote counting by how alike the colours
+are around both ends (non-local means: Buades et al. 2005, "A non-local algorithm for image denoising"; votes for
+labels: Coupé et al. 2011, "Patch-based segmentation using expert priors"). Both drawings vote, the nearer with more
+weight. The result is refined by the edges of the picture (guided filter: He et al. 2013).
+
+Flow and votes are found in pictures of at most WORKING pixels a side, edges in the whole picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from ..core import stopping
+from . import flow
+
+try:
+    import cv2
+except ImportError:  # a package without wheels; the extension registers without it
+    cv2 = None
+
+WORKING = 512
+FARTHEST = 100  # frames that a drawing is carried at most
+REACH, STEP = 6, 2  # pixels of the working picture, in which places lie that vote
+ALIKE = 6.0  # units of CIE Lab, its L halved: how far colours may differ
+NEAR = 6.0  # pixels of the working picture: how far votes may come from
+AROUND = 0.5  # pixels: the standard deviation of what is compared around a place
+# What most votes say lies inside: less than half, for what is thin has more around it than of itself
+# (scripts/carried_mattes.py).
+INSIDE = 0.4
+EDGE = 0.4  # votes from 0 to 1 in the middle of an edge
+RADIUS, SMOOTHNESS = 3, 1e-3  # of the guided filter: pixels of the working picture, and a variance of colours of 0 to 1
+
+THIN, LEAST = 4, 12  # every so many pixels tell an affine motion, and so many at least
+BETTER = 0.9  # share of a difference that must be left where flow between two frames alone is believed more
+
+Places = np.ndarray  # (h, w, 2) float32, x and y in pixels of the working picture
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A drawing of an outline: its source frame, and the share (h, w) float32 of each pixel of the working picture that
+    it covers."""
+
+    frame: int
+    cover: np.ndarray
+
+
+@dataclass(frozen=True)
+class Carried:
+    """A matte (H, W) uint8 of a source frame.
+
+    agreement: 0 to 1, of what the two drawings make of it; where there is one alone, how alike what it shows is"""
+
+    frame: int
+    matte: np.ndarray
+    agreement: float
+
+
+# Frames as they are displayed: (H, W, 3) uint8 of a source frame.
+Frames = Callable[[int], np.ndarray]
+
+
+def is_possible() -> bool:
+    """Whether the libraries are there that this takes."""
+    return hasattr(cv2, "ximgproc")
+
+
+def working_size(width: int, height: int) -> tuple[int, int]:
+    """Width and height of the picture in which flow is found."""
+    scale = min(1.0, WORKING / max(width, height))
+    return max(round(width * scale), 1), max(round(height * scale), 1)
+
+
+def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: range) -> Iterator[Carried]:
+    """The mattes of the frames of a span, which follow the first drawing's and precede the last's, in their order. One
+    of the drawings may be missing.
+
+    Frames are read twice, from first to last. Memory: flow and colours of the working picture, for each frame."""
+    ends = [each for each in (first, last) if each is not None]
+    if not span or not ends:
+        return
+    reading = range(first.frame if first else span.start, (last.frame if last else span.stop - 1) + 1)
+    size = ends[0].cover.shape[::-1]
+    footage = _Footage({}, {})
+    joined = _joined(lambda frame: _small(frames(frame), size), footage, reading, first, last)
+    for frame in span:
+        stopping.check()
+        places = [footage.best(joined.pop((end.frame, frame)), frame, end) for end in ends]
+        covers = [_at(end.cover, there) for end, there in zip(ends, places, strict=True)]
+        box = _box(np.maximum.reduce(covers))
+        sides = [
+            _votes(footage.colors[frame], _at(footage.colors[end.frame], there), cover, box)
+            for end, there, cover in zip(ends, places, covers, strict=True)
+        ]
+        share = _mixed(sides, _weights(frame, ends))
+        yield Carried(frame, refined(frames(frame), share), _agreement(sides))
+
+
+def drawn(picture: np.ndarray, cover: np.ndarray) -> np.ndarray:
+    """The matte (H, W) uint8 of a drawing in its own frame, refined as those that are carried.
+
+    picture: (H, W, 3) uint8; cover: see Drawing"""
+    shown = _lab(_small(picture, cover.shape[::-1]))
+    return refined(picture, _mixed([_votes(shown, shown, cover, _box(cover))], [1.0]))
+
+
+@dataclass(frozen=True)
+class _Footage:
+    """Working pictures, by their source frames: colours (3, h, w) float32, and greys (h, w) uint8."""
+
+    colors: dict[int, np.ndarray]
+    greys: dict[int, np.ndarray]
+
+    def add(self, frame: int, picture: np.ndarray) -> None:
+        self.colors[frame], self.greys[frame] = _lab(picture), cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
+
+    def to(self, frame: int, other: int) -> Places:
+        """Where in another frame lies what a frame shows."""
+        grey = self.greys[frame]
+        return _grid(*grey.shape) + flow.fine_vectors(grey, self.greys[other])
+
+    def best(self, joined: Places, frame: int, end: Drawing) -> Places:
+        """Where in a drawing's frame lies what a frame shows: for each pixel, of all ways to know the one that leads to
+        what is most alike. The first is believed where others are hardly better."""
+        picture = self.colors[frame]
+        cover = _at(end.cover, joined)
+        others = [self.to(frame, end.frame), *(_affine(joined, where) for where in (cover < 0.5, cover >= 0.5))]
+        places, apart = joined, _apart(picture, _at(self.colors[end.frame], joined))
+        for other in others:
+            differs = _apart(picture, _at(self.colors[end.frame], other))
+            better = differs < np.float32(BETTER) * apart
+            places = np.where(better[..., None], other, places)
+            apart = np.where(better, differs, apart)
+        return places
+
+
+def _apart(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """How much colours (3, h, w) differ around each pixel."""
+    return cv2.blur(np.abs(picture - other).sum(axis=0), (5, 5))
+
+
+def _affine(places: Places, where: np.ndarray) -> Places:
+    """The affine motion that most of the places in an area have, for the whole picture."""
+    grid = _grid(*where.shape)
+    chosen = np.flatnonzero(where[::THIN, ::THIN])
+    if chosen.size < LEAST:
+        return places
+    here, there = (each[::THIN, ::THIN].reshape(-1, 2)[chosen] for each in (grid, places))
+    matrix, _ = cv2.estimateAffine2D(here, there, method=cv2.RANSAC, ransacReprojThreshold=1.0)
+    return places if matrix is None else cv2.transform(grid, matrix).astype(np.float32)
+
+
+def _joined(
+    small: Frames, footage: _Footage, reading: range, first: Drawing | None, last: Drawing | None
+) -> dict[tuple[int, int], Places]:
+    """Where in each drawing's frame lies what the frames between show, by (the drawing's frame, frame): flow from frame
+    to frame, joined. Adds these frames to the footage."""
+    places: dict[tuple[int, int], Places] = {}
+    forth: dict[int, Places] = {}
+    for frame in reading:
+        stopping.check()
+        footage.add(frame, small(frame))
+        if first and frame > reading.start:
+            back = footage.to(frame, frame - 1)
+            known = places.get((first.frame, frame - 1))
+            places[first.frame, frame] = back if known is None else _at(known, back)
+        if last and frame > reading.start:
+            forth[frame - 1] = footage.to(frame - 1, frame)
+    if last:
+        there = None
+        for frame in reversed(forth):
+            there = forth[frame] if there is None else _at(there, forth[frame])
+            places[last.frame, frame] = there
+    return places
+
+
+def _weights(frame: int, ends: list[Drawing]) -> list[float]:
+    if len(ends) == 1:
+        return [1.0]
+    share = (frame - ends[0].frame) / (ends[1].frame - ends[0].frame)
+    return [1 - share, share]
+
+
+Box = tuple[slice, slice]  # rows and columns
+Votes = tuple[np.ndarray, np.ndarray]  # (h, w) each: the sum of those for a pixel's lying inside, and that of all
+
+
+def _votes(shown: np.ndarray, colors: np.ndarray, cover: np.ndarray, box: Box | None) -> Votes:
+    """Votes on each pixel of a picture, in a box: elsewhere none says that it lies inside.
+
+    shown, colors: (3, h, w) its colours and those of the drawing's frame, carried into it, as cover (h, w) is"""
+    inside = np.zeros_like(cover)
+    if box is None:
+        return inside, np.ones_like(cover)
+    rows, columns = box
+    total = np.full_like(cover, 1e-6)
+    here = shown[:, rows, columns]
+    padded = np.pad(colors, ((0, 0), (REACH, REACH), (REACH, REACH)), "edge")
+    covers = np.pad(cover, REACH, "edge")
+    h, w = here.shape[1:]
+    kernel = cv2.getGaussianKernel(3, AROUND, cv2.CV_32F)
+    for down, right in product(range(-REACH, REACH + 1, STEP), repeat=2):
+        place = (
+            slice(rows.start + REACH + down, rows.start + REACH + down + h),
+            slice(columns.start + REACH + right, columns.start + REACH + right + w),
+        )
+        apart = sum(np.square(mine - other) for mine, other in zip(here, padded[(slice(None), *place)], strict=True))
+        apart = cv2.sepFilter2D(apart, -1, kernel, kernel, borderType=cv2.BORDER_REPLICATE)
+        weight = np.exp(apart / np.float32(-(ALIKE**2)) - np.float32((down**2 + right**2) / NEAR**2))
+        total[rows, columns] += weight
+        inside[rows, columns] += weight * covers[place]
+    return inside, total
+
+
+def _box(cover: np.ndarray) -> Box | None:
+    """The rows and columns in which votes may say that something lies inside; None: nowhere."""
+    places = [np.flatnonzero(cover.max(axis=axis) > 0) for axis in (1, 0)]
+    if not places[0].size:
+        return None
+    low = [max(int(each[0]) - REACH, 0) for each in places]
+    high = [min(int(each[-1]) + 1 + REACH, length) for each, length in zip(places, cover.shape, strict=True)]
+    return slice(low[0], high[0]), slice(low[1], high[1])
+
+
+def _mixed(sides: list[Votes], weights: list[float]) -> np.ndarray:
+    """The share (h, w) of all votes."""
+    shares = np.array(weights, np.float32)
+    inside, total = (np.tensordot(shares, [side[part] for side in sides], axes=1) for part in (0, 1))
+    return inside / total
+
+
+def _agreement(sides: list[Votes]) -> float:
+    masks = [inside / total > INSIDE for inside, total in sides]
+    if len(masks) == 1:
+        (_, total), (mask,) = sides[0], masks
+        return float(np.minimum(total[mask], 1).mean()) if mask.any() else 0.0
+    either = np.count_nonzero(masks[0] | masks[1])
+    return np.count_nonzero(masks[0] & masks[1]) / either if either else 1.0
+
+
+def refined(picture: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """The matte (H, W) uint8 of a picture (H, W, 3) uint8, from shares (h, w) of votes in the working picture."""
+    height, width = picture.shape[:2]
+    scale = width / share.shape[1]
+    matte = np.zeros((height, width), np.uint8)
+    if (box := _box(share)) is None:
+        return matte
+    whole = cv2.resize(share, (width, height), interpolation=cv2.INTER_LINEAR) if scale != 1 else share
+    rows, columns = (slice(int(part.start * scale), int(np.ceil(part.stop * scale))) for part in box)
+    radius = max(round(RADIUS * scale), 1)
+    guide, values = np.ascontiguousarray(picture[rows, columns]), np.ascontiguousarray(whole[rows, columns])
+    values = cv2.ximgproc.guidedFilter(guide, values, radius, SMOOTHNESS * 255**2)
+    values = np.clip((values - INSIDE) / EDGE + 0.5, 0, 1)
+    matte[rows, columns] = np.rint(255 * values)
+    return matte
+
+
+def _small(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    return picture if picture.shape[1::-1] == size else cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+
+
+def _lab(picture: np.ndarray) -> np.ndarray:
+    """Colours (3, h, w) float32 of a picture (h, w, 3) uint8."""
+    lab = cv2.cvtColor(picture.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
+    lab[..., 0] /= 2
+    return np.ascontiguousarray(lab.transpose(2, 0, 1))
+
+
+def _grid(height: int, width: int) -> Places:
+    return np.dstack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in (width, height))))
+
+
+def _at(values: np.ndarray, places: Places) -> np.ndarray:
+    """Values (h, w), (h, w, 2) or planes (3, h, w) at places; beyond the picture its edge goes on."""
+    if values.ndim == 3 and values.shape[0] == 3:
+        return np.stack([_at(plane, places) for plane in values])
+    return cv2.remap(values, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)

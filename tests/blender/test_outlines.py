@@ -1,0 +1,132 @@
+"""Outlines in Blender: recipes in and out, trimmed and reversed strips, and the mattes that are kept beside a file."""
+
+import json
+
+import numpy as np
+import pytest
+from support import recipe, request, write_frames
+
+from shutter_addon.core.frames import light
+from shutter_addon.core.model import outlines
+from shutter_addon.core.recipes import recipe_file
+
+WIDTH, HEIGHT, COUNT = 96, 64, 12
+OPTIONS = {"light": "encoded", "interpolation": "value"}
+
+
+def ground(index):
+    """Frames that differ by 10 levels, and show a square that walks by 4 pixels a frame, textured."""
+    y, x = np.indices((HEIGHT, WIDTH))
+    frame = np.repeat((60 + 10 * index + 5 * ((x // 3 + y // 3) % 2))[..., None], 3, axis=2)
+    left = 10 + 4 * index
+    frame[20:44, left : left + 24] = np.stack([(x * 7 + y * 11) % 90 + 150] * 3, axis=2)[20:44, 10:34] * (1, 0.3, 0.3)
+    return frame.astype(np.uint8)
+
+
+def square(index):
+    """Its outline in the source's frame `index`, from 0."""
+    left, right, low, high = (10 + 4 * index) / WIDTH, (34 + 4 * index) / WIDTH, 20 / HEIGHT, 44 / HEIGHT
+    return [[[left, low], [right, low], [right, high], [left, high]]]
+
+
+@pytest.fixture(scope="module")
+def footage(tmp_path_factory):
+    """The first frame's path."""
+    return write_frames(tmp_path_factory.mktemp("footage"), [ground(i) for i in range(COUNT)])
+
+
+def region(*frames, shown=lambda frame: frame - 1, **fields):
+    """Drawn at these timeline frames, where the source's frame `shown` is."""
+    keys = [{"frame": frame, "strokes": square(shown(frame)), "ease": "linear"} for frame in frames]
+    return {"name": "o", "shutter": "S1", "kind": "outline", "strokes": keys[0]["strokes"], "keys": keys, **fields}
+
+
+@pytest.fixture
+def edited(bpy, edit, footage):
+    """Makes an effect of a recipe with regions: its strip and the effect."""
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import add_effect
+    from shutter_addon.blender.rendering import sessions
+
+    def make(*regions, change=lambda source: None):
+        source = edit.sequence_editor.strips.new_image("images", str(footage), 1, 1)
+        for i in range(2, COUNT + 1):
+            source.elements.append(f"f{i:04d}.png")
+        change(source)
+        strip, effect = add_effect.add_effect(edit, source)
+        content = recipe(2, [1, 0], [0, 1], regions=regions, **OPTIONS)
+        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(content)))
+        return strip, effect
+
+    yield make
+    sessions.forget()
+
+
+def coefficients(strip, effect, frame):
+    """Those of the region's shutter (H, W) at a timeline frame."""
+    return request(strip.id_data, effect, strip, frame).coefficients()[1]
+
+
+def covered(index):
+    return outlines.coverage(square(index), WIDTH, HEIGHT)
+
+
+def test_straight(edited):
+    strip, effect = edited(region(1, 9, between="straight"))
+    for frame in (1, 4, 9, 11):
+        np.testing.assert_allclose(coefficients(strip, effect, frame), covered(min(frame, 9) - 1), atol=1e-6)
+
+
+def test_carried(edited):
+    """In between and beyond; with the feather, turned inside out."""
+    strip, effect = edited(region(1, 9))
+    for frame in (1, 3, 5, 8, 10):
+        found = coefficients(strip, effect, frame)
+        assert np.abs(found - covered(frame - 1)).mean() < 0.01, frame
+    effect.regions[0].invert = True
+    assert np.abs(coefficients(strip, effect, 5) - (1 - covered(4))).mean() < 0.01
+
+
+def test_drawings_stay_with_the_footage(edited):
+    """Of a strip that is trimmed and runs backward, a drawing is of the source's frame that was seen there."""
+
+    def change(source):
+        source.left_handle = 3
+        source.use_reverse_frames = True
+
+    strip, effect = edited(region(1, 8, shown=lambda frame: COUNT - 2 - frame), change=change)
+    for frame in (3, 6, 10):
+        assert np.abs(coefficients(strip, effect, frame) - covered(COUNT - frame)).mean() < 0.01, frame
+
+
+@pytest.mark.parametrize("layer", [False, True])
+def test_out_and_in_again(edited, layer):
+    from shutter_addon.blender.data import recipe_export
+
+    said = region(1, 9, between="straight", layer=layer, invert=True, blend="add", opacity=0.5, width=0.125)
+    strip, effect = edited(said)
+    (back,) = recipe_export.recipe_of(strip.id_data, effect, strip).regions
+    expected = recipe_file.parse(json.dumps(recipe(2, [1, 0], [0, 1], regions=[said], **OPTIONS))).regions[0]
+    assert (back.between, back.layer, back.invert, back.blend) == ("straight", layer, True, "add")
+    assert (back.opacity, back.width) == (0.5, 0.125)
+    assert [key.frame for key in back.keys] == [1, 9]
+    shapes = [np.array([strokes for _, strokes in each.drawings()]) for each in (back, expected)]
+    np.testing.assert_allclose(*shapes, atol=1e-5)
+
+
+def test_as_a_layer_it_leaves_no_ghost(edited):
+    """Both frames of the window show the square; the one behind it does not."""
+    strip, effect = edited(region(1, 6, 12, layer=True))
+    picture = 255 * light.to_encoded(request(strip.id_data, effect, strip, 5).picture()[..., :3].astype(float))
+    ahead = covered(5) * (1 - covered(4)) > 0.99
+    grounds = [ground(index)[0, :6].mean() for index in (4, 5)]
+    assert picture[ahead].mean() < max(grounds) + 4
+
+
+def test_mattes_lie_beside_the_file(bpy, edited, tmp_path):
+    strip, effect = edited(region(1, 9))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
+    effect = strip.id_data.virtual_shutter.effects[0]
+    coefficients(strip, effect, 5)
+    names = [path.name[:8] for path in (tmp_path / "virtual_shutter_mattes").glob("*/*.png")]
+    assert sorted(names) == [f"{index:08d}" for index in range(1, 8)]

@@ -1,0 +1,62 @@
+"""What outlines enclose, against places that are asked one by one."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shutter_addon.core.model import outlines
+
+SQUARE = [[(0.25, 0.25), (0.75, 0.25), (0.75, 0.75), (0.25, 0.75)]]
+FINE = 16  # places across a pixel
+
+
+def asked(strokes, width, height):
+    """The share of FINE places across and LINES down each pixel from which a ray to the right crosses curves an odd
+    number of times."""
+    x = (np.arange(width * FINE) + 0.5) / FINE
+    y = height - (np.arange(height * outlines.LINES) + 0.5) / outlines.LINES
+    inside = np.zeros((len(y), len(x)), bool)
+    for stroke in strokes:
+        points = np.array(stroke) * (width, height)
+        for (x0, y0), (x1, y1) in zip(points, np.roll(points, -1, axis=0), strict=True):
+            for row in np.flatnonzero((y0 > y) != (y1 > y)):
+                inside[row] ^= x < x0 + (y[row] - y0) / (y1 - y0) * (x1 - x0)
+    return inside.reshape(height, outlines.LINES, width, FINE).mean(axis=(1, 3))
+
+
+point = st.tuples(st.floats(-0.5, 1.5), st.floats(-0.5, 1.5))
+
+
+@given(st.lists(st.lists(point, min_size=3, max_size=8), max_size=3))
+def test_any_curves(strokes):
+    found = outlines.coverage(strokes, 12, 7)
+    assert found.dtype == np.float32
+    assert np.abs(found - asked(strokes, 12, 7)).max() <= 8 / FINE  # of as many edges at most, each half a place off
+    assert np.abs(found - asked(strokes, 12, 7)).mean() <= 0.5 / FINE
+
+
+@pytest.mark.parametrize("size", [(8, 4), (9, 5), (1, 1), (640, 3)])
+def test_a_square_covers_its_area(size):
+    _width, height = size
+    found = outlines.coverage(SQUARE, *size)
+    lines = (np.arange(height * outlines.LINES) + 0.5) / outlines.LINES / height
+    share = ((lines > 0.25) & (lines < 0.75)).mean()
+    assert found.mean() == pytest.approx(0.5 * share, abs=1e-6)
+
+
+def test_a_curve_within_a_curve_is_a_hole():
+    hole = [[(x / 2 + 0.25, y / 2 + 0.25) for x, y in SQUARE[0]]]
+    both = outlines.coverage(SQUARE + hole, 32, 32)
+    np.testing.assert_allclose(both, outlines.coverage(SQUARE, 32, 32) - outlines.coverage(hole, 32, 32), atol=1e-6)
+    assert both[16, 16] == 0
+    assert both[9, 16] == 1
+
+
+@pytest.mark.parametrize("strokes", [[], [[]], [[(0.5, 0.5)]], [[(0.1, 0.1), (0.9, 0.9)]], [[(2, 2), (3, 2), (3, 3)]]])
+def test_what_encloses_nothing(strokes):
+    assert not outlines.coverage(strokes, 16, 9).any()
+
+
+def test_what_is_all_around_the_picture():
+    assert outlines.coverage([[(-5, -5), (5, -5), (5, 5), (-5, 5)]], 16, 9).min() == 1

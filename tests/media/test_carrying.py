@@ -1,0 +1,196 @@
+"""Mattes that are carried from drawings of outlines: a subject that turns and changes its shape over a ground that the
+camera passes, both of them textured."""
+
+import cv2
+import numpy as np
+import pytest
+
+from shutter_addon.core.model import outlines
+from shutter_addon.media import carried_mattes, carrying
+from shutter_addon.media.errors import MediaError
+
+WIDTH, HEIGHT, COUNT = 192, 128, 14
+
+
+def texture(seed, size):
+    noise = np.random.default_rng(seed).random((*size[::-1], 3), dtype=np.float32)
+    soft = cv2.GaussianBlur(noise, (0, 0), 2.5)
+    soft = (soft - soft.min(axis=(0, 1))) / np.ptp(soft, axis=(0, 1))
+    return (255 * soft).astype(np.uint8)
+
+
+GROUND, SKIN = texture(1, (2 * WIDTH, HEIGHT)), texture(2, (WIDTH, HEIGHT))
+
+
+def curve(frame, count=48):
+    """The subject's edge in pixels: a bean that turns, bends, and walks by 3 pixels a frame."""
+    angle = np.linspace(0, 2 * np.pi, count, endpoint=False)
+    radius = 26 + 7 * np.cos(2 * angle + 0.1 * frame) + 3 * np.sin(3 * angle - 0.2 * frame)
+    return np.stack([60 + 3 * frame + radius * np.cos(angle), 64 + radius * np.sin(angle)], axis=1)
+
+
+def strokes(frame):
+    return [curve(frame) / (WIDTH, -HEIGHT) + (0, 1)]
+
+
+def truth(frame):
+    return outlines.coverage(strokes(frame), WIDTH, HEIGHT)
+
+
+def picture(frame):
+    """The ground goes to the left by 2 pixels a frame; the skin goes with the subject."""
+    alpha = truth(frame)[..., None]
+    ground = GROUND[:, 2 * frame : 2 * frame + WIDTH]
+    skin = cv2.warpAffine(SKIN, np.float32([[1, 0, 3 * frame - 30], [0, 1, 0]]), (WIDTH, HEIGHT))
+    return np.rint(alpha * skin + (1 - alpha) * ground).astype(np.uint8)
+
+
+class Footage:
+    """Frames of the scene, or of another ground from a cut on, as a source; read: those that were asked for."""
+
+    transfer, alpha, dtype, fps, step = "srgb", "opaque", np.dtype(np.uint8), None, 1
+    width, height, options = WIDTH, HEIGHT, ()
+
+    def __init__(self, folder, count=COUNT, cut=None):
+        self.path = folder / "scene.png"
+        self.path.write_bytes(b"the files of frames")
+        self.files, self.count, self.filmed, self.cut, self.asked = (self.path,), count, count, cut, []
+
+    def open(self):
+        return self
+
+    def read(self, index):
+        self.asked.append(index)
+        shown = picture(index) if self.cut is None or index < self.cut else 255 - picture(index)[:, ::-1] // 3
+        return np.dstack([shown, np.full(shown.shape[:2], 255, np.uint8)])
+
+    decoded = read
+
+    def want(self, _indices):
+        pass
+
+    def close(self):
+        pass
+
+
+def iou(matte, frame):
+    inside, wanted = matte > 0.5, truth(frame) > 0.5
+    return (inside & wanted).sum() / (inside | wanted).sum()
+
+
+def drawings(*frames):
+    return tuple((frame, outlines.curves(strokes(frame))) for frame in frames)
+
+
+@pytest.fixture
+def footage(tmp_path):
+    return Footage(tmp_path)
+
+
+@pytest.fixture
+def carried(footage, tmp_path):
+    return lambda *frames: carried_mattes.CarriedFile(footage, drawings(*frames), tmp_path / "mattes").open()
+
+
+def test_from_both_sides(carried):
+    """Between drawings each matte is the subject's, which flow alone makes worse; hardly anything lies elsewhere."""
+    mattes = carried(0, COUNT - 1)
+    found = [mattes.read(frame) for frame in range(COUNT)]
+    assert min(iou(matte, frame) for frame, matte in enumerate(found)) > 0.96
+    assert min(matte.max() for matte in found) == 1
+    apart = [np.abs(matte - truth(frame)).mean() for frame, matte in enumerate(found)]
+    assert max(apart) < 0.01
+    assert np.mean(apart) < 0.75 * np.mean([np.abs(alone - truth(k)).mean() for k, alone in by_flow(0, COUNT - 1)])
+
+
+def by_flow(first, last):
+    """The drawings' mattes in the frames between, warped by DIS flow from frame to frame and mixed by time."""
+    grey = [cv2.cvtColor(picture(frame), cv2.COLOR_RGB2GRAY) for frame in range(first, last + 1)]
+    dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    grid = np.dstack(np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))).astype(np.float32)
+    forth, back, matte = {first: truth(first)}, {last: truth(last)}, truth(first)
+    for k in range(first + 1, last):
+        matte = cv2.remap(matte, grid + dis.calc(grey[k - first], grey[k - 1 - first], None), None, cv2.INTER_LINEAR)
+        forth[k] = matte
+    matte = truth(last)
+    for k in range(last - 1, first, -1):
+        matte = cv2.remap(matte, grid + dis.calc(grey[k - first], grey[k + 1 - first], None), None, cv2.INTER_LINEAR)
+        back[k] = matte
+    for k in range(first + 1, last):
+        share = (k - first) / (last - first)
+        yield k, (1 - share) * forth[k] + share * back[k]
+
+
+def test_beyond_a_drawing(carried):
+    """Before the first and behind the last drawing it goes on, one way. What the subject uncovers was never seen, so
+    some of that is taken along."""
+    mattes = carried(6)
+    assert min(iou(mattes.read(frame), frame) for frame in (5, 7)) > 0.85
+    assert min((mattes.read(frame) * truth(frame)).sum() / truth(frame).sum() for frame in (0, 3, 9, 13)) > 0.9
+
+
+def test_it_ends_at_a_cut(tmp_path):
+    footage = Footage(tmp_path, 30, cut=15)
+    mattes = carried_mattes.CarriedFile(footage, drawings(9), tmp_path / "mattes").open()
+    assert (mattes.read(13) * truth(13)).sum() > 0.9 * truth(13).sum()
+    assert not mattes.read(15).any()
+    assert not mattes.read(20).any()
+
+
+def test_it_fades_where_nothing_like_it_is_seen(tmp_path):
+    """From one frame on the subject is gone, behind what is no cut."""
+    footage = Footage(tmp_path)
+    shown = footage.read
+
+    def covered(index):
+        frame = shown(index)
+        if index >= 8:
+            frame[..., :3] = GROUND[:, 2 * index : 2 * index + WIDTH]
+        return frame
+
+    footage.read = footage.decoded = covered
+    values = [carrying_of(footage, tmp_path).read(frame).mean() for frame in range(COUNT)]
+    assert values[7] > 0.05
+    assert values[COUNT - 1] < 0.1 * values[7]
+
+
+def carrying_of(footage, folder):
+    return carried_mattes.CarriedFile(footage, drawings(4), folder / "mattes").open()
+
+
+def test_mattes_are_kept(carried, footage, tmp_path):
+    """The same matte again reads no frame; a drawing that changes leaves those alone that do not depend on it; a file
+    that is damaged is made again."""
+    mattes = carried(0, 6, 12)
+    first = [mattes.read(frame) for frame in range(COUNT)]
+    footage.asked.clear()
+    again = carried(0, 6, 12)
+    assert all((again.read(frame) == first[frame]).all() for frame in range(13))
+    assert footage.asked == []
+    changed = carried_mattes.CarriedFile(footage, (*drawings(0, 6), (12, drawings(11)[0][1])), tmp_path / "mattes")
+    other = changed.open()
+    assert all((other.read(frame) == first[frame]).all() for frame in range(7))
+    assert footage.asked == []
+    assert (other.read(11) != first[11]).any()
+    (damaged,) = (tmp_path / "mattes").glob("*/00000003-*.png")
+    damaged.write_bytes(damaged.read_bytes()[:40])
+    assert (carried(0, 6, 12).read(3) == first[3]).all()
+
+
+def test_a_folder_that_takes_nothing(footage, tmp_path):
+    (tmp_path / "file").write_text("")
+    mattes = carried_mattes.CarriedFile(footage, drawings(0, 6), tmp_path / "file").open()
+    with pytest.raises(MediaError, match="mattes cannot be written there"):
+        mattes.read(3)
+
+
+def test_no_drawing_is_no_matte(footage):
+    mattes = carried_mattes.CarriedFile(footage, ()).open()
+    assert mattes.read(5).shape == (HEIGHT, WIDTH)
+    assert not mattes.read(5).any()
+
+
+def test_without_opencv(footage, monkeypatch):
+    monkeypatch.setattr(carrying, "cv2", None)
+    with pytest.raises(MediaError, match="opencv-contrib-python-headless"):
+        carried_mattes.CarriedFile(footage, drawings(0)).open()
