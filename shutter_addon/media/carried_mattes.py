@@ -20,7 +20,7 @@ from OpenImageIO import ImageBuf
 
 from ..core import atomic_write
 from ..core.frames.frame_source import FrameSource
-from ..core.model import outlines
+from ..core.model import outlines, scribbles
 from . import carrying, flow
 from .cuts import ShotSource
 from .errors import MediaError
@@ -92,6 +92,23 @@ class CarriedMattes:
                 if made == index:
                     matte = values
         return self._nothing() if matte is None else matte / np.float32(255)
+
+    def has(self, index: int) -> bool:
+        """Whether a frame's matte is kept already; its file is not opened."""
+        near = self._near(index)
+        return near == (None, None) or self._path(index, *near).is_file()
+
+    def straight(self, index: int) -> np.ndarray:
+        """What stands in for a frame's matte until that is carried: curves that go straight from drawing to drawing,
+        as `read`."""
+        first, last = self._near(index)
+        ends = [frame for frame in (first, last) if frame is not None]
+        if not ends:
+            return self._nothing()
+        share = (index - ends[0]) / (ends[-1] - ends[0]) if ends[0] != ends[-1] else 0.0
+        before, behind = (self._drawings[frame] for frame in (ends[0], ends[-1]))
+        strokes = scribbles.between_strokes(before, behind, share, self.width / self.height)
+        return outlines.coverage(strokes, self.width, self.height)
 
     def close(self) -> None:
         """Closes the footage; a later read opens it again."""

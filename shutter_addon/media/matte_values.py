@@ -2,36 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
+from typing import Any
 
 import numpy as np
 
 from ..core.model.mattes import Content, FileFrame, Matte, MatteFile, MatteSource
 from ..core.pixels.matte_grid import block_means, feathered, fitted
+from .carried_mattes import CarriedMattes
 from .cuts import ShotSource
 
 # Files that stay open though the last mattes were of others.
 MOST_OPEN = 16
 
+Late = Callable[[Any, int], None]
+
 
 class MatteValues:
     """A core.model.mattes.MatteReader for pictures of one size.
 
-    step: frames of the source for each filmed one (Options.step)"""
+    step: frames of the source for each filmed one (Options.step)
+    late: is told of each matte of an outline that would have to be carried first, by its file and frame: a straight one
+    stands in for it; None: it is carried"""
 
-    def __init__(self, width: int, height: int, step: int = 1):
-        self._size, self._step = (width, height), step
+    def __init__(self, width: int, height: int, step: int = 1, late: Late | None = None):
+        self._size, self._step, self._late = (width, height), step, late
         self._sources: dict[MatteFile, MatteSource] = {}
         self._made: list[tuple[Hashable, np.ndarray]] = []
 
     def another(self) -> MatteValues:
         """See MatteReader."""
-        return MatteValues(*self._size, self._step)
+        return MatteValues(*self._size, self._step, self._late)
 
     @classmethod
-    def of(cls, source: ShotSource) -> MatteValues:
+    def of(cls, source: ShotSource, late: Late | None = None) -> MatteValues:
         """For the pictures of a source, as core.model.mattes has them."""
-        return cls(source.width, source.height, source.step)
+        return cls(source.width, source.height, source.step, late)
 
     def values(self, mattes: tuple[Matte, ...], index: int, block: int) -> list[tuple[Hashable, np.ndarray]]:
         """As MatteReader.values. EffectError, MediaError: those of a file cannot be had."""
@@ -48,7 +54,13 @@ class MatteValues:
     def _content_key(self, content: Content, index: int) -> Hashable:
         if not isinstance(content, FileFrame):
             return content
-        return content.file, self._frame(content, index)
+        frame = self._frame(content, index)
+        return content.file, frame, self._is_late(content.file, frame)
+
+    def _is_late(self, file: MatteFile, frame: int) -> bool:
+        """Whether another matte stands in for that of a frame."""
+        source = self._sources[file]
+        return self._late is not None and isinstance(source, CarriedMattes) and not source.has(frame)
 
     def _frame(self, content: FileFrame, index: int) -> int:
         """The frame of its file, which is opened."""
@@ -60,11 +72,18 @@ class MatteValues:
     def _values(self, matte: Matte, index: int, block: int) -> np.ndarray:
         if isinstance(matte.content, FileFrame):
             frame = self._frame(matte.content, index)
-            values = fitted(self._sources[matte.content.file].read(frame), *self._size)
+            values = fitted(self._read(matte.content.file, frame), *self._size)
         else:
             values = matte.content.values(*self._size)
         values = feathered(values, matte.feather * self._size[1])
         return block_means(1 - values if matte.invert else values, block)
+
+    def _read(self, file: MatteFile, frame: int) -> np.ndarray:
+        source = self._sources[file]
+        if self._late is None or not isinstance(source, CarriedMattes) or source.has(frame):
+            return source.read(frame)
+        self._late(file, frame)
+        return source.straight(frame)
 
     def close(self) -> None:
         """Closes the files; they are opened again when they are needed."""

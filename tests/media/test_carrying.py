@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from shutter_addon.core.model import outlines
+from shutter_addon.core.model.mattes import FileFrame, Matte
 from shutter_addon.media import carried_mattes, carrying
 from shutter_addon.media.errors import MediaError
+from shutter_addon.media.matte_values import MatteValues
 
 WIDTH, HEIGHT, COUNT = 192, 128, 14
 
@@ -175,6 +177,24 @@ def test_mattes_are_kept(carried, footage, tmp_path):
     (damaged,) = (tmp_path / "mattes").glob("*/00000003-*.png")
     damaged.write_bytes(damaged.read_bytes()[:40])
     assert (carried(0, 6, 12).read(3) == first[3]).all()
+
+
+def test_what_stands_in(footage, tmp_path):
+    """A reader that has no time takes a straight outline, and tells which matte it lacks; once that is there, it
+    counts."""
+    file, late = carried_mattes.CarriedFile(footage, drawings(0, 12), tmp_path / "mattes"), []
+    reader = MatteValues(WIDTH, HEIGHT, late=lambda *which: late.append(which))
+    matte = Matte(0, FileFrame(file))
+    ((first_key, first),) = reader.values((matte,), 6, 1)
+    assert late == [(file, 6)]
+    middle = [(curve(0) + curve(12)) / 2 / (WIDTH, -HEIGHT) + (0, 1)]
+    np.testing.assert_allclose(first, outlines.coverage(middle, WIDTH, HEIGHT), atol=1e-6)
+    expected = file.open().read(6)
+    ((key, values),) = reader.another().values((matte,), 6, 1)
+    assert key != first_key
+    assert len(late) == 1
+    np.testing.assert_array_equal(values, expected)
+    assert reader.values((matte,), 40, 1)[0][1].shape == (HEIGHT, WIDTH)
 
 
 def test_a_folder_that_takes_nothing(footage, tmp_path):

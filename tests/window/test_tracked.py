@@ -163,6 +163,23 @@ def test_a_layer(tmp_path):
     assert apart_on_screen(pixels(tmp_path / "7_full_quality.png"), pixels(tmp_path / "final_0070.png")) <= 1
 
 
+def test_an_outline(tmp_path):
+    """Drawn at two frames, carried beside Blender to those between, shown, rendered: she is sharp at one of these, in
+    the preview as in what is rendered, without a ghost."""
+    given = {"footage": shutil.copy(ROOT / "assets" / "walkers.mp4", tmp_path)}
+    given["packages"] = packages(tmp_path / "packages")
+    seen, console = tell("outline_story.py", "opengl", linked(tmp_path), **given)
+    assert "Traceback" not in console
+    facts = {name: entry[name] for entry in seen for name in entry}
+    assert facts["drawings"] == [62, 78]
+    final = pixels(tmp_path / "final_0070.png")
+    with open_source(given["footage"]) as source:
+        apart = np.abs(final - source.read(69)[..., :3])
+    assert apart[215:250, 350:362].mean() <= 3, "her jacket"
+    assert apart.max() > 60, "others walk"
+    assert apart_on_screen(pixels(tmp_path / "7_full_quality.png"), final) <= 1
+
+
 @pytest.mark.parametrize("backend", ["opengl", "vulkan"])
 def test_what_is_seen_is_edited_and_nothing_of_the_deleted_stays(backend, tmp_path):
     """A strip cut by K, its right half moved away: bars, strokes and tab are those of the half under the playhead. Then

@@ -24,6 +24,7 @@ from ..rendering import (
     effect_source,
     inbetween_build,
     invalidation,
+    outline_carrying,
     pictures,
     previews,
     render_job,
@@ -205,6 +206,7 @@ def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> No
             _show_holes(quad, renderer, request)
         _show_strokes(context, quad, shown, wanted)
     previews.was_drawn()
+    _tell_carrying(say)
     for sentence in pictures.shortages(renderer, request):
         say(sentence)
     # What it measures would take from what runs.
@@ -281,6 +283,16 @@ def _tell_missing(renderer, request, say) -> None:
         renderer.check(request)
     except MediaError as error:
         _tell_fault(error, say)
+
+
+def _tell_carrying(say) -> None:
+    """Has mattes carried that the picture lacks, and says so."""
+    fault, progress = outline_carrying.begin(), outline_carrying.progress()
+    if fault is not None:
+        say(rpt_("Shutter: {fault}").format(fault=fault))
+    if progress is not None:
+        done, total = progress
+        say(rpt_("Carrying the outline: {done} of {total} frames").format(done=done, total=total))
 
 
 def _tell_fault(error: Exception, say) -> None:

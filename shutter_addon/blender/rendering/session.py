@@ -19,7 +19,7 @@ from ...core.pixels import following, layering
 from ...core.pixels.matte_grid import block_means
 from ...core.stopping import never
 from ...devices.device import NoDeviceError
-from ...media.matte_values import MatteValues
+from ...media.matte_values import Late, MatteValues
 from ..data.snapshot import Snapshot
 from ..devices import available
 from . import render_settings
@@ -36,10 +36,15 @@ _KEPT = 4
 class RenderSession:
     """A compositor, opened when it is first used, and the renderers of the effects that were shown last."""
 
-    def __init__(self, choose: Callable[[], tuple[str, str | None]], ask_others: Callable[[], None]):
+    def __init__(
+        self,
+        choose: Callable[[], tuple[str, str | None]],
+        ask_others: Callable[[], None],
+        late: Late | None = None,
+    ):
         """choose: gives the device, as available.choose; ask_others: called where the GPU has no room, has others free
-        what they hold of it."""
-        self._choose, self._ask_others = choose, ask_others
+        what they hold of it; late: see MatteValues."""
+        self._choose, self._ask_others, self._late = choose, ask_others, late
         self._asks = False  # others for room, in the middle of a picture
         self._chosen: tuple[str, str | None] | None = None
         self._executor: ThreadPoolExecutor | None = None
@@ -156,7 +161,7 @@ class RenderSession:
             if known is not None:
                 self._submit(known[1].close)
             source = key.open(planes=compositor.takes_planes)
-            known = key, Renderer(compositor, source, MatteValues.of(source))
+            known = key, Renderer(compositor, source, MatteValues.of(source, self._late))
         self._renderers[key.scene] = known
         while len(self._renderers) > _KEPT:
             self._submit(self._renderers.pop(next(iter(self._renderers)))[1].close)

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from ..devices import available, gpu_relay
-from . import render_job, render_settings
+from . import outline_carrying, render_job, render_settings
 from .render_job import Where
 from .session import RenderSession
 
@@ -30,7 +30,7 @@ def _ask_offscreen() -> None:
 # beside Blender's own GL context another one cannot always be current (see GLDevice). In the background Blender's GPU
 # belongs to the main thread, and has none.
 OFFSCREEN = RenderSession(lambda: available.choose(render_settings.wanted()), _ask_window)
-WINDOW = RenderSession(lambda: ("blender", None), _ask_offscreen)
+WINDOW = RenderSession(lambda: ("blender", None), _ask_offscreen, outline_carrying.want)
 # For a thread whose pictures the window waits for, where OFFSCREEN has them made by the window.
 WAITED_FOR = RenderSession(lambda: available.choose(render_settings.wanted(), window_waits=True), lambda: None)
 SESSIONS = OFFSCREEN, WINDOW, WAITED_FOR
@@ -75,5 +75,6 @@ def drop_removed() -> None:
 
 def forget(*_: Any) -> None:
     """Closes all sources and frees the devices: when a file is loaded, and when the extension goes."""
+    outline_carrying.forget()
     for session in SESSIONS:
         session.forget()

@@ -368,6 +368,10 @@ MESSAGES = {
     ): "Die Striche selbst, so breit wie die Breite der Region",
     ("Virtual Shutter", "Lasso"): "Lasso",
     ("*", "All that the strokes enclose"): "Alles, was die Striche umschließen",
+    (
+        "*",
+        "Carrying the outline: {done} of {total} frames",
+    ): "Der Umriss wird mitgeführt: {done} von {total} Frames",
     ("Virtual Shutter", "Outline"): "Umriss",
     (
         "*",

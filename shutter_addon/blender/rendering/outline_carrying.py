@@ -1,0 +1,114 @@
+"""Mattes of outlines that previews lack: carried by a thread beside Blender, while straight ones stand in for them."""
+
+from __future__ import annotations
+
+import threading
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing
+from dataclasses import dataclass, field
+from typing import Any
+
+import bpy
+
+from ...core import stopping
+from ...core.messages import UserError
+from ...media.carried_mattes import CarriedFile
+from ..data import preview_areas, strips
+
+TICK = 0.25  # seconds from one look at the thread to the next
+
+
+@dataclass
+class _Carrying:
+    """The mattes that a thread carries: it touches no bpy.
+
+    frames: what is to come, the source frames of a file; done: how many are there by now"""
+
+    file: CarriedFile
+    frames: list[int]
+    done: int = 0
+    ended: threading.Event = field(default_factory=threading.Event)
+    future: Future | None = None
+
+    def carry(self) -> None:
+        with stopping.once(self.ended.is_set), closing(self.file.open()) as mattes:
+            for frame in self.frames:
+                mattes.read(frame)
+                self.done += 1
+
+
+_wanted: dict[CarriedFile, set[int]] = {}  # what was lacking since the last look
+_failed: dict[CarriedFile, str] = {}  # why they cannot be carried
+_running: list[_Carrying] = []  # one at most
+
+
+def want(file: CarriedFile, frame: int) -> None:
+    """Notes a matte that a preview lacks, by its source frame."""
+    if file not in _failed:
+        _wanted.setdefault(file, set()).add(frame)
+
+
+def begin() -> str | None:
+    """Carries what was wanted since the last call, in place of what is not wanted any longer: on Blender's main thread,
+    once a preview was drawn. Why something cannot be carried; None: nothing is lacking, or it is on its way."""
+    wanted = {file: frames for file, frames in _wanted.items() if file not in _failed}
+    _wanted.clear()
+    if wanted and not (_running and _running[0].file in wanted):
+        _end()
+        file, frames = next(iter(wanted.items()))
+        carrying = _Carrying(file=file, frames=sorted(frames))
+        pool = ThreadPoolExecutor(1, "Virtual Shutter")
+        carrying.future = pool.submit(carrying.carry)
+        pool.shutdown(wait=False)
+        _running.append(carrying)
+        if not bpy.app.timers.is_registered(_look):
+            bpy.app.timers.register(_look, first_interval=TICK)
+    return next(iter(_failed.values()), None)
+
+
+def progress() -> tuple[int, int] | None:
+    """How many mattes are carried, and of how many; None: none are on their way."""
+    return (_running[0].done, len(_running[0].frames)) if _running else None
+
+
+def _look() -> float | None:
+    """What has come is shown."""
+    if not _running:
+        return None
+    carrying = _running[0]
+    preview_areas.redraw(bpy.context)
+    if carrying.future is None or not carrying.future.done():
+        return TICK
+    _running.clear()
+    try:
+        carrying.future.result()
+    except stopping.StoppedError:
+        return None
+    except (UserError, MemoryError) as error:
+        _failed[carrying.file] = str(error)
+    _show()
+    return None
+
+
+def _show() -> None:
+    """Previews are made anew, with what was carried."""
+    from . import sessions  # which notes here what it lacks
+
+    sessions.WINDOW.keep(set())
+    for scene in bpy.data.scenes:
+        if scene.library is None and scene.virtual_shutter.effects:
+            strips.invalidate(scene)
+    preview_areas.redraw(bpy.context)
+
+
+def _end() -> None:
+    for carrying in _running:
+        carrying.ended.set()
+    _running.clear()
+
+
+def forget(*_: Any) -> None:
+    """Ends what runs: when a file is loaded, and when the extension goes."""
+    _end()
+    _wanted.clear()
+    _failed.clear()
