@@ -53,6 +53,13 @@ class CarriedFile:
     drawings: tuple[tuple[int, outlines.Curves], ...]
     folder: Path | None = None
 
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:  # asked for every frame of a window, of what may be thousands of points
+        return hash((self.footage, self.drawings, self.folder))
+
     def open(self) -> CarriedMattes:
         """MediaError: the footage cannot be read, or OpenCV is missing."""
         if not carrying.is_possible():

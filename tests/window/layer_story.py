@@ -52,13 +52,7 @@ def told():
     yield from holes()
     yield from played()
     yield from one_stroke_story.rendered(range(FRAME, FRAME + 1))
-    with driver.override("PREVIEW"):
-        bpy.ops.shutter.full_quality()
-        bpy.ops.sequencer.view_all_preview()
-        height = story.preview().height
-        bpy.ops.sequencer.view_zoom_ratio(ratio=(height + 1) / height)  # as the operator takes it for one pixel larger
-        bpy.context.space_data.show_overlays = bpy.context.space_data.show_gizmo = False
-    yield from story.seen("7_full_quality")
+    yield from one_stroke_story.looked_at()
 
 
 if __name__ == "__main__":

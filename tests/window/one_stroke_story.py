@@ -166,6 +166,17 @@ def rendered(frames=RENDERED):
         driver.saw(rendered=frame, stroke=stroke_at(frame))
 
 
+def looked_at():
+    """The frame as it is rendered, pixel for pixel, with nothing over it."""
+    with driver.override("PREVIEW"):
+        bpy.ops.shutter.full_quality()
+        bpy.ops.sequencer.view_all_preview()
+        height = story.preview().height
+        bpy.ops.sequencer.view_zoom_ratio(ratio=(height + 1) / height)  # as the operator takes it for one pixel larger
+        bpy.context.space_data.show_overlays = bpy.context.space_data.show_gizmo = False
+    yield from story.seen("7_full_quality")
+
+
 def stroke_at(frame):
     """The middle of the region's stroke at a frame, in fractions of the picture."""
     edit, effect, strip = part("blender.data.selection").active(bpy.context)

@@ -44,8 +44,8 @@ def carried_file(effect, strip, drawn: dict[int, outlines.Curves]) -> CarriedFil
     """What gives the mattes of an outline in the frames of the source, by the curves at some of them. EffectError,
     MediaError: there is no source."""
     spec = source_media.spec(strips.source_of(effect.id_data, effect, strip))
-    folder = Path(bpy.data.filepath).parent / FOLDER if bpy.data.filepath else None
-    return CarriedFile(footage=spec, drawings=tuple(sorted(drawn.items())), folder=folder)
+    place = Path(bpy.data.filepath).parent if bpy.data.filepath else Path(bpy.app.tempdir)  # which Blender clears up
+    return CarriedFile(footage=spec, drawings=tuple(sorted(drawn.items())), folder=place / FOLDER)
 
 
 def channel(region) -> str:
