@@ -140,7 +140,8 @@ class CarriedMattes:
 
     def _made(self, index: int, first: int | None, last: int | None) -> Iterator[tuple[int, np.ndarray]]:
         """Mattes (H, W) uint8 by frame: of all between two drawings, or of those beyond one as far as a frame."""
-        if first is None and last is None:
+        if first is None and last is None:  # kept as well: else it would be lacking again and again
+            yield index, np.zeros((self.height, self.width), np.uint8)
             return
         if first == last and first is not None:
             yield first, carrying.drawn(self._picture(first), self._drawing(first).cover)

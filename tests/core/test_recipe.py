@@ -576,3 +576,14 @@ def test_edge_aware_between_its_keys():
     assert strengths(0.5, -3, 9) == [0.5, 0.5]
     keys = [{"frame": 2, "value": 0.2}, {"frame": 6, "value": 1, "ease": "constant"}, {"frame": 9, "value": 0}]
     assert strengths(keys, 1, 4, 6, 8.5, 40) == pytest.approx([0.2, 0.6, 1, 1, 0])
+
+
+def test_what_is_drawn_comes_in_the_order_of_its_regions():
+    """Lines and outlines: whoever draws them goes through the regions beside them."""
+    strokes = [[[0.1, 0.1], [0.5, 0.1], [0.5, 0.5]]]
+    outline = {"shutter": "S1", "kind": "outline", "between": "straight", "strokes": strokes}
+    regions = [outline, {"shutter": "S0", "strokes": strokes}, outline | {"shutter": "S0"}]
+    shutters = [{"name": f"S{i}", "bars": [1]} for i in range(2)]
+    content = recipe_file.parse(json.dumps({"version": 1, "window": 1, "shutters": shutters, "regions": regions}))
+    drawn = content.effect(1.5).drawn_at(1)
+    assert [(shape.shutter, shape.kind) for shape in drawn] == [(1, "lasso"), (0, "line"), (0, "lasso")]

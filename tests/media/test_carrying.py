@@ -137,6 +137,7 @@ def test_it_ends_at_a_cut(tmp_path):
     assert (mattes.read(13) * truth(13)).sum() > 0.9 * truth(13).sum()
     assert not mattes.read(15).any()
     assert not mattes.read(20).any()
+    assert mattes.has(20), "that nothing is there is known from now on"
 
 
 def test_it_fades_where_nothing_like_it_is_seen(tmp_path):

@@ -320,9 +320,10 @@ class Effect:
         return [region for region in self.regions if region.layer and region.opacity.at(frame) > 0]
 
     def drawn_at(self, frame: float) -> list[scribbles.Shape]:
-        """All that is drawn, layers as well, where it is at a frame. EffectError: it lies nowhere."""
-        outlined = [each.drawn_at(frame) for each in self.regions if isinstance(each, OutlineRegion)]
-        return [region.at(frame) for region in self.regions if isinstance(region, Region)] + outlined
+        """All that is drawn, layers as well, where it is at a frame, in the order of its regions. EffectError: it lies
+        nowhere."""
+        drawn = [region for region in self.regions if isinstance(region, Region | OutlineRegion)]
+        return [region.at(frame) if isinstance(region, Region) else region.drawn_at(frame) for region in drawn]
 
     def _shapes_at(self, frame: float) -> Iterator[scribbles.Shape]:
         room = limits.MAX_POINTS
