@@ -18,7 +18,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from shutter_addon.core.model import outlines
+from shutter_addon.core.model import outlines, scribbles
 from shutter_addon.media import carrying, flow, open_source
 from shutter_addon.media.matte_files import MatteFile
 
@@ -33,18 +33,15 @@ def outline(mask: np.ndarray) -> list[np.ndarray]:
     contours, _ = cv2.findContours(large, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     size = np.array(large.shape[::-1])
     return [
-        around((contour[:, 0] + 0.5) / size * (1, -1) + (0, 1))
+        closed((contour[:, 0] + 0.5) / size * (1, -1) + (0, 1))
         for contour in contours
         if len(contour) > 3 * FINE * FINE  # a spot of a few pixels nobody draws
     ]
 
 
-def around(points: np.ndarray) -> np.ndarray:
+def closed(points: np.ndarray) -> np.ndarray:
     """POINTS points at equal lengths along a closed curve."""
-    closed = np.concatenate([points, points[:1]])
-    length = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
-    places = np.linspace(0, length[-1], POINTS, endpoint=False)
-    return np.stack([np.interp(places, length, closed[:, axis]) for axis in (0, 1)], axis=1)
+    return scribbles.resample(np.concatenate([points, points[:1]]), POINTS + 1)[:-1]
 
 
 def overlap(matte: np.ndarray, mask: np.ndarray) -> float:

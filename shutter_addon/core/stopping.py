@@ -9,9 +9,10 @@ from __future__ import annotations
 import queue
 import threading
 from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import TypeVar
+from typing import Any, TypeVar
 
 T = TypeVar("T")
 
@@ -41,6 +42,14 @@ def check() -> None:
     """StoppedError: the work that this step belongs to is to end here."""
     if _stopped.get()():
         raise StoppedError
+
+
+def in_thread(function: Callable[..., Any], *arguments: Any) -> Future:
+    """What a function will return or raise, called by a thread of its own, which ends with it."""
+    pool = ThreadPoolExecutor(1, "Virtual Shutter")
+    future = pool.submit(function, *arguments)
+    pool.shutdown(wait=False)
+    return future
 
 
 def beside(steps: Iterable[T], patience: float | None) -> Generator[T | None, None, None]:

@@ -4,8 +4,6 @@ files. What a file is made of is in its name: a drawing that changes leaves thos
 
 from __future__ import annotations
 
-import hashlib
-import json
 import tempfile
 from bisect import bisect_left, bisect_right
 from collections.abc import Hashable, Iterator
@@ -18,14 +16,14 @@ from typing import Protocol
 import numpy as np
 from OpenImageIO import ImageBuf
 
-from ..core import atomic_write
 from ..core.frames.frame_source import FrameSource
 from ..core.model import outlines, scribbles
 from . import carrying, flow
 from .cuts import ShotSource
 from .errors import MediaError
 from .files import check_name
-from .inbetween_cache import identity
+from .image_writing import write_levels
+from .inbetween_cache import identity, manifest_key
 
 FOLDER = "virtual_shutter_mattes"
 VERSION = 1  # raise it when mattes of the same drawings change
@@ -84,6 +82,7 @@ class CarriedMattes:
         self.fps: Fraction | None = source.fps
         self._drawings = {frame: curves for frame, curves in drawings if 0 <= frame < self.count}
         self._frames = sorted(self._drawings)
+        self._drawing_keys: dict[int, str] = {}  # previews ask for paths again and again
         self._parent = folder
 
     def read(self, index: int) -> np.ndarray:
@@ -184,9 +183,13 @@ class CarriedMattes:
 
     def _path(self, index: int, first: int | None, last: int | None) -> Path:
         """The file of a frame's matte, made of these drawings."""
-        made_of = [VERSION, index, [(frame, self._drawings[frame]) for frame in (first, last) if frame is not None]]
-        digest = hashlib.sha256(json.dumps(made_of).encode()).hexdigest()[:16]
-        return self._folder / f"{index:08d}-{digest}.png"
+        drawn = [self._drawing_key(frame) for frame in (first, last) if frame is not None]
+        return self._folder / f"{index:08d}-{manifest_key({'version': VERSION, 'frame': index, 'drawn': drawn})}.png"
+
+    def _drawing_key(self, frame: int) -> str:
+        if frame not in self._drawing_keys:
+            self._drawing_keys[frame] = manifest_key({"frame": frame, "curves": self._drawings[frame]})
+        return self._drawing_keys[frame]
 
     @cached_property
     def _folder(self) -> Path:
@@ -196,8 +199,7 @@ class CarriedMattes:
             if not _elsewhere:
                 _elsewhere.append(tempfile.TemporaryDirectory(prefix=FOLDER))
             parent = Path(_elsewhere[0].name)
-        digest = hashlib.sha256(json.dumps(identity(self._source), sort_keys=True).encode()).hexdigest()[:16]
-        return parent / f"{self._source.path.stem[:40]}-{digest}"
+        return parent / f"{self._source.path.stem[:40]}-{manifest_key(identity(self._source))}"
 
     def _kept(self, path: Path) -> np.ndarray | None:
         """The matte (H, W) uint8 of a file; None: there is none, or it is damaged."""
@@ -212,11 +214,8 @@ class CarriedMattes:
 
     def _keep(self, path: Path, matte: np.ndarray) -> None:
         """Writes a matte whole or not at all. MediaError: it cannot be written."""
-        image = ImageBuf(np.ascontiguousarray(matte[..., None]))
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            with atomic_write.writing(path) as part:
-                if not image.write(check_name(part)):
-                    raise MediaError(f"{path.parent}: a matte could not be written ({image.geterror()})")
         except OSError as error:
             raise MediaError(f"{path.parent}: mattes cannot be written there ({error.strerror or error})") from None
+        write_levels(path, matte)

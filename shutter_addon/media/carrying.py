@@ -13,7 +13,7 @@ Flow and votes are found in pictures of at most WORKING pixels a side, edges in 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
@@ -89,7 +89,7 @@ def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: r
         return
     reading = range(first.frame if first else span.start, (last.frame if last else span.stop - 1) + 1)
     size = ends[0].cover.shape[::-1]
-    footage = _Footage({}, {})
+    footage = _Footage()
     joined = _joined(lambda frame: _small(frames(frame), size), footage, reading, first, last)
     for frame in span:
         stopping.check()
@@ -116,8 +116,8 @@ def drawn(picture: np.ndarray, cover: np.ndarray) -> np.ndarray:
 class _Footage:
     """Working pictures, by their source frames: colours (3, h, w) float32, and greys (h, w) uint8."""
 
-    colors: dict[int, np.ndarray]
-    greys: dict[int, np.ndarray]
+    colors: dict[int, np.ndarray] = field(default_factory=dict)
+    greys: dict[int, np.ndarray] = field(default_factory=dict)
 
     def add(self, frame: int, picture: np.ndarray) -> None:
         self.colors[frame], self.greys[frame] = _lab(picture), cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
@@ -125,7 +125,7 @@ class _Footage:
     def to(self, frame: int, other: int) -> Places:
         """Where in another frame lies what a frame shows."""
         grey = self.greys[frame]
-        return _grid(*grey.shape) + flow.fine_vectors(grey, self.greys[other])
+        return flow.grid(*grey.shape) + flow.fine_vectors(grey, self.greys[other])
 
     def best(self, joined: Places, frame: int, end: Drawing) -> Places:
         """Where in a drawing's frame lies what a frame shows: for each pixel, of all ways to know the one that leads to
@@ -149,7 +149,7 @@ def _apart(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 def _affine(places: Places, where: np.ndarray) -> Places:
     """The affine motion that most of the places in an area have, for the whole picture."""
-    grid = _grid(*where.shape)
+    grid = flow.grid(*where.shape)
     chosen = np.flatnonzero(where[::THIN, ::THIN])
     if chosen.size < LEAST:
         return places
@@ -272,10 +272,6 @@ def _lab(picture: np.ndarray) -> np.ndarray:
     lab = cv2.cvtColor(picture.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
     lab[..., 0] /= 2
     return np.ascontiguousarray(lab.transpose(2, 0, 1))
-
-
-def _grid(height: int, width: int) -> Places:
-    return np.dstack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in (width, height))))
 
 
 def _at(values: np.ndarray, places: Places) -> np.ndarray:

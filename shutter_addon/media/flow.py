@@ -127,7 +127,7 @@ class _Paths:
         arrived = np.dstack([cost, other]) < np.inf
         vectors = _filled(vectors.astype(np.float32), arrived.any(axis=2))
         shown = cv2.blur(arrived.astype(np.float32), (5, 5)) + np.float32(0.05)
-        fine = _grid(*self._shape) / STEP
+        fine = grid(*self._shape) / STEP
         return _look(vectors, fine, cv2.INTER_LINEAR), _look(shown, fine, cv2.INTER_LINEAR)
 
     def _carry(
@@ -153,13 +153,13 @@ def _carriers(first: np.ndarray, second: np.ndarray, flow: Flow) -> tuple[np.nda
     """Places (n, 2) on every STEPth pixel, vectors (n, 2) and costs (n,), the dearest first: how much, in levels, the
     two ends differ."""
     stopping.check()
-    grid = _grid(*first.shape)
-    vectors = np.zeros_like(grid) if min(first.shape) < SMALLEST else flow(first, second)
+    places = grid(*first.shape)
+    vectors = np.zeros_like(places) if min(first.shape) < SMALLEST else flow(first, second)
     vectors = np.nan_to_num(vectors, posinf=0, neginf=0)  # of pictures without any structure
-    cost = cv2.blur(cv2.absdiff(first, _look(second, grid + vectors, cv2.INTER_LINEAR)).astype(np.float32), (5, 5))
+    cost = cv2.blur(cv2.absdiff(first, _look(second, places + vectors, cv2.INTER_LINEAR)).astype(np.float32), (5, 5))
     cost = cost[::STEP, ::STEP].ravel()
     order = np.argsort(-cost, kind="stable")
-    places, vectors = (each[::STEP, ::STEP].reshape(-1, 2)[order] for each in (grid, vectors))
+    places, vectors = (each[::STEP, ::STEP].reshape(-1, 2)[order] for each in (places, vectors))
     return places, vectors, cost[order]
 
 
@@ -180,8 +180,8 @@ def _mixed(ends: list[np.ndarray], paths: list[tuple[np.ndarray, np.ndarray]], t
     total = weights = np.zeros((), np.float32)
     for vectors, shown in paths:
         stopping.check()
-        grid = _grid(*vectors.shape[:2])
-        seen = _look(ends[0], grid - np.float32(t) * vectors), _look(ends[1], grid + np.float32(1 - t) * vectors)
+        here = grid(*vectors.shape[:2])
+        seen = _look(ends[0], here - np.float32(t) * vectors), _look(ends[1], here + np.float32(1 - t) * vectors)
         late: np.ndarray = np.float32(t) * shown[..., 1]
         late = (late / (late + np.float32(1 - t) * shown[..., 0]))[..., None]
         first, second = map(_light, seen)
@@ -206,7 +206,7 @@ def _look(picture: np.ndarray, places: np.ndarray, how: int | None = None) -> np
 
 
 @lru_cache(maxsize=1)  # 66 MB at 4K; a build has pictures of one size
-def _grid(height: int, width: int) -> np.ndarray:
+def grid(height: int, width: int) -> np.ndarray:
     """The places (H, W, 2) of all pixels."""
     return np.dstack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in (width, height))))
 

@@ -55,12 +55,14 @@ class MatteValues:
         if not isinstance(content, FileFrame):
             return content
         frame = self._frame(content, index)
-        return content.file, frame, self._is_late(content.file, frame)
+        return content.file, frame, self._stands_in(content.file, frame) is not None
 
-    def _is_late(self, file: MatteFile, frame: int) -> bool:
-        """Whether another matte stands in for that of a frame."""
+    def _stands_in(self, file: MatteFile, frame: int) -> CarriedMattes | None:
+        """What has a matte that stands in for that of a frame; None: its own is taken."""
         source = self._sources[file]
-        return self._late is not None and isinstance(source, CarriedMattes) and not source.has(frame)
+        if self._late is None or not isinstance(source, CarriedMattes) or source.has(frame):
+            return None
+        return source
 
     def _frame(self, content: FileFrame, index: int) -> int:
         """The frame of its file, which is opened."""
@@ -79,9 +81,9 @@ class MatteValues:
         return block_means(1 - values if matte.invert else values, block)
 
     def _read(self, file: MatteFile, frame: int) -> np.ndarray:
-        source = self._sources[file]
-        if self._late is None or not isinstance(source, CarriedMattes) or source.has(frame):
-            return source.read(frame)
+        source = self._stands_in(file, frame)
+        if source is None or self._late is None:
+            return self._sources[file].read(frame)
         self._late(file, frame)
         return source.straight(frame)
 

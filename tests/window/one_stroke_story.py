@@ -184,8 +184,9 @@ def stroke_at(frame):
     return points.mean(axis=0).tolist()
 
 
-def begun(shown=SHOWN):
-    """The stroke is drawn, and the sidebar shows its buttons. shown: the frames that the strip is trimmed to."""
+def begun(shown=SHOWN, draw=drawn):
+    """The stroke is drawn, and the sidebar shows its buttons. shown: the frames that the strip is trimmed to; draw: a
+    generator, as `drawn`, of what is drawn in its place."""
     yield from story.opened()
     story.edit().render.resolution_x, story.edit().render.resolution_y, story.edit().frame_end = 768, 576, 100
     yield from roomier()
@@ -195,7 +196,7 @@ def begun(shown=SHOWN):
     story.edit().frame_set(FRAME)
     yield from story.effect_added()
     story.effect().active_shutter = 1
-    yield from drawn()
+    yield from draw()
     driver.shot("1_stroke")
 
 

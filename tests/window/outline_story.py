@@ -12,9 +12,9 @@ import driver
 import numpy as np
 import one_stroke_story
 import story
-from one_stroke_story import on_preview, part, region
+from one_stroke_story import FRAME, on_preview, part, region
 
-SHOWN, BETWEEN = range(55, 86), 70
+SHOWN = range(55, 86)
 # Of the footage's frames, in pixels: the middle of a box around her, and half of its width and height.
 DRAWN = {62: (397, 239), 78: (316, 226)}
 HALF = 20, 44
@@ -47,7 +47,7 @@ def outlined():
 def carried():
     """A straight outline stands in until it is."""
     carrying = part("blender.rendering.outline_carrying")
-    story.edit().frame_set(BETWEEN)
+    story.edit().frame_set(FRAME)
     yield from driver.until(lambda: carrying.progress() is not None, "it is carried", 20, wait=0.02)
     yield from driver.until(lambda: carrying.progress() is None, "it is there", 60)
     yield from story.seen("2_carried")
@@ -59,18 +59,9 @@ def carried():
 
 
 def told():
-    yield from story.opened()
-    story.edit().render.resolution_x, story.edit().render.resolution_y, story.edit().frame_end = 768, 576, 100
-    yield from one_stroke_story.roomier()
-    yield from story.movie_added()
-    movie = story.edit().sequence_editor.strips_all[0]
-    movie.left_handle, movie.right_handle = SHOWN.start, SHOWN.stop
-    story.edit().frame_set(BETWEEN)
-    yield from story.effect_added()
-    story.effect().active_shutter = 1
-    yield from outlined()
+    yield from one_stroke_story.begun(SHOWN, outlined)
     yield from carried()
-    yield from one_stroke_story.rendered(range(BETWEEN, BETWEEN + 1))
+    yield from one_stroke_story.rendered(range(FRAME, FRAME + 1))
     yield from one_stroke_story.looked_at()
 
 

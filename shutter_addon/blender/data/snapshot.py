@@ -365,8 +365,10 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
     kind: type[model.MatteRegion] = model.MatteRegion
     drawn: dict[str, Any] = {}
     if region.kind == "OUTLINE":
-        kind, drawn = model.OutlineRegion, _outlined(sampling, path, region)
-        content = sampled.tried(_outlines, sampling, region, *drawn.values())
+        drawings = sampled.drawings(curves, path, effect, region, sampling.placement, None)
+        between = "straight" if region.between == "STRAIGHT" else "carried"
+        kind, drawn = model.OutlineRegion, {"drawings": drawings, "between": between}
+        content = sampled.tried(_outlines, sampling, region, drawings)
     else:
         content = sampled.tried(matte_content.content, effect, sampling.strip, region, moves, frames, sampling.time)
     blend = sampled.tried(validation.word, region, "blend")
@@ -387,17 +389,9 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
     )
 
 
-def _outlined(sampling: _Sampling, path: str, region) -> dict[str, Any]:
-    """What an outline has besides what all mattes have: all of its drawings, and what is between them."""
-    between = sampled.tried(validation.word, region, "between")
-    drawings = sampled.drawings(sampling.curves, path, sampling.effect, region, sampling.placement, None)
-    return {"drawings": drawings, "between": "straight" if between == "STRAIGHT" else "carried"}
-
-
-def _outlines(sampling: _Sampling, region, drawings: model.Drawings, between: str) -> keyframes.Channel:
+def _outlines(sampling: _Sampling, region, drawings: model.Drawings) -> keyframes.Channel:
     """The content of an outline. EffectError, MediaError: there is no source."""
-    validation.word(region, "between")
-    if between == "straight":
+    if validation.word(region, "between") == "STRAIGHT":
         return model.DrawnOutlines(drawings)
     numbers, effect, strip = drawings.frames, sampling.effect, sampling.strip
     there = _Sampling.of(sampling.curves, effect, strip, numbers)

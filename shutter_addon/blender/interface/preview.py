@@ -14,7 +14,7 @@ from ...core import stopping
 from ...core.model.frame_state import FrameState
 from ...media import MediaError
 from ...media.errors import NotBuiltError
-from ..data import annotations, preview_areas, selection
+from ..data import annotations, preview_areas, selection, strips
 from ..data.choices import CONTEXT
 from ..data.preview_areas import Shown
 from ..devices import blender_gpu
@@ -28,6 +28,7 @@ from ..rendering import (
     pictures,
     previews,
     render_job,
+    sessions,
     strobing,
 )
 from ..rendering.previews import Decision, Drawing
@@ -287,12 +288,21 @@ def _tell_missing(renderer, request, say) -> None:
 
 def _tell_carrying(say) -> None:
     """Has mattes carried that the picture lacks, and says so."""
-    fault, progress = outline_carrying.begin(), outline_carrying.progress()
+    fault, progress = outline_carrying.begin(_show_carried), outline_carrying.progress()
     if fault is not None:
         say(rpt_("Shutter: {fault}").format(fault=fault))
     if progress is not None:
         done, total = progress
         say(rpt_("Carrying the outline: {done} of {total} frames").format(done=done, total=total))
+
+
+def _show_carried() -> None:
+    """Previews are made anew, with what was carried."""
+    sessions.WINDOW.keep(set())
+    for scene in bpy.data.scenes:
+        if scene.library is None and scene.virtual_shutter.effects:
+            strips.invalidate(scene)
+    preview_areas.redraw(bpy.context)
 
 
 def _tell_fault(error: Exception, say) -> None:

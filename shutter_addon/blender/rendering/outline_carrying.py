@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import Future
 from contextlib import closing
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,8 +13,9 @@ import bpy
 
 from ...core import stopping
 from ...core.messages import UserError
+from ...core.stopping import in_thread
 from ...media.carried_mattes import CarriedFile
-from ..data import preview_areas, strips
+from ..data import preview_areas
 
 TICK = 0.25  # seconds from one look at the thread to the next
 
@@ -22,15 +24,20 @@ TICK = 0.25  # seconds from one look at the thread to the next
 class _Carrying:
     """The mattes that a thread carries: it touches no bpy.
 
-    frames: what is to come, the source frames of a file; done: how many are there by now"""
+    frames: what is to come, the source frames of a file; done: how many are there by now
+    arrived: called on Blender's main thread when all are"""
 
     file: CarriedFile
     frames: list[int]
+    arrived: Callable[[], None]
     done: int = 0
     ended: threading.Event = field(default_factory=threading.Event)
-    future: Future | None = None
+    future: Future = field(init=False)
 
-    def carry(self) -> None:
+    def __post_init__(self) -> None:
+        self.future = in_thread(self._carry)
+
+    def _carry(self) -> None:
         with stopping.once(self.ended.is_set), closing(self.file.open()) as mattes:
             for frame in self.frames:
                 mattes.read(frame)
@@ -48,19 +55,17 @@ def want(file: CarriedFile, frame: int) -> None:
         _wanted.setdefault(file, set()).add(frame)
 
 
-def begin() -> str | None:
+def begin(arrived: Callable[[], None]) -> str | None:
     """Carries what was wanted since the last call, in place of what is not wanted any longer: on Blender's main thread,
-    once a preview was drawn. Why something cannot be carried; None: nothing is lacking, or it is on its way."""
+    once a preview was drawn. Why something cannot be carried; None: nothing is lacking, or it is on its way.
+
+    arrived: called when it is there"""
     wanted = {file: frames for file, frames in _wanted.items() if file not in _failed}
     _wanted.clear()
     if wanted and not (_running and _running[0].file in wanted):
         _end()
         file, frames = next(iter(wanted.items()))
-        carrying = _Carrying(file=file, frames=sorted(frames))
-        pool = ThreadPoolExecutor(1, "Virtual Shutter")
-        carrying.future = pool.submit(carrying.carry)
-        pool.shutdown(wait=False)
-        _running.append(carrying)
+        _running.append(_Carrying(file=file, frames=sorted(frames), arrived=arrived))
         if not bpy.app.timers.is_registered(_look):
             bpy.app.timers.register(_look, first_interval=TICK)
     return next(iter(_failed.values()), None)
@@ -77,7 +82,7 @@ def _look() -> float | None:
         return None
     carrying = _running[0]
     preview_areas.redraw(bpy.context)
-    if carrying.future is None or not carrying.future.done():
+    if not carrying.future.done():
         return TICK
     _running.clear()
     try:
@@ -86,19 +91,8 @@ def _look() -> float | None:
         return None
     except (UserError, MemoryError) as error:
         _failed[carrying.file] = str(error)
-    _show()
+    carrying.arrived()
     return None
-
-
-def _show() -> None:
-    """Previews are made anew, with what was carried."""
-    from . import sessions  # which notes here what it lacks
-
-    sessions.WINDOW.keep(set())
-    for scene in bpy.data.scenes:
-        if scene.library is None and scene.virtual_shutter.effects:
-            strips.invalidate(scene)
-    preview_areas.redraw(bpy.context)
 
 
 def _end() -> None:

@@ -6,7 +6,7 @@ It is measured in a thread that touches no bpy, of a few frames of the footage, 
 
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -23,6 +23,7 @@ from ...core.model import shutters
 from ...core.model.frame_state import FrameState
 from ...core.model.motions import Similarity
 from ...core.pixels import compositor
+from ...core.stopping import in_thread
 from ...media import MediaError, inbetween, steps
 from ...media.cuts import ShotSource
 from ..data import inbetween_settings
@@ -213,10 +214,8 @@ def advance() -> bool:
         return False
     ended, _measuring.job = _measuring.job is not None, None
     if _measuring.wanted is not None:
-        pool = ThreadPoolExecutor(1, "Virtual Shutter")
         _stopped.clear()
-        _measuring.job, _measuring.wanted = pool.submit(_measuring.wanted), None
-        pool.shutdown(wait=False)
+        _measuring.job, _measuring.wanted = in_thread(_measuring.wanted), None
     return ended
 
 

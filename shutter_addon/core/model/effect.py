@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
@@ -54,6 +53,20 @@ class Drawings:
         before, after, share = keyframes.eased_span(self.frames, self.eases, frame)
         first, second = (self._on_picture(index, placement) for index in (before, after))
         return scribbles.between_strokes(first, second, share, self.aspect)
+
+    def moved(self, frame: float, placed: Placement) -> tuple[np.ndarray, ...]:
+        """As `at`, moved about the centre of what is drawn."""
+        return scribbles.transform(self.at(frame), placed.location, placed.rotation, placed.scale, self.aspect)
+
+    def centre(self, frame: float) -> np.ndarray | None:
+        """See Subject."""
+        strokes = self.at(frame)
+        return motions.centre(strokes) if strokes else None
+
+    def corners(self, frame: float, placed: Placement) -> np.ndarray:
+        """See Subject; placed: where it lies at the frame."""
+        strokes = self.moved(frame, placed)
+        return motions.corners(strokes) if strokes else np.empty((0, 2))
 
     def drawing(self, index: int, frame: float) -> list[np.ndarray]:
         """The strokes of a drawing as they lie on the picture at a frame; raises as `at`."""
@@ -133,19 +146,15 @@ class Region(Subject):
         return keyframes.are_still(self.drawings, self.kind, self.width, self.moves, self.opacity)
 
     def at(self, frame: float) -> scribbles.Shape:
-        placed, strokes = self.placement(frame), self.drawings.at(frame)
-        aspect = self.drawings.aspect
-        moved = scribbles.transform(strokes, placed.location, placed.rotation, placed.scale, aspect)
+        moved = self.drawings.moved(frame, self.placement(frame))
         kind, width, opacity = (channel.at(frame) for channel in (self.kind, self.width, self.opacity))
         return scribbles.Shape(shutter=self.shutter, kind=kind, width=width, strokes=moved, opacity=float(opacity))
 
     def centre(self, frame: float) -> np.ndarray | None:
-        strokes = self.drawings.at(frame)
-        return motions.centre(strokes) if strokes else None
+        return self.drawings.centre(frame)
 
     def corners(self, frame: float) -> np.ndarray:
-        strokes = self.at(frame).strokes
-        return motions.corners(strokes) if strokes else np.empty((0, 2))
+        return self.drawings.corners(frame, self.placement(frame))
 
 
 @dataclass(frozen=True)
@@ -192,7 +201,7 @@ class OutlineRegion(MatteRegion):
     go from one to the next; content: a channel of mattes.FileFrame or of mattes.Outline"""
 
     drawings: Drawings
-    between: Literal["carried", "straight"] = "carried"
+    between: mattes.Between = "carried"
 
     def drawn_at(self, frame: float) -> scribbles.Shape:
         """The curves at a frame, as a lasso. EffectError: they are nowhere near the picture."""
@@ -200,14 +209,10 @@ class OutlineRegion(MatteRegion):
         return scribbles.Shape(shutter=self.shutter, kind="lasso", width=0.0, strokes=strokes)
 
     def centre(self, frame: float) -> np.ndarray | None:
-        strokes = self.drawings.at(frame)
-        return motions.centre(strokes) if strokes else None
+        return self.drawings.centre(frame)
 
     def corners(self, frame: float) -> np.ndarray:
-        placed, strokes = self.placement(frame), self.drawings.at(frame)
-        aspect = self.drawings.aspect
-        moved = scribbles.transform(strokes, placed.location, placed.rotation, placed.scale, aspect)
-        return motions.corners(moved) if strokes else np.empty((0, 2))
+        return self.drawings.corners(frame, self.placement(frame))
 
 
 @dataclass(frozen=True)

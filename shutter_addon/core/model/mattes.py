@@ -16,6 +16,8 @@ from ..frames.retiming import Medium, StripTiming, source_frame
 from .outlines import Curves, coverage
 
 Blend = Literal["over", "add"]
+# What gives an outline's matte between two drawings: the footage's own motion, or curves that go straight.
+Between = Literal["carried", "straight"]
 RampKind = Literal["linear", "radial", "angle"]
 # A placement's scale from which on a ramp is a step, or none at all.
 _SMALLEST = 1e-6

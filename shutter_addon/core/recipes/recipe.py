@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -123,10 +123,40 @@ def _moves(keys: list[RegionKey] | list[CameraKey]) -> effect.Moves:
     return effect.Moves(*(keyframes.Keys(frames, values, eases) for values in numbers))
 
 
+M = TypeVar("M", bound=effect.MatteRegion)
+
+
+class Drawn:
+    """What regions have that are drawn. Redrawn shapes follow one another between the keys that carry strokes; a first
+    key without any carries the region's own."""
+
+    name: str
+    strokes: list[Stroke]
+    keys: list[RegionKey]
+
+    def drawings(self) -> list[tuple[RegionKey | None, list[Stroke]]]:
+        """The key that starts each drawing, and its strokes, in time."""
+        drawn: list[tuple[RegionKey | None, list[Stroke]]]
+        drawn = [(key, key.strokes) for key in self.keys if key.strokes is not None]
+        if not drawn or self.keys[0].strokes is None:
+            drawn.insert(0, (self.keys[0] if self.keys else None, self.strokes))
+        return drawn
+
+    def drawings_over_time(self, aspect: float) -> effect.Drawings:
+        """As plain data, for a picture of width / height = aspect."""
+        drawn = self.drawings()
+        return effect.Drawings(
+            name=self.name,
+            frames=tuple(key.frame if key else 0.0 for key, _ in drawn),
+            strokes=tuple([np.asarray(stroke, float) for stroke in strokes] for _, strokes in drawn),
+            eases=tuple(key.ease if key else "linear" for key, _ in drawn),
+            aspect=aspect,
+        )
+
+
 @dataclass(frozen=True)
-class Region:
-    """A scribble of a shutter. Redrawn shapes follow one another between the keys that carry strokes; a first key
-    without any carries the region's own.
+class Region(Drawn):
+    """A scribble of a shutter.
 
     layer: whether it is exposed by itself, before what the others make (core.pixels.layering)"""
 
@@ -139,10 +169,6 @@ class Region:
     opacity: Keyable = 1.0
     layer: bool = False
 
-    def drawings(self) -> list[tuple[RegionKey | None, list[Stroke]]]:
-        """The key that starts each drawing, and its strokes, in time."""
-        return _drawings(self)
-
     def over_time(self, shutter: int, aspect: float) -> effect.Region:
         """As plain data, for a picture of width / height = aspect; shutter: the index of its shutter."""
         return effect.Region(
@@ -150,7 +176,7 @@ class Region:
             shutter=shutter,
             kind=keyframes.Constant(self.kind),
             width=keyframes.Constant(self.width),
-            drawings=_drawings_over_time(self, aspect),
+            drawings=self.drawings_over_time(aspect),
             moves=_moves(self.keys),
             opacity=_numbers(self.opacity),
             layer=self.layer,
@@ -158,9 +184,8 @@ class Region:
 
 
 @dataclass(frozen=True)
-class OutlineRegion:
-    """A region by outlines: its shutter's coefficients are 1 in what closed curves enclose, and 0 elsewhere. Drawings
-    are as a Region's.
+class OutlineRegion(Drawn):
+    """A region by outlines: its shutter's coefficients are 1 in what closed curves enclose, and 0 elsewhere.
 
     between: what gives the matte between two drawings, as effect.OutlineRegion has it
     width, invert, blend, opacity, layer: as a MatteRegion's; keys: likewise, and drawings"""
@@ -169,7 +194,7 @@ class OutlineRegion:
     kind: Literal["outline"]
     name: str = ""
     strokes: list[Stroke] = field(default_factory=list)
-    between: Literal["carried", "straight"] = "carried"
+    between: mattes.Between = "carried"
     invert: bool = False
     blend: mattes.Blend = "over"
     opacity: Keyable = 1.0
@@ -177,45 +202,11 @@ class OutlineRegion:
     keys: list[RegionKey] = field(default_factory=list)
     layer: bool = False
 
-    def drawings(self) -> list[tuple[RegionKey | None, list[Stroke]]]:
-        """As Region.drawings."""
-        return _drawings(self)
-
     def over_time(self, shutter: int, aspect: float, file: mattes.MatteFile) -> effect.OutlineRegion:
         """As Region.over_time; file: what carried mattes are read from."""
-        drawings, straight = _drawings_over_time(self, aspect), self.between == "straight"
-        return effect.OutlineRegion(
-            name=self.name,
-            shutter=shutter,
-            content=effect.DrawnOutlines(drawings) if straight else mattes.FileFrames(file=file),
-            blend=self.blend,
-            invert=self.invert,
-            opacity=_numbers(self.opacity),
-            feather=_numbers(self.width),
-            moves=_moves(self.keys),
-            layer=self.layer,
-            drawings=drawings,
-            between=self.between,
-        )
-
-
-def _drawings(region: Region | OutlineRegion) -> list[tuple[RegionKey | None, list[Stroke]]]:
-    drawn: list[tuple[RegionKey | None, list[Stroke]]]
-    drawn = [(key, key.strokes) for key in region.keys if key.strokes is not None]
-    if not drawn or region.keys[0].strokes is None:
-        drawn.insert(0, (region.keys[0] if region.keys else None, region.strokes))
-    return drawn
-
-
-def _drawings_over_time(region: Region | OutlineRegion, aspect: float) -> effect.Drawings:
-    drawn = _drawings(region)
-    return effect.Drawings(
-        name=region.name,
-        frames=tuple(key.frame if key else 0.0 for key, _ in drawn),
-        strokes=tuple([np.asarray(stroke, float) for stroke in strokes] for _, strokes in drawn),
-        eases=tuple(key.ease if key else "linear" for key, _ in drawn),
-        aspect=aspect,
-    )
+        drawings, straight = self.drawings_over_time(aspect), self.between == "straight"
+        content = effect.DrawnOutlines(drawings) if straight else mattes.FileFrames(file=file)
+        return _matte(effect.OutlineRegion, self, shutter, content, drawings=drawings, between=self.between)
 
 
 @dataclass(frozen=True)
@@ -247,7 +238,7 @@ class MatteRegion:
     def over_time(self, shutter: int, file: mattes.MatteFile) -> effect.MatteRegion:
         """As plain data; shutter: the index of its shutter, file: what is at its path."""
         first = None if self.timing == "source" else 1
-        return _matte(self, shutter, mattes.FileFrames(file=file, offset=self.offset, first=first))
+        return _matte(effect.MatteRegion, self, shutter, mattes.FileFrames(file=file, offset=self.offset, first=first))
 
 
 @dataclass(frozen=True)
@@ -269,12 +260,18 @@ class RampRegion:
     def over_time(self, shutter: int, file: mattes.MatteFile) -> effect.MatteRegion:
         """As plain data; shutter: the index of its shutter, file: the source's luminance."""
         if self.ramp == "luminance":
-            return _matte(self, shutter, mattes.FileFrames(file=file))
-        return _matte(self, shutter, effect.PlacedRamp(self.ramp, _moves(self.keys)))
+            return _matte(effect.MatteRegion, self, shutter, mattes.FileFrames(file=file))
+        return _matte(effect.MatteRegion, self, shutter, effect.PlacedRamp(self.ramp, _moves(self.keys)))
 
 
-def _matte(region: MatteRegion | RampRegion, shutter: int, content: keyframes.Channel) -> effect.MatteRegion:
-    return effect.MatteRegion(
+def _matte(
+    kind: type[M],
+    region: OutlineRegion | MatteRegion | RampRegion,
+    shutter: int,
+    content: keyframes.Channel,
+    **drawn: Any,
+) -> M:
+    return kind(
         name=region.name,
         shutter=shutter,
         content=content,
@@ -284,6 +281,7 @@ def _matte(region: MatteRegion | RampRegion, shutter: int, content: keyframes.Ch
         feather=_numbers(region.width),
         moves=_moves(region.keys),
         layer=region.layer,
+        **drawn,
     )
 
 

@@ -20,6 +20,7 @@ from .recipe import (
     KINDS,
     AnyRegion,
     CameraKey,
+    Drawn,
     Keyable,
     MatteRegion,
     OutlineRegion,
@@ -338,7 +339,7 @@ def _check(recipe: Recipe) -> None:
             _check_matte(region, f"regions[{i}]")
         else:
             _check_region(region, f"regions[{i}]")
-    drawn = [region for region in recipe.regions if isinstance(region, Region | OutlineRegion)]
+    drawn = [region for region in recipe.regions if isinstance(region, Drawn)]
     points = sum(map(_most_points, drawn))
     _require(points <= limits.MAX_POINTS, "regions", f"{points} points at once, the most are {limits.MAX_POINTS}")
 
@@ -423,7 +424,7 @@ def _check_strokes(strokes: list[Stroke], place: str) -> None:
                     _require_within(value, limits.MAX_DISTANCE, f"{place}[{j}][{n}][{axis}]")
 
 
-def _most_points(region: Region | OutlineRegion) -> int:
+def _most_points(region: Drawn) -> int:
     """The points of the region's drawing that has the most."""
     return max(sum(map(len, strokes)) for _, strokes in region.drawings())
 
