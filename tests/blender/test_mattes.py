@@ -575,10 +575,17 @@ def test_what_panels_tell(edit, shown, matte):
     assert look() == ("", 'region "m": its channel has no name', "")
 
 
+def run(*arguments):
+    """The command, within this process, and what it leaves open is closed, as where its own ends."""
+    from shutter_addon.blender import command
+    from shutter_addon.blender.rendering import sessions
+
+    assert command.main([*arguments]) == 0
+    sessions.forget()
+
+
 def test_weights_are_read_back(bpy, tmp_path, footage):
     """What `--weights` writes gives the same picture as mattes, for each shutter but the default one."""
-    from shutter_addon.blender import command
-
     stroke = {"name": "s", "shutter": "S1", "strokes": [[[0.3, 0.2], [0.4, 0.9]]]}
     content = recipe(4, [1, 0, 0, 0], [0, 0, 0, 1], [1, 1, 1, 1], border=True, regions=[stroke])
     lasso = {"name": "l", "shutter": "S2", "kind": "lasso", "strokes": [[[0.6, 0.2], [0.9, 0.3], [0.7, 0.8]]]}
@@ -587,7 +594,7 @@ def test_weights_are_read_back(bpy, tmp_path, footage):
     def render(name, content, *more):
         (tmp_path / f"{name}.json").write_text(json.dumps(content))
         where = "--recipe", str(tmp_path / f"{name}.json"), "--output", str(tmp_path / name)
-        assert command.main(["render", str(footage), "--frames", "2:4", *where, *more]) == 0
+        run("render", str(footage), "--frames", "2:4", *where, *more)
 
     render("a", content, "--weights", str(tmp_path / "weights"))
     mattes = [
@@ -738,13 +745,11 @@ def test_a_sequence_is_one_image_however_often_it_is_imported(bpy, shown, matte)
 
 def test_between_filmed_frames_a_matte_is_that_of_the_one_before(bpy, tmp_path, footage, matte):
     """At half the speed, with an in-between frame for each filmed one; an exposure is a filmed frame later."""
-    from shutter_addon.blender import command
-
     content = recipe(4, [1, 0, 0, 0], [0, 0, 1, 0], regions=[region(matte)], inbetween=2, **OPTIONS)
     content["time"] = [{"frame": 1, "value": 1}, {"frame": 21, "value": 11}]
     (tmp_path / "r.json").write_text(json.dumps(content))
     where = "--recipe", str(tmp_path / "r.json"), "--output", str(tmp_path / "out")
-    assert command.main(["render", str(footage), "--frames", "5:8", *where]) == 0
+    run("render", str(footage), "--frames", "5:8", *where)
     for frame in range(5, 9):
         shown = (frame - 1) / 2
         expected = 20 + 10 * (shown + values(int(shown)) / 255)
