@@ -7,14 +7,15 @@ from __future__ import annotations
 import tempfile
 from bisect import bisect_left, bisect_right
 from collections.abc import Hashable, Iterator
-from dataclasses import dataclass
+from contextlib import closing
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from OpenImageIO import ImageBuf
+from OpenImageIO import ImageBuf, ImageInput
 
 from ..core.frames.frame_source import FrameSource
 from ..core.model import outlines, scribbles
@@ -24,9 +25,11 @@ from .errors import MediaError
 from .files import check_name
 from .image_writing import write_levels
 from .inbetween_cache import identity, manifest_key
+from .outline_tracing import traced
 
 FOLDER = "virtual_shutter_mattes"
-VERSION = 1  # raise it when mattes of the same drawings change
+AGREEMENT = "agreement "  # what a file's description says (carrying.Carried)
+VERSION = 2  # raise it when mattes of the same drawings change
 TRUSTED = 0.5  # agreement below which a drawing is carried no farther
 FADE = 4  # frames in which it fades there
 BLOCK = 20  # frames beyond a drawing that are carried together
@@ -93,10 +96,10 @@ class CarriedMattes:
         if near == (None, None):
             return self._nothing()
         if (matte := self._kept(self._path(index, *near))) is None:
-            for made, values in self._made(index, *self._in_shot(index, *near)):
-                self._keep(self._path(made, *near), values)
-                if made == index:
-                    matte = values
+            for made in self._made(index, *self._in_shot(index, *near)):
+                self._keep(self._path(made.frame, *near), made)
+                if made.frame == index:
+                    matte = made.matte
         return self._nothing() if matte is None else matte / np.float32(255)
 
     def has(self, index: int) -> bool:
@@ -104,17 +107,42 @@ class CarriedMattes:
         near = self._near(index)
         return near == (None, None) or self._path(index, *near).is_file()
 
+    def agreement(self, index: int) -> float | None:
+        """How far the drawings on both sides agree on a frame's matte (carrying.Carried); None: it is not kept yet."""
+        near = self._near(index)
+        if near == (None, None) or not (path := self._path(index, *near)).is_file():
+            return None
+        if (image := ImageInput.open(check_name(path))) is None:
+            return None
+        with closing(image):
+            said = image.spec().getattribute("ImageDescription")
+        try:
+            return float(str(said).removeprefix(AGREEMENT))
+        except ValueError:
+            return None
+
+    def curves(self, index: int) -> outlines.Curves:
+        """What encloses a frame's matte: drawn there, or around what is carried, and until that is kept, curves that go
+        straight from drawing to drawing. MediaError: the matte cannot be read."""
+        if index in self._drawings:
+            return self._drawings[index]
+        if self._near(index) != (None, None) and self.has(index):
+            return traced(self.read(index))
+        return outlines.curves(self._straight(index))
+
     def straight(self, index: int) -> np.ndarray:
-        """What stands in for a frame's matte until that is carried: curves that go straight from drawing to drawing,
-        as `read`."""
+        """What stands in for a frame's matte until that is carried, as `read`."""
+        return outlines.coverage(self._straight(index), self.width, self.height)
+
+    def _straight(self, index: int) -> list[np.ndarray]:
+        """Strokes that go straight from drawing to drawing."""
         first, last = self._near(index)
         ends = [frame for frame in (first, last) if frame is not None]
         if not ends:
-            return self._nothing()
+            return []
         share = (index - ends[0]) / (ends[-1] - ends[0]) if ends[0] != ends[-1] else 0.0
         before, behind = (self._drawings[frame] for frame in (ends[0], ends[-1]))
-        strokes = scribbles.between_strokes(before, behind, share, self.width / self.height)
-        return outlines.coverage(strokes, self.width, self.height)
+        return scribbles.between_strokes(before, behind, share, self.width / self.height)
 
     def close(self) -> None:
         """Closes the footage; a later read opens it again."""
@@ -137,18 +165,19 @@ class CarriedMattes:
         self._source.release()
         return (first if first in shot else None), (last if last in shot else None)
 
-    def _made(self, index: int, first: int | None, last: int | None) -> Iterator[tuple[int, np.ndarray]]:
-        """Mattes (H, W) uint8 by frame: of all between two drawings, or of those beyond one as far as a frame."""
+    def _made(self, index: int, first: int | None, last: int | None) -> Iterator[carrying.Carried]:
+        """Of all frames between two drawings, or of those beyond one as far as a frame."""
         if first is None and last is None:  # kept as well: else it would be lacking again and again
-            yield index, np.zeros((self.height, self.width), np.uint8)
+            yield carrying.Carried(index, np.zeros((self.height, self.width), np.uint8), agreement=1.0)
             return
         if first == last and first is not None:
-            yield first, carrying.drawn(self._picture(first), self._drawing(first).cover)
+            matte = carrying.drawn(self._picture(first), self._drawing(first).cover)
+            yield carrying.Carried(first, matte, agreement=1.0)
             return
         before, behind = (None if frame is None else self._drawing(frame) for frame in (first, last))
         carried = carrying.carried(self._picture, before, behind, self._span(index, first, last))
         if before and behind:
-            yield from ((each.frame, each.matte) for each in carried)
+            yield from carried
         else:
             yield from self._fading(list(carried) if before else list(carried)[::-1])
 
@@ -163,13 +192,13 @@ class CarriedMattes:
         start = max(last - min(-(-(last - index) // BLOCK) * BLOCK, carrying.FARTHEST), 0)
         return range(max(start, self._source.around(index, start, last).start), last)
 
-    def _fading(self, carried: list[carrying.Carried]) -> Iterator[tuple[int, np.ndarray]]:
+    def _fading(self, carried: list[carrying.Carried]) -> Iterator[carrying.Carried]:
         """Mattes away from their only drawing, which fade where it can be trusted no longer."""
         share = 1.0
         for each in carried:
             if share < 1 or each.agreement < TRUSTED:
                 share = max(share - 1 / FADE, 0.0)
-            yield each.frame, each.matte if share == 1 else np.rint(each.matte * share).astype(np.uint8)
+            yield each if share == 1 else replace(each, matte=np.rint(each.matte * share).astype(np.uint8))
 
     def _picture(self, frame: int) -> np.ndarray:
         return flow.displayed(self._source.read(frame), self._source.transfer, self._source.alpha)
@@ -212,10 +241,10 @@ class CarriedMattes:
         samples = image.get_pixels("uint8")
         return None if samples is None or image.has_error else samples[..., 0]
 
-    def _keep(self, path: Path, matte: np.ndarray) -> None:
+    def _keep(self, path: Path, carried: carrying.Carried) -> None:
         """Writes a matte whole or not at all. MediaError: it cannot be written."""
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise MediaError(f"{path.parent}: mattes cannot be written there ({error.strerror or error})") from None
-        write_levels(path, matte)
+        write_levels(path, carried.matte, f"{AGREEMENT}{carried.agreement:.3f}")

@@ -130,3 +130,67 @@ def test_mattes_lie_beside_the_file(bpy, edited, tmp_path):
     coefficients(strip, effect, 5)
     names = [path.name[:8] for path in (tmp_path / "virtual_shutter_mattes").glob("*/*.png")]
     assert sorted(names) == [f"{index:08d}" for index in range(1, 8)]
+
+
+@pytest.fixture
+def chosen(bpy, edited):
+    """An outline that is drawn at two frames, the second time elsewhere; its region and strip."""
+
+    def make(*args, **fields):
+        from shutter_addon.blender.data import selection
+
+        strip, effect = edited(region(*args, **fields))
+        selection.choose(strip.id_data, strip)
+        effect.active_shutter = 1
+        return strip, effect
+
+    return make
+
+
+def drawn_at(effect):
+    layer = effect.scene.annotation.layers[effect.regions[0].layer]
+    return sorted(drawing.frame_number for drawing in layer.frames)
+
+
+@pytest.mark.parametrize("between", ["carried", "straight"])
+def test_what_is_carried_becomes_a_drawing(bpy, chosen, between):
+    """It encloses what the matte covers; a drawing that is there already stays as it is."""
+    strip, effect = chosen(1, 9, between=between)
+    scene = strip.id_data
+    scene.frame_set(6)
+    expected = coefficients(strip, effect, 6)
+    assert bpy.ops.shutter.outline_draw() == {"FINISHED"}
+    assert drawn_at(effect) == [1, 6, 9]
+    from shutter_addon.blender.editing import outline_drawings
+
+    found = outline_drawings.curves_now(scene, effect, strip, 0)
+    assert np.abs(outlines.coverage(found, WIDTH, HEIGHT) - expected).mean() < 0.01
+    assert bpy.ops.shutter.outline_draw() == {"FINISHED"}
+    assert outline_drawings.curves_now(scene, effect, strip, 0) == found
+
+
+def test_the_next_drawing_needed(bpy, chosen):
+    """Where the sides agree, none is; else it is where they agree least, between the drawings that do not belong
+    together."""
+    strip, effect = chosen(1, 5, 9)
+    assert bpy.ops.shutter.outline_needed() == {"CANCELLED"}
+    from shutter_addon.blender.editing import outline_drawings
+
+    scene = strip.id_data
+    scene.frame_set(9)
+    wrong = [[(x + 0.12, y) for x, y in each] for each in outline_drawings.curves_now(scene, effect, strip, 0)]
+    outline_drawings.draw(effect, strip, effect.regions[0], wrong, 9)
+    scene.frame_set(1)
+    assert bpy.ops.shutter.outline_needed() == {"FINISHED"}
+    needed = outline_drawings.next_needed(scene, effect, strip, 0)
+    assert scene.frame_current == needed.frame in (6, 7, 8)
+    assert (needed.lacking, needed.agreement < 0.8) == (0, True)
+
+
+def test_what_is_needed_of_one_drawing_or_of_straight_ones(bpy, chosen):
+    chosen(1)
+    with pytest.raises(RuntimeError, match="Draw the outline at two frames first"):
+        bpy.ops.shutter.outline_needed()
+    chosen(1, 9, between="straight")
+    with pytest.raises(RuntimeError, match="a straight outline is not carried"):
+        bpy.ops.shutter.outline_needed()

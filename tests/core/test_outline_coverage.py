@@ -60,3 +60,33 @@ def test_what_encloses_nothing(strokes):
 
 def test_what_is_all_around_the_picture():
     assert outlines.coverage([[(-5, -5), (5, -5), (5, 5), (-5, 5)]], 16, 9).min() == 1
+
+
+ASPECT = 2.0
+CIRCLE = tuple((0.5 + 0.1 * np.cos(a), 0.5 + 0.2 * np.sin(a)) for a in np.linspace(0, 2 * np.pi, 40, endpoint=False))
+
+
+def test_the_nearest_curve():
+    square = outlines.curves(SQUARE)[0]
+    assert outlines.nearest((square, CIRCLE), (0.61, 0.5), ASPECT) == pytest.approx((1, 0.02), abs=1e-3)
+    assert outlines.nearest((square, CIRCLE), (0.3, 0.5), ASPECT) == pytest.approx((0, 0.1), abs=1e-3)
+
+
+@given(st.floats(0, 6.28), st.floats(-0.05, 0.05), st.floats(-0.05, 0.05), st.floats(0.02, 2))
+def test_a_curve_that_is_pulled(angle, right, up, reach):
+    """It goes through the place that the pointer is at, nothing beyond the reach moves, nor do other curves."""
+    grabbed, square = (0.5 + 0.1 * np.cos(angle), 0.5 + 0.2 * np.sin(angle)), outlines.curves(SQUARE)[0]
+    other, pulled = outlines.dragged((square, CIRCLE), 1, grabbed, (right, up), reach, ASPECT)
+    assert other == square
+    moved = (grabbed[0] + right, grabbed[1] + up)
+    assert np.hypot(*((np.array(pulled) - moved) * (ASPECT, 1)).T).min() <= reach / 12 + 0.002
+    far = [(x, y) for x, y in CIRCLE if np.hypot(ASPECT * (x - grabbed[0]), y - grabbed[1]) > 1.1 * reach + 0.002]
+    assert set(far) <= set(pulled)
+
+
+def test_what_lies_opposite_is_not_pulled_along():
+    """The other side of a thin arm is near to the pointer, and far along the curve."""
+    arm = ((0.1, 0.5), (0.9, 0.5), (0.9, 0.51), (0.1, 0.51))
+    (pulled,) = outlines.dragged((arm,), 0, (0.5, 0.51), (0, 0.1), 0.1, 1.0)
+    assert max(y for _x, y in pulled) == pytest.approx(0.61, abs=1e-3)
+    assert min(y for _x, y in pulled) == 0.5

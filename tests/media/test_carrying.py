@@ -7,7 +7,7 @@ import pytest
 
 from shutter_addon.core.model import outlines
 from shutter_addon.core.model.mattes import FileFrame, Matte
-from shutter_addon.media import carried_mattes, carrying
+from shutter_addon.media import carried_mattes, carrying, outline_tracing
 from shutter_addon.media.errors import MediaError
 from shutter_addon.media.matte_values import MatteValues
 
@@ -178,6 +178,46 @@ def test_mattes_are_kept(carried, footage, tmp_path):
     (damaged,) = (tmp_path / "mattes").glob("*/00000003-*.png")
     damaged.write_bytes(damaged.read_bytes()[:40])
     assert (carried(0, 6, 12).read(3) == first[3]).all()
+
+
+def test_agreement_is_kept(carried, footage):
+    """Beside drawings all is agreed; where the last one lies elsewhere, both sides contradict one another."""
+    mattes = carried(0, 6)
+    assert mattes.agreement(3) is None
+    mattes.read(3)
+    assert mattes.agreement(3) == carried(0, 6).agreement(3) > 0.7
+    away = tuple((x * 0.7 + 0.2, y * 0.7) for x, y in drawings(6)[0][1][0])
+    wrong = carried_mattes.CarriedFile(footage, (*drawings(0), (6, (away,)))).open()
+    wrong.read(3)
+    assert wrong.agreement(3) < 0.6
+
+
+def test_curves_around_what_is_carried(carried):
+    """Drawn, straight as long as nothing is carried, and then around that, to a fraction of a pixel."""
+    mattes = carried(0, 12)
+    assert mattes.curves(0) == drawings(0)[0][1]
+    middle = [(curve(0) + curve(12)) / 2 / (WIDTH, -HEIGHT) + (0, 1)]
+    np.testing.assert_allclose(mattes.curves(6)[0], middle[0])
+    matte = mattes.read(6)
+    found = mattes.curves(6)
+    assert sum(map(len, found)) < 150
+    assert np.abs(outlines.coverage(found, WIDTH, HEIGHT) - (matte > 0.5)).mean() < 0.004
+
+
+@pytest.mark.parametrize("off", [0.25, 1.0])
+def test_traced(off):
+    """A ring that the picture's edge cuts through, and a spot that is none."""
+    y, x = np.indices((90, 120)) + 0.5
+    away = np.hypot(x - 100, y - 40)
+    matte = np.clip(30.5 - away, 0, 1) * np.clip(away - 14.5, 0, 1)
+    matte[80, 5] = 1
+    found = outline_tracing.traced(matte.astype(np.float32), off)
+    assert len(found) == 2
+    matte[80, 5] = 0
+    apart = np.abs(outlines.coverage(found, 120, 90) - matte)
+    assert apart.max() <= off + 0.5
+    assert apart.mean() <= 0.02 * off + 0.005
+    assert outline_tracing.traced(np.zeros((4, 4), np.float32)) == ()
 
 
 def test_what_stands_in(footage, tmp_path):

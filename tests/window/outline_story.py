@@ -51,11 +51,61 @@ def carried():
     yield from driver.until(lambda: carrying.progress() is not None, "it is carried", 20, wait=0.02)
     yield from driver.until(lambda: carrying.progress() is None, "it is there", 60)
     yield from story.seen("2_carried")
+    yield from mended()
     region().is_layer = True
     yield from story.seen("3_layer")
     for view, name in (("COEFFICIENTS", "4_mattes"), ("RESULT", "5_result")):
         bpy.context.window_manager.virtual_shutter.view = view
         yield from story.seen(name)
+
+
+def mended():
+    """The carried curve is pulled up at her head, and let go again by Esc; then that is undone."""
+    drawings, gizmo = part("blender.editing.outline_drawings"), part("blender.interface.outline_gizmo")
+    before = shapes()
+    with driver.override("PREVIEW"):
+        scene, effect, strip = part("blender.data.selection").active(bpy.context)
+        curves = drawings.shown_curves(scene, effect, strip, effect.active_region)
+        assert gizmo.SHUTTER_GGT_outline.poll(bpy.context)
+    x, y = on_preview(*max(curves[0], key=lambda point: point[1]))
+    yield from driver.drag(story.preview(), [(x, y), (x, y + 6), (x, y + 12), (x, y + 25)])
+    yield from driver.until(lambda: FRAME in shapes(), "its frame is a drawing")
+    yield from story.seen("2_pulled")
+    after = shapes()
+    assert {frame: after[frame] for frame in before} == before
+    driver.saw(pulled=max(y for _x, y in after[FRAME]) - max(y for _x, y in curves[0]))
+    driver.key("ctrl+z")
+    yield from driver.until(lambda: shapes() == before, "it is undone")
+    yield from needed()
+
+
+def shapes():
+    """The first curve of each drawing, in fractions of the picture."""
+    annotations, effect = part("blender.data.annotations"), story.effect()
+    layer = annotations.layer_of(effect, region())
+    width, height = annotations.picture_size(effect)
+    return {
+        drawing.frame_number: [
+            (x / width + 0.5, y / height + 0.5) for x, y in annotations.strokes_of(drawing)[0].tolist()
+        ]
+        for drawing in layer.frames
+        if drawing.strokes
+    }
+
+
+def needed():
+    """Next Drawing Needed carries what is lacking, and goes where both sides agree least, if they do not agree."""
+    carrying = part("blender.rendering.outline_carrying")
+    with driver.override("PREVIEW"):
+        bpy.ops.shutter.outline_needed("INVOKE_DEFAULT")
+    yield from driver.until(lambda: not is_carrying() and carrying.progress() is None, "all is carried", 90)
+    driver.saw(needed=story.edit().frame_current)
+    story.edit().frame_set(FRAME)
+    yield 1.0
+
+
+def is_carrying():
+    return "SHUTTER_OT_outline_needed" in [operator.bl_idname for operator in bpy.context.window.modal_operators]
 
 
 def told():

@@ -40,6 +40,16 @@ def strokes_of(drawing) -> list[np.ndarray]:
     return [points for points in strokes if len(points)]
 
 
+def add_stroke(drawing, points: np.ndarray) -> None:
+    """Adds a stroke (n, 2), in the sequencer's image space, to an annotation's frame."""
+    stroke = drawing.strokes.new()
+    stroke.display_mode = "2DSPACE"
+    stroke.points.add(len(points))
+    places = np.zeros((len(points), 3), dtype=np.float32)
+    places[:, :2] = points
+    stroke.points.foreach_set("co", places.ravel())
+
+
 def layer_of(effect, region):
     """The annotation layer of a region, or None."""
     annotation = effect.scene and effect.scene.annotation

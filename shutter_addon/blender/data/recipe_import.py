@@ -19,7 +19,7 @@ from ...media.files import check_name
 from ...media.matte_files import MatteFile
 from ...media.sequence import IMAGE_SUFFIXES
 from . import fcurves, geometry, strips
-from .annotations import annotation, picture_size
+from .annotations import add_stroke, annotation, picture_size
 from .snapshot import OPTIONS
 
 
@@ -225,10 +225,5 @@ def _draw(effect, strip, source: recipe.Region | recipe.OutlineRegion, color: Se
     for key, strokes in source.drawings():
         drawing = layer.frames.new(int((key.frame if key else 1) + first))
         for points in strokes:
-            stroke = drawing.strokes.new()
-            stroke.display_mode = "2DSPACE"
-            stroke.points.add(len(points))
-            image = np.zeros((len(points), 3), dtype=np.float32)
-            image[:, :2] = mapped(to_image, np.asarray(points))
-            stroke.points.foreach_set("co", image.ravel())
+            add_stroke(drawing, mapped(to_image, np.asarray(points)))
     return layer.info

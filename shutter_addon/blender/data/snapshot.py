@@ -190,6 +190,20 @@ def region_at(scene, effect, strip, index: int, frames: Frames) -> Any:
     return _any_region(_Sampling.of(Curves(scene), effect, strip, frames), index, 0)
 
 
+def carried_outline(scene, effect, strip, index: int, frames: Frames) -> tuple[Any, dict[float, int]]:
+    """What gives the mattes of an outline (a media.carried_mattes.CarriedFile), and which of the source's filmed frames
+    timeline frames show. EffectError, MediaError: it is straight, or has no source."""
+    region = effect.regions[index]
+    if validation.word(region, "between") == "STRAIGHT":
+        raise EffectError(rpt_("{place}: a straight outline is not carried").format(place=validation.place(region)))
+    sampling = _Sampling.of(Curves(scene), effect, strip, frames)
+    drawings = sampled.drawings(
+        sampling.curves, f"{effect.path_from_id()}.regions[{index}]", effect, region, sampling.placement, None
+    )
+    shown = matte_content.shown_frame(scene, effect, strip, sampling.time)
+    return _outlines(sampling, region, drawings).file, {frame: int(shown(frame)) for frame in frames}
+
+
 def last_shown(scene, effect, strip) -> float:
     """The last of the source's frames that an effect strip shows (see matte_content.shown_frame); where keys say which
     these are, of a hundred frames of the strip. EffectError, MediaError: it cannot be known."""
@@ -389,7 +403,7 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
     )
 
 
-def _outlines(sampling: _Sampling, region, drawings: model.Drawings) -> keyframes.Channel:
+def _outlines(sampling: _Sampling, region, drawings: model.Drawings) -> Any:
     """The content of an outline. EffectError, MediaError: there is no source."""
     if validation.word(region, "between") == "STRAIGHT":
         return model.DrawnOutlines(drawings)

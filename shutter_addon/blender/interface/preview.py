@@ -19,7 +19,7 @@ from ..data.choices import CONTEXT
 from ..data.preview_areas import Shown
 from ..devices import blender_gpu
 from ..devices.blender_gpu import Texture
-from ..editing import shown_annotations
+from ..editing import outline_drawings, shown_annotations
 from ..rendering import (
     effect_source,
     inbetween_build,
@@ -288,7 +288,7 @@ def _tell_missing(renderer, request, say) -> None:
 
 def _tell_carrying(say) -> None:
     """Has mattes carried that the picture lacks, and says so."""
-    fault, progress = outline_carrying.begin(_show_carried), outline_carrying.progress()
+    fault, progress = outline_carrying.begin(show_carried), outline_carrying.progress()
     if fault is not None:
         say(rpt_("Shutter: {fault}").format(fault=fault))
     if progress is not None:
@@ -296,8 +296,9 @@ def _tell_carrying(say) -> None:
         say(rpt_("Carrying the outline: {done} of {total} frames").format(done=done, total=total))
 
 
-def _show_carried() -> None:
+def show_carried() -> None:
     """Previews are made anew, with what was carried."""
+    outline_drawings.carried()
     sessions.WINDOW.keep(set())
     for scene in bpy.data.scenes:
         if scene.library is None and scene.virtual_shutter.effects:

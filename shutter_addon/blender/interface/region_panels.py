@@ -42,6 +42,8 @@ class Regions(WithEffect):
             layout.prop(region, "width")
         elif region.kind == "OUTLINE":
             layout.prop(region, "between")
+            for operator in ("outline_carry", "outline_needed", "outline_draw"):
+                layout.operator(f"shutter.{operator}")
         elif region.kind == "RAMP":
             layout.prop(region, "ramp")
         elif region.kind == "MATTE":

@@ -1,4 +1,5 @@
-"""Mattes of outlines that previews lack: carried by a thread beside Blender, while straight ones stand in for them."""
+"""Mattes of outlines that previews lack, or that are asked for: carried by a thread beside Blender. In previews
+straight ones stand in for them meanwhile."""
 
 from __future__ import annotations
 
@@ -63,12 +64,28 @@ def begin(arrived: Callable[[], None]) -> str | None:
     wanted = {file: frames for file, frames in _wanted.items() if file not in _failed}
     _wanted.clear()
     if wanted and not (_running and _running[0].file in wanted):
-        _end()
         file, frames = next(iter(wanted.items()))
-        _running.append(_Carrying(file=file, frames=sorted(frames), arrived=arrived))
-        if not bpy.app.timers.is_registered(_look):
-            bpy.app.timers.register(_look, first_interval=TICK)
+        carry(file, sorted(frames), arrived)
     return next(iter(_failed.values()), None)
+
+
+def carry(file: CarriedFile, frames: list[int], arrived: Callable[[], None]) -> None:
+    """Carries the mattes of source frames, in place of what is on its way; arrived: as for `begin`."""
+    _end()
+    _failed.pop(file, None)
+    _running.append(_Carrying(file=file, frames=frames, arrived=arrived))
+    if not bpy.app.timers.is_registered(_look):
+        bpy.app.timers.register(_look, first_interval=TICK)
+
+
+def stop() -> None:
+    """Ends what is on its way; what is carried stays."""
+    _end()
+
+
+def failure(file: CarriedFile) -> str | None:
+    """Why the mattes of a file could not be carried."""
+    return _failed.get(file)
 
 
 def progress() -> tuple[int, int] | None:

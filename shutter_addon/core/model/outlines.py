@@ -8,6 +8,8 @@ import numpy as np
 
 # Lines of each row of pixels on which coverage is exact.
 LINES = 8
+_PULLED = 12  # points at least, of either side of a curve that is pulled
+_NEAR = 0.005  # parts of the picture's height, within which it is known how near a curve is
 
 Curves = tuple[tuple[tuple[float, float], ...], ...]  # hashable strokes: fractions of the picture, y up
 
@@ -31,6 +33,48 @@ def coverage(strokes: Sequence, width: int, height: int) -> np.ndarray:
     np.add.at(changes, (rows // LINES, columns), signs * (1 - beyond))
     np.add.at(changes, (rows // LINES, columns + 1), signs * beyond)
     return np.clip(np.cumsum(changes[:, :-1], axis=1), 0, 1).astype(np.float32)
+
+
+def nearest(shapes: Curves, point: tuple[float, float], aspect: float) -> tuple[int, float]:
+    """Which of some curves comes nearest to a point, and how near: in parts of the picture's height. ValueError: there
+    is none. aspect: the picture's width over its height"""
+    apart = [_apart(_finer(shape, aspect, _NEAR)[0], point, aspect).min() for shape in shapes]
+    index = int(np.argmin(apart))
+    return index, float(apart[index])
+
+
+def dragged(
+    shapes: Curves, index: int, grabbed: tuple[float, float], by: tuple[float, float], reach: float, aspect: float
+) -> Curves:
+    """Curves, one of which is pulled: where it comes nearest to the point `grabbed`, it moves `by` as much, and less
+    and less along its way, up to `reach`.
+
+    index: which one; grabbed, by: fractions of the picture, y up; reach: in parts of its height, along the curve"""
+    points, own = _finer(shapes[index], aspect, reach / _PULLED)
+    start = int(_apart(points, grabbed, aspect).argmin())
+    points, own = np.roll(points, -start, axis=0), np.roll(own, -start)
+    steps = np.hypot(*(np.diff(points, axis=0, append=points[:1]) * (aspect, 1)).T)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    way = np.minimum(along[:-1], along[-1] - along[:-1])  # from the start, whichever way is shorter
+    share = np.square(1 - np.minimum(way / reach, 1) ** 2)
+    moved = (points + share[:, None] * by)[own | (share > 0)]
+    return tuple(curves([moved])[0] if i == index else shape for i, shape in enumerate(shapes))
+
+
+def _finer(shape: Sequence, aspect: float, most: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 2) of a closed curve, with more of them where two are farther apart than `most`, in parts of the
+    picture's height; and which (n,) are its own."""
+    points = np.asarray(shape, dtype=np.float64)
+    ends = np.roll(points, -1, axis=0)
+    counts = np.ceil(np.hypot(*((ends - points) * (aspect, 1)).T) / most).astype(int).clip(1)
+    share = np.concatenate([np.arange(count) / count for count in counts])
+    finer = np.repeat(points, counts, axis=0) * (1 - share[:, None]) + np.repeat(ends, counts, axis=0) * share[:, None]
+    return finer, share == 0
+
+
+def _apart(points: np.ndarray, point: tuple[float, float], aspect: float) -> np.ndarray:
+    """How far points (n, 2) are from one, in parts of the picture's height."""
+    return np.hypot(*((points - point) * (aspect, 1)).T)
 
 
 def _crossings(strokes: Sequence, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:

@@ -389,6 +389,41 @@ MESSAGES = {
         "*",
         "Curves go straight from one drawing to the next",
     ): "Kurven gehen gerade von einer Zeichnung zur nächsten",
+    (
+        "*",
+        "Carrying the outline: {done} of {total} frames, Esc to stop",
+    ): "Der Umriss wird mitgeführt: {done} von {total} Frames, Esc hält an",
+    ("*", "Shutter Outline"): "Shutter-Umriss",
+    ("Operator", "Carry Outline"): "Umriss mitführen",
+    (
+        "*",
+        "Carry the active outline to all frames of its strip now (Esc stops and keeps what is carried)",
+    ): "Den aktiven Umriss jetzt in alle Frames seines Streifens mitführen (Esc hält an und behält, was da ist)",
+    ("Operator", "Next Drawing Needed"): "Nächste nötige Zeichnung",
+    (
+        "*",
+        "Go to the frame where the drawings before and behind it disagree most, carrying the outline first",
+    ): "Zum Frame gehen, in dem die Zeichnungen davor und dahinter am wenigsten übereinstimmen; der Umriss wird vorher"
+    " mitgeführt",
+    ("Operator", "Insert Outline Drawing"): "Umrisszeichnung einfügen",
+    (
+        "*",
+        "Make the outline that is carried to the current frame a drawing of its own, to be mended",
+    ): "Den Umriss, der zum aktuellen Frame mitgeführt ist, zu einer eigenen Zeichnung machen, um ihn auszubessern",
+    (
+        "*",
+        "Frame {frame}: the drawings before and behind it agree by {share:.0f} %",
+    ): "Frame {frame}: Die Zeichnungen davor und dahinter stimmen zu {share:.0f} % überein",
+    (
+        "*",
+        "The drawings agree by 90 % or more at all frames between them",
+    ): "Die Zeichnungen stimmen in allen Frames dazwischen zu 90 % oder mehr überein",
+    ("*", "Draw the outline at two frames first"): "Zeichnen Sie den Umriss zuerst in zwei Frames",
+    ("*", "The outline encloses nothing at the current frame"): "Der Umriss umschließt im aktuellen Frame nichts",
+    ("*", "The region is no outline"): "Die Region ist kein Umriss",
+    ("*", 'strip "{strip}" is scaled to nothing'): "Streifen „{strip}“ ist zu nichts skaliert",
+    ("*", "{place}: a straight outline is not carried"): "{place}: Ein gerader Umriss wird nicht mitgeführt",
+    ("Operator", "Mend Outline"): "Umriss ausbessern",
     ("*", "Width"): "Breite",
     ("*", "Width of the lines as a fraction of the picture's height"): "Breite der Linien als Bruchteil der Bildhöhe",
     ("*", "Location"): "Position",

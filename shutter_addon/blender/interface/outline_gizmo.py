@@ -1,0 +1,135 @@
+"""The active outline as it is carried to the current frame: pulling at it mends it, and makes that frame a drawing."""
+
+import bpy
+import numpy as np
+from bpy.app.translations import contexts
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.types import Gizmo, GizmoGroup
+
+from ...core.messages import UserError
+from ...core.model import outlines
+from ...core.model.scribbles import mapped
+from ..data import annotations, geometry, selection
+from ..editing import outline_drawings, track_region
+from . import drawing, gizmo_keymaps, region_gizmo
+
+_CARRIED = (0.2, 0.9, 1.0, 0.9)
+_NEAR = 6  # units of the interface, within which the pointer is at a curve
+_REACH = 0.08  # parts of the picture's height, along the curve, that are pulled along at first
+_MORE = 1.25  # times, with a turn of the wheel
+
+
+class SHUTTER_GT_outline(Gizmo):
+    """The curves."""
+
+    bl_idname = "SHUTTER_GT_outline"
+
+    def setup(self):
+        self.use_draw_modal = True
+
+    def draw(self, context):
+        if context.screen.is_animation_playing:
+            return
+        seen, curves = selection.in_picture(context), _curves(context)
+        if seen is None or not curves:
+            return
+        matrix = _to_region(context, seen[1], seen[2])
+        for points in self.mended() if self.is_modal else curves:
+            width = 2 if self.is_highlight or self.is_modal else 1
+            drawing.lines(mapped(matrix, np.array(points)), _CARRIED, closed=True, width=width)
+
+    def test_select(self, context, location):
+        curves = _curves(context)
+        if not curves:
+            return -1
+        _scene, effect, strip = selection.in_picture(context)
+        point, height = _on_picture(context, effect, strip, location)
+        _index, apart = outlines.nearest(curves, point, _aspect(effect))
+        return 0 if apart * height <= drawing.ui_scale() * _NEAR else -1
+
+    def invoke(self, context, event):
+        if not (curves := _curves(context)):
+            return {"CANCELLED"}
+        scene, effect, strip = selection.in_picture(context)
+        self.target, self.frame = track_region.Target.of(effect, effect.active_region), scene.frame_current
+        self.strip, self.curves, self.by, self.reach = strip.name, curves, (0.0, 0.0), _REACH
+        self.aspect = _aspect(effect)
+        self.grabbed, _height = _on_picture(context, effect, strip, (event.mouse_region_x, event.mouse_region_y))
+        self.pulled, _apart = outlines.nearest(curves, self.grabbed, self.aspect)
+        return {"RUNNING_MODAL"}
+
+    def mended(self):
+        return outlines.dragged(self.curves, self.pulled, self.grabbed, self.by, self.reach, self.aspect)
+
+    def modal(self, context, event, _tweak):
+        if (effect := self.target.effect()) is None or (strip := self._strip(effect)) is None:
+            return {"RUNNING_MODAL"}
+        if event.type in {"WHEELUPMOUSE", "WHEELDOWNMOUSE"}:
+            self.reach *= _MORE if event.type == "WHEELUPMOUSE" else 1 / _MORE
+        point, _height = _on_picture(context, effect, strip, (event.mouse_region_x, event.mouse_region_y))
+        self.by = tuple(np.subtract(point, self.grabbed))
+        context.area.tag_redraw()
+        return {"RUNNING_MODAL"}
+
+    def exit(self, context, cancel):
+        if cancel or not any(self.by) or (effect := self.target.effect()) is None:
+            return
+        if (strip := self._strip(effect)) is None:
+            return
+        outline_drawings.draw(effect, strip, effect.regions[self.target.index], self.mended(), self.frame)
+        context.area.tag_redraw()
+        bpy.ops.ed.undo_push(message=iface_("Mend Outline", contexts.operator_default))
+
+    def _strip(self, effect):
+        return effect.id_data.sequence_editor.strips_all.get(self.strip)
+
+
+def _curves(context) -> outlines.Curves:
+    """The active outline's at the current frame, where it is seen."""
+    scene, effect, strip = selection.in_picture(context)
+    try:
+        return outline_drawings.shown_curves(scene, effect, strip, effect.active_region)
+    except UserError:  # panels and the live preview tell it
+        return ()
+
+
+def _aspect(effect) -> float:
+    width, height = annotations.picture_size(effect)
+    return width / height
+
+
+def _to_region(context, effect, strip) -> np.ndarray:
+    return geometry.picture_to_region(strip, annotations.picture_size(effect), context.region)
+
+
+def _on_picture(context, effect, strip, location) -> tuple[tuple[float, float], float]:
+    """A point of the preview's region in fractions of the picture, and how many of the region's pixels that is high."""
+    matrix = _to_region(context, effect, strip)
+    x, y = mapped(np.linalg.inv(matrix), np.array([location], dtype=np.float64))[0]
+    return (float(x), float(y)), float(np.hypot(*matrix[:2, 1]))
+
+
+class SHUTTER_GGT_outline(GizmoGroup):
+    bl_idname = "SHUTTER_GGT_outline"
+    bl_label = "Shutter Outline"
+    bl_space_type = "SEQUENCE_EDITOR"
+    bl_region_type = "PREVIEW"
+    bl_options = {"PERSISTENT"}
+
+    @classmethod
+    def poll(cls, context):
+        if not region_gizmo.SHUTTER_GGT_region.poll(context):
+            return False
+        return outline_drawings.is_outline(selection.active_region(selection.in_picture(context)[1]))
+
+    @classmethod
+    def setup_keymap(cls, keyconfig):
+        keymap = gizmo_keymaps.new(cls, keyconfig)
+        keymap.keymap_items.new("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", any=True)
+        return keymap
+
+    def setup(self, _context):
+        self.gizmos.new(SHUTTER_GT_outline.bl_idname)
+
+
+classes = (SHUTTER_GT_outline, SHUTTER_GGT_outline)

@@ -1,0 +1,146 @@
+"""Operators of outlines: carried now, drawn where that is needed most, and made of what is carried."""
+
+from contextlib import closing
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import Operator
+
+from ...core.messages import UserError
+from ..data import selection
+from ..editing import outline_drawings, track_region
+from ..rendering import outline_carrying
+from ..rendering.effect_source import FAULTS
+from .operator_bases import Mixin, OfRegion, redraw, refused
+from .preview import show_carried
+
+_TICK = 0.1  # seconds from one look at what is carried to the next
+
+
+class _OfOutline(OfRegion):
+    """Works on the active region, which is an outline."""
+
+    only_seen = True
+
+    @classmethod
+    def possible(cls, effect):
+        if not super().possible(effect):
+            return False
+        is_outline = outline_drawings.is_outline(selection.active_region(effect))
+        return is_outline or refused(cls, rpt_("The region is no outline"))
+
+
+class _Carries(Mixin):
+    """Carries the active outline through its strip, beside Blender, and then does something with it."""
+
+    bl_options = {"REGISTER"}
+
+    def carried(self, context):
+        """Called once all is carried. One of FAULTS: what comes then cannot be done."""
+        return {"FINISHED"}
+
+    def execute(self, context):
+        return self._run(context, waits=True)
+
+    def invoke(self, context, _event):
+        return self._run(context, waits=bpy.app.background)
+
+    def _run(self, context, waits: bool):
+        scene, effect, strip = selection.active(context)
+        try:
+            file, shown = outline_drawings.carried_frames(scene, effect, strip, effect.active_region)
+            with closing(file.open()) as mattes:
+                frames = sorted({number for number in shown.values() if not mattes.has(number)})
+                if waits:
+                    for number in frames:
+                        mattes.read(number)
+            if waits or not frames:
+                return self._end(context)
+        except FAULTS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self._file, self._target = file, track_region.Target.of(effect, effect.active_region)
+        outline_carrying.carry(file, frames, show_carried)
+        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        progress = outline_carrying.progress()
+        is_stopped = self._target.effect() is None or (event.type == "ESC" and event.value == "PRESS")
+        if is_stopped:
+            outline_carrying.stop()
+            show_carried()
+        elif progress is not None:
+            sentence = rpt_("Carrying the outline: {done} of {total} frames, Esc to stop")
+            context.workspace.status_text_set(sentence.format(done=progress[0], total=progress[1]))
+            return {"PASS_THROUGH"}
+        self.cancel(context)
+        if is_stopped:
+            return {"CANCELLED"}
+        if (failure := outline_carrying.failure(self._file)) is not None:
+            self.report({"ERROR"}, failure)
+            return {"CANCELLED"}
+        return self._end(context)
+
+    def _end(self, context):
+        try:
+            return self.carried(context)
+        except FAULTS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+
+    def cancel(self, context):
+        """It has ended, or its window was closed."""
+        context.window_manager.event_timer_remove(self._timer)
+        context.workspace.status_text_set(None)
+
+
+class SHUTTER_OT_outline_carry(_Carries, _OfOutline, Operator):
+    """Carry the active outline to all frames of its strip now (Esc stops and keeps what is carried)"""
+
+    bl_idname = "shutter.outline_carry"
+    bl_label = "Carry Outline"
+
+
+class SHUTTER_OT_outline_needed(_Carries, _OfOutline, Operator):
+    """Go to the frame where the drawings before and behind it disagree most, carrying the outline first"""
+
+    bl_idname = "shutter.outline_needed"
+    bl_label = "Next Drawing Needed"
+
+    def carried(self, context):
+        scene, effect, strip = selection.active(context)
+        needed = outline_drawings.next_needed(scene, effect, strip, effect.active_region)
+        if needed.frame is None:
+            self.report({"INFO"}, rpt_("The drawings agree by 90 % or more at all frames between them"))
+            return {"CANCELLED"}
+        scene.frame_set(needed.frame)
+        sentence = rpt_("Frame {frame}: the drawings before and behind it agree by {share:.0f} %")
+        self.report({"INFO"}, sentence.format(frame=needed.frame, share=100 * needed.agreement))
+        redraw(context)
+        return {"FINISHED"}
+
+
+class SHUTTER_OT_outline_draw(_OfOutline, Operator):
+    """Make the outline that is carried to the current frame a drawing of its own, to be mended"""
+
+    bl_idname = "shutter.outline_draw"
+    bl_label = "Insert Outline Drawing"
+
+    def change(self, context, effect):
+        scene, _effect, strip = selection.active(context)
+        region = selection.active_region(effect)
+        try:
+            curves = outline_drawings.curves_now(scene, effect, strip, effect.active_region)
+        except UserError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        if not curves:
+            self.report({"WARNING"}, rpt_("The outline encloses nothing at the current frame"))
+            return {"CANCELLED"}
+        outline_drawings.draw(effect, strip, region, curves, scene.frame_current)
+        return None
+
+
+classes = (SHUTTER_OT_outline_carry, SHUTTER_OT_outline_needed, SHUTTER_OT_outline_draw)
