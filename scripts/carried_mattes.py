@@ -1,11 +1,12 @@
 """How well outlines are carried: of footage with masks of all frames, what is carried from outlines of some of them,
 and what flow alone makes of these, beside the masks of the others.
 
-python scripts/carried_mattes.py FIRST_FRAME FIRST_MASK
+python scripts/carried_mattes.py [FIRST_FRAME FIRST_MASK]
 
-FIRST_FRAME: the first image of a sequence; FIRST_MASK: likewise, its subject white. It prints the mean intersection
-over union of the drawings themselves, and by how many frames these are apart, of the frames between, with the seconds
-that one takes. Outlines have POINTS points for each part of the subject.
+FIRST_FRAME: the first image of a sequence; FIRST_MASK: likewise, its subject white. Without them, the scenes of
+outline_scenes.py, whose true alpha is known. It prints the mean intersection over union of the drawings themselves, and
+by how many frames these are apart, of the frames between; how many levels of 255 a matte is off, within BAND pixels of
+the subject's edge; and the seconds that a frame takes. Outlines have POINTS points for each part of the subject.
 """
 
 import sys
@@ -15,6 +16,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import outline_scenes
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
@@ -24,6 +26,7 @@ from shutter_addon.media.matte_files import MatteFile
 
 POINTS = 48
 APART = (5, 10, 20)
+BAND = 4
 FINE = 4  # contours are followed in masks so many times as large, along the edges of their pixels
 
 
@@ -66,33 +69,62 @@ def by_flow(frames: list, first: carrying.Drawing, last: carrying.Drawing) -> di
     return {k: (1 - share[k]) * sides[0][k] + share[k] * sides[1][k] for k in share}
 
 
-def measured(frames: list, masks: list, apart: int) -> tuple[float, float, float]:
-    """Mean overlaps of flow alone and of what is carried, and the seconds that a frame takes."""
+def off(matte: np.ndarray, alpha: np.ndarray) -> float:
+    """Mean levels of 255 that a matte is off beside the subject's edge."""
+    inside = (alpha > 0.5).astype(np.uint8)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * BAND + 1, 2 * BAND + 1))
+    return 255 * np.abs(matte - alpha)[cv2.dilate(inside, disc) > cv2.erode(inside, disc)].mean()
+
+
+def measured(frames: list, alphas: list, apart: int) -> tuple[float, float, float, float]:
+    """Mean overlaps of flow alone and of what is carried, how many levels this is off, and the seconds of a frame."""
+    masks = [alpha > 0.5 for alpha in alphas]
     size = carrying.working_size(*frames[0].shape[1::-1])
     drawn = [carrying.Drawing(k, outlines.coverage(outline(masks[k]), *size)) for k in range(0, len(frames), apart)]
-    alone, found, seconds = [], [], 0.0
+    alone, found, levels, seconds = [], [], [], 0.0
     for first, last in pairwise(drawn):
         alone += [overlap(matte, masks[k]) for k, matte in by_flow(frames, first, last).items()]
         start = time.perf_counter()
         mattes = list(carrying.carried(frames.__getitem__, first, last, range(first.frame + 1, last.frame)))
         seconds += time.perf_counter() - start
         found += [overlap(each.matte / 255, masks[each.frame]) for each in mattes]
-    return np.mean(alone), np.mean(found), seconds / len(found)
+        levels += [off(each.matte / 255, alphas[each.frame]) for each in mattes]
+    return np.mean(alone), np.mean(found), np.mean(levels), seconds / len(found)
+
+
+def tell(name: str, frames: list, alphas: list, apart: int) -> None:
+    alone, found, levels, seconds = measured(frames, alphas, apart)
+    print(
+        f"{name}, every {apart} frames: flow alone {alone:.3f}, carried {found:.3f}; {levels:.1f} of 255 off; "
+        f"{seconds:.2f} s a frame",
+        flush=True,
+    )
+
+
+def of_scenes() -> None:
+    for scene in outline_scenes.SCENES:
+        tell(scene.name, *map(list, zip(*outline_scenes.frames(scene), strict=True)), apart=10)
+
+
+def of_footage(first_frame: str, first_mask: str) -> None:
+    with open_source(first_frame) as source, MatteFile(Path(first_mask)).open() as matte:
+        frames = [flow.displayed(source.read(k), source.transfer, source.alpha) for k in range(source.count)]
+        alphas = [(matte.read(k) > 0).astype(np.float32) for k in range(source.count)]
+    height, width = alphas[0].shape
+    drawings = [overlap(outlines.coverage(outline(a > 0.5), width, height), a > 0.5) for a in alphas]
+    print(f"the drawings themselves: {np.mean(drawings):.3f}")
+    for apart in APART:
+        tell("footage", frames, alphas, apart)
 
 
 def main() -> int:
-    if len(sys.argv) != 3:
+    if len(sys.argv) not in (1, 3):
         print(__doc__, file=sys.stderr)
         return 2
-    with open_source(sys.argv[1]) as source, MatteFile(Path(sys.argv[2])).open() as matte:
-        frames = [flow.displayed(source.read(k), source.transfer, source.alpha) for k in range(source.count)]
-        masks = [matte.read(k) > 0 for k in range(source.count)]
-    height, width = masks[0].shape
-    drawings = [overlap(outlines.coverage(outline(mask), width, height), mask) for mask in masks]
-    print(f"the drawings themselves: {np.mean(drawings):.3f}")
-    for apart in APART:
-        alone, found, seconds = measured(frames, masks, apart)
-        print(f"every {apart} frames: flow alone {alone:.3f}, carried {found:.3f}, {seconds:.2f} s a frame")
+    if len(sys.argv) == 3:
+        of_footage(*sys.argv[1:])
+    else:
+        of_scenes()
     return 0
 
 

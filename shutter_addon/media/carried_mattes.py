@@ -29,7 +29,7 @@ from .outline_tracing import traced
 
 FOLDER = "virtual_shutter_mattes"
 AGREEMENT = "agreement "  # what a file's description says (carrying.Carried)
-VERSION = 2  # raise it when mattes of the same drawings change
+VERSION = 3  # raise it when mattes of the same drawings change
 TRUSTED = 0.5  # agreement below which a drawing is carried no farther
 FADE = 4  # frames in which it fades there
 BLOCK = 20  # frames beyond a drawing that are carried together

@@ -5,7 +5,11 @@ the two frames alone, or the motion of the camera or of the subject, leads to wh
 of them errs by a few pixels, so everything within REACH of that place votes, a vote counting by how alike the colours
 are around both ends (non-local means: Buades et al. 2005, "A non-local algorithm for image denoising"; votes for
 labels: Coupé et al. 2011, "Patch-based segmentation using expert priors"). Both drawings vote, the nearer with more
-weight. The result is refined by the edges of the picture (guided filter: He et al. 2013).
+weight.
+
+The result is refined by the edges of the picture (guided filter: He et al. 2013). Then, in linear light, in which soft
+edges and blurred ones are mixtures of what lies on their sides, it becomes what colours around a pixel explain of it:
+a linear function of them (Levin et al. 2008, "A closed-form solution to natural image matting"), as far as that fits.
 
 Flow and votes are found in pictures of at most WORKING pixels a side, edges in the whole picture.
 """
@@ -19,6 +23,7 @@ from itertools import product
 import numpy as np
 
 from ..core import stopping
+from ..core.frames.light import to_linear
 from . import flow
 
 try:
@@ -37,6 +42,14 @@ AROUND = 0.5  # pixels: the standard deviation of what is compared around a plac
 INSIDE = 0.4
 EDGE = 0.4  # votes from 0 to 1 in the middle of an edge
 RADIUS, SMOOTHNESS = 3, 1e-3  # of the guided filter: pixels of the working picture, and a variance of colours of 0 to 1
+# Of the filters that explain the result, in their order: the wide ones find an edge that lies beside its place.
+EXPLAINING, EXACT = (19, 9), 1e-6
+# Shares of its variance around a pixel that colours explain: none of that is believed below, and all above.
+DOUBTED, BELIEVED = 0.9, 0.97
+STEEPER = 1.05  # what colours explain is never quite 0 or 1
+# Where a place has moved by hardly more, in pixels of the working picture, and looks hardly more different than noise
+# makes it, in units of CIE Lab, the matte keeps so much of the one before.
+STILL, CHANGED, QUIET = 0.5, 4.0, 0.9
 
 THIN, LEAST = 4, 12  # every so many pixels tell an affine motion, and so many at least
 BETTER = 0.9  # share of a difference that must be left where flow between two frames alone is believed more
@@ -89,7 +102,7 @@ def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: r
         return
     reading = range(first.frame if first else span.start, (last.frame if last else span.stop - 1) + 1)
     size = ends[0].cover.shape[::-1]
-    footage = _Footage()
+    footage, before = _Footage(), None
     joined = _joined(lambda frame: _small(frames(frame), size), footage, reading, first, last)
     for frame in span:
         stopping.check()
@@ -100,8 +113,11 @@ def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: r
             _votes(footage.colors[frame], _at(footage.colors[end.frame], there), cover, box)
             for end, there, cover in zip(ends, places, covers, strict=True)
         ]
-        share = _mixed(sides, _weights(frame, ends))
-        yield Carried(frame, refined(frames(frame), share), _agreement(sides))
+        matte = refined(frames(frame), _mixed(sides, _weights(frame, ends)))
+        if before is not None:
+            matte += cv2.resize(footage.stillness(frame), matte.shape[::-1]) * (before - matte)
+        before = matte
+        yield Carried(frame, _levels(matte), _agreement(sides))
 
 
 def drawn(picture: np.ndarray, cover: np.ndarray) -> np.ndarray:
@@ -109,15 +125,22 @@ def drawn(picture: np.ndarray, cover: np.ndarray) -> np.ndarray:
 
     picture: (H, W, 3) uint8; cover: see Drawing"""
     shown = _lab(_small(picture, cover.shape[::-1]))
-    return refined(picture, _mixed([_votes(shown, shown, cover, _box(cover))], [1.0]))
+    return _levels(refined(picture, _mixed([_votes(shown, shown, cover, _box(cover))], [1.0])))
+
+
+def _levels(matte: np.ndarray) -> np.ndarray:
+    return np.rint(255 * matte).astype(np.uint8)
 
 
 @dataclass(frozen=True)
 class _Footage:
-    """Working pictures, by their source frames: colours (3, h, w) float32, and greys (h, w) uint8."""
+    """Working pictures, by their source frames: colours (3, h, w) float32, and greys (h, w) uint8.
+
+    moved: how many pixels a frame's places have moved since the frame before it (h, w)"""
 
     colors: dict[int, np.ndarray] = field(default_factory=dict)
     greys: dict[int, np.ndarray] = field(default_factory=dict)
+    moved: dict[int, np.ndarray] = field(default_factory=dict)
 
     def add(self, frame: int, picture: np.ndarray) -> None:
         self.colors[frame], self.greys[frame] = _lab(picture), cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
@@ -126,6 +149,14 @@ class _Footage:
         """Where in another frame lies what a frame shows."""
         grey = self.greys[frame]
         return flow.grid(*grey.shape) + flow.fine_vectors(grey, self.greys[other])
+
+    def stillness(self, frame: int) -> np.ndarray:
+        """The share (h, w) of the matte of the frame before that a frame keeps: where nothing moves, and nothing looks
+        different, what differs is noise."""
+        still = np.clip(1.5 - self.moved[frame] / np.float32(STILL), 0, 1)
+        apart = _apart(self.colors[frame], self.colors[frame - 1])
+        noise = float(np.median(apart[still > 0])) if still.any() else 0.0
+        return QUIET * still * np.exp(-np.square(apart / np.float32(CHANGED + 2 * noise)))
 
     def best(self, joined: Places, frame: int, end: Drawing) -> Places:
         """Where in a drawing's frame lies what a frame shows: for each pixel, of all ways to know the one that leads to
@@ -174,6 +205,9 @@ def _joined(
             places[first.frame, frame] = back if known is None else _at(known, back)
         if last and frame > reading.start:
             forth[frame - 1] = footage.to(frame - 1, frame)
+        if frame > reading.start:
+            way = (back if first else forth[frame - 1]) - flow.grid(*footage.greys[frame].shape)
+            footage.moved[frame] = np.hypot(way[..., 0], way[..., 1])
     if last:
         there = None
         for frame in reversed(forth):
@@ -220,13 +254,13 @@ def _votes(shown: np.ndarray, colors: np.ndarray, cover: np.ndarray, box: Box | 
     return inside, total
 
 
-def _box(cover: np.ndarray) -> Box | None:
-    """The rows and columns in which votes may say that something lies inside; None: nowhere."""
+def _box(cover: np.ndarray, reach: int = REACH) -> Box | None:
+    """The rows and columns within reach of what a matte covers; None: it covers nothing."""
     places = [np.flatnonzero(cover.max(axis=axis) > 0) for axis in (1, 0)]
     if not places[0].size:
         return None
-    low = [max(int(each[0]) - REACH, 0) for each in places]
-    high = [min(int(each[-1]) + 1 + REACH, length) for each, length in zip(places, cover.shape, strict=True)]
+    low = [max(int(each[0]) - reach, 0) for each in places]
+    high = [min(int(each[-1]) + 1 + reach, length) for each, length in zip(places, cover.shape, strict=True)]
     return slice(low[0], high[0]), slice(low[1], high[1])
 
 
@@ -247,20 +281,41 @@ def _agreement(sides: list[Votes]) -> float:
 
 
 def refined(picture: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """The matte (H, W) uint8 of a picture (H, W, 3) uint8, from shares (h, w) of votes in the working picture."""
+    """The matte (H, W) float32 of a picture (H, W, 3) uint8, from shares (h, w) of votes in the working picture."""
     height, width = picture.shape[:2]
     scale = width / share.shape[1]
-    matte = np.zeros((height, width), np.uint8)
-    if (box := _box(share)) is None:
+    matte = np.zeros((height, width), np.float32)
+    if (box := _box(share, EXPLAINING[0])) is None:
         return matte
     whole = cv2.resize(share, (width, height), interpolation=cv2.INTER_LINEAR) if scale != 1 else share
     rows, columns = (slice(int(part.start * scale), int(np.ceil(part.stop * scale))) for part in box)
-    radius = max(round(RADIUS * scale), 1)
     guide, values = np.ascontiguousarray(picture[rows, columns]), np.ascontiguousarray(whole[rows, columns])
-    values = cv2.ximgproc.guidedFilter(guide, values, radius, SMOOTHNESS * 255**2)
+    values = cv2.ximgproc.guidedFilter(guide, values, max(round(RADIUS * scale), 1), SMOOTHNESS * 255**2)
     values = np.clip((values - INSIDE) / EDGE + 0.5, 0, 1)
-    matte[rows, columns] = np.rint(255 * values)
+    light = cv2.LUT(guide, _LIGHT)
+    for radius in EXPLAINING:
+        values = _explained(light, values, max(round(radius * scale), 1), max(int(scale), 1))
+    matte[rows, columns] = values
     return matte
+
+
+# Linear light, 0 to 255, of code values: OpenCV's filter takes smaller numbers for none.
+_LIGHT = (255 * to_linear(np.arange(256) / 255)).astype(np.float32)
+
+
+def _explained(light: np.ndarray, values: np.ndarray, radius: int, coarse: int) -> np.ndarray:
+    """A matte (h, w) with what colours around each pixel explain of it, as a linear function of them.
+
+    light: (h, w, 3) float32, 0 to 255; coarse: every so many pixels of a row tell the function"""
+    found = cv2.ximgproc.guidedFilter(light, values, radius, EXACT * 255**2, scale=1 / coarse)
+
+    def mean(each: np.ndarray) -> np.ndarray:
+        return cv2.blur(each, (2 * radius + 1, 2 * radius + 1))
+
+    varies = mean(values**2) - mean(values) ** 2
+    explained = 1 - mean((values - found) ** 2) / (varies + np.float32(1e-4))
+    believed = np.clip((explained - DOUBTED) / (BELIEVED - DOUBTED), 0, 1)
+    return values + believed * (np.clip((found - 0.5) * STEEPER + 0.5, 0, 1) - values)
 
 
 def _small(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:

@@ -1,10 +1,13 @@
 """Mattes that are carried from drawings of outlines: a subject that turns and changes its shape over a ground that the
 camera passes, both of them textured."""
 
+from itertools import pairwise
+
 import cv2
 import numpy as np
 import pytest
 
+from shutter_addon.core.frames.light import to_encoded, to_linear
 from shutter_addon.core.model import outlines
 from shutter_addon.core.model.mattes import FileFrame, Matte
 from shutter_addon.media import carried_mattes, carrying, outline_tracing
@@ -155,6 +158,42 @@ def test_it_fades_where_nothing_like_it_is_seen(tmp_path):
     values = [carrying_of(footage, tmp_path).read(frame).mean() for frame in range(COUNT)]
     assert values[7] > 0.05
     assert values[COUNT - 1] < 0.1 * values[7]
+
+
+def around_the_edge(alpha):
+    """Within four pixels of it."""
+    inside, disc = (alpha > 0.5).astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
+    return cv2.dilate(inside, disc) > cv2.erode(inside, disc)
+
+
+@pytest.mark.parametrize(("soft", "most"), [(0, 8), (1.2, 10)])
+def test_edges_are_as_soft_as_the_pictures(soft, most):
+    """Of a subject that is mixed with what lies behind it in linear light, as by a lens, mean levels beside its true
+    alpha. Its outlines are hard."""
+
+    def alpha(frame):
+        return cv2.GaussianBlur(truth(frame), (0, 0), soft) if soft else truth(frame)
+
+    def mixed(frame):
+        share, ground = alpha(frame)[..., None], GROUND[:, 2 * frame : 2 * frame + WIDTH] / 255 * 0.5
+        skin = cv2.warpAffine(SKIN, np.float32([[1, 0, 3 * frame - 30], [0, 1, 0]]), (WIDTH, HEIGHT)) / 255 * 0.5 + 0.5
+        light = share * to_linear(skin) + (1 - share) * to_linear(ground)
+        return np.rint(255 * to_encoded(light)).astype(np.uint8)
+
+    drawn = [carrying.Drawing(frame, truth(frame)) for frame in (0, 8)]
+    for each in carrying.carried(mixed, *drawn, range(1, 8)):
+        apart = np.abs(each.matte - 255 * alpha(each.frame))
+        assert apart[around_the_edge(alpha(each.frame))].mean() <= most, each.frame
+
+
+def test_it_is_quiet_where_nothing_moves():
+    """Noise alone changes the pictures: mean levels from frame to frame within the subject."""
+    random = np.random.default_rng(5)
+    pictures = [np.clip(picture(4) + 6 * random.standard_normal(SKIN.shape), 0, 255).astype(np.uint8) for _ in range(9)]
+    drawn = [carrying.Drawing(frame, truth(4)) for frame in (0, 8)]
+    mattes = [each.matte.astype(float) for each in carrying.carried(pictures.__getitem__, *drawn, range(1, 8))]
+    changes = [np.abs(after - before)[truth(4) > 0].mean() for before, after in pairwise(mattes)]
+    assert np.mean(changes) <= 1
 
 
 def carrying_of(footage, folder):

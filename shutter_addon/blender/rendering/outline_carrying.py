@@ -25,17 +25,22 @@ TICK = 0.25  # seconds from one look at the thread to the next
 class _Carrying:
     """The mattes that a thread carries: it touches no bpy.
 
-    frames: what is to come, the source frames of a file; done: how many are there by now
-    arrived: called on Blender's main thread when all are"""
+    frames: what is to come, the source frames of a file, those first that are drawn; done: how many are there by now
+    arrived: called on Blender's main thread when what is drawn is there, and when all is"""
 
     file: CarriedFile
     frames: list[int]
     arrived: Callable[[], None]
     done: int = 0
+    told: int = 0  # how many were there when `arrived` was called
     ended: threading.Event = field(default_factory=threading.Event)
+    soon: int = field(init=False)  # how many of the frames are drawn
     future: Future = field(init=False)
 
     def __post_init__(self) -> None:
+        drawn = {frame for frame, _curves in self.file.drawings}
+        self.frames.sort(key=lambda frame: (frame not in drawn, frame))
+        self.soon = len(drawn & set(self.frames))
         self.future = in_thread(self._carry)
 
     def _carry(self) -> None:
@@ -65,7 +70,7 @@ def begin(arrived: Callable[[], None]) -> str | None:
     _wanted.clear()
     if wanted and not (_running and _running[0].file in wanted):
         file, frames = next(iter(wanted.items()))
-        carry(file, sorted(frames), arrived)
+        carry(file, list(frames), arrived)
     return next(iter(_failed.values()), None)
 
 
@@ -100,6 +105,9 @@ def _look() -> float | None:
     carrying = _running[0]
     preview_areas.redraw(bpy.context)
     if not carrying.future.done():
+        if carrying.done >= carrying.soon > carrying.told:  # what was mended is to be seen at once
+            carrying.told = carrying.done
+            carrying.arrived()
         return TICK
     _running.clear()
     try:
