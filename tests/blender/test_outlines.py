@@ -194,3 +194,22 @@ def test_what_is_needed_of_one_drawing_or_of_straight_ones(bpy, chosen):
     chosen(1, 9, between="straight")
     with pytest.raises(RuntimeError, match="a straight outline is not carried"):
         bpy.ops.shutter.outline_needed()
+
+
+@pytest.mark.parametrize(("frames", "fields"), [((1,), {}), ((1, 9), {}), ((1, 9), {"between": "straight"})])
+def test_its_motion_is_that_of_what_it_encloses(bpy, chosen, frames, fields):
+    """As keys of its location, which say how it moves and do not move it."""
+    strip, effect = chosen(*frames, **fields)
+    effect.regions[0].motion = "LOCATION"
+    strip.id_data.frame_set(1)
+    before = coefficients(strip, effect, 6)
+    assert bpy.ops.shutter.track(direction="FORWARD") == {"FINISHED"}
+    from shutter_addon.blender.data import snapshot
+
+    frames = range(1, 10)  # at the last one the recipe has set a key
+    (found,) = snapshot.read(strip.id_data, effect, strip, frames).regions
+    centres = [found.centre(frame) + found.placement(frame).location for frame in frames]
+    ways = (np.array(centres) - centres[0]) * (WIDTH, HEIGHT)
+    assert np.abs(ways - np.outer(np.arange(9), (4, 0))).max() < 1
+    assert found.placement(6).rotation == 0
+    np.testing.assert_array_equal(coefficients(strip, effect, 6), before)

@@ -15,6 +15,11 @@ MATTES = ("MATTE", "RAMP")  # kinds of regions that have no strokes
 LAID = ("OUTLINE", *MATTES)  # kinds of mattes, which are laid over what scribbles give
 
 
+def is_carried(region) -> bool:
+    """Whether a region is an outline that the footage's own motion carries from drawing to drawing."""
+    return region.kind == "OUTLINE" and region.between != "STRAIGHT"
+
+
 def effect_strips(scene) -> list:
     """The scene's effect strips, those inside meta strips too."""
     if scene.sequence_editor is None:

@@ -13,7 +13,7 @@ from ...core import revision
 from ...core.messages import EffectError
 from ...core.model import outlines
 from ...core.model.scribbles import mapped
-from ..data import annotations, geometry, snapshot
+from ..data import annotations, geometry, snapshot, strips
 from ..data.annotations import layer_of
 from . import region_edits
 
@@ -41,8 +41,8 @@ def is_outline(region) -> bool:
 def curves_now(scene, effect, strip, index: int) -> outlines.Curves:
     """The curves of an outline at the current frame, in fractions of the picture: drawn, carried, or straight where
     nothing is carried yet. EffectError, MediaError: there are none."""
-    frame, region = scene.frame_current, effect.regions[index]
-    if region.between == "STRAIGHT":
+    frame = scene.frame_current
+    if not strips.is_carried(effect.regions[index]):
         return outlines.curves(snapshot.strokes_at(scene, effect, strip, index, frame))
     file, shown = snapshot.carried_outline(scene, effect, strip, index, (frame,))
     with closing(file.open()) as mattes:

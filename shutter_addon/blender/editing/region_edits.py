@@ -25,7 +25,10 @@ def first_drawn(effect, shutter, kind: str):
     is_scribble = kind not in strips.LAID
     if is_scribble and is_sharp and not effect.regions and not effect.is_property_set("edge_aware"):
         effect.edge_aware = 1.0
-    return add_region(effect, shutter, kind)
+    region = add_region(effect, shutter, kind)
+    if not is_scribble:
+        region.motion = "LOCATION"  # limbs turn, and the subject does not
+    return region
 
 
 def add_matte(effect, shutter, kind: str = "MATTE", name: str = "", **values):

@@ -22,7 +22,7 @@ from ...core.model import limits, motions, presence
 from ...core.model.frame_state import Options
 from ...core.model.keyframes import Samples
 from ...core.recipes import region_keys
-from ...media import camera_tracking, pursuit, tracking
+from ...media import camera_tracking, matte_tracking, pursuit, tracking
 from ...media.footage import Footage
 from ...media.tracking import Tracked
 from ..data import annotations, inbetween_settings, selection, snapshot, strips, validation
@@ -36,6 +36,7 @@ FAULTS = (
     n_("the subject is covered, or looks too different"),
     n_("the subject has left the picture"),
     n_("there are too few corners to follow"),
+    n_("the outline encloses nothing here"),
     n_("the region has no strokes to follow"),
     n_("the region lies outside the picture"),
     n_("there is no other frame to track"),
@@ -241,7 +242,13 @@ def unsure_among(effect, index: int | None, frames) -> int:
 
 def _region(scene, effect, strip, index, frames, here: Tracked) -> _Subject:
     shape = _standing(snapshot.region_at(scene, effect, strip, index, frames), here)
-    return _Subject(partial(tracking.follow, shape), lambda: motions.offsets(shape.drawings.at(here.frame)))
+    follow: Callable = partial(tracking.follow, shape)
+    if strips.is_carried(effect.regions[index]):
+        carried = snapshot.carried_outline(scene, effect, strip, index, frames)
+        follow = partial(matte_tracking.follow_carried, shape, carried)
+    elif effect.regions[index].kind == "OUTLINE":
+        follow = partial(matte_tracking.follow_drawn, shape, shape.drawings.at)
+    return _Subject(follow, lambda: motions.offsets(shape.drawings.at(here.frame)))
 
 
 def _camera(scene, effect, strip, _index, frames, here: Tracked) -> _Subject:

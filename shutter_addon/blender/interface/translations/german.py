@@ -424,6 +424,7 @@ MESSAGES = {
     ("*", 'strip "{strip}" is scaled to nothing'): "Streifen „{strip}“ ist zu nichts skaliert",
     ("*", "{place}: a straight outline is not carried"): "{place}: Ein gerader Umriss wird nicht mitgeführt",
     ("Operator", "Mend Outline"): "Umriss ausbessern",
+    ("*", "the outline encloses nothing here"): "der Umriss umschließt hier nichts",
     ("*", "Width"): "Breite",
     ("*", "Width of the lines as a fraction of the picture's height"): "Breite der Linien als Bruchteil der Bildhöhe",
     ("*", "Location"): "Position",

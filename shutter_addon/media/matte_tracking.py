@@ -1,0 +1,196 @@
+"""Following what a matte covers, by dense flow inside it: from frame to frame, and drawings of the matte hold it where
+it is. No bpy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import closing
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core.model import outlines
+from ..core.model.motions import Motion, Similarity
+from . import flow, tracking
+from .carried_mattes import CarriedFile
+from .footage import Footage
+from .pursuit import COVERED, LEFT, Sighting
+from .registration import Part
+from .tracking import Subject, Tracked, TrackingError
+
+try:
+    import cv2
+except ImportError:  # a package without wheels; the extension registers without it
+    cv2 = None
+
+EMPTY = "the outline encloses nothing here"
+
+# The share (h, w) float32 of each pixel that a matte covers at a timeline frame, of the footage's pictures.
+Cover = Callable[[int], np.ndarray]
+
+_INSIDE = 0.9  # of a matte: its soft edge may move with what is behind it
+_AROUND = 24  # pixels around a matte, in which flow is found
+_POINTS = 4000  # that tell a motion, at most; and so many at least
+_FEWEST = 24
+_BACK = 1.0  # pixels that flow forth and back may be off, of 640
+_ALIKE = 2.0  # pixels of 640 within which a point moves as the subject does
+_AGREEING = 0.5  # share of the points that do, from which on a step is sure
+
+
+class Step(NamedTuple):
+    """How what a matte covers moves from a picture to another, and how sure that is, 0 to 1."""
+
+    motion: Similarity
+    confidence: float
+
+
+def follow_carried(
+    region: Subject, carried: tuple[CarriedFile, Mapping[float, int]], footage: Footage, *where: Any, **how: Any
+) -> Iterator[Tracked]:
+    """As tracking.follow, of what a carried outline encloses.
+
+    region: says where its centre is; carried: what gives the mattes, and the source's filmed frames that timeline
+    frames show. MediaError: a matte cannot be carried."""
+    file, shown = carried
+    with closing(file.open()) as mattes:
+
+        @lru_cache(2)  # a step looks at two frames, of which one was looked at before
+        def cover(frame: int) -> np.ndarray:
+            return flow.resized(mattes.read(min(shown[frame], mattes.count - 1)), footage.size)
+
+        yield from follow_cover(region, cover, footage, *where, **how)
+
+
+def follow_drawn(
+    region: Subject, drawn: Callable[[int], Sequence], footage: Footage, *where: Any, **how: Any
+) -> Iterator[Tracked]:
+    """As follow_carried, of what curves enclose that are known at every frame."""
+
+    def cover(frame: int) -> np.ndarray:
+        return outlines.coverage(drawn(frame), *footage.size)
+
+    return follow_cover(region, cover, footage, *where, **how)
+
+
+def follow_cover(
+    region: Subject,
+    cover: Cover,
+    footage: Footage,
+    start: int,
+    frames: range,
+    *,
+    motion: Motion = "location",
+    anchors: Collection[int] = (),
+) -> Iterator[Tracked]:
+    """As tracking.follow, of what a matte covers."""
+    tracking.check_frames(start, frames)
+    return _MatteTrack(region, cover, footage, motion, {*frames, *anchors}).both_ways(start, frames, anchors)
+
+
+class _MatteTrack(tracking.Track):
+    def __init__(self, region: Subject, cover: Cover, footage: Footage, motion: Motion, frames: Collection[int]):
+        super().__init__(region, footage, motion, frames)
+        self._cover = cover
+
+    def both_ways(self, start: int, frames: range, anchors: Collection[int]) -> Iterator[Tracked]:
+        """See Track.both_ways."""
+        if not (self._cover(start) > _INSIDE).any():
+            raise TrackingError(EMPTY)
+        return self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
+
+    def _part(self, frame: int) -> tuple[Part, float]:
+        raise TrackingError(EMPTY)  # it has no corners, and is known by its matte
+
+    def _has_part(self, frame: int) -> bool:
+        return bool((self._cover(frame) > _INSIDE).any())
+
+    def _pursuit(self, start: int) -> tuple[int, _Pursuit, float]:
+        return start, _Pursuit(self._cover, self._footage, start, self._motion), 1.0
+
+
+class _Pursuit:
+    """The motion of what a matte covers, from one frame to those after it."""
+
+    def __init__(self, cover: Cover, footage: Footage, frame: int, motion: Motion):
+        self._cover, self._footage, self._way = cover, footage, motion
+        self._last, self._motion, self.reason = frame, Similarity(), COVERED
+
+    def next(self, frame: int) -> Sighting | None:
+        """Where it is in a frame; None: it is not there."""
+        before, after = (self._cover(each) for each in (self._last, frame))
+        if not (after > _INSIDE).any():
+            self.reason = LEFT
+            return None
+        first, second = (self._footage.picture(each) for each in (self._last, frame))
+        step = moved(first, second, before, after, self._way)
+        if step is None:
+            self.reason = COVERED
+            return None
+        self._motion, self._last = step.motion.after(self._motion), frame
+        return Sighting(self._motion, step.confidence)
+
+
+def moved(
+    first: np.ndarray, second: np.ndarray, before: np.ndarray, after: np.ndarray, motion: Motion = "location"
+) -> Step | None:
+    """How what a matte covers moves from one picture (H, W) uint8 to another; None: that cannot be known.
+
+    before, after: (H, W) float32, 0 to 1, the matte of each"""
+    unit, (rows, columns) = max(first.shape) / 640, _box(np.maximum(before, after))
+    first, second, before, after = (
+        np.ascontiguousarray(each[rows, columns]) for each in (first, second, before, after)
+    )
+    if min(first.shape) < flow.SMALLEST:
+        return None
+    grid = flow.grid(*first.shape)
+    there = grid + flow.fine_vectors(first, second)
+    here = there + _at(flow.fine_vectors(second, first), there)
+    inside = before > _INSIDE
+    held = inside & (_at(after, there) > 0.5) & (np.hypot(*np.moveaxis(here - grid, -1, 0)) < _BACK * unit)
+    chosen = np.flatnonzero(held)
+    if chosen.size < _FEWEST:
+        return None
+    share = chosen.size / np.count_nonzero(inside)
+    chosen = chosen[:: -(-chosen.size // _POINTS)]
+    starts, ends = (each.reshape(-1, 2)[chosen] + (columns.start, rows.start) for each in (grid, there))
+    found = _fitted(starts, ends, motion, _ALIKE * unit)
+    agreeing = float((np.abs(found(_plane(starts)) - _plane(ends)) < _ALIKE * unit).mean())
+    return Step(found, min(agreeing / _AGREEING, 1.0) * min(share / _AGREEING, 1.0))
+
+
+def _fitted(starts: np.ndarray, ends: np.ndarray, motion: Motion, alike: float) -> Similarity:
+    """The motion that most points (n, 2) have, within `alike` pixels."""
+    if motion != "location":
+        matrix, _ = cv2.estimateAffinePartial2D(starts, ends, method=cv2.RANSAC, ransacReprojThreshold=alike)
+        if matrix is not None:
+            turn = complex(matrix[0, 0], matrix[1, 0])
+            if motion == "rotation":
+                turn /= abs(turn)
+            middle = complex(*starts.mean(axis=0))
+            return Similarity(turn, complex(*(matrix @ (middle.real, middle.imag, 1))) - turn * middle)
+    ways = _plane(ends - starts)
+    shift = complex(np.median(ways.real), np.median(ways.imag))
+    for _ in range(3):  # to the mean of those that agree
+        shift = complex(ways[np.abs(ways - shift) <= max(alike, np.abs(ways - shift).min())].mean())
+    return Similarity(1 + 0j, shift)
+
+
+def _plane(points: np.ndarray) -> np.ndarray:
+    """Points (n, 2) as complex numbers."""
+    return points[:, 0].astype(np.float64) + 1j * points[:, 1]
+
+
+def _at(values: np.ndarray, places: np.ndarray) -> np.ndarray:
+    return cv2.remap(values, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+
+
+def _box(matte: np.ndarray) -> tuple[slice, slice]:
+    """The rows and columns that a matte covers, and some around."""
+    ways = [np.flatnonzero(matte.max(axis=axis) > 0) for axis in (1, 0)]
+    rows, columns = (
+        slice(max(int(way[0]) - _AROUND, 0), min(int(way[-1]) + 1 + _AROUND, length))
+        for way, length in zip(ways, matte.shape, strict=True)
+    )
+    return rows, columns

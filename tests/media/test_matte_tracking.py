@@ -1,0 +1,95 @@
+"""The motion of what a matte covers, against the truth: a subject over a ground that moves otherwise."""
+
+import cv2
+import numpy as np
+import pytest
+
+from shutter_addon.core.model.motions import Placement
+from shutter_addon.media import matte_tracking
+
+SIZE = 320, 180
+RANDOM = np.random.default_rng(3)
+GROUND, SKIN = (
+    cv2.GaussianBlur((255 * RANDOM.random((400, 700))).astype(np.uint8), (0, 0), 2.5).astype(np.float32) * 3 - 255
+    for _ in range(2)
+)
+
+
+def scene(frame, turn=0.0, blur=0.0):
+    """A picture and its matte: a disc that goes by (3, −1) pixels a frame, and turns; the ground by (−2, 0.5)."""
+    x, y = 120 + 3 * frame, 110 - frame
+    matrix = cv2.getRotationMatrix2D((350, 200), turn * frame, 1)
+    matrix[:, 2] += (x - 350, y - 200)
+    skin = cv2.warpAffine(SKIN, matrix, SIZE)
+    ground = cv2.warpAffine(GROUND, np.float32([[1, 0, -100 - 2 * frame], [0, 1, -100 + 0.5 * frame]]), SIZE)
+    rows, columns = np.indices(SIZE[::-1])
+    matte = np.clip(45.5 - np.hypot(columns - x, rows - y), 0, 1).astype(np.float32)
+    picture = np.clip(matte * skin + (1 - matte) * ground, 0, 255)
+    return (cv2.GaussianBlur(picture, (0, 0), blur) if blur else picture).astype(np.uint8), matte
+
+
+@pytest.mark.parametrize("blur", [0, 2])
+def test_a_step(blur):
+    (first, before), (second, after) = scene(0, blur=blur), scene(1, blur=blur)
+    step = matte_tracking.moved(first, second, before, after)
+    assert abs(step.motion.shift - (3 - 1j)) < 0.25
+    assert step.confidence > 0.8
+
+
+@pytest.mark.parametrize("motion", ["location", "rotation", "scale"])
+def test_a_turn_is_found_where_it_is_asked_for(motion):
+    (first, before), (second, after) = scene(0, turn=4), scene(1, turn=4)
+    found = matte_tracking.moved(first, second, before, after, motion).motion
+    assert abs(found(120 + 110j) - (123 + 109j)) < 0.5
+    turn = np.degrees(np.angle(found.turn))
+    assert turn == (0 if motion == "location" else pytest.approx(-4, abs=0.4))
+    assert abs(found.turn) == pytest.approx(1, abs=0.01)
+
+
+def test_what_shows_nothing_is_not_known():
+    (first, before), (second, _after) = scene(0), scene(1)
+    assert matte_tracking.moved(first, second, before, np.zeros_like(before)) is None
+
+
+class Footage:
+    size = SIZE
+
+    def want(self, frames):
+        pass
+
+    def picture(self, frame):
+        return scene(frame)[0]
+
+    def cut(self, before, after):
+        return False
+
+
+class Still:
+    """A subject that is not moved yet."""
+
+    def placement(self, _frame):
+        return Placement()
+
+    def centre(self, _frame):
+        return np.array([0.4, 0.4])
+
+
+def test_from_frame_to_frame():
+    steps = list(matte_tracking.follow_cover(Still(), lambda frame: scene(frame)[1], Footage(), 4, range(9)))
+    places = {step.frame: np.multiply(step.placement.location, SIZE) for step in steps}
+    assert sorted(places) == list(range(9))
+    for frame, (x, y) in places.items():
+        assert np.hypot(x - 3 * (frame - 4), y - (frame - 4)) < 1
+    assert all(step.confidence > 0.5 for step in steps)
+
+
+def test_it_ends_where_there_is_no_matte():
+    def cover(frame):
+        matte = scene(frame)[1]
+        return matte if frame < 6 else 0 * matte
+
+    steps = list(matte_tracking.follow_cover(Still(), cover, Footage(), 4, range(4, 40)))
+    assert [step.frame for step in steps] == [4, 5, 6]
+    assert steps[-1].fault == "the subject has left the picture"
+    with pytest.raises(matte_tracking.TrackingError, match="the outline encloses nothing here"):
+        list(matte_tracking.follow_cover(Still(), cover, Footage(), 6, range(4, 40)))
