@@ -14,11 +14,11 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from ..core.model import motions, scribbles
-from ..core.model.effect import Camera, Region
+from ..core.model.effect import Camera, OutlineRegion, Region
 from ..core.model.motions import Placement
 from .tracking import EMPTY, Subject, Tracked, TrackingError
 
-S = TypeVar("S", Region, Camera)
+S = TypeVar("S", Region, OutlineRegion, Camera)
 
 
 class FilmedFrames:

@@ -14,7 +14,7 @@ import numpy as np
 from ..core.model import outlines
 from ..core.model.motions import Motion, Similarity
 from . import flow, tracking
-from .carried_mattes import CarriedFile
+from .carried_mattes import CarriedFile, CarriedMattes
 from .footage import Footage
 from .pursuit import COVERED, LEFT, Sighting
 from .registration import Part
@@ -55,23 +55,22 @@ def follow_carried(
     frames show. MediaError: a matte cannot be carried."""
     file, shown = carried
     with closing(file.open()) as mattes:
-
-        @lru_cache(2)  # a step looks at two frames, of which one was looked at before
-        def cover(frame: int) -> np.ndarray:
-            return flow.resized(mattes.read(min(shown[frame], mattes.count - 1)), footage.size)
-
-        yield from follow_cover(region, cover, footage, *where, **how)
+        yield from follow_cover(region, cover_of(mattes, shown.__getitem__, footage.size), footage, *where, **how)
 
 
-def follow_drawn(
-    region: Subject, drawn: Callable[[int], Sequence], footage: Footage, *where: Any, **how: Any
-) -> Iterator[Tracked]:
-    """As follow_carried, of what curves enclose that are known at every frame."""
+def cover_of(mattes: CarriedMattes, shown: Callable[[int], int], size: tuple[int, int]) -> Cover:
+    """What carried mattes cover of pictures of a size; shown: which filmed frame is seen at a timeline frame."""
 
+    @lru_cache(2)  # a step looks at two frames, of which one was looked at before
     def cover(frame: int) -> np.ndarray:
-        return outlines.coverage(drawn(frame), *footage.size)
+        return flow.resized(mattes.read(min(shown(frame), mattes.count - 1)), size)
 
-    return follow_cover(region, cover, footage, *where, **how)
+    return cover
+
+
+def cover_within(drawn: Callable[[int], Sequence], size: tuple[int, int]) -> Cover:
+    """What curves enclose that are known at every timeline frame."""
+    return lambda frame: outlines.coverage(drawn(frame), *size)
 
 
 def follow_cover(

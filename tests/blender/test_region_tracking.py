@@ -463,10 +463,10 @@ def test_forward_from_a_covered_frame_is_never_surely_wrong(bpy, edit, tmp_path)
 
 
 def test_every_sentence_of_the_tracker_can_be_translated():
-    from shutter_addon.media import camera_tracking, pursuit, tracking
+    from shutter_addon.media import camera_tracking, matte_tracking, pursuit, tracking
 
-    named = vars(tracking) | vars(camera_tracking) | vars(pursuit)
-    said = {words for name, words in named.items() if name.isupper() and isinstance(words, str)}
+    named = [each for module in (tracking, camera_tracking, pursuit, matte_tracking) for each in vars(module).items()]
+    said = {words for name, words in named if name.isupper() and isinstance(words, str)}
     assert len(said) > 5
     assert said == set(track_region.FAULTS)
 

@@ -160,6 +160,20 @@ def test_what_is_shown_twice_is_tracked_once(track, film, tmp_path):
         assert found[frame] == pytest.approx(expected(index, 6), abs=0.4 / WIDTH)
 
 
+@pytest.mark.parametrize("between", ["carried", "straight"])
+def test_an_outline_gets_keys_of_what_it_encloses(track, film, tmp_path, between):
+    """They say how that moves; its drawings stay where they are."""
+    box = [[[0.35, 0.35], [0.65, 0.35], [0.65, 0.65], [0.35, 0.65]]]
+    given = plain(kind="outline", strokes=box, between=between)
+    options = ("--region", "cross", "--frame", 5, "--motion", "location", "--all-keys")
+    assert track(film, *options, "--output", tmp_path / "t.json", recipe=given) == (0, "")
+    found = keys(tmp_path / "t.json")
+    assert [key.frame for key in found] == list(range(1, COUNT + 1))
+    for key in found:
+        assert key.location == pytest.approx(expected(key.frame), abs=1 / WIDTH)
+    assert recipe_file.load(tmp_path / "t.json").regions[1].strokes == [list(map(tuple, box[0]))]
+
+
 @pytest.mark.parametrize(
     ("shown", "last"), [({}, 6), ({"inbetween": 4, "time": [{"frame": 1, "value": 1}, {"frame": 45, "value": 12}]}, 21)]
 )

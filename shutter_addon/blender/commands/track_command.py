@@ -2,15 +2,17 @@
 
 import json
 import sys
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
 
 from ...core import atomic_write
 from ...core.frames import retiming
 from ...core.messages import signed
-from ...core.model import presence
-from ...core.model.effect import Region
+from ...core.model import outlines, presence
+from ...core.model.effect import OutlineRegion, Region
 from ...core.recipes import recipe, recipe_file, region_keys
-from ...media import PrefetchSource, camera_tracking, filmed_frames, registration, tracking
+from ...media import PrefetchSource, camera_tracking, filmed_frames, matte_tracking, registration, tracking
+from ...media.carried_mattes import CarriedMattes
 from ...media.cuts import ShotSource
 from ...media.footage import Footage
 from ..editing import new_edit
@@ -76,7 +78,7 @@ def _region_index(arguments, source_recipe) -> int:
     if arguments.region not in names:
         raise film_output.OutputError(f'{arguments.recipe}: there is no region "{arguments.region}"')
     index = names.index(arguments.region)
-    if not isinstance(source_recipe.regions[index], recipe.Region):
+    if not isinstance(source_recipe.regions[index], recipe.Region | recipe.OutlineRegion):
         sentence = f'region "{arguments.region}" is a matte or a ramp, and has no strokes to track'
         raise film_output.OutputError(f"{arguments.recipe}: {sentence}")
     return index
@@ -89,13 +91,18 @@ def _followed(arguments, source_recipe, index: int | None, medium, frames: range
     subject = effect.camera if index is None else effect.regions[index]
     times = {frame: _shown(source_recipe, frame, medium.count) for frame in frames}
     filmed = filmed_frames.FilmedFrames(times, arguments.frame)
-    with ShotSource(PrefetchSource(medium)) as shots, film_output.progress(len(filmed.frames), "frame") as moved:
+    with ExitStack() as ends:
+        shots = ends.enter_context(ShotSource(PrefetchSource(medium)))
+        moved = ends.enter_context(film_output.progress(len(filmed.frames), "frame"))
         footage = Footage(shots, filmed.index_at)
         what = footage, filmed.start, filmed.frames
         if index is None:
             drawn = [region for region in effect.regions if isinstance(region, Region)]
             regions = [filmed.seen(region) for region in drawn]
             steps = camera_tracking.follow_camera(filmed.seen(subject), regions, *what, motion=arguments.motion)
+        elif isinstance(subject, OutlineRegion):
+            cover = ends.enter_context(_cover(arguments, source_recipe, subject, filmed, footage.size))
+            steps = matte_tracking.follow_cover(filmed.seen(subject), cover, *what, motion=arguments.motion)
         else:
             steps = tracking.follow(filmed.seen(subject), *what, motion=arguments.motion)
         tracked = []
@@ -107,6 +114,20 @@ def _followed(arguments, source_recipe, index: int | None, medium, frames: range
     if len(shown) - len(stops) < 2:
         raise tracking.TrackingError(stops[0].fault if stops else tracking.ALONE)
     return {each.frame: each for each in shown if not each.fault}, stops
+
+
+@contextmanager
+def _cover(arguments, source_recipe, region: OutlineRegion, filmed, size: tuple[int, int]):
+    """What an outline covers at the places of filmed frames (media.matte_tracking.Cover)."""
+    if region.between == "straight":
+        yield matte_tracking.cover_within(filmed.seen(region.drawings).at, size)
+        return
+    with command_line.opened(arguments.source) as medium:
+        drawings, drawn = region.drawings, {}
+        for strokes, frame in zip(drawings.strokes, drawings.frames, strict=True):
+            drawn[int(_shown(source_recipe, frame, medium.count))] = outlines.curves(strokes)
+        with closing(CarriedMattes(medium, tuple(sorted(drawn.items())))) as mattes:
+            yield matte_tracking.cover_of(mattes, filmed.index_at, size)
 
 
 def _keyed(source_recipe, index: int | None, *placements, thin: bool) -> recipe.Recipe:
@@ -131,7 +152,7 @@ def _ended(source_recipe, index: int | None, tracked: dict, stops: list, start: 
     return replace(source_recipe, regions=regions)
 
 
-def _shown(source_recipe, frame: int, count: int) -> float:
+def _shown(source_recipe, frame: float, count: int) -> float:
     """Which of a source's frames, from 0 on, a recipe shows at a timeline frame; a fraction: an in-between one."""
     time, factor = source_recipe.time_at(frame), source_recipe.inbetween
     filmed = (frame if time is None else time) - 1

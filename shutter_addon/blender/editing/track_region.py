@@ -247,8 +247,13 @@ def _region(scene, effect, strip, index, frames, here: Tracked) -> _Subject:
         carried = snapshot.carried_outline(scene, effect, strip, index, frames)
         follow = partial(matte_tracking.follow_carried, shape, carried)
     elif effect.regions[index].kind == "OUTLINE":
-        follow = partial(matte_tracking.follow_drawn, shape, shape.drawings.at)
+        follow = partial(_follow_drawn, shape)
     return _Subject(follow, lambda: motions.offsets(shape.drawings.at(here.frame)))
+
+
+def _follow_drawn(shape, footage: Footage, *where: Any, **how: Any) -> Iterator[Tracked]:
+    cover = matte_tracking.cover_within(shape.drawings.at, footage.size)
+    return matte_tracking.follow_cover(shape, cover, footage, *where, **how)
 
 
 def _camera(scene, effect, strip, _index, frames, here: Tracked) -> _Subject:

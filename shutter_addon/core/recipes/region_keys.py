@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
-from ..model import effect, keyframes, motions, presence
+from ..model import effect, keyframes, mattes, motions, presence
 from ..model.motions import Placement, Placements, Size
-from .recipe import CameraKey, Keyable, Recipe, Region, RegionKey, ValueKey
+from .recipe import CameraKey, Keyable, OutlineRegion, Recipe, Region, RegionKey, ValueKey
 
+D = TypeVar("D", Region, OutlineRegion)
 _DIGITS = 6  # of what was measured: far below a pixel
 # Pixels by which a thinned camera may be off: unlike a region, it carries the picture itself.
 STEADY = 0.25
@@ -19,24 +21,23 @@ STEADY = 0.25
 CORNERS = motions.offsets([motions.PICTURE])
 
 
-def with_placements(
-    region: Region, placements: Placements, exact: Collection[int], size: Size, *, thin: bool = True
-) -> Region:
+def with_placements(region: D, placements: Placements, exact: Collection[int], size: Size, *, thin: bool = True) -> D:
     """The region with these placements as its keys, in place of those that it has from the first of these frames to the
     last. At whole frames beyond these it stays where its keys put it, and its drawings stay where and as they are.
 
     exact: those frames among them whose keys are kept in any case, and as they are given
     size: of the picture; thin: no more keys than the motion needs within a pixel"""
-    drawn = {key.frame if key else None: strokes for key, strokes in region.drawings()}
+    drawn: dict[float | None, list] = {key.frame if key else None: strokes for key, strokes in region.drawings()}
     eases = {key.frame: key.ease for key in region.keys if key.frame in drawn and len(drawn) > 1}
     chosen = sorted(placements)
     if thin:
         # behind a drawing with an ease of its own the motion is to go straight
-        straight = {frame + 1 for frame, ease in eases.items() if ease != "linear"}
+        straight: set[float] = {frame + 1 for frame, ease in eases.items() if ease != "linear"}
         kept = {*exact, *(frame for frame in drawn if frame is not None), *straight}
         shape = np.concatenate([motions.offsets(strokes) for strokes in drawn.values()])
         chosen = motions.thinned(placements, shape, size, kept)
-    keys = _keys(RegionKey, region.keys, region.over_time(0, size[0] / size[1]), placements, exact, chosen)
+    moving = region.over_time(0, size[0] / size[1], *([mattes.NoFile()] if isinstance(region, OutlineRegion) else []))
+    keys = _keys(RegionKey, region.keys, moving, placements, exact, chosen)
     keys = [replace(key, ease=eases.get(key.frame, key.ease)) for key in keys]
     return _redrawn(replace(region, keys=keys), drawn)
 
@@ -83,7 +84,7 @@ def _cut(keys: list, edge: int, step: int) -> list[int]:
     return list(range(edge, math.ceil(min(beyond)) if step > 0 else math.floor(max(beyond)), step))
 
 
-def _redrawn(region: Region, drawn: dict) -> Region:
+def _redrawn(region: D, drawn: dict) -> D:
     """The region with its drawings, by frame, on its keys: the first one is its own as well."""
     strokes = next(iter(drawn.values()))
     if len(drawn) == 1:
