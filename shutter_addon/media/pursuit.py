@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -22,14 +23,22 @@ _DRIFT, _LEAST = 0.95, 0.1  # what a later look is worth beside the one before i
 _SHIFTED = 0.6  # what a location is worth where rotation and scale could not be found
 _FADING = 0.6  # below it another frame is taken to compare with beside the first
 _AROUND = 0.05  # widths of the picture around its place within which it is sought at least
+# Frames after which what is found is compared with what was; correlations from which on that tells nothing against it,
+# and below which all.
+_BACK, _STEADY, _OTHER = 4, 0.65, 0.35
+_SAME = 0.005  # of the picture's size, within which two motions are the same
+_STEP, _KEPT = 0.2, 0.998  # a step that is as sure keeps so much of the trust
 _REPEATED = 0.3  # what a part is worth that looks like what is beside it
 
 
 class Sighting(NamedTuple):
-    """Where something is in a picture: its motion from the first one, and how sure that is, 0 to 1."""
+    """Where something is in a picture: its motion from the first one, and how sure that is, 0 to 1.
+
+    step: how sure the motion is from the picture that this one was compared with"""
 
     motion: Similarity
     confidence: float
+    step: float = 1.0
 
 
 class PartPursuit:
@@ -47,6 +56,8 @@ class PartPursuit:
         self._look = _Look(part, Similarity(), 1.0)  # how it looked later, if it is no longer like the first
         # the last picture in which it was found, the motion, its confidence
         self._seen = footage.picture(frame), Similarity(), 1.0
+        # how sure it is that what is followed is still the part, and the last pictures in which it was found
+        self._trust, self._found = 1.0, deque([self._seen[:2]], _BACK)
 
     def next(self, frame: int) -> Sighting | None:
         """Where it is in a frame's picture; None: it is not there."""
@@ -63,8 +74,20 @@ class PartPursuit:
             self._missed += 1
             return None
         self._speed = sighting.motion.after(self._known.inverse()) if not missed else Similarity()
-        self._known, self._seen, self._missed = sighting.motion, (picture, *sighting), 0
-        return sighting
+        self._known, self._seen, self._missed = sighting.motion, (picture, *sighting[:2]), 0
+        return Sighting(sighting.motion, self._trusted(picture, sighting))
+
+    def _trusted(self, picture: np.ndarray, sighting: Sighting) -> float:
+        """How sure it is that it is there. A comparison with how it looked first tells that by itself. Others tell that
+        what was followed goes on: so does what has slipped onto something else, but not onto what looked like it
+        shortly before."""
+        before, motion = self._found[0]
+        alike = self._first.likeness(before, motion, picture, sighting.motion)
+        steady = float(np.clip((alike - _OTHER) / (_STEADY - _OTHER), 0, 1))
+        kept = _KEPT * self._trust * steady * min(sighting.step / _STEP, 1.0)
+        self._trust = max(kept, sighting.confidence)
+        self._found.append((picture, sighting.motion))
+        return self._trust
 
     def _near(self, picture: np.ndarray, guess: Similarity) -> Sighting | None:
         """As `next`, near to a guess: as it looked first or, if that is not sure, as it looked later."""
@@ -73,17 +96,20 @@ class PartPursuit:
         if match and sure >= SURE:
             self._first.learn(match)
         if match and sure >= _FADING:
-            return Sighting(match.motion, sure)
+            return Sighting(match.motion, sure, sure)
         later = self._by_later_look(picture, guess)
         if later is None:
-            return Sighting(match.motion, sure) if match and sure >= _LOST else None
+            return Sighting(match.motion, sure, sure) if match and sure >= _LOST else None
         points = self._first.points
         if sure < SURE and np.abs(later.motion(points) - guess(points)).max() > 1:
             # from there the first look may be near enough
             again = self._first.find(picture, later.motion, self._motion)
             if confidence(again, picture) > sure:
                 match, sure = again, confidence(again, picture)
-        return Sighting(match.motion, sure) if match and sure >= min(SURE, later.confidence) else later
+        if match is None or sure < min(SURE, later.confidence):
+            return later
+        is_same = np.abs(later.motion(points) - match.motion(points)).max() <= _SAME * max(picture.shape)
+        return Sighting(match.motion, sure, max(sure, later.step) if is_same else sure)
 
     def _by_later_look(self, picture: np.ndarray, guess: Similarity) -> Sighting | None:
         if self._look.part is self._first:
@@ -109,7 +135,7 @@ class PartPursuit:
             for guess in (from_there, look.part.seek(picture, from_there, radius)):
                 match = look.part.find(picture, guess, self._motion) if guess else None
                 if match and (sure := confidence(match, picture)) >= _AGAIN:
-                    sightings.append(Sighting(match.motion.after(look.motion), look.worth * sure))
+                    sightings.append(Sighting(match.motion.after(look.motion), look.worth * sure, sure))
         return max(sightings, key=lambda each: each.confidence, default=None)
 
     def _leaves(self, picture: np.ndarray) -> bool:
@@ -135,7 +161,7 @@ class _Look:
         for way, share in ways:
             match = self.part.find(picture, guess, way)
             if match and (sure := confidence(match, picture)) >= _LOST:
-                return Sighting(match.motion.after(self.motion), share * self.worth * sure)
+                return Sighting(match.motion.after(self.motion), share * self.worth * sure, share * sure)
         return None
 
 
