@@ -28,9 +28,9 @@ from .inbetween_cache import identity, manifest_key
 from .outline_tracing import traced
 
 FOLDER = "virtual_shutter_mattes"
-AGREEMENT = "agreement "  # what a file's description says (carrying.Carried)
-VERSION = 3  # raise it when mattes of the same drawings change
-TRUSTED = 0.5  # agreement below which a drawing is carried no farther
+CONFIDENCE = "confidence "  # what a file's description says (carrying.Carried)
+VERSION = 4  # raise it when mattes of the same drawings change
+TRUSTED = 0.2  # confidence below which a drawing is carried no farther
 FADE = 4  # frames in which it fades there
 BLOCK = 20  # frames beyond a drawing that are carried together
 
@@ -107,8 +107,8 @@ class CarriedMattes:
         near = self._near(index)
         return near == (None, None) or self._path(index, *near).is_file()
 
-    def agreement(self, index: int) -> float | None:
-        """How far the drawings on both sides agree on a frame's matte (carrying.Carried); None: it is not kept yet."""
+    def confidence(self, index: int) -> float | None:
+        """How sure a frame's matte is (carrying.Carried); None: it is not kept yet."""
         near = self._near(index)
         if near == (None, None) or not (path := self._path(index, *near)).is_file():
             return None
@@ -117,7 +117,7 @@ class CarriedMattes:
         with closing(image):
             said = image.spec().getattribute("ImageDescription")
         try:
-            return float(str(said).removeprefix(AGREEMENT))
+            return float(str(said).removeprefix(CONFIDENCE))
         except ValueError:
             return None
 
@@ -168,11 +168,11 @@ class CarriedMattes:
     def _made(self, index: int, first: int | None, last: int | None) -> Iterator[carrying.Carried]:
         """Of all frames between two drawings, or of those beyond one as far as a frame."""
         if first is None and last is None:  # kept as well: else it would be lacking again and again
-            yield carrying.Carried(index, np.zeros((self.height, self.width), np.uint8), agreement=1.0)
+            yield carrying.Carried(index, np.zeros((self.height, self.width), np.uint8), confidence=1.0)
             return
         if first == last and first is not None:
             matte = carrying.drawn(self._picture(first), self._drawing(first).cover)
-            yield carrying.Carried(first, matte, agreement=1.0)
+            yield carrying.Carried(first, matte, confidence=1.0)
             return
         before, behind = (None if frame is None else self._drawing(frame) for frame in (first, last))
         carried = carrying.carried(self._picture, before, behind, self._span(index, first, last))
@@ -196,7 +196,7 @@ class CarriedMattes:
         """Mattes away from their only drawing, which fade where it can be trusted no longer."""
         share = 1.0
         for each in carried:
-            if share < 1 or each.agreement < TRUSTED:
+            if share < 1 or each.confidence < TRUSTED:
                 share = max(share - 1 / FADE, 0.0)
             yield each if share == 1 else replace(each, matte=np.rint(each.matte * share).astype(np.uint8))
 
@@ -247,4 +247,4 @@ class CarriedMattes:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise MediaError(f"{path.parent}: mattes cannot be written there ({error.strerror or error})") from None
-        write_levels(path, carried.matte, f"{AGREEMENT}{carried.agreement:.3f}")
+        write_levels(path, carried.matte, f"{CONFIDENCE}{carried.confidence:.3f}")

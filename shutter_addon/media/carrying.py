@@ -54,6 +54,10 @@ STILL, CHANGED, QUIET = 0.5, 4.0, 0.9
 THIN, LEAST = 4, 12  # every so many pixels tell an affine motion, and so many at least
 BETTER = 0.9  # share of a difference that must be left where flow between two frames alone is believed more
 
+# Votes on what lies inside, beside the most that there can be, which tell nothing (scripts/carried_mattes.py).
+UNLIKE = 0.4
+AGREED = 0.6  # overlap of what two drawings make of a frame, from which on they do not contradict one another
+
 Places = np.ndarray  # (h, w, 2) float32, x and y in pixels of the working picture
 
 
@@ -70,11 +74,11 @@ class Drawing:
 class Carried:
     """A matte (H, W) uint8 of a source frame.
 
-    agreement: 0 to 1, of what the two drawings make of it; where there is one alone, how alike what it shows is"""
+    confidence: 0 to 1; from one half on it overlaps with what a person draws by more than three quarters, as a rule"""
 
     frame: int
     matte: np.ndarray
-    agreement: float
+    confidence: float
 
 
 # Frames as they are displayed: (H, W, 3) uint8 of a source frame.
@@ -113,11 +117,12 @@ def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: r
             _votes(footage.colors[frame], _at(footage.colors[end.frame], there), cover, box)
             for end, there, cover in zip(ends, places, covers, strict=True)
         ]
-        matte = refined(frames(frame), _mixed(sides, _weights(frame, ends)))
+        share = _mixed(sides, _weights(frame, ends))
+        matte = refined(frames(frame), share)
         if before is not None:
             matte += cv2.resize(footage.stillness(frame), matte.shape[::-1]) * (before - matte)
         before = matte
-        yield Carried(frame, _levels(matte), _agreement(sides))
+        yield Carried(frame, _levels(matte), _confidence(share, sides))
 
 
 def drawn(picture: np.ndarray, cover: np.ndarray) -> np.ndarray:
@@ -271,13 +276,17 @@ def _mixed(sides: list[Votes], weights: list[float]) -> np.ndarray:
     return inside / total
 
 
-def _agreement(sides: list[Votes]) -> float:
-    masks = [inside / total > INSIDE for inside, total in sides]
-    if len(masks) == 1:
-        (_, total), (mask,) = sides[0], masks
-        return float(np.minimum(total[mask], 1).mean()) if mask.any() else 0.0
-    either = np.count_nonzero(masks[0] | masks[1])
-    return np.count_nonzero(masks[0] & masks[1]) / either if either else 1.0
+def _confidence(share: np.ndarray, sides: list[Votes]) -> float:
+    """How sure a matte is, by how alike what it covers is in the drawing where it is more so, and by how far two
+    drawings agree on it."""
+    inside = share > INSIDE
+    if not inside.any():
+        return float(len(sides) > 1)  # nothing is a matte where both agree on it
+    alike = max(float(np.minimum(total[inside], 1).mean()) for _inside, total in sides)
+    masks = [votes / total > INSIDE for votes, total in sides]
+    both, either = (int(np.count_nonzero(way.reduce(masks))) for way in (np.logical_and, np.logical_or))
+    agreed = both / either if either else 1.0
+    return max(alike - UNLIKE, 0.0) / (1 - UNLIKE) * min(agreed / AGREED, 1.0)
 
 
 def refined(picture: np.ndarray, share: np.ndarray) -> np.ndarray:

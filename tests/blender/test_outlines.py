@@ -184,7 +184,7 @@ def test_the_next_drawing_needed(bpy, chosen):
     assert bpy.ops.shutter.outline_needed() == {"FINISHED"}
     needed = outline_drawings.next_needed(scene, effect, strip, 0)
     assert scene.frame_current == needed.frame in (6, 7, 8)
-    assert (needed.lacking, needed.agreement < 0.8) == (0, True)
+    assert (needed.lacking, needed.confidence < 0.75) == (0, True)
 
 
 def test_what_is_needed_of_one_drawing_or_of_straight_ones(bpy, chosen):
@@ -213,3 +213,42 @@ def test_its_motion_is_that_of_what_it_encloses(bpy, chosen, frames, fields):
     assert np.abs(ways - np.outer(np.arange(9), (4, 0))).max() < 1
     assert found.placement(6).rotation == 0
     np.testing.assert_array_equal(coefficients(strip, effect, 6), before)
+
+
+@pytest.mark.parametrize(
+    ("kind", "strokes"),
+    [
+        ("line", [[[0.28, 0.4], [0.4, 0.5], [0.28, 0.6]]]),
+        ("lasso", [[[0.2, 0.25], [0.55, 0.22], [0.54, 0.75], [0.22, 0.72]]]),
+        ("outline", [[[0.2, 0.25], [0.55, 0.22], [0.54, 0.75], [0.22, 0.72]]]),
+    ],
+)
+def test_outline_it(bpy, edited, kind, strokes):
+    """A stroke through the square, or a rough line around it, becomes its outline at that frame."""
+    from shutter_addon.blender.data import selection
+    from shutter_addon.blender.editing import outline_drawings
+
+    said = {"name": "o", "shutter": "S1", "kind": kind, "strokes": strokes, "width": 0.02}
+    strip, effect = edited(said)
+    selection.choose(strip.id_data, strip)
+    effect.active_shutter = 1
+    strip.id_data.frame_set(5)
+    assert bpy.ops.shutter.outline_it() == {"FINISHED"}
+    assert (effect.regions[0].kind, effect.regions[0].motion) == (
+        "OUTLINE",
+        "LOCATION" if kind != "outline" else "SCALE",
+    )
+    assert 5 in drawn_at(effect)
+    found = outlines.coverage(outline_drawings.curves_now(strip.id_data, effect, strip, 0), WIDTH, HEIGHT) > 0.5
+    expected = covered(4) > 0.5
+    assert np.count_nonzero(found & expected) > 0.9 * np.count_nonzero(found | expected)
+
+
+def test_nothing_to_outline(bpy, edited):
+    from shutter_addon.blender.data import selection
+
+    strip, effect = edited({"name": "o", "shutter": "S1", "kind": "line", "strokes": [[[3, 3]]]})
+    selection.choose(strip.id_data, strip)
+    effect.active_shutter = 1
+    assert bpy.ops.shutter.outline_it() == {"CANCELLED"}
+    assert effect.regions[0].kind == "LINE"

@@ -219,16 +219,16 @@ def test_mattes_are_kept(carried, footage, tmp_path):
     assert (carried(0, 6, 12).read(3) == first[3]).all()
 
 
-def test_agreement_is_kept(carried, footage):
-    """Beside drawings all is agreed; where the last one lies elsewhere, both sides contradict one another."""
+def test_confidence_is_kept(carried, footage):
+    """It is high where the drawings show what lies between them, and low where they show something else."""
     mattes = carried(0, 6)
-    assert mattes.agreement(3) is None
+    assert mattes.confidence(3) is None
     mattes.read(3)
-    assert mattes.agreement(3) == carried(0, 6).agreement(3) > 0.7
-    away = tuple((x * 0.7 + 0.2, y * 0.7) for x, y in drawings(6)[0][1][0])
+    assert mattes.confidence(3) == carried(0, 6).confidence(3) > 0.7
+    away = tuple((x + 0.2, y) for x, y in drawings(6)[0][1][0])
     wrong = carried_mattes.CarriedFile(footage, (*drawings(0), (6, (away,)))).open()
     wrong.read(3)
-    assert wrong.agreement(3) < 0.6
+    assert wrong.confidence(3) < 0.5
 
 
 def test_curves_around_what_is_carried(carried):

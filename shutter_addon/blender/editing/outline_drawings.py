@@ -11,23 +11,25 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core import revision
 from ...core.messages import EffectError
-from ...core.model import outlines
+from ...core.model import outlines, scribbles
 from ...core.model.scribbles import mapped
+from ...media import flow, outlining
 from ..data import annotations, geometry, snapshot, strips
 from ..data.annotations import layer_of
+from ..rendering import effect_source
 from . import region_edits
 
-AGREED = 0.9  # agreement of the two sides from which on no drawing is needed
+SURE = 0.75  # confidence from which on no drawing is needed: an overlap of nine tenths, as a rule
 
 
 class Needed(NamedTuple):
     """Where a drawing is needed most.
 
-    frame: of the timeline; agreement: 0 to 1, of what both sides make of it; lacking: how many frames are not carried
-    yet, of which nobody knows"""
+    frame: of the timeline; confidence: 0 to 1, of its matte; lacking: how many frames are not carried yet, of which
+    nobody knows"""
 
     frame: int | None
-    agreement: float
+    confidence: float
     lacking: int
 
 
@@ -75,6 +77,37 @@ def draw(effect, strip, region, curves: outlines.Curves, frame: int) -> None:
         annotations.add_stroke(drawing, mapped(to_image, np.asarray(points)))
 
 
+def outline_it(scene, effect, strip, index: int) -> bool:
+    """Makes a region the outline of the subject that its strokes run over, or are drawn around, at the current frame;
+    what was drawn at other frames of an outline stays. Whether there is one. EffectError, MediaError: there are no
+    strokes, or no picture."""
+    region, frame = effect.regions[index], scene.frame_current
+    there = snapshot.region_at(scene, effect, strip, index, (frame,))
+    strokes = there.drawings.at(frame) if region.kind == "OUTLINE" else there.at(frame).strokes
+    if not len(strokes):
+        raise EffectError(rpt_("The region has no strokes at the current frame"))
+    shown = snapshot.take(scene, effect, strip, (frame,))
+    with effect_source.open_source(shown) as source:
+        samples = source.read(effect_source.source_index(shown, frame, source)[0])
+        picture = flow.displayed(samples, source.transfer, source.alpha)
+    height, width = outlining.working_shape(picture)
+    encloses = region.kind != "LINE"
+    shape = scribbles.Shape(shutter=0, kind="line", width=region.width, strokes=tuple(strokes))
+    drawn = outlines.coverage(strokes, width, height) > 0.5 if encloses else np.zeros((height, width), bool)
+    if not drawn.any():
+        drawn = scribbles.rasterise([shape], width, height) > 0
+    curves = outlining.proposed(picture, drawn, encloses=encloses)
+    if not curves:
+        return False
+    if region.kind != "OUTLINE":
+        region.kind, region.motion = "OUTLINE", "LOCATION"
+        layer = layer_of(effect, region)
+        for drawing in list(layer.frames):
+            layer.frames.remove(drawing)
+    draw(effect, strip, region, curves, frame)
+    return True
+
+
 def carried_frames(scene, effect, strip, index: int) -> tuple[Any, dict[int, int]]:
     """What gives the mattes of an outline (media.carried_mattes.CarriedFile), and which frames of the source the frames
     of its strip show, by timeline frame. EffectError, MediaError: nothing is carried."""
@@ -84,20 +117,20 @@ def carried_frames(scene, effect, strip, index: int) -> tuple[Any, dict[int, int
 
 
 def next_needed(scene, effect, strip, index: int) -> Needed:
-    """The frame of the strip on which the drawings before and behind it disagree most. EffectError, MediaError: nothing
+    """The frame of the strip at which what is carried between drawings is least sure. EffectError, MediaError: nothing
     is carried."""
     file, shown = carried_frames(scene, effect, strip, index)
     if len(file.drawings) < 2:
         raise EffectError(rpt_("Draw the outline at two frames first"))
     first, last = file.drawings[0][0], file.drawings[-1][0]
     drawn = {frame for frame, _curves in file.drawings}
-    worst, lacking = Needed(frame=None, agreement=AGREED, lacking=0), 0
+    worst, lacking = Needed(frame=None, confidence=SURE, lacking=0), 0
     with closing(file.open()) as mattes:
         for frame, number in shown.items():
             if number in drawn or not first < number < last:
                 continue
-            agreement = mattes.agreement(number)
-            lacking += agreement is None
-            if agreement is not None and agreement < worst.agreement:
-                worst = Needed(frame=frame, agreement=agreement, lacking=0)
+            confidence = mattes.confidence(number)
+            lacking += confidence is None
+            if confidence is not None and confidence < worst.confidence:
+                worst = Needed(frame=frame, confidence=confidence, lacking=0)
     return worst._replace(lacking=lacking)

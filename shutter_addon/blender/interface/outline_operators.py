@@ -11,7 +11,7 @@ from ..data import selection
 from ..editing import outline_drawings, track_region
 from ..rendering import outline_carrying
 from ..rendering.effect_source import FAULTS
-from .operator_bases import Mixin, OfRegion, redraw, refused
+from .operator_bases import Mixin, OfRegion, OfStrokes, redraw, refused
 from .preview import show_carried
 
 _TICK = 0.1  # seconds from one look at what is carried to the next
@@ -104,7 +104,7 @@ class SHUTTER_OT_outline_carry(_Carries, _OfOutline, Operator):
 
 
 class SHUTTER_OT_outline_needed(_Carries, _OfOutline, Operator):
-    """Go to the frame where the drawings before and behind it disagree most, carrying the outline first"""
+    """Go to the frame between two drawings at which the outline is least sure, carrying it first"""
 
     bl_idname = "shutter.outline_needed"
     bl_label = "Next Drawing Needed"
@@ -113,11 +113,11 @@ class SHUTTER_OT_outline_needed(_Carries, _OfOutline, Operator):
         scene, effect, strip = selection.active(context)
         needed = outline_drawings.next_needed(scene, effect, strip, effect.active_region)
         if needed.frame is None:
-            self.report({"INFO"}, rpt_("The drawings agree by 90 % or more at all frames between them"))
+            self.report({"INFO"}, rpt_("The outline is sure by 75 % or more at all frames between its drawings"))
             return {"CANCELLED"}
         scene.frame_set(needed.frame)
-        sentence = rpt_("Frame {frame}: the drawings before and behind it agree by {share:.0f} %")
-        self.report({"INFO"}, sentence.format(frame=needed.frame, share=100 * needed.agreement))
+        sentence = rpt_("Frame {frame}: the outline is sure by {share:.0f} %")
+        self.report({"INFO"}, sentence.format(frame=needed.frame, share=100 * needed.confidence))
         redraw(context)
         return {"FINISHED"}
 
@@ -143,4 +143,23 @@ class SHUTTER_OT_outline_draw(_OfOutline, Operator):
         return None
 
 
-classes = (SHUTTER_OT_outline_carry, SHUTTER_OT_outline_needed, SHUTTER_OT_outline_draw)
+class SHUTTER_OT_outline_it(OfStrokes, Operator):
+    """Make the active region an outline of the subject that its strokes run over, or go around, at this frame"""
+
+    bl_idname = "shutter.outline_it"
+    bl_label = "Outline It"
+    only_seen = True
+
+    def change(self, context, effect):
+        scene, _effect, strip = selection.active(context)
+        try:
+            if not outline_drawings.outline_it(scene, effect, strip, effect.active_region):
+                self.report({"WARNING"}, "No subject is told from what is around it")
+                return {"CANCELLED"}
+        except FAULTS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return None
+
+
+classes = (SHUTTER_OT_outline_carry, SHUTTER_OT_outline_needed, SHUTTER_OT_outline_draw, SHUTTER_OT_outline_it)

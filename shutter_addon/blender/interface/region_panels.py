@@ -48,6 +48,8 @@ class Regions(WithEffect):
             layout.prop(region, "ramp")
         elif region.kind == "MATTE":
             _draw_matte(layout, matte_look.look(scene, effect, strip, region), region)
+        if region.kind not in strips.MATTES:
+            layout.operator("shutter.outline_it")
         if region.kind not in strips.LAID:
             layout.prop(region, "opacity")
         else:

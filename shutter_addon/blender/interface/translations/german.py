@@ -402,9 +402,8 @@ MESSAGES = {
     ("Operator", "Next Drawing Needed"): "Nächste nötige Zeichnung",
     (
         "*",
-        "Go to the frame where the drawings before and behind it disagree most, carrying the outline first",
-    ): "Zum Frame gehen, in dem die Zeichnungen davor und dahinter am wenigsten übereinstimmen; der Umriss wird vorher"
-    " mitgeführt",
+        "Go to the frame between two drawings at which the outline is least sure, carrying it first",
+    ): "Zum Frame zwischen zwei Zeichnungen gehen, in dem der Umriss am unsichersten ist; er wird vorher mitgeführt",
     ("Operator", "Insert Outline Drawing"): "Umrisszeichnung einfügen",
     (
         "*",
@@ -412,18 +411,26 @@ MESSAGES = {
     ): "Den Umriss, der zum aktuellen Frame mitgeführt ist, zu einer eigenen Zeichnung machen, um ihn auszubessern",
     (
         "*",
-        "Frame {frame}: the drawings before and behind it agree by {share:.0f} %",
-    ): "Frame {frame}: Die Zeichnungen davor und dahinter stimmen zu {share:.0f} % überein",
+        "Frame {frame}: the outline is sure by {share:.0f} %",
+    ): "Frame {frame}: Der Umriss ist zu {share:.0f} % sicher",
     (
         "*",
-        "The drawings agree by 90 % or more at all frames between them",
-    ): "Die Zeichnungen stimmen in allen Frames dazwischen zu 90 % oder mehr überein",
+        "The outline is sure by 75 % or more at all frames between its drawings",
+    ): "Der Umriss ist in allen Frames zwischen seinen Zeichnungen zu 75 % oder mehr sicher",
     ("*", "Draw the outline at two frames first"): "Zeichnen Sie den Umriss zuerst in zwei Frames",
     ("*", "The outline encloses nothing at the current frame"): "Der Umriss umschließt im aktuellen Frame nichts",
     ("*", "The region is no outline"): "Die Region ist kein Umriss",
     ("*", 'strip "{strip}" is scaled to nothing'): "Streifen „{strip}“ ist zu nichts skaliert",
     ("*", "{place}: a straight outline is not carried"): "{place}: Ein gerader Umriss wird nicht mitgeführt",
     ("Operator", "Mend Outline"): "Umriss ausbessern",
+    ("Operator", "Outline It"): "Umreißen",
+    (
+        "*",
+        "Make the active region an outline of the subject that its strokes run over, or go around, at this frame",
+    ): "Die aktive Region zum Umriss des Motivs machen, über das ihre Striche in diesem Frame laufen oder das sie"
+    " umgeben",
+    ("*", "No subject is told from what is around it"): "Kein Motiv hebt sich von dem ab, was darum herum ist",
+    ("*", "The region has no strokes at the current frame"): "Die Region hat im aktuellen Frame keine Striche",
     ("*", "the outline encloses nothing here"): "der Umriss umschließt hier nichts",
     ("*", "Width"): "Breite",
     ("*", "Width of the lines as a fraction of the picture's height"): "Breite der Linien als Bruchteil der Bildhöhe",

@@ -1,0 +1,82 @@
+"""A proposal of an outline, by colours: of what a stroke runs over, or what a lasso is drawn around.
+
+GrabCut (Rother et al. 2004) tells the colours of the subject from those around it, and keeps to edges.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core.model.outlines import Curves
+from .carrying import working_size
+from .errors import MediaError
+from .outline_tracing import traced
+
+try:
+    import cv2
+except ImportError:  # a package without wheels; the extension registers without it
+    cv2 = None
+
+ROUNDS = 6
+# Of what is drawn: beyond that it is no subject; within that it may be; of a lasso, so deep inside it surely is.
+REACH, NEAR, DEEP = 1.0, 0.15, 0.6
+MARGIN = 0.06  # of a lasso's size, by which it may have missed the subject
+
+
+def working_shape(picture: np.ndarray) -> tuple[int, int]:
+    """Height and width in which strokes are given, and colours compared."""
+    width, height = working_size(*picture.shape[1::-1])
+    return height, width
+
+
+def proposed(picture: np.ndarray, drawn: np.ndarray, *, encloses: bool) -> Curves:
+    """Curves (core.model.outlines) around the subject of a picture (H, W, 3) uint8; none where it has none.
+
+    drawn: (h, w) bool, working_shape's: what strokes cover, or what they enclose
+    MediaError: OpenCV is missing."""
+    if cv2 is None:
+        raise MediaError(
+            "outlines are proposed by the Python package opencv-contrib-python-headless; "
+            "install the zip of Virtual Shutter that is made for your system"
+        )
+    if not drawn.any():
+        return ()
+    small = cv2.resize(picture, drawn.shape[::-1], interpolation=cv2.INTER_AREA)
+    labels = _enclosed(drawn) if encloses else _along(drawn)
+    cv2.setRNGSeed(0)  # the same proposal again
+    models = np.zeros((1, 65)), np.zeros((1, 65))
+    cv2.grabCut(np.ascontiguousarray(small), labels, None, *models, ROUNDS, cv2.GC_INIT_WITH_MASK)
+    inside = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD)).astype(np.uint8)
+    _, parts = cv2.connectedComponents(inside)
+    inside &= np.isin(parts, parts[drawn]).astype(np.uint8)  # what is apart from what is drawn is something else
+    for way in (cv2.MORPH_OPEN, cv2.MORPH_CLOSE):
+        inside = cv2.morphologyEx(inside, way, np.ones((3, 3), np.uint8))
+    return traced(inside.astype(np.float32), off=0.75)
+
+
+def _along(drawn: np.ndarray) -> np.ndarray:
+    """GrabCut's labels (h, w) uint8 of a subject that a stroke runs over."""
+    away = cv2.distanceTransform((~drawn).astype(np.uint8), cv2.DIST_L2, 3)
+    reach = max(REACH * _extent(drawn), NEAR * len(drawn))
+    labels = np.full(drawn.shape, cv2.GC_BGD, np.uint8)
+    labels[away < reach] = cv2.GC_PR_BGD
+    labels[away < NEAR * reach] = cv2.GC_PR_FGD
+    labels[drawn] = cv2.GC_FGD
+    return labels
+
+
+def _enclosed(drawn: np.ndarray) -> np.ndarray:
+    """GrabCut's labels (h, w) uint8 of a subject that a lasso is drawn around."""
+    margin = max(3, round(MARGIN * _extent(drawn)))
+    around = cv2.dilate(drawn.astype(np.uint8), np.ones((2 * margin + 1,) * 2, np.uint8)) > 0
+    deep = cv2.distanceTransform(drawn.astype(np.uint8), cv2.DIST_L2, 3)
+    labels = np.full(drawn.shape, cv2.GC_BGD, np.uint8)
+    labels[around] = cv2.GC_PR_BGD
+    labels[drawn] = cv2.GC_PR_FGD
+    labels[deep > DEEP * deep.max()] = cv2.GC_FGD
+    return labels
+
+
+def _extent(drawn: np.ndarray) -> int:
+    """The larger side of the box around it, in pixels."""
+    return max(int(np.ptp(np.flatnonzero(drawn.any(axis=axis)))) + 1 for axis in (0, 1))
