@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from OpenImageIO import ImageBuf
 from support import recipe, request, write_frames
 
 from shutter_addon.core.frames import light
@@ -252,3 +253,22 @@ def test_nothing_to_outline(bpy, edited):
     effect.active_shutter = 1
     assert bpy.ops.shutter.outline_it() == {"CANCELLED"}
     assert effect.regions[0].kind == "LINE"
+
+
+@pytest.mark.parametrize(("word", "levels"), [("PNG", 65535), ("EXR", 1)])
+def test_export(bpy, chosen, tmp_path, word, levels):
+    """A picture for each frame of the strip, by its number, with what the matte shows there; or none."""
+    strip, effect = chosen(1, 9)
+    expected = {frame: coefficients(strip, effect, frame) for frame in (1, 5, 12)}
+    folder = tmp_path / "mattes"
+    assert bpy.ops.shutter.matte_export(directory=str(folder), format=word) == {"FINISHED"}
+    files = sorted(folder.iterdir())
+    assert [file.name for file in files] == [f"{frame:04d}.{word.lower()}" for frame in range(1, COUNT + 1)]
+    for frame, values in expected.items():
+        image = ImageBuf(str(folder / f"{frame:04d}.{word.lower()}"))
+        assert image.nchannels == 1
+        np.testing.assert_allclose(image.get_pixels("float")[..., 0], values, atol=0.51 / 65535 if levels > 1 else 1e-6)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RuntimeError, match="file"):
+        bpy.ops.shutter.matte_export(directory=str(tmp_path / "file"), format=word)
+    assert sorted(path.name for path in tmp_path.iterdir() if path.name != "mattes") == ["file"]

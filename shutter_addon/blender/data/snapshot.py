@@ -190,6 +190,12 @@ def region_at(scene, effect, strip, index: int, frames: Frames) -> Any:
     return _any_region(_Sampling.of(Curves(scene), effect, strip, frames), index, 0)
 
 
+def matte_content_at(scene, effect, strip, index: int, frames: Frames) -> keyframes.Channel:
+    """The content of a region that is a matte, an outline too, sampled at timeline frames; as region_at."""
+    region: Any = _any_region(_Sampling.of(Curves(scene), effect, strip, frames), index, 0)
+    return region.content
+
+
 def carried_outline(scene, effect, strip, index: int, frames: Frames) -> tuple[Any, dict[float, int]]:
     """What gives the mattes of an outline (a media.carried_mattes.CarriedFile), and which of the source's filmed frames
     timeline frames show. EffectError, MediaError: it is straight, or has no source."""

@@ -1,5 +1,7 @@
 """Operators that make regions of mattes, ramps and time maps."""
 
+from pathlib import Path
+
 import bpy
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -14,7 +16,9 @@ from ...media import MediaError
 from ..data import matte_strips, recipe_import, selection, strips
 from ..data.choices import RAMPS
 from ..editing import region_edits, time_map
-from .operator_bases import OfShutter, chosen_file, has_room, refused
+from ..output import matte_export
+from ..rendering.effect_source import FAULTS
+from .operator_bases import OfRegion, OfShutter, chosen_file, has_room, refused
 
 
 class _AddsRegion(OfShutter):
@@ -103,6 +107,45 @@ class SHUTTER_OT_matte_mask(_AddsRegion, Operator):
         region_edits.add_matte(effect, selection.active_shutter(effect), name=mask.name, matte="MASK", mask=mask)
 
 
+class SHUTTER_OT_matte_export(OfRegion, ImportHelper, Operator):
+    """Write what the active matte or outline shows at each frame of its strip as pictures, for any other program"""
+
+    bl_idname = "shutter.matte_export"
+    bl_label = "Export Matte"
+    bl_options = {"REGISTER"}
+
+    directory: StringProperty(name="Folder", subtype="DIR_PATH", options={"SKIP_SAVE"})
+    format: EnumProperty(
+        name="Format",
+        description="What the pictures are",
+        items=(("PNG", "PNG", "Grey, 16 bits"), ("EXR", "OpenEXR", "Float, in the channel Y")),
+    )
+    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+
+    @classmethod
+    def possible(cls, effect):
+        if not super().possible(effect):
+            return False
+        return selection.active_region(effect).kind in strips.LAID or refused(
+            cls, rpt_("The region is no matte, ramp or outline")
+        )
+
+    def change(self, context, effect):
+        scene, _effect, strip = selection.active(context)
+        folder = Path(bpy.path.abspath(self.directory or str(Path(self.filepath).parent)))
+        try:
+            region, word = selection.active_region(effect), self.format.lower()
+            count = matte_export.save(scene, effect, strip, region, folder, word)
+        except FAULTS as error:
+            raise EffectError(str(error)) from None
+        except OSError as error:
+            sentence = f"{folder}: {error.strerror or error}"
+            self.report({"ERROR"}, sentence)
+            return {"CANCELLED"}
+        self.report({"INFO"}, rpt_('Saved {count} pictures in "{folder}"').format(count=count, folder=folder))
+        return None
+
+
 class SHUTTER_OT_ramp_add(_AddsRegion, Operator):
     """Make a ramp across the picture the matte of the active shutter"""
 
@@ -135,6 +178,7 @@ classes = (
     SHUTTER_OT_matte_add,
     SHUTTER_OT_matte_strip,
     SHUTTER_OT_matte_mask,
+    SHUTTER_OT_matte_export,
     SHUTTER_OT_ramp_add,
     SHUTTER_OT_time_map,
 )

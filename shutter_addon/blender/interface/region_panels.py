@@ -84,6 +84,7 @@ def _draw_blend(layout, region) -> None:
         row = layout.row()
         row.active = name != "blend" or not region.is_layer  # a layer lies before all of them
         row.prop(region, name)
+    layout.operator("shutter.matte_export")
 
 
 def draw_tracking(layout, index: int | None) -> None:

@@ -1,4 +1,5 @@
-"""Mattes of an effect for its recipe: files by their path, strips and masks as pictures written beside the recipe."""
+"""Mattes of an effect as pictures: for its recipe, which points to files and has strips and masks written beside it;
+and for other programs."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from ...core import atomic_write
 from ...core.messages import EffectError, translated
 from ...core.model import mattes
 from ...core.recipes import recipe
-from ...media.image_writing import write_grey
+from ...media.image_writing import write_exr, write_grey
 from ...media.matte_values import MatteValues
 from ...media.sequence import ImageFiles
 from ..data import matte_content, matte_strips, recipe_export, snapshot, source_media, strips, validation
@@ -33,6 +34,19 @@ def recipe_for(scene, effect, strip, path: Path) -> recipe.Recipe:
     _spare(folders, _read(scene, effect, strip, regions))
     words = [_words(scene, effect, strip, *both, path) for both in zip(regions, folders, strict=True)]
     return recipe_export.recipe_of(scene, effect, strip, words)
+
+
+def save(scene, effect, strip, region, folder: Path, word: str) -> int:
+    """Writes what a matte, a ramp or an outline shows at each timeline frame of the effect strip: FRAME.png, grey of 16
+    bits, or FRAME.exr, float, its channel Y. All of them are written or none; how many they are. One of
+    effect_source.FAULTS: the matte cannot be read, or the pictures cannot be written. OSError: nor their folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    _spare([folder], _read(scene, effect, strip, strips.matte_regions(effect)))
+    with atomic_write.part_folder(folder) as part:
+        frames = [frame for frame, _key in _write_frames(scene, effect, strip, region, part, word)]
+        for frame in frames:
+            os.replace(part / _name(frame, word), folder / _name(frame, word))
+    return len(frames)
 
 
 def _ramp(region) -> recipe.RampRegion:
@@ -91,30 +105,33 @@ def _write(scene, effect, strip, region, folder: Path) -> Path:
     them; the first one's path."""
     folder.mkdir(parents=True, exist_ok=True)
     with atomic_write.part_folder(folder) as part:
-        keys = _write_frames(scene, effect, strip, region, part)
-        kept = 1 if len(set(keys)) == 1 else len(keys)
-        for number in range(1, kept + 1):
-            os.replace(part / _name(number), folder / _name(number))
+        written = list(_write_frames(scene, effect, strip, region, part))
+        kept = 1 if len({key for _frame, key in written}) == 1 else len(written)
+        for number, (frame, _key) in enumerate(written[:kept], 1):
+            os.replace(part / _name(frame), folder / _name(number))
     for file in folder.glob("[0-9]*.png"):  # of a longer film, exported before
         if file.stem.isdecimal() and int(file.stem) > kept:
             file.unlink()
     return folder / _name(1)
 
 
-def _name(number: int) -> str:
-    return f"{number:04d}.png"
+def _name(number: int, word: str = "png") -> str:
+    return f"{number:04d}.{word}"
 
 
-def _write_frames(scene, effect, strip, region, folder: Path) -> list:
-    """Writes what a matte shows at each timeline frame of the effect strip; a key for each, equal for equal ones."""
-    frames, keys = range(strip.left_handle, strip.right_handle), []
+def _write_frames(scene, effect, strip, region, folder: Path, word: str = "png") -> Iterator[tuple[int, Any]]:
+    """Writes what a matte shows at each timeline frame of the effect strip: gives the frame, and a key that is equal
+    for equal ones."""
+    frames = range(strip.left_handle, strip.right_handle)
     shown = snapshot.take(scene, effect, strip, frames)
-    content = snapshot.region_at(scene, effect, strip, list(effect.regions).index(region), frames).content
+    content = snapshot.matte_content_at(scene, effect, strip, list(effect.regions).index(region), frames)
     with closing(effect_source.open_source(shown)) as source, closing(MatteValues.of(source)) as values:
-        for number, frame in enumerate(frames, 1):
+        for frame in frames:
             with translated(rpt_):
                 matte = mattes.Matte(shutter=0, content=content.at(frame))
             ((key, array),) = values.values((matte,), effect_source.source_index(shown, frame, source)[0], 1)
-            keys.append(key)
-            write_grey(folder / _name(number), array)
-    return keys
+            if word == "exr":
+                write_exr(folder / _name(frame, word), array[..., None], ["Y"])
+            else:
+                write_grey(folder / _name(frame, word), array)
+            yield frame, key
