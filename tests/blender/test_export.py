@@ -115,10 +115,22 @@ def mattes(draw, names):
 
 
 @st.composite
+def outlines(draw, names):
+    """Drawn once or several times, on whole frames."""
+    region = draw(regions(names))
+    fields = {"between": draw(st.sampled_from(["carried", "straight"])), "invert": draw(st.booleans())}
+    fields |= {"opacity": draw(numbers(0, 1) | value_keys(0, 1)), "width": draw(numbers(0, 1) | value_keys(0, 1))}
+    fields |= {"blend": draw(st.sampled_from(["over", "add"])), "layer": region.layer, "keys": region.keys}
+    fields |= {"shutter": region.shutter, "name": region.name, "strokes": region.strokes}
+    return recipes.OutlineRegion(kind="outline", **fields)
+
+
+@st.composite
 def following_recipes(draw, longest=6):
     """Recipes with mattes, whose shutters follow the camera, or regions, which have names of their own."""
     found = draw(valid_recipes(longest))
-    laid = draw(st.lists(mattes([shutter.name for shutter in found.shutters]), max_size=2))
+    names = [shutter.name for shutter in found.shutters]
+    laid = draw(st.lists(mattes(names) | outlines(names), max_size=2))
     regions_ = draw(st.permutations([*found.regions, *laid]))
     named = [dataclasses.replace(region, name=f"{region.name[:9]}{i}") for i, region in enumerate(regions_)]
     followed = st.sampled_from([None, recipes.CAMERA, *(region.name for region in named)])
