@@ -75,17 +75,17 @@ class PartPursuit:
             return None
         self._speed = sighting.motion.after(self._known.inverse()) if not missed else Similarity()
         self._known, self._seen, self._missed = sighting.motion, (picture, *sighting[:2]), 0
-        return Sighting(sighting.motion, self._trusted(picture, sighting))
+        return Sighting(sighting.motion, self._trusted(picture, sighting, goes_on=not missed))
 
-    def _trusted(self, picture: np.ndarray, sighting: Sighting) -> float:
+    def _trusted(self, picture: np.ndarray, sighting: Sighting, goes_on: bool) -> float:
         """How sure it is that it is there. A comparison with how it looked first tells that by itself. Others tell that
         what was followed goes on: so does what has slipped onto something else, but not onto what looked like it
-        shortly before."""
+        shortly before. goes_on: it was found in the picture before."""
         before, motion = self._found[0]
         alike = self._first.likeness(before, motion, picture, sighting.motion)
         steady = float(np.clip((alike - _OTHER) / (_STEADY - _OTHER), 0, 1))
         kept = _KEPT * self._trust * steady * min(sighting.step / _STEP, 1.0)
-        self._trust = max(kept, sighting.confidence)
+        self._trust = max(kept if goes_on else 0.0, sighting.confidence)
         self._found.append((picture, sighting.motion))
         return self._trust
 

@@ -225,6 +225,27 @@ def test_mattes(noise, check, tmp_path, plant, sentence):
     assert sentence in found[0]
 
 
+def test_outlines(noise, check, tmp_path, monkeypatch):
+    """Whose mattes are not carried yet: nothing is carried for this, their number is told, and room is asked for."""
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.media import carrying
+
+    scene, effect, strip = now()
+    box = [[[0.2, 0.2], [0.6, 0.2], [0.4, 0.7]]]
+    keys = [{"frame": frame, "strokes": box} for frame in (1, FRAMES)]
+    region = {"name": "o", "shutter": "S1", "kind": "outline", "strokes": box, "keys": keys}
+    given = recipe(2, [1, 1], [0, 1], regions=[region])
+    recipe_import.apply(scene, effect, strip, recipe_file.parse(json.dumps(given)))
+    monkeypatch.setattr(carrying, "carried", None)
+    code, sentences, report = check()
+    assert (code, sentences) == (0, [])
+    assert f"{FRAMES} mattes of outlines are not carried yet" in " ".join(report["notes"])
+    monkeypatch.setattr("shutter_addon.blender.output.output_space.free", lambda _folder: 10)
+    code, sentences, _report = check()
+    assert code == 2
+    assert "mattes of outlines may take" in sentences[0]
+
+
 def test_a_mask_and_a_strip_that_are_gone(noise, check, tmp_path):
     _matte(tmp_path)
     now()[1].regions[0].matte = "MASK"

@@ -213,6 +213,7 @@ def test_its_motion_is_that_of_what_it_encloses(bpy, chosen, frames, fields):
     ways = (np.array(centres) - centres[0]) * (WIDTH, HEIGHT)
     assert np.abs(ways - np.outer(np.arange(9), (4, 0))).max() < 1
     assert found.placement(6).rotation == 0
+    assert found.opacity.at(12) == 1, "a matte says itself where it is"
     np.testing.assert_array_equal(coefficients(strip, effect, 6), before)
 
 

@@ -189,6 +189,9 @@ def _disk(arguments, scene, frames: range, checks: list[EffectCheck], faults: li
     if arguments.movie:
         needs.append(Need(arguments.movie.parent, 0, "the movie"))
     needs += [Need(each.folder, each.bytes, "in-between frames") for each in checks if each.folder and each.missing]
+    for each in checks:
+        size = each.size[0] * each.size[1]
+        needs += [Need(folder, size * count, "mattes of outlines") for folder, count in each.mattes.items() if count]
     faults += output_space.faults(needs)
     return {
         "format": file_format,

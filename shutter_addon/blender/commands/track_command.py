@@ -61,7 +61,8 @@ def run(arguments) -> None:
         size = medium.width, medium.height
     placements = {frame: step.placement for frame, step in tracked.items()}
     with_keys = _keyed(source_recipe, index, placements, {arguments.frame}, size, thin=not arguments.all_keys)
-    if not arguments.hold:
+    has_matte = index is not None and isinstance(source_recipe.regions[index], recipe.OutlineRegion)
+    if not (arguments.hold or has_matte):  # a matte says itself where it is
         with_keys = _ended(with_keys, index, tracked, stops, arguments.frame, range(first, last + 1))
     _write_track(arguments, with_keys, tracked, stops)
     for stop in stops:

@@ -4,6 +4,7 @@ Annotations have no key types in Blender 5.2: a drawing that was made and one's 
 """
 
 from contextlib import closing
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from ...core.messages import EffectError
 from ...core.model import outlines, scribbles
 from ...core.model.scribbles import mapped
 from ...media import flow, outlining
+from ...media.carried_mattes import CarriedFile, CarriedMattes
 from ..data import annotations, geometry, snapshot, strips
 from ..data.annotations import layer_of
 from ..rendering import effect_source
@@ -47,8 +49,13 @@ def curves_now(scene, effect, strip, index: int) -> outlines.Curves:
     if not strips.is_carried(effect.regions[index]):
         return outlines.curves(snapshot.strokes_at(scene, effect, strip, index, frame))
     file, shown = snapshot.carried_outline(scene, effect, strip, index, (frame,))
-    with closing(file.open()) as mattes:
+    with closing(_opened(file)) as mattes:
         return mattes.curves(min(shown[frame], mattes.count - 1))
+
+
+@lru_cache(1)  # to open a movie at each frame that is passed would be slow; it is opened again where it is read
+def _opened(file: CarriedFile) -> CarriedMattes:
+    return file.open()
 
 
 def shown_curves(scene, effect, strip, index: int) -> outlines.Curves:

@@ -201,9 +201,11 @@ def _track(effect, index: int | None) -> tuple[list[int], list[presence.Stop]]:
 
 
 def key_ends(effect, index: int | None) -> None:
-    """Keys how much it counts by where its track ends, or takes such keys back."""
+    """Keys how much it counts by where its track ends, or takes such keys back; an outline's matte itself says where it
+    is."""
     keys, (seen, stops), fades = MotionKeys(effect, index, "SCALE"), _track(effect, index), []
-    if selection.moving(effect, index).track_ends and seen:
+    has_matte = index is not None and effect.regions[index].kind in strips.LAID
+    if selection.moving(effect, index).track_ends and seen and not has_matte:
         if index is None:
             fades = presence.keys(seen, stops, (), _reach(effect), beside=1)
         else:

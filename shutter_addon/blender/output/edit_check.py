@@ -4,7 +4,7 @@ import math
 import os
 import re
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from ...core.messages import UserError
 from ...core.model.frame_state import FrameState
 from ...core.model.mattes import FileFrame
 from ...media import MediaError, cuts
+from ...media.carried_mattes import CarriedMattes
 from ...media.files import check_file
 from ..data import requirements, snapshot, source_media, strips
 from ..rendering import effect_source, job_snapshots
@@ -38,6 +39,7 @@ class EffectCheck:
     missing: those of them that are not built, each by its first source frame, from 1 on
     lacking: the timeline frames that need these
     folder: of its in-between frames, None: it has none; bytes: what those that are missing take at most
+    mattes: how many mattes of outlines are to be carried first, by the folder that they are kept in
     needs: memory for a frame, None: its frames cannot be asked for
     faults, notes: sentences; notes are of what can be rendered, but otherwise than one may think"""
 
@@ -54,6 +56,7 @@ class EffectCheck:
     lacking: set[int] = field(default_factory=set)
     folder: Path | None = None
     bytes: int = 0
+    mattes: dict[Path, int] = field(default_factory=dict)
     needs: memory_needs.Needs | None = None
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -207,12 +210,17 @@ def _look_at_mattes(check: EffectCheck, source, requests: dict[float, Request]) 
         of_layers = layers.mattes[request.index - layers.first] if layers else ()
         for matte in (*request.state.mattes, *filter(None, of_layers)):
             if isinstance(matte.content, FileFrame):
-                shown.setdefault(matte.content.file, {})[matte.content] = request.index // source.step
+                shown.setdefault(matte.content.file, set()).add((matte.content, request.index // source.step))
     for file, contents in shown.items():
         try:
-            with file.open() as medium:
-                indices = {content.index(medium, index) for content, index in contents.items()}
-                check.faults += _unreadable(medium, {min(max(index, 0), medium.count - 1) for index in indices})
+            with closing(file.open()) as medium:
+                indices = {content.index(medium, index) for content, index in contents}
+                indices = {min(max(index, 0), medium.count - 1) for index in indices}
+                if isinstance(medium, CarriedMattes):
+                    lacking = sum(not medium.has(index) for index in indices)
+                    check.mattes[file.folder] = check.mattes.get(file.folder, 0) + lacking
+                else:
+                    check.faults += _unreadable(medium, indices)
         except UserError as error:
             check.faults.append(str(error))
 
@@ -221,6 +229,8 @@ def _notes(check: EffectCheck, requests: dict[float, Request]) -> list[str]:
     notes = []
     if (package := cuts.missing_package()) and any(each.state.options.stop_at_cuts for each in requests.values()):
         notes.append(f"no cuts are found, and exposures run across them: the Python package {package} is missing")
+    if lacking := sum(check.mattes.values()):
+        notes.append(f"{lacking} mattes of outlines are not carried yet: the first render does that, frame by frame")
     if check.needs and check.needs.sends:
         notes.append("the GPU has no room for all frames of an exposure: every picture sends them anew, which is slow")
     return notes
