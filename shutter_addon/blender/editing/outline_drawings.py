@@ -27,12 +27,10 @@ SURE = 0.75  # confidence from which on no drawing is needed: an overlap of nine
 class Needed(NamedTuple):
     """Where a drawing is needed most.
 
-    frame: of the timeline; confidence: 0 to 1, of its matte; lacking: how many frames are not carried yet, of which
-    nobody knows"""
+    frame: of the timeline, None: nowhere; confidence: 0 to 1, of its matte"""
 
     frame: int | None
     confidence: float
-    lacking: int
 
 
 _shown = revision.UntilChange()
@@ -124,20 +122,19 @@ def carried_frames(scene, effect, strip, index: int) -> tuple[Any, dict[int, int
 
 
 def next_needed(scene, effect, strip, index: int) -> Needed:
-    """The frame of the strip at which what is carried between drawings is least sure. EffectError, MediaError: nothing
-    is carried."""
+    """The frame of the strip at which the outline is least sure between two drawings, of those to which it is carried.
+    EffectError, MediaError: nothing is carried."""
     file, shown = carried_frames(scene, effect, strip, index)
     if len(file.drawings) < 2:
         raise EffectError(rpt_("Draw the outline at two frames first"))
     first, last = file.drawings[0][0], file.drawings[-1][0]
     drawn = {frame for frame, _curves in file.drawings}
-    worst, lacking = Needed(frame=None, confidence=SURE, lacking=0), 0
+    worst = Needed(frame=None, confidence=SURE)
     with closing(file.open()) as mattes:
         for frame, number in shown.items():
             if number in drawn or not first < number < last:
                 continue
             confidence = mattes.confidence(number)
-            lacking += confidence is None
             if confidence is not None and confidence < worst.confidence:
-                worst = Needed(frame=frame, confidence=confidence, lacking=0)
-    return worst._replace(lacking=lacking)
+                worst = Needed(frame=frame, confidence=confidence)
+    return worst

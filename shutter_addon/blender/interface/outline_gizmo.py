@@ -30,10 +30,10 @@ class SHUTTER_GT_outline(Gizmo):
     def draw(self, context):
         if context.screen.is_animation_playing:
             return
-        seen, curves = selection.in_picture(context), _curves(context)
-        if seen is None or not curves:
+        if not (curves := _curves(context)):
             return
-        matrix = _to_region(context, seen[1], seen[2])
+        _scene, effect, strip = selection.in_picture(context)
+        matrix = _to_region(context, effect, strip)
         for points in self.mended() if self.is_modal else curves:
             width = 2 if self.is_highlight or self.is_modal else 1
             drawing.lines(mapped(matrix, np.array(points)), _CARRIED, closed=True, width=width)
@@ -86,7 +86,9 @@ class SHUTTER_GT_outline(Gizmo):
 
 def _curves(context) -> outlines.Curves:
     """The active outline's at the current frame, where it is seen."""
-    scene, effect, strip = selection.in_picture(context)
+    if (seen := selection.in_picture(context)) is None:  # while it plays, it may just have gone
+        return ()
+    scene, effect, strip = seen
     try:
         return outline_drawings.shown_curves(scene, effect, strip, effect.active_region)
     except UserError:  # panels and the live preview tell it
