@@ -21,7 +21,7 @@ from ..core.frames.frame_source import FrameSource
 from ..core.model import outlines, scribbles
 from . import carrying, flow
 from .cuts import ShotSource
-from .errors import MediaError
+from .errors import MediaError, lacks_opencv
 from .files import check_name
 from .image_writing import write_levels
 from .inbetween_cache import identity, manifest_key
@@ -64,10 +64,7 @@ class CarriedFile:
     def open(self) -> CarriedMattes:
         """MediaError: the footage cannot be read, or OpenCV is missing."""
         if not carrying.is_possible():
-            raise MediaError(
-                "outlines are carried by the Python package opencv-contrib-python-headless; "
-                "install the zip of Virtual Shutter that is made for your system"
-            )
+            raise lacks_opencv("outlines are carried by")
         return CarriedMattes(self.footage.open(), self.drawings, self.folder)
 
 

@@ -112,7 +112,7 @@ def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: r
         stopping.check()
         places = [footage.best(joined.pop((end.frame, frame)), frame, end) for end in ends]
         covers = [_at(end.cover, there) for end, there in zip(ends, places, strict=True)]
-        box = _box(np.maximum.reduce(covers))
+        box = box_around(np.maximum.reduce(covers))
         sides = [
             _votes(footage.colors[frame], _at(footage.colors[end.frame], there), cover, box)
             for end, there, cover in zip(ends, places, covers, strict=True)
@@ -130,7 +130,7 @@ def drawn(picture: np.ndarray, cover: np.ndarray) -> np.ndarray:
 
     picture: (H, W, 3) uint8; cover: see Drawing"""
     shown = _lab(_small(picture, cover.shape[::-1]))
-    return _levels(refined(picture, _mixed([_votes(shown, shown, cover, _box(cover))], [1.0])))
+    return _levels(refined(picture, _mixed([_votes(shown, shown, cover, box_around(cover))], [1.0])))
 
 
 def _levels(matte: np.ndarray) -> np.ndarray:
@@ -259,8 +259,8 @@ def _votes(shown: np.ndarray, colors: np.ndarray, cover: np.ndarray, box: Box | 
     return inside, total
 
 
-def _box(cover: np.ndarray, reach: int = REACH) -> Box | None:
-    """The rows and columns within reach of what a matte covers; None: it covers nothing."""
+def box_around(cover: np.ndarray, reach: int = REACH) -> Box | None:
+    """The rows and columns within reach, in pixels, of what a matte (h, w) covers; None: it covers nothing."""
     places = [np.flatnonzero(cover.max(axis=axis) > 0) for axis in (1, 0)]
     if not places[0].size:
         return None
@@ -294,7 +294,7 @@ def refined(picture: np.ndarray, share: np.ndarray) -> np.ndarray:
     height, width = picture.shape[:2]
     scale = width / share.shape[1]
     matte = np.zeros((height, width), np.float32)
-    if (box := _box(share, EXPLAINING[0])) is None:
+    if (box := box_around(share, EXPLAINING[0])) is None:
         return matte
     whole = cv2.resize(share, (width, height), interpolation=cv2.INTER_LINEAR) if scale != 1 else share
     rows, columns = (slice(int(part.start * scale), int(np.ceil(part.stop * scale))) for part in box)
@@ -342,4 +342,4 @@ def _at(values: np.ndarray, places: Places) -> np.ndarray:
     """Values (h, w), (h, w, 2) or planes (3, h, w) at places; beyond the picture its edge goes on."""
     if values.ndim == 3 and values.shape[0] == 3:
         return np.stack([_at(plane, places) for plane in values])
-    return cv2.remap(values, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return flow.look(values, places, cv2.INTER_LINEAR)

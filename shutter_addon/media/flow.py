@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core import stopping
 from ..core.frames import light
-from .errors import MediaError
+from .errors import lacks_opencv
 
 try:
     import cv2
@@ -45,10 +45,7 @@ def between(
     What only one of the frames shows is taken from it, all else is mixed in linear light.
     Raises MediaError at the first frame where OpenCV is missing, or has no contributed modules."""
     if not hasattr(cv2, "optflow"):  # another add-on may bring an OpenCV without it
-        raise MediaError(
-            "in-between frames need the Python package opencv-contrib-python-headless; "
-            "install the zip of Virtual Shutter that is made for your system"
-        )
+        raise lacks_opencv("in-between frames need")
     ends = [_encoded(frame, transfer, alpha) for frame in (first, second)]
     luma = [_luma(end) for end in ends]
     paths = [_Paths(luma, flow) for flow in METHODS[method]]
@@ -128,7 +125,7 @@ class _Paths:
         vectors = _filled(vectors.astype(np.float32), arrived.any(axis=2))
         shown = cv2.blur(arrived.astype(np.float32), (5, 5)) + np.float32(0.05)
         fine = grid(*self._shape) / STEP
-        return _look(vectors, fine, cv2.INTER_LINEAR), _look(shown, fine, cv2.INTER_LINEAR)
+        return look(vectors, fine, cv2.INTER_LINEAR), look(shown, fine, cv2.INTER_LINEAR)
 
     def _carry(
         self, places: np.ndarray, vectors: np.ndarray, costs: np.ndarray, t: float
@@ -156,7 +153,7 @@ def _carriers(first: np.ndarray, second: np.ndarray, flow: Flow) -> tuple[np.nda
     places = grid(*first.shape)
     vectors = np.zeros_like(places) if min(first.shape) < SMALLEST else flow(first, second)
     vectors = np.nan_to_num(vectors, posinf=0, neginf=0)  # of pictures without any structure
-    cost = cv2.blur(cv2.absdiff(first, _look(second, places + vectors, cv2.INTER_LINEAR)).astype(np.float32), (5, 5))
+    cost = cv2.blur(cv2.absdiff(first, look(second, places + vectors, cv2.INTER_LINEAR)).astype(np.float32), (5, 5))
     cost = cost[::STEP, ::STEP].ravel()
     order = np.argsort(-cost, kind="stable")
     places, vectors = (each[::STEP, ::STEP].reshape(-1, 2)[order] for each in (places, vectors))
@@ -181,7 +178,7 @@ def _mixed(ends: list[np.ndarray], paths: list[tuple[np.ndarray, np.ndarray]], t
     for vectors, shown in paths:
         stopping.check()
         here = grid(*vectors.shape[:2])
-        seen = _look(ends[0], here - np.float32(t) * vectors), _look(ends[1], here + np.float32(1 - t) * vectors)
+        seen = look(ends[0], here - np.float32(t) * vectors), look(ends[1], here + np.float32(1 - t) * vectors)
         late: np.ndarray = np.float32(t) * shown[..., 1]
         late = (late / (late + np.float32(1 - t) * shown[..., 0]))[..., None]
         first, second = map(_light, seen)
@@ -200,7 +197,7 @@ def _difference(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
     return cv2.blur(each, (9, 9)) * np.float32(level)
 
 
-def _look(picture: np.ndarray, places: np.ndarray, how: int | None = None) -> np.ndarray:
+def look(picture: np.ndarray, places: np.ndarray, how: int | None = None) -> np.ndarray:
     """The picture (H, W, …) at places (h, w, 2), x and y in pixels; its edge goes on beyond it."""
     return cv2.remap(picture, places, None, cv2.INTER_CUBIC if how is None else how, borderMode=cv2.BORDER_REPLICATE)
 

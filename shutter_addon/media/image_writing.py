@@ -28,9 +28,9 @@ def write_grey(path: Path, values: np.ndarray) -> None:
     _write(path, OpenImageIO.ImageSpec(*_size(samples), OpenImageIO.UINT16), samples)
 
 
-def write_levels(path: Path, levels: np.ndarray, description: str = "") -> None:
-    """Writes levels (height, width) uint8 as a grey PNG of 8 bits, whole or not at all. MediaError: it cannot be
-    written."""
+def write_levels(path: Path, levels: np.ndarray, description: str) -> None:
+    """Writes levels (height, width) uint8 as a grey PNG of 8 bits with a description, whole or not at all. MediaError:
+    it cannot be written."""
     spec = OpenImageIO.ImageSpec(*_size(levels[..., None]), OpenImageIO.UINT8)
     spec["ImageDescription"] = description
     _write(path, spec, levels[..., None])

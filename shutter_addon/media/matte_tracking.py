@@ -1,13 +1,11 @@
-"""Following what a matte covers, by dense flow inside it: from frame to frame, and drawings of the matte hold it where
-it is. No bpy.
-"""
+"""Following what a matte covers, by dense flow inside it, from frame to frame. No bpy."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +13,7 @@ from ..core.model import outlines
 from ..core.model.motions import Motion, Similarity
 from . import flow, tracking
 from .carried_mattes import CarriedFile, CarriedMattes
+from .carrying import box_around
 from .footage import Footage
 from .pursuit import COVERED, LEFT, Sighting
 from .registration import Part
@@ -37,13 +36,6 @@ _FEWEST = 24
 _BACK = 1.0  # pixels that flow forth and back may be off, of 640
 _ALIKE = 2.0  # pixels of 640 within which a point moves as the subject does
 _AGREEING = 0.5  # share of the points that do, from which on a step is sure
-
-
-class Step(NamedTuple):
-    """How what a matte covers moves from a picture to another, and how sure that is, 0 to 1."""
-
-    motion: Similarity
-    confidence: float
 
 
 def follow_carried(
@@ -133,11 +125,15 @@ class _Pursuit:
 
 def moved(
     first: np.ndarray, second: np.ndarray, before: np.ndarray, after: np.ndarray, motion: Motion = "location"
-) -> Step | None:
-    """How what a matte covers moves from one picture (H, W) uint8 to another; None: that cannot be known.
+) -> Sighting | None:
+    """How what a matte covers moves from one picture (H, W) uint8 to another, and how sure that is; None: nobody
+    knows.
 
     before, after: (H, W) float32, 0 to 1, the matte of each"""
-    unit, (rows, columns) = max(first.shape) / 640, _box(np.maximum(before, after))
+    unit, box = max(first.shape) / 640, box_around(np.maximum(before, after), _AROUND)
+    if box is None:
+        return None
+    rows, columns = box
     first, second, before, after = (
         np.ascontiguousarray(each[rows, columns]) for each in (first, second, before, after)
     )
@@ -145,9 +141,13 @@ def moved(
         return None
     grid = flow.grid(*first.shape)
     there = grid + flow.fine_vectors(first, second)
-    here = there + _at(flow.fine_vectors(second, first), there)
+    here = there + flow.look(flow.fine_vectors(second, first), there, cv2.INTER_LINEAR)
     inside = before > _INSIDE
-    held = inside & (_at(after, there) > 0.5) & (np.hypot(*np.moveaxis(here - grid, -1, 0)) < _BACK * unit)
+    held = (
+        inside
+        & (flow.look(after, there, cv2.INTER_LINEAR) > 0.5)
+        & (np.hypot(*np.moveaxis(here - grid, -1, 0)) < _BACK * unit)
+    )
     chosen = np.flatnonzero(held)
     if chosen.size < _FEWEST:
         return None
@@ -156,7 +156,7 @@ def moved(
     starts, ends = (each.reshape(-1, 2)[chosen] + (columns.start, rows.start) for each in (grid, there))
     found = _fitted(starts, ends, motion, _ALIKE * unit)
     agreeing = float((np.abs(found(_plane(starts)) - _plane(ends)) < _ALIKE * unit).mean())
-    return Step(found, min(agreeing / _AGREEING, 1.0) * min(share / _AGREEING, 1.0))
+    return Sighting(found, min(agreeing / _AGREEING, 1.0) * min(share / _AGREEING, 1.0))
 
 
 def _fitted(starts: np.ndarray, ends: np.ndarray, motion: Motion, alike: float) -> Similarity:
@@ -179,17 +179,3 @@ def _fitted(starts: np.ndarray, ends: np.ndarray, motion: Motion, alike: float) 
 def _plane(points: np.ndarray) -> np.ndarray:
     """Points (n, 2) as complex numbers."""
     return points[:, 0].astype(np.float64) + 1j * points[:, 1]
-
-
-def _at(values: np.ndarray, places: np.ndarray) -> np.ndarray:
-    return cv2.remap(values, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-
-
-def _box(matte: np.ndarray) -> tuple[slice, slice]:
-    """The rows and columns that a matte covers, and some around."""
-    ways = [np.flatnonzero(matte.max(axis=axis) > 0) for axis in (1, 0)]
-    rows, columns = (
-        slice(max(int(way[0]) - _AROUND, 0), min(int(way[-1]) + 1 + _AROUND, length))
-        for way, length in zip(ways, matte.shape, strict=True)
-    )
-    return rows, columns

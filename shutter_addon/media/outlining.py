@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.model.outlines import Curves
 from .carrying import working_size
-from .errors import MediaError
+from .errors import lacks_opencv
 from .outline_tracing import traced
 
 try:
@@ -35,10 +35,7 @@ def proposed(picture: np.ndarray, drawn: np.ndarray, *, encloses: bool) -> Curve
     drawn: (h, w) bool, working_shape's: what strokes cover, or what they enclose
     MediaError: OpenCV is missing."""
     if cv2 is None:
-        raise MediaError(
-            "outlines are proposed by the Python package opencv-contrib-python-headless; "
-            "install the zip of Virtual Shutter that is made for your system"
-        )
+        raise lacks_opencv("outlines are proposed by")
     if not drawn.any():
         return ()
     small = cv2.resize(picture, drawn.shape[::-1], interpolation=cv2.INTER_AREA)

@@ -54,10 +54,9 @@ class PartPursuit:
         self._known, self._speed = known or Similarity(), Similarity()
         self._missed = 0 if known is None else 1  # for how many pictures it was not found
         self._look = _Look(part, Similarity(), 1.0)  # how it looked later, if it is no longer like the first
-        # the last picture in which it was found, the motion, its confidence
-        self._seen = footage.picture(frame), Similarity(), 1.0
-        # how sure it is that what is followed is still the part, and the last pictures in which it was found
-        self._trust, self._found = 1.0, deque([self._seen[:2]], _BACK)
+        # the last pictures in which it was found, the motion, its confidence
+        self._seen = deque([(footage.picture(frame), Similarity(), 1.0)], _BACK)
+        self._trust = 1.0  # how sure it is that what is followed is still the part
 
     def next(self, frame: int) -> Sighting | None:
         """Where it is in a frame's picture; None: it is not there."""
@@ -74,20 +73,20 @@ class PartPursuit:
             self._missed += 1
             return None
         self._speed = sighting.motion.after(self._known.inverse()) if not missed else Similarity()
-        self._known, self._seen, self._missed = sighting.motion, (picture, *sighting[:2]), 0
-        return Sighting(sighting.motion, self._trusted(picture, sighting, goes_on=not missed))
+        self._trust = self._trusted(picture, sighting, goes_on=not missed)
+        self._known, self._missed = sighting.motion, 0
+        self._seen.append((picture, sighting.motion, sighting.confidence))
+        return Sighting(sighting.motion, self._trust)
 
     def _trusted(self, picture: np.ndarray, sighting: Sighting, goes_on: bool) -> float:
         """How sure it is that it is there. A comparison with how it looked first tells that by itself. Others tell that
         what was followed goes on: so does what has slipped onto something else, but not onto what looked like it
         shortly before. goes_on: it was found in the picture before."""
-        before, motion = self._found[0]
+        before, motion, _worth = self._seen[0]
         alike = self._first.likeness(before, motion, picture, sighting.motion)
         steady = float(np.clip((alike - _OTHER) / (_STEADY - _OTHER), 0, 1))
         kept = _KEPT * self._trust * steady * min(sighting.step / _STEP, 1.0)
-        self._trust = max(kept if goes_on else 0.0, sighting.confidence)
-        self._found.append((picture, sighting.motion))
-        return self._trust
+        return max(kept if goes_on else 0.0, sighting.confidence)
 
     def _near(self, picture: np.ndarray, guess: Similarity) -> Sighting | None:
         """As `next`, near to a guess: as it looked first or, if that is not sure, as it looked later."""
@@ -122,7 +121,7 @@ class PartPursuit:
 
     def _look_anew(self) -> None:
         """Takes the look that it had when it was found last."""
-        picture, motion, worth = self._seen
+        picture, motion, worth = self._seen[-1]
         if later := self._first.again(picture, motion):
             self._look = _Look(later, motion, max(_DRIFT * worth, _LEAST))
 

@@ -12,7 +12,7 @@ from typing import Any, get_args
 import numpy as np
 
 from ..core.model.motions import Motion, Similarity
-from .errors import MediaError
+from .errors import lacks_opencv
 
 try:
     import cv2
@@ -40,10 +40,7 @@ _MOST_SCALE, _MOST_TURN = 1.5, 0.8
 def check() -> None:
     """MediaError: OpenCV is missing."""
     if cv2 is None:
-        raise MediaError(
-            "tracking needs the Python package opencv-contrib-python-headless; "
-            "install the zip of Virtual Shutter that is made for your system"
-        )
+        raise lacks_opencv("tracking needs")
 
 
 def grey(frame: np.ndarray, size: tuple[int, int], alpha: str = "opaque") -> np.ndarray:

@@ -36,10 +36,6 @@ class Needed(NamedTuple):
 _shown = revision.UntilChange()
 
 
-def is_outline(region) -> bool:
-    return region is not None and region.kind == "OUTLINE"
-
-
 def curves_now(scene, effect, strip, index: int) -> outlines.Curves:
     """The curves of an outline at the current frame, in fractions of the picture: drawn, carried, or straight where
     nothing is carried yet. EffectError, MediaError: there are none."""

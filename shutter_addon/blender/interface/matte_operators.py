@@ -17,7 +17,6 @@ from ..data import matte_strips, recipe_import, selection, strips
 from ..data.choices import RAMPS
 from ..editing import region_edits, time_map
 from ..output import matte_export
-from ..rendering.effect_source import FAULTS
 from .operator_bases import OfRegion, OfShutter, chosen_file, has_room, refused
 
 
@@ -136,8 +135,6 @@ class SHUTTER_OT_matte_export(OfRegion, ImportHelper, Operator):
         try:
             region, word = selection.active_region(effect), self.format.lower()
             count = matte_export.save(scene, effect, strip, region, folder, word)
-        except FAULTS as error:
-            raise EffectError(str(error)) from None
         except OSError as error:
             sentence = f"{folder}: {error.strerror or error}"
             self.report({"ERROR"}, sentence)

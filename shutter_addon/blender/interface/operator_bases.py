@@ -5,10 +5,10 @@ from typing import Any
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
 
-from ...core.messages import EffectError
 from ...core.recipes import recipe
 from ..data import selection, strips
 from ..editing import collection_edits
+from ..rendering.effect_source import FAULTS
 
 Mixin: Any = object  # for what is mixed into Blender's classes: mypy takes it to have what these have
 UNDOABLE = {"REGISTER", "UNDO"}
@@ -29,7 +29,8 @@ def redraw(context) -> None:
 
 
 class OfEffect(Mixin):
-    """Works on the effect that is seen, or where none is, on that of the active strip."""
+    """Works on the effect that is seen, or where none is, on that of the active strip; reports what `change` raises of
+    FAULTS."""
 
     bl_options = UNDOABLE
     only_seen = False  # it does something in the picture
@@ -52,7 +53,7 @@ class OfEffect(Mixin):
     def execute(self, context):
         try:
             result = self.change(context, selection.active(context)[1])
-        except EffectError as error:
+        except FAULTS as error:
             self.report({"ERROR"}, str(error))
             result = {"CANCELLED"}
         redraw(context)

@@ -122,7 +122,7 @@ class SHUTTER_GGT_outline(GizmoGroup):
     def poll(cls, context):
         if not region_gizmo.SHUTTER_GGT_region.poll(context):
             return False
-        return outline_drawings.is_outline(selection.active_region(selection.in_picture(context)[1]))
+        return selection.active_region(selection.in_picture(context)[1]).kind == "OUTLINE"
 
     @classmethod
     def setup_keymap(cls, keyconfig):

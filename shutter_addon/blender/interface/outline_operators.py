@@ -6,7 +6,6 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Operator
 
-from ...core.messages import UserError
 from ..data import selection
 from ..editing import outline_drawings, track_region
 from ..rendering import outline_carrying
@@ -26,7 +25,7 @@ class _OfOutline(OfRegion):
     def possible(cls, effect):
         if not super().possible(effect):
             return False
-        is_outline = outline_drawings.is_outline(selection.active_region(effect))
+        is_outline = selection.active_region(effect).kind == "OUTLINE"
         return is_outline or refused(cls, rpt_("The region is no outline"))
 
 
@@ -40,25 +39,29 @@ class _Carries(Mixin):
         return {"FINISHED"}
 
     def execute(self, context):
-        return self._run(context, waits=True)
+        return self._tried(self._begin, context, True)
 
     def invoke(self, context, _event):
-        return self._run(context, waits=bpy.app.background)
+        return self._tried(self._begin, context, bpy.app.background)
 
-    def _run(self, context, waits: bool):
-        scene, effect, strip = selection.active(context)
+    def _tried(self, step, *arguments):
+        """What a step of it returns; what it raises of FAULTS is reported."""
         try:
-            file, shown = outline_drawings.carried_frames(scene, effect, strip, effect.active_region)
-            with closing(file.open()) as mattes:
-                frames = sorted({number for number in shown.values() if not mattes.has(number)})
-                if waits:
-                    for number in frames:
-                        mattes.read(number)
-            if waits or not frames:
-                return self._end(context)
+            return step(*arguments)
         except FAULTS as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+
+    def _begin(self, context, waits: bool):
+        scene, effect, strip = selection.active(context)
+        file, shown = outline_drawings.carried_frames(scene, effect, strip, effect.active_region)
+        with closing(file.open()) as mattes:
+            frames = sorted({number for number in shown.values() if not mattes.has(number)})
+            if waits:
+                for number in frames:
+                    mattes.read(number)
+        if waits or not frames:
+            return self.carried(context)
         self._file, self._target = file, track_region.Target.of(effect, effect.active_region)
         outline_carrying.carry(file, frames, show_carried)
         self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
@@ -81,14 +84,7 @@ class _Carries(Mixin):
         if (failure := outline_carrying.failure(self._file)) is not None:
             self.report({"ERROR"}, failure)
             return {"CANCELLED"}
-        return self._end(context)
-
-    def _end(self, context):
-        try:
-            return self.carried(context)
-        except FAULTS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        return self._tried(self.carried, context)
 
     def cancel(self, context):
         """It has ended, or its window was closed."""
@@ -131,11 +127,7 @@ class SHUTTER_OT_outline_draw(_OfOutline, Operator):
     def change(self, context, effect):
         scene, _effect, strip = selection.active(context)
         region = selection.active_region(effect)
-        try:
-            curves = outline_drawings.curves_now(scene, effect, strip, effect.active_region)
-        except UserError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        curves = outline_drawings.curves_now(scene, effect, strip, effect.active_region)
         if not curves:
             self.report({"WARNING"}, rpt_("The outline encloses nothing at the current frame"))
             return {"CANCELLED"}
@@ -152,12 +144,8 @@ class SHUTTER_OT_outline_it(OfStrokes, Operator):
 
     def change(self, context, effect):
         scene, _effect, strip = selection.active(context)
-        try:
-            if not outline_drawings.outline_it(scene, effect, strip, effect.active_region):
-                self.report({"WARNING"}, "No subject is told from what is around it")
-                return {"CANCELLED"}
-        except FAULTS as error:
-            self.report({"ERROR"}, str(error))
+        if not outline_drawings.outline_it(scene, effect, strip, effect.active_region):
+            self.report({"WARNING"}, "No subject is told from what is around it")
             return {"CANCELLED"}
         return None
 

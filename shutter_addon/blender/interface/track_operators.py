@@ -280,12 +280,7 @@ class _Follows(Mixin):
     """Keys a region or the camera by what it is set to follow."""
 
     def change(self, context, effect):
-        try:
-            self.key(*selection.active(context))
-        except FAULTS as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return None
+        self.key(*selection.active(context))
 
 
 class SHUTTER_OT_follow(_Follows, OfStrokes, Operator):

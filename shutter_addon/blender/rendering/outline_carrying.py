@@ -76,16 +76,11 @@ def begin(arrived: Callable[[], None]) -> str | None:
 
 def carry(file: CarriedFile, frames: list[int], arrived: Callable[[], None]) -> None:
     """Carries the mattes of source frames, in place of what is on its way; arrived: as for `begin`."""
-    _end()
+    stop()
     _failed.pop(file, None)
     _running.append(_Carrying(file=file, frames=frames, arrived=arrived))
     if not bpy.app.timers.is_registered(_look):
         bpy.app.timers.register(_look, first_interval=TICK)
-
-
-def stop() -> None:
-    """Ends what is on its way; what is carried stays."""
-    _end()
 
 
 def failure(file: CarriedFile) -> str | None:
@@ -120,7 +115,8 @@ def _look() -> float | None:
     return None
 
 
-def _end() -> None:
+def stop() -> None:
+    """Ends what is on its way; what is carried stays."""
     for carrying in _running:
         carrying.ended.set()
     _running.clear()
@@ -128,6 +124,6 @@ def _end() -> None:
 
 def forget(*_: Any) -> None:
     """Ends what runs: when a file is loaded, and when the extension goes."""
-    _end()
+    stop()
     _wanted.clear()
     _failed.clear()
