@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.model.outlines import Curves, curves
+from .errors import lacks_opencv
 
 try:
     import cv2
@@ -19,7 +20,10 @@ def traced(matte: np.ndarray, off: float = 0.5) -> Curves:
     """Curves (core.model.outlines) around what a matte covers by more than half, the largest first; holes have their
     own.
 
-    matte: (height, width) float32, 0 to 1; off: how far curves may be from its contours, in pixels"""
+    matte: (height, width) float32, 0 to 1; off: how far curves may be from its contours, in pixels
+    MediaError: OpenCV is missing."""
+    if cv2 is None:
+        raise lacks_opencv("outlines are traced by")
     rows, columns = (np.flatnonzero(matte.max(axis=axis) > 0.5) for axis in (1, 0))
     if not rows.size:
         return ()

@@ -191,7 +191,13 @@ def test_draw_makes_a_region_and_takes_up_the_pen(bpy, effect, preview):
     assert bpy.ops.shutter.draw() == {"FINISHED"}
     assert len(effect.regions) == 1, "one more stroke of the same region"
     assert bpy.ops.shutter.draw(new=True, kind="LASSO") == {"FINISHED"}
-    assert [(region.name, region.kind) for region in effect.regions] == [("Sharp", "LINE"), ("Sharp.001", "LASSO")]
+    assert [(region.name, region.kind) for region in effect.regions] == [("Sharp", "LASSO")], (
+        "nothing is drawn in it yet"
+    )
+    layer = annotations.layer_of(effect, effect.regions[0])
+    annotations.add_stroke(layer.frames.new(1), np.array([[0.0, 0.0], [9.0, 5.0]]))
+    assert bpy.ops.shutter.draw(new=True, kind="OUTLINE") == {"FINISHED"}
+    assert [(region.name, region.kind) for region in effect.regions] == [("Sharp", "LASSO"), ("Sharp.001", "OUTLINE")]
     assert bpy.ops.shutter.erase() == {"FINISHED"}
     assert tool(bpy) == "builtin.annotate_eraser"
 

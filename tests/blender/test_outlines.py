@@ -148,8 +148,8 @@ def chosen(bpy, edited):
     return make
 
 
-def drawn_at(effect):
-    layer = effect.scene.annotation.layers[effect.regions[0].layer]
+def drawn_at(effect, index=0):
+    layer = effect.scene.annotation.layers[effect.regions[index].layer]
     return sorted(drawing.frame_number for drawing in layer.frames)
 
 
@@ -273,3 +273,73 @@ def test_export(bpy, chosen, tmp_path, word, levels):
     with pytest.raises(RuntimeError, match="file"):
         bpy.ops.shutter.matte_export(directory=str(tmp_path / "file"), format=word)
     assert sorted(path.name for path in tmp_path.iterdir() if path.name != "mattes") == ["file"]
+
+
+def test_to_a_mask_and_back(bpy, chosen):
+    """A mask with shape keys covers what the outline does, in every frame of the source; an outline of that mask, the
+    same at its keys."""
+    from shutter_addon.blender.data import mask_reading
+    from shutter_addon.blender.editing import outline_masks
+
+    strip, effect = chosen(2, 6, 12)
+    edit = strip.id_data
+    before = edit.frame_current, [area.ui_type for area in bpy.context.window.screen.areas]
+    assert bpy.ops.shutter.outline_mask(step=2) == {"FINISHED"}
+    assert (edit.frame_current, [area.ui_type for area in bpy.context.window.screen.areas]) == before
+    mask = bpy.data.masks["o"]
+    assert (mask.frame_start, mask.frame_end) == (1, COUNT)
+    assert mask_reading.key_frames(mask)[-6:] == [2, 4, 6, 8, 10, 12]
+    for number in range(1, COUNT):
+        values = mask_reading.mask_at(mask, 1 + number).values(WIDTH, HEIGHT)
+        assert np.abs(values - covered(number)).mean() < 0.015, number
+    assert mask_reading.mask_at(mask, 1).values(WIDTH, HEIGHT).max() == 0, "before its first drawing"
+    again = outline_masks.from_mask(edit, effect, strip, effect.shutters["S1"], mask)
+    index = len(effect.regions) - 1
+    assert (again.kind, again.between, effect.active_region) == ("OUTLINE", "STRAIGHT", index)
+    effect.regions[0].opacity = 0
+    for frame in (2, 4, 7, 12):
+        assert np.abs(coefficients(strip, effect, frame) - covered(frame - 1)).mean() < 0.015, frame
+
+
+def test_a_straight_outline_to_a_mask(bpy, chosen):
+    from shutter_addon.blender.data import mask_reading
+
+    chosen(1, 9, between="straight")
+    assert bpy.ops.shutter.outline_mask() == {"FINISHED"}
+    mask = bpy.data.masks["o"]
+    assert mask_reading.key_frames(mask) == [1, 9]
+    assert np.abs(mask_reading.mask_at(mask, 5).values(WIDTH, HEIGHT) - covered(4)).mean() < 0.005
+
+
+def test_masks_that_give_no_outline(bpy, chosen):
+    """Neither does an outline in which nothing is drawn give a mask; nothing is left behind."""
+    from shutter_addon.blender.data import annotations
+
+    _strip, effect = chosen(1, 9)
+    bpy.data.masks.new("empty")
+    with pytest.raises(RuntimeError, match='mask "empty" encloses nothing in the strip'):
+        bpy.ops.shutter.outline_from_mask(mask="empty")
+    assert len(effect.regions) == 1
+    layer = annotations.layer_of(effect, effect.regions[0])
+    for drawing in list(layer.frames):
+        layer.frames.remove(drawing)
+    with pytest.raises(RuntimeError, match="Nothing is drawn in the outline"):
+        bpy.ops.shutter.outline_mask()
+    assert [mask.name for mask in bpy.data.masks] == ["empty"]
+
+
+def test_a_mask_of_a_strip_that_runs_backward(bpy, edited):
+    """Its frames are the source's, and drawings lie where the strip shows these."""
+    from shutter_addon.blender.data import mask_reading
+    from shutter_addon.blender.editing import outline_masks
+
+    def change(source):
+        source.left_handle = 3
+        source.use_reverse_frames = True
+
+    said = region(1, 4, shown=lambda frame: COUNT - 2 - frame, between="straight")
+    strip, effect = edited(said, change=change)
+    mask = outline_masks.to_mask(bpy.context, strip.id_data, effect, strip, 0, 0)
+    assert mask_reading.key_frames(mask)[-2:] == [COUNT - 5, COUNT - 2]
+    outline_masks.from_mask(strip.id_data, effect, strip, effect.shutters["S1"], mask)
+    assert drawn_at(effect, 1) == [3, 6, COUNT], "at the last it is not there yet"

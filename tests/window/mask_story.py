@@ -16,7 +16,7 @@ FRAME, LATER, RENDERED = 50, 60, 55
 # In fractions of the picture.
 CORNERS = (0.25, 0.25), (0.55, 0.25), (0.55, 0.75), (0.25, 0.75)
 MOVED = (0.8, 0.75)  # where the third one is taken
-FROM_MASK = 3  # the entry in the menu of regions
+FROM_MASK = 4  # the entry in the menu of regions
 
 
 def clip():

@@ -1,6 +1,9 @@
 """Strokes that are tracked, and what is seen of an effect, by mouse: each a story in a real window."""
 
+import json
+import os
 import shutil
+from pathlib import Path
 
 import av
 import cv2
@@ -12,6 +15,7 @@ from telling import ROOT, linked, needs_window, packages, tell
 from shutter_addon.media import open_source
 
 pytestmark = needs_window
+SUBJECTS = os.environ.get("SUBJECTS", "")
 
 
 def test_one_stroke(tmp_path):
@@ -172,12 +176,64 @@ def test_an_outline(tmp_path):
     assert "Traceback" not in console
     facts = {name: entry[name] for entry in seen for name in entry}
     assert facts["drawings"] == [62, 78]
+    assert facts["mask"][0] >= 1
+    assert facts["mask"][1] >= 12
+    around_her = np.array(facts["clicked"]) * (768, 576)
+    assert len(around_her) > 8, "between points it goes along edges"
+    assert np.abs(around_her - around_her.mean(axis=0)).max(axis=0).tolist() <= [40, 70]
     final = pixels(tmp_path / "final_0070.png")
     with open_source(given["footage"]) as source:
         apart = np.abs(final - source.read(69)[..., :3])
     assert apart[215:250, 350:362].mean() <= 3, "her jacket"
     assert apart.max() > 60, "others walk"
     assert apart_on_screen(pixels(tmp_path / "7_full_quality.png"), final) <= 1
+
+
+@pytest.mark.skipif(not SUBJECTS, reason="NO FOOTAGE: set SUBJECTS to a folder with tennis/ and tennis_mask/ of DAVIS")
+def test_a_film_of_an_outlined_player(tmp_path):
+    """From an empty file to a film of 41 frames in 20 actions: he is outlined at three of them, as people masked him,
+    mended at one, and sharp before a court that is not."""
+    names = sorted((Path(SUBJECTS) / "tennis").glob("*.jpg"))[:41]
+    pictures = [cv2.imread(str(name))[..., ::-1] for name in names]
+    masks = [cv2.imread(str(Path(SUBJECTS) / "tennis_mask" / f"{name.stem}.png"), 0) > 0 for name in names]
+    (tmp_path / "footage").mkdir()
+    footage = tmp_path / "footage" / "player.mp4"
+    with av.open(str(footage), "w") as film:
+        stream = film.add_stream("libx264", rate=25, options={"crf": "4"})
+        stream.width, stream.height, stream.pix_fmt = 448, 256, "yuv420p"
+        for picture in pictures:
+            film.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), "rgb24")))
+        film.mux(stream.encode())
+    truth = tmp_path / "truth.json"
+    truth.write_text(json.dumps({number: around(mask) for number, mask in enumerate(masks, 1)}))
+    given = {"footage": footage, "packages": packages(tmp_path / "packages"), "truth": truth}
+    seen, console = tell("outlined_film_story.py", "opengl", linked(tmp_path), **given)
+    assert "Traceback" not in console
+    facts = {name: entry[name] for entry in seen for name in entry}
+    assert len(facts["actions"]) <= 20
+    sharp, blurred = [], []
+    with open_source(footage) as source:
+        for number, mask in enumerate(masks[: 41 - facts["before"]]):
+            final = pixels(tmp_path / f"final_{number + 1 + facts['before']:04d}.png")
+            apart = np.abs(final - source.read(number)[..., :3]).max(axis=2)
+            sharp.append((apart[cv2.erode(mask.astype(np.uint8), np.ones((5, 5))) > 0] <= 12).mean())
+            blurred.append(apart[cv2.dilate(mask.astype(np.uint8), np.ones((41, 41))) == 0].mean())
+    print(f"sharp: {np.mean(sharp):.3f} of him, {min(sharp):.3f} at least; the court is off by {np.mean(blurred):.1f}")
+    assert np.mean(sharp) >= 0.88
+    assert min(sharp) >= 0.7
+    assert np.mean(blurred) >= 8
+
+
+def around(mask):
+    """Curves (n, 2) around a mask, in fractions of the picture, of as many points as a mouse is moved through."""
+    fine = cv2.resize(mask.astype(np.uint8) * 255, None, fx=4, fy=4) > 127
+    contours, _ = cv2.findContours(fine.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    height, width = mask.shape
+    curves = []
+    for points in (contour[:, 0] for contour in contours if cv2.contourArea(contour) > 200):
+        steps = np.linspace(0, len(points), np.clip(len(points) // 12, 12, 64), endpoint=False).astype(int)
+        curves.append(((points[steps] + 0.5) / 4 / (width, height) * (1, -1) + (0, 1)).tolist())
+    return curves
 
 
 @pytest.mark.parametrize("backend", ["opengl", "vulkan"])

@@ -11,7 +11,7 @@ import bpy
 import driver
 import story
 
-TIME_MAP = 5  # the entry in the menu of regions
+TIME_MAP = 7  # the entry in the menu of regions
 RAMP, RADIAL = 556, 602  # where they stand in the sidebar, in pixels below its upper edge
 
 

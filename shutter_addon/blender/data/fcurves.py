@@ -142,7 +142,7 @@ def _channelbag(scene):
     if animation.action is None:
         animation.action = bpy.data.actions.new(f"{scene.name}Action")
     if animation.action_slot is None:
-        animation.action_slot = animation.action.slots.new("SCENE", scene.name)
+        animation.action_slot = animation.action.slots.new(scene.id_type, scene.name)
     return anim_utils.action_ensure_channelbag_for_slot(animation.action, animation.action_slot)
 
 

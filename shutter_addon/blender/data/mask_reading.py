@@ -8,6 +8,7 @@ import ctypes
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from itertools import chain, pairwise
+from typing import Any
 
 import bpy
 import numpy as np
@@ -68,12 +69,29 @@ def motion(mask: bpy.types.Mask) -> Iterator[tuple]:
     for layer in mask.layers:
         for shape in _shapes(mask, layer):
             yield shape.frame, np.ctypeslib.as_array(shape.data, (shape.points, _SHAPE_NUMBERS)).tobytes()
+    for track in _tracks(mask):
+        place = ("corners", 8) if isinstance(track, bpy.types.MovieTrackingPlaneTrack) else ("co", 2)
+        yield tuple(numbers.tobytes() for numbers in _markers(track, *place))
+
+
+def _tracks(mask: bpy.types.Mask) -> Iterator[Any]:
+    """The tracks, of points and planes, that are parents of a mask's points."""
     points = [point for layer in mask.layers for spline in layer.splines for point in spline.points]
     for clip, name, track in {(p.parent.id, p.parent.parent, p.parent.sub_parent) for p in points}:
         tracked = clip.tracking.objects.get(name) if isinstance(clip, bpy.types.MovieClip) else None
-        for tracks, place, size in ((tracked.tracks, "co", 2), (tracked.plane_tracks, "corners", 8)) if tracked else ():
+        for tracks in (tracked.tracks, tracked.plane_tracks) if tracked else ():
             if track in tracks:
-                yield tuple(numbers.tobytes() for numbers in _markers(tracks[track], place, size))
+                yield tracks[track]
+
+
+def key_frames(mask: bpy.types.Mask) -> list[float]:
+    """The frames of a mask at which something is said of it: shape keys, keys of its F-curves, markers of its parents,
+    of these every tenth. EffectError: as `mask_at`."""
+    keyed = {float(shape.frame) for layer in mask.layers for shape in _shapes(mask, layer)}
+    keyed |= set(fcurves.key_frames(fcurves.curves_under(mask, "")))
+    for track in _tracks(mask):
+        keyed |= {float(marker.frame) for marker in list(track.markers)[::10]}
+    return sorted(keyed)
 
 
 def moves(mask: bpy.types.Mask) -> bool:

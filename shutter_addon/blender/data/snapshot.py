@@ -203,11 +203,22 @@ def carried_outline(scene, effect, strip, index: int, frames: Frames) -> tuple[A
     if validation.word(region, "between") == "STRAIGHT":
         raise EffectError(rpt_("{place}: a straight outline is not carried").format(place=validation.place(region)))
     sampling = _Sampling.of(Curves(scene), effect, strip, frames)
-    drawings = sampled.drawings(
-        sampling.curves, f"{effect.path_from_id()}.regions[{index}]", effect, region, sampling.placement, None
-    )
+    return _outlines(sampling, region, _drawings(sampling, index)).file, source_frames(scene, effect, strip, frames)
+
+
+def drawn_outline(scene, effect, strip, index: int) -> dict[int, outlines.Curves]:
+    """The curves of an outline by the source's filmed frame at which they are drawn. EffectError, MediaError: it has no
+    source."""
+    sampling = _Sampling.of(Curves(scene), effect, strip, ())
+    return _by_source_frame(sampling, _drawings(sampling, index))
+
+
+def source_frames(scene, effect, strip, frames: Frames) -> dict[float, int]:
+    """Which of the source's filmed frames an effect strip shows, by timeline frame. EffectError, MediaError: nobody
+    knows."""
+    sampling = _Sampling.of(Curves(scene), effect, strip, frames)
     shown = matte_content.shown_frame(scene, effect, strip, sampling.time)
-    return _outlines(sampling, region, drawings).file, {frame: int(shown(frame)) for frame in frames}
+    return {frame: int(shown(frame)) for frame in frames}
 
 
 def last_shown(scene, effect, strip) -> float:
@@ -413,12 +424,22 @@ def _outlines(sampling: _Sampling, region, drawings: model.Drawings) -> Any:
     """The content of an outline. EffectError, MediaError: there is no source."""
     if validation.word(region, "between") == "STRAIGHT":
         return model.DrawnOutlines(drawings)
+    drawn = _by_source_frame(sampling, drawings)
+    return mattes.FileFrames(file=matte_content.carried_file(sampling.effect, sampling.strip, drawn))
+
+
+def _by_source_frame(sampling: _Sampling, drawings: model.Drawings) -> dict[int, outlines.Curves]:
+    """The curves of drawings by the source's filmed frame. EffectError, MediaError: there is no source."""
     numbers, effect, strip = drawings.frames, sampling.effect, sampling.strip
     there = _Sampling.of(sampling.curves, effect, strip, numbers)
     placed = replace(drawings, placement=there.placement)
     shown = matte_content.shown_frame(effect.id_data, effect, strip, there.time)
-    drawn = {int(shown(frame)): outlines.curves(placed.drawing(i, frame)) for i, frame in enumerate(numbers)}
-    return mattes.FileFrames(file=matte_content.carried_file(effect, strip, drawn))
+    return {int(shown(frame)): outlines.curves(placed.drawing(i, frame)) for i, frame in enumerate(numbers)}
+
+
+def _drawings(sampling: _Sampling, index: int) -> model.Drawings:
+    effect, path = sampling.effect, f"{sampling.effect.path_from_id()}.regions[{index}]"
+    return sampled.drawings(sampling.curves, path, effect, effect.regions[index], sampling.placement, None)
 
 
 def _region(sampling: _Sampling, path: str, region, shutter: int) -> model.Region:

@@ -66,16 +66,41 @@ def carried() -> None:
 def draw(effect, strip, region, curves: outlines.Curves, frame: int) -> None:
     """Makes curves the drawing of a region at a timeline frame, in place of one that is there. EffectError: the strip
     is scaled to nothing."""
+    layer = layer_of(effect, region) or region_edits.new_layer(effect, region)
+    to_image = _to_image(effect, strip)
+    for drawing in [drawing for drawing in layer.frames if drawing.frame_number == frame]:
+        layer.frames.remove(drawing)
+    _add(layer.frames.new(frame), to_image, curves)
+
+
+def add(effect, strip, region, curve: np.ndarray, frame: int) -> None:
+    """Adds a curve (n, 2), in fractions of the picture, to the drawing of a region at a timeline frame. EffectError: as
+    draw."""
+    layer = layer_of(effect, region) or region_edits.new_layer(effect, region)
+    to_image = _to_image(effect, strip)
+    there = [drawing for drawing in layer.frames if drawing.frame_number == frame]
+    _add(there[0] if there else layer.frames.new(frame), to_image, [curve])
+
+
+def _to_image(effect, strip) -> np.ndarray:
     to_image = geometry.picture_to_image(strip, annotations.picture_size(effect))
     if not geometry.is_invertible(to_image):
         raise EffectError(rpt_('strip "{strip}" is scaled to nothing').format(strip=strip.name))
-    layer = layer_of(effect, region) or region_edits.new_layer(effect, region)
-    for drawing in [drawing for drawing in layer.frames if drawing.frame_number == frame]:
-        layer.frames.remove(drawing)
-    drawing = layer.frames.new(frame)
+    return to_image
+
+
+def _add(drawing, to_image: np.ndarray, curves) -> None:
     revision.changed()  # Blender tells of no strokes
     for points in curves:
         annotations.add_stroke(drawing, mapped(to_image, np.asarray(points)))
+
+
+def picture_now(scene, effect, strip) -> np.ndarray:
+    """The source's frame (H, W, 3) uint8 that is seen at the current frame. EffectError, MediaError: there is none."""
+    shown = snapshot.take(scene, effect, strip, (scene.frame_current,))
+    with effect_source.open_source(shown) as source:
+        samples = source.read(effect_source.source_index(shown, scene.frame_current, source)[0])
+        return flow.displayed(samples, source.transfer, source.alpha)
 
 
 def outline_it(scene, effect, strip, index: int) -> bool:
@@ -87,10 +112,7 @@ def outline_it(scene, effect, strip, index: int) -> bool:
     strokes = there.drawings.at(frame) if region.kind == "OUTLINE" else there.at(frame).strokes
     if not len(strokes):
         raise EffectError(rpt_("The region has no strokes at the current frame"))
-    shown = snapshot.take(scene, effect, strip, (frame,))
-    with effect_source.open_source(shown) as source:
-        samples = source.read(effect_source.source_index(shown, frame, source)[0])
-        picture = flow.displayed(samples, source.transfer, source.alpha)
+    picture = picture_now(scene, effect, strip)
     height, width = outlining.working_shape(picture)
     encloses = region.kind != "LINE"
     shape = scribbles.Shape(shutter=0, kind="line", width=region.width, strokes=tuple(strokes))

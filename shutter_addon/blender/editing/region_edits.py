@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..data import strips
+from ..data import selection, strips
 from ..data.annotations import annotation, layer_of
 from ..data.consistency import bars, choose_region, color_layers, forget_followed, unique
 from . import collection_edits, motion_keys
@@ -19,16 +19,28 @@ def add_region(effect, shutter, kind: str = "LINE", name: str = ""):
 
 
 def first_drawn(effect, shutter, kind: str):
-    """Appends a region for strokes, as add_region does. The first of an effect, of a shutter that is sharp, follows
-    edges, unless the editor has said how much: a subject is meant, and no spot of it."""
+    """Appends a region for strokes, as add_region does; the active one of that shutter becomes it while it has none.
+    The first of an effect, of a shutter that is sharp, follows edges, unless the editor has said how much: a subject is
+    meant, and no spot of it."""
     is_sharp = np.count_nonzero(bars(shutter)) <= effect.bars_per_frame
     is_scribble = kind not in strips.LAID
     if is_scribble and is_sharp and not effect.regions and not effect.is_property_set("edge_aware"):
         effect.edge_aware = 1.0
-    region = add_region(effect, shutter, kind)
+    if (region := _undrawn(effect, shutter)) is None:
+        region = add_region(effect, shutter, kind)
+    region.kind = kind
     if not is_scribble:
         region.motion = "LOCATION"  # limbs turn, and the subject does not
     return region
+
+
+def _undrawn(effect, shutter):
+    """The active region, where it is a shutter's and nothing is drawn in it; None: it is not so."""
+    region = selection.active_region(effect)
+    if region is None or region.kind in strips.MATTES or region.shutter != shutter.name:
+        return None
+    layer = layer_of(effect, region)
+    return None if layer is not None and any(drawing.strokes for drawing in layer.frames) else region
 
 
 def add_matte(effect, shutter, kind: str = "MATTE", name: str = "", **values):

@@ -15,7 +15,7 @@ from ...core.recipes.recipe import RecipeError
 from ...media import MediaError
 from ..data import matte_strips, recipe_import, selection, strips
 from ..data.choices import RAMPS
-from ..editing import region_edits, time_map
+from ..editing import outline_masks, region_edits, time_map
 from ..output import matte_export
 from .operator_bases import OfRegion, OfShutter, chosen_file, has_room, refused
 
@@ -86,11 +86,8 @@ def _masks(_self, _context):
     return _mask_items
 
 
-class SHUTTER_OT_matte_mask(_AddsRegion, Operator):
-    """Make a mask the matte of the active shutter"""
-
-    bl_idname = "shutter.matte_mask"
-    bl_label = "Matte from Mask"
+class _OfMask(_AddsRegion):
+    """Adds a region that a mask makes."""
 
     mask: EnumProperty(name="Mask", items=_masks, translation_context=contexts.no_translation)
 
@@ -101,9 +98,30 @@ class SHUTTER_OT_matte_mask(_AddsRegion, Operator):
             or refused(cls, rpt_("There is no mask: draw one in the Mask mode of an image or clip"))
         )
 
+    def chosen(self):
+        return next(mask for mask in bpy.data.masks if mask.name_full == self.mask)
+
+
+class SHUTTER_OT_matte_mask(_OfMask, Operator):
+    """Make a mask the matte of the active shutter"""
+
+    bl_idname = "shutter.matte_mask"
+    bl_label = "Matte from Mask"
+
     def change(self, _context, effect):
-        mask = next(mask for mask in bpy.data.masks if mask.name_full == self.mask)
+        mask = self.chosen()
         region_edits.add_matte(effect, selection.active_shutter(effect), name=mask.name, matte="MASK", mask=mask)
+
+
+class SHUTTER_OT_outline_from_mask(_OfMask, Operator):
+    """Make an outline of the active shutter that is drawn at each key of a mask"""
+
+    bl_idname = "shutter.outline_from_mask"
+    bl_label = "Outline from Mask"
+
+    def change(self, context, effect):
+        scene, _effect, strip = selection.active(context)
+        outline_masks.from_mask(scene, effect, strip, selection.active_shutter(effect), self.chosen())
 
 
 class SHUTTER_OT_matte_export(OfRegion, ImportHelper, Operator):
@@ -175,6 +193,7 @@ classes = (
     SHUTTER_OT_matte_add,
     SHUTTER_OT_matte_strip,
     SHUTTER_OT_matte_mask,
+    SHUTTER_OT_outline_from_mask,
     SHUTTER_OT_matte_export,
     SHUTTER_OT_ramp_add,
     SHUTTER_OT_time_map,

@@ -4,19 +4,20 @@ from contextlib import closing
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import IntProperty
 from bpy.types import Operator
 
-from ..data import selection
-from ..editing import outline_drawings, track_region
+from ..data import selection, strips
+from ..editing import outline_drawings, outline_masks, track_region
 from ..rendering import outline_carrying
 from ..rendering.effect_source import FAULTS
-from .operator_bases import Mixin, OfRegion, OfStrokes, redraw, refused
+from .operator_bases import UNDOABLE, Mixin, OfRegion, OfStrokes, redraw, refused
 from .preview import show_carried
 
 _TICK = 0.1  # seconds from one look at what is carried to the next
 
 
-class _OfOutline(OfRegion):
+class OfOutline(OfRegion):
     """Works on the active region, which is an outline."""
 
     only_seen = True
@@ -54,6 +55,8 @@ class _Carries(Mixin):
 
     def _begin(self, context, waits: bool):
         scene, effect, strip = selection.active(context)
+        if not strips.is_carried(selection.active_region(effect)):
+            return self.carried(context)
         file, shown = outline_drawings.carried_frames(scene, effect, strip, effect.active_region)
         with closing(file.open()) as mattes:
             frames = sorted({number for number in shown.values() if not mattes.has(number)})
@@ -92,14 +95,14 @@ class _Carries(Mixin):
         context.workspace.status_text_set(None)
 
 
-class SHUTTER_OT_outline_carry(_Carries, _OfOutline, Operator):
+class SHUTTER_OT_outline_carry(_Carries, OfOutline, Operator):
     """Carry the active outline to all frames of its strip now (Esc stops and keeps what is carried)"""
 
     bl_idname = "shutter.outline_carry"
     bl_label = "Carry Outline"
 
 
-class SHUTTER_OT_outline_needed(_Carries, _OfOutline, Operator):
+class SHUTTER_OT_outline_needed(_Carries, OfOutline, Operator):
     """Go to the frame between two drawings at which the outline is least sure, carrying it first"""
 
     bl_idname = "shutter.outline_needed"
@@ -118,7 +121,29 @@ class SHUTTER_OT_outline_needed(_Carries, _OfOutline, Operator):
         return {"FINISHED"}
 
 
-class SHUTTER_OT_outline_draw(_OfOutline, Operator):
+class SHUTTER_OT_outline_mask(_Carries, OfOutline, Operator):
+    """Make a Blender mask with shape keys of the active outline, carrying it first"""
+
+    bl_idname = "shutter.outline_mask"
+    bl_label = "Outline to Mask"
+    bl_options = UNDOABLE
+
+    step: IntProperty(
+        name="Every",
+        description="Frames from one shape key to the next between drawings of a carried outline; 0 for drawings alone",
+        default=5,
+        min=0,
+        soft_max=50,
+    )
+
+    def carried(self, context):
+        scene, effect, strip = selection.active(context)
+        mask = outline_masks.to_mask(context, scene, effect, strip, effect.active_region, self.step)
+        self.report({"INFO"}, rpt_('Made the mask "{mask}"').format(mask=mask.name))
+        return {"FINISHED"}
+
+
+class SHUTTER_OT_outline_draw(OfOutline, Operator):
     """Make the outline that is carried to the current frame a drawing of its own, to be mended"""
 
     bl_idname = "shutter.outline_draw"
@@ -150,4 +175,10 @@ class SHUTTER_OT_outline_it(OfStrokes, Operator):
         return None
 
 
-classes = (SHUTTER_OT_outline_carry, SHUTTER_OT_outline_needed, SHUTTER_OT_outline_draw, SHUTTER_OT_outline_it)
+classes = (
+    SHUTTER_OT_outline_carry,
+    SHUTTER_OT_outline_needed,
+    SHUTTER_OT_outline_mask,
+    SHUTTER_OT_outline_draw,
+    SHUTTER_OT_outline_it,
+)

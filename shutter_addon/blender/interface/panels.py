@@ -75,12 +75,16 @@ class SHUTTER_MT_regions(Menu):
 
     def draw(self, _context):
         layout = self.layout
+        outline = layout.operator("shutter.draw", text="Draw Outline", icon=_ICONS["OUTLINE"])
+        outline.new, outline.kind = True, "OUTLINE"
+        layout.separator()
         layout.operator("shutter.matte_add", icon="FILE_MOVIE")
         layout.operator_menu_enum("shutter.matte_strip", "strip", icon="SEQUENCE")
-        if bpy.data.masks:
-            layout.operator_menu_enum("shutter.matte_mask", "mask", icon="MOD_MASK")
-        else:
-            layout.operator("shutter.matte_mask", icon="MOD_MASK")  # greyed out; its tooltip says why
+        for operator, icon in (("shutter.matte_mask", "MOD_MASK"), ("shutter.outline_from_mask", _ICONS["OUTLINE"])):
+            if bpy.data.masks:
+                layout.operator_menu_enum(operator, "mask", icon=icon)
+            else:
+                layout.operator(operator, icon=icon)  # greyed out; its tooltip says why
         layout.operator_menu_enum("shutter.ramp_add", "ramp", icon="IPO_EASE_IN_OUT")
         layout.separator()
         layout.operator_menu_enum("shutter.time_map", "ramp", icon="TIME")
@@ -143,10 +147,15 @@ def _draw_tools(layout, effect) -> None:
     row.operator("shutter.erase")
     row.menu("SHUTTER_MT_regions", text="", icon="DOWNARROW_HLT")
     draw_tracking(layout, effect.active_region)
+    region = selection.active_region(effect)
+    if region is not None and region.kind == "OUTLINE":
+        row = layout.row(align=True)
+        row.operator("shutter.outline_carry")
+        row.operator("shutter.outline_needed")
     row = layout.row(align=True)
     row.operator("shutter.panning_shot", icon="CON_FOLLOWTRACK")
     row.operator("shutter.tripod", icon="CON_CAMERASOLVER")
-    if (region := selection.active_region(effect)) is not None:
+    if region is not None:
         row = layout.split(factor=0.4)
         label = row.row()
         label.alignment = "RIGHT"

@@ -42,8 +42,9 @@ class Regions(WithEffect):
             layout.prop(region, "width")
         elif region.kind == "OUTLINE":
             layout.prop(region, "between")
-            for operator in ("outline_carry", "outline_needed", "outline_draw"):
-                layout.operator(f"shutter.{operator}")
+            layout.operator("shutter.outline_points")
+            layout.operator("shutter.outline_draw")
+            layout.operator("shutter.outline_mask")
         elif region.kind == "RAMP":
             layout.prop(region, "ramp")
         elif region.kind == "MATTE":

@@ -204,8 +204,10 @@ class OutlineRegion(MatteRegion):
     between: mattes.Between = "carried"
 
     def drawn_at(self, frame: float) -> scribbles.Shape:
-        """The curves at a frame, as a lasso. EffectError: they are nowhere near the picture."""
-        strokes = tuple(self.drawings.at(frame))
+        """The curves at a frame, as a lasso; between drawings, what is carried has none. EffectError: they are nowhere
+        near the picture."""
+        has_curves = self.between == "straight" or frame in self.drawings.frames
+        strokes = tuple(self.drawings.at(frame)) if has_curves else ()
         return scribbles.Shape(shutter=self.shutter, kind="lasso", width=0.0, strokes=strokes)
 
     def centre(self, frame: float) -> np.ndarray | None:

@@ -307,6 +307,7 @@ MESSAGES = {
     ("Operator", "Paint Bars"): "Balken malen",
     # Regions
     ("Operator", "Draw"): "Zeichnen",
+    ("Operator", "Draw Outline"): "Umriss zeichnen",
     (
         "*",
         "Draw on the sharp frame where the active shutter holds (at another frame, this redraws the active region)",
@@ -438,6 +439,43 @@ MESSAGES = {
     ("*", "The region is no matte, ramp or outline"): "Die Region ist keine Matte, keine Rampe und kein Umriss",
     ("*", 'Saved {count} pictures in "{folder}"'): "{count} Bilder in „{folder}“ gespeichert",
     ("Operator", "Outline It"): "Umreißen",
+    ("Operator", "Outline from Points"): "Umriss aus Punkten",
+    (
+        "*",
+        "Draw a curve of the active outline point by point, along the picture's edges (Ctrl for straight lines)",
+    ): "Eine Kurve des aktiven Umrisses Punkt für Punkt an den Kanten des Bildes entlang zeichnen (Strg für gerade"
+    " Linien)",
+    (
+        "*",
+        "Click points around the subject, Ctrl: straight, Backspace: one less, Return: close, Esc: nothing",
+    ): "Punkte um das Motiv klicken, Strg: gerade, Rücktaste: einer weniger, Eingabe: schließen, Esc: nichts",
+    ("*", "A curve has three points at least"): "Eine Kurve hat mindestens drei Punkte",
+    ("Operator", "Outline to Mask"): "Umriss zu Maske",
+    ("Operator", "Outline from Mask"): "Umriss aus Maske",
+    (
+        "*",
+        "Make a Blender mask with shape keys of the active outline, carrying it first",
+    ): "Aus dem aktiven Umriss eine Blender-Maske mit Formschlüsseln machen; zuvor wird er mitgeführt",
+    (
+        "*",
+        "Make an outline of the active shutter that is drawn at each key of a mask",
+    ): "Einen Umriss des aktiven Verschlusses machen, der an jedem Schlüssel einer Maske gezeichnet ist",
+    ("*", "Every"): "Jedes",
+    (
+        "*",
+        "Frames from one shape key to the next between drawings of a carried outline; 0 for drawings alone",
+    ): "Bilder von einem Formschlüssel zum nächsten zwischen den Zeichnungen eines mitgeführten Umrisses; 0 nur für die"
+    " Zeichnungen",
+    ("*", 'Made the mask "{mask}"'): "Maske „{mask}“ gemacht",
+    ("*", "Nothing is drawn in the outline"): "Im Umriss ist nichts gezeichnet",
+    (
+        "*",
+        'mask "{mask}" encloses nothing in the strip',
+    ): "Maske „{mask}“ umschließt im Streifen nichts",
+    (
+        "*",
+        "A mask is written in a window of Blender, and there is none",
+    ): "Eine Maske wird in einem Fenster von Blender geschrieben, und es gibt keines",
     (
         "*",
         "Make the active region an outline of the subject that its strokes run over, or go around, at this frame",

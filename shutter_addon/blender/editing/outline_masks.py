@@ -1,0 +1,162 @@
+"""An outline as a Blender mask with shape keys, and a mask as an outline."""
+
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...core.messages import EffectError
+from ...core.model import outline_chains, outlines
+from ...core.model.keyframes import Ease
+from ...media.outline_tracing import traced
+from ..data import annotations, fcurves, mask_reading, snapshot, strips
+from . import outline_drawings, region_edits
+
+
+def to_mask(context, scene, effect, strip, index: int, step: int):
+    """A new mask of an outline, whose frames are the source's, from its start on; each curve that comes and goes has a
+    layer, and what two of them enclose lies outside.
+
+    step: how many frames from one shape key to the next, between the drawings of what is carried; 0: drawings alone
+    EffectError, MediaError: nothing is drawn, nothing can be carried, or there is no window to write shape keys in."""
+    keys = _keys(scene, effect, strip, index, step)
+    if not any(curves for _frame, curves in keys):
+        raise EffectError(rpt_("Nothing is drawn in the outline"))
+    size = annotations.picture_size(effect)
+    mask = bpy.data.masks.new(effect.regions[index].name)
+    mask.frame_start, mask.frame_end = 1, max(_length(scene, effect, strip), keys[-1][0] + 1)
+    chains = outline_chains.chains(keys, size[0] / size[1])
+    with _mask_editor(context, mask):
+        for number, chain in enumerate(chains, 1):
+            _add_layer(mask, f"{mask.name} {number}", chain, size)
+        _insert_keys(context, mask, chains, size)
+    return mask
+
+
+def from_mask(scene, effect, strip, shutter, mask):
+    """A new region: an outline with a drawing for each frame at which something is said of a mask. EffectError,
+    MediaError: the mask cannot be read or encloses nothing there, or OpenCV is missing."""
+    size = annotations.picture_size(effect)
+    shapes = {
+        frame: traced(mask_reading.mask_at(mask, mask.frame_start + number).values(*size))
+        for frame, number in _drawn_frames(scene, effect, strip, mask).items()
+    }
+    if not any(shapes.values()):
+        raise EffectError(rpt_('mask "{mask}" encloses nothing in the strip').format(mask=mask.name))
+    region = region_edits.add_region(effect, shutter, "OUTLINE", mask.name)
+    region.motion, region.between = "LOCATION", "STRAIGHT"
+    for frame, curves in _in_order(shapes, size[0] / size[1]).items():
+        outline_drawings.draw(effect, strip, region, curves, frame)
+    return region
+
+
+def _keys(scene, effect, strip, index: int, step: int) -> list[tuple[int, outlines.Curves]]:
+    """The curves of an outline, at the source's frames that get a shape key, ascending."""
+    drawn = snapshot.drawn_outline(scene, effect, strip, index)
+    if not (strips.is_carried(effect.regions[index]) and step and drawn):
+        return sorted(drawn.items())
+    file, _shown = outline_drawings.carried_frames(scene, effect, strip, index)
+    frames = sorted({*drawn, *range(min(drawn), max(drawn), step)})
+    with closing(file.open()) as mattes:
+        return [(frame, mattes.curves(frame)) for frame in frames]
+
+
+def _length(scene, effect, strip) -> int:
+    return int(snapshot.last_shown(scene, effect, strip)) + 1
+
+
+def _in_mask(points: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """Points (..., 2) in mask space (core.masks.mask), of fractions of the picture."""
+    return (points - 0.5) * np.array(size) / max(size) + 0.5
+
+
+def _add_layer(mask, name: str, chain: outline_chains.Chain, size: tuple[int, int]) -> None:
+    """A layer of one spline, which is there from its first frame on until it is gone."""
+    layer = mask.layers.new(name=name)
+    layer.blend, layer.alpha = "DIFFERENCE", 1.0  # Blender's own begin with 0 where a script makes them
+    spline = layer.splines.new()
+    spline.points.add(chain.points.shape[1] - len(spline.points))
+    spline.use_cyclic = True
+    for point in spline.points:
+        point.handle_type = "FREE"
+    _place(spline, _in_mask(chain.points[0], size))
+    keys: list[tuple[float, float, Ease]] = [(1.0, 0.0, "constant")] if chain.frames[0] else []
+    keys.append((chain.frames[0] + 1.0, 1.0, "constant"))
+    if chain.gone is not None:
+        keys.append((chain.gone + 1.0, 0.0, "constant"))
+    if len(keys) > 1:
+        fcurves.set_keys(mask, f'layers["{bpy.utils.escape_identifier(layer.name)}"].alpha', 0, keys)
+
+
+def _place(spline, points: np.ndarray) -> None:
+    flat = np.ascontiguousarray(points, np.float32).ravel()
+    for name in ("co", "handle_left", "handle_right"):
+        spline.points.foreach_set(name, flat)
+
+
+def _insert_keys(context, mask, chains: list[outline_chains.Chain], size: tuple[int, int]) -> None:
+    """Blender gives shape keys to selected layers, at its current frame."""
+    edited = context.window.scene
+    current = edited.frame_current
+    try:
+        for frame in sorted({frame for chain in chains for frame in chain.frames}):
+            edited.frame_current = frame + 1
+            context.window.view_layer.update()  # or the operator would, and put the points where the last key has them
+            for layer, chain in zip(mask.layers, chains, strict=True):
+                has_key = frame in chain.frames
+                layer.hide = not has_key
+                for point in layer.splines[0].points:
+                    point.select = has_key
+                if has_key:
+                    _place(layer.splines[0], _in_mask(chain.points[chain.frames.index(frame)], size))
+            bpy.ops.mask.shape_key_insert()
+        for layer in mask.layers:
+            layer.hide = False
+    finally:
+        edited.frame_current = current
+
+
+@contextmanager
+def _mask_editor(context, mask) -> Iterator[None]:
+    """Where Blender's operators on masks run: the area becomes an editor of one for a moment. EffectError: there is no
+    window."""
+    window = context.window
+    if window is None:
+        raise EffectError(rpt_("A mask is written in a window of Blender, and there is none"))
+    area = context.area or window.screen.areas[0]
+    before = area.ui_type
+    area.ui_type = "IMAGE_EDITOR"
+    space = area.spaces.active
+    shown = space.mode, space.mask
+    try:
+        space.mode, space.mask = "MASK", mask
+        region = next(region for region in area.regions if region.type == "WINDOW")
+        with context.temp_override(window=window, area=area, region=region):
+            yield
+    finally:
+        space.mode, space.mask = shown
+        area.ui_type = before
+
+
+def _drawn_frames(scene, effect, strip, mask) -> dict[int, int]:
+    """The timeline frames of the strip that get a drawing, and the source's that they show: those of a mask's keys, and
+    the ends, where it has some beyond them."""
+    frames = range(strip.left_handle, strip.right_handle)
+    shown = snapshot.source_frames(scene, effect, strip, frames)
+    wanted = [frame - mask.frame_start for frame in mask_reading.key_frames(mask)] or [0]
+    numbers = {round(min(max(number, min(shown.values())), max(shown.values()))) for number in wanted}
+    nearest = {min(frames, key=lambda frame: abs(shown[frame] - number)): number for number in sorted(numbers)}
+    return {frame: shown[frame] for frame in sorted(nearest)}
+
+
+def _in_order(shapes: dict[int, outlines.Curves], aspect: float) -> dict[int, outlines.Curves]:
+    """Curves by frame, so that those go into each other, as they go straight from drawing to drawing, that belong
+    together: those first that are there all the time."""
+    chains = outline_chains.chains(sorted(shapes.items()), aspect)
+    chains.sort(key=lambda chain: -len(chain.frames))
+    return {
+        frame: outlines.curves([chain.points[chain.frames.index(frame)] for chain in chains if frame in chain.frames])
+        for frame in shapes
+    }

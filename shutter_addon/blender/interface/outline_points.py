@@ -1,0 +1,159 @@
+"""Drawing a curve of an outline point by point: between two of them it goes along the picture's edges."""
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import Operator
+
+from ...core.messages import UserError
+from ...core.model.scribbles import mapped
+from ...media import outlining
+from ..data import annotations, geometry, preview_areas, selection
+from ..editing import outline_drawings, track_region
+from . import drawing, sharp_frame
+from .operator_bases import redraw
+from .outline_operators import OfOutline
+
+_COLOR = (0.2, 0.9, 1.0, 0.9)
+_STRIDE = 12  # units of the interface from point to point, as the pointer is dragged
+_CLOSES = 8  # units of the interface around the first point, within which a click closes the curve
+_KEYS = {"ESC", "RIGHTMOUSE", "RET", "NUMPAD_ENTER", "BACK_SPACE"}
+
+
+class SHUTTER_OT_outline_points(OfOutline, Operator):
+    """Draw a curve of the active outline point by point, along the picture's edges (Ctrl for straight lines)"""
+
+    bl_idname = "shutter.outline_points"
+    bl_label = "Outline from Points"
+
+    def invoke(self, context, _event):
+        scene, effect, strip = selection.active(context)
+        areas = [area for _window, area in preview_areas.previews(context)]
+        if not areas:
+            self.report({"WARNING"}, "Open a sequencer with a preview to draw")
+            return {"CANCELLED"}
+        self._area = context.area if context.area in areas else areas[0]
+        try:
+            self._picture = outline_drawings.picture_now(scene, effect, strip)
+            outlining.along_edges(self._picture, np.zeros(2), np.zeros(2))  # that it can, before anything is drawn
+        except UserError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self._target, self._frame = track_region.Target.of(effect, effect.active_region), scene.frame_current
+        self._strip, self._ways, self._next, self._is_down = strip.name, [], np.zeros((0, 2)), False
+        sharp_frame.show(context)
+        self._drawn = bpy.types.SpaceSequenceEditor.draw_handler_add(self._draw, (), "PREVIEW", "POST_PIXEL")
+        sentence = rpt_(
+            "Click points around the subject, Ctrl: straight, Backspace: one less, Return: close, Esc: nothing"
+        )
+        context.workspace.status_text_set(sentence)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, _context):
+        self.report({"WARNING"}, "Open a sequencer with a preview to draw")  # it is drawn with a mouse alone
+        return {"CANCELLED"}
+
+    def modal(self, context, event):
+        if (there := self._there()) is None or there[0].frame_current != self._frame:
+            return self._ended(context, {"CANCELLED"})
+        if event.type == "LEFTMOUSE" and event.value == "RELEASE":
+            self._is_down = False
+        if event.type in {"MOUSEMOVE", "LEFTMOUSE"} and self._is_over(event):
+            return self._pointed(context, event)
+        return self._key(context, event) if event.type in _KEYS else {"PASS_THROUGH"}
+
+    def _pointed(self, context, event):
+        """A click adds a point; dragging adds one after the other."""
+        point = self._on_picture(event)
+        if event.type == "LEFTMOUSE" and event.value in {"PRESS", "DOUBLE_CLICK"}:
+            if len(self._ways) > 2 and self._apart(point, self._ways[0][0]) <= _CLOSES * drawing.ui_scale():
+                return self._closed(context)
+            self._is_down = True
+            self._ways.append(self._way(point, event.ctrl))
+        elif self._is_down and self._apart(point, self._ways[-1][-1]) >= _STRIDE * drawing.ui_scale():
+            self._ways.append(self._way(point, event.ctrl))
+        self._next = self._way(point, event.ctrl) if self._ways else np.zeros((0, 2))
+        self._area.tag_redraw()
+        return {"RUNNING_MODAL"}
+
+    def _key(self, context, event):
+        if event.value == "PRESS":
+            if event.type in {"ESC", "RIGHTMOUSE"}:
+                return self._ended(context, {"CANCELLED"})
+            if event.type in {"RET", "NUMPAD_ENTER"}:
+                return self._closed(context)
+            if event.type == "BACK_SPACE" and self._ways:
+                self._ways.pop()
+                self._next = np.zeros((0, 2))
+                self._area.tag_redraw()
+        return {"RUNNING_MODAL"}
+
+    def _closed(self, context):
+        """The curve becomes one of the drawing at this frame."""
+        if len(self._ways) < 3:
+            self.report({"WARNING"}, "A curve has three points at least")
+            return {"RUNNING_MODAL"}
+        _scene, effect, strip = self._there()
+        region = effect.regions[self._target.index]
+        curve = np.concatenate([*self._ways, self._way(self._ways[0][0], False)])
+        steps = np.hypot(*np.diff(curve, axis=0, append=curve[:1]).T)
+        try:
+            outline_drawings.add(effect, strip, region, curve[steps > 0], self._frame)
+        except UserError as error:
+            self.report({"ERROR"}, str(error))
+            return self._ended(context, {"CANCELLED"})
+        return self._ended(context, {"FINISHED"})
+
+    def _ended(self, context, result):
+        self.cancel(context)
+        redraw(context)
+        return result
+
+    def cancel(self, context):
+        """It has ended, or its window was closed."""
+        bpy.types.SpaceSequenceEditor.draw_handler_remove(self._drawn, "PREVIEW")
+        context.workspace.status_text_set(None)
+        sharp_frame.give_back(context)
+
+    def _there(self):
+        """Scene, effect and strip as Blender has them now; None: they are gone."""
+        effect = self._target.effect()
+        strip = effect and effect.id_data.sequence_editor.strips_all.get(self._strip)
+        return None if strip is None else (effect.id_data, effect, strip)
+
+    def _way(self, point: np.ndarray, is_straight: bool) -> np.ndarray:
+        """From the last point to another one; the first is on its own."""
+        if not self._ways:
+            return point[None]
+        last = self._ways[-1][-1]
+        return np.stack([last, point]) if is_straight else outlining.along_edges(self._picture, last, point)
+
+    def _is_over(self, event) -> bool:
+        region = preview_areas.preview_region(self._area)
+        x, y = event.mouse_x - region.x, event.mouse_y - region.y
+        return 0 <= x < region.width and 0 <= y < region.height
+
+    def _to_region(self) -> np.ndarray:
+        _scene, effect, strip = self._there()
+        region = preview_areas.preview_region(self._area)
+        return geometry.picture_to_region(strip, annotations.picture_size(effect), region)
+
+    def _on_picture(self, event) -> np.ndarray:
+        """Where the pointer is, in fractions of the picture."""
+        region = preview_areas.preview_region(self._area)
+        pointer = np.array([[event.mouse_x - region.x, event.mouse_y - region.y]], np.float64)
+        return mapped(np.linalg.inv(self._to_region()), pointer)[0]
+
+    def _apart(self, *points: np.ndarray) -> float:
+        """How far two points are from each other, in pixels of the region."""
+        return float(np.hypot(*np.diff(mapped(self._to_region(), np.stack(points)), axis=0)[0]))
+
+    def _draw(self):
+        if bpy.context.area != self._area or self._there() is None or not self._ways:
+            return
+        curve = np.concatenate([*self._ways, self._next])
+        drawing.lines(mapped(self._to_region(), curve), _COLOR, width=2)
+
+
+classes = (SHUTTER_OT_outline_points,)
