@@ -5,9 +5,10 @@ files. What a file is made of is in its name: a drawing that changes leaves thos
 from __future__ import annotations
 
 import tempfile
+import time
 from bisect import bisect_left, bisect_right
 from collections.abc import Hashable, Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -17,6 +18,8 @@ from typing import Protocol
 import numpy as np
 from OpenImageIO import ImageBuf, ImageInput
 
+from ..core import stopping
+from ..core.farm.claims import Claims
 from ..core.frames.frame_source import FrameSource
 from ..core.model import outlines, scribbles
 from . import carrying, flow
@@ -33,6 +36,9 @@ VERSION = 4  # raise it when mattes of the same drawings change
 TRUSTED = 0.2  # confidence below which a drawing is carried no farther
 FADE = 4  # frames in which it fades there
 BLOCK = 20  # frames beyond a drawing that are carried together
+# Seconds between two looks at what another process carries, after which that counts as killed, and from one sign of its
+# life to the next: somebody waits for what is carried, and to carry it twice does no harm.
+_PAUSE, _PATIENCE, _BEAT = 0.5, 20.0, 4.0
 
 _elsewhere: list[tempfile.TemporaryDirectory] = []  # where mattes are kept that have no folder, until this program ends
 
@@ -92,11 +98,10 @@ class CarriedMattes:
         near = self._near(index)
         if near == (None, None):
             return self._nothing()
-        if (matte := self._kept(self._path(index, *near))) is None:
-            for made in self._made(index, *self._in_shot(index, *near)):
-                self._keep(self._path(made.frame, *near), made)
-                if made.frame == index:
-                    matte = made.matte
+        path = self._path(index, *near)
+        if (matte := self._kept(path)) is None:
+            with self._claimed(path, *near) as kept:
+                matte = kept if kept is not None else self._carried(index, *near)
         return self._nothing() if matte is None else matte / np.float32(255)
 
     def has(self, index: int) -> bool:
@@ -140,6 +145,25 @@ class CarriedMattes:
         share = (index - ends[0]) / (ends[-1] - ends[0]) if ends[0] != ends[-1] else 0.0
         before, behind = (self._drawings[frame] for frame in (ends[0], ends[-1]))
         return scribbles.between_strokes(before, behind, share, self.width / self.height)
+
+    def _carried(self, index: int, first: int | None, last: int | None) -> np.ndarray | None:
+        """A frame's matte (H, W) uint8, which is kept then, as are those that are carried with it."""
+        matte = None
+        for made in self._made(index, *self._in_shot(index, first, last)):
+            self._keep(self._path(made.frame, first, last), made)
+            if made.frame == index:
+                matte = made.matte
+        return matte
+
+    @contextmanager
+    def _claimed(self, path: Path, first: int | None, last: int | None) -> Iterator[np.ndarray | None]:
+        """While this process alone carries what lies between two drawings; what another has kept of a matte by then."""
+        name = manifest_key({"drawn": [self._drawing_key(frame) for frame in (first, last) if frame is not None]})
+        with Claims(path.parent, _PATIENCE, _BEAT) as claims:
+            while not _taken(claims, path.parent, name):
+                stopping.check()
+                time.sleep(_PAUSE)
+            yield self._kept(path)
 
     def close(self) -> None:
         """Closes the footage; a later read opens it again."""
@@ -240,8 +264,13 @@ class CarriedMattes:
 
     def _keep(self, path: Path, carried: carrying.Carried) -> None:
         """Writes a matte whole or not at all. MediaError: it cannot be written."""
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise MediaError(f"{path.parent}: mattes cannot be written there ({error.strerror or error})") from None
         write_levels(path, carried.matte, f"{CONFIDENCE}{carried.confidence:.3f}")
+
+
+def _taken(claims: Claims, folder: Path, name: str) -> bool:
+    """As Claims.take. MediaError: the folder cannot be written to."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return claims.take(name)
+    except OSError as error:
+        raise MediaError(f"{folder}: mattes cannot be written there ({error.strerror or error})") from None

@@ -1,6 +1,7 @@
 """Mattes that are carried from drawings of outlines: a subject that turns and changes its shape over a ground that the
 camera passes, both of them textured."""
 
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 import cv2
@@ -217,6 +218,17 @@ def test_mattes_are_kept(carried, footage, tmp_path):
     (damaged,) = (tmp_path / "mattes").glob("*/00000003-*.png")
     damaged.write_bytes(damaged.read_bytes()[:40])
     assert (carried(0, 6, 12).read(3) == first[3]).all()
+
+
+def test_who_shares_a_folder_carries_once(tmp_path):
+    """Two that ask at the same time: one carries, the other waits, and reads no frame."""
+    both = [Footage(tmp_path) for _ in range(2)]
+    files = [carried_mattes.CarriedFile(footage, drawings(0, 6), tmp_path / "mattes") for footage in both]
+    with ThreadPoolExecutor(2) as pool:
+        first, second = pool.map(lambda file: file.open().read(3), files)
+    np.testing.assert_array_equal(first, second)
+    assert sorted(bool(footage.asked) for footage in both) == [False, True]
+    assert not list((tmp_path / "mattes").glob("*/.claim*"))
 
 
 def test_confidence_is_kept(carried, footage):
