@@ -22,8 +22,11 @@ from shutter_addon.core.recipes import recipe_file
 
 REGION = {"name": "Face", "shutter": "S1", "strokes": [[[0.1, 0.1], [0.9, 0.1]]]}
 MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
+OUTLINE = {"name": "Hand", "shutter": "S1", "kind": "outline", "strokes": [[[0.2, 0.2], [0.6, 0.2], [0.4, 0.7]]]}
+REDRAWN = [[[0.3, 0.2], [0.7, 0.2], [0.5, 0.7], [0.4, 0.5]]]
 RECIPES = [
     recipe(2, [1, 0]),
+    recipe(2, [1, 1], [0, 1], regions=[OUTLINE | {"keys": [{"frame": 1}, {"frame": 7, "strokes": REDRAWN}]}]),
     recipe(4, {1: [1, 0, 0, 0], 9: [0, 0, 0, 1]}, [1, 1, 1, 1], regions=[MOVED]),
     recipe(3, [1, 1, 1], {5: [0, 1, 0]}, regions=[REGION, MOVED | {"name": "Hand"}]),
     recipe(
@@ -74,7 +77,7 @@ def snapshot(bpy):
                     )
                     for s in e.shutters
                 ],
-                [(r.name, r.shutter, r.layer, r.is_layer) for r in e.regions],
+                [(r.name, r.shutter, r.layer, r.is_layer, r.kind, r.between) for r in e.regions],
                 [
                     (y.info, [(f.frame_number, [[tuple(p.co) for p in s.points] for s in f.strokes]) for f in y.frames])
                     for y in layers(e)
