@@ -74,7 +74,13 @@ void add_piece(int quad, int row, float dz) {
 }
 
 void add_frame(int quad) {
+#if MOVED && COMBINE
+  start_sight(quad);
   expose(quad, frame, after[quad] - before[quad]);
+  fold_sight(quad, frame);
+#else
+  expose(quad, frame, after[quad] - before[quad]);
+#endif
   before[quad] = after[quad];
 }
 
@@ -91,6 +97,10 @@ void main() {
   int end = last;
 #if MOVED
   EACH(widen_exposure);
+#  if THRESHOLD
+  from = min(from, float(shown));
+  until = max(until, float(shown + 1));
+#  endif
   begin = max(begin, int(from));
   end = min(end, int(ceil(until)));
 #endif

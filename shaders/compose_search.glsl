@@ -6,8 +6,8 @@ uniform int rows, first, last;
 
 int frame;
 float boundary;  // the frame's end
-vec4 before = vec4(0.0);  // Q at the frame's start
-ivec4 row = ivec4(1);  // of each pixel: the first piece that does not end before the boundary
+vec4 before;  // Q at the frame's start
+ivec4 row;  // of each pixel: the first piece that does not end before the boundary
 
 // A pixel's quantile in the table's row, at the piece's start (column 0) or end (column GROUPS).
 float time_at(int pixel, int column, int row) {
@@ -36,15 +36,36 @@ float searched(int pixel, inout int row) {
   return piece.z + piece.x * clamp((boundary - from) / max(until - from, 1e-7), 0.0, 1.0);
 }
 
+void expose_frames() {
+  row = ivec4(1);
+  before = vec4(0.0);
+  for (frame = first; frame < last; frame++) {
+    boundary = float(frame + 1);
+    vec4 after = vec4(searched(0, row.x), searched(1, row.y), searched(2, row.z), searched(3, row.w));
+#if MOVED && COMBINE
+    start_sight(0);
+    expose(0, frame, after - before);
+    fold_sight(0, frame);
+#else
+    expose(0, frame, after - before);
+#endif
+    before = after;
+  }
+}
+
 void main() {
   if (!start_block()) {
     return;
   }
-  for (frame = first; frame < last; frame++) {
-    boundary = float(frame + 1);
-    vec4 after = vec4(searched(0, row.x), searched(1, row.y), searched(2, row.z), searched(3, row.w));
-    expose(0, frame, after - before);
-    before = after;
+#if COMBINE == 3
+  start_median();
+  for (scan = 0; scan <= SCANS; scan++) {
+    start_scan();
+    expose_frames();
+    end_scan();
   }
+#else
+  expose_frames();
+#endif
   finish_quad(0);
 }

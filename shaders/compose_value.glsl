@@ -12,17 +12,42 @@ void add_frame(int quad) {
 #endif
 }
 
-void main() {
-  if (!start_block()) {
-    return;
-  }
+#if MOVED && COMBINE
+void fold_frame(int quad) {
+  fold_sight(quad, frame);
+}
+#endif
+
+void expose_frames() {
   for (frame = first; frame < last; frame++) {
+#if MOVED && COMBINE
+    EACH(start_sight);
+#endif
 #if MOVED
     for (motion = 0; motion < motions; motion++)
 #endif
     {
       EACH(add_frame);
     }
+#if MOVED && COMBINE
+    EACH(fold_frame);
+#endif
   }
+}
+
+void main() {
+  if (!start_block()) {
+    return;
+  }
+#if COMBINE == 3
+  start_median();
+  for (scan = 0; scan <= SCANS; scan++) {
+    start_scan();
+    expose_frames();
+    end_scan();
+  }
+#else
+  expose_frames();
+#endif
   EACH(finish_quad);
 }

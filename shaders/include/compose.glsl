@@ -7,6 +7,7 @@
 // i mod `layers`; or with SUMS the running sums instead, from position `lowest` on, the shot's ends extended: position
 // i's in that layer.
 // With MOVED shutters follow something: see moved.glsl.
+// COMBINE: frames are not averaged (combine.glsl); 0: they are.
 // GROUPS of four shutters, TILED, EDGES, DECODE, PREMULTIPLIED, ENCODED: see compute/composition_passes.py. Software renderers run both
 // sides of every branch: what is costly stands in loops or behind these definitions.
 layout(local_size_x = 64) in;
@@ -61,6 +62,9 @@ mat4 total[QUADS];
 #endif
 vec4 share[QUADS];  // of the exposure that fell on frames that are there
 vec4 centre[QUADS];  // of the exposure in time, frames left out included
+#if COMBINE == 1 || COMBINE == 2
+vec4 gain[QUADS];  // how much a frame's weight counts (combine.glsl)
+#endif
 
 // A pixel of a quad; beyond the picture's edge the last one inside.
 ivec2 pixel_at(int quad, int pixel) {
@@ -112,9 +116,23 @@ void start_light(int quad) {
 }
 #else
 void start_light(int quad) {
+#if COMBINE == 1 || COMBINE == 2
+  vec4 none = vec4(vec3(-1e30), 0.0);
+  total[quad] = mat4(none, none, none, none);
+#else
   total[quad] = mat4(0.0);
+#endif
 }
 #endif
+
+// Σ cᵢ tableᵢ, for the table's row and the first of its columns.
+vec4 mixed(int quad, int column, int row) {
+  vec4 sum = vec4(0.0);
+  for (int g = 0; g < GROUPS; g++) {
+    sum += imageLoad(table, ivec3(column + g, row, 0)) * c[quad * GROUPS + g];
+  }
+  return sum;
+}
 
 void start_quad(int quad) {
   vec4 sum = vec4(0.0);
@@ -133,6 +151,9 @@ void start_quad(int quad) {
   share[quad] = vec4(0.0);
   centre[quad] = vec4(0.0);
   start_light(quad);
+#if COMBINE == 1 || COMBINE == 2
+  gain[quad] = mixed(quad, 0, 0);
+#endif
 }
 
 // False where the block lies outside the picture.
@@ -143,15 +164,6 @@ bool start_block() {
 #endif
   EACH(start_quad);
   return corner.x < size.x && corner.y < size.y;
-}
-
-// Σ cᵢ tableᵢ, for the table's row and the first of its columns.
-vec4 mixed(int quad, int column, int row) {
-  vec4 sum = vec4(0.0);
-  for (int g = 0; g < GROUPS; g++) {
-    sum += imageLoad(table, ivec3(column + g, row, 0)) * c[quad * GROUPS + g];
-  }
-  return sum;
 }
 
 #if !SUMS
@@ -188,8 +200,40 @@ int layer_of(int frame) {
 #  endif
 #endif
 
+#if COMBINE
+#  include "combine.glsl"
+#endif
+
 #if MOVED
 #  include "moved.glsl"
+#elif COMBINE
+void expose(int quad, int frame, vec4 weight) {
+#if EDGES == 2  // shorten
+  centre[quad] += weight * (float(frame) + 0.5);
+  int index = origin + direction * frame;
+  weight = index >= 0 && index < count ? weight : vec4(0.0);
+#endif
+  int layer = layer_of(frame);
+#if COMBINE == 3
+  for (int pixel = 0; pixel < 4; pixel++) {
+    count_sample(pixel, sample_at(pixel_at(quad, pixel), layer), weight[pixel]);
+  }
+#else
+  weight *= gain[quad];
+  for (int pixel = 0; pixel < 4; pixel++) {
+    vec4 light = frame_light(pixel_at(quad, pixel), layer);
+#if THRESHOLD
+    fold(quad, pixel, light, frame == shown ? 1.0 : weight[pixel] * passed(light));
+#else
+    fold(quad, pixel, light, weight[pixel]);
+#endif
+  }
+#if THRESHOLD
+  share[quad] = frame == shown ? vec4(1.0) : share[quad];
+#endif
+  share[quad] = max(share[quad], weight);
+#endif
+}
 #else
 // Frames one after another: at each, the sum at its end is looked up, and that at its start is known.
 void expose(int quad, int frame, vec4 weight) {
@@ -215,7 +259,9 @@ void expose(int quad, int frame, vec4 weight) {
 #endif
 }
 
-#if EDGES == 2
+#endif
+
+#if !MOVED && EDGES == 2
 // The light of the frame that is nearest to the window's among those that are there.
 vec4 nearest_light(int quad, int pixel, int frame) {
 #if SUMS
@@ -232,15 +278,18 @@ vec4 nearest_light(int quad, int pixel, int frame) {
 #endif
 }
 #endif
-#endif
 
-void store(int quad, int pixel, float gain) {
+void store(int quad, int pixel, float brightness) {
   ivec2 at = corner + ivec2(0, 4 * quad + pixel);
   if (at.y >= size.y) {
     return;
   }
 #if SUMS && COVER
   vec4 color = covered(unit * total[4 * quad + pixel] / max(share[quad][pixel], 1e-6));
+#elif COMBINE == 3
+  vec4 color = median_of(pixel);
+#elif COMBINE
+  vec4 color = folded(quad, pixel);
 #elif SUMS
   vec4 color = vec4(unit * total[4 * quad + pixel], share[quad][pixel]) / max(share[quad][pixel], 1e-6);
 #else
@@ -256,8 +305,14 @@ void store(int quad, int pixel, float gain) {
   color = share[quad][pixel] > 1e-6 ? color : nearest_light(quad, pixel, int(centre[quad][pixel] - 1e-3));
 #  endif
 #endif
-#if CONTINUED
+#if CONTINUED && COMBINE
+  color = share[quad][pixel] > 1e-6 ? with_others(color, texelFetch(summed, ivec3(at, 0), 0))
+                                    : color + texelFetch(summed, ivec3(at, 0), 0);
+#elif CONTINUED
   color += texelFetch(summed, ivec3(at, 0), 0);
+#endif
+#if !UNFINISHED && COMBINE == 1 || !UNFINISHED && COMBINE == 2
+  color = share[quad][pixel] > 1e-6 ? finished_fold(color) : color;
 #endif
 #if UNFINISHED
   imageStore(picture, ivec3(at, 0), color);
@@ -265,15 +320,17 @@ void store(int quad, int pixel, float gain) {
 #  if ENCODED
   color.rgb = to_linear_exact(straight(color)) * color.a;
 #  endif
-  color.rgb *= gain;
+#  if !COMBINE
+  color.rgb *= brightness;
+#  endif
   finish(at + ivec2(0, top), color);
 #endif
 }
 
 void finish_quad(int quad) {
-  vec4 gain = mixed(quad, 0, 0);
-  store(quad, 0, gain.x);
-  store(quad, 1, gain.y);
-  store(quad, 2, gain.z);
-  store(quad, 3, gain.w);
+  vec4 brightness = mixed(quad, 0, 0);
+  store(quad, 0, brightness.x);
+  store(quad, 1, brightness.y);
+  store(quad, 2, brightness.z);
+  store(quad, 3, brightness.w);
 }

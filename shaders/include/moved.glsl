@@ -12,7 +12,10 @@ uniform int motions;
 layout(rgba16ui) uniform readonly uimage2DArray packed_frames;
 #endif
 #if EDGES == 2
-uniform int seen_first, seen_last, parts;
+uniform int seen_first, seen_last;
+#endif
+#if EDGES == 2 || THRESHOLD
+uniform int parts;
 #endif
 #if CONTINUED
 uniform sampler2DArray summed;
@@ -132,27 +135,90 @@ mat4 moves_of(int quad, int row) {
 #endif
 }
 
+#if COMBINE
+// A frame as it is seen by all motions: its light, weighted, how much it counts, and whether it is among these frames.
+mat4 sight[QUADS];
+vec4 sight_weight[QUADS];
+bool is_here;
+#  if THRESHOLD
+mat4 shown_sight[QUADS];  // its light, whatever it counts
+#  endif
+
+void start_sight(int quad) {
+  sight[quad] = mat4(0.0);
+  sight_weight[quad] = vec4(0.0);
+#  if THRESHOLD
+  shown_sight[quad] = mat4(0.0);
+#  endif
+}
+
+void add_sight(int quad, int pixel, vec4 light, float weight) {
+  sight[quad][pixel] += weight * light;
+#  if THRESHOLD
+  // How much of the pixel's coefficients is that of the motion's shutters.
+  float part = 0.0;
+  for (int g = 0; g < GROUPS; g++) {
+    part += dot(c[quad * GROUPS + g][pixel], imageLoad(table, ivec3(g, parts + motion, 0)));
+  }
+  shown_sight[quad][pixel] += part * light;
+#  endif
+}
+
+void fold_sight(int quad, int frame) {
+  for (int pixel = 0; pixel < 4; pixel++) {
+    float weight = sight_weight[quad][pixel];
+    vec4 light = sight[quad][pixel] / max(weight, 1e-30);
+    share[quad][pixel] = max(share[quad][pixel], weight);
+    weight = is_here ? weight : 0.0;
+#  if THRESHOLD
+    fold(quad, pixel, light, weight * passed(light));
+    fold(quad, pixel, shown_sight[quad][pixel], is_here && frame == shown ? 1.0 : 0.0);
+    share[quad][pixel] = frame == shown ? 1.0 : share[quad][pixel];
+#  else
+    fold(quad, pixel, light, weight);
+#  endif
+  }
+}
+#endif
+
 void expose(int quad, int frame, vec4 weight) {
   int row = frame * motions + motion;
   vec4 place = imageLoad(moves, ivec3(0, row, 0));
   centre[quad] += weight * (float(frame) + 0.5);
   weight *= place.y;
+#if COMBINE
+  weight *= gain[quad];
+  sight_weight[quad] += weight;
+  is_here = place.x >= 0.0;
+#else
   share[quad] += weight;
+#endif
 #if SEVERAL
   // A loop, for software renderers run both sides of a branch; and it is dear to them as well.
+#  if THRESHOLD
+  int layer = frame == shown || any(greaterThan(weight, vec4(0.0))) ? int(place.x) : -1;
+#  else
   int layer = any(greaterThan(weight, vec4(0.0))) ? int(place.x) : -1;
+#  endif
   for (; layer >= 0; layer = -1)
 #else
   int layer = max(int(place.x), 0);
 #endif
   {
     mat4 move = moves_of(quad, row);
+#if COMBINE
+    for (int pixel = 0; pixel < 4; pixel++) {
+      ivec2 own = pixel_at(quad, pixel);
+      add_sight(quad, pixel, seen_light(own, moved_by(move[pixel], own), layer), weight[pixel]);
+    }
+#else
     mat4 light;
     light[0] = weight.x * seen_light(pixel_at(quad, 0), moved_by(move[0], pixel_at(quad, 0)), layer);
     light[1] = weight.y * seen_light(pixel_at(quad, 1), moved_by(move[1], pixel_at(quad, 1)), layer);
     light[2] = weight.z * seen_light(pixel_at(quad, 2), moved_by(move[2], pixel_at(quad, 2)), layer);
     light[3] = weight.w * seen_light(pixel_at(quad, 3), moved_by(move[3], pixel_at(quad, 3)), layer);
     total[quad] += light;
+#endif
   }
 }
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.model.combining import AVERAGE, Combine
 from ..core.model.frame_state import Options
 from ..devices.llvmpipe import MOST_ITERATIONS
 from ..devices.passes import Pass, read_pass
@@ -16,6 +17,7 @@ from .window import BLOCK, STORED_SUMS, Sums
 # Rows of pixels that one invocation of compose_sums composes.
 PAIR = 2
 
+MODES = {"average": 0, "lightest": 1, "darkest": 2, "median": 3}
 EDGES = {"hold": 0, "mirror": 1, "shorten": 2}
 # What a picture is stored as, by whether it is levels.
 PICTURE = {False: "rgba32f", True: "rgba8"}
@@ -34,13 +36,33 @@ class LightFormat:
     premultiplied: whether the frames' colours are
     encoded: whether the sums are of encoded light (Options.light)
     levels: whether the picture is of levels, not scene-linear
-    cover: of weighted_window.WeightedSums"""
+    cover: of weighted_window.WeightedSums
+    combine: how frames are combined; kind: of the texture that has them"""
 
     decode: int
     premultiplied: bool
     encoded: bool
     levels: bool
     cover: int = 0
+    combine: Combine = AVERAGE
+    kind: str = "rgba32f"
+
+    def defines(self) -> dict[str, int | str]:
+        """The macros of include/compose.glsl that say so."""
+        mode = MODES[self.combine.mode]
+        raw = {"rgba8": 0, "rgba16": 1}.get(self.kind, 2)
+        return {
+            "DECODE": self.decode,
+            "PREMULTIPLIED": int(self.premultiplied),
+            "ENCODED": int(self.encoded),
+            "LEVELS": int(self.levels),
+            "COVER": self.cover,
+            "STORED": STORED_SUMS[self.cover],
+            "COMBINE": mode,
+            "BY_LUMINANCE": int(self.combine.by_luminance),
+            "THRESHOLD": int(self.combine.threshold is not None),
+            "LEVELS_OF": (2 if self.premultiplied else raw) if mode == MODES["median"] else 0,
+        }
 
 
 @dataclass(frozen=True)
@@ -76,12 +98,12 @@ def composition(way: str, groups: int, stored: str, edges: int, light: LightForm
         PACKED=0,
         CONTINUED=0,
         UNFINISHED=0,
-        QUADS=lines_of(way) // 4,
+        QUADS=lines_of(way, light.combine) // 4,
         GROUPS=groups,
         SUMS=int(stored != "frames"),
         TILED=int(stored == "tiles"),
         EDGES=edges,
-        **_light(light),
+        **light.defines(),
     )
 
 
@@ -94,7 +116,7 @@ def composition_of_sums(rows: float, groups: int, back: bool, tiled: bool, light
         TABLE=(1 + rows) * (2 * groups + 1),
         BACK=int(back),
         TILED=int(tiled),
-        **_light(light),
+        **light.defines(),
     )
 
 
@@ -116,20 +138,23 @@ def composition_of_moved(way: str, moved: Moved, light: LightFormat) -> Pass:
         SHARP=int(moved.sharp),
         SQUARED=int(not light.encoded),
         SEVERAL=int(moved.continued or moved.unfinished),
-        **_light(light),
+        **light.defines(),
     )
 
 
-def _light(light: LightFormat) -> dict[str, int | str]:
-    return {name.upper(): int(value) for name, value in vars(light).items()} | {"STORED": STORED_SUMS[light.cover]}
-
-
-def lines_of(way: str) -> int:
+def lines_of(way: str, combine: Combine = AVERAGE) -> int:
     """The rows of pixels that one invocation of a way's pass composes."""
-    return _LINES.get(way, BLOCK)
+    return 4 if combine.mode == "median" else _LINES.get(way, BLOCK)
 
 
-def way_of(window: Any, options: Options, values: np.ndarray, span: tuple[int, int], shortened: bool) -> str:
+def way_of(
+    window: Any,
+    options: Options,
+    values: np.ndarray,
+    span: tuple[int, int],
+    shortened: bool,
+    combine: Combine = AVERAGE,
+) -> str:
     """The fastest way to compose: the name of a pass, without compose_.
 
     values: the table of tables.table, a row of gains and a row per piece
@@ -144,6 +169,10 @@ def way_of(window: Any, options: Options, values: np.ndarray, span: tuple[int, i
     if options.interpolation == "value":
         return "value"
     rows, frames = len(values) - 1, span[1] - span[0]
+    if combine.mode == "median":
+        return "search"
+    if combine.mode != "average":
+        return "frames" if frames_iterations(values, span) <= MOST_ITERATIONS else "search"
     if isinstance(window, Sums) and not shortened and filled_rows(rows) <= 2 + 0.45 * frames:
         return "sums"
     if not isinstance(window, Sums) and 3 * rows < 2 * frames:
@@ -184,3 +213,13 @@ def moved_way(
 def filled_rows(rows: int) -> float:
     """The number of pieces that compose_sums is compiled for, if there are `rows`; infinite: there are too many."""
     return next((filled for filled in _ROWS if filled >= rows), np.inf)
+
+
+def selection(groups: int, shutters: int) -> Pass:
+    """The pass that gathers the coefficients of some shutters, in so many groups of four, out of those of all."""
+    return read_pass("ways", "SELECT", GROUPS=groups, ALL=shutters)
+
+
+def way_sum(begins: bool, levels: bool) -> Pass:
+    """The pass that adds a picture of some shutters to those of the others."""
+    return read_pass("ways", BEGINS=int(begins), LEVELS=int(levels))

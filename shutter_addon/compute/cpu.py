@@ -9,54 +9,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..core import stopping
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.model import mattes, shutters
-from ..core.model.frame_state import Options
 from ..core.pixels import compositor, layering
+from . import cpu_combined
+from .cpu_weights import Exposed, Mix, Weight, displaced, mixed, pace, valued
 from .cpu_window import Tile, TiledFrames, TiledSums
 from .diffusion import diffuse
 from .edge_diffusion import diffuse_along_edges, follows_edges
 from .laying import Behind, Exposure
 from .request import Coefficients, Request
 
-# Pieces of a quantile that are computed in one step.
-TOGETHER = 3
-
 Window = TiledFrames | TiledSums
-Weight = tuple[int, np.ndarray | float]  # of a frame: (h, w) or a number
 Weighted = tuple[int, np.ndarray | float, np.ndarray | None]  # the same, and the shares by which shutters look at it
 Look = Callable[[int, Any], np.ndarray]
-
-
-class Mix(NamedTuple):
-    """A tile with the coefficients c (N, h, w) of its blocks of pixels, block × block each."""
-
-    tile: Tile
-    c: np.ndarray
-    block: int
-
-    def pixels(self, values: np.ndarray | float) -> Any:
-        """See Tile.pixels."""
-        return self.tile.pixels(values, self.block)
-
-
-class Exposed(NamedTuple):
-    """What a window exposes: its bars (N, L), forwards in time, from the position `origin` on; present (L,) bool: which
-    of its frames there are."""
-
-    options: Options
-    bars: np.ndarray
-    origin: int
-    present: np.ndarray
-    direction: int
 
 
 class Solver:
@@ -144,10 +118,11 @@ class CPUCompositor:
     freeing = current
 
     def window(
-        self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4
+        self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4, summed: bool = True
     ) -> TiledFrames | TiledSums:
-        """A window of `capacity` frames; moved: pictures of it have FrameState.following."""
-        return (TiledSums if TiledSums.fit(source, capacity) and not moved else TiledFrames)(source, capacity)
+        """A window of `capacity` frames; moved: pictures of it have FrameState.following; summed: they average."""
+        has_sums = summed and not moved and TiledSums.fit(source, capacity)
+        return (TiledSums if has_sums else TiledFrames)(source, capacity)
 
     def solver(self) -> Solver:
         return Solver()
@@ -183,17 +158,18 @@ class CPUCompositor:
         """The picture (H, W, 4), top row first: float32, or levels in uint8; arguments as for GPUCompositor.draw."""
         state, index, direction = request.state, request.index, request.direction
         source, options, (handle, block) = window.source, state.options, coefficients
+        if len(state.groups) > 1:
+            return self._draw_mixed(window, request, coefficients)
         picture = np.empty((source.height, source.width, 4), dtype=np.float32)
         # Backwards in time is forwards with the shutters reversed.
         bars = state.bars[:, ::direction]
         origin = int(compositor.window_positions(options, index, direction).min())
         frames = compositor.source_frames(options, origin + np.arange(options.window), window.shot)
         exposed = Exposed(options=options, bars=bars, origin=origin, present=frames >= 0, direction=direction)
-        expose: Callable[[Mix], np.ndarray]
-        if state.following is not None and isinstance(window, TiledFrames):
-            expose = partial(_followed, window, exposed, state.following.at(frames))
-        else:
-            expose = _way(window, exposed)
+        moves = None if state.following is None else state.following.at(frames)
+        expose = _exposure(window, exposed, moves)
+        if not state.averages:
+            expose = cpu_combined.exposure(window, exposed, state, moves, expose)
         for tile in window.tiles:
             stopping.check()
             mix = Mix(tile, tile.coefficients(handle, block), block)
@@ -201,15 +177,40 @@ class CPUCompositor:
             planes *= np.float32(window.unit)
             if options.light == "encoded":
                 planes = _linear(planes)
-            planes[:3] *= mix.pixels(_mixed(state.gains[None], mix.c)[0])
+            planes[:3] *= mix.pixels(mixed(state.gains[None], mix.c)[0])
             pixels = tile.of(picture)
             pixels[..., 3] = 1
             for k, plane in enumerate(planes):
                 pixels[..., k] = plane
         return self.over_black(picture) if request.levels else picture
 
+    def _draw_mixed(self, window: Window, request: Request, coefficients: Coefficients) -> np.ndarray:
+        """As `draw`, of shutters that combine in several ways: a picture for each of these, mixed."""
+        state, (handle, block) = request.state, coefficients
+        height, width = window.source.height, window.source.width
+        whole = np.maximum(handle[: len(state.bars)], 0)
+        picture = np.zeros((height, width, 4), np.float32)
+        for chosen in map(list, state.groups.values()):
+            sums = whole[chosen].sum(axis=0)
+            own = np.where(sums > 0, whole[chosen] / np.where(sums > 0, sums, 1), np.float32(1 / len(chosen)))
+            share = sums / whole.sum(axis=0)
+            if share.size > 1:
+                share = share.repeat(block, 0).repeat(block, 1)[:height, :width]
+            part = replace(request, state=state.of(chosen), levels=False)
+            picture += share[..., None] * self.draw(window, part, Coefficients(own.astype(np.float32), block))
+        return self.over_black(picture) if request.levels else picture
+
     def release(self) -> None:
         pass
+
+
+def _exposure(
+    window: Window, exposed: Exposed, moves: tuple[np.ndarray, np.ndarray] | None
+) -> Callable[[Mix], np.ndarray]:
+    """What gives the light of a tile; moves: the turns and shifts (L, N) of all frames of the window."""
+    if moves is not None and isinstance(window, TiledFrames):
+        return partial(_followed, window, exposed, moves)
+    return _way(window, exposed)
 
 
 def _few(pieces: int, frames: int) -> bool:
@@ -229,75 +230,29 @@ def _way(window: Window, exposed: Exposed) -> Callable[[Mix], np.ndarray]:
         knots = shutters.knots(bars)
         if isinstance(window, TiledSums) and whole and _few(len(knots.start), last - first):
             return partial(_by_pieces, window, knots, origin, last - first)
-        weigh = partial(_displaced, knots, last - first)
+        weigh = partial(displaced, knots, last - first)
     else:
-        weigh = partial(_valued, bars / bars.sum(axis=1, keepdims=True))
+        weigh = partial(valued, bars / bars.sum(axis=1, keepdims=True))
     return partial(_by_frames, window, weigh, origin, None if whole else np.flatnonzero(present) - first, direction)
-
-
-def _mixed(times: ArrayLike, c: np.ndarray) -> np.ndarray:
-    """Σ cᵢ · timesᵢ (K, h, w) float32 for coefficients c (N, h, w) and times, or other numbers, (K, N)."""
-    times = np.asarray(times, dtype=np.float32)
-    return (times @ c.reshape(len(c), -1)).reshape(-1, *c.shape[1:])
 
 
 def _by_pieces(window: TiledSums, knots: shutters.Quantile, origin: int, count: int, mix: Mix) -> np.ndarray:
     """The light (3, h, w) of a tile from the sums at the ends of the quantile's pieces."""
 
     def until(times: np.ndarray) -> np.ndarray:
-        x = np.full((1, 1), times[0], np.float32) if np.ptp(times) == 0 else _mixed(times[None], mix.c)[0]
+        x = np.full((1, 1), times[0], np.float32) if np.ptp(times) == 0 else mixed(times[None], mix.c)[0]
         # Rounding must not lead beyond what is held.
         x = np.clip(x, np.float32(0), np.float32(count))
         return window.light_between(mix.tile, origin, mix.pixels(x))
 
     total: np.ndarray | float = 0.0
     late = np.zeros(())
-    for k, pace in enumerate(_pace(knots)):
+    for k, own_pace in enumerate(pace(knots)):
         goes_on = k and np.array_equal(knots.start[k], knots.end[k - 1])
         early = late if goes_on else until(knots.start[k])
         late = until(knots.end[k])
-        total += (late - early) / mix.pixels(_mixed(pace[None], mix.c)[0])
+        total += (late - early) / mix.pixels(mixed(own_pace[None], mix.c)[0])
     return np.asarray(total)
-
-
-def _pace(knots: shutters.Quantile) -> np.ndarray:
-    """The time (K, N) by which a level takes each piece of the shutters' quantiles: 1 or more."""
-    return (knots.end - knots.start) / np.diff(knots.z)[:, None]
-
-
-def _displaced(knots: shutters.Quantile, count: int, c: np.ndarray) -> Iterator[Weight]:
-    """Yields (frame, weight (h, w) or a number) of the interpolated shutter, of frames that may have any."""
-    ends, pace, dz = np.arange(count) + 1, _pace(knots), np.diff(knots.z).astype(np.float32)[:, None, None]
-    # The quantile's pieces that are over everywhere at each frame's end, and those that have begun somewhere.
-    over = np.searchsorted(-_least(-knots.end, c), ends, "right").tolist()
-    begun = np.searchsorted(_least(knots.start, c), ends, "left").tolist()
-    before: np.ndarray | float = 0.0
-    for end, low, high in zip(ends.tolist(), over, begun, strict=True):
-        after: np.ndarray | float = float(knots.z[low])
-        for k in range(low, high, TOGETHER):
-            some = slice(k, min(k + TOGETHER, high))
-            passed = _mixed(end - knots.start[some], c)
-            passed /= _mixed(pace[some], c)
-            after = after + np.clip(passed, 0, dz[some], out=passed).sum(axis=0)
-        if np.ndim(before) or np.ndim(after) or after > before:
-            yield end - 1, after - before
-        before = after
-
-
-def _least(times: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """The least (K,) of mixed times (K, N) on a tile, as far as the range of each coefficient tells."""
-    low, high = (extreme(c, axis=(1, 2)).astype(np.float64) for extreme in (np.min, np.max))
-    # What the coefficients' least leave of 1 goes to the earliest times first, as far as their most allow.
-    order = np.argsort(times, axis=1)
-    given = np.minimum(np.cumsum((high - low)[order], axis=1), max(0.0, 1 - low.sum()))
-    shares = np.diff(given, axis=1, prepend=0)
-    return (times * low).sum(axis=1) + (shares * np.take_along_axis(times, order, axis=1)).sum(axis=1)
-
-
-def _valued(normalised: np.ndarray, c: np.ndarray) -> Iterator[Weight]:
-    """As _displaced, by value interpolation."""
-    for frame in np.flatnonzero(normalised.any(axis=0)).tolist():
-        yield frame, _mixed(normalised[None, :, frame], c)[0]
 
 
 def _by_frames(
@@ -334,7 +289,7 @@ def _followed(window: TiledFrames, exposed: Exposed, moves: tuple[np.ndarray, np
 
     if options.interpolation == "displacement":
         parts, knots = [(1.0, c)], shutters.knots(bars[:, first:last])
-        weighted = weighed(_displaced(knots, last - first, c), c)
+        weighted = weighed(displaced(knots, last - first, c), c)
     else:
         # What moves alike is looked at once.
         alike = np.unique(np.concatenate(moves).T, axis=0, return_inverse=True)[1]
@@ -342,7 +297,7 @@ def _followed(window: TiledFrames, exposed: Exposed, moves: tuple[np.ndarray, np
         shares = [(np.arange(len(alike)) == one.argmax()).astype(float)[:, None, None] for one in own]
         parts = [(mix.pixels(c[one].sum(axis=0)), share) for one, share in zip(own, shares, strict=True)]
         normalised = bars[:, first:last] / bars.sum(axis=1, keepdims=True)
-        some = [weighed(_valued(normalised[one], c[one]), share) for one, share in zip(own, shares, strict=True)]
+        some = [weighed(valued(normalised[one], c[one]), share) for one, share in zip(own, shares, strict=True)]
         weighted = [entry for entries in some for entry in entries]
     if there[first:last].all():
         return _sum(look, weighted)

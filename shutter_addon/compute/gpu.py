@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
+from ..core.model.combining import AVERAGE, Combine
+from ..core.model.frame_state import Options
 from ..core.pixels import compositor
 from ..devices.device import Device, NoDeviceError, Texture
 from ..devices.passes import Pass
@@ -24,7 +27,9 @@ from .composition_passes import (
     filled_rows,
     lines_of,
     moved_way,
+    selection,
     way_of,
+    way_sum,
 )
 from .diffusion_gpu import Diffusion
 from .edge_diffusion import follows_edges
@@ -76,6 +81,7 @@ def _from_frames(
     rows: pieces in the table; shortened: as for way_of"""
     state, direction = request.state, request.direction
     options, source, summed = state.options, window.source, isinstance(window, Sums)
+    (combine,) = state.groups
     given: dict[str, Any] = {"images": {}, "textures": {}, "rows": rows, "direction": direction}
     given["first"], given["last"] = state.open_span
     if summed:
@@ -98,8 +104,18 @@ def _from_frames(
         encoded=options.light == "encoded",
         levels=request.levels,
         cover=window.cover if summed else 0,
+        combine=combine,
+        kind=window.kind if not summed else "",
     )
+    given |= _threshold(combine, options)
     return composition(way, -(-len(state.bars) // 4), stored, edges, light), given
+
+
+def _threshold(combine: Combine, options: Options) -> dict[str, Any]:
+    """The arguments of passes with a threshold."""
+    if combine.threshold is None:
+        return {}
+    return {"threshold": (combine.threshold, max(combine.softness, 1e-6) / 2), "shown": options.before}
 
 
 class Solver:
@@ -186,10 +202,12 @@ class GPUCompositor:
         """A context manager: what windows, solvers and matting hold is released inside it (Device.freeing)."""
         return self.device.freeing()
 
-    def window(self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4) -> Window:
+    def window(
+        self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4, summed: bool = True
+    ) -> Window:
         """A window of `capacity` frames on the device; moved: pictures of it have FrameState.following; shutters: of
-        these pictures."""
-        return open_any(self.device, source, capacity, moved, shutters)
+        these pictures; summed: all of them average."""
+        return open_any(self.device, source, capacity, moved, shutters, summed)
 
     def solver(self) -> Solver:
         """A new solver. Its solution is valid until its next solve."""
@@ -244,14 +262,22 @@ class GPUCompositor:
 
         window: must have loaded all frames that some shutter exposes
         """
+        if len(request.state.groups) > 1:
+            return self._draw_ways(window, request, coefficients)
+        (combine,) = request.state.groups
+        if len(request.state.bars) == 1 and combine != AVERAGE:  # it is not displaced: how much frames count is known
+            options = replace(request.state.options, interpolation="value")
+            request = replace(request, state=replace(request.state, options=options))
         state, index, direction, levels = request.state, request.index, request.direction, request.levels
         if state.following is not None:
+            if combine.mode == "median":
+                return self._draw_on_host(window, request, coefficients)
             return self._draw_moved(window, request, coefficients)
         options, values = state.options, table(state)
         first, last = state.open_span
         origin, (low, high) = compositor.origin(options, index, direction), compositor.reach(state, index, direction)
         shortened = options.edges == "shorten" and (low < window.shot.start or high >= window.shot.stop)
-        way = way_of(window, options, values, (first, last), shortened)
+        way = way_of(window, options, values, (first, last), shortened, combine)
         if way == "sums":
             program, given = _from_sums(window, request, values, origin)
         else:
@@ -260,7 +286,7 @@ class GPUCompositor:
             given["images"]["table"] = self._filled("table", values[None], "rgba32f")
         picture = window.levels() if levels else window.picture
         given["images"] |= {"picture": picture, "coefficients": coefficients.handle}
-        lines = lines_of(way)
+        lines = lines_of(way, combine)
         for top, height, stored in window.bands():
             name = "sums" if isinstance(window, Sums) else "frames"
             given["images" if name == "sums" else "textures"][name] = stored
@@ -274,6 +300,49 @@ class GPUCompositor:
                 block_bits=(coefficients.block - 1).bit_length(),
                 **given,
             )
+        return picture
+
+    def _draw_ways(self, window: Any, request: Request, coefficients: Coefficients) -> Texture:
+        """As `draw`, of shutters that combine in several ways: a picture for each of these, mixed."""
+        state, (width, height) = request.state, (window.source.width, window.source.height)
+        groups = list(state.groups.values())
+        for number, chosen in enumerate(groups):
+            selected, share = self._selected(coefficients.handle, chosen, len(state.bars))
+            part = replace(request, state=state.of(chosen), levels=False)
+            drawn = self.draw(window, part, Coefficients(selected, coefficients.block))
+            levels = request.levels and number == len(groups) - 1
+            images = {"part": drawn, "share": share, "mixed": window.mixed()}
+            if levels:
+                images["picture"] = window.levels()
+            bits = (coefficients.block - 1).bit_length()
+            size = width, height
+            self.device.run(way_sum(not number, levels), size, images=images, size=size, block_bits=bits)
+        return window.levels() if request.levels else window.mixed()
+
+    def _selected(self, handle: Texture, chosen: tuple[int, ...], count: int) -> tuple[Texture, Texture]:
+        """The coefficients of some shutters alone, and how much all of them have: valid until the next call."""
+        groups, (width, height, _) = -(-len(chosen) // 4), handle.size
+        numbers = np.full((groups, 4), -1, np.float32)
+        numbers.flat[: len(chosen)] = chosen
+        selected = self._texture("selected", width, height, groups, "rgba32f")
+        share = self._texture("share", width, height, 1, "r32f")
+        images = {"coefficients": handle, "selected": selected, "share": share}
+        given: dict[str, Any] = {"size": (width, height), "count": len(chosen), "blocks": {"chosen": numbers}}
+        self.device.run(selection(groups, count), (width, height), images=images, **given)
+        return selected, share
+
+    def _draw_on_host(self, window: Any, request: Request, coefficients: Coefficients) -> Texture:
+        """As `draw`, by NumPy: of medians whose frames are seen elsewhere, which passes over some of them at a time
+        cannot find."""
+        host, source, options = cpu.CPUCompositor(), window.source, request.state.options
+        frames = host.window(source, options.window, True)
+        within = compositor.window_positions(options, request.index, request.direction)
+        frames.load(within[slice(*request.state.open_span)], options, window.shot)
+        values = self.coefficients(coefficients.handle, len(request.state.bars))
+        made = host.draw(frames, request, Coefficients(values, coefficients.block))
+        frames.release()
+        picture = window.levels() if request.levels else window.picture
+        self.device.write(picture, np.ascontiguousarray(made if request.levels else made[::-1]))
         return picture
 
     def _draw_moved(self, window: WholeFrames, request: Request, coefficients: Coefficients) -> Texture:
@@ -302,7 +371,11 @@ class GPUCompositor:
         sums = "sum", "other sum"
         picture: Any = window.levels() if request.levels else window.picture
         alpha, decode = window.source.alpha, 0 if packed else decoding(window.transfer, options.light)
-        light = LightFormat(decode, alpha == "premultiplied", options.light == "encoded", request.levels)
+        (combine,) = state.groups
+        light = LightFormat(
+            decode, alpha == "premultiplied", options.light == "encoded", request.levels, combine=combine
+        )
+        given |= _threshold(combine, options)
         for held, stack in window.stacks():
             before, after = held.start > 0, held.stop < window.capacity
             inside = (slots >= held.start) & (slots < held.stop)

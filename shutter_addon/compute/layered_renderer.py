@@ -156,7 +156,8 @@ class LayeredRenderer:
 
     def _window(self, name: tuple[int, bool], part: Request, shutters: int) -> Any:
         (layer, alone), moved, options = name, part.state.following is not None, part.state.options
-        key = layer, alone, moved, options.window, self._colors.changes(layer)
+        summed = part.state.averages
+        key = layer, alone, moved, options.window, summed, self._colors.changes(layer)
         window = self._windows.get(key)
         if window is None or not window.is_open:
             for other in [other for other in self._windows if other[:2] == name]:
@@ -164,7 +165,7 @@ class LayeredRenderer:
             weighted = WeightedFrames(
                 self._colors.frames(layer), self._colors.weights(layer), rest=layer < 0, alone=alone
             )
-            window = self._windows[key] = self._compositor.window(weighted, options.window, moved, shutters)
+            window = self._windows[key] = self._compositor.window(weighted, options.window, moved, shutters, summed)
         return window
 
     def _load(self, windows: dict, positions: np.ndarray, request: Request, shot: range) -> None:

@@ -61,7 +61,7 @@ class Renderer:
         self._layered: LayeredRenderer | None = None
         self._scribbles: Renderer | None = None  # of layers
         self._window: Any = None
-        self._kind: tuple[int, bool, int] | None = None
+        self._kind: tuple[int, bool, int, bool] | None = None
         self.shortages: set[str] = set()
         self._kept_labels, self._kept_diffusion, self._kept_mattes, self._kept_picture = Memo(), Memo(), Memo(), Memo()
 
@@ -270,11 +270,11 @@ class Renderer:
         self._note_shortage("window", window.sends)
         return window
 
-    def _kind_for(self, request: Request) -> tuple[int, bool, int]:
-        """The length of the window, whether its frames are seen elsewhere than where they are, and the number of all
-        shutters."""
-        moved = self._exposing(request, self.labels(request)).state.following is not None
-        return request.state.options.window, moved, len(request.state.bars)
+    def _kind_for(self, request: Request) -> tuple[int, bool, int, bool]:
+        """The length of the window, whether its frames are seen elsewhere than where they are, the number of all
+        shutters, and whether sums of frames are enough."""
+        exposing = self._exposing(request, self.labels(request)).state
+        return request.state.options.window, exposing.following is not None, len(request.state.bars), exposing.averages
 
     def _window_for(self, request: Request) -> Any:
         kind = self._kind_for(request)

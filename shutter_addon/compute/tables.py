@@ -21,13 +21,13 @@ def padded(values: np.ndarray) -> np.ndarray:
 def table(state: FrameState) -> np.ndarray:
     """The table (1 + rows, columns, 4) float32 that shaders/include/compose.glsl describes.
 
-    Row 0: the gains. Displacement: a row per piece of the quantiles: starts, ends, then dz, the time by which the
-    shutters differ at most at either, and z at its start. Value: a row per frame of the shutters' open span, its
-    normalised bars.
+    Row 0: the gains; of the lightest and the darkest what makes the highest weight 1 (core.pixels.combined).
+    Displacement: a row per piece of the quantiles: starts, ends, then dz, the time by which the shutters differ at most
+    at either, and z at its start. Value: a row per frame of the shutters' open span, how much it counts.
     """
-    rows = _pieces(state.bars) if state.options.interpolation == "displacement" else _bars(state.bars)
+    rows = _pieces(state.bars) if state.options.interpolation == "displacement" else _bars(state)
     result = np.zeros((1 + len(rows), rows.shape[1], 4), dtype=np.float32)
-    gains = padded(state.gains)
+    gains = padded(_gains(state))
     result[0, : len(gains)] = gains
     result[1:] = rows
     return result
@@ -49,9 +49,18 @@ def _pieces_of(content: bytes, dtype: np.dtype, shape: tuple[int, ...]) -> np.nd
     return np.concatenate([start, end, last], axis=1)
 
 
-def _bars(bars: np.ndarray) -> np.ndarray:
-    first, last = shutters.open_span(bars)
-    return padded((bars / bars.sum(axis=1, keepdims=True)).T[first:last])
+def _gains(state: FrameState) -> np.ndarray:
+    (combine,) = state.groups
+    if combine.mode not in ("lightest", "darkest") or state.options.interpolation == "value":
+        return state.gains
+    return state.bars.sum(axis=1) / state.bars.max(axis=1)
+
+
+def _bars(state: FrameState) -> np.ndarray:
+    """How much each frame of the open span counts."""
+    (combine,) = state.groups
+    whole = state.bars.max(axis=1) if combine.mode in ("lightest", "darkest") else state.bars.sum(axis=1)
+    return padded((state.bars / whole[:, None]).T[slice(*state.open_span)])
 
 
 def moved_tables(state: FrameState, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -71,7 +80,7 @@ def moved_tables(state: FrameState, frames: np.ndarray) -> tuple[np.ndarray, np.
         kinds, kind = np.unique(numbers.reshape(-1, len(state.bars)), axis=1, return_inverse=True)
         own = np.eye(kinds.shape[1])[:, kind]
         numbers = kinds.reshape(*numbers.shape[:2], -1).swapaxes(1, 2).reshape(-1, 4, 1)
-        bars = _bars(state.bars)
+        bars = _bars(state)
         values = np.concatenate([values[:1], (bars[:, None] * padded(own)).reshape(-1, *bars.shape[1:])])
     parts = np.zeros((len(own), *values.shape[1:]), np.float32)
     grouped = padded(own)

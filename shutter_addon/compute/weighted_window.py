@@ -11,12 +11,12 @@ from .layer_frames import WeightedFrames
 from .window import Frames, Sums, WholeFrames, Window, open_window
 
 
-def open_any(device: Device, source: Any, capacity: int, moved: bool, shutters: int) -> Window:
+def open_any(device: Device, source: Any, capacity: int, moved: bool, shutters: int, summed: bool = True) -> Window:
     """As window.open_window, of weighted frames as well: running sums, if they can be made of them and the device has
     room, else the frames."""
     if not isinstance(source, WeightedFrames):
-        return open_window(device, source, capacity, moved, shutters)
-    if not moved and source.is_summable:
+        return open_window(device, source, capacity, moved, shutters, summed)
+    if not moved and summed and source.is_summable:
         try:
             return WeightedSums(device, source, capacity, shutters)
         except NoDeviceError:

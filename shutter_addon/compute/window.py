@@ -33,13 +33,15 @@ TILE = 8, BLOCK
 _STORED = {np.uint8: "rgba8", np.uint16: "rgba16", np.float16: "rgba16f", np.float32: "rgba32f"}
 
 
-def open_window(device: Device, source: FrameSource, capacity: int, moved: bool, shutters: int) -> Window:
+def open_window(
+    device: Device, source: FrameSource, capacity: int, moved: bool, shutters: int, summed: bool = True
+) -> Window:
     """The fastest window of `capacity` frames: running sums if the source is `summable` and the device has room for
     them, else the frames. moved: what is seen of a frame lies elsewhere in it, so it has to be whole. shutters: those
-    whose coefficients have to have room beside it."""
+    whose coefficients have to have room beside it. summed: all that is made of the frames are sums of them."""
     if moved:
         return (PackedFrames if summable(source) else WholeFrames)(device, source, capacity, shutters)
-    if summable(source):
+    if summed and summable(source):
         try:
             return Sums(device, source, capacity, shutters)
         except NoDeviceError:
@@ -77,6 +79,7 @@ class Window:
         self.textures: list[Texture] = []
         self.picture: Texture | None = None
         self._levels: Texture | None = None
+        self._mixed: Texture | None = None
         device.use(self)
 
     @property
@@ -127,10 +130,16 @@ class Window:
             self._levels = self.device.texture(self.source.width, self.source.height, 1, "rgba8")
         return self._levels
 
+    def mixed(self) -> Texture:
+        """The texture that pictures of several ways to combine are added up in, made when it is first asked for."""
+        if self._mixed is None:
+            self._mixed = self.device.texture(self.source.width, self.source.height, 1, "rgba32f")
+        return self._mixed
+
     def release(self) -> None:
-        for texture in (*self.textures, *filter(None, [self.picture, self._levels])):
+        for texture in (*self.textures, *filter(None, [self.picture, self._levels, self._mixed])):
             texture.release()
-        self.textures, self.picture, self._levels = [], None, None
+        self.textures, self.picture, self._levels, self._mixed = [], None, None, None
         self.device.forget(self)
 
 

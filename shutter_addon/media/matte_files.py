@@ -9,9 +9,8 @@ from typing import Self
 
 import numpy as np
 
+from ..core.frames.light import REC709
 from .opening import open_channel
-
-REC709 = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 
 @dataclass(frozen=True)

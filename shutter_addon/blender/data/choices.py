@@ -152,6 +152,13 @@ FOLLOWS = (
 )
 
 
+COMBINES = (
+    ("AVERAGE", "Average", "The average of the frames, as a camera makes it"),
+    ("LIGHTEST", "Lightest", "What is lightest in any of them: a trail of light, as bright however long it is"),
+    ("DARKEST", "Darkest", "What is darkest in any of them"),
+    ("MEDIAN", "Median", "What most of them show: who passes by is gone"),
+)
+
 LENGTHS = (
     ("FRAMES", "Bars", "The bars say for how many frames the shutter is open"),
     ("MOTION", "Motion", "The shutter is open while what it follows moves by a set length; the bars are the shape"),

@@ -26,11 +26,13 @@ from ...core.model.limits import (
     MAX_FRAME,
     MAX_PLATE_REACH,
     MAX_SMOOTH,
+    MAX_THRESHOLD,
 )
 from ...core.model.shutters import MAX_WINDOW
 from . import consistency, selection
 from .choices import (
     AGGREGATES,
+    COMBINES,
     CONTEXT,
     EDGES,
     EXPOSURES,
@@ -140,6 +142,40 @@ class Shutter(PropertyGroup):
         default=0.1,
         min=0.0,
         max=MAX_DISTANCE,
+        soft_max=1.0,
+        precision=3,
+        step=1,
+        update=changed,
+    )
+
+    combine: choice("Combine", "What the frames that are exposed become", COMBINES)
+    by_luminance: BoolProperty(
+        name="By Luminance",
+        description="Choose a frame for each pixel, by how light it is there, and not one for each color channel",
+        update=changed,
+    )
+    use_threshold: BoolProperty(
+        name="Use Threshold",
+        description="Let only what is lighter, or of the darkest darker, leave a trail beside what is shown",
+        update=changed,
+    )
+    threshold: FloatProperty(
+        name="Threshold",
+        description="Luminance of linear light from which on it leaves a trail; white is 1",
+        default=0.5,
+        min=0.0,
+        max=MAX_THRESHOLD,
+        soft_max=1.0,
+        precision=3,
+        step=1,
+        update=changed,
+    )
+    softness: FloatProperty(
+        name="Softness",
+        description="Range of luminance, around the threshold, over which a trail fades in",
+        default=0.1,
+        min=0.0,
+        max=MAX_THRESHOLD,
         soft_max=1.0,
         precision=3,
         step=1,

@@ -111,6 +111,7 @@ def _check_keys(source: recipe.Recipe, first: float) -> None:
     """EffectError: keys would lie beyond Blender's timeline, or on the same frame, as it counts in float32."""
     mattes = [region for region in source.regions if not isinstance(region, recipe.Region)]
     numbers = [source.edge_aware, source.camera_influence, *(shutter.trail for shutter in source.shutters)]
+    numbers += [number for shutter in source.shutters for number in (shutter.threshold, shutter.softness)]
     numbers += [*(region.opacity for region in source.regions), *(region.width for region in mattes)]
     keyed: list = [source.time, source.camera, *(number for number in numbers if isinstance(number, list))]
     for keys in (*keyed, *(part.keys for part in (*source.shutters, *source.regions))):
@@ -145,6 +146,11 @@ def _add_shutter(scene, effect, path: str, source: recipe.Shutter, first: float)
     if source.trail is not None:
         shutter.length = "MOTION"
         _set_number(scene, shutter, path, "trail", source.trail, first)
+    shutter.combine, shutter.by_luminance = source.combine.upper(), source.by_luminance
+    if source.threshold is not None:
+        shutter.use_threshold = True
+        for name in ("threshold", "softness"):
+            _set_number(scene, shutter, path, name, getattr(source, name), first)
     for weight in source.bars if source.bars is not None else source.keys[0].bars:
         shutter.bars.add().weight = weight
     if source.keys:

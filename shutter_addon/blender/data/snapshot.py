@@ -296,8 +296,20 @@ def _shutter(
     trail = sampled.channel(curves, shutter, path, "trail", frames) if is_trail else None
     motion = validation.word(shutter, "follow_motion").lower()
     smooth = validation.number(shutter, "follow_smooth")
+    numbers = {}
+    if shutter.use_threshold:
+        numbers = {name: sampled.channel(curves, shutter, path, name, frames) for name in ("threshold", "softness")}
     return model.Shutter(
-        name=shutter.name, color=tuple(shutter.color), bars=bars, follow=None, trail=trail, motion=motion, smooth=smooth
+        name=shutter.name,
+        color=tuple(shutter.color),
+        bars=bars,
+        follow=None,
+        trail=trail,
+        motion=motion,
+        smooth=smooth,
+        combine=validation.word(shutter, "combine").lower(),
+        by_luminance=shutter.by_luminance,
+        **numbers,
     )
 
 

@@ -133,6 +133,7 @@ class _Shutters(Mixin):
         row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
         layout.use_property_split = True
         layout.prop(effect, "window")
+        _draw_combine(layout, shutter)
         if selection.active_region(effect) is not None:
             draw_tracked(layout, effect, effect.active_region)
         if shutter.follow == "CAMERA":
@@ -164,6 +165,21 @@ def _draw_tools(layout, effect) -> None:
     row = layout.row(align=True)
     row.operator("shutter.sharp_subject", icon="RENDERLAYERS")
     row.operator("shutter.clean_trail", icon="CURVE_PATH")
+
+
+def _draw_combine(layout, shutter) -> None:
+    """What the shutter makes of the frames."""
+    layout.prop(shutter, "combine")
+    if shutter.combine not in ("LIGHTEST", "DARKEST"):
+        return
+    layout.prop(shutter, "by_luminance")
+    row = layout.row(heading="Threshold")
+    row.prop(shutter, "use_threshold", text="")
+    number = row.row()
+    number.active = shutter.use_threshold
+    number.prop(shutter, "threshold", text="")
+    if shutter.use_threshold:
+        layout.prop(shutter, "softness")
 
 
 def _draw_bars(layout, active) -> None:

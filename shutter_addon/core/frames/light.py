@@ -7,6 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
+REC709 = np.array([0.2126, 0.7152, 0.0722], np.float32)  # luminance of linear light
+
 
 def to_linear(encoded: ArrayLike) -> np.ndarray:
     """sRGB code values (1.0 = white) to linear light. Negative values pass through the linear foot."""

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from ..messages import EffectError
-from . import keyframes, limits, mattes, motions, outlines, scribbles, shutters
+from . import combining, keyframes, limits, mattes, motions, outlines, scribbles, shutters
 from .frame_state import FrameState
 from .keyframes import Bars, Channel
 from .motions import Placement
@@ -267,7 +267,9 @@ class Shutter:
     trail: channel of how far that moves while the shutter is open, in fractions of the picture's height; None: the bars
     say for how many frames it is open
     motion: what of its motion is followed: the location, its rotation too, or its scale as well
-    smooth: frames before and after each over which that motion is averaged"""
+    smooth: frames before and after each over which that motion is averaged
+    combine, by_luminance: as mode and by_luminance of combining.Combine
+    threshold, softness: channels of its numbers; None: it has no threshold"""
 
     name: str
     color: tuple[float, float, float]
@@ -276,6 +278,14 @@ class Shutter:
     trail: Channel | None = None
     motion: motions.Motion = "scale"
     smooth: int = 0
+    combine: combining.Mode = "average"
+    by_luminance: bool = False
+    threshold: Channel | None = None
+    softness: Channel = field(default=keyframes.Constant(0.0))
+
+    def combine_at(self, frame: float) -> combining.Combine:
+        threshold = None if self.threshold is None else float(self.threshold.at(frame))
+        return combining.Combine.of(self.combine, self.by_luminance, threshold, float(self.softness.at(frame)))
 
 
 @dataclass(frozen=True)
@@ -301,7 +311,8 @@ class Effect:
     def is_still(self) -> bool:
         """Whether its state is known to be the same at every frame."""
         bars = (shutter.bars for shutter in self.shutters)
-        return keyframes.are_still(self.options, self.edge_aware, *bars, *self.regions)
+        thresholds = [each for shutter in self.shutters for each in (shutter.threshold, shutter.softness) if each]
+        return keyframes.are_still(self.options, self.edge_aware, *bars, *thresholds, *self.regions)
 
     def at(self, frame: float) -> FrameState:
         """The effect at a frame. EffectError: no picture can be made of it."""
@@ -320,7 +331,13 @@ class Effect:
         mattes_ = [each for each in self.regions if isinstance(each, MatteRegion) and not each.layer]
         laid = [region.at(frame) for region in mattes_]
         seen = tuple(matte for matte in laid if matte.opacity > 0)
-        return FrameState(options=options, bars=np.stack(bars), shapes=tuple(self._shapes_at(frame)), mattes=seen)
+        return FrameState(
+            options=options,
+            bars=np.stack(bars),
+            shapes=tuple(self._shapes_at(frame)),
+            mattes=seen,
+            combines=tuple(shutter.combine_at(frame) for shutter in self.shutters),
+        )
 
     def layers_at(self, frame: float) -> list[Region | MatteRegion]:
         """The layers that there are at a frame, the first farthest."""

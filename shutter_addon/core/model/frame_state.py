@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import scribbles, shutters
+from .combining import AVERAGE, Combine
 from .mattes import Matte
 
 Interpolation = Literal["displacement", "value"]
@@ -149,6 +150,7 @@ class FrameState:
     following: what exposures follow; None: nothing that moves
     mattes: laid over what the scribbles give, the later over the earlier
     layers: regions before what all these make; None: there are none
+    combines: of each shutter, how what it exposes becomes one picture; none: all average
     open_for: by shutter whose trail has a length, the frames from its first open time to its last: for who is told of
     it, as its bars say what is exposed
     """
@@ -160,22 +162,40 @@ class FrameState:
     following: Following | None = None
     mattes: tuple[Matte, ...] = ()
     layers: Layers | None = None
+    combines: tuple[Combine, ...] = ()
     open_for: dict[int, float] = field(default_factory=dict)
 
     @property
     def gains(self) -> np.ndarray:
-        """Brightness (N,) of each shutter: all 1, or its exposure over the reference ("weighted").
+        """Brightness (N,) of each shutter: all 1, or its exposure over the reference ("weighted"), where it averages.
 
         It scales linear light, as an aperture would: where encoded values are summed, it applies after decoding."""
         exposures = self.bars.sum(axis=1)
         if self.options.exposure == "normalized":
             return np.ones_like(exposures)
-        return exposures / (self.reference or exposures[0])
+        averages = [combine == AVERAGE for combine in self.combines or (AVERAGE,) * len(self.bars)]
+        return np.where(averages, exposures / (self.reference or exposures[0]), 1.0)
 
     @cached_property
     def open_span(self) -> tuple[int, int]:
-        """As shutters.open_span of the bars."""
-        return shutters.open_span(self.bars)
+        """As shutters.open_span of the bars; with the shown frame where that is needed whatever they are."""
+        first, last = shutters.open_span(self.bars)
+        if any(combine.threshold is not None for combine in self.combines):
+            return min(first, self.options.before), max(last, self.options.before + 1)
+        return first, last
+
+    @cached_property
+    def groups(self) -> dict[Combine, tuple[int, ...]]:
+        """The shutters that combine alike, and are displaced together."""
+        groups: dict[Combine, tuple[int, ...]] = {}
+        for index, combine in enumerate(self.combines or (AVERAGE,) * len(self.bars)):
+            groups[combine] = (*groups.get(combine, ()), index)
+        return groups
+
+    @property
+    def averages(self) -> bool:
+        """Whether all shutters do."""
+        return set(self.groups) == {AVERAGE}
 
     @cached_property
     def key(self) -> tuple:
@@ -183,7 +203,7 @@ class FrameState:
         bars = self.bars.shape, self.bars.tobytes()
         following = self.following and self.following.key
         layers = self.layers and self.layers.key
-        return self.options, *bars, self.reference, following, self.mattes, layers, self.shapes_key
+        return self.options, *bars, self.reference, following, self.mattes, layers, self.combines, self.shapes_key
 
     @cached_property
     def shapes_key(self) -> tuple:
@@ -203,6 +223,11 @@ class FrameState:
     def alone(self, chosen: int) -> FrameState:
         """The state of a picture in which one shutter, `chosen`, is everywhere."""
         options = replace(self.options, edge_aware=0.0)  # there is nothing to diffuse
-        following = self.following and self.following.of([chosen])
+        return replace(self.of([chosen]), options=options, shapes=(), mattes=(), layers=None, open_for={})
+
+    def of(self, chosen: Sequence[int]) -> FrameState:
+        """The state with some of its shutters alone."""
+        following = self.following and self.following.of(chosen)
+        combines = tuple(self.combines[index] for index in chosen) if self.combines else ()
         reference = self.reference or float(self.bars[0].sum())
-        return FrameState(options=options, bars=self.bars[chosen, None], reference=reference, following=following)
+        return replace(self, bars=self.bars[list(chosen)], reference=reference, following=following, combines=combines)

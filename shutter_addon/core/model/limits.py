@@ -29,5 +29,7 @@ MAX_CHANNEL = 255
 # A bar, and what the bars of a shutter add up to at least: of two shutters, one may be 10¹⁴ times as bright.
 MAX_BAR = 1e6
 MIN_EXPOSURE = 1e-6
+# Luminance below which light leaves no trail, and over which that fades: white is 1.
+MAX_THRESHOLD = 1000.0
 # Of a recipe's file.
 MAX_BYTES = 32_000_000

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..frames import light
 from ..model import shutters
+from ..model.combining import Combine
 from ..model.frame_state import FrameState, Options
+from . import combined
 
 # By how much of a frame the window's earlier ones are preferred, where the nearest frame is shown: of two that are as
 # near, rounding must not choose, for devices round differently.
@@ -71,7 +73,9 @@ def compose(
     coefficients: ArrayLike,
     moves: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> np.ndarray:
-    """The picture (H, W, 4) float64, scene-linear and premultiplied: F = e(q) · ∫ V(t + ⌊Q⁻¹(z)⌋) dz (§3.1, §3.4.1).
+    """The picture (H, W, 4) float64, scene-linear and premultiplied: F = e(q) · ∫ V(t + ⌊Q⁻¹(z)⌋) dz (§3.1, §3.4.1); or
+    what core.pixels.combined makes of the same frames. Of shutters that combine in several ways, each way makes a
+    picture with its own, and these are mixed by the coefficients.
 
     frames: L pictures (H, W, 4), scene-linear, premultiplied; present: (L,) bool, False for frames left out, whose
     share goes to the others (if none has a share: to the nearest present frame, of two the window's earlier one).
@@ -79,20 +83,89 @@ def compose(
     moves: turns and shifts (L, N) of each frame for each shutter (FrameState.following): a frame is not taken at x, but
     at Σ cᵢ Wᵢ(x), or by value interpolation mixed of those at each Wᵢ(x). None: nothing is followed.
     """
-    coefficients = np.asarray(coefficients, dtype=np.float64)
+    coefficients, present = np.asarray(coefficients, dtype=np.float64), np.asarray(present)
+    if len(state.groups) == 1:
+        return _composed(state, frames, present, coefficients, moves)
+    total = np.zeros((*coefficients.shape[1:], 4))
+    for chosen in map(list, state.groups.values()):
+        share = coefficients[chosen].sum(axis=0)
+        own = np.where(share > 0, coefficients[chosen] / np.where(share > 0, share, 1), 1 / len(chosen))
+        moved = None if moves is None else (moves[0][:, chosen], moves[1][:, chosen])
+        total += share[..., None] * _composed(state.of(chosen), frames, present, own, moved)
+    return total
+
+
+def _composed(
+    state: FrameState,
+    frames: Sequence[np.ndarray],
+    present: np.ndarray,
+    coefficients: np.ndarray,
+    moves: tuple[np.ndarray, np.ndarray] | None,
+) -> np.ndarray:
+    """As `compose`, of shutters that combine alike."""
+    (combine,) = state.groups
     encoded = state.options.light == "encoded"
     frames = [_encode(frame) if encoded else frame for frame in frames]
     opaque = all((frame[..., 3] == 1).all() for frame in frames)
     y, x = np.indices(coefficients.shape[1:])
-    total, own = np.zeros((*x.shape, 4)), x + 1j * y
-    for weights, turns, shifts in _exposed(state, coefficients, np.asarray(present), moves):
-        for k, frame in enumerate(frames):
-            shown = frame if moves is None else seen(frame, turns[k] * own + shifts[k], sharp=opaque)
-            total = total + weights[..., k, None] * shown
-    gain = np.einsum("n,nhw->hw", state.gains, coefficients)
-    return (_decode(total) if encoded else total) * np.concatenate(
-        [np.repeat(gain[..., None], 3, axis=-1), np.ones_like(gain)[..., None]], axis=-1
-    )
+    own = x + 1j * y
+
+    def look(k: int, turns: np.ndarray | None, shifts: np.ndarray | None) -> np.ndarray:
+        if turns is None or shifts is None:
+            return frames[k]
+        return seen(frames[k], turns[k] * own + shifts[k], sharp=opaque)
+
+    total = np.zeros((*x.shape, 4))
+    for weights, *moved in _exposed(state, coefficients, present, moves):
+        for k in range(len(frames)):
+            total = total + weights[..., k, None] * look(k, *moved)
+    if combine.mode == "average":
+        gain = np.einsum("n,nhw->hw", state.gains, coefficients)[..., None]
+        return (_decode(total) if encoded else total) * np.concatenate([gain, gain, gain, np.ones_like(gain)], axis=-1)
+    samples = _samples(combine, state, coefficients, present, moves, look)
+    found = combined.of_samples(combine, samples)
+    # Where no frame is there that counts, it is the nearest, as of an average.
+    found = np.where((_counted(combine, samples) > 1e-6)[..., None], found, total)
+    return _decode(found) if encoded else found
+
+
+def _counted(combine: Combine, samples: list[combined.Sample]) -> np.ndarray:
+    """How much (H, W) of all frames counts."""
+    if combine.threshold is not None and any(sample.shown is not None for sample in samples):
+        return np.ones(samples[0].weight.shape)
+    return sum((sample.weight for sample in samples), np.zeros(samples[0].weight.shape))
+
+
+def _samples(
+    combine: Combine,
+    state: FrameState,
+    coefficients: np.ndarray,
+    present: np.ndarray,
+    moves: tuple[np.ndarray, np.ndarray] | None,
+    look: Callable[[int, np.ndarray | None, np.ndarray | None], np.ndarray],
+) -> list[combined.Sample]:
+    """The frames that are there. By value interpolation, of what follows several motions, those of a frame are mixed,
+    by how much it counts by each."""
+    options, bars = state.options, state.bars
+    apart = [] if moves is None else [part.T[:, :, None, None] for part in moves]
+    if moves is not None and options.interpolation == "value":
+        alone = np.stack([combined.counts(combine, row, np.ones(1), options.interpolation) for row in bars])
+        weights, shares = coefficients[..., None] * alone[:, None, None], coefficients
+        turns, shifts = (list(part) for part in apart)
+    else:
+        weights = combined.counts(combine, bars, np.moveaxis(coefficients, 0, -1), options.interpolation)[None]
+        shares = np.ones(weights.shape[:-1])
+        mixed: list = [None] if moves is None else [np.einsum("ln,nhw->lhw", part, coefficients) for part in moves]
+        turns, shifts = [mixed[0]], [mixed[-1]]
+    samples = []
+    for k in np.flatnonzero(present).tolist():
+        looks = [look(k, *moved) for moved in zip(turns, shifts, strict=True)]
+        weight = weights[..., k].sum(axis=0)
+        light_ = sum(own[..., k, None] * sight for own, sight in zip(weights, looks, strict=True))
+        shown = sum(share[..., None] * sight for share, sight in zip(shares, looks, strict=True))
+        there = np.where(weight[..., None] > 0, light_ / np.where(weight > 0, weight, 1)[..., None], shown)
+        samples.append(combined.Sample(there, weight, shown if k == options.before else None))
+    return samples
 
 
 def _exposed(

@@ -59,7 +59,7 @@ def baked(
     sampled = recipe.Recipe(
         version=1,
         shutters=[
-            _following(effect.shutters[i], _shutter(effect, i, name, options.interpolation, shown), follows[i], shown)
+            _whole(effect.shutters[i], _shutter(effect, i, name, options.interpolation, shown), follows[i], shown)
             for i, name in enumerate(names)
         ],
         regions=[region for region in regions if region],
@@ -110,8 +110,15 @@ def _follows(effect: Effect, names: list[str]) -> list[str | None]:
     return [words.get(id(shutter.follow)) for shutter in effect.shutters]
 
 
-def _following(shutter: Shutter, said: recipe.Shutter, follow: str | None, shown: range) -> recipe.Shutter:
-    """A recipe's shutter with what it follows, and how far."""
+def _whole(shutter: Shutter, said: recipe.Shutter, follow: str | None, shown: range) -> recipe.Shutter:
+    """A recipe's shutter with what it makes of frames, what it follows, and how far."""
+    if shutter.combine != "average":
+        said = replace(said, combine=shutter.combine)
+    if shutter.combine in ("lightest", "darkest"):
+        said = replace(said, by_luminance=shutter.by_luminance)
+        if shutter.threshold is not None:
+            threshold, softness = _number(shutter.threshold, shown), _number(shutter.softness, shown)
+            said = replace(said, threshold=threshold, softness=softness)
     if not follow:
         return said
     trail = _number(shutter.trail, shown) if shutter.trail else None

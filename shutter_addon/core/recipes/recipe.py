@@ -15,7 +15,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 
 from ..messages import UserError, sentence
-from ..model import effect, keyframes, mattes, motions, shutters
+from ..model import combining, effect, keyframes, mattes, motions, shutters
 from ..model.frame_state import Edges, Exposure, FrameState, Interpolation, Light, Options, Position
 from ..model.keyframes import Ease
 
@@ -62,7 +62,8 @@ class Shutter:
     follow: a region's name, or CAMERA
     trail: how far that moves while the shutter is open, in fractions of the picture's height; None: the bars say for
     how many frames it is open
-    follow_motion, follow_smooth: as motion and smooth of effect.Shutter"""
+    follow_motion, follow_smooth: as motion and smooth of effect.Shutter
+    combine, by_luminance, threshold, softness: as effect.Shutter has them"""
 
     name: str
     color: tuple[float, float, float] = (0.8, 0.8, 0.8)
@@ -72,6 +73,10 @@ class Shutter:
     trail: Keyable | None = None
     follow_motion: motions.Motion = "scale"
     follow_smooth: int = 0
+    combine: combining.Mode = "average"
+    by_luminance: bool = False
+    threshold: Keyable | None = None
+    softness: Keyable = 0.0
 
     def over_time(self, follow: effect.Subject | None = None) -> effect.Shutter:
         """As plain data; follow: what is followed, in the same form."""
@@ -83,6 +88,10 @@ class Shutter:
             trail=None if self.trail is None else _numbers(self.trail),
             motion=self.follow_motion,
             smooth=self.follow_smooth,
+            combine=self.combine,
+            by_luminance=self.by_luminance,
+            threshold=None if self.threshold is None else _numbers(self.threshold),
+            softness=_numbers(self.softness),
         )
 
     def _bars_over_time(self) -> keyframes.Bars:

@@ -108,6 +108,7 @@ def save(recipe: Recipe, path: str | Path) -> None:
 
 # Values that say nothing, of fields that few recipes need.
 _UNTOLD = {"opacity": 1.0, "follow_motion": "scale", "follow_smooth": 0, "camera_influence": 1.0}
+_UNTOLD |= {"combine": "average", "by_luminance": False, "softness": 0.0}
 
 
 def _compact(value: Any) -> Any:
@@ -325,6 +326,11 @@ def _check(recipe: Recipe) -> None:
             _require(shutter.follow, f"shutters[{i}].trail", "the shutter follows nothing that could move so far")
             _check_number(shutter.trail, f"shutters[{i}].trail", limits.MAX_DISTANCE)
         _require_within(shutter.follow_smooth, limits.MAX_SMOOTH, f"shutters[{i}].follow_smooth", 0)
+        if shutter.threshold is not None:
+            has_one = shutter.combine in ("lightest", "darkest")
+            _require(has_one, f"shutters[{i}].threshold", "the lightest and the darkest alone have a threshold")
+            _check_number(shutter.threshold, f"shutters[{i}].threshold", limits.MAX_THRESHOLD)
+        _check_number(shutter.softness, f"shutters[{i}].softness", limits.MAX_THRESHOLD)
     _check_values(recipe.time, "time", limits.MAX_FRAME)
     _check_frames(recipe.camera, "camera")
     for k, key in enumerate(recipe.camera):

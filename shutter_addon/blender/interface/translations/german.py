@@ -306,6 +306,42 @@ MESSAGES = {
     ("*", "The shutter has {count} bars"): "Der Verschluss hat {count} Balken",
     ("Operator", "Paint Bars"): "Balken malen",
     # Regions
+    ("*", "Combine"): "Verrechnen",
+    ("*", "What the frames that are exposed become"): "Was aus den belichteten Bildern wird",
+    ("*", "Average"): "Mittelwert",
+    ("*", "The average of the frames, as a camera makes it"): "Der Mittelwert der Bilder, wie ihn eine Kamera macht",
+    ("*", "Lightest"): "Hellstes",
+    (
+        "*",
+        "What is lightest in any of them: a trail of light, as bright however long it is",
+    ): "Was in einem von ihnen am hellsten ist: eine Lichtspur, gleich hell, so lang sie auch ist",
+    ("*", "Darkest"): "Dunkelstes",
+    ("*", "What is darkest in any of them"): "Was in einem von ihnen am dunkelsten ist",
+    ("*", "Median"): "Median",
+    (
+        "*",
+        "What most of them show: who passes by is gone",
+    ): "Was die meisten von ihnen zeigen: Wer vorbeigeht, ist weg",
+    ("*", "By Luminance"): "Nach Luminanz",
+    (
+        "*",
+        "Choose a frame for each pixel, by how light it is there, and not one for each color channel",
+    ): "Für jedes Pixel ein Bild wählen, danach, wie hell es dort ist, und nicht für jeden Farbkanal eines",
+    ("*", "Use Threshold"): "Schwelle verwenden",
+    (
+        "*",
+        "Let only what is lighter, or of the darkest darker, leave a trail beside what is shown",
+    ): "Nur was heller ist, oder beim Dunkelsten dunkler, neben dem Gezeigten eine Spur hinterlassen lassen",
+    ("*", "Threshold"): "Schwelle",
+    (
+        "*",
+        "Luminance of linear light from which on it leaves a trail; white is 1",
+    ): "Luminanz linearen Lichts, von der an es eine Spur hinterlässt; Weiß ist 1",
+    ("*", "Softness"): "Weichheit",
+    (
+        "*",
+        "Range of luminance, around the threshold, over which a trail fades in",
+    ): "Bereich der Luminanz um die Schwelle, über den eine Spur einblendet",
     ("Operator", "Draw"): "Zeichnen",
     ("Operator", "Draw Outline"): "Umriss zeichnen",
     (

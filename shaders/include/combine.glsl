@@ -1,0 +1,179 @@
+// What is made of the frames where they are not averaged; core/pixels/combined.py is the reference.
+// COMBINE: 1 lightest, 2 darkest, 3 median. Of the first two, `total` has the best light by now and the most of wₖ aₖ, and
+// `share` the most of wₖ, a frame's weight times `gain`. BY_LUMINANCE: a pixel's light is that of one frame. THRESHOLD:
+// what is darker (or lighter) than `threshold`, give or take half of the softness behind it, leaves no trail beside the
+// window's frame `shown`.
+#if COMBINE == 3
+// The median is looked for by its level, a whole number that rises with a sample: in each scan through the frames an
+// eighth of those is chosen in which it may still lie, by the weight of what is below eight thresholds. The last scan
+// finds the samples at that level, and the next above. LEVELS_OF: 0 samples of 8 bits, 1 of 16, 2 light of any.
+#  if LEVELS_OF == 0
+#    define SCANS 3
+#    define WIDEST 64.0
+#  else
+#    define SCANS 6
+#    define WIDEST 32768.0
+#  endif
+#  define STEPS 7
+// Around the middle, where both neighbours count: MIDDLE of core/pixels/combined.py.
+const float NEAR_MIDDLE = 1.0 / 1024.0;
+int scan = 0;
+float width_of_step = WIDEST;
+vec3 base[4];  // the level from which on the median lies, by pixel
+vec3 below[4 * STEPS];  // the weight of what is below each threshold
+vec3 until[4];  // in the last scan, that of what is at the median's level or below
+vec3 lower[4];
+vec3 upper[4];
+vec4 covered = vec4(0.0);  // Σ qₖ aₖ of each pixel
+
+vec3 level_of(vec3 value) {
+#  if LEVELS_OF == 0
+  return floor(value * 255.0 + 0.5);
+#  elif LEVELS_OF == 1
+  return floor(value * 65535.0 + 0.5);
+#  else
+  vec3 root = sqrt(sqrt(max(value, 0.0)));
+  return floor(262143.0 * root / (1.0 + root));
+#  endif
+}
+
+// A sample of a frame, whose light rises with it, and its alpha.
+vec4 sample_at(ivec2 place, int slot) {
+#  if LEVELS_OF == 2
+  vec4 light = frame_light(place, slot);
+  return vec4(light.rgb / (light.a > 0.0 ? light.a : 1.0), light.a);
+#  else
+  return texelFetch(frames, ivec3(place, slot), 0);
+#  endif
+}
+
+vec3 light_of(vec3 value) {
+#  if LEVELS_OF == 2
+  return value;
+#  else
+  return decoded(value);
+#  endif
+}
+
+void start_median() {
+  for (int pixel = 0; pixel < 4; pixel++) {
+    base[pixel] = vec3(0.0);
+    until[pixel] = vec3(0.0);
+    lower[pixel] = vec3(1e30);
+    upper[pixel] = vec3(1e30);
+  }
+}
+
+void start_scan() {
+  for (int k = 0; k < 4 * STEPS; k++) {
+    below[k] = vec3(0.0);
+  }
+}
+
+void count_sample(int pixel, vec4 found, float weight) {
+  float own = weight * found.a;
+  vec3 level = level_of(found.rgb);
+  if (scan < SCANS) {
+    for (int k = 0; k < STEPS; k++) {
+      vec3 bound = base[pixel] + float(k + 1) * width_of_step;
+      below[pixel * STEPS + k] += own * vec3(lessThan(level, bound));
+    }
+    covered[pixel] += scan == 0 ? own : 0.0;
+    share[0][pixel] += scan == 0 ? weight : 0.0;
+  } else {
+    vec3 value = own > 0.0 ? found.rgb : vec3(1e30);
+    vec3 is_above = vec3(greaterThan(level, base[pixel]));
+    vec3 is_at = vec3(equal(level, base[pixel]));
+    until[pixel] += own * (1.0 - is_above);
+    lower[pixel] = min(lower[pixel], mix(vec3(1e30), value, is_at));
+    upper[pixel] = min(upper[pixel], mix(vec3(1e30), value, is_above));
+  }
+}
+
+void end_scan() {
+  if (scan < SCANS) {
+    for (int pixel = 0; pixel < 4; pixel++) {
+      vec3 steps = vec3(0.0);
+      for (int k = 0; k < STEPS; k++) {
+        steps += vec3(lessThan(below[pixel * STEPS + k], vec3((0.5 - NEAR_MIDDLE) * covered[pixel])));
+      }
+      base[pixel] += width_of_step * steps;
+    }
+    width_of_step /= 8.0;
+  }
+}
+
+vec4 median_of(int pixel) {
+  float cover = covered[pixel] / max(share[0][pixel], 1e-30);
+  vec3 part = clamp((until[pixel] / max(covered[pixel], 1e-30) - (0.5 - NEAR_MIDDLE)) / (2.0 * NEAR_MIDDLE), 0.0, 1.0);
+  vec3 first = light_of(lower[pixel]);
+  vec3 next = light_of(min(upper[pixel], 1e29));
+  part = mix(part, vec3(1.0), greaterThan(upper[pixel], vec3(1e29)));
+  vec3 middle = mix(part * first + (1.0 - part) * next, first, equal(part, vec3(1.0)));
+  return vec4(covered[pixel] > 0.0 ? middle * cover : vec3(0.0), cover);
+}
+#else
+#  if THRESHOLD
+uniform vec2 threshold;
+uniform int shown;
+#  endif
+const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
+// How much of a light leaves a trail.
+float passed(vec4 light) {
+#  if THRESHOLD
+  float luminance = dot(straight(light), LUMINANCE);
+  float t = clamp((luminance - threshold.x + threshold.y) / (2.0 * threshold.y), 0.0, 1.0);
+  t = t * t * (3.0 - 2.0 * t);
+#    if COMBINE == 2
+  return 1.0 - t;
+#    else
+  return t;
+#    endif
+#  else
+  return 1.0;
+#  endif
+}
+
+// A frame's light, which counts `weight`, from 0 to 1.
+void fold(int quad, int pixel, vec4 light, float weight) {
+#  if COMBINE == 2
+  vec3 value = vec3(light.a) - light.rgb;
+  value = mix(value, weight * value, greaterThan(value, vec3(0.0)));
+#  else
+  vec3 value = weight * light.rgb;
+#  endif
+  value = weight > 0.0 ? value : vec3(-1e30);
+  vec4 best = total[quad][pixel];
+#  if BY_LUMINANCE
+  best.rgb = dot(value, LUMINANCE) > dot(best.rgb, LUMINANCE) ? value : best.rgb;
+#  else
+  best.rgb = max(best.rgb, value);
+#  endif
+  best.a = max(best.a, weight * light.a);
+  total[quad][pixel] = best;
+}
+
+// What was folded, to be folded with what other passes have.
+vec4 folded(int quad, int pixel) {
+  vec4 best = total[quad][pixel];
+  return vec4(best.rgb, best.a / max(share[quad][pixel], 1e-30));
+}
+
+vec4 with_others(vec4 color, vec4 other) {
+#  if BY_LUMINANCE
+  vec3 best = dot(other.rgb, LUMINANCE) > dot(color.rgb, LUMINANCE) ? other.rgb : color.rgb;
+#  else
+  vec3 best = max(color.rgb, other.rgb);
+#  endif
+  return vec4(best, max(color.a, other.a));
+}
+
+vec4 finished_fold(vec4 color) {
+  vec3 best = mix(color.rgb, vec3(0.0), lessThan(color.rgb, vec3(-1e29)));
+#  if COMBINE == 2
+  return vec4(color.a - best, color.a);
+#  else
+  return vec4(best, color.a);
+#  endif
+}
+#endif

@@ -1,0 +1,76 @@
+// Shutters that combine frames in several ways: of each way a picture is made with its own, then these are mixed.
+#ifdef SELECT
+// The coefficients of some shutters alone, for Σ = 1, and how much all of them have. `chosen`: their numbers, four to a
+// vector; −1: none. GROUPS of four; ALL shutters.
+layout(local_size_x = 64) in;
+layout(rgba32f) uniform readonly image2DArray coefficients;
+layout(rgba32f) uniform writeonly image2DArray selected;
+layout(r32f) uniform writeonly image2DArray share;
+layout(std140) uniform Chosen { vec4 chosen[GROUPS]; };
+uniform ivec2 size;
+uniform int count;
+
+void main() {
+  ivec2 place = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(place, size))) {
+    return;
+  }
+  float sum = 0.0;
+  for (int k = 0; k < ALL; k++) {
+    sum += max(imageLoad(coefficients, ivec3(place, k / 4))[k % 4], 0.0);
+  }
+  float own = 0.0;
+  vec4 found[GROUPS];
+  for (int g = 0; g < GROUPS; g++) {
+    found[g] = vec4(0.0);
+    for (int k = 0; k < 4; k++) {
+      int number = int(chosen[g][k]);
+      int there = max(number, 0);
+      float value = max(imageLoad(coefficients, ivec3(place, there / 4))[there % 4], 0.0);
+      found[g][k] = number < 0 ? 0.0 : value;
+      own += found[g][k];
+    }
+  }
+  for (int g = 0; g < GROUPS; g++) {
+    vec4 equal_parts = vec4(greaterThanEqual(chosen[g], vec4(0.0))) / float(count);
+    imageStore(selected, ivec3(place, g), own > 0.0 ? found[g] / own : equal_parts);
+  }
+  imageStore(share, ivec3(place, 0), vec4(own / sum));
+}
+#else
+// Adds a way's picture, as much as its shutters have, to `mixed`. Both are scene-linear, bottom row first. BEGINS: it is
+// the first. LEVELS: it is the last, and the sum becomes a picture of levels.
+layout(local_size_x = 64) in;
+layout(rgba32f) uniform readonly image2DArray part;
+layout(r32f) uniform readonly image2DArray share;
+#if BEGINS
+layout(rgba32f) uniform writeonly image2DArray mixed;
+#elif LEVELS
+layout(rgba32f) uniform readonly image2DArray mixed;
+#else
+layout(rgba32f) uniform image2DArray mixed;
+#endif
+uniform ivec2 size;
+uniform int block_bits;
+#include "light.glsl"
+#if LEVELS
+#  include "finish.glsl"
+#endif
+
+void main() {
+  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);  // top row first
+  if (any(greaterThanEqual(pixel, size))) {
+    return;
+  }
+  ivec3 place = ivec3(pixel.x, size.y - 1 - pixel.y, 0);
+  vec4 light = imageLoad(share, ivec3(pixel >> block_bits, 0)).r * imageLoad(part, place);
+#if !BEGINS
+  light += imageLoad(mixed, place);
+#endif
+#if LEVELS
+  finish(pixel, light);
+#else
+  imageStore(mixed, place, light);
+#endif
+}
+#endif
