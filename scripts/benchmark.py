@@ -14,7 +14,7 @@ copy: a gigabyte moved from one buffer of the device to another, read and writte
 Methods: ours; paper: its Appendix A with search bounds (scripts/benchmark/appendix_a.glsl); average: the plain mean of
 the window's frames in the same light; edges: coefficients that follow a guide's edges; follow: ours, where the last
 shutter follows a subject that moves, turns and grows; layer: ours with a layer, a soft disc that moves, of the second
-shutter. Times are medians in milliseconds.
+shutter; lightest, darkest, median: of the frames of all shutters. Times are medians in milliseconds.
 Frames are random noise. Errors are the largest over random pixels of the picture (--pixels) in 8-bit levels against
 the float64 reference; those of diffusion over all coefficients, times 255, against twelve cycles with cells
 everywhere on all grids; those along edges against eight more cycles; those of coefficients with a matte, times 255,
@@ -60,13 +60,15 @@ from shutter_addon.compute.tables import table as table_of
 from shutter_addon.compute.window import Frames
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import mattes, scribbles, shutters
+from shutter_addon.core.model.combining import Combine
 from shutter_addon.core.model.frame_state import Following, FrameState, Layers, Options
-from shutter_addon.core.pixels import compositor, layering
+from shutter_addon.core.pixels import combined, compositor, layering
 from shutter_addon.devices.gl import GLDevice
 from shutter_addon.devices.passes import Pass, read_pass
 
 HERE = Path(__file__).resolve().with_suffix("")
-METHODS = ("ours", "layer", "paper", "average", "edges", "follow")
+COMBINED = ("lightest", "darkest", "median")
+METHODS = ("ours", "layer", "paper", "average", "edges", "follow", *COMBINED)
 MATTES = ("matte", "matte_images", "matte_read", "matte_images_read", "matte_blend")
 PASSES = ("compose", "accumulate", "diffuse", "diffuse_moved", "readback", "frame", *MATTES)
 MATTE_FRAMES = 24
@@ -97,6 +99,22 @@ def following(count: int, window: int, size) -> Following:
     turns[:, -1] = (1 + 0.0005 * frames) * np.exp(0.001j * frames)
     shifts[:, -1] = (1 - turns[:, -1]) * centre + (3.3 + 1.7j) * frames
     return Following(0, turns, shifts)
+
+
+def combining(state: FrameState, mode: str) -> FrameState:
+    """The state whose shutters all make that of the frames."""
+    return replace(state, combines=(Combine.of(mode),) * len(state.bars))
+
+
+def combined_reference(state: FrameState, mode: str, codes: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """float64 colours (P, 3) of pixels with coefficients c (N, P), whose samples in the frames are codes (L, P, 4)."""
+    encoded = state.options.light == "encoded"
+    lights = codes / 255.0 if encoded else light.premultiplied(codes / 255.0, light.to_linear)
+    c = np.maximum(c, 0).astype(np.float64)
+    weights = combined.counts(Combine.of(mode), state.bars, (c / c.sum(axis=0)).T, state.options.interpolation)
+    samples = [combined.Sample(own[:, None], weights[:, None, k]) for k, own in enumerate(lights)]
+    found = combined.of_samples(Combine.of(mode), samples)[:, 0, :3]
+    return light.to_linear(found) if encoded else found
 
 
 def has_mattes() -> bool:
@@ -247,7 +265,7 @@ class Case:
             window.load(self._wanted, self.state.options, range(self.source.count))
 
     def compose(self, method: str) -> None:
-        if method in ("ours", "follow", "layer"):
+        if method in ("ours", "follow", "layer", *COMBINED):
             self.drawn = self._drawn(method)
             return
         self.drawn, block = self.window.picture, self.state.options.aggregate if method == "paper" else 1
@@ -273,6 +291,9 @@ class Case:
             return self.layer.draw(self.index, Coefficients(self.handle, block))
         if method == "ours":
             return self.compositor.draw(self.window, Request(self.index, self.state), Coefficients(self.handle, block))
+        if method in COMBINED:
+            request = Request(self.index, combining(self.state, method))
+            return self.compositor.draw(self.frames, request, Coefficients(self.handle, block))
         moved = replace(self.followed.following, first=self.index)
         state = replace(self.followed, following=moved)
         return self.compositor.draw(self.whole, Request(self.index, state), Coefficients(self.handle, block))
@@ -369,6 +390,8 @@ class Case:
             mean = (codes / 255.0 if encoded else light.to_linear(codes / 255.0))[..., :3].mean(axis=0)
             return light.to_linear(mean) if encoded else mean
         c = self.compositor.coefficients(self.handle, len(self.state.bars))[:, y // block, x // block]
+        if method in COMBINED:
+            return combined_reference(self.state, method, codes, c)
         return reference(self.state, codes, c)
 
     def _followed(self, y, x) -> np.ndarray:
@@ -456,7 +479,7 @@ class HostCase(Case):
         self.whole = self.frames = cpu_window.TiledFrames(self.source, window)
 
     def compose(self, method: str) -> None:
-        if method in ("ours", "follow", "layer"):
+        if method in ("ours", "follow", "layer", *COMBINED):
             self.drawn = self._drawn(method)
             return
         encoded = self.state.options.light == "encoded"
@@ -530,6 +553,7 @@ def jobs(case: Case, passes, methods):
             "paper": ("compose",),
             "average": ("compose", "accumulate", "frame"),
             "edges": ("diffuse",),
+            **dict.fromkeys(COMBINED, ("compose",)),
             "follow": ("compose",) if case.state.options.light == "linear" else (),
         }
         if isinstance(case, HostCase):

@@ -11,6 +11,7 @@ ROOT = Path(__file__).parents[1]
 KEYS = {"pass", "method", "bars", "width", "height", "shutters", "window", "aggregate", "device", "ms", "error"}
 # Appendix A's z is within 2⁻¹⁰ of Q: a jump of the quantile may move that much of the light.
 ALLOWED = {"ours": 0.5, "layer": 0.5, "average": 0.5, "paper": 8.0, "edges": 0.5, "follow": 0.5}
+ALLOWED |= dict.fromkeys(("lightest", "darkest", "median"), 1.0)
 
 # Numbers and pictures alone: everything else must not be needed.
 ALONE = """
@@ -38,8 +39,9 @@ def test_rows(ran):
     passes = {"copy", "compose", "accumulate", "diffuse", "diffuse_moved", "readback", "frame"}
     assert {row["pass"] for row in rows} == passes
     composed = [row for row in rows if row["pass"] == "compose"]
-    # For each of the cases: ours, a layer, the paper's and what follows at either aggregation, and the average.
-    assert len(composed) == 2 * 3 * 9
+    # For each of the cases: ours, a layer, the paper's, what follows and what is combined in three other ways, at either
+    # aggregation, and the average.
+    assert len(composed) == 2 * 3 * 15
 
 
 def test_errors(ran):
@@ -56,7 +58,7 @@ def test_errors(ran):
 def test_table(ran):
     _, printed = ran
     assert "45×27, random bars" in printed
-    assert "| N\\T | ours T=8 | layer T=8 | paper T=8 | average T=8 | follow T=8 | ours 2×2 T=8 |" in printed
+    assert "| N\\T | ours T=8 | layer T=8 | paper T=8 | average T=8 | follow T=8 | lightest T=8 | darkest" in printed
 
 
 def test_numpy(tmp_path):
@@ -72,7 +74,7 @@ def test_numpy(tmp_path):
         *((name, "layer") for name in ("compose", "accumulate", "frame")),
         *((name, "average") for name in ("compose", "accumulate", "frame")),
         ("diffuse", "edges"),
-        ("compose", "follow"),
+        *(("compose", name) for name in ("follow", "lightest", "darkest", "median")),
     }
     assert all(row["error"] <= ALLOWED[row["method"]] for row in rows)
 

@@ -4,36 +4,38 @@
 // what is darker (or lighter) than `threshold`, give or take half of the softness behind it, leaves no trail beside the
 // window's frame `shown`.
 #if COMBINE == 3
-// The median is looked for by its level, a whole number that rises with a sample: in each scan through the frames an
-// eighth of those is chosen in which it may still lie, by the weight of what is below eight thresholds. The last scan
+// The median is looked for by its level, a whole number that rises with a sample: in each scan through the frames a
+// quarter of those is chosen in which it may still lie, by the weight of what is below three thresholds. The last scan
 // finds the samples at that level, and the next above. LEVELS_OF: 0 samples of 8 bits, 1 of 16, 2 light of any.
 #  if LEVELS_OF == 0
-#    define SCANS 3
+#    define SCANS 4
 #    define WIDEST 64.0
+#    define HIGHEST 255.0
 #  else
-#    define SCANS 6
-#    define WIDEST 32768.0
+#    define SCANS 9
+#    define WIDEST 65536.0
+#    define HIGHEST (LEVELS_OF == 1 ? 65535.0 : 262143.0)
 #  endif
-#  define STEPS 7
+#  define STEPS 3
 // Around the middle, where both neighbours count: MIDDLE of core/pixels/combined.py.
 const float NEAR_MIDDLE = 1.0 / 1024.0;
 int scan = 0;
 float width_of_step = WIDEST;
 vec3 base[4];  // the level from which on the median lies, by pixel
-vec3 below[4 * STEPS];  // the weight of what is below each threshold
+vec3 bounds[4 * STEPS];  // the thresholds, between levels
+vec3 below[4 * STEPS];  // the weight of what is below each
 vec3 until[4];  // in the last scan, that of what is at the median's level or below
 vec3 lower[4];
 vec3 upper[4];
 vec4 covered = vec4(0.0);  // Σ qₖ aₖ of each pixel
 
+// What is compared: it rises with a sample.
 vec3 level_of(vec3 value) {
-#  if LEVELS_OF == 0
-  return floor(value * 255.0 + 0.5);
-#  elif LEVELS_OF == 1
-  return floor(value * 65535.0 + 0.5);
-#  else
+#  if LEVELS_OF == 2
   vec3 root = sqrt(sqrt(max(value, 0.0)));
-  return floor(262143.0 * root / (1.0 + root));
+  return root / (1.0 + root);
+#  else
+  return value;
 #  endif
 }
 
@@ -65,28 +67,37 @@ void start_median() {
 }
 
 void start_scan() {
-  for (int k = 0; k < 4 * STEPS; k++) {
-    below[k] = vec3(0.0);
+  for (int pixel = 0; pixel < 4; pixel++) {
+    for (int k = 0; k < STEPS; k++) {
+      // In the last scan: below the median's level, and above it.
+      float up = scan < SCANS ? float(k + 1) * width_of_step : float(min(k, 1));
+      bounds[pixel * STEPS + k] = (base[pixel] + up - 0.5) / HIGHEST;
+      below[pixel * STEPS + k] = vec3(0.0);
+    }
   }
 }
 
 void count_sample(int pixel, vec4 found, float weight) {
+#  if OPAQUE
+  float own = weight;
+#  else
   float own = weight * found.a;
+#  endif
   vec3 level = level_of(found.rgb);
+  vec3 counted = vec3(own);
   if (scan < SCANS) {
     for (int k = 0; k < STEPS; k++) {
-      vec3 bound = base[pixel] + float(k + 1) * width_of_step;
-      below[pixel * STEPS + k] += own * vec3(lessThan(level, bound));
+      below[pixel * STEPS + k] += mix(vec3(0.0), counted, lessThan(level, bounds[pixel * STEPS + k]));
     }
     covered[pixel] += scan == 0 ? own : 0.0;
     share[0][pixel] += scan == 0 ? weight : 0.0;
   } else {
     vec3 value = own > 0.0 ? found.rgb : vec3(1e30);
-    vec3 is_above = vec3(greaterThan(level, base[pixel]));
-    vec3 is_at = vec3(equal(level, base[pixel]));
-    until[pixel] += own * (1.0 - is_above);
-    lower[pixel] = min(lower[pixel], mix(vec3(1e30), value, is_at));
-    upper[pixel] = min(upper[pixel], mix(vec3(1e30), value, is_above));
+    bvec3 is_lower = lessThan(level, bounds[pixel * STEPS]);
+    bvec3 is_first = lessThan(level, bounds[pixel * STEPS + 1]);
+    until[pixel] += mix(vec3(0.0), counted, is_first);
+    lower[pixel] = min(lower[pixel], mix(value, vec3(1e30), is_lower));
+    upper[pixel] = min(upper[pixel], mix(value, vec3(1e30), is_first));
   }
 }
 
@@ -99,7 +110,7 @@ void end_scan() {
       }
       base[pixel] += width_of_step * steps;
     }
-    width_of_step /= 8.0;
+    width_of_step /= 4.0;
   }
 }
 
@@ -137,20 +148,19 @@ float passed(vec4 light) {
 // A frame's light, which counts `weight`, from 0 to 1.
 void fold(int quad, int pixel, vec4 light, float weight) {
 #  if COMBINE == 2
-  vec3 value = vec3(light.a) - light.rgb;
-  value = mix(value, weight * value, greaterThan(value, vec3(0.0)));
+  vec3 dark = vec3(light.a) - light.rgb;
+  vec4 value = vec4(weight * max(dark, 0.0) + min(dark, 0.0), weight * light.a);
+  value.rgb = weight > 0.0 ? value.rgb : vec3(-1e30);
 #  else
-  vec3 value = weight * light.rgb;
+  vec4 value = weight * light;
 #  endif
-  value = weight > 0.0 ? value : vec3(-1e30);
-  vec4 best = total[quad][pixel];
 #  if BY_LUMINANCE
-  best.rgb = dot(value, LUMINANCE) > dot(best.rgb, LUMINANCE) ? value : best.rgb;
+  vec4 best = total[quad][pixel];
+  best.rgb = dot(value.rgb, LUMINANCE) > dot(best.rgb, LUMINANCE) ? value.rgb : best.rgb;
+  total[quad][pixel] = vec4(best.rgb, max(best.a, value.a));
 #  else
-  best.rgb = max(best.rgb, value);
+  total[quad][pixel] = max(total[quad][pixel], value);
 #  endif
-  best.a = max(best.a, weight * light.a);
-  total[quad][pixel] = best;
 }
 
 // What was folded, to be folded with what other passes have.
@@ -169,11 +179,10 @@ vec4 with_others(vec4 color, vec4 other) {
 }
 
 vec4 finished_fold(vec4 color) {
-  vec3 best = mix(color.rgb, vec3(0.0), lessThan(color.rgb, vec3(-1e29)));
 #  if COMBINE == 2
-  return vec4(color.a - best, color.a);
+  return vec4(color.a - mix(color.rgb, vec3(0.0), lessThan(color.rgb, vec3(-1e29))), color.a);
 #  else
-  return vec4(best, color.a);
+  return color;
 #  endif
 }
 #endif

@@ -116,7 +116,7 @@ void start_light(int quad) {
 }
 #else
 void start_light(int quad) {
-#if COMBINE == 1 || COMBINE == 2
+#if COMBINE == 2
   vec4 none = vec4(vec3(-1e30), 0.0);
   total[quad] = mat4(none, none, none, none);
 #else
@@ -177,6 +177,8 @@ vec4 frame_light(ivec2 place, int slot) {
 #  elif DECODE == 2
   color.rgb = to_encoded(straight(color)) * color.a;
 #  endif
+#elif OPAQUE
+  return vec4(decoded(color.rgb), 1.0);
 #else
   color.rgb = decoded(color.rgb) * color.a;
 #endif
@@ -215,19 +217,23 @@ void expose(int quad, int frame, vec4 weight) {
 #endif
   int layer = layer_of(frame);
 #if COMBINE == 3
-  for (int pixel = 0; pixel < 4; pixel++) {
-    count_sample(pixel, sample_at(pixel_at(quad, pixel), layer), weight[pixel]);
-  }
+  count_sample(0, sample_at(pixel_at(quad, 0), layer), weight.x);
+  count_sample(1, sample_at(pixel_at(quad, 1), layer), weight.y);
+  count_sample(2, sample_at(pixel_at(quad, 2), layer), weight.z);
+  count_sample(3, sample_at(pixel_at(quad, 3), layer), weight.w);
 #else
   weight *= gain[quad];
+#if THRESHOLD
   for (int pixel = 0; pixel < 4; pixel++) {
     vec4 light = frame_light(pixel_at(quad, pixel), layer);
-#if THRESHOLD
     fold(quad, pixel, light, frame == shown ? 1.0 : weight[pixel] * passed(light));
-#else
-    fold(quad, pixel, light, weight[pixel]);
-#endif
   }
+#else
+  fold(quad, 0, frame_light(pixel_at(quad, 0), layer), weight.x);
+  fold(quad, 1, frame_light(pixel_at(quad, 1), layer), weight.y);
+  fold(quad, 2, frame_light(pixel_at(quad, 2), layer), weight.z);
+  fold(quad, 3, frame_light(pixel_at(quad, 3), layer), weight.w);
+#endif
 #if THRESHOLD
   share[quad] = frame == shown ? vec4(1.0) : share[quad];
 #endif

@@ -37,7 +37,7 @@ class LightFormat:
     encoded: whether the sums are of encoded light (Options.light)
     levels: whether the picture is of levels, not scene-linear
     cover: of weighted_window.WeightedSums
-    combine: how frames are combined; kind: of the texture that has them"""
+    combine: how frames are combined; kind: of the texture that has them; opaque: their alpha is 1"""
 
     decode: int
     premultiplied: bool
@@ -46,6 +46,7 @@ class LightFormat:
     cover: int = 0
     combine: Combine = AVERAGE
     kind: str = "rgba32f"
+    opaque: bool = False
 
     def defines(self) -> dict[str, int | str]:
         """The macros of include/compose.glsl that say so."""
@@ -60,6 +61,7 @@ class LightFormat:
             "STORED": STORED_SUMS[self.cover],
             "COMBINE": mode,
             "BY_LUMINANCE": int(self.combine.by_luminance),
+            "OPAQUE": int(self.opaque),
             "THRESHOLD": int(self.combine.threshold is not None),
             "LEVELS_OF": (2 if self.premultiplied else raw) if mode == MODES["median"] else 0,
         }

@@ -106,6 +106,7 @@ def _from_frames(
         cover=window.cover if summed else 0,
         combine=combine,
         kind=window.kind if not summed else "",
+        opaque=source.alpha == "opaque",
     )
     given |= _threshold(combine, options)
     return composition(way, -(-len(state.bars) // 4), stored, edges, light), given

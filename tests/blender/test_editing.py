@@ -249,6 +249,8 @@ def test_a_summary_in_words():
     assert bar_edits.summary([0.5, 0.5]) == "Angle 360°, light of 1 frame"
     assert bar_edits.summary(np.float32([0.1] * 10)) == "Angle 360°, light of 1 frame"
     assert "never opens" in bar_edits.summary([0, 0])
+    assert bar_edits.summary([1, 0.5, 0, 0], "MEDIAN") == "Median of 2 frames"
+    assert bar_edits.summary([0, 1], "LIGHTEST") == "Lightest of 1 frame"
 
 
 @given(st.integers(1, 24), st.sampled_from([(1, 1), (2, 4), (3, 3), (4, 2)]), st.booleans())
@@ -517,7 +519,7 @@ def test_only_what_renders_by_its_keys_can_be_keyed(effect):
     }
     assert can == {
         ("ShutterBar", "weight"),
-        ("Shutter", "trail"),
+        *(("Shutter", name) for name in ("trail", "threshold", "softness")),
         *(("ShutterRegion", name) for name in ("width", "opacity", "feather")),
         *(("ShutterRegion", name) for name in ("location", "rotation", "scale", "confidence")),
         *(("ShutterEffect", name) for name in ("position", "interpolation", "light", "exposure", "edges")),

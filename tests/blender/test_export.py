@@ -125,6 +125,17 @@ def outlines(draw, names):
     return recipes.OutlineRegion(kind="outline", **fields)
 
 
+extremes = st.sampled_from(["lightest", "darkest"])
+thresholds = st.fixed_dictionaries(
+    {"combine": extremes, "threshold": numbers(0, 5) | value_keys(0, 5), "softness": numbers(0, 1) | value_keys(0, 1)}
+)
+combining = (
+    st.fixed_dictionaries({"combine": st.sampled_from(["average", "median"])})
+    | st.fixed_dictionaries({"combine": extremes, "by_luminance": st.booleans()})
+    | thresholds
+)
+
+
 @st.composite
 def following_recipes(draw, longest=6):
     """Recipes with mattes, whose shutters follow the camera, or regions, which have names of their own."""
@@ -137,7 +148,8 @@ def following_recipes(draw, longest=6):
     shutters = [dataclasses.replace(shutter, follow=draw(followed)) for shutter in found.shutters]
     trails = st.none() | numbers(0, 10) | value_keys(0, 10)
     shutters = [dataclasses.replace(shutter, trail=draw(trails)) if shutter.follow else shutter for shutter in shutters]
-    return dataclasses.replace(found, shutters=shutters, regions=named)
+    combined = [dataclasses.replace(shutter, **draw(combining)) for shutter in shutters]
+    return dataclasses.replace(found, shutters=combined, regions=named)
 
 
 @pytest.fixture

@@ -153,11 +153,13 @@ class Shutter(PropertyGroup):
         name="By Luminance",
         description="Choose a frame for each pixel, by how light it is there, and not one for each color channel",
         update=changed,
+        options=UNKEYED,
     )
     use_threshold: BoolProperty(
         name="Use Threshold",
         description="Let only what is lighter, or of the darkest darker, leave a trail beside what is shown",
         update=changed,
+        options=UNKEYED,
     )
     threshold: FloatProperty(
         name="Threshold",

@@ -9,15 +9,21 @@ from bpy.app.translations import pgettext_iface as iface_
 from ...core import revision
 from ...core.model import shutters
 from ..data import fcurves, snapshot
+from ..data.choices import COMBINES
 from ..data.consistency import bars
 from ..rendering import effect_source, invalidation, render_context
 
 
-def summary(weights) -> str:
-    """A shutter's bars (L,) in words: its angle, and how many frames' light it gathers."""
+def summary(weights, combine: str = "AVERAGE") -> str:
+    """A shutter's bars (L,) in words: its angle, and how many frames' light it gathers; or how many frames it combines
+    otherwise (choices.COMBINES)."""
     light = shutters.exposure(weights)
     if not light:
         return iface_("All bars are zero: the shutter never opens")
+    if combine != "AVERAGE":
+        name, count = next(name for word, name, _ in COMBINES if word == combine), np.count_nonzero(weights)
+        words = iface_("{combine} of 1 frame") if count == 1 else iface_("{combine} of {count} frames")
+        return words.format(combine=iface_(name), count=count)
     angle, frames = f"{shutters.open_angle(weights):.0f}", f"{light:.3g}"
     if frames == "1":
         return iface_("Angle {angle}°, light of 1 frame").format(angle=angle)

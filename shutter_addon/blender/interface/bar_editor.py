@@ -114,7 +114,8 @@ class SHUTTER_GT_bars(Gizmo):
         if (shown := _shown(effect)) is None:
             return
         shutter = selection.active_shutter(effect)
-        words = bar_edits.open_for(scene, effect, strip, effect.active_shutter) or bar_edits.summary(shown.bars)
+        words = bar_edits.open_for(scene, effect, strip, effect.active_shutter)
+        words = words or bar_edits.summary(shown.bars, shutter.combine)
         _draw(_layout(context, shown.bars), shutter.color, f"{shutter.name}   {words}", *shown)
 
     def test_select(self, context, location):

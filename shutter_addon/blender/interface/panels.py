@@ -191,7 +191,8 @@ def _draw_bars(layout, active) -> None:
         sentence(layout, str(error), "ERROR")
         return
     is_open = bool(bars.any())
-    sentence(layout, bar_edits.summary(bars), "NONE" if is_open else "ERROR", is_quiet=is_open)
+    summary = bar_edits.summary(bars, effect.shutters[effect.active_shutter].combine)
+    sentence(layout, summary, "NONE" if is_open else "ERROR", is_quiet=is_open)
     if words := bar_edits.open_for(scene, effect, strip, effect.active_shutter):
         sentence(layout, words, is_quiet=True)
 

@@ -306,6 +306,8 @@ MESSAGES = {
     ("*", "The shutter has {count} bars"): "Der Verschluss hat {count} Balken",
     ("Operator", "Paint Bars"): "Balken malen",
     # Regions
+    ("*", "{combine} of 1 frame"): "{combine} von 1 Bild",
+    ("*", "{combine} of {count} frames"): "{combine} von {count} Bildern",
     ("*", "Combine"): "Verrechnen",
     ("*", "What the frames that are exposed become"): "Was aus den belichteten Bildern wird",
     ("*", "Average"): "Mittelwert",
