@@ -39,8 +39,8 @@ def test_rows(ran):
     passes = {"copy", "compose", "accumulate", "diffuse", "diffuse_moved", "readback", "frame"}
     assert {row["pass"] for row in rows} == passes
     composed = [row for row in rows if row["pass"] == "compose"]
-    # For each of the cases: ours, a layer, the paper's, what follows and what is combined in three other ways, at either
-    # aggregation, and the average.
+    # For each of the cases: ours, a layer, the paper's, what follows and what is combined in three other ways, at
+    # either aggregation, and the average.
     assert len(composed) == 2 * 3 * 15
 
 

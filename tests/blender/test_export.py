@@ -149,7 +149,9 @@ def following_recipes(draw, longest=6):
     trails = st.none() | numbers(0, 10) | value_keys(0, 10)
     shutters = [dataclasses.replace(shutter, trail=draw(trails)) if shutter.follow else shutter for shutter in shutters]
     combined = [dataclasses.replace(shutter, **draw(combining)) for shutter in shutters]
-    return dataclasses.replace(found, shutters=combined, regions=named)
+    lengths = st.sampled_from(["bars", "timeline"])
+    timed = [each if each.trail is not None else dataclasses.replace(each, length=draw(lengths)) for each in combined]
+    return dataclasses.replace(found, shutters=timed, regions=named)
 
 
 @pytest.fixture

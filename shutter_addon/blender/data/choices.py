@@ -161,6 +161,7 @@ COMBINES = (
 
 LENGTHS = (
     ("FRAMES", "Bars", "The bars say for how many frames the shutter is open"),
+    ("TIMELINE", "Timeline", "The bars are the exposure of one frame of the timeline, however fast the footage runs"),
     ("MOTION", "Motion", "The shutter is open while what it follows moves by a set length; the bars are the shape"),
 )
 

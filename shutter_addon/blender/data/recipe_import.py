@@ -143,6 +143,8 @@ def _add_shutter(scene, effect, path: str, source: recipe.Shutter, first: float)
         shutter.follow = "CAMERA" if source.follow == recipe.CAMERA else "REGION"
         shutter.follow_region = "" if source.follow == recipe.CAMERA else source.follow
     shutter.follow_motion, shutter.follow_smooth = source.follow_motion.upper(), source.follow_smooth
+    if source.length == "timeline":
+        shutter.length = "TIMELINE"
     if source.trail is not None:
         shutter.length = "MOTION"
         _set_number(scene, shutter, path, "trail", source.trail, first)

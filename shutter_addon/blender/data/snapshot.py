@@ -141,7 +141,8 @@ def _around(effect, frames: Frames) -> Frames:
     around these frames too."""
     has_layers = any(region.is_layer for region in effect.regions)
     if not has_layers and all(shutter.follow == "NOTHING" for shutter in effect.shutters):
-        return frames
+        beside = int(any(shutter.length == "TIMELINE" for shutter in effect.shutters))
+        return np.unique(np.add.outer(sorted(frames), np.arange(-beside, beside + 1))).tolist() if beside else frames
     smooth = max(validation.number(shutter, "follow_smooth") for shutter in effect.shutters)
     reach = following.reach(validation.number(effect, "window")) + smooth
     if has_layers:
@@ -307,6 +308,7 @@ def _shutter(
         trail=trail,
         motion=motion,
         smooth=smooth,
+        timeline=validation.word(shutter, "length") == "TIMELINE",
         combine=validation.word(shutter, "combine").lower(),
         by_luminance=shutter.by_luminance,
         **numbers,

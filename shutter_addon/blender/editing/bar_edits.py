@@ -35,7 +35,7 @@ def open_for(scene, effect, strip, index: int) -> str | None:
     that, or there is no picture. For what is drawn: worked out once, with all that the live preview shows, until
     something changes."""
     shutter, frame = effect.shutters[index], scene.frame_current
-    has_length = shutter.follow != "NOTHING" and shutter.length == "MOTION"
+    has_length = shutter.length == "TIMELINE" or (shutter.follow != "NOTHING" and shutter.length == "MOTION")
     is_shown = strip.left_handle <= frame < strip.right_handle and not bpy.app.is_job_running("RENDER")
     if not (has_length and is_shown):
         return None

@@ -248,11 +248,11 @@ class _Move(WithEffect):
         if (shutter := selection.active_shutter(effect)) is None:
             return
         layout.use_property_split = True
+        layout.prop(shutter, "length")
         layout.prop(shutter, "follow")
         if shutter.follow == "REGION":
             layout.prop_search(shutter, "follow_region", effect, "regions", text="Region")
         if shutter.follow != "NOTHING":
-            layout.prop(shutter, "length")
             if shutter.length == "MOTION":
                 layout.prop(shutter, "trail")
             draw_followed_motion(layout, shutter)

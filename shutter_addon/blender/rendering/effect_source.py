@@ -77,6 +77,15 @@ def open_source(snapshot: Snapshot) -> ShotSource:
     return SourceKey.of(snapshot).open()
 
 
+def source_position(snapshot: Snapshot, frame: float, source: ShotSource) -> float:
+    """Where in an effect's source a timeline frame is, in frames, in-between ones counted. EffectError: as
+    source_index."""
+    if snapshot.effect.time is not None:
+        return (snapshot.effect.time.at(frame)[0] - 1) * source.step
+    assert snapshot.timing is not None  # of a strip without source time
+    return retiming.source_position(snapshot.timing, frame, source)
+
+
 def source_index(snapshot: Snapshot, frame: float, source: ShotSource) -> tuple[int, bool]:
     """Which frame of an effect's source is shown at a timeline frame, in-between frames counted, and whether the source
     runs backward there. EffectError: it cannot be known."""

@@ -15,7 +15,7 @@ from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core.messages import translated
 from ...core.model.frame_state import FrameState
-from ...core.pixels import following, layering
+from ...core.pixels import following, layering, timeline_exposure
 from ...core.pixels.matte_grid import block_means
 from ...core.stopping import never
 from ...devices.device import NoDeviceError
@@ -24,7 +24,7 @@ from ..data.snapshot import Snapshot
 from ..devices import available
 from . import render_settings
 from .device_work import Work, broken_off, result_of
-from .effect_source import FAULTS, FULL, Detail, SourceKey, source_index
+from .effect_source import FAULTS, FULL, Detail, SourceKey, source_index, source_position
 
 if TYPE_CHECKING:
     from .render_context import RenderContext
@@ -106,6 +106,10 @@ class RenderSession:
             def shown_at(other: float) -> int:
                 return source_index(snapshot, other, source)[0]
 
+            def position(other: float) -> float:
+                return source_position(snapshot, other, source)
+
+            state = timeline_exposure.exposed(snapshot.effect, state, frame, direction, position, source.count)
             state = following.followed(snapshot.effect, state, shown, source, shown_at)
             state = layering.layered(snapshot.effect, state, shown, source, shown_at)
         request = Request(index=index, state=state, direction=direction, source=key, levels=context.levels)

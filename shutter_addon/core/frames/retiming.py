@@ -3,7 +3,7 @@
 import math
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
 from typing import Protocol
@@ -87,6 +87,15 @@ def source_frame(strip: StripTiming, frame: float, medium: Medium) -> int:
     frame -= bisect_left(earlier, True, key=lambda back: int(position(frame - back)) != whole)
     index = math.floor(position(frame) + np.float32(0.5))
     return first + min(index, length - 1)
+
+
+def source_position(strip: StripTiming, frame: float, medium: Medium) -> float:
+    """Where in the medium a strip is at a timeline frame, in frames, in-between ones counted; source_frame has one of
+    those that are beside it. EffectError: how the strip is retimed cannot be known."""
+    length = max(1, medium.filmed - strip.content_trim_start - strip.content_trim_end)
+    rate = _playback_rate(strip, length, float(medium.fps or 0) / medium.step / strip.scene_fps)
+    position = float(_position(replace(strip, strobe=1.0), rate, length, frame))
+    return (strip.content_trim_start + strip.first + position) * medium.step
 
 
 def nearest(filmed: float, step: int, count: int) -> int:

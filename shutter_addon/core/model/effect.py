@@ -268,6 +268,7 @@ class Shutter:
     say for how many frames it is open
     motion: what of its motion is followed: the location, its rotation too, or its scale as well
     smooth: frames before and after each over which that motion is averaged
+    timeline: whether the bars are the shape of the exposure over one frame of the timeline
     combine, by_luminance: as mode and by_luminance of combining.Combine
     threshold, softness: channels of its numbers; None: it has no threshold"""
 
@@ -278,6 +279,7 @@ class Shutter:
     trail: Channel | None = None
     motion: motions.Motion = "scale"
     smooth: int = 0
+    timeline: bool = False
     combine: combining.Mode = "average"
     by_luminance: bool = False
     threshold: Channel | None = None

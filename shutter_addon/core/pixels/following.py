@@ -111,7 +111,7 @@ def _with_trails(
 ) -> tuple[np.ndarray, dict[int, float]]:
     """The state's bars (N, L), those of shutters whose trail has a length open for it, and FrameState.open_for;
     arguments like those of `followed`."""
-    bars, open_for, size = state.bars.copy(), {}, (source.width, source.height)
+    bars, open_for, size = state.bars.copy(), dict(state.open_for), (source.width, source.height)
     frame, index, direction = at
     positions = compositor.window_positions(state.options, index, direction)
     shown_at = float(np.abs(positions - index).argmin()) + 0.5

@@ -112,6 +112,8 @@ def _follows(effect: Effect, names: list[str]) -> list[str | None]:
 
 def _whole(shutter: Shutter, said: recipe.Shutter, follow: str | None, shown: range) -> recipe.Shutter:
     """A recipe's shutter with what it makes of frames, what it follows, and how far."""
+    if shutter.timeline:
+        said = replace(said, length="timeline")
     if shutter.combine != "average":
         said = replace(said, combine=shutter.combine)
     if shutter.combine in ("lightest", "darkest"):

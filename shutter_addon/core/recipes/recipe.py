@@ -63,6 +63,7 @@ class Shutter:
     trail: how far that moves while the shutter is open, in fractions of the picture's height; None: the bars say for
     how many frames it is open
     follow_motion, follow_smooth: as motion and smooth of effect.Shutter
+    length: what bars count, source frames or, all of them together, a frame of the timeline
     combine, by_luminance, threshold, softness: as effect.Shutter has them"""
 
     name: str
@@ -73,6 +74,7 @@ class Shutter:
     trail: Keyable | None = None
     follow_motion: motions.Motion = "scale"
     follow_smooth: int = 0
+    length: Literal["bars", "timeline"] = "bars"
     combine: combining.Mode = "average"
     by_luminance: bool = False
     threshold: Keyable | None = None
@@ -88,6 +90,7 @@ class Shutter:
             trail=None if self.trail is None else _numbers(self.trail),
             motion=self.follow_motion,
             smooth=self.follow_smooth,
+            timeline=self.length == "timeline",
             combine=self.combine,
             by_luminance=self.by_luminance,
             threshold=None if self.threshold is None else _numbers(self.threshold),

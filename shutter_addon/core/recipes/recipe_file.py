@@ -108,7 +108,7 @@ def save(recipe: Recipe, path: str | Path) -> None:
 
 # Values that say nothing, of fields that few recipes need.
 _UNTOLD = {"opacity": 1.0, "follow_motion": "scale", "follow_smooth": 0, "camera_influence": 1.0}
-_UNTOLD |= {"combine": "average", "by_luminance": False, "softness": 0.0}
+_UNTOLD |= {"length": "bars", "combine": "average", "by_luminance": False, "softness": 0.0}
 
 
 def _compact(value: Any) -> Any:
@@ -324,6 +324,7 @@ def _check(recipe: Recipe) -> None:
         _check_follow(shutter.follow, recipe.regions, f"shutters[{i}].follow")
         if shutter.trail is not None:
             _require(shutter.follow, f"shutters[{i}].trail", "the shutter follows nothing that could move so far")
+            _require(shutter.length == "bars", f"shutters[{i}].trail", "a shutter has one length")
             _check_number(shutter.trail, f"shutters[{i}].trail", limits.MAX_DISTANCE)
         _require_within(shutter.follow_smooth, limits.MAX_SMOOTH, f"shutters[{i}].follow_smooth", 0)
         if shutter.threshold is not None:

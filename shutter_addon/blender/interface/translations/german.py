@@ -1130,6 +1130,10 @@ MESSAGES = {
         "Name of the region that the exposure moves with",
     ): "Name der Region, mit der sich die Belichtung bewegt",
     ("*", "Length"): "Länge",
+    (
+        "*",
+        "The bars are the exposure of one frame of the timeline, however fast the footage runs",
+    ): "Die Balken sind die Belichtung eines Bildes der Zeitleiste, wie schnell das Material auch läuft",
     ("*", "Motion"): "Bewegung",
     ("*", "What says how long the exposure is"): "Was sagt, wie lang die Belichtung ist",
     (

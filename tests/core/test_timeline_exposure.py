@@ -1,0 +1,85 @@
+"""Exposures whose length is the timeline's."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shutter_addon.core.model.frame_state import Options
+from shutter_addon.core.pixels import timeline_exposure
+
+HALF = [1, 1, 1, 1, 0, 0, 0, 0]  # 180°
+OPEN = [1] * 8
+
+
+def exposed(bars, speed=1.0, direction=1, here=100.0, after=None, before=None, **options):
+    """Bars, and for how many frames they are open; speed: source frames a timeline frame, or `before` and `after`."""
+    before = here - direction * speed if before is None else before
+    after = here + direction * speed if after is None else after
+    options = Options(len(bars), **options)
+    return timeline_exposure.on_timeline(np.array(bars, float), options, direction, (before, here, after))
+
+
+def test_half_open_at_eight_times_the_speed_is_four_frames():
+    bars, length = exposed(HALF, 8)
+    np.testing.assert_allclose(bars, [1, 1, 1, 1, 0, 0, 0, 0])
+    assert length == pytest.approx(4)
+    np.testing.assert_allclose(exposed(OPEN, 8)[0], OPEN)
+
+
+def test_as_it_was_filmed_and_slower_it_is_the_shown_frame():
+    for speed in (1, 0.3, 0):
+        bars, length = exposed(OPEN, speed)
+        np.testing.assert_allclose(bars, [8, 0, 0, 0, 0, 0, 0, 0], atol=1e-9)
+        assert length == pytest.approx(speed)
+
+
+def test_in_between_frames_have_their_part():
+    """Half the speed is two of four; a quarter more speed than filmed goes into the next frame."""
+    np.testing.assert_allclose(exposed(OPEN, 2, step=4)[0], [4, 4, 0, 0, 0, 0, 0, 0])
+    np.testing.assert_allclose(exposed(OPEN, 5, step=4)[0], [1.6] * 5 + [0, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("position", "expected"),
+    [("start", [1, 1, 1, 1, 0, 0, 0]), ("center", [0, 0.5, 1, 1, 1, 0.5, 0]), ("end", [0, 0, 0, 1, 1, 1, 1])],
+)
+def test_around_the_shown_frame(position, expected):
+    bars, _length = exposed([1] * 7, 4, position=position)
+    np.testing.assert_allclose(bars, np.array(expected) * 7 / 4, atol=1e-9)
+
+
+def test_backward_it_goes_the_windows_way():
+    np.testing.assert_allclose(exposed(HALF, 8, direction=-1)[0], HALF)
+
+
+def test_along_a_ramp_it_is_as_long_as_the_way_goes():
+    """From one speed to another, in the middle of the exposure."""
+    bars, length = exposed(OPEN, before=98.0, after=104.0, position="center")
+    assert length == pytest.approx(3)
+    # Four bars over one frame before the shown one's middle, four over two behind it.
+    np.testing.assert_allclose(bars, [0, 0, 2, 3, 2, 1, 0, 0])
+    assert bars.sum() == pytest.approx(8)
+
+
+def test_where_it_turns_around_it_goes_there_and_back():
+    bars, length = exposed(OPEN, before=104.0, after=104.0, position="center")
+    assert length == pytest.approx(2)
+    np.testing.assert_allclose(bars, [0, 0, 0, 2, 4, 2, 0, 0])
+
+
+@given(
+    st.lists(st.floats(0, 5), min_size=1, max_size=20).filter(lambda bars: sum(bars) > 0.1),
+    st.floats(0, 40),
+    st.floats(0, 40),
+    st.sampled_from(["start", "center", "end"]),
+    st.sampled_from([1, 2, 4]),
+    st.sampled_from([1, -1]),
+)
+def test_whatever_the_speed_is(bars, earlier, later, position, step, direction):
+    """The exposure's light stays, and no bar is negative."""
+    before, after = 100 - direction * earlier, 100 + direction * later
+    found, length = exposed(bars, before=before, after=after, direction=direction, position=position, step=step)
+    assert found.sum() == pytest.approx(sum(bars))
+    assert (found >= 0).all()
+    assert 0 <= length <= max(earlier, later) + 1e-9
