@@ -9,6 +9,7 @@ NAMES = (
     "crowd",
     "rolling_shutter",
     "light_trails",
+    "empty_street",
     "one_stroke",
     "handheld",
     "panning",
