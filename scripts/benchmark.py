@@ -113,7 +113,7 @@ def combined_reference(state: FrameState, mode: str, codes: np.ndarray, c: np.nd
     c = np.maximum(c, 0).astype(np.float64)
     weights = combined.counts(Combine.of(mode), state.bars, (c / c.sum(axis=0)).T, state.options.interpolation)
     samples = [combined.Sample(own[:, None], weights[:, None, k]) for k, own in enumerate(lights)]
-    found = combined.of_samples(Combine.of(mode), samples)[:, 0, :3]
+    found = combined.of_samples(Combine.of(mode), samples, encoded=encoded)[:, 0, :3]
     return light.to_linear(found) if encoded else found
 
 

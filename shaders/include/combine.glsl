@@ -18,7 +18,7 @@
 #  endif
 #  define STEPS 3
 // Around the middle, where both neighbours count: MIDDLE of core/pixels/combined.py.
-const float NEAR_MIDDLE = 1.0 / 1024.0;
+const float NEAR_MIDDLE = 1.0 / 8192.0;
 int scan = 0;
 float width_of_step = WIDEST;
 vec3 base[4];  // the level from which on the median lies, by pixel
@@ -132,7 +132,11 @@ const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
 // How much of a light leaves a trail.
 float passed(vec4 light) {
 #  if THRESHOLD
+#    if ENCODED
+  float luminance = dot(to_linear_of_any(max(straight(light), 0.0)), LUMINANCE);
+#    else
   float luminance = dot(straight(light), LUMINANCE);
+#    endif
   float t = clamp((luminance - threshold.x + threshold.y) / (2.0 * threshold.y), 0.0, 1.0);
   t = t * t * (3.0 - 2.0 * t);
 #    if COMBINE == 2
@@ -150,10 +154,10 @@ void fold(int quad, int pixel, vec4 light, float weight) {
 #  if COMBINE == 2
   vec3 dark = vec3(light.a) - light.rgb;
   vec4 value = vec4(weight * max(dark, 0.0) + min(dark, 0.0), weight * light.a);
-  value.rgb = weight > 0.0 ? value.rgb : vec3(-1e30);
 #  else
   vec4 value = weight * light;
 #  endif
+  value.rgb = weight > 0.0 ? value.rgb : vec3(-1e30);
 #  if BY_LUMINANCE
   vec4 best = total[quad][pixel];
   best.rgb = dot(value.rgb, LUMINANCE) > dot(best.rgb, LUMINANCE) ? value.rgb : best.rgb;
@@ -179,10 +183,11 @@ vec4 with_others(vec4 color, vec4 other) {
 }
 
 vec4 finished_fold(vec4 color) {
+  vec3 best = mix(color.rgb, vec3(0.0), lessThan(color.rgb, vec3(-1e29)));
 #  if COMBINE == 2
-  return vec4(color.a - mix(color.rgb, vec3(0.0), lessThan(color.rgb, vec3(-1e29))), color.a);
+  return vec4(color.a - best, color.a);
 #  else
-  return color;
+  return vec4(best, color.a);
 #  endif
 }
 #endif

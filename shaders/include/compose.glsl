@@ -116,7 +116,7 @@ void start_light(int quad) {
 }
 #else
 void start_light(int quad) {
-#if COMBINE == 2
+#if COMBINE == 1 || COMBINE == 2
   vec4 none = vec4(vec3(-1e30), 0.0);
   total[quad] = mat4(none, none, none, none);
 #else

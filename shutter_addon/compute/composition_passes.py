@@ -195,6 +195,13 @@ def frames_iterations(values: np.ndarray, span: tuple[int, int]) -> int:
     return int(frames.sum()) + len(start) + span[1] - span[0]
 
 
+def median_iterations(rows: int, frames: int, kind: str) -> int:
+    """As frames_iterations, of compose_search for a median (include/combine.glsl), with `rows` pieces, of frames in
+    textures of a kind."""
+    scans = 5 if kind == "rgba8" else 10
+    return scans * frames * (1 + 4 * (1 + rows.bit_length()))
+
+
 def moved_way(
     options: Options, values: np.ndarray, span: tuple[int, int], motions: int, mixed: int, quads: int
 ) -> tuple[str, int]:

@@ -44,8 +44,11 @@ def _combined(
     averaged: Callable[[Mix], np.ndarray],
     mix: Mix,
 ) -> np.ndarray:
-    samples = _samples(window, exposed, combine, moves, mix)
-    found, counted = _median(samples, mix) if combine.mode == "median" else _extreme(combine, samples, mix)
+    encoded = exposed.options.light == "encoded"
+    samples = list(_samples(window, exposed, combine, moves, mix))
+    if not samples:
+        return averaged(mix)
+    found, counted = _median(samples, mix) if combine.mode == "median" else _extreme(combine, samples, mix, encoded)
     unit = np.float32(window.unit)
     found /= unit
     return found if exposed.present.all() else np.where(counted > 1e-6, found, averaged(mix))
@@ -104,14 +107,14 @@ def _parts(exposed: Exposed, combine: Combine, moves: Moves | None, mix: Mix) ->
     yield {frame: weight * highest for frame, weight in weights}, mix.c
 
 
-def _extreme(combine: Combine, samples: Iterator[_Sample], mix: Mix) -> tuple[np.ndarray, np.ndarray]:
+def _extreme(combine: Combine, samples: list[_Sample], mix: Mix, encoded: bool) -> tuple[np.ndarray, np.ndarray]:
     """The lightest or the darkest (3 or 4, h, w), and how much (h, w) of all frames counts."""
     best: Any = -np.inf
     alpha: Any = np.float32(0)
     most: Any = np.float32(0)
     is_opaque = True
     for light_, weight, shown in samples:
-        passed = weight if combine.threshold is None else weight * _passes(combine, light_)
+        passed = weight if combine.threshold is None else weight * _passes(combine, light_, encoded)
         for seen, counted in [(light_, passed)] + ([] if shown is None else [(shown, np.float32(1))]):
             is_opaque = len(seen) == 3
             cover = np.float32(1) if is_opaque else seen[3]
@@ -137,18 +140,19 @@ def _luminance(planes: np.ndarray) -> np.ndarray:
     return np.where(np.isinf(planes[0]), -np.inf, found)
 
 
-def _passes(combine: Combine, planes: np.ndarray) -> np.ndarray:
+def _passes(combine: Combine, planes: np.ndarray, encoded: bool) -> np.ndarray:
     """As combined.passes."""
     cover = planes[3] if len(planes) == 4 else np.float32(1)
     color = planes[:3] / np.where(cover > 0, cover, 1)
+    if encoded:
+        color = light.to_linear(color)
     return combined.passes(combine, np.tensordot(light.REC709, color, axes=1))
 
 
-def _median(samples: Iterator[_Sample], mix: Mix) -> tuple[np.ndarray, np.ndarray]:
+def _median(samples: list[_Sample], mix: Mix) -> tuple[np.ndarray, np.ndarray]:
     """The median (3 or 4, h, w), and how much (h, w) of all frames counts."""
-    all_ = list(samples)
-    lights = np.stack([sample.light for sample in all_])
-    weights = np.stack([np.broadcast_to(np.float32(sample.weight), mix.tile.shape) for sample in all_])
+    lights = np.stack([sample.light for sample in samples])
+    weights = np.stack([np.broadcast_to(np.float32(sample.weight), mix.tile.shape) for sample in samples])
     counted = weights.sum(axis=0)
     if lights.shape[1] == 3:
         return np.stack([combined.weighted_median(lights[:, k], weights) for k in range(3)]), counted

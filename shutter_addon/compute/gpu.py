@@ -13,6 +13,7 @@ from ..core.model.combining import AVERAGE, Combine
 from ..core.model.frame_state import Options
 from ..core.pixels import compositor
 from ..devices.device import Device, NoDeviceError, Texture
+from ..devices.llvmpipe import MOST_ITERATIONS
 from ..devices.passes import Pass
 from . import cpu
 from .composition_passes import (
@@ -26,6 +27,7 @@ from .composition_passes import (
     composition_of_sums,
     filled_rows,
     lines_of,
+    median_iterations,
     moved_way,
     selection,
     way_of,
@@ -279,6 +281,9 @@ class GPUCompositor:
         origin, (low, high) = compositor.origin(options, index, direction), compositor.reach(state, index, direction)
         shortened = options.edges == "shorten" and (low < window.shot.start or high >= window.shot.stop)
         way = way_of(window, options, values, (first, last), shortened, combine)
+        is_search = combine.mode == "median" and way == "search"
+        if is_search and median_iterations(len(values) - 1, last - first, window.kind) > MOST_ITERATIONS:
+            return self._draw_on_host(window, request, coefficients)
         if way == "sums":
             program, given = _from_sums(window, request, values, origin)
         else:
@@ -334,7 +339,7 @@ class GPUCompositor:
 
     def _draw_on_host(self, window: Any, request: Request, coefficients: Coefficients) -> Texture:
         """As `draw`, by NumPy: of medians whose frames are seen elsewhere, which passes over some of them at a time
-        cannot find."""
+        cannot find; and of those that take more iterations than a device has."""
         host, source, options = cpu.CPUCompositor(), window.source, request.state.options
         frames = host.window(source, options.window, True)
         within = compositor.window_positions(options, request.index, request.direction)

@@ -23,6 +23,18 @@ class Needs(NamedTuple):
     sends: bool
 
 
+class Kind(NamedTuple):
+    """What a picture asks of its windows: how many frames they have, whether exposures follow something, the number of
+    shutters, that of layers, of which each has a window, as has what lies behind them, and whether all of it is
+    averages."""
+
+    window: int
+    moved: bool
+    shutters: int
+    layers: int = 0
+    summed: bool = True
+
+
 class _CountedTexture:
     def __init__(self, budget: Budget, size: int):
         self._budget, self._size = budget, size
@@ -51,18 +63,14 @@ class _CountingDevice:
     forget = use
 
 
-def of_window(device: Device, source: FrameSource, capacity: int, moved: bool, shutters: int, layers: int = 0) -> Needs:
-    """What a window on a GPU needs, with all that is made beside it; arguments like those of open_window. layers: those
-    of the picture, of which each has a window, as has what lies behind them.
-
-    NoDeviceError: not even a picture has room on the device."""
-    counting = _CountingDevice(device)
-    windows = [
-        open_any(counting, frames, capacity, moved, shutters)  # type: ignore[arg-type]  # it makes textures alone
-        for frames in _read(source, layers)
-    ]
-    gpu = min(counting.budget.used + beside(source, shutters), counting.budget.limit)
-    host = sum(capacity * frame_bytes(window.source) for window in windows if window.sends)
+def of_window(device: Device, source: FrameSource, kind: Kind) -> Needs:
+    """What windows on a GPU need, with all that is made beside them. NoDeviceError: not even a picture has room on the
+    device."""
+    counting: Any = _CountingDevice(device)
+    asked = kind.window, kind.moved, kind.shutters, kind.summed
+    windows = [open_any(counting, frames, *asked) for frames in _read(source, kind.layers)]
+    gpu = min(counting.budget.used + beside(source, kind.shutters), counting.budget.limit)
+    host = sum(kind.window * frame_bytes(window.source) for window in windows if window.sends)
     return Needs(gpu, host, any(window.sends for window in windows))
 
 
@@ -82,14 +90,14 @@ def _no_weight(_frame: int) -> Any:
     raise NotImplementedError("nothing is read")
 
 
-def of_numpy_window(source: FrameSource, capacity: int, moved: bool, layers: int = 0) -> Needs:
-    """What a window needs with NumPy; layers: as for of_window."""
-    if layers:
-        frames = {id(read): read for read in (source, *_read(source, layers))}
-        return Needs(0, sum(capacity * frame_bytes(read) for read in frames.values()), False)
-    if cpu_window.TiledSums.fit(source, capacity) and not moved:
-        return Needs(0, 12 * source.width * source.height * (capacity + 1), False)
-    return Needs(0, capacity * frame_bytes(source), False)
+def of_numpy_window(source: FrameSource, kind: Kind) -> Needs:
+    """What windows need with NumPy."""
+    if kind.layers:
+        frames = {id(read): read for read in (source, *_read(source, kind.layers))}
+        return Needs(0, sum(kind.window * frame_bytes(read) for read in frames.values()), False)
+    if cpu_window.TiledSums.fit(source, kind.window) and kind.summed and not kind.moved:
+        return Needs(0, 12 * source.width * source.height * (kind.window + 1), False)
+    return Needs(0, kind.window * frame_bytes(source), False)
 
 
 def frame_bytes(source: FrameSource) -> int:

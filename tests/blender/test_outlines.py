@@ -339,7 +339,7 @@ def test_a_mask_of_a_strip_that_runs_backward(bpy, edited):
 
     said = region(1, 4, shown=lambda frame: COUNT - 2 - frame, between="straight")
     strip, effect = edited(said, change=change)
-    mask = outline_masks.to_mask(bpy.context, strip.id_data, effect, strip, 0, 0)
+    mask = outline_masks.to_mask(bpy.context, (strip.id_data, effect, strip), 0, 0)
     assert mask_reading.key_frames(mask)[-2:] == [COUNT - 5, COUNT - 2]
     outline_masks.from_mask(strip.id_data, effect, strip, effect.shutters["S1"], mask)
     assert drawn_at(effect, 1) == [3, 6, COUNT], "at the last it is not there yet"

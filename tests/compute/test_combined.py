@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from test_composition import SHAPES, check, footage, state
+from test_composition import SHAPES, check, composed, footage, state
 
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import open_compositor
@@ -70,6 +70,33 @@ def test_ways_are_mixed(device, interpolation, direction):
 def test_ends_of_the_clip(device, edges, mode, index):
     rng = np.random.default_rng(5)
     check(device, footage(rng), combining(rng, AVERAGE, MODES[mode], edges=edges, position="center"), index)
+
+
+@pytest.mark.parametrize("mode", FEW)
+@pytest.mark.parametrize("kind", [{}, {"alpha": "straight"}], ids=["opaque", "straight"])
+def test_all_that_is_exposed_is_left_out(device, mode, kind):
+    """Open ahead of the shown frame alone, at the clip's last one: the nearest frame is seen."""
+    rng = np.random.default_rng(6)
+    moment = combining(rng, MODES[mode], shapes=(), edges="shorten")
+    moment.bars[:, :3] = 0
+    check(device, footage(rng, **kind), moment, 19)
+
+
+def test_a_long_median_of_any_light(device):
+    """More iterations than a software renderer has."""
+    rng = np.random.default_rng(8)
+    source = footage(rng, count=230, size=(9, 7), dtype=np.float32, transfer="linear")
+    check(device, source, combining(rng, *[MEDIAN] * 3, window=220), 1)
+
+
+@pytest.mark.parametrize("mode", ["lightest", "darkest", "by luminance"])
+def test_light_below_black(device, mode):
+    rng = np.random.default_rng(10)
+    source = footage(rng, dtype=np.float32, transfer="linear")
+    source.frames[..., :3] -= 5
+    picture, expected = composed(device, source, combining(rng, MODES[mode], shapes=()), 2)
+    assert expected.min() < -0.03
+    np.testing.assert_allclose(picture, expected, atol=1e-4)
 
 
 @pytest.mark.parametrize("mode", FEW)
@@ -171,7 +198,7 @@ def test_by_luminance_colours_stay_together():
 def test_a_median_is_continuous():
     """Between the samples beside the middle, as their weights change by a little."""
     values = np.array([0.0, 1.0])
-    shares = np.linspace(0.4, 0.6, 4001)
+    shares = np.linspace(0.49, 0.51, 4001)
     found = combined.weighted_median(np.broadcast_to(values[:, None], (2, 4001)), np.stack([shares, 1 - shares]))
     assert found[0] == 1
     assert found[-1] == 0

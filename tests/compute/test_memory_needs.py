@@ -34,14 +34,16 @@ def device():
     device.release()
 
 
-@pytest.mark.parametrize("moved", [False, True])
+@pytest.mark.parametrize(("moved", "summed"), [(False, True), (False, False), (True, True)])
 @pytest.mark.parametrize(("dtype", "alpha"), [(np.uint8, "opaque"), (np.uint16, "straight"), (np.float32, "opaque")])
-def test_on_a_gpu(device, dtype, alpha, moved):
+def test_on_a_gpu(device, dtype, alpha, moved, summed):
+    """Of averages, and of frames that are combined otherwise."""
     with device.current():
-        window = open_window(device, source(dtype, alpha), WINDOW, moved, SHUTTERS)
+        window = open_window(device, source(dtype, alpha), WINDOW, moved, SHUTTERS, summed)
         taken = device.budget.used
         window.release()
-    needs = memory_needs.of_window(device, source(dtype, alpha), WINDOW, moved, SHUTTERS)
+    kind = memory_needs.Kind(WINDOW, moved, SHUTTERS, summed=summed)
+    needs = memory_needs.of_window(device, source(dtype, alpha), kind)
     assert needs == (taken + beside(source(dtype, alpha), SHUTTERS), 0, False)
 
 
@@ -58,13 +60,13 @@ def test_of_layers_on_a_gpu(dtype, alpha):
         taken = roomy.budget.used
         for window in windows:
             window.release()
-    needs = memory_needs.of_window(roomy, pictures, WINDOW, False, SHUTTERS, 2)
+    needs = memory_needs.of_window(roomy, pictures, memory_needs.Kind(WINDOW, False, SHUTTERS, 2))
     roomy.release()
     assert needs == (taken + beside(pictures, SHUTTERS), 0, False)
 
 
 def test_without_room_the_frames_stay_on_the_host(device):
-    needs = memory_needs.of_window(device, source(np.float32, "opaque"), 250, False, SHUTTERS)
+    needs = memory_needs.of_window(device, source(np.float32, "opaque"), memory_needs.Kind(250, False, SHUTTERS))
     assert needs.sends
     assert needs.host == 250 * 70 * 50 * 16
     assert needs.gpu <= device.budget.limit
@@ -83,4 +85,4 @@ def test_with_numpy(dtype, alpha, curve):
     finally:
         tracemalloc.stop()
     taken = sum(trace.size for trace in arrays.traces) - 4 * curve
-    assert memory_needs.of_numpy_window(pictures, WINDOW, moved=False) == (0, taken, False)
+    assert memory_needs.of_numpy_window(pictures, memory_needs.Kind(WINDOW, False, SHUTTERS)) == (0, taken, False)

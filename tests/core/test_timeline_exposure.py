@@ -62,6 +62,15 @@ def test_along_a_ramp_it_is_as_long_as_the_way_goes():
     assert bars.sum() == pytest.approx(8)
 
 
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+def test_a_freeze_is_the_shown_frame(position):
+    """Of in-between frames as well, forward and backward."""
+    for direction, place in ((1, 0), (-1, 3)):
+        options = Options(8, position=position, step=4)
+        bars, length = exposed(OPEN, 0, direction, position=position, step=4)
+        assert (np.flatnonzero(bars).tolist(), length) == ([options.before + place], 0)
+
+
 def test_where_it_turns_around_it_goes_there_and_back():
     bars, length = exposed(OPEN, before=104.0, after=104.0, position="center")
     assert length == pytest.approx(2)

@@ -63,7 +63,7 @@ def _as_layer(effect, index: int) -> int:
         region_edits.assign_region(effect, index, shutter)
         place = len(effect.shutters) - 1
     for shutter in (effect.shutters[0], effect.shutters[place]):
-        shutter.follow = "NOTHING"
+        shutter.follow, shutter.length = "NOTHING", "FRAMES"
     effect.regions[index].is_layer = True
     effect.position = "CENTER"
     effect.active_shutter = place

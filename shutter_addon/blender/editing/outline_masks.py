@@ -15,12 +15,14 @@ from ..data import annotations, fcurves, mask_reading, snapshot, strips
 from . import outline_drawings, region_edits
 
 
-def to_mask(context, scene, effect, strip, index: int, step: int):
+def to_mask(context, of, index: int, step: int):
     """A new mask of an outline, whose frames are the source's, from its start on; each curve that comes and goes has a
     layer, and what two of them enclose lies outside.
 
+    of: scene, effect and strip
     step: how many frames from one shape key to the next, between the drawings of what is carried; 0: drawings alone
     EffectError, MediaError: nothing is drawn, nothing can be carried, or there is no window to write shape keys in."""
+    scene, effect, strip = of
     keys = _keys(scene, effect, strip, index, step)
     if not any(curves for _frame, curves in keys):
         raise EffectError(rpt_("Nothing is drawn in the outline"))
@@ -28,10 +30,14 @@ def to_mask(context, scene, effect, strip, index: int, step: int):
     mask = bpy.data.masks.new(effect.regions[index].name)
     mask.frame_start, mask.frame_end = 1, max(_length(scene, effect, strip), keys[-1][0] + 1)
     chains = outline_chains.chains(keys, size[0] / size[1])
-    with _mask_editor(context, mask):
-        for number, chain in enumerate(chains, 1):
-            _add_layer(mask, f"{mask.name} {number}", chain, size)
-        _insert_keys(context, mask, chains, size)
+    try:
+        with _mask_editor(context, mask):
+            for number, chain in enumerate(chains, 1):
+                _add_layer(mask, f"{mask.name} {number}", chain, size)
+            _insert_keys(context, mask, chains, size)
+    except (EffectError, RuntimeError):
+        bpy.data.masks.remove(mask)
+        raise
     return mask
 
 

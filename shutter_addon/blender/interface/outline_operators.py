@@ -55,6 +55,7 @@ class _Carries(Mixin):
 
     def _begin(self, context, waits: bool):
         scene, effect, strip = selection.active(context)
+        self._target = track_region.Target.of(effect, effect.active_region)
         if not strips.is_carried(selection.active_region(effect)):
             return self.carried(context)
         file, shown = outline_drawings.carried_frames(scene, effect, strip, effect.active_region)
@@ -65,7 +66,7 @@ class _Carries(Mixin):
                     mattes.read(number)
         if waits or not frames:
             return self.carried(context)
-        self._file, self._target = file, track_region.Target.of(effect, effect.active_region)
+        self._file = file
         outline_carrying.carry(file, frames, show_carried)
         self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
         context.window_manager.modal_handler_add(self)
@@ -110,7 +111,7 @@ class SHUTTER_OT_outline_needed(_Carries, OfOutline, Operator):
 
     def carried(self, context):
         scene, effect, strip = selection.active(context)
-        needed = outline_drawings.next_needed(scene, effect, strip, effect.active_region)
+        needed = outline_drawings.next_needed(scene, effect, strip, self._target.index)
         if needed.frame is None:
             self.report({"INFO"}, rpt_("The outline is sure by 75 % or more at all frames between its drawings"))
             return {"CANCELLED"}
@@ -138,7 +139,7 @@ class SHUTTER_OT_outline_mask(_Carries, OfOutline, Operator):
 
     def carried(self, context):
         scene, effect, strip = selection.active(context)
-        mask = outline_masks.to_mask(context, scene, effect, strip, effect.active_region, self.step)
+        mask = outline_masks.to_mask(context, (scene, effect, strip), self._target.index, self.step)
         self.report({"INFO"}, rpt_('Made the mask "{mask}"').format(mask=mask.name))
         return {"FINISHED"}
 

@@ -28,7 +28,7 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
 
     def invoke(self, context, _event):
         scene, effect, strip = selection.active(context)
-        areas = [area for _window, area in preview_areas.previews(context)]
+        areas = [area for window, area in preview_areas.previews(context) if window == context.window]
         if not areas:
             self.report({"WARNING"}, "Open a sequencer with a preview to draw")
             return {"CANCELLED"}
@@ -55,7 +55,9 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
         return {"CANCELLED"}
 
     def modal(self, context, event):
-        if (there := self._there()) is None or there[0].frame_current != self._frame:
+        there, has_preview = self._there(), self._area.type == "SEQUENCE_EDITOR"
+        has_preview = has_preview and self._area.spaces.active.view_type != "SEQUENCER"
+        if there is None or there[0].frame_current != self._frame or not has_preview:
             return self._ended(context, {"CANCELLED"})
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
             self._is_down = False
@@ -96,7 +98,9 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
             return {"RUNNING_MODAL"}
         _scene, effect, strip = self._there()
         region = effect.regions[self._target.index]
-        curve = np.concatenate([*self._ways, self._way(self._ways[0][0], False)])
+        # The first click is at no edge; the way from it begins at the one beside it.
+        first = self._ways[1][0]
+        curve = np.concatenate([*self._ways[1:], self._way(first, False)])
         steps = np.hypot(*np.diff(curve, axis=0, append=curve[:1]).T)
         try:
             outline_drawings.add(effect, strip, region, curve[steps > 0], self._frame)

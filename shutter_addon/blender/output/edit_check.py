@@ -239,20 +239,20 @@ def _notes(check: EffectCheck, requests: dict[float, Request]) -> list[str]:
 def _needs(source, requests: dict[float, Request], compositor) -> memory_needs.Needs:
     """The most that one of the windows needs, decoded frames included."""
     device, most = getattr(compositor, "device", None), memory_needs.Needs(0, 0, False)
-    for window, moved, shutters, layers in {_kind(request.state) for request in requests.values()}:
+    for kind in {_kind(request.state) for request in requests.values()}:
         if device is None:
-            needs = memory_needs.of_numpy_window(source, window, moved, layers)
+            needs = memory_needs.of_numpy_window(source, kind)
         else:
-            needs = memory_needs.of_window(device, source, window, moved, shutters, layers)
+            needs = memory_needs.of_window(device, source, kind)
         most = max(most, needs)
     window = max(request.state.options.window for request in requests.values())
     return most._replace(host=most.host + decoding_ahead.decoded_bytes(source, window))
 
 
-def _kind(state: FrameState) -> tuple[int, bool, int, int]:
-    """Frames of a window, whether exposures of it follow something, and the numbers of shutters and of layers."""
+def _kind(state: FrameState) -> memory_needs.Kind:
     layers = len(state.layers.shutters) if state.layers else 0
-    return state.options.window, state.following is not None, len(state.bars), layers
+    moved, count = state.following is not None, len(state.bars)
+    return memory_needs.Kind(state.options.window, moved, count, layers, state.averages)
 
 
 def left_out(scene, frames: range) -> list[str]:

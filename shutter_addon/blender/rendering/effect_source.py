@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -84,6 +85,13 @@ def source_position(snapshot: Snapshot, frame: float, source: ShotSource) -> flo
         return (snapshot.effect.time.at(frame)[0] - 1) * source.step
     assert snapshot.timing is not None  # of a strip without source time
     return retiming.source_position(snapshot.timing, frame, source)
+
+
+def source_ends(snapshot: Snapshot, source: ShotSource) -> tuple[float, float]:
+    """The first and the last position beyond which an effect's source stays; infinite: it goes on."""
+    if snapshot.timing is None:
+        return -math.inf, math.inf
+    return retiming.content_ends(snapshot.timing, source)
 
 
 def source_index(snapshot: Snapshot, frame: float, source: ShotSource) -> tuple[int, bool]:

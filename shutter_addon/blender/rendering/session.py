@@ -24,7 +24,7 @@ from ..data.snapshot import Snapshot
 from ..devices import available
 from . import render_settings
 from .device_work import Work, broken_off, result_of
-from .effect_source import FAULTS, FULL, Detail, SourceKey, source_index, source_position
+from .effect_source import FAULTS, FULL, Detail, SourceKey, source_ends, source_index, source_position
 
 if TYPE_CHECKING:
     from .render_context import RenderContext
@@ -109,7 +109,8 @@ class RenderSession:
             def position(other: float) -> float:
                 return source_position(snapshot, other, source)
 
-            state = timeline_exposure.exposed(snapshot.effect, state, frame, direction, position, source.count)
+            ends = source_ends(snapshot, source)
+            state = timeline_exposure.exposed(snapshot.effect, state, shown, position, ends)
             state = following.followed(snapshot.effect, state, shown, source, shown_at)
             state = layering.layered(snapshot.effect, state, shown, source, shown_at)
         request = Request(index=index, state=state, direction=direction, source=key, levels=context.levels)

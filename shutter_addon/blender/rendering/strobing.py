@@ -129,6 +129,8 @@ def _ways(renderer: Renderer, request: Request) -> dict[int, list[tuple[Similari
     shot = renderer.shot(request, known=True)
     frames = compositor.window_indices(options, request.index, shot, request.direction)
     for i in _seen(state):
+        if state.combines and state.combines[i].mode == "median":  # which leaves no streaks
+            continue
         is_open = state.bars[i] > 0
         both = is_open[1:] & is_open[:-1] & (frames[1:] != frames[:-1]) & (frames[1:] >= 0) & (frames[:-1] >= 0)
         for pair in set((np.minimum(frames[1:], frames[:-1])[both] // count).tolist()):
@@ -185,7 +187,8 @@ def pairs(snapshot: Snapshot, medium: FrameSource, settings: inbetween_settings.
     factor = settings.factor
     needed: set[int] = set()
     source = ShotSource(inbetween.InbetweenSource(medium, *settings), factor)
-    has_trails = any(shutter.trail for shutter in snapshot.effect.shutters)
+    moved = (shutter.trail or shutter.timeline or shutter.threshold for shutter in snapshot.effect.shutters)
+    has_trails = any(moved)
     for frame in snapshot.frames:
         with translated(rpt_):
             state = snapshot.effect.at(frame)

@@ -98,6 +98,13 @@ def source_position(strip: StripTiming, frame: float, medium: Medium) -> float:
     return (strip.content_trim_start + strip.first + position) * medium.step
 
 
+def content_ends(strip: StripTiming, medium: Medium) -> tuple[float, float]:
+    """The first and the last of what source_position gives."""
+    first = strip.content_trim_start + strip.first
+    length = max(1, medium.filmed - strip.content_trim_start - strip.content_trim_end)
+    return float(first * medium.step), float((first + length - 1) * medium.step)
+
+
 def nearest(filmed: float, step: int, count: int) -> int:
     """The frame that is nearest to a time, which counts filmed frames from 0 on, of a medium that has so many frames,
     every step-th of which was filmed."""

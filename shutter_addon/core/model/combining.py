@@ -14,8 +14,8 @@ class Combine:
 
     Of the lightest and the darkest:
     by_luminance: whether a pixel's light is that of one frame; else each channel goes by itself
-    threshold: luminance, of the light that is summed (Options.light), below which, or of the darkest above which, a
-    frame leaves no trail beside what is shown; None: all leaves one
+    threshold: luminance of linear light below which, or of the darkest above which, a frame leaves no trail beside
+    what is shown; None: all leaves one
     softness: over how much luminance, around the threshold, that fades in"""
 
     mode: Mode = "average"

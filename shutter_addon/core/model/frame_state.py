@@ -151,8 +151,8 @@ class FrameState:
     mattes: laid over what the scribbles give, the later over the earlier
     layers: regions before what all these make; None: there are none
     combines: of each shutter, how what it exposes becomes one picture; none: all average
-    open_for: by shutter whose trail has a length, the frames from its first open time to its last: for who is told of
-    it, as its bars say what is exposed
+    open_for: by shutter whose trail has a length, or whose length is the timeline's, the frames from its first open
+    time to its last: for who is told of it, as its bars say what is exposed
     """
 
     options: Options
@@ -222,12 +222,14 @@ class FrameState:
 
     def alone(self, chosen: int) -> FrameState:
         """The state of a picture in which one shutter, `chosen`, is everywhere."""
-        options = replace(self.options, edge_aware=0.0)  # there is nothing to diffuse
-        return replace(self.of([chosen]), options=options, shapes=(), mattes=(), layers=None, open_for={})
+        return self.of([chosen])
 
     def of(self, chosen: Sequence[int]) -> FrameState:
-        """The state with some of its shutters alone."""
-        following = self.following and self.following.of(chosen)
-        combines = tuple(self.combines[index] for index in chosen) if self.combines else ()
-        reference = self.reference or float(self.bars[0].sum())
-        return replace(self, bars=self.bars[list(chosen)], reference=reference, following=following, combines=combines)
+        """What composes a picture of some of its shutters alone; nothing is left to diffuse."""
+        return FrameState(
+            options=replace(self.options, edge_aware=0.0),
+            bars=self.bars[list(chosen)],
+            reference=self.reference or float(self.bars[0].sum()),
+            following=self.following and self.following.of(chosen),
+            combines=tuple(self.combines[index] for index in chosen) if self.combines else (),
+        )

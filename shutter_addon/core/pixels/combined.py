@@ -24,7 +24,7 @@ from ..model.combining import Combine
 
 # Around the middle of a median's weights: within so much of it, both neighbours count, as of an even number of frames.
 # Rounding must not choose between them, for devices round differently.
-MIDDLE = 1 / 1024
+MIDDLE = 1 / 8192
 
 
 class Sample(NamedTuple):
@@ -52,17 +52,18 @@ def counts(combine: Combine, bars: ArrayLike, coefficients: ArrayLike, interpola
     return between(normalised, coefficients) * highest[..., None]
 
 
-def of_samples(combine: Combine, samples: Sequence[Sample]) -> np.ndarray:
-    """The picture (H, W, 4), premultiplied, of frames that are there; where none counts, black."""
-    return median(samples) if combine.mode == "median" else extreme(combine, samples)
+def of_samples(combine: Combine, samples: Sequence[Sample], *, encoded: bool = False) -> np.ndarray:
+    """The picture (H, W, 4), premultiplied, of frames that are there, one at least; where none counts, black. encoded:
+    whether their light is (Options.light)"""
+    return median(samples) if combine.mode == "median" else extreme(combine, samples, encoded=encoded)
 
 
-def extreme(combine: Combine, samples: Sequence[Sample]) -> np.ndarray:
+def extreme(combine: Combine, samples: Sequence[Sample], *, encoded: bool = False) -> np.ndarray:
     """The lightest or the darkest (H, W, 4). Frames with a weight of 0 do not count."""
     best = np.full((*samples[0].weight.shape, 3), -np.inf)
     alpha, most = np.zeros(best.shape[:2]), np.zeros(best.shape[:2])
     for sample in samples:
-        for light_, weight in _counted(combine, sample):
+        for light_, weight in _counted(combine, sample, encoded):
             value = light_[..., :3]
             if combine.mode == "darkest":
                 value = light_[..., 3:] - value
@@ -78,11 +79,12 @@ def extreme(combine: Combine, samples: Sequence[Sample]) -> np.ndarray:
     return np.concatenate([alpha - best if combine.mode == "darkest" else best, alpha], axis=-1)
 
 
-def _counted(combine: Combine, sample: Sample) -> list[tuple[np.ndarray, np.ndarray]]:
+def _counted(combine: Combine, sample: Sample, encoded: bool) -> list[tuple[np.ndarray, np.ndarray]]:
     """What of a frame counts, and how much: with a threshold the shown one does whatever its weight is."""
     if combine.threshold is None:
         return [(sample.light, sample.weight)]
-    luminance = light.straight(sample.light)[..., :3] @ light.REC709.astype(np.float64)
+    color = light.straight(sample.light)[..., :3]
+    luminance = (light.to_linear(color) if encoded else color) @ light.REC709.astype(np.float64)
     counted = [(sample.light, sample.weight * passes(combine, luminance))]
     if sample.shown is not None:
         counted.append((sample.shown, np.ones(sample.weight.shape)))
@@ -94,7 +96,7 @@ def _luminance(value: np.ndarray) -> np.ndarray:
 
 
 def passes(combine: Combine, luminance: np.ndarray) -> np.ndarray:
-    """How much of light of a luminance (…) leaves a trail, 0 to 1."""
+    """How much of light of a linear luminance (…) leaves a trail, 0 to 1."""
     half = max(combine.softness, 1e-6) / 2
     t = np.clip((luminance - ((combine.threshold or 0.0) - half)) / (2 * half), 0, 1)
     t = t * t * (3 - 2 * t)

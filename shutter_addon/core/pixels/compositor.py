@@ -62,8 +62,15 @@ def window_indices(options: Options, index: int, shot: range, direction: int = 1
 
 
 def mixed_shutter(state: FrameState, coefficients: ArrayLike) -> np.ndarray:
-    """The bars (…, L) of the shutter that pixels with coefficients (…, N) are exposed with, Σ coefficients = 1."""
-    return shutters.INTERPOLATIONS[state.options.interpolation](state.bars, coefficients)
+    """The bars (…, L) of the shutter that pixels with coefficients (…, N) are exposed with, Σ coefficients = 1; of
+    shutters that combine in several ways, of all of these."""
+    mixed, c = shutters.INTERPOLATIONS[state.options.interpolation], np.asarray(coefficients, dtype=np.float64)
+    total = np.zeros((*c.shape[:-1], state.bars.shape[1]))
+    for chosen in map(list, state.groups.values()):
+        share = c[..., chosen].sum(axis=-1, keepdims=True)
+        own = np.where(share > 0, c[..., chosen] / np.where(share > 0, share, 1), 1 / len(chosen))
+        total = total + share * mixed(state.bars[chosen], own)
+    return total
 
 
 def compose(
@@ -123,7 +130,9 @@ def _composed(
         gain = np.einsum("n,nhw->hw", state.gains, coefficients)[..., None]
         return (_decode(total) if encoded else total) * np.concatenate([gain, gain, gain, np.ones_like(gain)], axis=-1)
     samples = _samples(combine, state, coefficients, present, moves, look)
-    found = combined.of_samples(combine, samples)
+    if not samples:
+        return _decode(total) if encoded else total
+    found = combined.of_samples(combine, samples, encoded=encoded)
     # Where no frame is there that counts, it is the nearest, as of an average.
     found = np.where((_counted(combine, samples) > 1e-6)[..., None], found, total)
     return _decode(found) if encoded else found

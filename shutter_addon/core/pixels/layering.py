@@ -159,6 +159,7 @@ def compose(
     mattes: (n, L, H, W) of the layers in the window's frames; plate: (H, W, 4), None: nothing lacks"""
     if state.layers is None:
         raise ValueError("there are no layers")
+    opaque = all((frame[..., 3] == 1).all() for frame in frames)
     clear = np.stack([behind(list(of_frame)) for of_frame in np.swapaxes(mattes, 0, 1)])
 
     def exposed(
@@ -168,6 +169,8 @@ def compose(
         shares = [np.stack([weight] * 4, axis=-1) for weight in weights]
         plain = replace(part, options=replace(part.options, light="linear", exposure="normalized"))
         color = compositor.compose(part, colors, present, c, moved)
+        if opaque:  # what it covers is as much as its weights are
+            return color, color[..., 3]
         return color, compositor.compose(plain, shares, present, c, moved)[..., 3]
 
     behind_them = replace(state, layers=None)

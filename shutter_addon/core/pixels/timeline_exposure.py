@@ -14,6 +14,7 @@ import numpy as np
 
 from ..model.effect import Effect
 from ..model.frame_state import FrameState, Options
+from .following import Shown
 
 # In frames: what is open for less is open in one.
 _SHORTEST = 1e-6
@@ -22,25 +23,28 @@ _LEAST = 1e-9
 
 
 def exposed(
-    effect: Effect, state: FrameState, frame: float, direction: int, position: Callable[[float], float], count: int
+    effect: Effect,
+    state: FrameState,
+    at: Shown,
+    position: Callable[[float], float],
+    ends: tuple[float, float],
 ) -> FrameState:
     """The effect's state at a timeline frame, with the bars of those shutters whose length is the timeline's, and for
     how many frames they are open (FrameState.open_for).
 
-    direction: as for compositor.window_positions; count: of the source's frames
-    position: where in the source, in frames, a timeline frame is; asked for the frame and those beside it"""
+    position: where in the source, in frames, a timeline frame is; asked for the frame and those beside it
+    ends: the first and the last position that its strip shows"""
     chosen = [i for i, shutter in enumerate(effect.shutters) if shutter.timeline]
     if not chosen:
         return state
-    before, here, after = (position(frame + k) for k in (-1, 0, 1))
-    if not 0 < here < count - 1:  # the clip's end, where a strip goes on with its last frame
-        before, after = (
-            (2 * here - after if before == here else before),
-            (2 * here - before if after == here else after),
-        )
+    before, here, after = (position(at.frame + k) for k in (-1, 0, 1))
+    if before == here in ends:  # there a strip goes on with the same frame: it is no freeze
+        before = 2 * here - after
+    elif after == here in ends:
+        after = 2 * here - before
     bars, open_for = state.bars.copy(), dict(state.open_for)
     for index in chosen:
-        bars[index], open_for[index] = on_timeline(bars[index], state.options, direction, (before, here, after))
+        bars[index], open_for[index] = on_timeline(bars[index], state.options, at.direction, (before, here, after))
     return replace(state, bars=bars, open_for=open_for)
 
 
@@ -63,6 +67,9 @@ def on_timeline(
     way = direction * (np.interp(times, (-1, 0, 1), (before, here, after)) - here)
     places = options.before + anchor + way
     found = np.zeros(window)
+    if np.ptp(places) < _SHORTEST:
+        found[options.before + (options.step - 1 if direction < 0 else 0)] = bars.sum()
+        return found, 0.0
     for weight, start, end in zip(bars, places[:-1], places[1:], strict=True):
         found += weight * _spread(min(start, end), max(start, end), window)
     is_open = np.flatnonzero(bars)

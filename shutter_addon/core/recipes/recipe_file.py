@@ -332,6 +332,10 @@ def _check(recipe: Recipe) -> None:
             _require(has_one, f"shutters[{i}].threshold", "the lightest and the darkest alone have a threshold")
             _check_number(shutter.threshold, f"shutters[{i}].threshold", limits.MAX_THRESHOLD)
         _check_number(shutter.softness, f"shutters[{i}].softness", limits.MAX_THRESHOLD)
+        is_soft = isinstance(shutter.softness, list) or shutter.softness != 0
+        _require(shutter.threshold is not None or not is_soft, f"shutters[{i}].softness", "it has no threshold")
+        chooses = shutter.combine in ("lightest", "darkest") or not shutter.by_luminance
+        _require(chooses, f"shutters[{i}].by_luminance", "the lightest and the darkest alone go by it")
     _check_values(recipe.time, "time", limits.MAX_FRAME)
     _check_frames(recipe.camera, "camera")
     for k, key in enumerate(recipe.camera):
