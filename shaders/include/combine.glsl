@@ -117,10 +117,10 @@ void end_scan() {
 vec4 median_of(int pixel) {
   float cover = covered[pixel] / max(share[0][pixel], 1e-30);
   vec3 part = clamp((until[pixel] / max(covered[pixel], 1e-30) - (0.5 - NEAR_MIDDLE)) / (2.0 * NEAR_MIDDLE), 0.0, 1.0);
-  vec3 first = light_of(lower[pixel]);
+  vec3 least = light_of(lower[pixel]);
   vec3 next = light_of(min(upper[pixel], 1e29));
   part = mix(part, vec3(1.0), greaterThan(upper[pixel], vec3(1e29)));
-  vec3 middle = mix(part * first + (1.0 - part) * next, first, equal(part, vec3(1.0)));
+  vec3 middle = mix(part * least + (1.0 - part) * next, least, equal(part, vec3(1.0)));
   return vec4(covered[pixel] > 0.0 ? middle * cover : vec3(0.0), cover);
 }
 #else

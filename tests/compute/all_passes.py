@@ -2,6 +2,7 @@
 
 import importlib.util
 import itertools
+from dataclasses import replace
 
 import pytest
 
@@ -13,6 +14,7 @@ from shutter_addon.compute.composition_passes import (
     composition_of_moved,
     composition_of_sums,
 )
+from shutter_addon.core.model.combining import Combine
 from shutter_addon.devices.passes import Pass
 
 _WAYS = ("frames", "search", "value")
@@ -48,6 +50,25 @@ def _composing():
         )
 
 
+def _combining():
+    for mode, way in (("lightest", "frames"), ("darkest", "search"), ("median", "search"), ("median", "value")):
+        has_threshold = mode == "darkest" and {"by_luminance": True, "threshold": 0.5}
+        combine = Combine.of(mode, **(has_threshold or {}))
+        for edges, kind in ((1, "rgba8"), (2, "rgba16f")):
+            light = LightFormat(1, kind != "rgba8", edges == 2, edges == 1, combine=combine, kind=kind)
+            yield composition(way, 3, "frames", edges, light)
+        if mode != "median":
+            for quads, packed, at in ((4, True, (False, False)), (1, False, (True, False)), (1, False, (False, True))):
+                moved = Moved(quads, 3, 3, packed, True, True, *at)
+                for each in (way, "value"):
+                    own = quads if each != "search" else 1
+                    light = LightFormat(1, False, False, at == (False, False), combine=combine)
+                    yield composition_of_moved(each, replace(moved, quads=own), light)
+    yield composition_passes.selection(2, 9)
+    for begins, levels in ((True, False), (False, False), (False, True)):
+        yield composition_passes.way_sum(begins, levels)
+
+
 def _layers():
     for cover, stored in ((1, "sums"), (2, "tiles")):
         light = LightFormat(0, False, True, cover == 2, cover)
@@ -81,5 +102,5 @@ def _unpacking():
         yield blender_gpu.LETTING_GO
 
 
-PASSES = list(dict.fromkeys((*_declared(), *_composing(), *_layers(), *_filling(), *_unpacking())))
+PASSES = list(dict.fromkeys((*_declared(), *_composing(), *_combining(), *_layers(), *_filling(), *_unpacking())))
 each_pass = pytest.mark.parametrize("program", PASSES, ids=lambda program: f"{program.file}-{program.step}".strip("-"))

@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+from itertools import pairwise
 from pathlib import Path
 
 import av
@@ -186,6 +187,25 @@ def test_an_outline(tmp_path):
         apart = np.abs(final - source.read(69)[..., :3])
     assert apart[215:250, 350:362].mean() <= 3, "her jacket"
     assert apart.max() > 60, "others walk"
+    assert apart_on_screen(pixels(tmp_path / "7_full_quality.png"), final) <= 1
+
+
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_the_street_without_those_who_pass(tmp_path, backend):
+    """Its median, behind a woman who stays sharp, in the preview as in what is rendered."""
+    given = {"footage": shutil.copy(ROOT / "assets" / "walkers.mp4", tmp_path)}
+    given["packages"] = packages(tmp_path / "packages")
+    seen, console = tell("combine_story.py", backend, linked(tmp_path), **given)
+    assert "Traceback" not in console
+    steps = {entry["step"]: crop(tmp_path, entry) for entry in seen if "step" in entry}
+    previews = [steps[name] for name in ("1_average", "2_lightest", "3_darkest", "4_median")]
+    assert all(np.abs(a - b).max() > 50 for a, b in pairwise(previews))
+    final = pixels(tmp_path / "final_0070.png")
+    with open_source(given["footage"]) as source:
+        frames = np.stack([source.read(69 + k)[..., :3] for k in range(-16, 17)])
+    street = np.median(frames, axis=0)[150:500, 480:]
+    assert np.abs(frames[16, 150:500, 480:] - street).mean() > 5, "people walk there"
+    assert np.abs(final[150:500, 480:] - street).mean() <= 1, "of them no more is seen than her stroke reaches"
     assert apart_on_screen(pixels(tmp_path / "7_full_quality.png"), final) <= 1
 
 
