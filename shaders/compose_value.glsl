@@ -39,15 +39,6 @@ void main() {
   if (!start_block()) {
     return;
   }
-#if COMBINE == 3
-  start_median();
-  for (scan = 0; scan <= SCANS; scan++) {
-    start_scan();
-    expose_frames();
-    end_scan();
-  }
-#else
-  expose_frames();
-#endif
+  GO_THROUGH(expose_frames)
   EACH(finish_quad);
 }

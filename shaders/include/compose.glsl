@@ -49,6 +49,13 @@ layout(rgba32f) uniform writeonly image2DArray picture;
 #  define EACH(does) does(0)
 #endif
 
+// Goes through the frames by a function: of a median, once a scan (combine.glsl).
+#if COMBINE == 3
+#  define GO_THROUGH(does) start_median(); for (scan = 0; scan <= SCANS; scan++) { start_scan(); does(); end_scan(); }
+#else
+#  define GO_THROUGH(does) does();
+#endif
+
 ivec2 corner;
 #if TILED
 ivec3 corner_place;  // of the corner's sums

@@ -190,14 +190,12 @@ class CPUCompositor:
         height, width = window.source.height, window.source.width
         whole = np.maximum(handle[: len(state.bars)], 0)
         picture = np.zeros((height, width, 4), np.float32)
-        for chosen in map(list, state.groups.values()):
-            sums = whole[chosen].sum(axis=0)
-            own = np.where(sums > 0, whole[chosen] / np.where(sums > 0, sums, 1), np.float32(1 / len(chosen)))
+        for chosen, sums, own in compositor.ways(state, whole):
             share = sums / whole.sum(axis=0)
             if share.size > 1:
                 share = share.repeat(block, 0).repeat(block, 1)[:height, :width]
             part = replace(request, state=state.of(chosen), levels=False)
-            picture += share[..., None] * self.draw(window, part, Coefficients(own.astype(np.float32), block))
+            picture += share[..., None] * self.draw(window, part, Coefficients(own, block))
         return self.over_black(picture) if request.levels else picture
 
     def release(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,9 +46,10 @@ def _combined(
     mix: Mix,
 ) -> np.ndarray:
     encoded = exposed.options.light == "encoded"
-    samples = list(_samples(window, exposed, combine, moves, mix))
-    if not samples:
+    samples = _samples(window, exposed, combine, moves, mix)
+    if (first := next(samples, None)) is None:
         return averaged(mix)
+    samples = chain([first], samples)
     found, counted = _median(samples, mix) if combine.mode == "median" else _extreme(combine, samples, mix, encoded)
     unit = np.float32(window.unit)
     found /= unit
@@ -107,7 +109,7 @@ def _parts(exposed: Exposed, combine: Combine, moves: Moves | None, mix: Mix) ->
     yield {frame: weight * highest for frame, weight in weights}, mix.c
 
 
-def _extreme(combine: Combine, samples: list[_Sample], mix: Mix, encoded: bool) -> tuple[np.ndarray, np.ndarray]:
+def _extreme(combine: Combine, samples: Iterator[_Sample], mix: Mix, encoded: bool) -> tuple[np.ndarray, np.ndarray]:
     """The lightest or the darkest (3 or 4, h, w), and how much (h, w) of all frames counts."""
     best: Any = -np.inf
     alpha: Any = np.float32(0)
@@ -149,10 +151,11 @@ def _passes(combine: Combine, planes: np.ndarray, encoded: bool) -> np.ndarray:
     return combined.passes(combine, np.tensordot(light.REC709, color, axes=1))
 
 
-def _median(samples: list[_Sample], mix: Mix) -> tuple[np.ndarray, np.ndarray]:
+def _median(samples: Iterator[_Sample], mix: Mix) -> tuple[np.ndarray, np.ndarray]:
     """The median (3 or 4, h, w), and how much (h, w) of all frames counts."""
-    lights = np.stack([sample.light for sample in samples])
-    weights = np.stack([np.broadcast_to(np.float32(sample.weight), mix.tile.shape) for sample in samples])
+    seen, counts = zip(*((light_, weight) for light_, weight, _shown in samples), strict=True)
+    lights = np.stack(seen)
+    weights = np.stack([np.broadcast_to(np.float32(weight), mix.tile.shape) for weight in counts])
     counted = weights.sum(axis=0)
     if lights.shape[1] == 3:
         return np.stack([combined.weighted_median(lights[:, k], weights) for k in range(3)]), counted

@@ -55,11 +55,17 @@ def broken_film(path):
     for n in range(63, 70):
         shots[n] = shots[n].copy()
         shots[n][:, 200:560] = 110
+    return write_film(path, shots, 10)
+
+
+def write_film(path, pictures, crf):
+    """The path of an H.264 film of pictures (H, W, 3) uint8."""
     with av.open(str(path), "w") as film:
-        stream = film.add_stream("libx264", rate=25, options={"crf": "10"})
-        stream.width, stream.height, stream.pix_fmt = 768, 576, "yuv420p"
-        for frame in shots:
-            film.mux(stream.encode(av.VideoFrame.from_ndarray(frame, "rgb24")))
+        stream = film.add_stream("libx264", rate=25, options={"crf": str(crf)})
+        stream.height, stream.width, _ = pictures[0].shape
+        stream.pix_fmt = "yuv420p"
+        for picture in pictures:
+            film.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), "rgb24")))
         film.mux(stream.encode())
     return path
 
@@ -217,13 +223,7 @@ def test_a_film_of_an_outlined_player(tmp_path):
     pictures = [cv2.imread(str(name))[..., ::-1] for name in names]
     masks = [cv2.imread(str(Path(SUBJECTS) / "tennis_mask" / f"{name.stem}.png"), 0) > 0 for name in names]
     (tmp_path / "footage").mkdir()
-    footage = tmp_path / "footage" / "player.mp4"
-    with av.open(str(footage), "w") as film:
-        stream = film.add_stream("libx264", rate=25, options={"crf": "4"})
-        stream.width, stream.height, stream.pix_fmt = 448, 256, "yuv420p"
-        for picture in pictures:
-            film.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), "rgb24")))
-        film.mux(stream.encode())
+    footage = write_film(tmp_path / "footage" / "player.mp4", pictures, 4)
     truth = tmp_path / "truth.json"
     truth.write_text(json.dumps({number: around(mask) for number, mask in enumerate(masks, 1)}))
     given = {"footage": footage, "packages": packages(tmp_path / "packages"), "truth": truth}

@@ -92,6 +92,12 @@ def _aimed(effect, _context):
     consistency.aim_pen(effect)
 
 
+def _number(name: str, description: str, default: float, most: float):
+    """From 0 on, as a rule no more than 1, of what pictures are made by."""
+    words = {"name": name, "description": description}
+    return FloatProperty(**words, default=default, min=0.0, max=most, soft_max=1.0, precision=3, step=1, update=changed)
+
+
 class ShutterBar(PropertyGroup):
     weight: FloatProperty(
         name="Weight",
@@ -136,16 +142,11 @@ class Shutter(PropertyGroup):
         options=UNKEYED,
     )
     length: choice("Length", "What says how long the exposure is", LENGTHS)
-    trail: FloatProperty(
-        name="Trail Length",
-        description="How far what is followed moves while the shutter is open, as a fraction of the picture's height",
-        default=0.1,
-        min=0.0,
-        max=MAX_DISTANCE,
-        soft_max=1.0,
-        precision=3,
-        step=1,
-        update=changed,
+    trail: _number(
+        "Trail Length",
+        "How far what is followed moves while the shutter is open, as a fraction of the picture's height",
+        0.1,
+        MAX_DISTANCE,
     )
 
     combine: choice("Combine", "What the frames that are exposed become", COMBINES)
@@ -161,27 +162,17 @@ class Shutter(PropertyGroup):
         update=changed,
         options=UNKEYED,
     )
-    threshold: FloatProperty(
-        name="Threshold",
-        description="Luminance of linear light from which on it leaves a trail; white is 1",
-        default=0.5,
-        min=0.0,
-        max=MAX_THRESHOLD,
-        soft_max=1.0,
-        precision=3,
-        step=1,
-        update=changed,
+    threshold: _number(
+        "Threshold",
+        "Luminance of linear light from which on it leaves a trail; white is 1",
+        0.5,
+        MAX_THRESHOLD,
     )
-    softness: FloatProperty(
-        name="Softness",
-        description="Range of luminance, around the threshold, over which a trail fades in",
-        default=0.1,
-        min=0.0,
-        max=MAX_THRESHOLD,
-        soft_max=1.0,
-        precision=3,
-        step=1,
-        update=changed,
+    softness: _number(
+        "Softness",
+        "Range of luminance, around the threshold, over which a trail fades in",
+        0.1,
+        MAX_THRESHOLD,
     )
 
 

@@ -204,7 +204,7 @@ def carried_outline(scene, effect, strip, index: int, frames: Frames) -> tuple[A
     if validation.word(region, "between") == "STRAIGHT":
         raise EffectError(rpt_("{place}: a straight outline is not carried").format(place=validation.place(region)))
     sampling = _Sampling.of(Curves(scene), effect, strip, frames)
-    return _outlines(sampling, region, _drawings(sampling, index)).file, source_frames(scene, effect, strip, frames)
+    return _outlines(sampling, region, _drawings(sampling, index)).file, _source_frames(sampling)
 
 
 def drawn_outline(scene, effect, strip, index: int) -> dict[int, outlines.Curves]:
@@ -217,9 +217,7 @@ def drawn_outline(scene, effect, strip, index: int) -> dict[int, outlines.Curves
 def source_frames(scene, effect, strip, frames: Frames) -> dict[float, int]:
     """Which of the source's filmed frames an effect strip shows, by timeline frame. EffectError, MediaError: nobody
     knows."""
-    sampling = _Sampling.of(Curves(scene), effect, strip, frames)
-    shown = matte_content.shown_frame(scene, effect, strip, sampling.time)
-    return {frame: int(shown(frame)) for frame in frames}
+    return _source_frames(_Sampling.of(Curves(scene), effect, strip, frames))
 
 
 def last_shown(scene, effect, strip) -> float:
@@ -449,6 +447,12 @@ def _by_source_frame(sampling: _Sampling, drawings: model.Drawings) -> dict[int,
     placed = replace(drawings, placement=there.placement)
     shown = matte_content.shown_frame(effect.id_data, effect, strip, there.time)
     return {int(shown(frame)): outlines.curves(placed.drawing(i, frame)) for i, frame in enumerate(numbers)}
+
+
+def _source_frames(sampling: _Sampling) -> dict[float, int]:
+    """See source_frames."""
+    shown = matte_content.shown_frame(sampling.effect.id_data, sampling.effect, sampling.strip, sampling.time)
+    return {frame: int(shown(frame)) for frame in sampling.frames}
 
 
 def _drawings(sampling: _Sampling, index: int) -> model.Drawings:

@@ -60,11 +60,11 @@ def from_mask(scene, effect, strip, shutter, mask):
 
 def _keys(scene, effect, strip, index: int, step: int) -> list[tuple[int, outlines.Curves]]:
     """The curves of an outline, at the source's frames that get a shape key, ascending."""
-    drawn = snapshot.drawn_outline(scene, effect, strip, index)
-    if not (strips.is_carried(effect.regions[index]) and step and drawn):
-        return sorted(drawn.items())
-    file, _shown = outline_drawings.carried_frames(scene, effect, strip, index)
-    frames = sorted({*drawn, *range(min(drawn), max(drawn), step)})
+    if not (strips.is_carried(effect.regions[index]) and step):
+        return sorted(snapshot.drawn_outline(scene, effect, strip, index).items())
+    file, _shown = snapshot.carried_outline(scene, effect, strip, index, ())
+    drawn = [frame for frame, _curves in file.drawings]
+    frames = sorted({*drawn, *range(drawn[0], drawn[-1], step)}) if drawn else []
     with closing(file.open()) as mattes:
         return [(frame, mattes.curves(frame)) for frame in frames]
 

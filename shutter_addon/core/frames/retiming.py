@@ -65,8 +65,7 @@ def source_frame(strip: StripTiming, frame: float, medium: Medium) -> int:
     there are frames between filmed ones, it is the nearest of all, which Blender knows nothing of. EffectError: how the
     strip is retimed cannot be known.
     """
-    length = max(1, medium.filmed - strip.content_trim_start - strip.content_trim_end)
-    rate = _playback_rate(strip, length, float(medium.fps or 0) / medium.step / strip.scene_fps)
+    length, rate = _content(strip, medium)
     if strip.is_clip and abs(length / rate - (strip.content_end - strip.content_start)) > 1:
         raise EffectError(
             'strip "{strip}" is not as long as its clip: retimed clips are not supported', strip=strip.name
@@ -92,16 +91,14 @@ def source_frame(strip: StripTiming, frame: float, medium: Medium) -> int:
 def source_position(strip: StripTiming, frame: float, medium: Medium) -> float:
     """Where in the medium a strip is at a timeline frame, in frames, in-between ones counted; source_frame has one of
     those that are beside it. EffectError: how the strip is retimed cannot be known."""
-    length = max(1, medium.filmed - strip.content_trim_start - strip.content_trim_end)
-    rate = _playback_rate(strip, length, float(medium.fps or 0) / medium.step / strip.scene_fps)
+    length, rate = _content(strip, medium)
     position = float(_position(replace(strip, strobe=1.0), rate, length, frame))
     return (strip.content_trim_start + strip.first + position) * medium.step
 
 
 def content_ends(strip: StripTiming, medium: Medium) -> tuple[float, float]:
     """The first and the last of what source_position gives."""
-    first = strip.content_trim_start + strip.first
-    length = max(1, medium.filmed - strip.content_trim_start - strip.content_trim_end)
+    first, (length, _rate) = strip.content_trim_start + strip.first, _content(strip, medium)
     return float(first * medium.step), float((first + length - 1) * medium.step)
 
 
@@ -109,6 +106,12 @@ def nearest(filmed: float, step: int, count: int) -> int:
     """The frame that is nearest to a time, which counts filmed frames from 0 on, of a medium that has so many frames,
     every step-th of which was filmed."""
     return min(max(math.floor(filmed * step + 0.5), 0), count - 1)
+
+
+def _content(strip: StripTiming, medium: Medium) -> tuple[int, float]:
+    """How many filmed frames of the medium a strip has, and how many pass in a timeline frame before it is retimed."""
+    length = max(1, medium.filmed - strip.content_trim_start - strip.content_trim_end)
+    return length, _playback_rate(strip, length, float(medium.fps or 0) / medium.step / strip.scene_fps)
 
 
 def _position(strip: StripTiming, rate: float, length: int, frame: float) -> np.float32:

@@ -173,8 +173,10 @@ class FrameState:
         exposures = self.bars.sum(axis=1)
         if self.options.exposure == "normalized":
             return np.ones_like(exposures)
-        averages = [combine == AVERAGE for combine in self.combines or (AVERAGE,) * len(self.bars)]
-        return np.where(averages, exposures / (self.reference or exposures[0]), 1.0)
+        gains = np.ones_like(exposures)
+        averaging = list(self.groups.get(AVERAGE, ()))
+        gains[averaging] = exposures[averaging] / (self.reference or exposures[0])
+        return gains
 
     @cached_property
     def open_span(self) -> tuple[int, int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,11 +66,18 @@ def mixed_shutter(state: FrameState, coefficients: ArrayLike) -> np.ndarray:
     shutters that combine in several ways, of all of these."""
     mixed, c = shutters.INTERPOLATIONS[state.options.interpolation], np.asarray(coefficients, dtype=np.float64)
     total = np.zeros((*c.shape[:-1], state.bars.shape[1]))
-    for chosen in map(list, state.groups.values()):
-        share = c[..., chosen].sum(axis=-1, keepdims=True)
-        own = np.where(share > 0, c[..., chosen] / np.where(share > 0, share, 1), 1 / len(chosen))
-        total = total + share * mixed(state.bars[chosen], own)
+    for chosen, share, own in ways(state, np.moveaxis(c, -1, 0)):
+        total = total + share[..., None] * mixed(state.bars[chosen], np.moveaxis(own, 0, -1))
     return total
+
+
+def ways(state: FrameState, coefficients: np.ndarray) -> Iterator[tuple[list[int], np.ndarray, np.ndarray]]:
+    """By ways to combine frames, the shutters that do so, how much they have of coefficients (N, …), which are not
+    negative, and their own (n, …), Σ = 1."""
+    for chosen in map(list, state.groups.values()):
+        share = coefficients[chosen].sum(axis=0)
+        equal = coefficients.dtype.type(1 / len(chosen))
+        yield chosen, share, np.where(share > 0, coefficients[chosen] / np.where(share > 0, share, 1), equal)
 
 
 def compose(
@@ -94,9 +101,7 @@ def compose(
     if len(state.groups) == 1:
         return _composed(state, frames, present, coefficients, moves)
     total = np.zeros((*coefficients.shape[1:], 4))
-    for chosen in map(list, state.groups.values()):
-        share = coefficients[chosen].sum(axis=0)
-        own = np.where(share > 0, coefficients[chosen] / np.where(share > 0, share, 1), 1 / len(chosen))
+    for chosen, share, own in ways(state, coefficients):
         moved = None if moves is None else (moves[0][:, chosen], moves[1][:, chosen])
         total += share[..., None] * _composed(state.of(chosen), frames, present, own, moved)
     return total
