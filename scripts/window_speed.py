@@ -10,7 +10,8 @@ process.
 
 Any Blender 5.2 with the extension enabled, started with a window and `--python` this file, will do. Ways:
 plain: the movie strip alone; texture: its picture replaced by a draw handler that draws one texture of its size;
-engine: the effect strip, live preview off; live: the effect strip with its live preview.
+engine: the effect strip, live preview off; live: the effect strip with its live preview; baked: what it was baked to,
+a movie, which is made beside OUT.json.
 """
 
 import argparse
@@ -26,7 +27,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 WINDOW, ROUNDS, SECONDS = 16, 3, 4.0
-WAYS = "plain", "texture", "engine", "live"
+WAYS = "plain", "texture", "engine", "live", "baked"
 
 
 def arguments():
@@ -94,6 +95,17 @@ def add_effect(edit, source):
     return strip, effect
 
 
+def baked_strip(edit, strip):
+    """The effect as a movie, in a strip above it; generator, which returns that."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(Path(OPTIONS.out).with_suffix(".blend")))
+    edit.sequence_editor.active_strip = strip
+    with bpy.context.temp_override(**timeline()):
+        bpy.ops.shutter.bake("INVOKE_DEFAULT", file_format="MOVIE")
+    while not (found := [s for s in edit.sequence_editor.strips if s.type == "MOVIE" and s.name != "Footage"]):
+        yield 0.5
+    return found[0]
+
+
 def texture_handler():
     """A draw handler that draws one texture of the picture's size over the preview."""
     pixels = np.random.default_rng(0).random((*SIZE[::-1], 4), dtype=np.float32)
@@ -114,8 +126,8 @@ def texture_handler():
 class Ways:
     """Switches between the ways; each leaves the others' work undone."""
 
-    def __init__(self, source, strip):
-        self.source, self.strip, self.handler = source, strip, None
+    def __init__(self, source, strip, baked):
+        self.source, self.strip, self.baked, self.handler = source, strip, baked, None
 
     def __call__(self, way):
         if self.handler:
@@ -123,6 +135,8 @@ class Ways:
             self.handler = None
         self.strip.mute = way not in ("engine", "live")
         self.source.mute = way == "texture"
+        if self.baked:
+            self.baked.mute = way != "baked"
         bpy.context.window_manager.virtual_shutter.live = way == "live"
         if way == "texture":
             self.handler = bpy.types.SpaceSequenceEditor.draw_handler_add(texture_handler(), (), "PREVIEW", "POST_VIEW")
@@ -207,7 +221,7 @@ def story():
     edit, source = make_edit()
     yield 1.0
     strip, effect = add_effect(edit, source)
-    ways = Ways(source, strip)
+    ways = Ways(source, strip, (yield from baked_strip(edit, strip)) if "baked" in OPTIONS.ways else None)
     bar = effect.shutters[0].bars[3]
 
     def drag(step):

@@ -3,6 +3,7 @@
 from . import handlers
 from .data import preferences, properties
 from .interface import (
+    bake_operators,
     bar_editor,
     full_quality,
     gizmo_keymaps,
@@ -45,6 +46,7 @@ _modules = (
     outline_operators,
     outline_points,
     recipe_operators,
+    bake_operators,
     full_quality,
     option_panels,
     panels,

@@ -13,12 +13,28 @@ from pathlib import Path
 from ..core.messages import UserError, signed
 from ..devices.device import NoDeviceError
 from ..media.files import check_name
-from .commands import benchmark_command, check_command, inbetween_command, join_command, render_command, track_command
+from .commands import (
+    bake_command,
+    benchmark_command,
+    check_command,
+    inbetween_command,
+    join_command,
+    render_command,
+    track_command,
+)
 from .output import film_output
 
 BAD_INPUT = 2
 PLACES = ("output", "save", "cache", "json", "source", "edit")  # where a fault may be that says not where
-COMMANDS = (render_command, inbetween_command, track_command, check_command, join_command, benchmark_command)
+COMMANDS = (
+    render_command,
+    inbetween_command,
+    track_command,
+    bake_command,
+    check_command,
+    join_command,
+    benchmark_command,
+)
 
 
 def main(argv: list[str]) -> int:

@@ -10,7 +10,7 @@ from bpy.app.handlers import persistent
 from ..core import revision
 from .data import inbetween_settings, preview_areas, source_media, strips, versions
 from .editing import copies, lifecycle, shown_annotations, track_region, undelete, undo_repair
-from .interface import inbetween_operators, sharp_frame
+from .interface import bake_operators, inbetween_operators, sharp_frame
 from .rendering import invalidation, job_snapshots, render_job, sessions
 from .rendering.render_job import Where
 
@@ -19,6 +19,7 @@ from .rendering.render_job import Where
 def _before_load(*_):
     sharp_frame.give_back(bpy.context)
     inbetween_operators.stop()
+    bake_operators.forget()
     track_region.data_replaced()
     sessions.forget()
     invalidation.forget()

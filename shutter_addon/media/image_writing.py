@@ -10,14 +10,16 @@ from .errors import MediaError
 from .files import check_name
 
 
-def write_exr(path: Path, values: np.ndarray, names: list[str]) -> None:
+def write_exr(path: Path, values: np.ndarray, names: list[str], note: str = "") -> None:
     """Writes values (height, width, channels) float32 with these channel names, whole or not at all.
 
-    MediaError: it cannot be written."""
+    note: for its metadata, which rendered_pictures reads. MediaError: it cannot be written."""
     spec = OpenImageIO.ImageSpec(*_size(values), OpenImageIO.FLOAT)
     spec.channelnames = tuple(names)
     spec["compression"] = "zip"
     spec["DateTime"] = "1970:01:01 00:00:00"  # else the time of writing: equal samples are equal files
+    if note:
+        spec["Note"] = note
     _write(path, spec, np.asarray(values, np.float32))
 
 

@@ -294,7 +294,19 @@ class ShutterScene(PropertyGroup):
     identity: StringProperty()
 
 
-classes = (ShutterBar, Shutter, TrackStop, ShutterRegion, ShutterCamera, ShutterEffect, ShutterScene)
+class ShutterBake(PropertyGroup):
+    """Of a strip that was baked from an effect strip, and of that strip: `identity` is the same.
+
+    version: of the effect when it was baked (effect_version), over `count` frames from `first`, which count from the
+    effect strip's origin"""
+
+    identity: StringProperty()
+    version: StringProperty()
+    first: IntProperty()
+    count: IntProperty()
+
+
+classes = (ShutterBar, Shutter, TrackStop, ShutterRegion, ShutterCamera, ShutterEffect, ShutterScene, ShutterBake)
 
 
 def register():
@@ -307,6 +319,7 @@ def register():
     bpy.types.Strip.virtual_shutter_effect = StringProperty(options={"HIDDEN"})
     # That the source was muted when the effect was made, and shall show again when it goes.
     bpy.types.Strip.virtual_shutter_muted = BoolProperty(options={"HIDDEN"})
+    bpy.types.Strip.virtual_shutter_bake = PointerProperty(type=ShutterBake, options={"HIDDEN"})
     # Of annotations and cameras that were made for an effect: its scene's identity. They go with it.
     # annotations.USERS: the user's own.
     bpy.types.ID.virtual_shutter_made = StringProperty(options={"HIDDEN"})
@@ -317,7 +330,7 @@ def register():
 
 
 def unregister():
-    for name in ("source", "matte", "effect", "muted"):
+    for name in ("source", "matte", "effect", "muted", "bake"):
         delattr(bpy.types.Strip, f"virtual_shutter_{name}")
     del bpy.types.ID.virtual_shutter_made
     del bpy.types.Annotation.virtual_shutter_start

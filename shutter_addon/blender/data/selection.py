@@ -75,18 +75,43 @@ def why_unseen(scene, strip) -> str:
     """Why nothing of an effect strip is in the picture, and what to do, as a sentence."""
     if not strip.left_handle <= scene.frame_current < strip.right_handle:
         return rpt_("Move the playhead onto the Shutter strip")
+    if strip.mute and strip.virtual_shutter_bake.identity:
+        return rpt_("The effect is baked: unbake it to see changes")
     if strip.mute or (strip.parent_meta() or scene.sequence_editor).channels[strip.channel].mute:
         return rpt_("Unmute the Shutter strip")
     return rpt_("Open the meta strip that the Shutter strip is in")
 
 
 def _effects_of(scene, strip) -> list:
-    """The effects of the source that a strip is, or whose effect it shows."""
+    """The effects of the source that a strip is, or whose effect it shows; of a baked strip, what it was baked of."""
     if strip is None:
         return []
+    if baked := baked_effect(scene, strip):
+        return [baked]
     own = effect_of(scene, strip.scene) if strip.type == "SCENE" and strip.scene else None
     identity = own.source if own else strip.virtual_shutter_source
     return [effect for effect in scene.virtual_shutter.effects if effect == own or effect.source == identity != ""]
+
+
+def baked_effect(scene, strip):
+    """The effect that a baked strip shows, or None."""
+    if strip.type == "SCENE":
+        return None
+    parts = [part for part in of_bake(scene, strip) if part.type == "SCENE" and part.scene]
+    parts.sort(key=lambda part: not overlap(part, strip))  # a copy has the same identity
+    return next((effect for part in parts if (effect := effect_of(scene, part.scene))), None)
+
+
+def of_bake(scene, strip) -> list:
+    """All strips that belong to the same bake as a strip, and that itself; none, if it belongs to none."""
+    identity = strip.virtual_shutter_bake.identity
+    strips = scene.sequence_editor.strips_all if identity else ()
+    return [other for other in strips if other.virtual_shutter_bake.identity == identity]
+
+
+def overlap(a, b) -> bool:
+    """Whether two strips share timeline frames."""
+    return a.left_handle < b.right_handle and b.left_handle < a.right_handle
 
 
 def choose(scene, strip) -> None:

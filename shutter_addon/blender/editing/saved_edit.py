@@ -22,9 +22,9 @@ def is_saved(path: Path) -> bool:
     return path.suffix.lower() == ENDING
 
 
-def open_edit(path: Path):
-    """Opens a .blend file, none of whose scripts is run: it may be a stranger's. Its active scene, which Blender
-    would render. SavedEditError: it cannot be opened, or shows no edit."""
+def open_edit(path: Path, name: str | None = None):
+    """Opens a .blend file, none of whose scripts is run: it may be a stranger's. Its scene of that name; None: the
+    active one, which Blender would render. SavedEditError: it cannot be opened, or shows no edit."""
     if not path.is_file():
         raise SavedEditError(f"{path}: " + ("is no file" if path.exists() else "no such file"))
     try:
@@ -33,8 +33,10 @@ def open_edit(path: Path):
             bpy.ops.wm.open_mainfile(filepath=str(path), use_scripts=False)
     except RuntimeError as error:
         raise SavedEditError(f"{path}: {film_output.message(error)}") from None
-    scene = bpy.context.scene
-    if not _has_strips(scene):
+    if name is not None and name not in bpy.data.scenes:
+        raise SavedEditError(f'{path}: has no scene "{sentence(name, 40)}"')
+    scene = bpy.context.scene if name is None else bpy.data.scenes[name]
+    if name is None and not _has_strips(scene):
         others = [other.name for other in bpy.data.scenes if _has_strips(other)]
         where = f'; make "{others[0]}" the active one, and save the file' if others else ""
         raise SavedEditError(f'{path}: its active scene, "{scene.name}", has no strips{where}')

@@ -9,6 +9,7 @@ from ..data import annotations, selection, strips
 from ..editing import bar_edits, match_source
 from ..rendering import inbetween_build, strobing
 from . import inbetween_operators
+from .bake_operators import Bake
 from .operator_bases import Mixin
 from .option_panels import Inbetween, Options
 from .panel_parts import WithEffect, draw_list, sentence
@@ -313,6 +314,7 @@ _PANELS = {
     "_bars": (_Bars, ""),
     "_options": (Options, ""),
     "_inbetween": (Inbetween, ""),
+    "_bake": (Bake, ""),
 }
 
 

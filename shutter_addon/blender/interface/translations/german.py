@@ -1255,6 +1255,64 @@ MESSAGES = {
         "*",
         "No in-between frames: the nearest source frame is shown",
     ): "Keine Zwischenbilder: Das nächste Bild der Quelle wird gezeigt",
+    # Bake
+    ("*", "Bake"): "Backen",
+    ("Operator", "Bake to Strip"): "Zu Strip backen",
+    ("Operator", "Bake Again"): "Neu backen",
+    ("Operator", "Stop Baking"): "Backen anhalten",
+    ("Operator", "Unbake"): "Backen aufheben",
+    (
+        "*",
+        "Render the effect beside Blender, and put the film above it as a strip. Frames that are finished are kept",
+    ): "Den Effekt neben Blender rendern und den Film als Strip darüberlegen. Fertige Bilder bleiben erhalten",
+    (
+        "*",
+        "Stop the bake that runs. Frames that are finished stay, and the next bake goes on from there",
+    ): "Das laufende Backen anhalten. Fertige Bilder bleiben, und das nächste Backen macht dort weiter",
+    (
+        "*",
+        "Remove the baked strip, and show the effect again. The baked files stay",
+    ): "Den gebackenen Strip entfernen und den Effekt wieder zeigen. Die gebackenen Dateien bleiben",
+    (
+        "*",
+        "H.264, for playing: levels are off by little, and there is no transparency",
+    ): "H.264, zum Abspielen: Werte weichen um wenig ab, und es gibt keine Transparenz",
+    (
+        "*",
+        "A folder of pictures in full precision, which play more slowly",
+    ): "Ein Ordner von Bildern in voller Genauigkeit, die langsamer abspielen",
+    ("*", "Movie"): "Film",
+    ("*", "An effect is being baked"): "Ein Effekt wird gerade gebacken",
+    ("*", "No effect is being baked"): "Es wird kein Effekt gebacken",
+    ("*", "The effect is not baked"): "Der Effekt ist nicht gebacken",
+    ("*", "The effect is baked: unbake it to see changes"): "Der Effekt ist gebacken: Backen aufheben, um Änderungen"
+    " zu sehen",
+    ("*", "The baked strip was deleted"): "Der gebackene Strip wurde gelöscht",
+    ("*", "The effect has changed since it was baked"): "Der Effekt hat sich geändert, seit er gebacken wurde",
+    ("*", "Baked, and up to date"): "Gebacken und aktuell",
+    (
+        "*",
+        "baked frames lie beside the .blend file: save it first",
+    ): "gebackene Bilder liegen neben der .blend-Datei: zuerst speichern",
+    (
+        "*",
+        '"{strip}" has retiming keys of its own: retime its source',
+    ): "„{strip}“ hat eigene Zeitkeys: stattdessen die Quelle umzeiten",
+    (
+        "*",
+        "the Python package {package} is missing, which movies need: bake to OpenEXR",
+    ): "das Python-Paket {package} fehlt, das Filme brauchen: zu OpenEXR backen",
+    (
+        "*",
+        "movies are baked in Blender's own colours: with another configuration, bake to OpenEXR",
+    ): "Filme haben Blenders eigene Farben: mit einer anderen Konfiguration zu OpenEXR backen",
+    ("*", "a movie has no transparency: bake to OpenEXR"): "ein Film hat keine Transparenz: zu OpenEXR backen",
+    ("*", "the bake ended without a word"): "das Backen endete ohne ein Wort",
+    ("*", "the bake cannot begin: {reason}"): "das Backen kann nicht beginnen: {reason}",
+    (
+        "*",
+        'the strip that was baked is gone; its film is "{path}"',
+    ): "der Strip, der gebacken wurde, ist nicht mehr da; sein Film ist „{path}“",
     # Devices
     ("Virtual Shutter", "Render Device"): "Rendergerät",
     (

@@ -1,0 +1,52 @@
+"""The command `bake`: the film of one effect of a saved edit, for an ordinary strip to show."""
+
+from ...core.messages import sentence
+from ..data import strips
+from ..editing import saved_edit
+from ..output import baked_film, film_output
+from ..rendering import render_settings
+from . import command_line
+from .command_line import place
+
+FORMATS: dict[str, baked_film.Kind] = {"movie": "MOVIE", "exr": "OPEN_EXR"}
+PROGRESS = "{done} of {total}"  # what is printed after each frame, unless there is a terminal with a bar
+
+
+def add(commands) -> None:
+    parser = commands.add_parser("bake", help="render one effect of a saved edit, for a strip to show")
+    option = parser.add_argument
+    option("source", type=place, help="a saved edit (.blend)")
+    option("--strip", required=True, metavar="NAME", help="its effect strip")
+    option("--scene", metavar="NAME", help="the scene that the strip is in (default: the active one)")
+    option("--format", choices=tuple(FORMATS), default="movie", help="H.264, or float EXR (default: movie)")
+    option("--output", type=place, metavar="DIR", help="the folder it gets into (default: beside the edit)")
+    command_line.add_device(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments) -> None:
+    scene = saved_edit.open_edit(arguments.source, arguments.scene)
+    scene.frame_set(scene.frame_current)  # what drivers and keys say, once
+    effect, strip = _effect_strip(scene, arguments.strip)
+    film = baked_film.film_of(scene, effect, strip, FORMATS[arguments.format], arguments.output)
+    total = len(film.frames)
+    with (
+        render_settings.using(render_settings.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)),
+        film_output.progress(total, "frame") as moved,
+    ):
+
+        def told(done: int) -> None:
+            moved()
+            command_line.tell(PROGRESS.format(done=done, total=total))
+
+        baked_film.render(scene, effect, strip, film, told)
+    command_line.tell(str(film.place))
+
+
+def _effect_strip(scene, name: str):
+    """OutputError: the scene has no such effect strip."""
+    for strip in strips.effect_strips(scene):
+        if strip.name == name and (effect := strips.effect_of(scene, strip.scene)) is not None:
+            return effect, strip
+    others = ", ".join(f'"{strip.name}"' for strip in strips.effect_strips(scene)[:5]) or "none"
+    raise film_output.OutputError(f'--strip: there is no Shutter strip "{sentence(name, 40)}"; there are: {others}')

@@ -1,0 +1,172 @@
+"""Operators that bake an effect to a strip of its own, and bring the effect back; and their panel."""
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import EnumProperty
+from bpy.types import Operator
+
+from ..data import selection, strips
+from ..editing import baked_strips
+from ..output import bake_job, baked_film, film_output
+from .operator_bases import UNDOABLE, OfEffect, redraw, refused
+from .panel_parts import WithEffect, sentence
+
+TICK = 0.5  # seconds from one look at the job to the next
+FORMATS = (
+    ("MOVIE", "Movie", "H.264, for playing: levels are off by little, and there is no transparency"),
+    ("OPEN_EXR", "OpenEXR", "A folder of pictures in full precision, which play more slowly"),
+)
+_running: list[bake_job.BakeJob] = []  # one at most
+_failures: dict[str, str] = {}  # by the effect's identity: why its last bake failed
+
+
+class SHUTTER_OT_bake(OfEffect, Operator):
+    """Render the effect beside Blender, and put the film above it as a strip. Frames that are finished are kept"""
+
+    bl_idname = "shutter.bake"
+    bl_label = "Bake to Strip"
+
+    file_format: EnumProperty(name="Format", items=FORMATS)
+
+    @classmethod
+    def possible(cls, effect):
+        return not _running or refused(cls, rpt_("An effect is being baked"))
+
+    def change(self, context, effect):
+        scene, effect, strip = selection.active(context)
+        _failures.pop(effect.identity, None)
+        film = baked_film.film_of(scene, effect, strip, self.file_format)
+        try:
+            if bpy.app.background or film.is_finished():
+                baked_film.render(scene, effect, strip, film, lambda _done: None)
+                baked_strips.lay(scene, strip, film)
+                return None
+            _running.append(bake_job.start(scene, effect, strip, film))
+        except (film_output.OutputError, OSError) as error:
+            self.report({"ERROR"}, film_output.in_words(error, film.place))
+            return {"CANCELLED"}
+        bpy.app.timers.register(_look, first_interval=TICK)
+        return {"CANCELLED"}  # nothing has changed yet that could be undone
+
+
+class SHUTTER_OT_bake_stop(Operator):
+    """Stop the bake that runs. Frames that are finished stay, and the next bake goes on from there"""
+
+    bl_idname = "shutter.bake_stop"
+    bl_label = "Stop Baking"
+
+    @classmethod
+    def poll(cls, _context):
+        return bool(_running) or refused(cls, rpt_("No effect is being baked"))
+
+    def execute(self, context):
+        stop()
+        redraw(context)
+        return {"FINISHED"}
+
+
+class SHUTTER_OT_unbake(OfEffect, Operator):
+    """Remove the baked strip, and show the effect again. The baked files stay"""
+
+    bl_idname = "shutter.unbake"
+    bl_label = "Unbake"
+    bl_options = UNDOABLE
+
+    @classmethod
+    def possible(cls, effect):
+        parts = [strip for strip in strips.effect_strips(effect.id_data) if strip.scene == effect.scene]
+        is_baked = any(part.virtual_shutter_bake.identity for part in parts)
+        return is_baked or refused(cls, rpt_("The effect is not baked"))
+
+    def change(self, context, effect):
+        scene, _effect, strip = selection.active(context)
+        baked_strips.unbake(scene, strip)
+
+
+def _look() -> float | None:
+    """Lays the film of a job that is over."""
+    if not _running:
+        return None
+    job = _running[0]
+    redraw(bpy.context)
+    if not job.is_over():
+        if job.done():
+            job.copy.unlink(missing_ok=True)  # it has been read
+        return TICK
+    try:
+        if (failure := job.failure()) is None:
+            failure = _lay(job)
+        if failure is not None:
+            _failures[job.effect] = failure
+    finally:
+        stop()
+    return None
+
+
+def _lay(job: bake_job.BakeJob) -> str | None:
+    """Puts a finished film where its effect strip is by now. A sentence: there is none any more."""
+    scene = next((scene for scene in bpy.data.scenes if scene.session_uid == job.scene), None)
+    strip = next((s for s in strips.effect_strips(scene) if s.name == job.strip), None) if scene else None
+    if strip is None or strip.scene.virtual_shutter.identity != job.effect:
+        return rpt_('the strip that was baked is gone; its film is "{path}"').format(path=job.film.place)
+    baked_strips.lay(scene, strip, job.film)
+    windows = bpy.context.window_manager.windows
+    with bpy.context.temp_override(window=windows[0]):
+        bpy.ops.ed.undo_push(message=SHUTTER_OT_bake.bl_label)
+    return None
+
+
+def stop() -> None:
+    """Ends the bake that runs."""
+    while _running:
+        _running.pop().end()
+
+
+def forget() -> None:
+    """As stop, and what failed is forgotten: before another file is loaded."""
+    stop()
+    _failures.clear()
+
+
+class Bake(WithEffect):
+    bl_label = "Bake"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        scene, effect, strip = selection.active(context)
+        job = next((job for job in _running if job.effect == effect.identity), None)
+        if job is not None:
+            done, total = job.done(), len(job.film.frames)
+            row = layout.row(align=True)
+            progress = iface_("{done} of {total}").format(done=done, total=total)
+            row.progress(factor=done / total, text=progress, translate=False)
+            row.operator("shutter.bake_stop", text="", icon="X")
+            return
+        if failure := _failures.get(effect.identity):
+            sentence(layout, failure, "ERROR")
+        identity = strip.virtual_shutter_bake.identity
+        if identity:
+            _draw_state(layout, scene, effect, strip)
+        row = layout.row(align=True)
+        row.operator_menu_enum("shutter.bake", "file_format", text="Bake Again" if identity else "Bake to Strip")
+        if identity:
+            layout.operator("shutter.unbake")
+
+
+def _draw_state(layout, scene, effect, strip) -> None:
+    if not baked_strips.baked_of(scene, strip):
+        sentence(layout, iface_("The baked strip was deleted"), "ERROR")
+    elif baked_strips.is_stale(scene, effect, strip):
+        sentence(layout, iface_("The effect has changed since it was baked"), "ERROR")
+    else:
+        sentence(layout, iface_("Baked, and up to date"), "CHECKMARK")
+
+
+classes = SHUTTER_OT_bake, SHUTTER_OT_bake_stop, SHUTTER_OT_unbake
+TIMERS = (_look,)
+
+
+def unregister():
+    forget()

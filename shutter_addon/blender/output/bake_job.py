@@ -1,0 +1,102 @@
+"""A film that is baked by a Blender of its own, while the editor goes on working. It reads a copy of the edit as it was
+then."""
+
+from __future__ import annotations
+
+import secrets
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...core.messages import EffectError
+from .baked_film import Film
+
+_ROOT = Path(__file__).parents[3]  # of the extension, or of the checkout
+_FORMATS = {"MOVIE": "movie", "OPEN_EXR": "exr"}  # as the command calls them
+
+
+@dataclass
+class BakeJob:
+    """A bake that runs.
+
+    scene: session_uid of the edit's; effect: identity of the effect, strip: name of its strip
+    copy: of the edit; log: folder with what the process says"""
+
+    scene: int
+    effect: str
+    strip: str
+    film: Film
+    copy: Path
+    log: tempfile.TemporaryDirectory
+    process: subprocess.Popen
+
+    def done(self) -> int:
+        """How many frames are finished."""
+        lines = self._said("out").split("\n")[:-1]
+        counts = [line.split()[0] for line in lines[-2:] if line.endswith(f" of {len(self.film.frames)}")]
+        return int(counts[-1]) if counts else 0
+
+    def is_over(self) -> bool:
+        return self.process.poll() is not None
+
+    def failure(self) -> str | None:
+        """Why it failed, as a sentence, once it is over; None: the film is there."""
+        if self.process.returncode == 0 and self.film.is_finished():
+            return None
+        said = [line for line in self._said("err").splitlines() if line.strip()]
+        return said[-1].removeprefix("shutter: ") if said else rpt_("the bake ended without a word")
+
+    def _said(self, stream: str) -> str:
+        return Path(self.log.name, stream).read_text(encoding="utf-8", errors="replace")
+
+    def end(self) -> None:
+        """Stops it, if it runs, and removes what it needed alone. Frames that are finished stay."""
+        if not self.is_over():
+            self.process.terminate()
+        self.copy.unlink(missing_ok=True)
+        self.log.cleanup()
+
+
+def start(scene: Any, effect: Any, strip: Any, film: Film) -> BakeJob:
+    """Begins to bake a film. EffectError, OSError: it cannot be begun."""
+    edit = Path(bpy.data.filepath)
+    copy = edit.with_name(f"{edit.stem}.bake-{secrets.token_hex(4)}.blend")  # where the paths in it lead to the same
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, compress=True, relative_remap=False)
+        log = tempfile.TemporaryDirectory(prefix="virtual_shutter_bake_", ignore_cleanup_errors=True)
+        words = ["bake", str(copy), "--scene", scene.name, "--strip", strip.name, "--format", _FORMATS[film.kind]]
+        with open(Path(log.name, "out"), "wb") as out, open(Path(log.name, "err"), "wb") as err:
+            process = subprocess.Popen(
+                [*_command(), *words, "--output", str(film.place.parent)],
+                cwd=_ROOT,
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=err,
+            )
+    except (RuntimeError, OSError) as error:
+        copy.unlink(missing_ok=True)
+        raise EffectError(rpt_("the bake cannot begin: {reason}").format(reason=" ".join(str(error).split()))) from None
+    return BakeJob(
+        scene=scene.session_uid,
+        effect=effect.identity,
+        strip=strip.name,
+        film=film,
+        copy=copy,
+        log=log,
+        process=process,
+    )
+
+
+def _command() -> list[str]:
+    """What runs the command `shutter` in a process of its own."""
+    if not bpy.app.binary_path:  # Blender as a library
+        return [sys.executable, "-m", "shutter_addon"]
+    package = __package__.rpartition(".shutter_addon")[0]
+    enabled = ["--addons", package] if package else []  # as here, whatever the preferences that are saved say
+    return [bpy.app.binary_path, "--background", *enabled, "--command", "shutter"]

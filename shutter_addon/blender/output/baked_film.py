@@ -1,0 +1,174 @@
+"""The film of an effect by itself, as files that an ordinary strip shows: a movie, or a folder of EXR pictures.
+
+The pictures are those that the engine gives to Blender. They are written past the sequencer, which would put them
+through its own colour space and back: an EXR has their very bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Literal
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...core.farm import edit_version
+from ...core.messages import EffectError
+from ...core.stopping import StoppedError
+from ...media import film_parts, image_writing, rendered_pictures
+from ...media.completeness import is_whole_movie
+from ..data import colour_configuration, effect_version, snapshot, source_media, strips
+from ..rendering import pictures, render_context, render_settings
+from . import film_output
+
+FOLDER = "virtual_shutter_baked"  # beside the .blend file
+Kind = Literal["MOVIE", "OPEN_EXR"]
+_CHANNELS = ["R", "G", "B", "A"]
+
+
+@dataclass(frozen=True)
+class Film:
+    """What is baked of an effect strip.
+
+    frames: counted from the strip's origin (effect_version.frames_of); version: the key of the effect there
+    place: the movie, or the folder of pictures, numbered from 1"""
+
+    kind: Kind
+    frames: range
+    version: str
+    place: Path
+
+    @property
+    def pictures(self) -> list[Path]:
+        """The EXR picture of each frame."""
+        return [self.place / f"{number:04d}.exr" for number in range(1, len(self.frames) + 1)]
+
+    @property
+    def parts(self) -> list[tuple[Path, range]]:
+        """The parts of the movie that are there before all of it is, and the frames of each."""
+        folder, length = self.place.with_suffix(".parts"), film_parts.LENGTH
+        starts = range(0, len(self.frames), length)
+        return [
+            (folder / f"{start + 1:04d}{film_parts.ENDING}", self.frames[start : start + length]) for start in starts
+        ]
+
+    def is_finished(self) -> bool:
+        """Whether all of it is there; pictures are not decoded for that."""
+        if self.kind == "MOVIE":
+            return self.place.is_file() and is_whole_movie(self.place, len(self.frames))
+        return all(picture.is_file() for picture in self.pictures)
+
+
+def film_of(scene: Any, effect: Any, strip: Any, kind: Kind, folder: Path | None = None) -> Film:
+    """What would be baked of an effect strip as it is now. folder: where; None: beside the .blend file.
+
+    EffectError, MediaError: it cannot be."""
+    _check(scene, effect, strip, kind)
+    frames = effect_version.frames_of(strip)
+    version = effect_version.key(scene, effect, strip, frames)
+    name = f"{bpy.path.clean_name(strip.name)}_{version[:8]}"
+    if kind == "MOVIE":
+        name += film_parts.ENDING
+    return Film(kind=kind, frames=frames, version=version, place=(folder or default_folder()) / name)
+
+
+def default_folder() -> Path:
+    """EffectError: there is none, beside a file that is not saved."""
+    if not bpy.data.filepath:
+        raise EffectError(rpt_("baked frames lie beside the .blend file: save it first"))
+    return Path(bpy.data.filepath).parent / FOLDER
+
+
+def _check(scene: Any, effect: Any, strip: Any, kind: Kind) -> None:
+    """EffectError: the strip's film would not be its picture."""
+    if getattr(strip, "retiming_keys", ()):
+        raise EffectError(rpt_('"{strip}" has retiming keys of its own: retime its source').format(strip=strip.name))
+    if kind != "MOVIE":
+        return
+    if package := film_parts.missing_package():
+        sentence = rpt_("the Python package {package} is missing, which movies need: bake to OpenEXR")
+        raise EffectError(sentence.format(package=package))
+    if colour_configuration.name():
+        raise EffectError(
+            rpt_("movies are baked in Blender's own colours: with another configuration, bake to OpenEXR")
+        )
+    with source_media.open_media(strips.source_of(scene, effect, strip)) as medium:
+        if medium.alpha != "opaque":
+            raise EffectError(rpt_("a movie has no transparency: bake to OpenEXR"))
+
+
+def render(scene: Any, effect: Any, strip: Any, film: Film, told: Callable[[int], object]) -> None:
+    """Renders what is missing of a film. told: called with the number of frames that are there.
+
+    One of FAULTS, OutputError, OSError: it cannot be made. InterruptedRenderError: it was stopped. What is finished
+    stays, and the next call goes on from there."""
+    if film.kind == "MOVIE" and film.is_finished():
+        told(len(film.frames))
+        return
+    start = round(strips.origin(strip))
+    taken = snapshot.take(
+        scene, effect, strip, [start + frame for frame in film.frames], folder=render_settings.settings().inbetween
+    )
+    size = film_output.size(effect.scene)
+    with film_output.stoppable() as stopped:
+
+        def shown(frames: range) -> Iterator[np.ndarray]:
+            for frame in frames:
+                yield _picture(taken, start + frame, film.kind == "MOVIE", lambda: bool(stopped))
+
+        try:
+            make = _make_movie if film.kind == "MOVIE" else _make_pictures
+            make(film, shown, size, _rate(scene), told)
+        except StoppedError:
+            raise film_output.InterruptedRenderError(f"{film.place}: stopped") from None
+
+
+def _picture(taken: snapshot.Snapshot, frame: int, levels: bool, stopped: Callable[[], bool]) -> np.ndarray:
+    context = render_context.of_render(stopped=stopped, levels=levels)
+    picture = pictures.picture(context, taken, frame)
+    context.session.begin_next(taken, frame, context)
+    return picture
+
+
+def _rate(scene: Any) -> Fraction:
+    """Frames per second of the edit."""
+    return Fraction(scene.render.fps) / Fraction(scene.render.fps_base).limit_denominator(1001)
+
+
+def _make_pictures(film: Film, shown: Callable, size: tuple[int, int], _fps: Fraction, told: Callable) -> None:
+    film_output.prepare(film.place)
+    note = edit_version.note(film.version)
+    for number, (path, frame) in enumerate(zip(film.pictures, film.frames, strict=True), start=1):
+        there = rendered_pictures.read(path, film.version)
+        if there is None or there.size != size:
+            picture = pictures.resized(next(shown(range(frame, frame + 1))), *size)
+            channels = 3 if (picture[..., 3] == 1).all() else 4
+            image_writing.write_exr(path, picture[..., :channels], _CHANNELS[:channels], note)
+        told(number)
+
+
+def _make_movie(film: Film, shown: Callable, _size: tuple[int, int], fps: Fraction, told: Callable) -> None:
+    done = 0
+    for path, frames in film.parts:
+        if not (path.is_file() and is_whole_movie(path, len(frames))):
+            film_output.prepare(path.parent)
+            film_parts.write_part(path, _counted(shown(frames), done, told), fps)
+        done += len(frames)
+        told(done)
+    parts = [path for path, _frames in film.parts]
+    film_parts.join(parts, film.place, fps)
+    with suppress(OSError):
+        for path in parts:
+            path.unlink()
+        parts[0].parent.rmdir()
+
+
+def _counted(shown: Iterator[np.ndarray], done: int, told: Callable[[int], object]) -> Iterator[np.ndarray]:
+    for number, picture in enumerate(shown, start=done + 1):
+        yield picture
+        told(number)

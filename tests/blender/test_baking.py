@@ -1,0 +1,304 @@
+"""Baking: an effect as files that an ordinary strip shows, and the effect again."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import noise_film, picture_of, read_picture, sequencer
+
+from shutter_addon.blender.data import selection, strips
+from shutter_addon.blender.editing import baked_strips, lifecycle
+from shutter_addon.blender.output import baked_film
+from shutter_addon.blender.rendering import sessions
+from shutter_addon.core import revision
+from shutter_addon.core.frames import light
+from shutter_addon.media import film_parts
+
+ROOT = Path(__file__).parents[2]
+COUNT, SIZE = 9, (24, 40)
+
+
+def noise(channels=3):
+    return np.random.default_rng(3).integers(0, 256, (COUNT, *SIZE, channels), dtype=np.uint8)
+
+
+def gradients():
+    ramp = np.add.outer(np.arange(SIZE[0]) * 3, np.arange(SIZE[1]) * 3) + np.arange(COUNT)[:, None, None] * 6
+    return np.repeat(ramp[..., None], 3, -1).astype(np.uint8)
+
+
+@pytest.fixture
+def film(bpy, edit, tmp_path):
+    """Makes a saved edit of noise, or of gradients, under an effect, its strip active: scene, effect, strip."""
+
+    def make(channels=3, *, smooth=False):
+        edit.render.fps = 25
+        _source, effect, strip = noise_film(edit, gradients() if smooth else noise(channels), tmp_path)
+        selection.choose(edit, strip)
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"), relative_remap=False)
+        return edit, effect, strip
+
+    yield make
+    sessions.forget()
+
+
+def bake(bpy, kind="OPEN_EXR"):
+    assert bpy.ops.shutter.bake(file_format=kind) == {"FINISHED"}
+    return baked_in(bpy.context.scene)[0]
+
+
+def baked_in(scene):
+    return [strip for strip in scene.sequence_editor.strips if "Baked" in strip.name]
+
+
+def rendered(bpy, scene, folder, frames):
+    """The edit's frames as float EXR, by Blender."""
+    settings = scene.render.image_settings
+    settings.media_type, settings.file_format, settings.color_depth, settings.exr_codec = (
+        *("IMAGE", "OPEN_EXR"),
+        *("32", "ZIP"),
+    )
+    pictures = []
+    for frame in frames:
+        scene.frame_set(frame)
+        scene.render.filepath = str(folder / f"{frame}")
+        bpy.ops.render.render(write_still=True)
+        pictures.append(read_picture(folder / f"{frame}.exr"))
+    return np.array(pictures)
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+def test_an_exr_has_the_bits_of_the_effect(bpy, film, tmp_path, channels):
+    scene, effect, strip = film(channels)
+    whole = range(1, COUNT + 1)
+    before = rendered(bpy, scene, tmp_path / "effect", whole)
+    assert np.ptp(before) > 0.5
+    composed = [picture_of(effect.scene, frame) for frame in whole]
+    baked = bake(bpy)
+    assert strip.mute
+    assert baked.channel > strip.channel
+    assert (baked.left_handle, baked.right_handle) == (strip.left_handle, strip.right_handle)
+    written = [read_picture(Path(bpy.path.abspath(baked.directory)) / element.filename) for element in baked.elements]
+    assert (np.array(written) == np.array(composed)[..., :channels]).all()
+    # Of the effect's picture Blender's way through the sequencer's colours leaves less.
+    assert np.abs(rendered(bpy, scene, tmp_path / "baked", whole) - before).max() < 1e-4
+
+
+def test_a_movie_is_off_by_little(bpy, film, tmp_path):
+    scene, _effect, _strip = film(smooth=True)
+    before = rendered(bpy, scene, tmp_path / "effect", (1, 5, 9))
+    baked = bake(bpy, "MOVIE")
+    assert baked.content_end - baked.content_start == COUNT
+    after = rendered(bpy, scene, tmp_path / "baked", (1, 5, 9))
+    off = 255 * np.abs(light.to_encoded(after) - light.to_encoded(before))
+    assert off.max() <= 5
+    assert off.mean() <= 1
+
+
+def test_a_movie_has_no_transparency(bpy, film):
+    film(4)
+    with pytest.raises(RuntimeError, match="a movie has no transparency: bake to OpenEXR"):
+        bpy.ops.shutter.bake(file_format="MOVIE")
+
+
+def test_an_edit_that_is_not_saved_is_not_baked(bpy, edit, tmp_path):
+    noise_film(edit, noise(), tmp_path)
+    with pytest.raises(RuntimeError, match="save it first"):
+        bpy.ops.shutter.bake(file_format="OPEN_EXR")
+
+
+def test_unbake_brings_the_effect_back(bpy, film):
+    scene, _effect, strip = film()
+    before = sorted(s.name for s in scene.sequence_editor.strips_all)
+    baked = bake(bpy)
+    place = Path(bpy.path.abspath(baked.directory))
+    assert bpy.ops.shutter.unbake() == {"FINISHED"}
+    assert sorted(s.name for s in scene.sequence_editor.strips_all) == before
+    assert not strip.mute
+    assert len(list(place.glob("*.exr"))) == COUNT  # files stay: baked again, they are found
+
+
+def states(scene, effect, strip):
+    revision.changed()
+    parts = baked_strips.effect_parts(scene, strip)
+    return [baked_strips.is_stale(scene, effect, part) for part in parts]
+
+
+def test_it_says_that_it_is_stale(bpy, film):
+    scene, effect, strip = film()
+    bake(bpy)
+
+    def stale():
+        return states(scene, effect, strip)
+
+    assert stale() == [False]
+    effect.shutters[0].bars[1].weight = 0.5
+    assert stale() == [True]
+    effect.shutters[0].bars[1].weight = 1
+    assert stale() == [False]
+    effect.regions[0].location[0] = 0.1
+    assert stale() == [True]
+    effect.regions[0].location[0] = 0
+    for each in scene.sequence_editor.strips:  # a ripple edit: all of it moves
+        each.content_start += 7
+    bpy.context.view_layer.update()
+    assert strips.origin(strip) == 8
+    assert stale() == [False]
+
+
+def test_both_are_cut_and_nothing_is_lost(bpy, film, tmp_path):
+    scene, effect, strip = film()
+    before = rendered(bpy, scene, tmp_path / "effect", (3, 6))
+    baked = bake(bpy)
+    for each in (baked, strip):
+        each.split(5, "SOFT")
+    bpy.context.view_layer.update()
+    assert states(scene, effect, strip) == [False, False]
+    selection.choose(scene, baked_in(scene)[1])
+    assert bpy.ops.shutter.unbake() == {"FINISHED"}
+    shown = [s for s in scene.sequence_editor.strips if s.type == "SCENE"]
+    assert len(shown) == 2
+    assert not any(part.mute for part in shown)
+    assert not baked_in(scene)
+    assert np.abs(rendered(bpy, scene, tmp_path / "after", (3, 6)) - before).max() < 1e-6
+
+
+def test_a_copy_that_was_moved_away_stays(bpy, film):
+    scene, _effect, _strip = film()
+    baked = bake(bpy)
+    copy = scene.sequence_editor.strips.new_image(
+        "copy", str(Path(bpy.path.abspath(baked.directory)) / "0001.exr"), 9, 200
+    )
+    copy.virtual_shutter_bake.identity = baked.virtual_shutter_bake.identity
+    bpy.ops.shutter.unbake()
+    assert "copy" in scene.sequence_editor.strips_all
+
+
+def shutter(*words):
+    return subprocess.run(
+        [sys.executable, "-m", "shutter_addon", *map(str, words)], cwd=ROOT, capture_output=True, text=True
+    )
+
+
+@pytest.mark.parametrize("kind", ["exr", "movie"])
+def test_the_command_goes_on_where_it_was_broken_off(bpy, film, tmp_path, kind):
+    film()
+    said = shutter("bake", tmp_path / "edit.blend", "--strip", "Shutter", "--format", kind)
+    assert said.returncode == 0, said.stderr
+    place = Path(said.stdout.splitlines()[-1])
+    assert f"1 of {COUNT}" in said.stdout.splitlines()
+    assert place.parent == tmp_path / baked_film.FOLDER
+    if kind == "movie":
+        whole = place.read_bytes()
+        assert film_parts.is_whole_movie(place, COUNT)
+        assert not place.with_suffix(".parts").exists()
+        place.write_bytes(whole[: len(whole) // 2])  # as a full disk leaves it, or a process that was killed
+        assert shutter("bake", tmp_path / "edit.blend", "--strip", "Shutter").returncode == 0
+        assert place.read_bytes() == whole
+        return
+    pictures = sorted(place.iterdir())
+    kept, lost, broken = pictures[0].stat().st_mtime_ns, pictures[3], pictures[5]
+    whole = {path: path.read_bytes() for path in pictures}
+    lost.unlink()
+    broken.write_bytes(whole[broken][:-50])
+    assert shutter("bake", tmp_path / "edit.blend", "--strip", "Shutter", "--format", kind).returncode == 0
+    assert {path: path.read_bytes() for path in place.iterdir()} == whole
+    assert pictures[0].stat().st_mtime_ns == kept
+
+
+def test_parts_of_a_movie_are_kept(film, tmp_path, monkeypatch):
+    monkeypatch.setattr(film_parts, "LENGTH", 4)
+    scene, effect, strip = film(smooth=True)
+    film_of = baked_film.film_of(scene, effect, strip, "MOVIE")
+    assert [len(frames) for _path, frames in film_of.parts] == [4, 4, 1]
+
+    class KilledError(Exception):
+        pass
+
+    def killed(done):
+        if done == 6:
+            raise KilledError
+
+    with pytest.raises(KilledError):
+        baked_film.render(scene, effect, strip, film_of, killed)
+    first = film_of.parts[0][0]
+    assert [path.is_file() for path, _ in film_of.parts] == [True, False, False]
+    assert not film_of.is_finished()
+    written, told = first.stat().st_mtime_ns, []
+
+    def tell(done):
+        told.append(done)
+        if done == 4 and len(told) == 1:
+            assert first.stat().st_mtime_ns == written
+
+    baked_film.render(scene, effect, strip, film_of, tell)
+    assert told[0] == 4
+    assert told[-1] == COUNT
+    assert film_of.is_finished()
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--strip", "Other"], '--strip: there is no Shutter strip "Other"; there are: "Shutter"'),
+        (["--strip", "Shutter", "--scene", "No"], 'has no scene "No"'),
+    ],
+)
+def test_what_cannot_be_baked_is_one_sentence(film, tmp_path, words, sentence):
+    film()
+    said = shutter("bake", tmp_path / "edit.blend", *words)
+    assert said.returncode == 2
+    assert sentence in said.stderr
+    assert len(said.stderr.splitlines()) == 1
+
+
+def test_a_copy_in_another_place_is_of_the_same_version(bpy, film, tmp_path):
+    scene, effect, strip = film()
+    here = baked_film.film_of(scene, effect, strip, "OPEN_EXR").version
+    away = tmp_path / "away"
+    shutil.copytree(tmp_path / "in", away / "in")
+    source = strips.source_of(scene, effect, strip)
+    source.directory = str(away / "in")
+    assert baked_film.film_of(scene, effect, strip, "OPEN_EXR").version == here
+    (away / "in" / "f0002.png").write_bytes((away / "in" / "f0003.png").read_bytes())
+    revision.changed()
+    assert baked_film.film_of(scene, effect, strip, "OPEN_EXR").version != here
+
+
+def test_it_plays_without_the_extension(bpy, film, tmp_path):
+    scene, _effect, _strip = film()
+    bake(bpy)
+    before = rendered(bpy, scene, tmp_path / "with", (4,))
+    scene.frame_set(4)
+    scene.render.filepath = str(tmp_path / "without")
+    bpy.ops.wm.save_mainfile()
+    script = (
+        f"import bpy; bpy.ops.wm.open_mainfile(filepath={str(tmp_path / 'edit.blend')!r});"
+        " assert not hasattr(bpy.types.Scene, 'virtual_shutter'); bpy.ops.render.render(write_still=True)"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, cwd=tmp_path)
+    assert (read_picture(tmp_path / "without.exr") == before[0]).all()
+
+
+def test_a_copy_of_all_of_it_is_unbaked_alone(bpy, film):
+    scene, _effect, strip = film()
+    bake(bpy)
+    for each in scene.sequence_editor.strips_all:
+        each.select = True
+    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+        bpy.ops.sequencer.copy()
+        scene.frame_set(101)
+        bpy.ops.sequencer.paste()
+    assert len(scene.sequence_editor.strips) == 6
+    lifecycle.update()
+    selection.choose(scene, strip)
+    bpy.ops.shutter.unbake()
+    assert len(baked_in(scene)) == 1
+    copied = next(each for each in scene.sequence_editor.strips_all if each.type == "SCENE" and each != strip)
+    assert copied.mute
+    assert not strip.mute
+    effect = strips.effect_of(scene, copied.scene)
+    assert states(scene, effect, copied) == [False]
