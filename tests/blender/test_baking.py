@@ -302,3 +302,31 @@ def test_a_copy_of_all_of_it_is_unbaked_alone(bpy, film):
     assert not strip.mute
     effect = strips.effect_of(scene, copied.scene)
     assert states(scene, effect, copied) == [False]
+
+
+def test_the_baked_strip_looks_as_the_effect_strip(bpy, film, tmp_path):
+    """Transform, crop, flip and opacity, keys included, and in a meta strip."""
+    scene, _effect, strip = film(4)
+    strip.transform.offset_x, strip.transform.rotation, strip.crop.min_y = 3, 0.2, 4
+    strip.transform.scale_x, strip.use_flip_x, strip.color_saturation = 0.5, True, 0.4
+    for frame, opacity in ((1, 1.0), (9, 0.2)):
+        strip.blend_alpha = opacity
+        strip.keyframe_insert("blend_alpha", frame=frame)
+        strip.transform.offset_y = frame
+        strip.transform.keyframe_insert("offset_y", frame=frame)
+    meta = scene.sequence_editor.strips.new_meta("Meta", 3, 1)
+    meta.right_handle = COUNT + 1
+    for each in list(scene.sequence_editor.strips):
+        if each != meta:
+            each.move_to_meta(meta)
+    shown = (2, 6)
+    before = rendered(bpy, scene, tmp_path / "effect", shown)
+    baked = None
+    assert bpy.ops.shutter.bake(file_format="OPEN_EXR") == {"FINISHED"}
+    baked = next(each for each in scene.sequence_editor.strips_all if "Baked" in each.name)
+    assert baked.parent_meta() == meta
+    after = rendered(bpy, scene, tmp_path / "baked", shown)
+    assert np.ptp(before[0] - before[1]) > 0.1
+    assert np.abs(after - before).max() < 1e-4
+    bpy.ops.shutter.unbake()
+    assert (rendered(bpy, scene, tmp_path / "again", shown) == before).all()
