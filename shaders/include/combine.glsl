@@ -32,8 +32,8 @@ vec4 covered = vec4(0.0);  // Σ qₖ aₖ of each pixel
 // What is compared: it rises with a sample.
 vec3 level_of(vec3 value) {
 #  if LEVELS_OF == 2
-  vec3 root = sqrt(sqrt(max(value, 0.0)));
-  return root / (1.0 + root);
+  vec3 root = sign(value) * sqrt(sqrt(abs(value)));  // light of wide gamuts may be below 0
+  return 0.5 + 0.5 * root / (1.0 + abs(root));
 #  else
   return value;
 #  endif

@@ -91,6 +91,7 @@ def make(seed: int) -> Case:
     mattes = add_mattes(np.random.default_rng([seed, 2]), recipe, (count, height, width))
     add_layers(np.random.default_rng([seed, 3]), recipe)
     add_outlines(np.random.default_rng([seed, 4]), recipe, count)
+    add_combining(np.random.default_rng([seed, 5]), recipe, count)
     if "time" in recipe:
         # Halfway between two source frames nobody can tell which is shown.
         last = max(count, int(recipe["time"][-1]["frame"]))
@@ -183,6 +184,23 @@ def add_outlines(rng, recipe: dict, count: int) -> None:
     recipe["regions"].insert(int(rng.integers(len(recipe["regions"]) + 1)), region)
     if rng.random() < 0.2:
         choose(rng, *recipe["shutters"]).update(follow="O")
+
+
+def add_combining(rng, recipe: dict, count: int) -> None:
+    """Shutters that make something else than an average of their frames, where none follows and there are no layers."""
+    if follows(recipe) or "plate_reach" in recipe or rng.random() < 0.1:
+        return
+    for shutter in recipe["shutters"]:
+        if (way := choose(rng, "average", "lightest", "darkest", "median")) == "average":
+            continue
+        shutter["combine"] = way
+        if way == "median":
+            continue
+        if rng.random() < 0.5:
+            shutter["by_luminance"] = True
+        if rng.random() < 0.8:
+            shutter["threshold"] = choose(rng, round(rng.random(), 3), random_numbers(rng, count, 1))
+            shutter["softness"] = choose(rng, 0.0, round(rng.uniform(0.05, 0.5), 3), 0.2)
 
 
 def random_matte(rng, number: int, shape) -> tuple[str, np.ndarray]:

@@ -25,6 +25,8 @@ What neither the paper nor the manual says is taken from the product; these are 
 - what an outline covers of a pixel is told by eight lines across it, each to its exact places;
 - mattes lie over what scribbles give, whichever comes first in the list; a ramp at rest runs from one corner of the
   picture to the opposite one; a feather is a Gaussian of a quarter of its width, of which a pixel has what it covers;
+- of shutters that combine alike, the lightest and darkest frames are weighted by the displaced bars over the mixed
+  peak of theirs; a median at exactly half of all weights is the mean of both its neighbours;
 - a premultiplied colour without cover (alpha 0) is light that is added to what lies below (as in Blender). What it is
   among encoded values, nothing says; there this is no reference.
 
@@ -763,6 +765,8 @@ def exposed(recipe, frame, footage, index, direction, given, weights=None):
             ]
         )
     exposures = bars.sum(axis=1)
+    if any("combine" in shutter for shutter in recipe["shutters"]):
+        return combined(recipe, frame, footage, [at_edges(option(recipe, "edges"), w, count) for w in where], mix, bars)
     if option(recipe, "interpolation") == "displacement":
         parts = displaced(bars, mix)[None]
     else:  # a picture of each shutter, mixed
@@ -803,6 +807,136 @@ def exposed(recipe, frame, footage, index, direction, given, weights=None):
     if option(recipe, "light") == "encoded":
         colour = to_linear(colour / covering(alpha)) * covering(alpha)
     return np.concatenate([colour * of_pixels(gain)[..., None], alpha], axis=-1), left, of_pixels(doubtful)
+
+
+def combined(recipe, frame, footage, frames, mix, bars):
+    """As `exposed`, of shutters that combine frames in several ways and follow nothing. mix: (N, n) of the blocks"""
+    _, height, width, _ = footage.samples.shape
+    block, exposures = option(recipe, "aggregate"), bars.sum(axis=1)
+    shape = -(-height // block), -(-width // block)
+    before = {"start": 0, "center": (len(frames) - 1) // 2, "end": len(frames) - 1}[option(recipe, "position")]
+
+    def of_pixels(values):
+        return values.reshape(shape).repeat(block, 0).repeat(block, 1)[:height, :width]
+
+    lights = [None if f is None else summed(footage, f, option(recipe, "light")) for f in frames]
+    ways = [way_of(shutter, frame) for shutter in recipe["shutters"]]
+    total, doubtful = np.zeros((height, width, 4)), np.zeros((height, width), bool)
+    for way in sorted(set(ways), key=str):
+        chosen = [i for i, other in enumerate(ways) if other == way]
+        share = mix[chosen].sum(axis=0)
+        own = np.where(share > 0, mix[chosen] / np.where(share > 0, share, 1), 1 / len(chosen))
+        normalised = bars[chosen] / exposures[chosen, None]
+        is_moved = option(recipe, "interpolation") == "displacement"
+        parts = displaced(bars[chosen], own) if is_moved else normalised.T @ own
+        kept, lost = shortened(parts[None], frames, own)
+        averaged = sum(of_pixels(kept[0, k])[..., None] * light for k, light in enumerate(lights) if light is not None)
+        unsure = of_pixels(lost)
+        if way[0] == "average":
+            gain = (
+                exposures[chosen] @ own / exposures[0]
+                if option(recipe, "exposure") == "weighted"
+                else np.ones(len(share))
+            )
+            made = decoded(recipe, averaged) * [1, 1, 1, 0] * of_pixels(gain)[..., None] + averaged * [0, 0, 0, 1]
+        else:
+            if way[0] == "median":
+                counts = parts
+            elif is_moved:
+                counts = parts * (own / normalised.max(axis=1)[:, None]).sum(axis=0)
+            else:
+                counts = (normalised / normalised.max(axis=1)[:, None]).T @ own
+            seen = [(light, of_pixels(counts[k]), k == before) for k, light in enumerate(lights) if light is not None]
+            found, doubt, counted = (median if way[0] == "median" else extreme)(way, seen, option(recipe, "light"))
+            made = decoded(recipe, np.where((counted > NOTHING)[..., None], found, averaged))
+            unsure = unsure | doubt | (counted > NOTHING / 100) & (counted < ROUNDING)
+        total += of_pixels(share)[..., None] * made
+        doubtful |= unsure & (of_pixels(share) > 0)
+    return total, np.ones((height, width)), doubtful
+
+
+def way_of(shutter, frame):
+    """How a shutter combines its frames: the way, whether by luminance, its threshold or None, and its softness."""
+    way = shutter.get("combine", "average")
+    if way in ("average", "median"):
+        return way, False, None, 0
+    if "threshold" not in shutter:
+        return way, shutter.get("by_luminance", False), None, 0
+    softness = number_at(shutter.get("softness", 0.1), frame)
+    return way, shutter.get("by_luminance", False), number_at(shutter["threshold"], frame), softness
+
+
+def decoded(recipe, light):
+    """Light (H, W, 4) as it was summed, as linear light."""
+    if option(recipe, "light") == "linear":
+        return light
+    alpha = light[..., 3:]
+    return np.concatenate([to_linear(light[..., :3] / covering(alpha)) * covering(alpha), alpha], axis=-1)
+
+
+def extreme(way, seen, light):
+    """What is lightest or darkest (H, W, 4) of frames (light, weight, whether it is the shown one), where that is
+    doubtful, and how much counts."""
+    mode, by_luminance, threshold, softness = way
+    doubtful, offered = np.zeros(seen[0][1].shape, bool), []
+    for colour, weight, is_shown in seen:
+        if threshold is not None:
+            straight = colour[..., :3] / covering(colour[..., 3:])
+            brightness = (to_linear(straight) if light == "encoded" else straight) @ LUMINANCE
+            t = ((brightness - threshold) / max(softness, NOTHING) + 0.5).clip(0, 1)
+            passed = 3 * t**2 - 2 * t**3
+            doubtful |= (softness < 0.01) & (np.abs(brightness - threshold) < ROUNDING * 10)
+            weight = weight * (passed if mode == "lightest" else 1 - passed)
+            if is_shown:
+                offered.append((colour, np.ones_like(weight)))
+        offered.append((colour, weight))
+    colours, weights = (np.array(each) for each in zip(*offered, strict=True))
+    counted = weights.sum(axis=0)
+    cover = (weights * colours[..., 3]).max(axis=0) / np.maximum(weights.max(axis=0), 1e-30)
+    there = weights[..., None] > NOTHING / 1000  # less is what the bisection leaves of none
+    value = colours[..., :3] if mode == "lightest" else colours[..., 3:] - colours[..., :3]
+    value = np.where((mode == "lightest") | (value > 0), weights[..., None] * value, value)
+    doubtful |= (there & (weights[..., None] < ROUNDING) & (value < 0)).any(axis=(0, -1))
+    if by_luminance:
+        rank = np.where(there[..., 0], value @ LUMINANCE, -np.inf)
+        order = np.sort(np.concatenate([rank, np.full_like(rank[:1], -np.inf)]), axis=0)
+        with np.errstate(invalid="ignore"):
+            doubtful |= order[-1] - order[-2] < 1e-4 * np.maximum(1, np.abs(order[-1]))
+        best = np.take_along_axis(value, rank.argmax(axis=0)[None, ..., None], axis=0)[0]
+    else:
+        best = np.where(there, value, -np.inf).max(axis=0)
+    best = np.where(counted[..., None] > 0, best, 0)
+    if threshold is not None and any(is_shown for _, _, is_shown in seen):
+        counted = np.ones_like(counted)
+    return (
+        np.concatenate([best if mode == "lightest" else cover[..., None] - best, cover[..., None]], -1),
+        doubtful,
+        counted,
+    )
+
+
+def median(_way, seen, _light):
+    """The weighted median (H, W, 4) of frames, where it is doubtful, and how much counts."""
+    colours, weights = np.array([each[0] for each in seen]), np.array([each[1] for each in seen])
+    alphas, counted = weights * colours[..., 3], weights.sum(axis=0)
+    alphas = np.where(alphas > NOTHING / 1000, alphas, 0)  # less is what the bisection leaves of none
+    whole = np.maximum(alphas.sum(axis=0), 1e-30)
+    result, doubtful = [], np.zeros(counted.shape, bool)
+    for channel in np.moveaxis(colours[..., :3] / np.maximum(colours[..., 3:], 1e-30), -1, 0):
+        least = np.full(counted.shape, np.inf)  # that has half of all at it and below
+        above = np.full(counted.shape, np.inf)
+        for candidate, own in zip(channel, alphas, strict=True):
+            below = (alphas * (channel <= candidate)).sum(axis=0) / whole
+            doubtful |= (own > 0) & (np.abs(below - 0.5) > 1e-9) & (np.abs(below - 0.5) < 1 / 4096)
+            least = np.where((own > 0) & (below >= 0.5 - 1e-9), np.minimum(least, candidate), least)
+        share = (alphas * (channel <= least)).sum(axis=0) / whole
+        for candidate, own in zip(channel, alphas, strict=True):
+            above = np.where((own > 0) & (candidate > least), np.minimum(above, candidate), above)
+        is_half = (np.abs(share - 0.5) < 1e-9) & np.isfinite(above)
+        least = np.where(np.isfinite(least), least, 0)
+        result.append(np.where(is_half, (least + np.where(np.isfinite(above), above, 0)) / 2, least))
+    cover = alphas.sum(axis=0) / np.maximum(counted, 1e-30)
+    return np.stack([*(each * cover for each in result), cover], axis=-1), doubtful, counted
 
 
 def shortened(parts, frames, mix):

@@ -15,7 +15,7 @@ from reference import DEFAULTS, layers_at, picture, shown
 from shutter_addon.compute import cpu, cpu_window, plates
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import keyframes, mattes, scribbles, shutters
-from shutter_addon.core.pixels import compositor, following, layering, trails
+from shutter_addon.core.pixels import combined, compositor, following, layering, trails
 from shutter_addon.media import matte_values
 
 SEEDS = range(120)
@@ -92,6 +92,8 @@ def test_recipes_have_all_that_a_recipe_may_have():
         seen.update(("follow", shutter["follow"] == "camera") for shutter in recipe["shutters"] if "follow" in shutter)
         seen.update(("trail", type(shutter["trail"])) for shutter in recipe["shutters"] if "trail" in shutter)
         seen.update([("edge_aware", type(recipe.get("edge_aware")))])
+        for name, about in (("combine", str), ("by_luminance", str), ("threshold", type)):
+            seen.update((name, about(shutter[name])) for shutter in recipe["shutters"] if name in shutter)
         found = picture(recipe, case.frame, case.footage(), case.index, case.direction, mattes=case.matte_samples())
         is_layered = bool(layers_at(recipe, case.frame))
         seen.update([("layer", is_layered)])
@@ -99,11 +101,12 @@ def test_recipes_have_all_that_a_recipe_may_have():
     values = {"position": 3, "interpolation": 2, "light": 2, "exposure": 2, "edges": 3, "aggregate": 3, "border": 2}
     values |= {"ease": 4, "redrawn": 2, "kind": 5, "shutters": 6, "time": 2, "direction": 2, "footage": len(KINDS)}
     values |= {"ramp": 4, "blend": 2, "timing": 2, "channel": 4}
+    values |= {"combine": 3, "by_luminance": 1, "threshold": 2}
     values |= {"follow": 2, "trail": 2, "edge_aware": 3, "layer": 2, "plate_reach": 4}
     assert Counter(name for name, _ in seen) == values
     assert min(seen.values()) >= 5
     assert seen["layer", True] >= 0.4 * len(SEEDS)
-    assert np.mean(doubtful[0]) < 0.01
+    assert np.mean(doubtful[0]) < 0.02
     assert np.mean(doubtful[1]) < 0.35  # nothing is seen behind layers that cover all
 
 
@@ -133,12 +136,18 @@ FAULTS = {
     ),
     "ghosts": (layering, "behind", lambda values: np.ones_like(values[0])),
     "what a camera pans over": (plates, "uncovered", lambda colors, seen, *_: (colors, seen)),
+    "the mean for the median": (combined, "weighted_median", lambda values, weights: mean(values, weights)),
+    "thresholds that let all pass": (combined, "passes", lambda combine, luminance: np.ones_like(luminance)),
     "soft scribbles": (layering, "matte_of", lambda values: values),
     "not normalised": (compositor, "source_frames", lambda options, places, shot: places.clip(0, shot.stop - 1)),
 }
 eased, source_frames, solve = keyframes.eased, compositor.source_frames, cpu.Solver.solve
 blended, ramp_values, coverage = mattes.blended, mattes.Ramp.values, mattes.coverage
 rasterise, resampled = scribbles.rasterise, cpu_window.resampled
+
+
+def mean(values, weights):
+    return (values * weights).sum(axis=0) / np.maximum(weights.sum(axis=0), 1e-30)
 
 
 def outlines(shapes):
