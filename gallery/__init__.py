@@ -13,6 +13,7 @@ NAMES = (
     "one_stroke",
     "handheld",
     "panning",
+    "sped_up",
     "time_map",
     "object_matte",
 )
