@@ -163,7 +163,7 @@ def rendered(frames=RENDERED):
         bpy.ops.render.render("INVOKE_DEFAULT", animation=True)
     yield from driver.until(lambda: done, "the render ends", 200)
     for frame in frames:
-        driver.saw(rendered=frame, stroke=stroke_at(frame))
+        driver.saw(rendered=frame, stroke=stroke_at(frame) if story.effect().regions else None)
 
 
 def looked_at():

@@ -13,6 +13,7 @@ import pytest
 from screens import apart_on_screen, assert_alike, crop, pixels
 from telling import ROOT, linked, needs_window, packages, tell
 
+from shutter_addon.core.frames import light
 from shutter_addon.media import open_source
 
 pytestmark = needs_window
@@ -212,6 +213,23 @@ def test_the_street_without_those_who_pass(tmp_path, backend):
     street = np.median(frames, axis=0)[150:500, 480:]
     assert np.abs(frames[16, 150:500, 480:] - street).mean() > 5, "people walk there"
     assert np.abs(final[150:500, 480:] - street).mean() <= 1, "of them no more is seen than her stroke reaches"
+    assert apart_on_screen(pixels(tmp_path / "7_full_quality.png"), final) <= 1
+
+
+def test_footage_that_is_sped_up_gets_a_cameras_blur(tmp_path):
+    """Eight times as fast by Blender's retiming, half open: four frames of the footage make each picture."""
+    given = {"footage": shutil.copy(ROOT / "assets" / "walkers.mp4", tmp_path)}
+    given["packages"] = packages(tmp_path / "packages")
+    seen, console = tell("sped_up_story.py", "opengl", linked(tmp_path), **given)
+    assert "Traceback" not in console
+    facts = {name: entry[name] for entry in seen for name in entry}
+    assert facts["length"] == 10
+    steps = {entry["step"]: crop(tmp_path, entry) for entry in seen if "step" in entry}
+    assert np.abs(steps["1_sharp"] - steps["2_timeline"]).max() > 50
+    final = pixels(tmp_path / "final_0005.png")
+    with open_source(given["footage"]) as source:
+        frames = np.stack([light.to_linear(source.read(32 + k)[..., :3] / 255) for k in range(4)])
+    assert np.abs(final - 255 * light.to_encoded(frames.mean(axis=0))).max() <= 2
     assert apart_on_screen(pixels(tmp_path / "7_full_quality.png"), final) <= 1
 
 
