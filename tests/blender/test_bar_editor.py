@@ -87,3 +87,10 @@ def test_a_stroke_leaves_the_given_bars_alone(editor):
     place = editor.layout(WIDTH, values, 1.0)
     editor.painted(values, place, centre(place, 0, 0), centre(place, 3, 0), snap=False)
     assert values.tolist() == [1, 1, 1, 1]
+
+
+@pytest.mark.parametrize(("combine", "start"), [("LIGHTEST", 54), ("DARKEST", 13), ("MEDIAN", 33.5)])
+def test_bars_that_do_not_average_are_marked(editor, combine, start):
+    boxes = [(0, 10, 8, 60), (8, 10, 16, 11)]  # the second is closed
+    assert editor.marked(boxes, combine, 3) == [(0, start, 8, start + 3)]
+    assert editor.marked(boxes, "AVERAGE", 3) == []

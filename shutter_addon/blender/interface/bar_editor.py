@@ -116,7 +116,7 @@ class SHUTTER_GT_bars(Gizmo):
         shutter = selection.active_shutter(effect)
         words = bar_edits.open_for(scene, effect, strip, effect.active_shutter)
         words = words or bar_edits.summary(shown.bars, shutter.combine)
-        _draw(_layout(context, shown.bars), shutter.color, f"{shutter.name}   {words}", *shown)
+        _draw(_layout(context, shown.bars), shutter, f"{shutter.name}   {words}", *shown)
 
     def test_select(self, context, location):
         return 0 if bar_under(context, *location) is not None else -1
@@ -165,17 +165,29 @@ class SHUTTER_GT_bars(Gizmo):
         bpy.ops.ed.undo_push(message=iface_("Paint Bars", contexts.operator_default))
 
 
-def _draw(place: Layout, color, words: str, values, states) -> None:
+def marked(boxes, combine: str, thickness: float) -> list[tuple[float, float, float, float]]:
+    """What tells at the bars' boxes (left, bottom, right, top), to all eyes, that they do not average: a line below
+    the upper ends of bars that keep the lightest, above the feet of those that keep the darkest, and across the middle
+    of those of a median."""
+    if combine == "AVERAGE":
+        return []
+    middle = {"LIGHTEST": 1.0, "DARKEST": 0.0, "MEDIAN": 0.5}[combine]
+    starts = [bottom + thickness + middle * (top - bottom - 3 * thickness) for _, bottom, _, top in boxes]
+    open_ones = [(box, start) for box, start in zip(boxes, starts, strict=True) if box[3] - box[1] > 3 * thickness]
+    return [(left, start, right, start + thickness) for (left, _, right, _), start in open_ones]
+
+
+def _draw(place: Layout, shutter, words: str, values, states) -> None:
     left, bottom, right, top = place.box
     edges = np.linspace(left, right, place.count + 1)
     heights = bottom + np.minimum(values / place.top, 1.0) * (top - bottom)
     gap = 1.0 if edges[1] - edges[0] > 3 else 0.0
     colors = _key_colors()
     drawing.rectangles([place.frame], [_BACK])
-    drawing.rectangles(
-        [(a, bottom, b - gap, max(h, bottom + 1)) for a, b, h in zip(edges, edges[1:], heights, strict=False)],
-        np.tile((*color, 0.95), (place.count, 1)),
-    )
+    boxes = [(a, bottom, b - gap, max(h, bottom + 1)) for a, b, h in zip(edges, edges[1:], heights, strict=False)]
+    drawing.rectangles(boxes, np.tile((*shutter.color, 0.95), (place.count, 1)))
+    marks = marked(boxes, shutter.combine, drawing.ui_scale() * 3)
+    drawing.rectangles(marks, np.tile((0.0, 0.0, 0.0, 0.7), (len(marks), 1)))
     foot = drawing.ui_scale() * 3
     keyed = [i for i, state in enumerate(states) if state]
     drawing.rectangles(
