@@ -58,5 +58,9 @@ class UntilChange:
             raise value.with_traceback(None)  # which would grow with every raise
         return value
 
+    def known(self, key: Hashable) -> Any:
+        """The value of a key that has been made since something changed; None: none has."""
+        return self._values.get(key, (True, None))[1] if self._number == number() else None
+
     def clear(self) -> None:
         self._values = {}

@@ -47,10 +47,8 @@ def write_part(path: Path, pictures: Iterable[np.ndarray], fps: Fraction) -> int
                 container.mux(stream.encode(None))
             if not is_whole_movie(part, count):
                 raise MediaError(f"{path}: could not be written whole")
-    except (OSError, ValueError) as error:  # PyAV's are both
-        if isinstance(error, MediaError):
-            raise
-        raise MediaError(f"{path}: cannot be written ({getattr(error, 'strerror', None) or error})") from None
+    except (OSError, ValueError, av.error.FFmpegError) as error:
+        raise _unwritten(path, error) from None
     return count
 
 
@@ -103,7 +101,9 @@ def join(paths: Sequence[Path], output: Path, fps: Fraction) -> None:
                                 index += 1
             if not is_whole_movie(part, index):
                 raise MediaError(f"{output}: could not be written whole")
-    except (OSError, ValueError, IndexError) as error:
-        if isinstance(error, MediaError):
-            raise
-        raise MediaError(f"{output}: cannot be written ({getattr(error, 'strerror', None) or error})") from None
+    except (OSError, ValueError, IndexError, av.error.FFmpegError) as error:
+        raise _unwritten(output, error) from None
+
+
+def _unwritten(path: Path, error: Exception) -> MediaError:
+    return MediaError(f"{path}: cannot be written ({getattr(error, 'strerror', None) or error})")

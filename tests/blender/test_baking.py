@@ -1,17 +1,19 @@
 """Baking: an effect as files that an ordinary strip shows, and the effect again."""
 
+import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
+import OpenImageIO
 import pytest
 from support import noise_film, picture_of, read_picture, sequencer
 
-from shutter_addon.blender.data import selection, strips
-from shutter_addon.blender.editing import baked_strips, lifecycle
-from shutter_addon.blender.output import baked_film
+from shutter_addon.blender.data import effect_version, selection, strips
+from shutter_addon.blender.editing import add_effect, baked_strips, lifecycle
+from shutter_addon.blender.output import bake_job, baked_film
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core import revision
 from shutter_addon.core.frames import light
@@ -330,3 +332,163 @@ def test_the_baked_strip_looks_as_the_effect_strip(bpy, film, tmp_path):
     assert np.abs(after - before).max() < 1e-4
     bpy.ops.shutter.unbake()
     assert (rendered(bpy, scene, tmp_path / "again", shown) == before).all()
+
+
+@pytest.mark.parametrize("change", ["location", "weight"])
+def test_keys_that_moved_along_are_no_change_and_others_are(bpy, film, change):
+    """Between keys Blender gives other floats at other frames."""
+    scene, effect, strip = film()
+    owner, name = (effect.regions[0], "location") if change == "location" else (effect.shutters[0].bars[1], "weight")
+    for frame, value in ((1, 0.1), (4, 0.73), (9, 0.31)):
+        setattr(owner, name, (value, 0) if change == "location" else value)
+        owner.keyframe_insert(name, frame=frame)
+    bake(bpy)
+    assert states(scene, effect, strip) == [False]
+    for each in scene.sequence_editor.strips:
+        each.content_start += 1007
+    lifecycle.update()
+    assert states(scene, effect, strip) == [False]
+    point = scene.animation_data.action.layers[0].strips[0].channelbags[0].fcurves[0].keyframe_points[1]
+    point.handle_right[0] += 0.5
+    assert states(scene, effect, strip) == [True]
+
+
+def test_names_are_no_change(bpy, film):
+    scene, effect, strip = film()
+    bake(bpy)
+    effect.shutters[1].name, effect.shutters[0].color = "another", (1, 0, 0)
+    effect.regions[0].shutter = "another"
+    effect.regions[0].name = strip.name = "name"
+    assert states(scene, effect, strip) == [False]
+
+
+def test_a_longer_strip_is_stale(bpy, film):
+    scene, effect, strip = film()
+    strip.right_handle = 6
+    baked = bake(bpy)
+    strip.right_handle = baked.right_handle = 10
+    assert states(scene, effect, strip) == [True]
+
+
+def test_any_retouched_frame_is_a_change(bpy, film, tmp_path):
+    """Of a file that is read in blocks where there are many."""
+    scene, effect, strip = film()
+    before = baked_film.film_of(scene, effect, strip, "OPEN_EXR").version
+    rows = np.random.default_rng(5).integers(0, 256, (180, 320, 3), dtype=np.uint8)
+    path = tmp_path / "in" / "f0004.png"
+    output = OpenImageIO.ImageOutput.create("png")
+
+    def write(picture):
+        output.open(str(path), OpenImageIO.ImageSpec(320, 180, 3, "uint8"))
+        output.write_image(picture)
+        output.close()
+
+    write(rows)
+    revision.changed()
+    first = effect_version.key(scene, effect, strip, effect_version.frames_of(strip))
+    rows[90, 160] ^= 128
+    write(rows)
+    assert first not in (before, effect_version.key(scene, effect, strip, effect_version.frames_of(strip)))
+
+
+def test_what_lies_above_stays_above(bpy, film, tmp_path):
+    """A title above the effect, with room above it alone."""
+    scene, _effect, strip = film()
+    title = scene.sequence_editor.strips.new_effect("title", "COLOR", strip.channel + 1, 1, length=COUNT)
+    title.color, title.blend_type, title.transform.scale_x = (0, 1, 0), "ALPHA_OVER", 0.5
+    scene.sequence_editor.channels[strip.channel + 2].mute = True
+    before, channel = rendered(bpy, scene, tmp_path / "effect", (4,)), strip.channel
+    baked = bake(bpy)
+    assert np.abs(rendered(bpy, scene, tmp_path / "baked", (4,)) - before).max() < 1e-4
+    assert (baked.channel, title.channel, strip.channel) == (channel, channel + 1, channel + 3)
+    bpy.ops.shutter.unbake()
+    assert strip.channel == channel
+    assert (rendered(bpy, scene, tmp_path / "again", (4,)) == before).all()
+
+
+def test_half_of_a_cut_effect_is_baked_again(bpy, film, tmp_path):
+    scene, _effect, strip = film()
+    before = rendered(bpy, scene, tmp_path / "effect", (3, 7))
+    baked = bake(bpy)
+    source = next(each for each in scene.sequence_editor.strips if each.name == "images")
+    for each in (baked, strip, source):
+        each.split(5, "SOFT")
+    part = next(each for each in scene.sequence_editor.strips if each.type == "SCENE" and each != strip)
+    selection.choose(scene, part)
+    bake(bpy)
+    assert len(baked_in(scene)) == 2
+    assert np.abs(rendered(bpy, scene, tmp_path / "baked", (3, 7)) - before).max() < 1e-4
+
+
+def test_modifiers_go_along(bpy, film, tmp_path):
+    scene, _effect, strip = film()
+    strip.modifiers.new("bright", "BRIGHT_CONTRAST").bright = 20
+    before = rendered(bpy, scene, tmp_path / "effect", (4,))
+    bake(bpy)
+    assert np.abs(rendered(bpy, scene, tmp_path / "baked", (4,)) - before).max() < 1e-4
+
+
+@pytest.mark.parametrize("owner", ["strobe", "input"])
+def test_what_cannot_stand_in_is_refused(bpy, film, owner):
+    scene, _effect, strip = film()
+    if owner == "strobe":
+        strip.strobe = 3
+        said = "is retimed, strobed or reversed itself"
+    else:
+        scene.sequence_editor.strips.new_effect("blur", "GAUSSIAN_BLUR", 5, 1, length=COUNT, input1=strip)
+        said = "is the input of another strip"
+    with pytest.raises(RuntimeError, match=said):
+        bpy.ops.shutter.bake(file_format="OPEN_EXR")
+    assert not strip.mute
+
+
+def test_an_effect_beside_a_visible_one_is_unbaked(bpy, film):
+    scene, effect, strip = film()
+    bake(bpy)
+    source = scene.sequence_editor.strips.new_image("other", str(Path(bpy.data.filepath).parent / "in/f0001.png"), 8, 1)
+    source.right_handle = COUNT + 1
+    _strip, other = add_effect.add_effect(scene, source)
+    other_name = other.name
+    selection.choose(scene, baked_in(scene)[0])
+    assert selection.active(bpy.context)[1].name == effect.name != other_name
+    assert bpy.ops.shutter.unbake() == {"FINISHED"}
+    assert not strip.mute
+
+
+def test_a_transparent_source_stays_muted_below_what_was_baked_of_it(bpy, film, tmp_path):
+    scene, _effect, strip = film(4)
+    bake(bpy)
+    before = rendered(bpy, scene, tmp_path / "baked", (4,))
+    scene.sequence_editor.strips.remove(strip)
+    lifecycle.update()
+    assert (rendered(bpy, scene, tmp_path / "left", (4,)) == before).all()
+
+
+def test_a_copy_of_a_killed_bake_goes(bpy, film, tmp_path):
+    scene, effect, strip = film()
+    left = tmp_path / "edit.bake-00000000.blend"
+    left.write_bytes(b"")
+    os.utime(left, (0, 0))
+    job = bake_job.start(scene, effect, strip, baked_film.film_of(scene, effect, strip, "OPEN_EXR"))
+    try:
+        assert not left.exists()
+        assert job.copy.exists()
+        assert job.process.wait(60) == 0
+        assert job.failure() is None
+        assert job.done() == COUNT
+    finally:
+        job.end()
+    assert not list(tmp_path.glob("*.bake-*"))
+
+
+def test_a_job_tells_why_it_failed(bpy, film, tmp_path):
+    scene, effect, strip = film()
+    film_ = baked_film.film_of(scene, effect, strip, "OPEN_EXR")
+    (tmp_path / baked_film.FOLDER).write_bytes(b"")
+    job = bake_job.start(scene, effect, strip, film_)
+    try:
+        assert job.process.wait(60) == 2
+        assert baked_film.FOLDER in job.failure()
+        assert not job.failure().startswith("Virtual Shutter")
+    finally:
+        job.end()

@@ -4,8 +4,9 @@ and its files in the file system. What is baked has the key of what it was made 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from numbers import Number
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,10 @@ import numpy as np
 
 from ...core.messages import UserError
 from ...media import MediaError, inbetween_cache
-from . import colour_configuration, snapshot, strips, versions
+from ...media.sequence import ImageFiles
+from . import colour_configuration, fcurves, geometry, snapshot, strips, versions
 
-_BLOCKS = 1 << 16  # bytes of a file above which blocks of it are read, and not all
+_FEW, _BLOCKS = 256, 1 << 16  # of more files than these, blocks are read, where they have more bytes
 # Fields that hold timeline frames: they count from the effect strip's origin. In mappings the keys are frames, in
 # sequences of pairs the first of each.
 _FRAMES = {
@@ -23,6 +25,7 @@ _FRAMES = {
     "Keys": {"frames"},
     "Bars": {"keys"},
     "Drawings": {"frames"},
+    "FileFrames": {"first"},
     "StripTiming": {"content_start", "content_end"},
 }
 # Fields that say nothing of the pictures: names, where a strip was cut, when a file was written.
@@ -31,7 +34,13 @@ _LEFT_OUT = {
     "SourceSpec": {"key"},
     "MatteFile": {"stamp"},
     "CarriedFile": {"folder"},
+    "Shutter": {"name", "color"},
+    "Region": {"name"},
+    "MatteRegion": {"name"},
+    "OutlineRegion": {"name"},
+    "Drawings": {"name"},
 }
+_POINTS = ("co", "handle_left", "handle_right")
 
 
 def frames_of(strip) -> range:
@@ -44,16 +53,39 @@ def key(scene, effect, strip, frames: range) -> str:
     """16 hexadecimal digits; frames: as frames_of. EffectError, MediaError: the effect cannot be shown."""
     start = round(strips.origin(strip))
     taken = snapshot.take(scene, effect, strip, [start + frame for frame in frames])
-    return of_snapshot(taken, start, frames)
-
-
-def of_snapshot(taken: snapshot.Snapshot, start: int, frames: range) -> str:
-    """As `key`, of the effect at `frames` after the timeline frame `start`."""
     digest = _Digest(start)
     size = None if taken.inbetween is None else (taken.inbetween.factor, taken.inbetween.method)
     parts = taken.effect, taken.timing, taken.source, size, (frames.start, frames.stop)
     digest.add((versions.extension(), colour_configuration.name(), *parts))
+    digest.add(_curves(scene, f"{effect.path_from_id()}.", start))
+    if placed := _curves(scene, f"{strip.path_from_id()}.transform.", start):
+        keyed = {path for path, *_ in placed}
+        digest.add([placed, [getattr(strip.transform, name) for name in geometry.TRANSFORM if name not in keyed]])
     return digest.hexadecimal[:16]
+
+
+def _curves(scene: Any, path: str, start: int) -> list[tuple]:
+    """The F-curves below a path, as plain data."""
+    found = fcurves.curves_under(scene, path)
+    return sorted(((curve.data_path.removeprefix(path), *_curve(curve, start)) for curve in found), key=lambda c: c[:2])
+
+
+def _curve(curve: Any, start: int) -> tuple:
+    """An F-curve, its frames from `start` on; these are rounded, as floats of other frames are others."""
+    points = np.empty((len(_POINTS), len(curve.keyframe_points), 2), np.float32)
+    for name, values in zip(_POINTS, points, strict=True):
+        flat = np.empty(values.size, np.float32)
+        curve.keyframe_points.foreach_get(name, flat)
+        values[:] = flat.reshape(values.shape)
+    points[..., 0] = np.round(points[..., 0] - start, 2) + 0.0
+    kinds = tuple((p.interpolation, p.easing, p.amplitude, p.back, p.period) for p in curve.keyframe_points)
+    changes = tuple((each.type, each.mute, repr(_plain(each))) for each in curve.modifiers)
+    return curve.array_index, curve.mute, curve.extrapolation, points, kinds, changes
+
+
+def _plain(modifier: Any) -> list:
+    simple = (prop for prop in modifier.bl_rna.properties if prop.type in ("INT", "FLOAT", "BOOLEAN", "ENUM"))
+    return [(prop.identifier, str(getattr(modifier, prop.identifier))) for prop in simple]
 
 
 class _Digest:
@@ -75,7 +107,7 @@ class _Digest:
             self._feed(value.dtype.str, value.shape)
             self._hash.update(np.ascontiguousarray(value).tobytes())
         elif isinstance(value, Path):
-            self._feed(_content(value))
+            self._feed(_content(value, inbetween_cache.WHOLE))
         elif is_dataclass(value):
             self._add_fields(value)
         elif isinstance(value, Mapping):
@@ -90,22 +122,38 @@ class _Digest:
     def _add_all(self, values: Iterable) -> None:
         values = list(values)
         self._feed(len(values))
+        if values and all(isinstance(value, Path) for value in values):
+            values = [_content(path, inbetween_cache.WHOLE if len(values) <= _FEW else _BLOCKS) for path in values]
         for value in values:
             self.add(value)
 
     def _add_fields(self, value: Any) -> None:
         name = type(value).__name__
         self._feed(name)
+        if name == "Samples" and all(map(_is_number, value.values.values())):
+            # Where they come from is known by their curve; of it Blender gives other floats at other frames.
+            first = next(iter(value.values.values()))
+            self.add(np.round(np.asarray(first, np.float64), 5) + 0.0)
+            return
         for field in fields(value):
             if field.name in _LEFT_OUT.get(name, ()):
                 continue
             content = getattr(value, field.name)
             if name == "SourceSpec" and field.name == "options":
                 content = {option: each for option, each in content.items() if option != "config"}
+            if name == "MatteFile" and field.name == "files":
+                content = _files(value.path, content)
             if field.name in _FRAMES.get(name, ()):
                 content = _shifted(content, -self._start)
             self._feed(field.name)
             self.add(content)
+
+
+def _is_number(value: Any) -> bool:
+    """Whether it is a number, or several."""
+    if isinstance(value, tuple | list):
+        return all(map(_is_number, value))
+    return isinstance(value, Number | np.ndarray)
 
 
 def _shifted(value: Any, by: float) -> Any:
@@ -117,8 +165,18 @@ def _shifted(value: Any, by: float) -> Any:
     return value if value is None else float(value + by)
 
 
-def _content(path: Path) -> str:
+def _files(path: Path, files: Sequence | None) -> list[Path]:
+    """The files of a matte; files: as it names them."""
+    if files is not None:
+        return [path.parent / file for file in files]
     try:
-        return inbetween_cache.content_digest(path, _BLOCKS).hex()
+        return ImageFiles(path).files
+    except MediaError:  # it is a movie, or whoever reads it is told
+        return [path]
+
+
+def _content(path: Path, whole: int) -> str:
+    try:
+        return inbetween_cache.content_digest(path, whole).hex()
     except MediaError as error:
         return f"missing: {error}"

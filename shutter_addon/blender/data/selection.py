@@ -26,6 +26,8 @@ def active(context):
     """Scene, effect and effect strip that the interface shows and changes: those that are seen, or where none are,
     those of the active strip, which may be the source as well. None: that has no effect, or nothing has."""
     scene, strip = scene_of(context), active_strip(context)
+    if strip is not None and (baked := _baked_part(scene, strip)) is not None:
+        return baked
     effects = _effects_of(scene, strip)
     if strip is not None and not effects:
         return None
@@ -83,23 +85,21 @@ def why_unseen(scene, strip) -> str:
 
 
 def _effects_of(scene, strip) -> list:
-    """The effects of the source that a strip is, or whose effect it shows; of a baked strip, what it was baked of."""
+    """The effects of the source that a strip is, or whose effect it shows."""
     if strip is None:
         return []
-    if baked := baked_effect(scene, strip):
-        return [baked]
     own = effect_of(scene, strip.scene) if strip.type == "SCENE" and strip.scene else None
     identity = own.source if own else strip.virtual_shutter_source
     return [effect for effect in scene.virtual_shutter.effects if effect == own or effect.source == identity != ""]
 
 
-def baked_effect(scene, strip):
-    """The effect that a baked strip shows, or None."""
-    if strip.type == "SCENE":
-        return None
+def _baked_part(scene, strip):
+    """Scene, effect and effect strip of a strip that belongs to a bake, or None. Of several the one with which it
+    shares frames: copies have the same identity."""
     parts = [part for part in of_bake(scene, strip) if part.type == "SCENE" and part.scene]
-    parts.sort(key=lambda part: not overlap(part, strip))  # a copy has the same identity
-    return next((effect for part in parts if (effect := effect_of(scene, part.scene))), None)
+    parts.sort(key=lambda part: (part != strip, not overlap(part, strip)))
+    shown = ((effect_of(scene, part.scene), part) for part in parts)
+    return next(((scene, effect, part) for effect, part in shown if effect), None)
 
 
 def of_bake(scene, strip) -> list:

@@ -11,37 +11,63 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core.messages import EffectError
 from ...core.revision import UntilChange
 from ..data import effect_version, fcurves, selection, strips
 from ..output.baked_film import Film
 from ..rendering.effect_source import FAULTS
-from . import add_effect
+from . import add_effect, match_source
 
 _LOOK = ("blend_type", "blend_alpha")
 _CURVES = "transform.", "crop.", "blend_alpha", "color_multiply", "color_saturation"
+_CHANNELS = 128  # of Blender's sequencer
 _states = UntilChange()
 
 
+def check(scene: Any, strip: Any) -> None:
+    """EffectError: no film could stand in for an effect strip, and why."""
+    if match_source.effects_on(scene, strip):
+        sentence = rpt_('"{strip}" is the input of another strip, which would not show the baked one')
+        raise EffectError(sentence.format(strip=strip.name))
+    _channel(scene, strip)
+
+
 def lay(scene: Any, strip: Any, film: Film) -> Any:
-    """Puts a finished film above the effect strip that it was baked of, and mutes that; the new strip. That of an older
-    bake goes."""
-    _remove_baked(scene, strip)
+    """Puts a finished film in the place of the effect strip that it was baked of, and mutes that; the new strip. That
+    of an older bake goes. EffectError: there is no room for it. RuntimeError: Blender cannot read the film."""
     level = (strip.parent_meta() or scene.sequence_editor).strips
-    taken = {other.channel for other in level if selection.overlap(other, strip)}
-    channel = next(c for c in range(strip.channel + 1, strip.channel + len(taken) + 2) if c not in taken)
-    start = round(strips.origin(strip)) + film.frames.start
+    older = [baked for baked in baked_of(scene, strip) if selection.overlap(baked, strip)]
+    start, channel = round(strips.origin(strip)) + film.frames.start, _channel(scene, strip)
+    if any(strip.channel < each.channel < channel and selection.overlap(each, strip) for each in {*level} - {*older}):
+        strip.channel, channel = channel, strip.channel  # what lies above the effect has to lie above its film
     baked = _new_strip(level, f"{strip.name} Baked", film, channel, start)
     baked.left_handle, baked.right_handle = strip.left_handle, strip.right_handle
+    for other in older:
+        level.remove(other)
     add_effect.copy_look(strip, baked)
     for name in _LOOK:
         setattr(baked, name, getattr(strip, name))
     _copy_curves(scene, strip, baked)
-    _note(strip, baked, film)
+    match_source.append_modifiers(scene, strip, baked)
     strip.mute = True
+    _note(strip, baked, film)
     baked.color_tag = strip.color_tag
     add_effect.connect(scene, [baked, strip, *strip.connections])
     return baked
+
+
+def _channel(scene: Any, strip: Any) -> int:
+    """The first channel above an effect strip that has room beside it, and is not muted. EffectError: there is none."""
+    owner = strip.parent_meta() or scene.sequence_editor
+    taken = {other.channel for other in owner.strips if selection.overlap(other, strip)}
+    for channel in range(strip.channel + 1, _CHANNELS + 1):
+        if channel not in taken and not owner.channels[channel].mute:
+            return channel
+    raise EffectError(
+        rpt_('above "{strip}" there is no channel with room for the baked strip').format(strip=strip.name)
+    )
 
 
 def _new_strip(level: Any, name: str, film: Film, channel: int, start: int) -> Any:
@@ -77,11 +103,11 @@ def _note(strip: Any, baked: Any, film: Film) -> None:
 
 
 def baked_of(scene: Any, strip: Any) -> list:
-    """The baked strips, or their parts, above an effect strip and all that it was cut into. Copies that were moved
-    elsewhere are none of them."""
-    below = effect_parts(scene, strip)
+    """The baked strips, or their parts, of an effect strip and all that it was cut into: those that begin with it.
+    Copies that were moved elsewhere are none of them."""
+    start = round(strips.origin(strip))
     parts = [other for other in selection.of_bake(scene, strip) if other.type in strips.SOURCES]
-    return [part for part in parts if any(selection.overlap(part, other) for other in below)]
+    return [part for part in parts if round(strips.origin(part)) - part.virtual_shutter_bake.first == start]
 
 
 def effect_parts(scene: Any, strip: Any) -> list:
@@ -91,27 +117,38 @@ def effect_parts(scene: Any, strip: Any) -> list:
 
 def unbake(scene: Any, strip: Any) -> None:
     """Removes what is baked of an effect strip, and shows the effect again. Files stay."""
-    _remove_baked(scene, strip)
-    for part in effect_parts(scene, strip):
+    parts, channels = effect_parts(scene, strip), []
+    for baked in baked_of(scene, strip):
+        channels.append(baked.channel)
+        (baked.parent_meta() or scene.sequence_editor).strips.remove(baked)
+    for part in parts:
+        if channels and part.channel > min(channels):  # they had changed places
+            part.channel = min(channels)
         part.mute = False
         for name in ("version", "first", "count", "identity"):
             part.virtual_shutter_bake.property_unset(name)
-
-
-def _remove_baked(scene: Any, strip: Any) -> None:
-    for baked in baked_of(scene, strip):
-        (baked.parent_meta() or scene.sequence_editor).strips.remove(baked)
 
 
 def is_stale(scene: Any, effect: Any, strip: Any) -> bool:
     """Whether an effect has changed since its strip was baked: its pictures would be others. True as well where it has
     none any more."""
     bake = strip.virtual_shutter_bake
-    return _states.get((scene.session_uid, bake.identity), lambda: _current(scene, effect, strip) != bake.version)
+    return _states.get(_place(scene, effect, strip), lambda: _current(scene, effect, strip) != bake.version)
+
+
+def known_stale(scene: Any, effect: Any, strip: Any) -> bool | None:
+    """As is_stale, where that has been asked since something changed; None: it has not."""
+    return _states.known(_place(scene, effect, strip))
+
+
+def _place(scene: Any, effect: Any, strip: Any) -> tuple:
+    return scene.session_uid, effect.identity, strip.name
 
 
 def _current(scene: Any, effect: Any, strip: Any) -> str | None:
-    bake = strip.virtual_shutter_bake
+    bake, frames = strip.virtual_shutter_bake, effect_version.frames_of(strip)
+    if frames.start < bake.first or frames.stop > bake.first + bake.count:
+        return None  # it has become longer
     try:
         return effect_version.key(scene, effect, strip, range(bake.first, bake.first + bake.count))
     except FAULTS:

@@ -4,7 +4,7 @@ import uuid
 
 import bpy
 
-from ..data import annotations, fcurves, requirements, strips, undo
+from ..data import annotations, fcurves, requirements, selection, strips, undo
 from ..rendering import invalidation, render_job, sessions
 from . import copies, match_source, renamed_drawings, shown_annotations, undelete
 from .add_effect import add_camera
@@ -152,8 +152,14 @@ def _unmute_sources(scene) -> None:
     muted = [s for s in scene.sequence_editor.strips_all if s.virtual_shutter_muted] if scene.sequence_editor else []
     shown = strips.shown_sources(scene) if muted else ()
     for source in muted:
-        if source.name not in shown:
+        if source.name not in shown and not _is_baked_over(scene, source):
             source.mute = source.virtual_shutter_muted = False
+
+
+def _is_baked_over(scene, source) -> bool:
+    """Whether what was baked of its effect lies above a source, which would show through it."""
+    above = (s for s in scene.sequence_editor.strips_all if s.type in strips.SOURCES and s.channel > source.channel)
+    return any(s.virtual_shutter_bake.identity and selection.overlap(s, source) for s in above)
 
 
 def _remove_scenes(updated) -> None:

@@ -291,19 +291,26 @@ def copy_modifiers(effect) -> None:
     """Gives the effect's strips the modifiers of their sources that they lack, keys included."""
     scene = effect.id_data
     for part, source in parts(effect):
-        lacking, count = missing_modifiers(part, source), len(part.modifiers)
-        if not lacking:
+        if not (lacking := missing_modifiers(part, source)):
             continue
-        active, scene.sequence_editor.active_strip = scene.sequence_editor.active_strip, source
-        # Blender has an operator only, which takes all modifiers of the active strip.
-        with _selected(scene, [part]), bpy.context.temp_override(sequencer_scene=scene):
-            bpy.ops.sequencer.strip_modifier_copy(type="APPEND")
-        scene.sequence_editor.active_strip = active
-        for old, new in list(zip(source.modifiers, part.modifiers[count:], strict=True)):
-            if old in lacking:
-                fcurves.copy_curves(scene, f"{old.path_from_id()}.", scene, f"{new.path_from_id()}.")
-            else:
-                part.modifiers.remove(new)
+        append_modifiers(scene, source, part, lacking)
+
+
+def append_modifiers(scene, source, part, chosen: list | None = None) -> None:
+    """Gives a strip the modifiers of another one, keys included; chosen: these alone."""
+    if not source.modifiers:
+        return
+    count = len(part.modifiers)
+    active, scene.sequence_editor.active_strip = scene.sequence_editor.active_strip, source
+    # Blender has an operator only, which takes all modifiers of the active strip.
+    with _selected(scene, [part]), bpy.context.temp_override(sequencer_scene=scene):
+        bpy.ops.sequencer.strip_modifier_copy(type="APPEND")
+    scene.sequence_editor.active_strip = active
+    for old, new in list(zip(source.modifiers, part.modifiers[count:], strict=True)):
+        if chosen is None or old in chosen:
+            fcurves.copy_curves(scene, f"{old.path_from_id()}.", scene, f"{new.path_from_id()}.")
+        else:
+            part.modifiers.remove(new)
 
 
 def effects_on(scene, source) -> list:

@@ -6,6 +6,8 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
 from bpy.types import Operator
 
+from ...core import messages
+from ...core.messages import EffectError
 from ..data import selection, strips
 from ..editing import baked_strips
 from ..output import bake_job, baked_film, film_output
@@ -18,7 +20,13 @@ FORMATS = (
     ("OPEN_EXR", "OpenEXR", "A folder of pictures in full precision, which play more slowly"),
 )
 _running: list[bake_job.BakeJob] = []  # one at most
+_stopped: list[bake_job.BakeJob] = []  # that finish the frame they are at
 _failures: dict[str, str] = {}  # by the effect's identity: why its last bake failed
+
+
+def _is_baking() -> bool:
+    _stopped[:] = [job for job in _stopped if not job.is_over()]
+    return bool(_running or _stopped)
 
 
 class SHUTTER_OT_bake(OfEffect, Operator):
@@ -31,15 +39,17 @@ class SHUTTER_OT_bake(OfEffect, Operator):
 
     @classmethod
     def possible(cls, effect):
-        return not _running or refused(cls, rpt_("An effect is being baked"))
+        return not _is_baking() or refused(cls, rpt_("An effect is being baked"))
 
     def change(self, context, effect):
         scene, effect, strip = selection.active(context)
         _failures.pop(effect.identity, None)
+        baked_strips.check(scene, strip)
         film = baked_film.film_of(scene, effect, strip, self.file_format)
         try:
-            if bpy.app.background or film.is_finished():
+            if bpy.app.background:
                 baked_film.render(scene, effect, strip, film, lambda _done: None)
+            if film.is_finished():
                 baked_strips.lay(scene, strip, film)
                 return None
             _running.append(bake_job.start(scene, effect, strip, film))
@@ -74,9 +84,10 @@ class SHUTTER_OT_unbake(OfEffect, Operator):
     bl_options = UNDOABLE
 
     @classmethod
-    def possible(cls, effect):
-        parts = [strip for strip in strips.effect_strips(effect.id_data) if strip.scene == effect.scene]
-        is_baked = any(part.virtual_shutter_bake.identity for part in parts)
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        is_baked = bool(selection.active(context)[2].virtual_shutter_bake.identity)
         return is_baked or refused(cls, rpt_("The effect is not baked"))
 
     def change(self, context, effect):
@@ -92,8 +103,10 @@ def _look() -> float | None:
     redraw(bpy.context)
     if not job.is_over():
         if job.done():
-            job.copy.unlink(missing_ok=True)  # it has been read
+            job.drop_copy()
         return TICK
+    if bpy.app.is_job_running("RENDER") or any(window.modal_operators for window in _windows()):
+        return TICK  # a film is rendered of strips that would change, or a strip is being dragged
     try:
         if (failure := job.failure()) is None:
             failure = _lay(job)
@@ -104,23 +117,34 @@ def _look() -> float | None:
     return None
 
 
+def _windows() -> list:
+    return list(bpy.context.window_manager.windows)
+
+
 def _lay(job: bake_job.BakeJob) -> str | None:
-    """Puts a finished film where its effect strip is by now. A sentence: there is none any more."""
+    """Puts a finished film where its effect strip is by now. A sentence: there is none any more, or no room."""
     scene = next((scene for scene in bpy.data.scenes if scene.session_uid == job.scene), None)
-    strip = next((s for s in strips.effect_strips(scene) if s.name == job.strip), None) if scene else None
-    if strip is None or strip.scene.virtual_shutter.identity != job.effect:
+    parts = [s for s in strips.effect_strips(scene) if _identity(s) == job.effect] if scene else []
+    if not parts:
         return rpt_('the strip that was baked is gone; its film is "{path}"').format(path=job.film.place)
-    baked_strips.lay(scene, strip, job.film)
-    windows = bpy.context.window_manager.windows
-    with bpy.context.temp_override(window=windows[0]):
+    try:
+        baked_strips.lay(scene, next((part for part in parts if part.name == job.strip), parts[0]), job.film)
+    except (EffectError, RuntimeError) as error:
+        return messages.sentence(error)
+    with bpy.context.temp_override(window=_windows()[0]):
         bpy.ops.ed.undo_push(message=SHUTTER_OT_bake.bl_label)
     return None
+
+
+def _identity(strip) -> str:
+    return strip.scene.virtual_shutter.identity
 
 
 def stop() -> None:
     """Ends the bake that runs."""
     while _running:
-        _running.pop().end()
+        _stopped.append(job := _running.pop())
+        job.end()
 
 
 def forget() -> None:
@@ -158,14 +182,23 @@ class Bake(WithEffect):
 def _draw_state(layout, scene, effect, strip) -> None:
     if not baked_strips.baked_of(scene, strip):
         sentence(layout, iface_("The baked strip was deleted"), "ERROR")
-    elif baked_strips.is_stale(scene, effect, strip):
+    elif (is_stale := baked_strips.known_stale(scene, effect, strip)) is None:
+        if not bpy.app.timers.is_registered(_ask_whether_stale):  # beside drawing: it reads all of the effect
+            bpy.app.timers.register(_ask_whether_stale, first_interval=TICK)
+    elif is_stale:
         sentence(layout, iface_("The effect has changed since it was baked"), "ERROR")
     else:
         sentence(layout, iface_("Baked, and up to date"), "CHECKMARK")
 
 
+def _ask_whether_stale() -> None:
+    if (active := selection.active(bpy.context)) is not None:
+        baked_strips.is_stale(*active)
+        redraw(bpy.context)
+
+
 classes = SHUTTER_OT_bake, SHUTTER_OT_bake_stop, SHUTTER_OT_unbake
-TIMERS = (_look,)
+TIMERS = _look, _ask_whether_stale
 
 
 def unregister():

@@ -3,10 +3,13 @@ then."""
 
 from __future__ import annotations
 
+import glob
 import secrets
 import subprocess
 import sys
 import tempfile
+import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,9 +17,11 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core.messages import EffectError
+from ...core.messages import EffectError, signed
 from .baked_film import Film
 
+_ZSTD = b"\x28\xb5\x2f\xfd"  # how a compressed file begins
+_READ = 600  # seconds after which a copy has been read
 _ROOT = Path(__file__).parents[3]  # of the extension, or of the checkout
 _FORMATS = {"MOVIE": "movie", "OPEN_EXR": "exr"}  # as the command calls them
 
@@ -49,8 +54,8 @@ class BakeJob:
         """Why it failed, as a sentence, once it is over; None: the film is there."""
         if self.process.returncode == 0 and self.film.is_finished():
             return None
-        said = [line for line in self._said("err").splitlines() if line.strip()]
-        return said[-1].removeprefix("shutter: ") if said else rpt_("the bake ended without a word")
+        said = [line for line in self._said("err").splitlines() if line.startswith(signed(""))]
+        return said[-1].removeprefix(signed("")).strip() if said else rpt_("the bake ended without a word")
 
     def _said(self, stream: str) -> str:
         return Path(self.log.name, stream).read_text(encoding="utf-8", errors="replace")
@@ -59,18 +64,28 @@ class BakeJob:
         """Stops it, if it runs, and removes what it needed alone. Frames that are finished stay."""
         if not self.is_over():
             self.process.terminate()
-        self.copy.unlink(missing_ok=True)
+        self.drop_copy()
         self.log.cleanup()
+
+    def drop_copy(self) -> None:
+        """Removes the copy of the edit, once it has been read."""
+        with suppress(OSError):  # Windows keeps what is open
+            self.copy.unlink(missing_ok=True)
 
 
 def start(scene: Any, effect: Any, strip: Any, film: Film) -> BakeJob:
     """Begins to bake a film. EffectError, OSError: it cannot be begun."""
     edit = Path(bpy.data.filepath)
+    for left in edit.parent.glob(f"{glob.escape(edit.stem)}.bake-*.blend"):  # by a Blender that was killed
+        with suppress(OSError):
+            if time.time() - left.stat().st_mtime > _READ:
+                left.unlink()
     copy = edit.with_name(f"{edit.stem}.bake-{secrets.token_hex(4)}.blend")  # where the paths in it lead to the same
     try:
-        bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, compress=True, relative_remap=False)
+        bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, compress=_is_compressed(edit), relative_remap=False)
         log = tempfile.TemporaryDirectory(prefix="virtual_shutter_bake_", ignore_cleanup_errors=True)
-        words = ["bake", str(copy), "--scene", scene.name, "--strip", strip.name, "--format", _FORMATS[film.kind]]
+        # Names may begin with a dash.
+        words = ["bake", str(copy), f"--scene={scene.name}", f"--strip={strip.name}", f"--format={_FORMATS[film.kind]}"]
         with open(Path(log.name, "out"), "wb") as out, open(Path(log.name, "err"), "wb") as err:
             process = subprocess.Popen(
                 [*_command(), *words, "--output", str(film.place.parent)],
@@ -91,6 +106,15 @@ def start(scene: Any, effect: Any, strip: Any, film: Film) -> BakeJob:
         log=log,
         process=process,
     )
+
+
+def _is_compressed(edit: Path) -> bool:
+    """Whether a .blend file is: Blender writes the user's own as it was last told to, by a copy as well."""
+    try:
+        with edit.open("rb") as file:
+            return file.read(4) == _ZSTD
+    except OSError:
+        return False
 
 
 def _command() -> list[str]:

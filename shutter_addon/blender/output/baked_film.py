@@ -21,7 +21,7 @@ from ...core.farm import edit_version
 from ...core.messages import EffectError
 from ...core.stopping import StoppedError
 from ...media import film_parts, image_writing, rendered_pictures
-from ...media.completeness import is_whole_movie
+from ...media.completeness import is_whole_movie, is_whole_picture
 from ..data import colour_configuration, effect_version, snapshot, source_media, strips
 from ..rendering import pictures, render_context, render_settings
 from . import film_output
@@ -61,7 +61,7 @@ class Film:
         """Whether all of it is there; pictures are not decoded for that."""
         if self.kind == "MOVIE":
             return self.place.is_file() and is_whole_movie(self.place, len(self.frames))
-        return all(picture.is_file() for picture in self.pictures)
+        return all(picture.is_file() and is_whole_picture(picture) for picture in self.pictures)
 
 
 def film_of(scene: Any, effect: Any, strip: Any, kind: Kind, folder: Path | None = None) -> Film:
@@ -86,8 +86,10 @@ def default_folder() -> Path:
 
 def _check(scene: Any, effect: Any, strip: Any, kind: Kind) -> None:
     """EffectError: the strip's film would not be its picture."""
-    if getattr(strip, "retiming_keys", ()):
-        raise EffectError(rpt_('"{strip}" has retiming keys of its own: retime its source').format(strip=strip.name))
+    if getattr(strip, "retiming_keys", ()) or strip.strobe > 1 or strip.use_reverse_frames:
+        raise EffectError(
+            rpt_('"{strip}" is retimed, strobed or reversed itself: do that to its source').format(strip=strip.name)
+        )
     if kind != "MOVIE":
         return
     if package := film_parts.missing_package():
@@ -100,6 +102,8 @@ def _check(scene: Any, effect: Any, strip: Any, kind: Kind) -> None:
     with source_media.open_media(strips.source_of(scene, effect, strip)) as medium:
         if medium.alpha != "opaque":
             raise EffectError(rpt_("a movie has no transparency: bake to OpenEXR"))
+        if medium.transfer == "linear":
+            raise EffectError(rpt_("a movie has no light above white: bake to OpenEXR"))
 
 
 def render(scene: Any, effect: Any, strip: Any, film: Film, told: Callable[[int], object]) -> None:

@@ -1296,8 +1296,17 @@ MESSAGES = {
     ): "gebackene Bilder liegen neben der .blend-Datei: zuerst speichern",
     (
         "*",
-        '"{strip}" has retiming keys of its own: retime its source',
-    ): "„{strip}“ hat eigene Zeitkeys: stattdessen die Quelle umzeiten",
+        '"{strip}" is retimed, strobed or reversed itself: do that to its source',
+    ): "„{strip}“ ist selbst umgezeitet, stroboskopiert oder umgekehrt: das gehört an die Quelle",
+    (
+        "*",
+        '"{strip}" is the input of another strip, which would not show the baked one',
+    ): "„{strip}“ ist die Eingabe eines anderen Strips, der den gebackenen nicht zeigen würde",
+    (
+        "*",
+        'above "{strip}" there is no channel with room for the baked strip',
+    ): "über „{strip}“ ist kein Kanal mit Platz für den gebackenen Strip",
+    ("*", "a movie has no light above white: bake to OpenEXR"): "ein Film hat kein Licht über Weiß: zu OpenEXR backen",
     (
         "*",
         "the Python package {package} is missing, which movies need: bake to OpenEXR",
