@@ -18,6 +18,8 @@ from support import write_frames
 
 REPAIR, FIND = 8, 9  # the entries in the menu of regions
 MENU = 184  # where that is below four shutters, in pixels below the sidebar's upper edge
+FIELD = 210, 101  # of the readout in the panel of the last operation, to the right of where that opens, and below
+ADJUSTED = 30
 COUNT, SIZE, READOUT = 16, (360, 640), 0.6
 SHOWN = 10  # the pole is fastest here
 FILM = driver.OUT / "film"
@@ -90,6 +92,25 @@ def built():
     yield from driver.until(lambda: label() is None, "the in-between frames are built", 90)
 
 
+def adjusted():
+    """In the panel of the last operation, which opens at the pointer."""
+    region = story.preview()
+    driver.move(region, 60, 600)
+    yield 0.5
+    with driver.override("PREVIEW"):
+        bpy.ops.screen.redo_last("INVOKE_DEFAULT")
+    yield 1.0
+    driver.shot("last_operation")
+    driver.click(region, 60 + FIELD[0], 600 - FIELD[1], repeat=2)
+    yield 0.5
+    driver.key("ctrl+a")
+    driver.text("30")
+    driver.key("Return")
+    yield from driver.until(lambda: readout() == ADJUSTED, "the readout is another")
+    driver.key("Escape")
+    yield 0.5
+
+
 def told():
     yield from opened()
     yield from shown("1_skewed")
@@ -100,20 +121,15 @@ def told():
     yield from story.chosen_beside_draw(REPAIR, MENU)
     yield 1.0
     yield from shown("4_again")
-    driver.move(story.preview(), 300, 300)
-    yield 0.3
-    driver.key("F9")
-    yield 1.0
-    driver.shot("last_operation")
-    driver.key("Escape")
-    yield 0.5
+    yield from adjusted()
+    yield from shown("5_adjusted")
     for times in (1, 2, 3):  # the second repair, the in-between frames, the first repair
         driver.move(story.preview(), 300, 300)
         driver.key("ctrl+z")
         yield 1.5
         driver.saw(undone=times, readout=readout())
     yield from driver.until(lambda: not readout(), "it is undone")
-    yield from shown("5_undone")
+    yield from shown("6_undone")
 
 
 if __name__ == "__main__":

@@ -234,13 +234,15 @@ def test_a_rolling_shutter_is_repaired(backend, tmp_path):
     seen, console = tell("rolling_story.py", backend, linked(tmp_path), **given)
     assert "Traceback" not in console
     steps = {entry["step"]: entry for entry in seen if "step" in entry}
-    assert [(entry["factor"], entry["regions"]) for entry in steps.values()] == [("1", 0), *[("8", 1)] * 3, ("1", 0)]
+    assert [(entry["factor"], entry["regions"]) for entry in steps.values()] == [("1", 0), *[("8", 1)] * 4, ("1", 0)]
     for name in ("2_missing", "3_found", "4_again"):
         assert steps[name]["readout"] == pytest.approx(60, abs=2), name
     assert steps["2_missing"]["label"] == "Build"
     leans = {name: lean(crop(tmp_path, steps[name])) for name in steps if name != "2_missing"}
-    assert min(leans["1_skewed"], leans["5_undone"]) > 6
+    assert steps["5_adjusted"]["readout"] == 30
+    assert min(leans["1_skewed"], leans["6_undone"]) > 6
     assert max(leans["3_found"], leans["4_again"]) < 1
+    assert leans["5_adjusted"] == pytest.approx(leans["1_skewed"] / 2, abs=1)
 
 
 def lean(picture):
