@@ -5,6 +5,7 @@ import pytest
 from support import request, write_frames
 
 from shutter_addon.blender.data import consistency, selection
+from shutter_addon.core.model import limits
 from shutter_addon.core.pixels import compositor
 
 WIDTH, HEIGHT, COUNT = 160, 120, 16
@@ -113,6 +114,19 @@ def test_in_between_frames_that_are_there_stay(bpy, edited, factor):
     np.testing.assert_allclose(moments(strip, effect)[0], expected(0.6, "TOP"), atol=2e-6)
 
 
+def test_another_factor_keeps_it(bpy, edited):
+    from shutter_addon.blender.editing import rolling_shutter
+
+    strip, effect = edited()
+    call(bpy, side="TOP", readout=30)
+    effect.inbetween = "16"
+    assert rolling_shutter.of(effect) == (0, pytest.approx(0.3), "TOP")
+    call(bpy, side="TOP")
+    shown, count = moments(strip, effect)
+    np.testing.assert_allclose(shown, expected(0.3, "TOP"), atol=2e-6)
+    assert (count.max(), len(effect.regions)) == (2, 1)
+
+
 def test_of_footage_that_runs_backward(bpy, edit, edited):
     strip, effect = edited()
     edit.sequence_editor.strips["images"].use_reverse_frames = True
@@ -202,6 +216,39 @@ def test_a_readout_is_found_and_repaired(bpy, edited, share, reads, side):
     _strip, effect = edited(share, turned=reads == "COLUMNS")
     assert call(bpy, "find_readout", reads=reads) == {"FINISHED"}
     assert rolling_shutter.of(effect) == (0, pytest.approx(abs(share), rel=0.1), side)
+
+
+def test_what_is_found_again_changes_the_repair(bpy, edited):
+    """With in-between frames that are not built yet."""
+    from shutter_addon.blender.editing import rolling_shutter
+
+    _strip, effect = edited(0.4)
+    call(bpy, side="BOTTOM", readout=90)
+    assert call(bpy, "find_readout", reads="ROWS") == {"FINISHED"}
+    assert rolling_shutter.of(effect) == (0, pytest.approx(0.4, rel=0.1), "TOP")
+    assert (len(effect.shutters), len(effect.regions)) == (4, 1)
+
+
+def test_an_effect_without_a_shutter_gets_its_two(bpy, edited):
+    strip, effect = edited()
+    effect.shutters.clear()
+    call(bpy, side="TOP", readout=40)
+    assert [shutter.name for shutter in effect.shutters] == ["Earlier", "Later"]
+    np.testing.assert_allclose(moments(strip, effect)[0], expected(0.4, "TOP"), atol=2e-6)
+
+
+def test_where_nothing_more_fits_it_is_greyed_out(bpy, edited):
+    """A value that no effect can have is no traceback."""
+    _strip, effect = edited()
+    for _ in range(limits.MAX_REGIONS):
+        effect.regions.add()
+    assert not bpy.ops.shutter.rolling_shutter.poll()
+    effect.regions.clear()
+    assert bpy.ops.shutter.rolling_shutter.poll()
+    effect.inbetween, effect.position = "2", "CENTER"
+    call(bpy, side="TOP", readout=50)
+    effect["inbetween"] = 77
+    assert not bpy.ops.shutter.find_readout.poll()
 
 
 def test_where_it_cannot_be_found_one_sentence_says_so(bpy, edited):

@@ -24,7 +24,6 @@ from ..data import inbetween_settings, sampled, snapshot, source_media, strips, 
 from ..data.consistency import bars
 from ..data.fcurves import Curves
 from ..data.strip_timing import timing_of
-from ..rendering import effect_source
 from . import bar_edits, collection_edits, region_edits, shutter_edits
 
 # In-between frames where there are none: the first of these that there is room for.
@@ -89,7 +88,7 @@ def repair(scene: Any, effect: Any, strip: Any, share: float, side: str) -> None
     """Repairs the readout of an effect's source, or changes the repair that it has.
 
     share: as Repair.readout, 0 to 1; side: likewise
-    EffectError: there is no room for it, and nothing has changed. Else one of effect_source.FAULTS."""
+    EffectError: there is no room for it, and nothing has changed. MediaError: the footage cannot be read."""
     backward = _is_backward(scene, effect, strip)
     known = of(effect)
     if known is None:
@@ -153,8 +152,8 @@ def _begin(effect):
 
 
 def share_of(scene: Any, effect: Any, strip: Any, milliseconds: float) -> float:
-    """What share of the time from a filmed frame to the next a time is. EffectError: it is longer than that. Else one
-    of effect_source.FAULTS."""
+    """What share of the time from a filmed frame to the next a time is. EffectError: it is longer than that.
+    MediaError: the footage cannot be read."""
     with source_media.open_media(strips.source_of(scene, effect, strip)) as medium:
         rate = float(medium.fps or scene.render.fps / scene.render.fps_base)
     share = milliseconds * rate / 1000
@@ -166,13 +165,11 @@ def share_of(scene: Any, effect: Any, strip: Any, milliseconds: float) -> float:
 
 def find(scene: Any, effect: Any, strip: Any, side: str) -> tuple[readout.Readout, str]:
     """The readout of an effect's source, by what it shows around the current frame; and the side that is read first:
-    that one, or the one across. EffectError: it cannot be found, and why, or there is none. Else one of
-    effect_source.FAULTS."""
-    frame, step = scene.frame_current, inbetween_settings.factor(effect)
-    shown = snapshot.take(scene, effect, strip, (frame,))
-    with effect_source.open_source(shown) as source:
-        index = effect_source.source_index(shown, frame, source)[0] // step
-    with ShotSource(shown.source.open()) as medium:
+    that one, or the one across. EffectError: it cannot be found, and why, or there is none. MediaError: the footage
+    cannot be read."""
+    frame = scene.frame_current
+    index = snapshot.source_frames(scene, effect, strip, (frame,))[frame]
+    with ShotSource(source_media.open_media(strips.source_of(scene, effect, strip))) as medium:
         half = readout.FRAMES // 2
         low, high = max(index - half, 0), min(index + half, medium.count)
         shot = medium.around(index, low, high - 1)

@@ -5,10 +5,11 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty, FloatProperty
 from bpy.types import Operator
 
+from ...core.messages import EffectError
 from ..data import selection
 from ..data.choices import CONTEXT, READOUT_UNITS, READS, SIDES
 from ..editing import rolling_shutter
-from .operator_bases import OfEffect, has_room
+from .operator_bases import OfEffect, has_room, refused
 
 
 class _OfReadout(OfEffect):
@@ -16,8 +17,11 @@ class _OfReadout(OfEffect):
 
     @classmethod
     def possible(cls, effect):
-        if rolling_shutter.of(effect) is not None:
-            return True
+        try:
+            if rolling_shutter.of(effect) is not None:
+                return True
+        except EffectError as error:
+            return refused(cls, str(error))
         return has_room(cls, effect, "regions") and has_room(cls, effect, "shutters", 2)
 
 
