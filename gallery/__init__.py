@@ -8,6 +8,7 @@ NAMES = (
     "hands",
     "crowd",
     "rolling_shutter",
+    "rolling_repair",
     "light_trails",
     "empty_street",
     "one_stroke",

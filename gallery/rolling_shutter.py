@@ -22,12 +22,12 @@ def footage(folder: Path) -> Path:
     scenes.begin("#a9cdea", 0.8, samples=2)
     scenes.camera((0, -24, 1.75), (0, 0, 1.75), 36 * 24 / 9.6)
     scenes.lamp("SUN", 3.2, (-6, -9, 10), color="#fff1d6", size=0.03)
-    _street(scenes)
-    _car(scenes)
+    street(scenes)
+    car(scenes)
     return scenes.render_frames(folder, COUNT)
 
 
-def _street(scenes) -> None:
+def street(scenes) -> None:
     colors = "#2f3437", "#f3ead8", "#587a94", "#7a4a35"
     dark, cream, glass, door = (scenes.paint(color, 0.5) for color in colors)
     scenes.box((60, 40, 0.2), (0, -18, -0.1), scenes.paint("#5a5c61", 0.9))
@@ -46,7 +46,7 @@ def _street(scenes) -> None:
         scenes.tube((x, 2.3, 0), (x, 2.3, 0.5), 0.11, dark)
 
 
-def _car(scenes) -> None:
+def car(scenes) -> None:
     """A microbus that drives to the right, its wheels turning."""
     red, cream, glass = scenes.paint("#c8352b", 0.3), scenes.paint("#f5ecd7", 0.3), scenes.paint("#22323d", 0.15)
     dark, chrome = scenes.paint("#26282b", 0.8), scenes.paint("#d5d8da", 0.2, 1.0)

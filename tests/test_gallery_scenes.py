@@ -56,7 +56,9 @@ def test_a_stopped_render_goes_on(tmp_path):
     assert np.abs(first - last).max() > 0.1, "the ball has moved"
 
 
-@pytest.mark.parametrize("name", ["pendulum", "sphere", "displacement", "hands", "rolling_shutter", "light_trails"])
+@pytest.mark.parametrize(
+    "name", ["pendulum", "sphere", "displacement", "hands", "rolling_shutter", "rolling_repair", "light_trails"]
+)
 def test_a_scene_is_built_and_rendered(name, tmp_path):
     path = run(FIRST_FRAME, tmp_path, name).splitlines()[-1]
     picture = ImageBuf(path).get_pixels()[..., :3]

@@ -246,7 +246,7 @@ class Work(RuleBasedStateMachine):
     @rule(
         data=st.data(),
         late=st.booleans(),
-        name=st.sampled_from(["track", "track_camera", "panning_shot", "tripod"]),
+        name=st.sampled_from(["track", "track_camera", "panning_shot", "tripod", "rolling_shutter", "find_readout"]),
     )
     def track(self, data, late, name):
         from shutter_addon.blender.data import selection, strips

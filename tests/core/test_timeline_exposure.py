@@ -17,7 +17,7 @@ def exposed(bars, speed=1.0, direction=1, here=100.0, after=None, before=None, *
     before = here - direction * speed if before is None else before
     after = here + direction * speed if after is None else after
     options = Options(len(bars), **options)
-    return timeline_exposure.on_timeline(np.array(bars, float), options, direction, (before, here, after))
+    return timeline_exposure.on_timeline(np.array(bars, float), options, direction, np.array([before, here, after]))
 
 
 def test_half_open_at_eight_times_the_speed_is_four_frames():
@@ -60,6 +60,14 @@ def test_along_a_ramp_it_is_as_long_as_the_way_goes():
     # Four bars over one frame before the shown one's middle, four over two behind it.
     np.testing.assert_allclose(bars, [0, 0, 2, 3, 2, 1, 0, 0])
     assert bars.sum() == pytest.approx(8)
+
+
+def test_speed_that_changes_within_a_frame_counts():
+    """Half of a frame at one source frame, the other at three: half open, it is one."""
+    places = np.array([98.0, 99.0, 100.0, 101.0, 104.0])
+    bars, length = timeline_exposure.on_timeline(np.array(HALF, float), Options(8), 1, places)
+    assert length == pytest.approx(1)
+    np.testing.assert_allclose(bars, [4, 0, 0, 0, 0, 0, 0, 0], atol=1e-9)
 
 
 @pytest.mark.parametrize("position", ["start", "center", "end"])

@@ -228,6 +228,33 @@ def test_too_few_frames_for_a_streak(backend, tmp_path):
 
 
 @pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_a_rolling_shutter_is_repaired(backend, tmp_path):
+    """Found from the menu, the in-between frames by the note's button: the pole stands upright. Undone, it leans."""
+    given = {"packages": packages(tmp_path / "packages")}
+    seen, console = tell("rolling_story.py", backend, linked(tmp_path), **given)
+    assert "Traceback" not in console
+    steps = {entry["step"]: entry for entry in seen if "step" in entry}
+    assert [(entry["factor"], entry["regions"]) for entry in steps.values()] == [("1", 0), *[("8", 1)] * 4, ("1", 0)]
+    for name in ("2_missing", "3_found", "4_again"):
+        assert steps[name]["readout"] == pytest.approx(60, abs=2), name
+    assert steps["2_missing"]["label"] == "Build"
+    leans = {name: lean(crop(tmp_path, steps[name])) for name in steps if name != "2_missing"}
+    assert steps["5_adjusted"]["readout"] == 30
+    assert min(leans["1_skewed"], leans["6_undone"]) > 6
+    assert max(leans["3_found"], leans["4_again"]) < 1
+    assert leans["5_adjusted"] == pytest.approx(leans["1_skewed"] / 2, abs=1)
+
+
+def lean(picture):
+    """How far a red pole's middle goes from side to side in a picture, in pixels, in the middle of its rows."""
+    red = np.clip(picture[..., 0] - picture[..., 1:].max(axis=2) - 60, 0, None)
+    rows = np.flatnonzero(red.sum(axis=1) > 300)
+    rows = rows[len(rows) // 5 : -len(rows) // 5]
+    middles = (red[rows] * np.arange(red.shape[1])).sum(axis=1) / red[rows].sum(axis=1)
+    return np.ptp(middles)
+
+
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
 def test_what_is_needed_first_is_above_the_fold(backend, tmp_path):
     """In the default layout; the region's shutter is chosen there by the story. And no sentence beneath is cut."""
     given = {"packages": packages(tmp_path / "packages")}

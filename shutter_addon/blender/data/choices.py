@@ -165,5 +165,25 @@ LENGTHS = (
     ("MOTION", "Motion", "The shutter is open while what it follows moves by a set length; the bars are the shape"),
 )
 
+SIDES = (
+    ("TOP", "Top", "Rows are read downward, as most cameras do"),
+    ("BOTTOM", "Bottom", "Rows are read upward, as by a camera that hung upside down"),
+    ("LEFT", "Left", "Columns are read, from the left, as by a camera that was turned"),
+    ("RIGHT", "Right", "Columns are read, from the right, as by a camera that was turned"),
+)
+
+
+READS = (
+    ("ROWS", "Rows", "Upright lines lean as they move sideways"),
+    ("COLUMNS", "Columns", "Level lines lean as they move up and down: of a camera that was turned"),
+)
+
+
+READOUT_UNITS = (
+    ("PERCENT", "Percent", "Of the time from a filmed frame to the next"),
+    ("MILLISECONDS", "Milliseconds", "A time, as tables of cameras have it"),
+)
+
+
 # The renderer asks the F-curves itself: keys on these would show, and not render.
 UNKEYED: set[str] = set()

@@ -387,7 +387,11 @@ class _Sampling:
 
     @staticmethod
     def of(curves: Curves, effect, strip, frames: Frames) -> "_Sampling":
-        time = sampled.source_time(curves, effect.path_from_id(), effect, frames) if effect.use_source_time else None
+        moments, time = frames, None
+        if any(shutter.length == "TIMELINE" for shutter in effect.shutters):
+            moments = np.unique(np.add.outer(sorted(frames), (-0.5, 0, 0.5))).tolist()
+        if effect.use_source_time:
+            time = sampled.source_time(curves, effect.path_from_id(), effect, moments)
         return _Sampling(
             curves=curves,
             effect=effect,

@@ -89,6 +89,8 @@ class SHUTTER_MT_regions(Menu):
         layout.operator_menu_enum("shutter.ramp_add", "ramp", icon="IPO_EASE_IN_OUT")
         layout.separator()
         layout.operator_menu_enum("shutter.time_map", "ramp", icon="TIME")
+        layout.operator_menu_enum("shutter.rolling_shutter", "side", icon="CAMERA_DATA")
+        layout.operator_menu_enum("shutter.find_readout", "reads", icon="VIEWZOOM")
         layout.separator()
         layout.operator_menu_enum("shutter.region_take", "layer", icon="GREASEPENCIL")
 

@@ -32,39 +32,40 @@ def exposed(
     """The effect's state at a timeline frame, with the bars of those shutters whose length is the timeline's, and for
     how many frames they are open (FrameState.open_for).
 
-    position: where in the source, in frames, a timeline frame is; asked for the frame and those beside it
+    position: where in the source, in frames, a timeline frame is; asked for the frame, those beside it, and halfway to
+    these
     ends: the first and the last position that its strip shows"""
     chosen = [i for i, shutter in enumerate(effect.shutters) if shutter.timeline]
     if not chosen:
         return state
-    before, here, after = (position(at.frame + k) for k in (-1, 0, 1))
-    if before == here in ends:  # there a strip goes on with the same frame: it is no freeze
-        before = 2 * here - after
-    elif after == here in ends:
-        after = 2 * here - before
+    places = np.array([position(at.frame + k) for k in (-1, -0.5, 0, 0.5, 1)])
+    here = places[2]
+    if places[0] == here in ends:  # there a strip goes on with the same frame: it is no freeze
+        places[:2] = 2 * here - places[:2:-1]
+    elif places[4] == here in ends:
+        places[3:] = 2 * here - places[1::-1]
     bars, open_for = state.bars.copy(), dict(state.open_for)
     for index in chosen:
-        bars[index], open_for[index] = on_timeline(bars[index], state.options, at.direction, (before, here, after))
+        bars[index], open_for[index] = on_timeline(bars[index], state.options, at.direction, places)
     return replace(state, bars=bars, open_for=open_for)
 
 
-def on_timeline(
-    bars: np.ndarray, options: Options, direction: int, positions: tuple[float, float, float]
-) -> tuple[np.ndarray, float]:
+def on_timeline(bars: np.ndarray, options: Options, direction: int, positions: np.ndarray) -> tuple[np.ndarray, float]:
     """Bars (L,) of a window by those that are the shape of an exposure over a timeline frame, of the same sum; and how
     many frames it goes through, from its first open time to its last.
 
-    positions: in the source, in frames, of the timeline frame before, the shown one, and the next
+    positions: (n,), n odd, in the source, in frames, of the timeline frame before, the shown one in the middle, and the
+    next, evenly apart; even in between
     What the window does not reach is left out. By Options.position the exposure begins with the shown filmed frame, has
     its middle there, or ends with it."""
-    window, (before, here, after) = len(bars), positions
+    window, here = len(bars), positions[len(positions) // 2]
     begin, anchor = {
         "start": (0.0, 0.0),
         "center": (-0.5, options.step / 2),
         "end": (-1.0, float(options.step)),
     }[options.position]
     times = begin + np.arange(window + 1) / window
-    way = direction * (np.interp(times, (-1, 0, 1), (before, here, after)) - here)
+    way = direction * (np.interp(times, np.linspace(-1, 1, len(positions)), positions) - here)
     places = options.before + anchor + way
     found = np.zeros(window)
     if np.ptp(places) < _SHORTEST:

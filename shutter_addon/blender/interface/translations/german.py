@@ -563,6 +563,95 @@ MESSAGES = {
     ("*", "First"): "Erstes",
     ("*", "Last"): "Letztes",
     ("*", "Time Map"): "Zeitkarte",
+    # Rolling shutter
+    ("Operator", "Rolling Shutter Repair"): "Rolling Shutter ausgleichen",
+    (
+        "*",
+        "Show every row as it was when the middle one was filmed: straight, where a rolling shutter has skewed it",
+    ): "Jede Zeile so zeigen, wie sie war, als die mittlere gefilmt wurde, so dass gerade ist, was ein Rolling Shutter"
+    " verzerrt hat",
+    ("Virtual Shutter", "Read First"): "Zuerst gelesen",
+    (
+        "*",
+        "Side of the filmed picture that the sensor reads first",
+    ): "Seite des gefilmten Bildes, die der Sensor zuerst ausliest",
+    ("Virtual Shutter", "Top"): "Oben",
+    ("*", "Rows are read downward, as most cameras do"): "Zeilen werden abwärts gelesen, wie von den meisten Kameras",
+    ("Virtual Shutter", "Bottom"): "Unten",
+    (
+        "*",
+        "Rows are read upward, as by a camera that hung upside down",
+    ): "Zeilen werden aufwärts gelesen, wie von einer Kamera, die kopfüber hing",
+    ("Virtual Shutter", "Left"): "Links",
+    (
+        "*",
+        "Columns are read, from the left, as by a camera that was turned",
+    ): "Spalten werden von links gelesen, wie von einer Kamera, die gedreht war",
+    ("Virtual Shutter", "Right"): "Rechts",
+    (
+        "*",
+        "Columns are read, from the right, as by a camera that was turned",
+    ): "Spalten werden von rechts gelesen, wie von einer Kamera, die gedreht war",
+    ("Virtual Shutter", "Unit"): "Einheit",
+    ("*", "What the readout is counted in"): "Worin die Auslesezeit gezählt wird",
+    ("Virtual Shutter", "Percent"): "Prozent",
+    (
+        "*",
+        "Of the time from a filmed frame to the next",
+    ): "Der Zeit von einem gefilmten Bild zum nächsten",
+    ("Virtual Shutter", "Milliseconds"): "Millisekunden",
+    ("*", "A time, as tables of cameras have it"): "Eine Zeit, wie sie in Tabellen von Kameras steht",
+    ("*", "Readout"): "Auslesezeit",
+    (
+        "*",
+        "Time from the first row to the last, of that from a filmed frame to the next",
+    ): "Zeit von der ersten Zeile zur letzten, als Anteil der Zeit von einem gefilmten Bild zum nächsten",
+    (
+        "*",
+        "Time from the first row to the last, in milliseconds",
+    ): "Zeit von der ersten Zeile zur letzten, in Millisekunden",
+    ("Operator", "Find Readout"): "Auslesezeit finden",
+    (
+        "*",
+        "Find how long the sensor reads out, by lines that lean as they move around the current frame, and repair that",
+    ): "Finden, wie lange der Sensor ausliest, an Linien, die sich um den aktuellen Frame beim Bewegen neigen, und das"
+    " ausgleichen",
+    ("Virtual Shutter", "Reads"): "Liest",
+    ("*", "What the sensor reads one after the other"): "Was der Sensor nacheinander ausliest",
+    ("Virtual Shutter", "Rows"): "Zeilen",
+    ("*", "Upright lines lean as they move sideways"): "Senkrechte Linien neigen sich, wenn sie sich seitwärts bewegen",
+    ("Virtual Shutter", "Columns"): "Spalten",
+    (
+        "*",
+        "Level lines lean as they move up and down: of a camera that was turned",
+    ): "Waagrechte Linien neigen sich, wenn sie sich auf und ab bewegen: bei einer gedrehten Kamera",
+    (
+        "*",
+        "Readout of {percent} % of a frame, read first: {side}",
+    ): "Auslesezeit von {percent} % eines Bildes, zuerst gelesen: {side}",
+    ("*", "Earlier"): "Früher",
+    ("*", "Later"): "Später",
+    ("*", "Rolling Shutter"): "Rolling Shutter",
+    (
+        "*",
+        "in-between frames of {count} frames are too many: set Frames to {most} or fewer",
+    ): "Zwischenbilder von {count} Bildern sind zu viele: Bilder auf {most} oder weniger setzen",
+    (
+        "*",
+        "{time} ms is longer than a frame of the footage, {longest} ms",
+    ): "{time} ms sind länger als ein Bild des Filmmaterials, {longest} ms",
+    ("*", "the readout cannot be found here: {why}"): "die Auslesezeit lässt sich hier nicht finden: {why}",
+    ("*", "there are too few frames"): "es gibt zu wenige Bilder",
+    ("*", "too few straight lines go across the picture"): "zu wenige gerade Linien gehen durch das Bild",
+    ("*", "lines move too little, or always alike"): "Linien bewegen sich zu wenig oder immer gleich",
+    (
+        "*",
+        "lines do not lean as one readout would have them",
+    ): "Linien neigen sich nicht, wie eine einzige Auslesezeit es täte",
+    (
+        "*",
+        "lines stand upright however they move: there is no rolling shutter to repair",
+    ): "Linien bleiben gerade, wie sie sich auch bewegen: Es gibt keinen Rolling Shutter auszugleichen",
     ("*", "Region Specials"): "Regions-Spezialmenü",
     (
         "*",

@@ -1,0 +1,176 @@
+"""How close sped-up footage with *Length: Timeline* comes to what a camera films whose scene runs as much faster.
+
+    python scripts/timeline_truth.py [--output DIR] [--json FILE] [--size 320x180] [--samples 128] [--frames 5,6 …]
+
+Cycles renders the scene of scripts/truth.py as sharp footage, a moment a frame, that moves by up to four pixels from
+frame to frame. It is sped up by the recipe's source time, eight times, and along a ramp from 1 to 8, and exposed by a
+shutter of 180° whose length is the timeline's: through the sequencer, by `shutter render`. The truth is Cycles' own
+exposure, motion blur with a shutter of 0.5, of the same scene whose clock runs as fast as the footage does.
+
+Where both begin: *Position: Start* has the exposure begin with the shown frame, which is a moment, as Cycles' does with
+the shutter at START. Four frames of eight are open at full speed, which are four copies and no streak: with in-between
+frames at 8× they are 32. The rows "no in-betweens" are without, "bars" with *Length: Bars*.
+
+A white rod runs over black along the bottom, 4 pixels a frame of 320. The light of its streak has a second moment, of
+which the length of an evenly lit one comes, once the still rod's is taken off. Printed are SSIM (Wang et al. 2004) of
+8-bit sRGB, the mean difference in levels, and the length beside Cycles'. Needs Blender as a library (bpy).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from truth import ROOT, codes, compare, fail, place, read, stage
+
+from gallery import stills
+
+# Frames of truth.py's scene that a frame of the footage lasts, and the timeline's frames that it is sped up over.
+MOMENT, TIMELINE = 1 / 16, 6
+WINDOW = 8  # filmed frames
+ROD_WAY = 0.2  # a frame of the footage, of a picture 16 wide
+FIRST = -7.2  # where the rod begins
+
+
+def position(case: str, frame: float) -> float:
+    """Which frame of the footage, from 0, a frame of the timeline begins with, from 0."""
+    return 8 * frame if case == "eight times" else frame + 3.5 * frame**2 / TIMELINE
+
+
+CASES = {"eight times": "8*frame", "ramp": f"(frame+{3.5 / TIMELINE}*frame*frame)"}
+
+
+def filmed(size: tuple[int, int], clock: str = "frame") -> bpy.types.Scene:
+    """The scene, whose frame of the footage is what `clock` says of Blender's."""
+    scene = stage(*size)
+    rectangle = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    place(scene, "Night", [rectangle * (9, 0.6) + (0, -3.9)], [(0, 0, 0)] * 2, z="5")
+    place(scene, "Rod", [rectangle * (0.15, 1)], [(0.9, 0.9, 0.9)] * 2, x=f"{FIRST}+{ROD_WAY / MOMENT}*frame", y="-4.4",
+          z="6")  # fmt: skip
+    for thing in scene.objects:
+        for curve in thing.animation_data.drivers if thing.animation_data else ():
+            curve.driver.expression = curve.driver.expression.replace("frame", f"({MOMENT}*{clock})")
+    return scene
+
+
+def render(scene, file: Path, frame: int, samples: int, shutter: float = 0.0) -> Path:
+    scene.render.use_motion_blur, scene.render.motion_blur_shutter = shutter > 0, shutter or 1
+    scene.cycles.samples = samples
+    scene.frame_set(frame)
+    bpy.ops.render.render()
+    bpy.data.images["Render Result"].save_render(str(file), scene=scene)
+    return file
+
+
+def recipe(case: str, *, timeline: bool = True, inbetween: int = 8) -> dict:
+    """The recipe: time as it is keyed twice a frame of the timeline."""
+    window = WINDOW * inbetween
+    shutter = {"name": "180°", "bars": [1.0] * (window // 2) + [0.0] * (window // 2)}
+    keys = [{"frame": 1 + at / 2, "value": 1 + position(case, at / 2)} for at in range(2 * TIMELINE + 1)]
+    shutters = [shutter | ({"length": "timeline"} if timeline else {})]
+    said = {"version": 1, "window": window, "shutters": shutters, "regions": [], "time": keys}
+    return said | {"inbetween": inbetween, "inbetween_method": "good", "stop_at_cuts": False}
+
+
+def exposed(first: Path, said: dict, frames: list[int], folder: Path) -> list[np.ndarray]:
+    """Pictures (H, W, 3), scene-linear, that the command makes of the footage at frames of the timeline, from 0."""
+    folder.mkdir()
+    (folder / "recipe.json").write_text(json.dumps(said), encoding="utf-8")
+    command = [sys.executable, "-m", "shutter_addon", "render", str(first), "--recipe", str(folder / "recipe.json")]
+    command += ["--output", str(folder), "--format", "exr", "--cache", str(first.parent / "inbetween")]
+    for frame in frames:
+        done = subprocess.run([*command, "--frames", str(frame + 1)], cwd=ROOT, capture_output=True, text=True)
+        if done.returncode:
+            fail(done.stderr.strip())
+    return [read(folder / f"{frame + 1:04d}.exr") for frame in frames]
+
+
+def spread(picture: np.ndarray) -> float:
+    """The variance of the rod's light along its row, in pixels²."""
+    line = picture[round(picture.shape[0] * 0.89) : -1, :, 1].mean(axis=0)
+    x = np.arange(len(line))
+    middle = (line * x).sum() / line.sum()
+    return float((line * (x - middle) ** 2).sum() / line.sum())
+
+
+def length(picture: np.ndarray, still: np.ndarray) -> float:
+    """How long the rod's streak is, in pixels, beyond the rod's own width."""
+    return float(np.sqrt(max(12 * (spread(picture) - spread(still)), 0)))
+
+
+def measure(args, folder: Path) -> tuple[list[dict], np.ndarray]:
+    """A row for each case, frame and way, and the pictures side by side."""
+    scene = filmed(args.size)
+    count = 8 * (max(args.frames) + 1) + WINDOW + 1
+    for index in range(count):
+        render(scene, folder / f"{index + 1:04d}.exr", index, max(args.samples // 8, 16))
+    still = read(folder / "0002.exr")
+    ways = {"timeline": {}, "no in-betweens": {"inbetween": 1}, "bars": {"timeline": False}}
+    rows, strips = [], []
+    for case, clock in CASES.items():
+        scene = filmed(args.size, clock)
+        truths = [
+            render(scene, folder / f"{case}-{frame}.exr", frame, args.samples, shutter=0.5) for frame in args.frames
+        ]
+        made = {
+            way: exposed(folder / "0001.exr", recipe(case, **said), args.frames, folder / f"{case} {way}")
+            for way, said in ways.items()
+        }
+        for at, (frame, truth) in enumerate(zip(args.frames, map(read, truths), strict=True)):
+            speed = (position(case, frame + 0.5) - position(case, frame)) * 2
+            for way, pictures in made.items():
+                own, pixels = length(pictures[at], still), length(truth, still)
+                row = {"case": case, "frame": frame, "speed": speed, "picture": way, "length": own, "truth": pixels}
+                rows.append(row | compare(codes(truth), codes(pictures[at])))
+                print(WORDS.format(**rows[-1]), flush=True)
+            strips.append(_strip(f"{case}, frame {frame}", truth, made["timeline"][at], made["bars"][at]))
+    return rows, stills.sheet(*strips)
+
+
+WORDS = "| {case} | {frame} | {speed:.2f} | {picture} | {similarity:.4f} | {mean:.2f} | {length:.2f} | {truth:.2f} |"
+
+
+def _strip(text: str, *pictures: np.ndarray) -> np.ndarray:
+    texts = (f"{text}: Cycles", "Length: Timeline", "Length: Bars")
+    shown = [stills.labelled(codes(p) / np.float32(255), text) for p, text in zip(pictures, texts, strict=True)]
+    return stills.beside(*shown)
+
+
+def parse(arguments=None):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    add = parser.add_argument
+    add("--output", type=Path, default=ROOT / "out" / "timeline_truth", metavar="DIR", help="for timeline_truth.png")
+    add("--json", type=Path, metavar="FILE", help="where the rows are written")
+    add("--size", type=lambda text: tuple(map(int, text.split("x"))), default=(320, 180), metavar="WIDTHxHEIGHT")
+    add("--samples", type=int, default=256, help="for each pixel of Cycles' exposures")
+    add(
+        "--frames", type=lambda text: list(map(int, text.split(","))), default=[1, 3, 5], help="of the timeline, from 0"
+    )
+    args = parser.parse_args(arguments)
+    if not all(0 <= frame < TIMELINE for frame in args.frames):
+        parser.error(f"--frames: the timeline goes from 0 to {TIMELINE - 1}")
+    return args
+
+
+def main(arguments=None) -> None:
+    args = parse(arguments)
+    print("| case | frame | speed | picture | SSIM | mean | length | Cycles' |\n|---|---|---|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        rows, sheet = measure(args, Path(folder))
+    args.output.mkdir(parents=True, exist_ok=True)
+    stills.save(sheet, args.output / "timeline_truth.png")
+    if args.json:
+        args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

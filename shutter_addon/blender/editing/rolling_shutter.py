@@ -1,0 +1,185 @@
+"""Rolling Shutter Repair: a sensor that is read row by row films each row at a moment of its own, and each is shown
+from another one in turn, so that all of them show what was there when the middle row was read.
+
+A row that is read a part y of the readout after the first one is shown y - 1/2 of the readout earlier. Two shutters are
+open for a single frame each, as long before the shown one as behind it, and a ramp across the whole picture goes from
+the one to the other. By displacement its pixels' moments lie evenly in between. The ramp is larger than the picture, so
+that both moments are whole in-between frames, and what lies between two of these is of both its neighbours alone.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from bpy.app.translations import pgettext_data as data_
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...core.messages import EffectError
+from ...core.model import shutters
+from ...core.model.frame_state import Options
+from ...media import readout
+from ...media.cuts import ShotSource
+from ..data import inbetween_settings, sampled, snapshot, source_media, strips, validation
+from ..data.consistency import bars
+from ..data.fcurves import Curves
+from ..data.strip_timing import timing_of
+from . import bar_edits, collection_edits, region_edits, shutter_edits
+
+# In-between frames where there are none: the first of these that there is room for.
+FACTORS = 8, 4, 2
+FILMED = 3  # frames of the window, at least: the shown one and those beside it
+LEAST = 0.02  # of a frame: a readout that is shorter, and found, is none
+# How the ramp is turned, in degrees, so that what is read first is at its end, which is shown from later.
+_TURNS = {"TOP": 90, "BOTTOM": -90, "LEFT": 180, "RIGHT": 0}
+_OPPOSITE = {"TOP": "BOTTOM", "BOTTOM": "TOP", "LEFT": "RIGHT", "RIGHT": "LEFT"}
+
+# Sentences of media/readout.py, which are looked up where they are shown.
+FAULTS = (
+    n_("there are too few frames"),
+    n_("too few straight lines go across the picture"),
+    n_("lines move too little, or always alike"),
+    n_("lines do not lean as one readout would have them"),
+)
+
+
+class Repair(NamedTuple):
+    """What an effect repairs. region: the index of its ramp; readout: from the first to the last row, as a share
+    of the time from a filmed frame to the next; side: that is read first, a key of choices.SIDES"""
+
+    region: int
+    readout: float
+    side: str
+
+
+def of(effect) -> Repair | None:
+    """The repair that an effect has, however its shutters and its ramp are called; None: it has none."""
+    step = inbetween_settings.factor(effect)
+    if step == 1 or not effect.shutters:
+        return None
+    default = _moment(effect.shutters[0])
+    for index, region in enumerate(effect.regions):
+        place = effect.shutters.find(region.shutter)
+        if (region.kind, region.ramp) != ("RAMP", "LINEAR") or place <= 0:
+            continue
+        turn = round(math.degrees(region.rotation)) % 360
+        side = next((side for side, turned in _TURNS.items() if turned % 360 == turn), None)
+        span = _moment(effect.shutters[place]) - default
+        middle, near = default + span / 2, _shown(effect)
+        if side and 0 < abs(span) <= 2 * step and min(abs(middle - shown) for shown in near) < 0.6:
+            return Repair(index, abs(span) / step / abs(region.scale or 1), side)
+    return None
+
+
+def _moment(shutter) -> float:
+    """The middle of a shutter's open time, in bars from the middle of the first; none: it is never open."""
+    weights = bars(shutter)
+    return float((weights * np.arange(len(weights))).sum() / weights.sum()) if weights.any() else math.nan
+
+
+def _shown(effect) -> tuple[int, int]:
+    """The bar of the shown frame, where the source runs forward, and where it runs backward."""
+    step = inbetween_settings.factor(effect)
+    options = Options(validation.number(effect, "window"), position="center", step=step)
+    return options.before, options.before + step - 1
+
+
+def repair(scene: Any, effect: Any, strip: Any, share: float, side: str) -> None:
+    """Repairs the readout of an effect's source, or changes the repair that it has.
+
+    share: as Repair.readout, 0 to 1; side: likewise
+    EffectError: there is no room for it, and nothing has changed. MediaError: the footage cannot be read."""
+    backward = _is_backward(scene, effect, strip)
+    known = of(effect)
+    if known is None:
+        _check_room(effect)
+    _make_room(effect)
+    effect.position, effect.interpolation = "CENTER", "DISPLACEMENT"
+    step, shown = inbetween_settings.factor(effect), _shown(effect)[backward]
+    half = share * step / 2
+    reach = max(math.ceil(half), 1)
+    region = _begin(effect) if known is None else effect.regions[known.region]
+    region.rotation, region.scale = math.radians(_TURNS[side]), reach / half
+    region.location, region.opacity, region.invert, region.blend = (0, 0), 1.0, False, "OVER"
+    earlier, later = effect.shutters[0], effect.shutters[region.shutter]
+    for shutter, to in ((earlier, -reach), (later, reach)):
+        shutter.follow, shutter.length, shutter.combine = "NOTHING", "FRAMES", "AVERAGE"
+        place = shown - to if backward else shown + to
+        bar_edits.paint(effect, effect.shutters.find(shutter.name), np.eye(effect.window)[place])
+    effect.active_shutter = effect.shutters.find(later.name)
+    effect.active_region = list(effect.regions).index(region)
+
+
+def _is_backward(scene: Any, effect: Any, strip: Any) -> bool:
+    """Whether the source runs backward at the current frame: its next frames are those that were filmed before."""
+    frame = scene.frame_current
+    if effect.use_source_time:
+        time = sampled.source_time(Curves(scene), effect.path_from_id(), effect, (frame,))
+        return bool(time.at(frame)[1])
+    return bool(timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames)
+
+
+def _check_room(effect) -> None:
+    for collection, more in (("shutters", 2), ("regions", 1)):
+        if sentence := collection_edits.why_full(effect, collection, more):
+            raise EffectError(sentence)
+
+
+def _make_room(effect) -> None:
+    """Has the effect show in-between frames, if it has none, and the filmed frames on both sides of the shown one."""
+    step, window = inbetween_settings.factor(effect), validation.number(effect, "window")
+    filmed = max(-(-window // step), FILMED)
+    factor = step
+    if step == 1:
+        possible = [factor for factor in FACTORS if filmed * factor <= shutters.MAX_WINDOW]
+        if not possible:
+            sentence = rpt_("in-between frames of {count} frames are too many: set Frames to {most} or fewer")
+            raise EffectError(sentence.format(count=filmed, most=shutters.MAX_WINDOW // FACTORS[-1]))
+        factor = possible[0]
+    if window < FILMED * step:
+        effect.window = FILMED * step
+    if factor != step:
+        effect.inbetween = str(factor)
+
+
+def _begin(effect):
+    """The two shutters, the first of which is the default, and the ramp; which is returned."""
+    window = validation.number(effect, "window")
+    earlier = shutter_edits.add_shutter(effect, data_("Earlier"), np.eye(window)[0])
+    shutter_edits.move_shutter(effect, list(effect.shutters).index(earlier), 0)
+    later = shutter_edits.add_shutter(effect, data_("Later"), np.eye(window)[-1])
+    return region_edits.add_matte(effect, later, "RAMP", data_("Rolling Shutter"), ramp="LINEAR")
+
+
+def share_of(scene: Any, effect: Any, strip: Any, milliseconds: float) -> float:
+    """What share of the time from a filmed frame to the next a time is. EffectError: it is longer than that.
+    MediaError: the footage cannot be read."""
+    with source_media.open_media(strips.source_of(scene, effect, strip)) as medium:
+        rate = float(medium.fps or scene.render.fps / scene.render.fps_base)
+    share = milliseconds * rate / 1000
+    if share > 1:
+        sentence = rpt_("{time} ms is longer than a frame of the footage, {longest} ms")
+        raise EffectError(sentence.format(time=f"{milliseconds:g}", longest=f"{1000 / rate:.1f}"))
+    return share
+
+
+def find(scene: Any, effect: Any, strip: Any, side: str) -> tuple[readout.Readout, str]:
+    """The readout of an effect's source, by what it shows around the current frame; and the side that is read first:
+    that one, or the one across. EffectError: it cannot be found, and why, or there is none. MediaError: the footage
+    cannot be read."""
+    frame = scene.frame_current
+    index = snapshot.source_frames(scene, effect, strip, (frame,))[frame]
+    with ShotSource(source_media.open_media(strips.source_of(scene, effect, strip))) as medium:
+        half = readout.FRAMES // 2
+        low, high = max(index - half, 0), min(index + half, medium.count)
+        shot = medium.around(index, low, high - 1)
+        frames = range(max(low, shot.start), min(high, shot.stop))
+        try:
+            found = readout.of_source(medium, frames, columns=side in ("LEFT", "RIGHT"))
+        except readout.ReadoutError as error:
+            sentence = rpt_("the readout cannot be found here: {why}")
+            raise EffectError(sentence.format(why=rpt_(str(error)))) from None
+    if abs(found.share) < LEAST:
+        raise EffectError(rpt_("lines stand upright however they move: there is no rolling shutter to repair"))
+    first = "TOP" if side in ("TOP", "BOTTOM") else "LEFT"
+    return found, first if found.share > 0 else _OPPOSITE[first]

@@ -1,0 +1,107 @@
+"""Operators that repair what a rolling shutter has skewed, and find how long its readout is."""
+
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import EnumProperty, FloatProperty
+from bpy.types import Operator
+
+from ...core.messages import EffectError
+from ..data import selection
+from ..data.choices import CONTEXT, READOUT_UNITS, READS, SIDES
+from ..editing import rolling_shutter
+from .operator_bases import OfEffect, has_room, refused
+
+
+class _OfReadout(OfEffect):
+    """Needs room for what a repair adds, unless there is one."""
+
+    @classmethod
+    def possible(cls, effect):
+        try:
+            if rolling_shutter.of(effect) is not None:
+                return True
+        except EffectError as error:
+            return refused(cls, str(error))
+        return has_room(cls, effect, "regions") and has_room(cls, effect, "shutters", 2)
+
+
+class SHUTTER_OT_rolling_shutter(_OfReadout, Operator):
+    """Show every row as it was when the middle one was filmed: straight, where a rolling shutter has skewed it"""
+
+    bl_idname = "shutter.rolling_shutter"
+    bl_label = "Rolling Shutter Repair"
+
+    side: EnumProperty(
+        name="Read First",
+        description="Side of the filmed picture that the sensor reads first",
+        items=SIDES,
+        translation_context=CONTEXT,
+    )
+    unit: EnumProperty(
+        name="Unit",
+        description="What the readout is counted in",
+        items=READOUT_UNITS,
+        translation_context=CONTEXT,
+        options={"SKIP_SAVE"},
+    )
+    readout: FloatProperty(
+        name="Readout",
+        description="Time from the first row to the last, of that from a filmed frame to the next",
+        subtype="PERCENTAGE",
+        default=50.0,
+        min=1.0,
+        max=100.0,
+        options={"SKIP_SAVE"},
+    )
+    milliseconds: FloatProperty(
+        name="Readout",
+        description="Time from the first row to the last, in milliseconds",
+        default=15.0,
+        min=0.1,
+        max=1000.0,
+        soft_max=40.0,
+        options={"SKIP_SAVE"},
+    )
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "side")
+        layout.prop(self, "unit")
+        layout.prop(self, "readout" if self.unit == "PERCENT" else "milliseconds")
+
+    def change(self, context, _effect):
+        scene, effect, strip = selection.active(context)
+        known = rolling_shutter.of(effect)
+        if known is not None and not self.properties.is_property_set("readout"):
+            self.readout = 100 * known.readout  # from the menu, another side keeps it
+        share = self.readout / 100
+        if self.unit == "MILLISECONDS":
+            share = rolling_shutter.share_of(scene, effect, strip, self.milliseconds)
+        rolling_shutter.repair(scene, effect, strip, share, self.side)
+
+
+class SHUTTER_OT_find_readout(_OfReadout, Operator):
+    """Find how long the sensor reads out, by lines that lean as they move around the current frame, and repair that"""
+
+    bl_idname = "shutter.find_readout"
+    bl_label = "Find Readout"
+
+    reads: EnumProperty(
+        name="Reads",
+        description="What the sensor reads one after the other",
+        items=READS,
+        translation_context=CONTEXT,
+    )
+
+    def change(self, context, _effect):
+        scene, effect, strip = selection.active(context)
+        found, side = rolling_shutter.find(scene, effect, strip, "TOP" if self.reads == "ROWS" else "LEFT")
+        rolling_shutter.repair(scene, effect, strip, min(abs(found.share), 1.0), side)
+        name = next(name for word, name, _ in SIDES if word == side)
+        percent = round(100 * abs(found.share))
+        sentence = rpt_("Readout of {percent} % of a frame, read first: {side}")
+        self.report({"INFO"}, sentence.format(percent=percent, side=iface_(name, CONTEXT)))
+
+
+classes = (SHUTTER_OT_rolling_shutter, SHUTTER_OT_find_readout)

@@ -1,0 +1,269 @@
+"""How long a sensor reads out, by lines that lean as they move.
+
+A row at a height y of H is filmed y/H of the readout after the first one. So a line that the picture moves sideways by
+v pixels a frame leans by v · readout / H beside its own direction. Edges that are nearly upright are followed from
+frame to frame; how much each of them leans is held against its speed, with a direction of its own for each: what they
+have in common is the readout. Speeds have to change, therefore: what always moves alike may well lean by itself. No
+bpy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core import stopping
+from ..core.frames.frame_source import FrameSource
+from . import flow
+from .errors import MediaError, lacks_opencv
+
+try:
+    import cv2
+except ImportError:  # a package without wheels; the extension registers without it
+    cv2 = None
+
+ROWS = 540  # of the pictures that are looked at, at most
+FRAMES = 48  # one after the other, that are looked at
+# Of an edge: how long it is at least, in heights of the picture, how far it leans at most, and how many are followed.
+LONG, UPRIGHT, MOST = 0.1, 0.35, 60
+_ANEW = 6  # frames after which more edges are looked for
+_REACH, _NEAR = 6, 3  # pixels beside where an edge is expected, and beside where it was found then
+_STEEP = 6.0  # levels from one side of a pixel to the other, from which on there is an edge
+_SEEN, _OFF = 0.6, 1.0  # the share of an edge's rows where it has to be, and how far they may be off, in pixels
+# What has to be there to tell a readout: edges, frames of one, pixels a frame by which speeds differ, and how sure the
+# readout is then, as a share of a frame, or of itself.
+LINES, _SAMPLES, CHANGING = 3, 5, 0.7
+SURE, SURE_SHARE = 0.02, 0.1
+_LONGEST = 1.2  # of a frame: beyond it, it is none
+
+
+class ReadoutError(MediaError):
+    """It cannot be told, and why: a sentence, without its beginning, that is looked up where it is shown."""
+
+
+TOO_FEW_FRAMES = "there are too few frames"
+TOO_FEW_LINES = "too few straight lines go across the picture"
+TOO_LITTLE_MOTION = "lines move too little, or always alike"
+UNLIKE = "lines do not lean as one readout would have them"
+
+
+class Readout(NamedTuple):
+    """share: of the time from a filmed frame to the next, which the readout takes; below 0 where the last row is read
+    first; error: its standard error; lines: how many edges tell it"""
+
+    share: float
+    error: float
+    lines: int
+
+
+def of_source(source: FrameSource, indices: Sequence[int], *, columns: bool = False) -> Readout:
+    """The readout of a source, by FRAMES of its filmed frames at most, the middle ones of `indices`, which follow one
+    another in one shot. columns: the sensor reads column by column, from the left.
+
+    ReadoutError: it cannot be told. MediaError: the frames cannot be read, or OpenCV is missing."""
+    if cv2 is None:
+        raise lacks_opencv("the readout is found by")
+    first = max((len(indices) - FRAMES) // 2, 0)
+    chosen = indices[first : first + FRAMES]
+    source.want(chosen)
+    return of_pictures([_small(source, index, columns=columns) for index in chosen])
+
+
+def _small(source: FrameSource, index: int, *, columns: bool) -> np.ndarray:
+    stopping.check()
+    luma = flow.luma(source.read(index), source.transfer, source.alpha)
+    luma = np.ascontiguousarray(luma.T) if columns else luma
+    rows = min(ROWS, luma.shape[0])
+    return flow.resized(luma, (max(1, round(luma.shape[1] * rows / luma.shape[0])), rows))
+
+
+def of_pictures(pictures: Sequence[np.ndarray]) -> Readout:
+    """As of_source, of pictures (H, W) uint8 that follow one another."""
+    if len(pictures) < _SAMPLES + 2:
+        raise ReadoutError(TOO_FEW_FRAMES)
+    if min(pictures[0].shape) < flow.SMALLEST:
+        raise ReadoutError(TOO_FEW_LINES)
+    samples = [found for edge in _followed(pictures) if (found := edge.samples()) is not None]
+    if len(samples) < LINES:
+        raise ReadoutError(TOO_FEW_LINES)
+    return _fitted(samples, pictures[0].shape[0])
+
+
+@dataclass
+class _Edge:
+    """An edge by the rows that it goes through, as long as it is followed.
+
+    polarity: 1 where it is lighter on its right, −1 on its left; places: of each frame, where it is in its middle row
+    and how far it leans: pixels to the right from a row to the next"""
+
+    rows: np.ndarray
+    polarity: float
+    places: list[tuple[float, float]] = field(default_factory=list)
+    is_lost: bool = False
+
+    def samples(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Speeds and leans (n,), in pixels a frame and from row to row; None: there are too few."""
+        if len(self.places) < _SAMPLES + 2:
+            return None
+        x, lean = np.array(self.places).T
+        return _speeds(x)[1:-1], lean[1:-1]
+
+    def at(self, x: float, lean: float) -> np.ndarray:
+        """Where its rows are (n,)."""
+        return x + lean * (self.rows - self.rows.mean())
+
+
+def _speeds(x: np.ndarray) -> np.ndarray:
+    """Pixels a frame (n,) of what is at places (n,), along the natural cubic spline through them: of hands that shake,
+    differences of neighbours are too small by a fifth."""
+    of = 4 * np.eye(len(x)) + np.eye(len(x), k=1) + np.eye(len(x), k=-1)
+    of[[0, -1], [0, -1]] = 2
+    outer = np.pad(x, 1, mode="edge")
+    return np.linalg.solve(of, 3 * (outer[2:] - outer[:-2]))
+
+
+def _followed(pictures: Sequence[np.ndarray]) -> list[_Edge]:
+    """The edges of pictures, as long as each is seen."""
+    edges: list[_Edge] = []
+    steepness = _steepness(pictures[0])
+    for index, picture in enumerate(pictures):
+        stopping.check()
+        if index:
+            vectors, steepness = flow.vectors(pictures[index - 1], picture), _steepness(picture)
+            for edge in (edge for edge in edges if not edge.is_lost):
+                _follow(edge, vectors[..., 0], steepness)
+        if index % _ANEW == 0:
+            _add_new(edges, picture, steepness)
+    return edges
+
+
+def _steepness(picture: np.ndarray) -> np.ndarray:
+    """By how much (H, W) it gets lighter from the left to the right of each pixel."""
+    smooth = cv2.GaussianBlur(picture.astype(np.float32), (5, 1), 0.8, sigmaY=1e-6)
+    return cv2.filter2D(smooth, -1, np.array([[-0.5, 0, 0.5]], np.float32), borderType=cv2.BORDER_REPLICATE)
+
+
+def _follow(edge: _Edge, vectors: np.ndarray, steepness: np.ndarray) -> None:
+    x, lean = edge.places[-1]
+    columns = np.clip(np.rint(edge.at(x, lean)).astype(int), 0, vectors.shape[1] - 1)
+    moved = float(np.median(vectors[edge.rows, columns]))
+    place = _placed(edge, (x + moved, lean), steepness)
+    if place is None:
+        edge.is_lost = True
+    else:
+        edge.places.append(place)
+
+
+def _add_new(edges: list[_Edge], picture: np.ndarray, steepness: np.ndarray) -> None:
+    """Adds the longest edges of a picture that are none of those already."""
+    there = [edge for edge in edges if not edge.is_lost]
+    for x0, y0, x1, y1 in _segments(picture):
+        if len(there) >= MOST:
+            return
+        rows = np.arange(max(int(np.ceil(y0)), 0), min(int(y1), len(picture) - 1) + 1)
+        edge, lean = _Edge(rows, 1.0), (x1 - x0) / (y1 - y0)
+        x = x0 + lean * (rows.mean() - y0)
+        columns = np.clip(np.rint(edge.at(x, lean)).astype(int), 0, picture.shape[1] - 1)
+        edge.polarity = 1.0 if np.median(steepness[rows, columns]) > 0 else -1.0
+        place = _placed(edge, (x, lean), steepness)
+        if place is not None and not any(_is_same(edge, place, other) for other in there):
+            edge.places.append(place)
+            edges.append(edge)
+            there.append(edge)
+
+
+def _is_same(edge: _Edge, place: tuple[float, float], other: _Edge) -> bool:
+    """Whether it goes where another one of the same polarity does, in the rows that they share."""
+    if edge.polarity != other.polarity or not np.intersect1d(edge.rows, other.rows).size:
+        return False
+    x, lean = other.places[-1]
+    row = np.intersect1d(edge.rows, other.rows).mean()
+    own = place[0] + place[1] * (row - edge.rows.mean())
+    return bool(abs(own - (x + lean * (row - other.rows.mean()))) < 2)
+
+
+def _segments(picture: np.ndarray) -> np.ndarray:
+    """Edges (n, 4) that are nearly upright: x and y of their upper ends and of their lower ones, the longest first."""
+    found = cv2.createLineSegmentDetector().detect(picture)[0]
+    if found is None:
+        return np.empty((0, 4))
+    lines = found.reshape(-1, 4).astype(np.float64)
+    lines = np.where(lines[:, 1:2] > lines[:, 3:4], lines[:, [2, 3, 0, 1]], lines)
+    wide, high = lines[:, 2] - lines[:, 0], lines[:, 3] - lines[:, 1]
+    lines = lines[(high >= LONG * len(picture)) & (np.abs(wide) <= UPRIGHT * high)]
+    return lines[np.argsort(lines[:, 1] - lines[:, 3], kind="stable")]
+
+
+def _placed(edge: _Edge, expected: tuple[float, float], steepness: np.ndarray) -> tuple[float, float] | None:
+    """Where an edge is that is expected at a place, as _Edge.places; None: it is not seen there."""
+    place = expected
+    for reach in (_REACH, _NEAR, _NEAR):
+        centres, is_there = _centres(edge, place, steepness, reach)
+        if is_there.mean() < _SEEN:
+            return None
+        place = _line(edge.rows, centres, is_there)
+    off = np.abs(centres - edge.at(*place))[is_there]
+    return place if np.median(off) <= _OFF and 0 <= place[0] < steepness.shape[1] else None
+
+
+def _centres(
+    edge: _Edge, place: tuple[float, float], steepness: np.ndarray, reach: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where an edge is in each of its rows (n,), within a reach beside where it is expected, and whether it is."""
+    width = steepness.shape[1]
+    middle = np.rint(edge.at(*place)).astype(int)
+    columns = middle[:, None] + np.arange(-reach, reach + 1)
+    is_inside = (middle >= reach) & (middle < width - reach)
+    values = np.maximum(edge.polarity * steepness[edge.rows[:, None], np.clip(columns, 0, width - 1)], 0)
+    # Around the steepest place near by: another edge of the same polarity must not draw it away.
+    peak = columns[np.arange(len(columns)), values.argmax(axis=1)]
+    values = np.where(np.abs(columns - peak[:, None]) <= 2, values, 0)
+    total = values.sum(axis=1)
+    is_there = is_inside & (values.max(axis=1) >= _STEEP / 2)
+    return (values * columns).sum(axis=1) / np.maximum(total, 1e-6), is_there
+
+
+def _line(rows: np.ndarray, centres: np.ndarray, is_there: np.ndarray) -> tuple[float, float]:
+    """The line through places of rows, as _Edge.places, by most of them."""
+    y, weight = rows - rows.mean(), is_there.astype(float)
+    x = lean = 0.0
+    for _ in range(5):
+        total = weight.sum()
+        mean_y, mean_x = (weight * y).sum() / total, (weight * centres).sum() / total
+        lean = (weight * (y - mean_y) * (centres - mean_x)).sum() / max((weight * (y - mean_y) ** 2).sum(), 1e-9)
+        x = mean_x - lean * mean_y
+        off = np.abs(centres - x - lean * y)
+        scale = max(1.5 * float(np.median(off[is_there])), 0.05)
+        weight = is_there / (1 + (off / scale) ** 2) ** 2
+    return float(x), float(lean)
+
+
+def _fitted(samples: list[tuple[np.ndarray, np.ndarray]], height: int) -> Readout:
+    """The readout that speeds and leans of edges say, each of which has a direction of its own."""
+    speeds, leans = (np.concatenate(part) for part in zip(*samples, strict=True))
+    of = np.repeat(np.arange(len(samples)), [len(speed) for speed, _lean in samples])
+    leans = leans * height
+    weight = np.ones(len(of))
+    share = 0.0
+    for _ in range(30):
+        own_speeds, own_leans = (_without_mean(values, weight, of) for values in (speeds, leans))
+        spread = (weight * own_speeds**2).sum()
+        if spread <= (CHANGING**2) * weight.sum():
+            raise ReadoutError(TOO_LITTLE_MOTION)
+        share = float((weight * own_speeds * own_leans).sum() / spread)
+        off = own_leans - share * own_speeds
+        scale = max(2.5 * 1.48 * float(np.median(np.abs(off))), 0.02)
+        weight = 1 / (1 + (off / scale) ** 2) ** 2
+    # Errors of one edge go together.
+    error = float(np.sqrt((np.bincount(of, weight * own_speeds * off) ** 2).sum()) / spread)
+    if error > max(SURE, SURE_SHARE * abs(share)) or abs(share) > _LONGEST:
+        raise ReadoutError(UNLIKE)
+    return Readout(share=share, error=error, lines=len(samples))
+
+
+def _without_mean(values: np.ndarray, weight: np.ndarray, of: np.ndarray) -> np.ndarray:
+    """Values (n,) less the mean of those that are of the same edge."""
+    return values - (np.bincount(of, weight * values) / np.bincount(of, weight))[of]

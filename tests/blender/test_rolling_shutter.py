@@ -1,0 +1,282 @@
+"""Rolling Shutter Repair and Find Readout: which moment each row is shown at, and what both say."""
+
+import numpy as np
+import pytest
+from support import request, write_frames
+
+from shutter_addon.blender.data import consistency, selection
+from shutter_addon.core.model import limits
+from shutter_addon.core.pixels import compositor
+
+WIDTH, HEIGHT, COUNT = 160, 120, 16
+SIDES = "TOP", "BOTTOM", "LEFT", "RIGHT"
+
+
+def frames(share, way=18):
+    """Poles that go from side to side, row by row (COUNT, H, W, 3)."""
+    y, x = (np.arange(HEIGHT) + 0.5)[:, None], np.arange(WIDTH)[None]
+    for t in range(COUNT):
+        moved = way * np.sin((t + share * (y / HEIGHT - 0.5)) / 2)
+        picture = np.full((HEIGHT, WIDTH), 170.0)
+        for left, wide in ((25, 6), (60, 9), (95, 5), (125, 8)):
+            covered = np.clip(np.minimum(x + 1, left + wide + moved) - np.maximum(x, left + moved), 0, 1)
+            picture += (50 - picture) * covered
+        yield np.repeat(np.rint(picture)[..., None], 3, axis=2).astype(np.uint8)
+
+
+@pytest.fixture
+def edited(bpy, edit, tmp_path):
+    """Makes an effect of footage with a readout, as the button does; its strip and the effect. From frame 1 on."""
+    from shutter_addon.blender.editing import add_effect, shutter_edits
+    from shutter_addon.blender.rendering import render_settings, sessions
+
+    def make(share=0.0, turned=False):
+        pictures = [picture.swapaxes(0, 1) if turned else picture for picture in frames(share)]
+        source = edit.sequence_editor.strips.new_image("images", str(write_frames(tmp_path / "in", pictures)), 1, 1)
+        for number in range(2, COUNT + 1):
+            source.elements.append(f"f{number:04d}.png")
+        strip, effect = add_effect.add_effect(edit, source)
+        shutter_edits.start(effect)
+        selection.choose(edit, strip)
+        edit.frame_set(8)
+        return strip, effect
+
+    with render_settings.using(render_settings.RenderSettings(inbetween=tmp_path / "cache")):
+        yield make
+    sessions.forget()
+
+
+def moments(strip, effect, at=8):
+    """When each pixel (H, W) is shown, in filmed frames from the shown one on; and over how many frames it is."""
+    asked = request(strip.id_data, effect, strip, at)
+    options, places = (
+        asked.state.options,
+        compositor.window_positions(asked.state.options, asked.index, asked.direction),
+    )
+    coefficients = np.moveaxis(asked.coefficients(), 0, -1)
+    exposed = compositor.mixed_shutter(asked.state, coefficients)
+    shown = (exposed * places).sum(axis=-1) / exposed.sum(axis=-1)
+    return (shown - asked.index) / options.step, (exposed > 1e-6).sum(axis=-1)
+
+
+def expected(share, side):
+    down, right = ((np.arange(n) + 0.5) / n - 0.5 for n in (HEIGHT, WIDTH))
+    along = {"TOP": down[:, None], "BOTTOM": -down[:, None], "LEFT": right[None], "RIGHT": -right[None]}[side]
+    return np.broadcast_to(-share * along, (HEIGHT, WIDTH))
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("share", [0.03, 0.25, 0.431, 1.0])
+def test_each_row_is_shown_when_the_middle_one_was_filmed(bpy, edited, share, side):
+    """Exactly evenly from edge to edge, each of two neighbouring frames."""
+    strip, effect = edited()
+    assert call(bpy, side=side, readout=100 * share) == {"FINISHED"}
+    shown, count = moments(strip, effect)
+    np.testing.assert_allclose(shown, expected(share, side), atol=2e-6)
+    assert count.max() == 2
+    assert (effect.inbetween, effect.window, effect.position) == ("8", 64, "CENTER")
+
+
+def call(bpy, name="rolling_shutter", **settings):
+    return getattr(bpy.ops.shutter, name)("EXEC_DEFAULT", True, **settings)
+
+
+def test_again_it_changes_the_readout(bpy, edited):
+    from shutter_addon.blender.editing import rolling_shutter
+
+    strip, effect = edited()
+    call(bpy, side="TOP", readout=30)
+    for shutter, name in zip(effect.shutters, "ABCD", strict=True):
+        shutter.name = name
+    effect.regions[0].name = "E"
+    before = [shutter.name for shutter in effect.shutters]
+    call(bpy, side="LEFT", readout=80)
+    assert [shutter.name for shutter in effect.shutters] == before
+    assert len(effect.regions) == 1
+    np.testing.assert_allclose(moments(strip, effect)[0], expected(0.8, "LEFT"), atol=2e-6)
+    known = rolling_shutter.of(effect)
+    assert known == (0, pytest.approx(0.8), "LEFT")
+
+
+def test_another_side_from_the_menu_keeps_the_readout(bpy, edited):
+    strip, effect = edited()
+    call(bpy, side="TOP", readout=30)
+    assert call(bpy, side="BOTTOM") == {"FINISHED"}
+    np.testing.assert_allclose(moments(strip, effect)[0], expected(0.3, "BOTTOM"), atol=2e-6)
+
+
+@pytest.mark.parametrize("factor", ["2", "16"])
+def test_in_between_frames_that_are_there_stay(bpy, edited, factor):
+    strip, effect = edited()
+    effect.inbetween = factor
+    call(bpy, side="TOP", readout=60)
+    assert effect.inbetween == factor
+    np.testing.assert_allclose(moments(strip, effect)[0], expected(0.6, "TOP"), atol=2e-6)
+
+
+def test_another_factor_keeps_it(bpy, edited):
+    from shutter_addon.blender.editing import rolling_shutter
+
+    strip, effect = edited()
+    call(bpy, side="TOP", readout=30)
+    effect.inbetween = "16"
+    assert rolling_shutter.of(effect) == (0, pytest.approx(0.3), "TOP")
+    call(bpy, side="TOP")
+    shown, count = moments(strip, effect)
+    np.testing.assert_allclose(shown, expected(0.3, "TOP"), atol=2e-6)
+    assert (count.max(), len(effect.regions)) == (2, 1)
+
+
+def test_of_footage_that_runs_backward(bpy, edit, edited):
+    strip, effect = edited()
+    edit.sequence_editor.strips["images"].use_reverse_frames = True
+    call(bpy, side="TOP", readout=50)
+    shown, _ = moments(strip, effect)
+    np.testing.assert_allclose(shown, expected(0.5, "TOP"), atol=2e-6)
+    assert call(bpy, side="BOTTOM", readout=50) == {"FINISHED"}
+    assert len(effect.regions) == 1
+
+
+def test_a_short_window_becomes_as_long_as_it_takes(bpy, edited):
+    strip, effect = edited()
+    effect.window = 1
+    call(bpy, side="TOP", readout=100)
+    assert effect.window == 24
+    np.testing.assert_allclose(moments(strip, effect)[0], expected(1.0, "TOP"), atol=2e-6)
+
+
+@pytest.mark.parametrize(("window", "factor"), [(32, "8"), (33, "4"), (128, "2")])
+def test_of_a_long_window_there_are_fewer(bpy, edited, window, factor):
+    _strip, effect = edited()
+    effect.window = window
+    call(bpy, side="TOP", readout=50)
+    assert effect.inbetween == factor
+
+
+def test_where_there_is_no_room_nothing_changes(bpy, edited):
+    _strip, effect = edited()
+    effect.window = 129
+    sentence = "in-between frames of 129 frames are too many: set Frames to 128 or fewer"
+    with pytest.raises(RuntimeError, match=sentence):
+        call(bpy, side="TOP", readout=50)
+    assert (effect.inbetween, effect.position, len(effect.shutters), len(effect.regions)) == ("1", "START", 2, 0)
+
+
+def test_one_undo_takes_it_back(bpy, edited):
+    _strip, effect = edited()
+    bpy.ops.ed.undo_push(message="before")
+    call(bpy, side="TOP", readout=50)
+    bpy.ops.ed.undo()
+    effect = bpy.context.scene.virtual_shutter.effects[0]
+    assert (effect.inbetween, effect.window, len(effect.shutters), len(effect.regions)) == ("1", 8, 2, 0)
+
+
+def test_milliseconds_are_of_the_footage_s_rate(bpy, edit, edited):
+    strip, effect = edited()
+    edit.render.fps = 25
+    call(bpy, side="TOP", unit="MILLISECONDS", milliseconds=20)
+    np.testing.assert_allclose(moments(strip, effect)[0], expected(0.5, "TOP"), atol=2e-6)
+    with pytest.raises(RuntimeError, match=r"41 ms is longer than a frame of the footage, 40\.0 ms"):
+        call(bpy, side="TOP", unit="MILLISECONDS", milliseconds=41)
+    np.testing.assert_allclose(moments(strip, effect)[0], expected(0.5, "TOP"), atol=2e-6)
+
+
+def test_a_time_map_is_no_repair(bpy, edited):
+    from shutter_addon.blender.editing import rolling_shutter, time_map
+
+    _strip, effect = edited()
+    effect.position, effect.inbetween = "CENTER", "2"
+    time_map.add(effect, "LINEAR")
+    assert rolling_shutter.of(effect) is None
+    effect.shutters.clear()
+    assert rolling_shutter.of(effect) is None
+
+
+def test_a_recipe_keeps_it(bpy, edit, edited, tmp_path):
+    from shutter_addon.blender.data import recipe_import
+    from shutter_addon.blender.editing import rolling_shutter
+    from shutter_addon.blender.output import matte_export
+
+    strip, effect = edited()
+    call(bpy, side="BOTTOM", readout=40)
+    saved = matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json")
+    recipe_import.apply(edit, effect, strip, saved, tmp_path)
+    assert rolling_shutter.of(effect) == (0, pytest.approx(0.4), "BOTTOM")
+    np.testing.assert_allclose(moments(strip, effect)[0], expected(0.4, "BOTTOM"), atol=2e-6)
+    assert consistency.bars(effect.shutters[0]).sum() == 1
+
+
+@pytest.mark.parametrize(
+    ("share", "reads", "side"),
+    [(0.4, "ROWS", "TOP"), (-0.6, "ROWS", "BOTTOM"), (0.4, "COLUMNS", "LEFT"), (-0.4, "COLUMNS", "RIGHT")],
+)
+def test_a_readout_is_found_and_repaired(bpy, edited, share, reads, side):
+    from shutter_addon.blender.editing import rolling_shutter
+
+    _strip, effect = edited(share, turned=reads == "COLUMNS")
+    assert call(bpy, "find_readout", reads=reads) == {"FINISHED"}
+    assert rolling_shutter.of(effect) == (0, pytest.approx(abs(share), rel=0.1), side)
+
+
+def test_what_is_found_again_changes_the_repair(bpy, edited):
+    """With in-between frames that are not built yet."""
+    from shutter_addon.blender.editing import rolling_shutter
+
+    _strip, effect = edited(0.4)
+    call(bpy, side="BOTTOM", readout=90)
+    assert call(bpy, "find_readout", reads="ROWS") == {"FINISHED"}
+    assert rolling_shutter.of(effect) == (0, pytest.approx(0.4, rel=0.1), "TOP")
+    assert (len(effect.shutters), len(effect.regions)) == (4, 1)
+
+
+def test_an_effect_without_a_shutter_gets_its_two(bpy, edited):
+    strip, effect = edited()
+    effect.shutters.clear()
+    call(bpy, side="TOP", readout=40)
+    assert [shutter.name for shutter in effect.shutters] == ["Earlier", "Later"]
+    np.testing.assert_allclose(moments(strip, effect)[0], expected(0.4, "TOP"), atol=2e-6)
+
+
+def test_where_nothing_more_fits_it_is_greyed_out(bpy, edited):
+    """A value that no effect can have is no traceback."""
+    _strip, effect = edited()
+    for _ in range(limits.MAX_REGIONS):
+        effect.regions.add()
+    assert not bpy.ops.shutter.rolling_shutter.poll()
+    effect.regions.clear()
+    assert bpy.ops.shutter.rolling_shutter.poll()
+    effect.inbetween, effect.position = "2", "CENTER"
+    call(bpy, side="TOP", readout=50)
+    effect["inbetween"] = 77
+    assert not bpy.ops.shutter.find_readout.poll()
+
+
+def test_where_it_cannot_be_found_one_sentence_says_so(bpy, edited):
+    _strip, effect = edited(0.4)
+    with pytest.raises(RuntimeError, match="the readout cannot be found here: too few straight lines"):
+        call(bpy, "find_readout", reads="COLUMNS")
+    assert (effect.inbetween, len(effect.shutters)) == ("1", 2)
+
+
+def test_where_there_is_none_nothing_is_repaired(bpy, edited):
+    _strip, effect = edited(0.0)
+    with pytest.raises(RuntimeError, match="lines stand upright however they move"):
+        call(bpy, "find_readout", reads="ROWS")
+    assert (effect.inbetween, len(effect.shutters)) == ("1", 2)
+
+
+def test_it_does_not_look_beyond_a_cut(bpy, edited, tmp_path):
+    """Of the other shot, whose readout is another one."""
+    strip, effect = edited(0.4)
+    is_dark = np.arange(HEIGHT)[:, None, None] // 30 % 2 == 0
+    others = [np.where(is_dark, picture // 3, picture).astype(np.uint8) for picture in frames(-0.4, way=14)]
+    write_frames(tmp_path / "in", others, name="g")
+    source = next(s for s in strip.id_data.sequence_editor.strips if s.type == "IMAGE")
+    for _ in range(4):
+        source.elements.pop(index=len(source.elements) - 1)
+    for number in range(1, COUNT):
+        source.elements.append(f"g{number:04d}.png")
+    assert call(bpy, "find_readout", reads="ROWS") == {"FINISHED"}
+    from shutter_addon.blender.editing import rolling_shutter
+
+    assert rolling_shutter.of(effect) == (0, pytest.approx(0.4, rel=0.1), "TOP")

@@ -1,0 +1,136 @@
+"""A pole that a rolling shutter has skewed: Find Readout and Rolling Shutter Repair from the menu, the in-between
+frames by the note's button, and undo. Run inside Blender, by test_window.py."""
+
+# ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
+import os
+import sys
+from pathlib import Path
+
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
+sys.path.append(os.environ["SHUTTER_PACKAGES"])
+
+import bpy
+import driver
+import full_quality_story as look
+import numpy as np
+import story
+from support import write_frames
+
+REPAIR, FIND = 8, 9  # the entries in the menu of regions
+MENU = 184  # where that is below four shutters, in pixels below the sidebar's upper edge
+FIELD = 210, 101  # of the readout in the panel of the last operation, to the right of where that opens, and below
+ADJUSTED = 30
+COUNT, SIZE, READOUT = 16, (360, 640), 0.6
+SHOWN = 10  # the pole is fastest here
+FILM = driver.OUT / "film"
+BUTTON = "shutter.smooth_streaks"
+
+
+def frame(number):
+    """A red pole and grey ones before a wall, each row at its own moment."""
+    y, x = (np.arange(SIZE[0]) + 0.5)[:, None], np.arange(SIZE[1])[None]
+    moved = 60 * np.sin((number + READOUT * (y / SIZE[0] - 0.5)) / 3)
+    wall = 150 + 40 * np.sin((x - moved) / 17) + 0.1 * y
+    picture = np.repeat(wall[..., None], 3, axis=2)
+    for left, wide, color in ((110, 12, 60), (210, 16, 40), (300, 14, 50), (420, 20, (190, 10, 10)), (510, 12, 70)):
+        covered = np.clip(np.minimum(x + 1, left + wide + moved) - np.maximum(x, left + moved), 0, 1)[..., None]
+        picture = picture * (1 - covered) + np.array(color) * covered
+    return np.rint(picture).clip(0, 255).astype(np.uint8)
+
+
+def opened():
+    yield from story.opened()
+    yield from driver.edge_moved(driver.area_of("SEQUENCE_EDITOR", "SEQUENCER"), 0, -296)
+    first = write_frames(FILM, [frame(number) for number in range(COUNT)])
+    edit = story.edit()
+    edit.render.resolution_y, edit.render.resolution_x = SIZE
+    source = edit.sequence_editor.strips.new_image("Film", str(first), 1, 1)
+    for path in sorted(first.parent.iterdir())[1:]:
+        source.elements.append(path.name)
+    edit.sequence_editor.active_strip = source
+    edit.frame_end = COUNT
+    bpy.ops.wm.save_as_mainfile(filepath=str(driver.OUT / "film.blend"))
+    with driver.override("SEQUENCER"):
+        bpy.ops.shutter.add_effect("INVOKE_DEFAULT", True)
+    yield 1.0
+    edit.frame_set(SHOWN)
+    for bar in story.effect().shutters[0].bars[1:]:  # a still frame
+        bar.weight = 0.0
+    bpy.ops.ed.undo_push(message="Start")
+    with driver.override("PREVIEW"):
+        bpy.ops.sequencer.view_all_preview()
+    yield 1.0
+
+
+def label():
+    found = look.interface("note_buttons").places.get((story.preview().as_pointer(), BUTTON))
+    return found and found[1].label
+
+
+def readout():
+    """In per cent, by the ramp; 0: there is none."""
+    repair = sys.modules["bl_ext.user_default.virtual_shutter.shutter_addon.blender.editing.rolling_shutter"]
+    known = repair.of(story.effect())
+    return known and round(100 * known.readout, 1)
+
+
+def shown(name):
+    region = story.preview()
+    driver.move(region, region.width / 2, region.height + 12)
+    yield 1.0
+    yield from driver.shot_when_shown(name)
+    facts = {"label": label(), "readout": readout(), "factor": story.effect().inbetween}
+    driver.saw(step=name, crop=story.crop(), regions=len(story.effect().regions), **facts)
+
+
+def built():
+    yield from driver.until(label, "the note says that frames are missing", 20)
+    yield from shown("2_missing")
+    driver.move(story.preview(), *look.button(BUTTON))
+    yield 0.5
+    driver.xdotool("click", 1)
+    yield from driver.until(lambda: label() is None, "the in-between frames are built", 90)
+
+
+def adjusted():
+    """In the panel of the last operation, which opens at the pointer."""
+    region = story.preview()
+    driver.move(region, 60, 600)
+    yield 0.5
+    with driver.override("PREVIEW"):
+        bpy.ops.screen.redo_last("INVOKE_DEFAULT")
+    yield 1.0
+    driver.shot("last_operation")
+    driver.click(region, 60 + FIELD[0], 600 - FIELD[1], repeat=2)
+    yield 0.5
+    driver.key("ctrl+a")
+    driver.text("30")
+    driver.key("Return")
+    yield from driver.until(lambda: readout() == ADJUSTED, "the readout is another")
+    driver.key("Escape")
+    yield 0.5
+
+
+def told():
+    yield from opened()
+    yield from shown("1_skewed")
+    yield from story.chosen_beside_draw(FIND)
+    yield from driver.until(readout, "the menu finds the readout", 60)
+    yield from built()
+    yield from shown("3_found")
+    yield from story.chosen_beside_draw(REPAIR, MENU)
+    yield 1.0
+    yield from shown("4_again")
+    yield from adjusted()
+    yield from shown("5_adjusted")
+    for times in (1, 2, 3):  # the second repair, the in-between frames, the first repair
+        driver.move(story.preview(), 300, 300)
+        driver.key("ctrl+z")
+        yield 1.5
+        driver.saw(undone=times, readout=readout())
+    yield from driver.until(lambda: not readout(), "it is undone")
+    yield from shown("6_undone")
+
+
+if __name__ == "__main__":
+    driver.play(told)
