@@ -1,11 +1,11 @@
 """The steps of scripts/screenshots, run inside Blender: an edit of the demo's footage, and pictures of it."""
 
-import subprocess
 import sys
 from pathlib import Path
 
 import bpy
 import numpy as np
+from OpenImageIO import ROI, UINT8, ImageBuf, ImageBufAlgo
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "window"))
 import driver
@@ -72,13 +72,17 @@ def picture(name, box=None):
     yield 1.5
     path = driver.shot(name)
     if box:
-        subprocess.run(["convert", path, "-crop", "{2}x{3}+{0}+{1}".format(*box), "+repage", path], check=True)
+        left, top, width, height = box
+        whole = ImageBuf(str(path))
+        ImageBufAlgo.cut(whole, ROI(left, left + width, top, top + height)).write(str(path))
 
 
 def published(name, *pictures):
     """Pictures side by side as a JPG of docs/."""
-    paths = [driver.OUT / f"{picture}.png" for picture in pictures or (name,)]
-    subprocess.run(["convert", *paths, "+append", "-quality", "90", driver.OUT / f"{name}.jpg"], check=True)
+    panels = [ImageBuf(str(driver.OUT / f"{picture}.png")) for picture in pictures or (name,)]
+    sheet = ImageBuf(np.hstack([panel.get_pixels(UINT8)[..., :3] for panel in panels]))
+    sheet.specmod().attribute("Compression", "jpeg:90")
+    assert sheet.write(str(driver.OUT / f"{name}.jpg")), sheet.geterror()
 
 
 def preset(name):
@@ -112,6 +116,41 @@ def dope_sheet_shown():
     yield 0.5
 
 
+def scrolled_down(region):
+    driver.move(region, region.width / 2, 100)
+    driver.xdotool("click", "--repeat", 60, "--delay", 20, 5)
+    yield 1.0
+
+
+def baked():
+    """The effect is baked, looked at and brought back."""
+    strips = story.edit().sequence_editor.strips_all
+    ends = {strip.name: strip.right_handle for strip in strips}
+    for strip in strips:
+        strip.right_handle = FRAME + 24
+    bpy.ops.wm.save_as_mainfile(filepath=str(driver.OUT / "edit.blend"))
+    with driver.override("PREVIEW"):
+        bpy.ops.shutter.bake("INVOKE_DEFAULT", file_format="MOVIE")
+    yield from driver.until(lambda: any("Baked" in strip.name for strip in strips), "it is baked", 300)
+    area = driver.area_of("SEQUENCE_EDITOR", "PREVIEW")
+    side = driver.region_of(area, "UI")
+    yield from scrolled_down(side)
+    driver.click(side, side.width * 0.4, 13)  # the panel opens
+    yield 1.0
+    yield from scrolled_down(side)
+    low = driver.screen(side, 0, 0)
+    yield from picture("panel", (low[0], low[1] - 129, side.width, 130))
+    timeline = driver.region_of(driver.area_of("SEQUENCE_EDITOR", "SEQUENCER"))
+    left, bottom = driver.screen(timeline, 0, 0)
+    yield from picture("strips", (left, bottom - 129, 700, 130))
+    published("baked", "panel", "strips")
+    with driver.override("PREVIEW"):
+        bpy.ops.shutter.unbake("EXEC_DEFAULT", True)
+    for strip in strips:
+        strip.right_handle = ends[strip.name]
+    yield 0.5
+
+
 def pictures():
     yield from story.opened()
     yield from areas_arranged()
@@ -139,6 +178,7 @@ def pictures():
     published("views", "split", "coefficients")
     live.view = "RESULT"
 
+    yield from baked()
     story.effect().active_shutter = 0
     yield from preset("TRAIL")
     yield from story.keyed()
