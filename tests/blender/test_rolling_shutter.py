@@ -1,5 +1,7 @@
 """Rolling Shutter Repair and Find Readout: which moment each row is shown at, and what both say."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from support import request, write_frames
@@ -75,6 +77,14 @@ def test_each_row_is_shown_when_the_middle_one_was_filmed(bpy, edited, share, si
     np.testing.assert_allclose(shown, expected(share, side), atol=2e-6)
     assert count.max() == 2
     assert (effect.inbetween, effect.window, effect.position) == ("8", 64, "CENTER")
+
+
+def test_what_was_there_before_stays_beside_it(bpy, edited):
+    _strip, effect = edited()
+    call(bpy, side="TOP", readout=50)
+    assert [shutter.name for shutter in effect.shutters] == ["Earlier", "Long", "Sharp", "Later"]
+    assert consistency.bars(effect.shutters["Long"]).tolist() == [1] * 64
+    assert [consistency.bars(effect.shutters[i]).sum() for i in (0, 2, 3)] == [1, 8, 1]
 
 
 def call(bpy, name="rolling_shutter", **settings):
@@ -181,6 +191,15 @@ def test_milliseconds_are_of_the_footage_s_rate(bpy, edit, edited):
     np.testing.assert_allclose(moments(strip, effect)[0], expected(0.5, "TOP"), atol=2e-6)
 
 
+def test_a_movie_has_a_rate_of_its_own(bpy, edit):
+    from shutter_addon.blender.editing import add_effect, rolling_shutter
+
+    edit.render.fps = 50
+    movie = Path(__file__).parents[2] / "assets" / "bigbuckbunny.mp4"
+    strip, effect = add_effect.add_effect(edit, edit.sequence_editor.strips.new_movie("film", str(movie), 1, 1))
+    assert rolling_shutter.share_of(edit, effect, strip, 20) == pytest.approx(20 * 25 / 1000)
+
+
 def test_a_time_map_is_no_repair(bpy, edited):
     from shutter_addon.blender.editing import rolling_shutter, time_map
 
@@ -237,7 +256,7 @@ def test_an_effect_without_a_shutter_gets_its_two(bpy, edited):
     np.testing.assert_allclose(moments(strip, effect)[0], expected(0.4, "TOP"), atol=2e-6)
 
 
-def test_where_nothing_more_fits_it_is_greyed_out(bpy, edited):
+def test_where_nothing_more_fits_it_is_greyed_out(bpy, edited, capfd):
     """A value that no effect can have is no traceback."""
     _strip, effect = edited()
     for _ in range(limits.MAX_REGIONS):
@@ -249,6 +268,7 @@ def test_where_nothing_more_fits_it_is_greyed_out(bpy, edited):
     call(bpy, side="TOP", readout=50)
     effect["inbetween"] = 77
     assert not bpy.ops.shutter.find_readout.poll()
+    assert "Traceback" not in "".join(capfd.readouterr())
 
 
 def test_where_it_cannot_be_found_one_sentence_says_so(bpy, edited):
