@@ -6,7 +6,7 @@ import tempfile
 import numpy as np
 import OpenImageIO
 import pytest
-from support import noise_film
+from support import EXTENSION, noise_film
 
 COUNT, HEIGHT, WIDTH = 8, 24, 40
 
@@ -375,3 +375,22 @@ def test_what_cannot_be_written_is_left_to_the_engine(edit, made, compared, monk
 
     monkeypatch.setattr(edit_feed, "LevelsFile", no_room)
     assert compared() == []
+
+
+def test_blender_itself_renders_the_same(bpy, edit, made, blender, tmp_path):
+    made()
+    edit.render.filepath = "//out/"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
+    # Says how often the file was written, and, of the second render, leaves all to the engine.
+    module = f"import {EXTENSION}.shutter_addon.blender.output.edit_feed as feed; "
+    note = "write = feed.LevelsFile.write; feed.LevelsFile.write = lambda *given: (print('FED'), write(*given))"
+    films = []
+    for told, fed in ((note, COUNT), ("feed.begin = lambda scene: None", 0)):
+        done = blender(tmp_path / "edit.blend", "--python-expr", module + told, "-a")
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.count("FED") == fed, done.stdout + done.stderr
+        paths = sorted((tmp_path / "out").iterdir())
+        assert len(paths) == COUNT
+        films.append([OpenImageIO.ImageBuf(str(path)).get_pixels("uint8").tobytes() for path in paths])
+        shutil.rmtree(tmp_path / "out")
+    assert films[0] == films[1]
