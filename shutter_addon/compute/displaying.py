@@ -20,7 +20,7 @@ _FIRST = (127 + _LOWEST) << (23 - _SHIFT)
 _PIECES = _OCTAVES << (23 - _SHIFT)
 _PROBED = 128  # values of each piece, of which the parabola is made
 # How far off a device's own arithmetic may be, in levels; and how much worse than at the probed values it may be.
-_ROUNDING, _DOUBT = 3e-4, 2.0
+_ROUNDING, _DOUBT = 1.2e-4, 2.0
 _AT_ONCE = 256, 64  # pixels that are asked for, columns and rows
 
 _LIMITS = {"FIRST": f"{_FIRST}u", "LOWEST": repr(2.0**_LOWEST), "HIGHEST": repr(2.0 - 2**-23)}
