@@ -5,6 +5,7 @@
 
 Needs Blender as a library (bpy), or a Blender that has the extension's packages. Ways, interleaved in one run:
 ours: FOOTAGE under an effect of three shutters, scribbled, through the sequencer;
+saved: the same edit as Blender renders it by itself, from a file by `blender -b -a`, with dither and all;
 plain: the movie strip alone, through the sequencer, to the same output;
 echo: the edit of ours, but its engine gives the source's own frames, decoded and made scene-linear ahead by a thread;
 tmix: `ffmpeg -vf tmix` of as many frames, with the codec settings of Blender's output. It takes ffmpeg from PATH. Its
@@ -50,7 +51,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from shutter_addon import blender
 from shutter_addon.blender.data import snapshot, strips
 from shutter_addon.blender.editing import new_edit
-from shutter_addon.blender.output import film_output, movie_feed
+from shutter_addon.blender.output import edit_feed, film_output, movie_feed
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.blender.rendering.engine import VirtualShutterEngine
 from shutter_addon.compute.cpu import CPUCompositor
@@ -68,7 +69,7 @@ from shutter_addon.media.source import SourceWrapper
 
 ROOT = Path(__file__).resolve().parents[1]
 FOOTAGE = [ROOT / "assets" / name for name in ("bigbuckbunny.mp4", "pedestrians.avi")]
-WAYS = ("ours", "plain", "echo", "tmix")
+WAYS = ("ours", "saved", "plain", "echo", "tmix")
 PARTS = ("encoder", "composition", "decoding", "device", "engine", "blender")
 # Levels of 255, on average, that the codec may take means of 8 × 8 pixels away from what was given to it.
 LOSSY = 1.5
@@ -171,8 +172,10 @@ class ProcessorTime:
         def opened(*_):
             self._encoders = self._encoders or _threads().keys() - before[0]
 
+        # They change nothing: without this, effects would be read at each frame (render_job.scripts_act).
+        begun.__module__ = opened.__module__ = blender.__name__
         handlers.render_init.append(begun)
-        handlers.render_pre.append(opened)
+        handlers.render_pre.insert(0, opened)  # before ours, which may begin threads
         try:
             yield
         finally:
@@ -259,14 +262,14 @@ def engine_of(way: str, footage: Path):
         yield
         return
     # Another engine would make it another strip, and the effect would go with it.
-    kept, feeding = VirtualShutterEngine.render, movie_feed.feeding
+    kept, feeding, begin = VirtualShutterEngine.render, movie_feed.feeding, edit_feed.begin
     with open_source(footage) as medium, PrefetchSource(LinearSource(medium)) as source:
         VirtualShutterEngine.render = lambda engine, depsgraph: echo(engine, source, depsgraph)
-        movie_feed.feeding = nullcontext
+        movie_feed.feeding, edit_feed.begin = nullcontext, lambda _scene: None
         try:
             yield
         finally:
-            VirtualShutterEngine.render, movie_feed.feeding = kept, feeding
+            VirtualShutterEngine.render, movie_feed.feeding, edit_feed.begin = kept, feeding, begin
 
 
 def tmix_command(edit, footage: Path, window: int, film: Path) -> list[str]:
@@ -289,7 +292,7 @@ def check(way: str, film: Path, edit, footage: Path) -> float | None:
         if way == "tmix":
             assert all(picture.std() > 5 for picture in shown.values()), f"{way}: pictures without content"
             return None
-        if way == "ours":
+        if way in ("ours", "saved"):
             expected = _composed(edit, source, chosen)
         else:
             expected = {index: source.read(index)[..., :3] for index in chosen}
@@ -329,7 +332,12 @@ def run(way: str, footage: Path, window: int, film: Path, *, checked: bool) -> d
     else:
         measured = ProcessorTime()
         with engine_of(way, footage), measured.of_render():
-            film_output.film(edit, film)
+            if way == "saved":
+                edit.render.dither_intensity, edit.render.filepath = 1, film_output.for_blender(str(film))
+                with film_output.quiet():
+                    bpy.ops.render.render(animation=True, scene=edit.name)
+            else:
+                film_output.film(edit, film)
         found = {"cpu": measured.total} | measured.parts
     found["clock"] = time.perf_counter() - start
     return found | {"error": check(way, film, edit, footage) if checked else None}

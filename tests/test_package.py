@@ -61,7 +61,8 @@ def members(path):
 
 def sources():
     """What every zip has to hold: the extension's own files, and no other."""
-    code = [*(ROOT / "shutter_addon").rglob("*.py"), *(ROOT / "shaders").rglob("*.glsl")]
+    package = ROOT / "shutter_addon"
+    code = [*package.rglob("*.py"), *package.rglob("*.clf"), *(ROOT / "shaders").rglob("*.glsl")]
     return {"blender_manifest.toml", "__init__.py", "LICENSE", *(path.relative_to(ROOT).as_posix() for path in code)}
 
 

@@ -49,12 +49,12 @@ def done(clip, tmp_path_factory):
 
 def test_rows(done):
     output, rows = done
-    assert set(rows) == {"ours", "plain", "echo"} | ({"tmix"} if shutil.which("ffmpeg") else set())
+    assert set(rows) == {"ours", "saved", "plain", "echo"} | ({"tmix"} if shutil.which("ffmpeg") else set())
     for row in rows.values():
         assert (row["film"], row["width"], row["height"], row["window"], row["frames"]) == ("clip.mp4", 96, 64, 4, 12)
         assert row["fps"] > 0
         assert row["cpu_ms"] > 0
-    for way in {"ours", "plain", "echo"}:
+    for way in {"ours", "saved", "plain", "echo"}:
         assert rows[way]["error"] < 1.5
     assert "ours is 1.00 of ours" in output
 
@@ -76,7 +76,12 @@ def test_parts_make_the_whole(done):
 def test_without_ffmpeg(clip, tmp_path):
     done = run(clip, tmp_path / "rows.json", rounds=1, PATH=str(tmp_path))
     assert "no ffmpeg on the PATH" in done.stderr
-    assert {row["way"] for row in json.loads((tmp_path / "rows.json").read_text())} == {"ours", "plain", "echo"}
+    assert {row["way"] for row in json.loads((tmp_path / "rows.json").read_text())} == {
+        "ours",
+        "saved",
+        "plain",
+        "echo",
+    }
 
 
 def test_a_film_that_is_not_there_is_one_sentence():

@@ -11,12 +11,14 @@ from ..core import revision
 from .data import inbetween_settings, preview_areas, source_media, strips, versions
 from .editing import copies, lifecycle, shown_annotations, track_region, undelete, undo_repair
 from .interface import bake_operators, inbetween_operators, sharp_frame
+from .output import edit_feed
 from .rendering import invalidation, job_snapshots, render_job, sessions
 from .rendering.render_job import Where
 
 
 @persistent
 def _before_load(*_):
+    edit_feed.end()
     sharp_frame.give_back(bpy.context)
     inbetween_operators.stop()
     bake_operators.forget()
@@ -40,6 +42,7 @@ def _after_load(*_):
 
 @persistent
 def _before_save(*_):
+    edit_feed.end()
     lifecycle.update()  # a script may have removed strips, since Blender last told
     lifecycle.leave_to_user()
     sharp_frame.give_back(bpy.context)
@@ -88,6 +91,7 @@ def _before_render(scene, *_):
         film = scene.session_uid
         if not render_job.on_main_thread(partial(_prepare, film, render_job.where() is Where.JOB)):
             render_job.fail("Blender's window did not answer, and the effects could not be read")
+        edit_feed.begin(scene)
 
 
 def _prepare(film: int, in_job: bool) -> bool:
@@ -116,6 +120,8 @@ def _before_frame(scene, *_):
             render_job.fail(sentence)
         if render_job.stopping():
             render_job.cancel()
+        else:
+            edit_feed.before_frame(scene)
 
 
 @persistent
@@ -123,6 +129,7 @@ def _after_render(scene, *_):
     if not render_job.is_film(scene):
         return  # of an effect, for a film or a preview
     invalidation.drop_spoilt_later()
+    edit_feed.end()
     job_snapshots.end()
     render_job.end(scene, alone=not render_job.script_waits(inspect.currentframe()))
     source_media.rest(render_job.runs())
@@ -162,6 +169,7 @@ def unregister():
         getattr(bpy.app.handlers, name).remove(function)
     if bpy.app.timers.is_registered(_drop_frames):
         bpy.app.timers.unregister(_drop_frames)
+    edit_feed.end()
     sessions.forget()
     source_media.forget()
     lifecycle.forget()

@@ -20,6 +20,7 @@ from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.model import mattes, shutters
 from ..core.pixels import compositor, layering
+from ..core.pixels.shown_levels import Display
 from . import cpu_combined
 from .cpu_weights import Exposed, Mix, Weight, displaced, mixed, pace, valued
 from .cpu_window import Tile, TiledFrames, TiledSums
@@ -152,6 +153,13 @@ class CPUCompositor:
         """A scene-linear picture of `draw` as Renderer.picture has it of levels."""
         levels = np.full(drawn.shape, 255, np.uint8)
         levels[..., :3] = 255 * light.to_encoded(np.nan_to_num(drawn[..., :3]).clip(0, 1)) + np.float32(0.5)
+        return levels
+
+    def shown(self, drawn: np.ndarray, display: Display) -> np.ndarray:
+        """As GPUCompositor.shown."""
+        levels = np.full(drawn.shape, 255, np.uint8)
+        noise = display.noise(drawn.shape[1], drawn.shape[0])[::-1]
+        levels[..., :3] = display.levels(drawn[..., :3], noise)
         return levels
 
     def draw(self, window: Window, request: Request, coefficients: Coefficients) -> np.ndarray:

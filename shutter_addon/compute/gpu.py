@@ -12,6 +12,7 @@ from ..core.frames.frame_source import FrameSource
 from ..core.model.combining import AVERAGE, Combine
 from ..core.model.frame_state import Options
 from ..core.pixels import compositor
+from ..core.pixels.shown_levels import Display
 from ..devices.device import Device, NoDeviceError, Texture
 from ..devices.llvmpipe import MOST_ITERATIONS
 from ..devices.passes import Pass
@@ -34,6 +35,7 @@ from .composition_passes import (
     way_sum,
 )
 from .diffusion_gpu import Diffusion
+from .displaying import Displaying
 from .edge_diffusion import follows_edges
 from .edge_diffusion_gpu import EdgeDiffusion
 from .laying import Laying
@@ -191,6 +193,7 @@ class GPUCompositor:
         self.name = device.name
         self.device = device
         self._textures: dict[str, Texture] = {}
+        self._displaying = Displaying(device)
 
     @property
     def takes_planes(self) -> bool:
@@ -257,6 +260,10 @@ class GPUCompositor:
         texture = self._texture("levels", *size, 1, "rgba8")
         self.device.run(LEVELS, size, images={"picture": drawn, "levels": texture}, size=size)
         return self.device.read(texture)[0]
+
+    def shown(self, drawn: Texture, display: Display) -> np.ndarray:
+        """The levels (H, W, 4) uint8 of an opaque scene-linear picture of `draw`, top row first."""
+        return self._displaying.levels(drawn, display)
 
     def draw(self, window: Any, request: Request, coefficients: Coefficients) -> Texture:
         """The picture on the device, premultiplied: a texture array rgba32f of one layer, scene-linear, bottom row
@@ -427,4 +434,5 @@ class GPUCompositor:
             for texture in self._textures.values():
                 texture.release()
             self._textures.clear()
+            self._displaying.release()
         self.device.release()

@@ -67,8 +67,10 @@ class Renderer:
 
     def picture(self, request: Request) -> np.ndarray:
         """The picture (H, W, 4), top row first: scene-linear float32, premultiplied. Of levels: 8-bit sRGB over black,
-        its alpha full, as a movie has it where Blender's view transform is Standard."""
+        its alpha full, as a movie has it where Blender's view transform is Standard. With a display: its levels."""
         with self.compositor.current():
+            if request.display is not None:
+                return self.compositor.shown(self.draw(request), request.display)
             if request.levels and self.source.alpha != "opaque":
                 return self.compositor.over_black(self.draw(replace(request, levels=False)))
             return self.compositor.read(self.draw(request))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ..core.model.frame_state import FrameState
+from ..core.pixels.shown_levels import Display
 
 
 @dataclass(frozen=True)
@@ -17,6 +18,7 @@ class Request:
     direction: 1, or −1 where the source plays in reverse, so that the window's next frames are those before `index`
     source: what is read and in how much detail, for who has several renderers
     levels: the picture is of 8-bit display code values, not scene-linear
+    display: what shows the opaque scene-linear picture, whose levels are wanted in its place; None: the picture is
     quick: the diffusion may start from the last coefficients, so that the picture depends slightly on them
     """
 
@@ -26,11 +28,12 @@ class Request:
     source: Any = None
     levels: bool = False
     quick: bool = False
+    display: Display | None = None
 
     @property
     def key(self) -> tuple:
         """Equal for requests of the same picture, quick or not."""
-        return self.source, self.index, self.direction, self.state.key, self.levels
+        return self.source, self.index, self.direction, self.state.key, self.levels, self.display
 
 
 class Coefficients(NamedTuple):

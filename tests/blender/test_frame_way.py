@@ -31,7 +31,7 @@ def ways(bpy, footage, frames, tmp_path):
     sessions.forget()
     with open_source(footage) as medium:
         scene = new_edit.make_edit(footage, medium, recipe_file.parse(json.dumps(RECIPE)), tmp_path)
-    scene.render.image_settings.file_format = "PNG"
+    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "PNG", "16"
     door = "VirtualShutterEngine.render"
     for frame in frames:
         scene.frame_set(frame)

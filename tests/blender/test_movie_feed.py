@@ -97,7 +97,7 @@ def test_a_file_that_is_gone_ends_the_film(bpy, film, tmp_path, monkeypatch, cap
 @pytest.mark.parametrize("width", [7, 16, 40])
 @pytest.mark.parametrize("height", [5, 64, 65, 200])
 def test_a_file_whose_pixels_are_replaced(tmp_path, width, height):
-    from shutter_addon.blender.output.movie_feed import LevelsFile
+    from shutter_addon.blender.output.levels_file import LevelsFile
 
     levels = np.random.default_rng(0).integers(0, 256, (2, height, width, 4), dtype=np.uint8)
     levels[..., 3] = 255

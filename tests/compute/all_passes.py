@@ -6,7 +6,16 @@ from dataclasses import replace
 
 import pytest
 
-from shutter_addon.compute import composition_passes, diffusion_gpu, edge_diffusion_gpu, laying, matting, mixing, window
+from shutter_addon.compute import (
+    composition_passes,
+    diffusion_gpu,
+    displaying,
+    edge_diffusion_gpu,
+    laying,
+    matting,
+    mixing,
+    window,
+)
 from shutter_addon.compute.composition_passes import (
     LightFormat,
     Moved,
@@ -21,7 +30,7 @@ _WAYS = ("frames", "search", "value")
 
 
 def _declared():
-    for module in (diffusion_gpu, edge_diffusion_gpu, composition_passes, laying):
+    for module in (diffusion_gpu, displaying, edge_diffusion_gpu, composition_passes, laying):
         yield from (value for value in vars(module).values() if isinstance(value, Pass))
     for ties in ("LABELS", "LINKS", "STENCIL"):
         yield from diffusion_gpu.operators(ties).values()

@@ -1,9 +1,10 @@
 """The snapshots that pictures are made of.
 
-On Blender's main thread an effect is read when its picture is asked for. A job of the window renders on a thread of its
-own, while the editor goes on working: its effects are read on the main thread when it begins, at every frame of the
-film, and not again. What was not read then (a strip that was pasted later, frames that a retimed effect strip skips to)
-is read on the main thread when it is asked for.
+On Blender's main thread an effect is read when its picture is asked for; in the background, at the second frame of a
+film for all others, unless a script that Blender calls at frames may change it meanwhile. A job of the window renders
+on a thread of its own, while the editor goes on working: its effects are read on the main thread when it begins, at
+every frame of the film, and not again. What was not read then (a strip that was pasted later, frames that a retimed
+effect strip skips to) is read on the main thread when it is asked for.
 """
 
 import math
@@ -22,6 +23,7 @@ from . import effect_source, invalidation, render_job, render_settings, sessions
 from .render_job import Where
 
 _taken: dict[int, Snapshot | Exception] = {}  # by effect scene: of the job that runs
+_films: dict[int, Snapshot | None] = {}  # by effect scene: of the film in the background; None: read once
 pictures: dict[int, np.ndarray] = {}  # likewise: the last one, which the render's window shows until the next is made
 _left_out: list[tuple[range, str]] = []  # of its film, see requirements.left_out
 
@@ -42,8 +44,9 @@ def begin(film: int) -> None:
 
 
 def end() -> None:
-    """Forgets what was read, after a job."""
+    """Forgets what was read, after a job or a film."""
     _taken.clear()
+    _films.clear()
     _left_out.clear()
     pictures.clear()
     sessions.end_job()
@@ -75,13 +78,27 @@ def of(effect_scene: Any, scene_frame: float, ended: Callable[[], bool] | None =
         if isinstance(taken, Exception):
             raise taken.with_traceback(None)
         return taken, taken.timeline_frame(scene_frame)
-    folder = render_settings.settings().inbetween
     scene, effect, strip = strips.find_effect(effect_scene)
     frame = strips.timeline_frame(strip, scene_frame)
     if not bpy.app.background:
         return invalidation.current(scene, effect, strip, frame), frame
-    frames = frame, frame + scene.frame_step
-    return snapshot.take(scene, effect, strip, frames, folder=folder), frame
+    known = _films.get(effect_scene.session_uid)
+    if known is not None and frame in known.frames and not render_job.scripts_act():
+        return known, frame
+    return _of_film(scene, effect, strip, frame), frame
+
+
+def _of_film(scene: Any, effect: Any, strip: Any, frame: float) -> Snapshot:
+    """The snapshot of an effect in the background."""
+    uid, frames = effect.scene.session_uid, {frame, frame + scene.frame_step}
+    is_again = uid in _films and not render_job.scripts_act()
+    if is_again:
+        parts = [part for part in strips.effect_strips(scene) if part.scene == effect.scene]
+        frames |= asked_frames(scene, parts, scene.session_uid == render_job.film())
+    taken = snapshot.take(scene, effect, strip, frames, folder=render_settings.settings().inbetween)
+    if render_job.runs():
+        _films[uid] = taken if is_again else None
+    return taken
 
 
 def _late(uid: int, scene_frame: float) -> Snapshot | Exception:

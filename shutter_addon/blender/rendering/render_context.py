@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
+from ...core.pixels.shown_levels import Display
 from ...core.stopping import never
 from ..data.snapshot import Snapshot
 from . import render_job, render_settings, sessions
@@ -25,13 +26,15 @@ class RenderContext:
     settings: what a command has set for them
     say: called with a sentence when the device is a lesser one, or something cannot be done
     stopped: whether they are not wanted any longer
-    levels: they are of 8-bit display code values (Request.levels)"""
+    levels: they are of 8-bit display code values (Request.levels)
+    display: what shows them, whose levels are wanted (Request.display)"""
 
     session: RenderSession
     settings: RenderSettings
     say: Callable[[str], None] = print
     stopped: Callable[[], bool] = never
     levels: bool = False
+    display: Display | None = None
 
     def request(self, snapshot: Snapshot, frame: float, detail: Detail | None = None) -> Request:
         """See RenderSession.request."""
@@ -57,8 +60,12 @@ def of_engine(say: Callable[[str], None], stopped: Callable[[], bool]) -> Render
 
 
 def of_render(
-    say: Callable[[str], None] = print, stopped: Callable[[], bool] = never, *, levels: bool = False
+    say: Callable[[str], None] = print,
+    stopped: Callable[[], bool] = never,
+    *,
+    levels: bool = False,
+    display: Display | None = None,
 ) -> RenderContext:
     """For a render: on a device apart from the window's, which need not be current. NoDeviceError: there is none."""
     session, settings = sessions.of_render(), render_settings.settings()
-    return RenderContext(session=session, settings=settings, say=say, stopped=stopped, levels=levels)
+    return RenderContext(session, settings, say, stopped, levels=levels, display=display)

@@ -155,6 +155,19 @@ def calling(handlers: list, function: Callable) -> Iterator[None]:
         handlers.remove(function)
 
 
+def scripts_act() -> bool:
+    """Whether Blender calls others than us at frames that it renders: they may change anything."""
+    handlers, own = bpy.app.handlers, __name__.split(".blender.")[0]
+    lists: list[list] = [handlers.render_pre, handlers.render_post, handlers.render_write, handlers.render_stats]
+    lists += [handlers.render_init, handlers.frame_change_pre, handlers.frame_change_post]  # of effects at each frame
+    return any(not _module(function).startswith(own) for functions in lists for function in functions)
+
+
+def _module(function: Any) -> str:
+    """Where a function, or what is partly given its arguments, is from."""
+    return str(getattr(getattr(function, "func", function), "__module__", ""))
+
+
 def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None) -> Any:
     """What a function gives on Blender's main thread, where its data and its operators belong; None: it was not waited
     for, and is not called any more. ended: whether nobody waits for it any longer; without it, the window is not waited

@@ -95,7 +95,7 @@ class RenderSession:
         source: Any = self.renderer(key, context.say, context.stopped).source  # what the key has opened
         if (last := self._requests.get(snapshot.scene)) and last[0] is snapshot and last[1] == frame:
             request = last[2]
-            if (request.source, request.levels) == (key, context.levels):
+            if (request.source, request.levels, request.display) == (key, context.levels, context.display):
                 return request
         with translated(rpt_):
             state = _in_blocks(snapshot.effect.at(frame), key.detail.divisor)
@@ -113,7 +113,14 @@ class RenderSession:
             state = timeline_exposure.exposed(snapshot.effect, state, shown, position, ends)
             state = following.followed(snapshot.effect, state, shown, source, shown_at)
             state = layering.layered(snapshot.effect, state, shown, source, shown_at)
-        request = Request(index=index, state=state, direction=direction, source=key, levels=context.levels)
+        request = Request(
+            index=index,
+            state=state,
+            direction=direction,
+            source=key,
+            levels=context.levels,
+            display=context.display,
+        )
         self._requests[snapshot.scene] = snapshot, frame, request
         return request
 

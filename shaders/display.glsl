@@ -1,0 +1,58 @@
+// Levels of 8 bits as Blender makes them of light (compute/displaying.py).
+
+#ifdef SHOW
+// A picture as its levels, top row first, their alpha full; 0 where rounding is too near for the curve to tell.
+layout(local_size_x = 64) in;
+layout(rgba32f) uniform readonly image2DArray picture;
+layout(r32f) uniform readonly image2DArray grain;
+// A parabola for each 32nd of an octave from 2^-9 on, in levels, and how far off it may be.
+layout(rgba32f) uniform readonly image2DArray curve;
+layout(rgba8) uniform writeonly image2DArray levels;
+uniform ivec2 size;
+uniform float slope;  // below, in levels
+
+bool is_sure;
+
+float level(float light, float added) {
+  uint bits = floatBitsToUint(clamp(light, LOWEST, HIGHEST));
+  vec4 piece = imageLoad(curve, ivec3(int((bits >> 18u) - FIRST), 0, 0));
+  float along = float(bits & 0x3ffffu) / 262144.0 - 0.5;
+  float value = light < LOWEST ? light * slope : (piece.x * along + piece.y) * along + piece.z;
+  value += added * 255.0 + 0.5;
+  // Below and above all levels there is nothing to round; and what is no number is not sure.
+  is_sure = is_sure && (value < 0.5 || value > 255.9 || abs(value - round(value)) > piece.w);
+  return clamp(floor(value), 0.0, 255.0) / 255.0;
+}
+
+void main() {
+  ivec2 p = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(p, size))) {
+    return;
+  }
+  is_sure = true;
+  ivec3 from = ivec3(p.x, size.y - 1 - p.y, 0);
+  vec3 light = imageLoad(picture, from).rgb;
+  float added = imageLoad(grain, from).r;
+  vec3 found = vec3(level(light.r, added), level(light.g, added), level(light.b, added));
+  imageStore(levels, ivec3(p, 0), vec4(found, is_sure ? 1.0 : 0.0));
+}
+#endif
+
+#ifdef PICK
+// The light of some pixels. places: their numbers, row by row from the bottom.
+layout(local_size_x = 64) in;
+layout(rgba32f) uniform readonly image2DArray picture;
+layout(r32ui) uniform readonly uimage2DArray places;
+layout(rgba32f) uniform writeonly image2DArray picked;
+uniform ivec2 size;
+uniform int width;
+
+void main() {
+  ivec2 p = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(p, size))) {
+    return;
+  }
+  int place = int(imageLoad(places, ivec3(p, 0)).r);
+  imageStore(picked, ivec3(p, 0), imageLoad(picture, ivec3(place % width, place / width, 0)));
+}
+#endif

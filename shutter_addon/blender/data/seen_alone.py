@@ -1,0 +1,113 @@
+"""What a film shows of an effect: whether its picture hides what lies below, is all that is seen, and becomes levels
+that are known beforehand."""
+
+from typing import Any, NamedTuple
+
+import bpy
+
+from . import colour_configuration, fcurves, strips
+
+# Of Blender's dither and colours no other versions are known to the bit.
+_KNOWN_TO = (5, 3)
+_PLAIN_STRIP = {
+    **{"blend_alpha": 1.0, "color_multiply": 1.0, "color_saturation": 1.0, "strobe": 0.0, "scene_input": "CAMERA"},
+    **dict.fromkeys(("use_flip_x", "use_flip_y", "use_float", "use_reverse_frames", "multiply_alpha"), False),
+}
+_PLAIN_TRANSFORM = {"scale_x": 1.0, "scale_y": 1.0, "offset_x": 0.0, "offset_y": 0.0, "rotation": 0.0}
+_UNCROPPED = dict.fromkeys(("min_x", "min_y", "max_x", "max_y"), 0)
+_WHOLE = {"resolution_percentage": 100, "use_border": False, "use_multiview": False}
+_PLAIN_RENDER = {"use_sequencer": True, "use_stamp": False, "metadata_input": "SCENE"}
+_PLAIN_RENDER |= {"frame_map_old": 100, "frame_map_new": 100}
+_STANDARD = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
+_STANDARD |= {"use_curve_mapping": False, "use_white_balance": False}
+_LEVELS = {"color_depth": "8", "color_management": "FOLLOW_SCENE"}
+_FORMATS = ("FFMPEG", "PNG", "JPEG")
+
+
+def has(item: Any, values: dict[str, Any]) -> bool:
+    """Whether an item's properties have these values."""
+    return all(getattr(item, name) == value for name, value in values.items())
+
+
+def hides(scene: Any, strip: Any) -> bool:
+    """Whether an effect strip's picture, where it is opaque, stays as it is over all that lies below, at all frames."""
+    size, shown = scene.render, strip.scene.render
+    return (
+        strip.blend_type in ("REPLACE", "ALPHA_OVER")
+        and has(strip, _PLAIN_STRIP)
+        and has(strip.transform, _PLAIN_TRANSFORM)
+        and has(strip.crop, _UNCROPPED)
+        and not strip.modifiers
+        and not strip.retiming_keys
+        and has(size, _WHOLE)
+        and (shown.resolution_x, shown.resolution_y) == (size.resolution_x, size.resolution_y)
+        and not _is_animated(scene, strip)
+    )
+
+
+class Alone(NamedTuple):
+    """An effect strip that is all that is seen of a scene at a frame.
+
+    is_blended: whether Blender lays it over something, which makes other bits of it"""
+
+    strip: Any
+    is_blended: bool
+
+
+def alone(scene: Any, frame: int, but: str | None = None) -> Alone | None:
+    """What is seen of a scene at a frame, if it is an effect strip alone, by `hides`. but: the name of a strip that
+    does not count."""
+    editor = scene.sequence_editor
+    if _has_animation(scene, ".mute"):
+        return None  # what is muted now may not be then
+    seen = [
+        strip
+        for strip in editor.strips
+        if strip.type != "SOUND"
+        and strip.name != but
+        and strip.left_handle <= frame < strip.right_handle
+        and not (strip.mute or editor.channels[strip.channel].mute)
+    ]
+    top = max(seen, key=lambda strip: strip.channel, default=None)
+    if top is None or top not in strips.effect_strips(scene) or not hides(scene, top):
+        return None
+    # What an effect takes as its input is not seen itself, wherever that effect lies.
+    inputs = [getattr(strip, name, None) for strip in seen for name in ("input_1", "input_2")]
+    if top in inputs or not strips.origin(top).is_integer():
+        return None
+    is_blended = top.blend_type != "REPLACE" and len(seen) > 1
+    effect = strips.effect_of(scene, top.scene)
+    # Others may give nothing to be laid over.
+    if is_blended and (effect is None or strips.nearest_source(scene, effect, top) not in seen):
+        return None
+    return Alone(top, is_blended)
+
+
+def makes_levels(scene: Any) -> bool:
+    """Whether a scene's render makes levels of 8 bits of what its sequencer shows, by sRGB alone."""
+    return (
+        bpy.app.version < _KNOWN_TO
+        and not colour_configuration.name()
+        and bpy.data.colorspace.working_space == "Linear Rec.709"
+        and scene.sequencer_colorspace_settings.name == "sRGB"
+        and scene.display_settings.display_device == "sRGB"
+        and has(scene.view_settings, _STANDARD)
+        and has(scene.render.image_settings, _LEVELS)
+        and scene.render.image_settings.file_format in _FORMATS
+        and has(scene.render, _PLAIN_RENDER)
+        and scene.frame_subframe == 0
+        and not any(_has_animation(scene, name) for name in ("view_settings", "render.", "display_settings"))
+    )
+
+
+def _is_animated(scene: Any, strip: Any) -> bool:
+    return _has_animation(scene, f'sequence_editor.strips_all["{bpy.utils.escape_identifier(strip.name)}"]')
+
+
+def _has_animation(scene: Any, part: str) -> bool:
+    """Whether anything animates a property of the scene in whose path that is; of what the NLA does, it may."""
+    animation = scene.animation_data
+    if animation is None:
+        return False
+    curves = [*fcurves.curves_under(scene, ""), *animation.drivers]
+    return bool(animation.nla_tracks) or any(part in curve.data_path for curve in curves)

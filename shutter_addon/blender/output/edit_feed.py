@@ -1,0 +1,135 @@
+"""Renders of the user's edit from files of finished levels, as long as they run.
+
+Where an effect is all that is seen of an edit, Blender makes levels of the engine's floats in several passes, and
+blends them over footage that nobody sees: several times the work that it has with a strip of footage. So a strip above
+shows a file of the very levels that Blender would make (core.pixels.shown_levels). The edit is as it was once the
+render ends, or a file is saved or loaded meanwhile: from then on the engine renders.
+"""
+
+import tempfile
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...core import atomic_write
+from ...core.pixels.shown_levels import Display
+from ...media import display_transfer
+from ..data import seen_alone, strips
+from ..rendering import job_snapshots, pictures, render_context, render_job
+from ..rendering.effect_source import FULL
+from ..rendering.engine import in_words, say
+from ..rendering.render_job import Where
+from .levels_file import LevelsFile, strip_above
+
+_NAME = "picture.tif"
+
+
+@dataclass
+class _Film:
+    """What a render has changed.
+
+    scene: session_uid of the edit; changed: what puts it back
+    strip: of the file, by name; None: there is none yet
+    file: of levels; None: as above
+    makes_levels: as seen_alone.makes_levels; None: nobody has asked; has_failed: it was not possible"""
+
+    scene: int
+    changed: ExitStack = field(default_factory=ExitStack)
+    strip: str | None = None
+    file: LevelsFile | None = None
+    makes_levels: bool | None = None
+    has_failed: bool = False
+
+
+_films: list[_Film] = []  # one, while it renders
+
+
+def begin(scene: Any) -> None:
+    """The render of an edit begins, on the main thread."""
+    end()
+    if render_job.where() is Where.BACKGROUND and scene.sequence_editor is not None:
+        _films.append(_Film(scene.session_uid))
+
+
+def end() -> None:
+    """Puts the edit back."""
+    while _films:
+        _films.pop().changed.close()
+
+
+def before_frame(scene: Any) -> None:
+    """Prepares the edit for its current frame."""
+    if not _films or _films[0].scene != scene.session_uid:
+        return
+    film = _films[0]
+    if film.makes_levels is None or render_job.scripts_act():
+        film.makes_levels = seen_alone.makes_levels(scene)
+    can_feed = film.makes_levels and not film.has_failed
+    seen = seen_alone.alone(scene, scene.frame_current, film.strip) if can_feed else None
+    is_fed = seen is not None and _feed(film, scene, seen)
+    shown = film.strip and scene.sequence_editor.strips_all.get(film.strip)
+    if shown and shown.mute == is_fed:  # each change costs
+        shown.mute = not is_fed
+
+
+def _strip(uid: int, name: str) -> Any:
+    scene = next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
+    return scene.sequence_editor.strips_all.get(name) if scene and scene.sequence_editor else None
+
+
+def _feed(film: _Film, scene: Any, seen: seen_alone.Alone) -> bool:
+    """Fills the file with the effect's levels. False: the engine has to render the frame, and to say what is wrong."""
+    strip = seen.strip
+    try:
+        shown = scene.frame_current - strips.origin(strip) + strip.scene.frame_start
+        snapshot, frame = job_snapshots.of(strip.scene, int(shown))
+        transfer = display_transfer.blended if seen.is_blended else display_transfer.shown
+        display = Display(scene.render.dither_intensity, transfer)
+        context = render_context.of_render(say, render_job.stopping, display=display)
+        source = context.renderer(context.request(snapshot, frame, FULL)).source
+        size = scene.render.resolution_x, scene.render.resolution_y
+        if source.alpha != "opaque" or (source.width, source.height) != size:
+            return False
+        levels = pictures.picture(context, snapshot, frame)
+        _file(film, scene).write(levels)
+        context.session.begin_next(snapshot, frame, context)
+    except Exception:
+        film.has_failed = True
+        return False
+    except BaseException as error:  # Ctrl-C, of which the engine would not hear
+        render_job.fail(in_words(error))
+        render_job.cancel()
+    return True
+
+
+def _file(film: _Film, scene: Any) -> LevelsFile:
+    """The file of the film, with a strip that shows it. OSError: it cannot be written."""
+    if film.file is None:
+        size = scene.render.resolution_x, scene.render.resolution_y
+        atomic_write.clear_up(place := Path(tempfile.gettempdir()))
+        folder = film.changed.enter_context(atomic_write.part_folder(place))
+        film.file = film.changed.enter_context(LevelsFile(folder / _NAME, *size))
+        film.strip = _add_strip(film, scene, film.file.path)
+    return film.file
+
+
+def _add_strip(film: _Film, scene: Any, path: Path) -> str:
+    editor, uid = scene.sequence_editor, scene.session_uid
+    active, kept = editor.active_strip, (editor.use_cache_raw, editor.use_cache_final)
+    first, last = min(scene.frame_start, scene.frame_current), max(scene.frame_end, scene.frame_current)
+    strip = strip_above(editor, path, first, last + 1)
+    # Blender would keep the file's first picture, and every frame of the film.
+    editor.active_strip, editor.use_cache_raw, editor.use_cache_final = active, False, False
+    name = strip.name
+
+    def remove() -> None:
+        if (found := _strip(uid, name)) is not None:
+            editor = found.id_data.sequence_editor
+            editor.use_cache_raw, editor.use_cache_final = kept
+            editor.strips.remove(found)
+
+    film.changed.callback(remove)
+    return name

@@ -1,0 +1,396 @@
+"""An edit that Blender renders by itself has the bits that the engine's pictures give it, whatever else is in it."""
+
+import shutil
+import tempfile
+
+import numpy as np
+import OpenImageIO
+import pytest
+from support import EXTENSION, noise_film
+
+COUNT, HEIGHT, WIDTH = 8, 24, 40
+
+
+@pytest.fixture
+def made(bpy, edit, tmp_path, monkeypatch):
+    """Makes an edit of noise with so many channels under an effect, dithered: its source, effect and strip. Files of
+    levels lie in a folder of their own."""
+
+    def make(channels=3):
+        noise = np.random.default_rng(0).integers(0, 256, (COUNT, HEIGHT, WIDTH, channels), dtype=np.uint8)
+        found = noise_film(edit, noise, tmp_path)
+        edit.render.dither_intensity = 1
+        settings = edit.render.image_settings
+        settings.file_format, settings.color_depth, settings.color_mode = "PNG", "8", "RGB"
+        return found
+
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    return make
+
+
+def look(edit):
+    """All that a render might leave changed in an edit."""
+    editor = edit.sequence_editor
+    strips = [(s.name, s.channel, s.mute, s.blend_type, s.blend_alpha, s.select) for s in editor.strips_all]
+    return strips, editor.use_cache_raw, editor.use_cache_final, editor.active_strip
+
+
+def pictures(bpy, edit, folder):
+    edit.render.filepath = f"{folder}/"
+    assert bpy.ops.render.render(animation=True, scene=edit.name) == {"FINISHED"}
+    assert len(list(folder.iterdir())) == COUNT
+    found = np.stack([OpenImageIO.ImageBuf(str(path)).get_pixels("uint8") for path in sorted(folder.iterdir())])
+    shutil.rmtree(folder)
+    return found
+
+
+@pytest.fixture
+def compared(bpy, edit, tmp_path, monkeypatch):
+    """Renders an edit by the engine alone, and as ever: asserts equal bits, and gives the frames that needed no
+    engine."""
+    from shutter_addon.blender.output import edit_feed
+    from shutter_addon.blender.output.levels_file import LevelsFile
+
+    def compare():
+        edit.frame_set(edit.frame_start)  # animation is as it will be left
+        fed, write = [], LevelsFile.write
+
+        def note(file, levels):
+            fed.append(edit.frame_current)
+            write(file, levels)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(edit_feed, "begin", lambda _scene: None)
+            expected = pictures(bpy, edit, tmp_path / "engine")
+        edit.sequence_editor.use_cache_raw = edit.sequence_editor.use_cache_final = True
+        before = look(edit)
+        monkeypatch.setattr(LevelsFile, "write", note)
+        found = pictures(bpy, edit, tmp_path / "fed")
+        assert np.array_equal(found, expected)
+        assert len({picture.tobytes() for picture in found}) == COUNT
+        assert look(edit) == before
+        assert list((tmp_path / "temporary").iterdir()) == []
+        return fed
+
+    return compare
+
+
+ALL = list(range(1, COUNT + 1))
+
+
+def plain(edit, source, strip, folder):
+    return ALL
+
+
+def without_dither(edit, source, strip, folder):
+    edit.render.dither_intensity = 0
+    return ALL
+
+
+def much_dither(edit, source, strip, folder):
+    edit.render.dither_intensity = 1.7
+    return ALL
+
+
+def with_alpha_channel(edit, source, strip, folder):
+    edit.render.image_settings.color_mode = "RGBA"
+    return ALL
+
+
+def jpeg(edit, source, strip, folder):
+    edit.render.image_settings.file_format = "JPEG"
+    return ALL
+
+
+def sixteen_bits(edit, source, strip, folder):
+    edit.render.image_settings.color_depth = "16"
+    return []
+
+
+def another_view(edit, source, strip, folder):
+    edit.view_settings.view_transform = "AgX"
+    return []
+
+
+def brighter_view(edit, source, strip, folder):
+    edit.view_settings.exposure = 0.5
+    return []
+
+
+def replacing(edit, source, strip, folder):
+    strip.blend_type = "REPLACE"
+    return ALL
+
+
+def blended(edit, source, strip, folder):
+    strip.blend_type = "MULTIPLY"
+    return []
+
+
+def half_shown(edit, source, strip, folder):
+    strip.blend_alpha = 0.5
+    return []
+
+
+def fading(edit, source, strip, folder):
+    strip.blend_alpha = 1.0
+    for frame, value in ((1, 1.0), (COUNT, 0.2)):
+        strip.blend_alpha = value
+        strip.keyframe_insert("blend_alpha", frame=frame)
+    return []
+
+
+def modified(edit, source, strip, folder):
+    strip.modifiers.new("Bright", "BRIGHT_CONTRAST").bright = 20
+    return []
+
+
+def moved(edit, source, strip, folder):
+    strip.transform.offset_x = 3
+    return []
+
+
+def cropped(edit, source, strip, folder):
+    strip.crop.min_x = 5
+    return []
+
+
+def smaller(edit, source, strip, folder):
+    edit.render.resolution_percentage = 50
+    return []
+
+
+def larger_edit(edit, source, strip, folder):
+    edit.render.resolution_x += 8
+    return []
+
+
+def cut(edit, source, strip, folder):
+    strip.split(frame=4, split_method="SOFT")
+    return ALL
+
+
+def muted(edit, source, strip, folder):
+    strip.mute = True
+    return []
+
+
+def ends_early(edit, source, strip, folder):
+    strip.right_handle = 5
+    return [1, 2, 3, 4]
+
+
+def above(edit, folder, first, stop):
+    other = edit.sequence_editor.strips.new_image("above", str(folder / "in" / "f0003.png"), 6, first)
+    other.right_handle, other.blend_alpha = stop, 0.4
+    return other
+
+
+def titled(edit, source, strip, folder):
+    above(edit, folder, 3, 6)
+    return [1, 2, 6, 7, 8]
+
+
+def title_is_muted(edit, source, strip, folder):
+    above(edit, folder, 3, 6).mute = True
+    return ALL
+
+
+def title_comes(edit, source, strip, folder):
+    title = above(edit, folder, 1, COUNT + 1)
+    for frame, value in ((1, True), (4, False)):
+        title.mute = value
+        title.keyframe_insert("mute", frame=frame)
+    return []
+
+
+def adjusted(edit, source, strip, folder):
+    layer = edit.sequence_editor.strips.new_effect("layer", "ADJUSTMENT", 7, 1, length=COUNT)
+    layer.modifiers.new("Bright", "BRIGHT_CONTRAST").bright = 20
+    return []
+
+
+def in_a_transition(edit, source, strip, folder):
+    other = above(edit, folder, 1, COUNT + 1)
+    edit.sequence_editor.strips.new_effect("cross", "CROSS", 8, 1, length=COUNT, input1=strip, input2=other)
+    return []
+
+
+def over_more(edit, source, strip, folder):
+    strip.channel = 4
+    other = edit.sequence_editor.strips.new_image("below", str(folder / "in" / "f0002.png"), 3, 1)
+    other.right_handle = COUNT + 1
+    return ALL
+
+
+def in_the_topmost_channel(edit, source, strip, folder):
+    strip.channel = 128
+    return []
+
+
+def over_nothing(edit, source, strip, folder):
+    source.mute = True
+    return ALL
+
+
+def over_another(edit, source, strip, folder):
+    over_more(edit, source, strip, folder)
+    source.mute = True
+    return []
+
+
+def behind_its_source(edit, source, strip, folder):
+    source.right_handle = 5
+    return ALL
+
+
+def in_a_meta(edit, source, strip, folder):
+    meta = edit.sequence_editor.strips.new_meta("meta", 9, 1)
+    strip.move_to_meta(meta)
+    source.move_to_meta(meta)
+    meta.right_handle = COUNT + 1
+    return []
+
+
+def two_effects(edit, source, strip, folder):
+    from shutter_addon.blender.editing import add_effect, shutter_edits
+
+    source.right_handle = strip.right_handle = 5
+    other = edit.sequence_editor.strips.new_image("second", str(folder / "in" / "f0005.png"), 1, 5)
+    other.right_handle = COUNT + 1
+    for name in ("f0006.png", "f0007.png", "f0008.png"):
+        other.elements.append(name)
+    second, effect = add_effect.add_effect(edit, other)
+    shutter_edits.start(effect)
+    second.right_handle = COUNT + 1
+    return ALL
+
+
+def keyed_effect(edit, source, strip, folder):
+    for frame, value in ((1, 0.2), (COUNT, 1.0)):
+        edit.virtual_shutter.effects[0].shutters[0].bars[0].weight = value
+        edit.keyframe_insert("virtual_shutter.effects[0].shutters[0].bars[0].weight", frame=frame)
+    return ALL
+
+
+EDITS = [
+    *(plain, without_dither, much_dither, with_alpha_channel, jpeg, sixteen_bits, another_view, brighter_view),
+    *(replacing, blended, half_shown, fading, modified, moved, cropped, smaller, larger_edit, cut, muted, ends_early),
+    *(titled, title_is_muted, title_comes, adjusted, in_a_transition, in_a_meta, two_effects, keyed_effect),
+    *(in_the_topmost_channel, over_more, over_nothing, over_another, behind_its_source),
+]
+
+
+@pytest.mark.parametrize("change", EDITS, ids=lambda change: change.__name__)
+def test_bits_are_the_engines(edit, made, compared, tmp_path, change):
+    source, _effect, strip = made()
+    expected = change(edit, source, strip, tmp_path)
+    assert compared() == expected
+
+
+def test_footage_with_an_alpha_is_left_to_the_engine(edit, made, compared):
+    made(channels=4)
+    assert compared() == []
+
+
+def test_a_script_may_change_the_effect_at_a_frame(bpy, edit, made, compared, tmp_path):
+    _source, effect, _strip = made()
+
+    def change(_scene, *_):
+        effect.shutters[0].bars[0].weight = 0.1 * edit.frame_current
+
+    bpy.app.handlers.render_pre.insert(0, change)
+    try:
+        assert compared() == ALL
+        changed = pictures(bpy, edit, tmp_path / "changed")
+    finally:
+        bpy.app.handlers.render_pre.remove(change)
+    edit.frame_set(5)
+    change(edit)
+    still = pictures(bpy, edit, tmp_path / "still")
+    assert [np.array_equal(changed[frame - 1], still[frame - 1]) for frame in (4, 5, 6)] == [False, True, False]
+
+
+def test_a_movie_has_the_engines_bits(bpy, edit, made, tmp_path, monkeypatch):
+    from shutter_addon.blender.output import edit_feed
+    from shutter_addon.media import open_source
+
+    made()
+    edit.render.image_settings.media_type = "VIDEO"
+    edit.render.ffmpeg.format, edit.render.ffmpeg.codec = "MKV", "FFV1"
+
+    def film(name):
+        edit.render.filepath, edit.render.use_file_extension = str(tmp_path / name), False
+        assert bpy.ops.render.render(animation=True) == {"FINISHED"}
+        with open_source(tmp_path / name) as source:
+            return np.stack([source.read(index) for index in range(source.count)])
+
+    found = film("fed.mkv")
+    monkeypatch.setattr(edit_feed, "begin", lambda _scene: None)
+    assert len(found) == COUNT
+    assert np.array_equal(found, film("engine.mkv"))
+
+
+@pytest.mark.parametrize("how", ["stopped", "saved"])
+def test_the_edit_is_put_back(bpy, edit, made, tmp_path, how):
+    """Of a render that ends early, and before a file is saved in the midst of one."""
+    made()
+    before, seen = look(edit), []
+
+    def act(scene, *_):
+        if scene.render.engine == "VIRTUAL_SHUTTER" or scene.frame_current != 4:
+            return
+        seen.append(look(edit) != before)
+        if how == "stopped":
+            from shutter_addon.blender.rendering import render_job
+
+            render_job.stop()
+        elif how == "saved":
+            bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"), copy=True)
+
+    edit.render.filepath = f"{tmp_path / 'out'}/"
+    bpy.app.handlers.render_post.append(act)
+    try:
+        bpy.ops.render.render(animation=True)
+    finally:
+        bpy.app.handlers.render_post.remove(act)
+    assert seen == [True]
+    assert look(edit) == before
+    assert len(list((tmp_path / "out").iterdir())) == (4 if how == "stopped" else COUNT)
+    if how == "saved":
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "edit.blend"))
+        scene = bpy.context.scene
+        assert [strip[:5] for strip in look(scene)[0]] == [strip[:5] for strip in before[0]]
+        assert look(scene)[1:3] == before[1:3]
+
+
+def test_what_cannot_be_written_is_left_to_the_engine(edit, made, compared, monkeypatch):
+    from shutter_addon.blender.output import edit_feed
+
+    made()
+
+    def no_room(*_):
+        raise OSError(28, "No space left on device", "picture.tif")
+
+    monkeypatch.setattr(edit_feed, "LevelsFile", no_room)
+    assert compared() == []
+
+
+def test_blender_itself_renders_the_same(bpy, edit, made, blender, tmp_path):
+    made()
+    edit.render.filepath = "//out/"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
+    # Says how often the file was written, and, of the second render, leaves all to the engine.
+    module = f"import {EXTENSION}.shutter_addon.blender.output.edit_feed as feed; "
+    note = "write = feed.LevelsFile.write; feed.LevelsFile.write = lambda *given: (print('FED'), write(*given))"
+    films = []
+    for told, fed in ((note, COUNT), ("feed.begin = lambda scene: None", 0)):
+        done = blender(tmp_path / "edit.blend", "--python-expr", module + told, "-a")
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.count("FED") == fed, done.stdout + done.stderr
+        paths = sorted((tmp_path / "out").iterdir())
+        assert len(paths) == COUNT
+        films.append([OpenImageIO.ImageBuf(str(path)).get_pixels("uint8").tobytes() for path in paths])
+        shutil.rmtree(tmp_path / "out")
+    assert films[0] == films[1]
