@@ -151,14 +151,15 @@ def test_it_says_that_it_is_stale(bpy, film):
     assert stale() == [False]
 
 
-def test_both_are_cut_and_nothing_is_lost(bpy, film, tmp_path):
+@pytest.mark.parametrize("kind", ["SOFT", "HARD"])
+def test_both_are_cut_and_nothing_is_lost(bpy, film, tmp_path, kind):
     scene, effect, strip = film()
     before = rendered(bpy, scene, tmp_path / "effect", (3, 6))
     baked = bake(bpy)
-    for each in (baked, strip):
-        each.split(5, "SOFT")
+    for each in [baked, strip, strips.source_of(scene, effect, strip)][: 3 if kind == "HARD" else 2]:
+        each.split(5, kind)
     bpy.context.view_layer.update()
-    assert states(scene, effect, strip) == [False, False]
+    assert states(scene, effect, strip) == [kind == "HARD"] * 2  # which leaves another content
     selection.choose(scene, baked_in(scene)[1])
     assert bpy.ops.shutter.unbake() == {"FINISHED"}
     shown = [s for s in scene.sequence_editor.strips if s.type == "SCENE"]

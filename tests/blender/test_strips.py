@@ -5,7 +5,7 @@ import ctypes
 import av
 import numpy as np
 import pytest
-from support import picture_of, recipe, sequencer, write_frames
+from support import noise_film, picture_of, recipe, sequencer, write_frames
 
 LEVELS = 1
 
@@ -378,3 +378,23 @@ def test_no_shutters_and_a_closed_shutter_are_said(bpy, edit, effect_on, movie):
     effect.shutters.clear()
     with pytest.raises(effect_source.FAULTS, match='"Shutter" has no shutter'):
         picture_of(effect.scene, 5)
+
+
+def test_a_hard_cut_changes_no_picture(bpy, edit, render, tmp_path):
+    """Each part has a source of its own, whose content ends at the cut."""
+    frames = np.random.default_rng(2).integers(0, 256, (9, 24, 40, 3), dtype=np.uint8)
+    source, _effect, strip = noise_film(edit, frames, tmp_path)
+    before = render(edit, [3, 5, 8])
+    for each in (source, strip):
+        each.split(5, "HARD")
+    after = render(edit, [3, 5, 8])
+    assert all(np.array_equal(after[frame], before[frame]) for frame in before)
+    from shutter_addon.blender.rendering import job_snapshots as snapshots
+
+    snapshots.begin(edit.session_uid)
+    try:
+        of_parts = snapshots._taken[strip.scene.session_uid]  # what a job of the window reads, which is not to be seen
+        assert [shown for shown, _ in of_parts] == [range(1, 5), range(5, 10)]
+        assert of_parts[0][1].timing != of_parts[1][1].timing
+    finally:
+        snapshots.end()

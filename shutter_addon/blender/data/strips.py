@@ -61,13 +61,16 @@ def effect_of(scene, effect_scene):
     return next((effect for effect in scene.virtual_shutter.effects if effect.scene == effect_scene), None)
 
 
-def find_effect(effect_scene: Any) -> tuple[Any, Any, Any]:
-    """Scene, effect and one of its strips for an effect scene. EffectError: nothing uses it any more."""
+def find_effect(effect_scene: Any, scene_frame: float | None = None) -> tuple[Any, Any, Any]:
+    """Scene, effect and one of its strips for an effect scene: the part of a cut one that shows a frame of the effect
+    scene, or the first. EffectError: nothing uses it any more."""
     for scene in bpy.data.scenes:
         if (effect := effect_of(scene, effect_scene)) is not None:
-            for strip in effect_strips(scene):
-                if strip.scene == effect_scene:
-                    return scene, effect, strip
+            parts = [strip for strip in effect_strips(scene) if strip.scene == effect_scene]
+            if scene_frame is not None:
+                parts.sort(key=lambda part: not is_at(part, timeline_frame(part, scene_frame)))
+            if parts:
+                return scene, effect, parts[0]
     raise EffectError(rpt_('scene "{scene}" belongs to no Shutter strip').format(scene=effect_scene.name))
 
 
@@ -79,6 +82,11 @@ def origin(strip) -> float:
 def skipped(strip) -> int:
     """How many frames of its content a strip leaves out before the first that it shows."""
     return math.floor(strip.left_handle - origin(strip))
+
+
+def is_at(strip, frame: float) -> bool:
+    """Whether a strip lies at a timeline frame."""
+    return strip.left_handle <= frame < strip.right_handle
 
 
 def timeline_frame(strip, scene_frame: float) -> float:

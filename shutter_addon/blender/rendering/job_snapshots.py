@@ -9,6 +9,7 @@ effect strip skips to) is read on the main thread when it is asked for.
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import bpy
@@ -19,11 +20,14 @@ from ...core.messages import EffectError
 from ...core.stopping import StoppedError
 from ..data import requirements, snapshot, strips
 from ..data.snapshot import Snapshot
+from ..data.strip_timing import timing_of
 from . import effect_source, invalidation, render_job, render_settings, sessions
 from .render_job import Where
 
-_taken: dict[int, Snapshot | Exception] = {}  # by effect scene: of the job that runs
-_films: dict[int, Snapshot | None] = {}  # by effect scene: of the film in the background; None: read once
+# Of the job that runs, by effect scene: of each part of a cut strip its timeline frames and its snapshot.
+_taken: dict[int, list[tuple[range, Snapshot]] | Exception] = {}
+# Of the film in the background, by effect scene and strip; None: read once.
+_films: dict[tuple[int, str], Snapshot | None] = {}
 pictures: dict[int, np.ndarray] = {}  # likewise: the last one, which the render's window shows until the next is made
 _left_out: list[tuple[range, str]] = []  # of its film, see requirements.left_out
 
@@ -37,10 +41,29 @@ def begin(film: int) -> None:
             continue
         try:
             frames = asked_frames(scene, parts, scene == film_scene)
-            _taken[effect.scene.session_uid] = snapshot.take(scene, effect, parts[0], frames)
+            _taken[effect.scene.session_uid] = _of_parts(scene, effect, parts, frames)
         except effect_source.FAULTS as error:
             _taken[effect.scene.session_uid] = error
     look(film)
+
+
+def _of_parts(scene: Any, effect: Any, parts: list, frames: set[float]) -> list[tuple[range, Snapshot]]:
+    """The timeline frames and the snapshot of each part of an effect strip: those whose source is cut without its
+    content have one in common. One of effect_source.FAULTS: there is none."""
+    found: list[tuple[range, Snapshot]] = []
+    by_timing: dict[Any, Snapshot] = {}
+    for part in parts:
+        timing = replace(timing_of(strips.source_of(scene, effect, part)), name="", left_handle=0)
+        if timing not in by_timing:
+            by_timing[timing] = snapshot.take(scene, effect, part, frames)
+        found.append((range(part.left_handle, part.right_handle), by_timing[timing]))
+    return found
+
+
+def _part_at(parts: list[tuple[range, Snapshot]], scene_frame: float) -> Snapshot:
+    """The snapshot of the part that shows a frame of the effect's scene; else the first."""
+    frame = parts[0][1].timeline_frame(scene_frame)
+    return next((taken for shown, taken in parts if shown.start <= frame < shown.stop), parts[0][1])
 
 
 def end() -> None:
@@ -70,7 +93,8 @@ def of(effect_scene: Any, scene_frame: float, ended: Callable[[], bool] | None =
     effect_source.FAULTS: there is none. ended: whether nobody waits for it any longer."""
     uid = effect_scene.session_uid
     if render_job.where() is Where.JOB:
-        taken = _taken.get(uid)
+        parts = _taken.get(uid)
+        taken = _part_at(parts, scene_frame) if isinstance(parts, list) else parts
         if taken is None or (isinstance(taken, Snapshot) and taken.timeline_frame(scene_frame) not in taken.frames):
             taken = render_job.on_main_thread(lambda: _late(uid, scene_frame), ended)
         if taken is None:
@@ -78,11 +102,11 @@ def of(effect_scene: Any, scene_frame: float, ended: Callable[[], bool] | None =
         if isinstance(taken, Exception):
             raise taken.with_traceback(None)
         return taken, taken.timeline_frame(scene_frame)
-    scene, effect, strip = strips.find_effect(effect_scene)
+    scene, effect, strip = strips.find_effect(effect_scene, scene_frame)
     frame = strips.timeline_frame(strip, scene_frame)
     if not bpy.app.background:
         return invalidation.current(scene, effect, strip, frame), frame
-    known = _films.get(effect_scene.session_uid)
+    known = _films.get((effect_scene.session_uid, strip.name))
     if known is not None and frame in known.frames and not render_job.scripts_act():
         return known, frame
     return _of_film(scene, effect, strip, frame), frame
@@ -90,14 +114,14 @@ def of(effect_scene: Any, scene_frame: float, ended: Callable[[], bool] | None =
 
 def _of_film(scene: Any, effect: Any, strip: Any, frame: float) -> Snapshot:
     """The snapshot of an effect in the background."""
-    uid, frames = effect.scene.session_uid, {frame, frame + scene.frame_step}
-    is_again = uid in _films and not render_job.scripts_act()
+    key, frames = (effect.scene.session_uid, strip.name), {frame, frame + scene.frame_step}
+    is_again = key in _films and not render_job.scripts_act()
     if is_again:
         parts = [part for part in strips.effect_strips(scene) if part.scene == effect.scene]
         frames |= asked_frames(scene, parts, scene.session_uid == render_job.film())
     taken = snapshot.take(scene, effect, strip, frames, folder=render_settings.settings().inbetween)
     if render_job.runs():
-        _films[uid] = taken if is_again else None
+        _films[key] = taken if is_again else None
     return taken
 
 
@@ -105,7 +129,7 @@ def _late(uid: int, scene_frame: float) -> Snapshot | Exception:
     if (effect_scene := _scene(uid)) is None:
         return EffectError(rpt_("the effect was deleted while it was rendered"))
     try:
-        scene, effect, strip = strips.find_effect(effect_scene)
+        scene, effect, strip = strips.find_effect(effect_scene, scene_frame)
         return snapshot.take(scene, effect, strip, (strips.timeline_frame(strip, scene_frame),))
     except effect_source.FAULTS as error:
         return error

@@ -116,7 +116,7 @@ def for_engine(context: Any, effect_scene: Any) -> Asked | None:
     if region is None or region.type != "PREVIEW" or is_read(context):
         return None
     scene, seen = selection.scene_of(context), preview_areas.shown(context)
-    owner, effect, strip = strips.find_effect(effect_scene)
+    owner, effect, strip = strips.find_effect(effect_scene, effect_scene.frame_current)
     frame = strips.timeline_frame(strip, effect_scene.frame_current)
     if seen is not None and (seen.effect != effect or scene.frame_current != frame):
         seen = None
