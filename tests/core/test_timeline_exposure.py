@@ -79,6 +79,12 @@ def test_a_freeze_is_the_shown_frame(position):
         assert (np.flatnonzero(bars).tolist(), length) == ([options.before + place], 0)
 
 
+def test_a_freeze_in_a_window_that_is_shorter_than_a_filmed_frame():
+    for window in (1, 2, 3):
+        bars, _length = exposed([1] * window, 0, -1, step=4)
+        assert bars.tolist() == [0] * (window - 1) + [window]
+
+
 def test_where_it_turns_around_it_goes_there_and_back():
     bars, length = exposed(OPEN, before=104.0, after=104.0, position="center")
     assert length == pytest.approx(2)

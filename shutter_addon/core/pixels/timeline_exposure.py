@@ -69,7 +69,8 @@ def on_timeline(bars: np.ndarray, options: Options, direction: int, positions: n
     places = options.before + anchor + way
     found = np.zeros(window)
     if np.ptp(places) < _SHORTEST:
-        found[options.before + (options.step - 1 if direction < 0 else 0)] = bars.sum()
+        shown = options.before + (options.step - 1 if direction < 0 else 0)
+        found[min(shown, window - 1)] = bars.sum()  # a window may be shorter than a filmed frame
         return found, 0.0
     for weight, start, end in zip(bars, places[:-1], places[1:], strict=True):
         found += weight * _spread(min(start, end), max(start, end), window)
