@@ -20,7 +20,7 @@ float level(float light, float added) {
   float value = light < LOWEST ? light * slope : (piece.x * along + piece.y) * along + piece.z;
   value += added * 255.0 + 0.5;
   // Below and above all levels there is nothing to round; and what is no number is not sure.
-  is_sure = is_sure && (value < 0.5 || value > 255.9 || abs(value - round(value)) > piece.w);
+  is_sure = is_sure && !isnan(light) && (value < 0.5 || value > 255.9 || abs(value - round(value)) > piece.w);
   return clamp(floor(value), 0.0, 255.0) / 255.0;
 }
 

@@ -59,8 +59,9 @@ class UntilChange:
         return value
 
     def known(self, key: Hashable) -> Any:
-        """The value of a key that has been made since something changed; None: none has."""
-        return self._values.get(key, (True, None))[1] if self._number == number() else None
+        """The value of a key that has been made since something changed; None: none has, or it could not be."""
+        good, value = self._values.get(key, (False, None))
+        return value if good and self._number == number() else None
 
     def clear(self) -> None:
         self._values = {}

@@ -7,6 +7,7 @@ import OpenImageIO
 
 from .files import check_name
 
+UNKNOWN = "nothing says why"  # why a file is short
 _PNG_END = b"IEND\xaeB`\x82"
 _BLEND_END = 32  # bytes of its last block
 _ZSTD_TABLE_END = b"\xb1\xea\x92\x8f"
@@ -67,4 +68,4 @@ def why_short(folder: Path) -> str:
     finally:
         with suppress(OSError):
             probe.unlink(missing_ok=True)
-    return "nothing says why"
+    return UNKNOWN

@@ -6,7 +6,7 @@ import numpy as np
 import OpenImageIO
 
 from ..core import atomic_write
-from .completeness import why_short
+from .completeness import UNKNOWN, why_short
 from .errors import MediaError
 from .files import check_name
 
@@ -52,6 +52,7 @@ def _write(path: Path, spec: OpenImageIO.ImageSpec, samples: np.ndarray) -> None
                 raise MediaError(f"{path}: {OpenImageIO.geterror() or 'cannot be written'}")
             written = output.open(name, spec) and output.write_image(np.ascontiguousarray(samples))
             if not (output.close() and written):
-                raise MediaError(f"{path}: could not be written whole; {why_short(part.parent)}")
+                said, why = output.geterror(), why_short(part.parent)
+                raise MediaError(f"{path}: could not be written whole; {said or why if why == UNKNOWN else why}")
     except OSError as error:
         raise MediaError(f"{path}: cannot be written ({error.strerror or error})") from None

@@ -13,7 +13,7 @@ from support import noise_film, picture_of, read_picture, sequencer
 
 from shutter_addon.blender.data import effect_version, selection, strips
 from shutter_addon.blender.editing import add_effect, baked_strips, lifecycle
-from shutter_addon.blender.output import bake_job, baked_film
+from shutter_addon.blender.output import bake_job, baked_film, edit_check, film_output
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core import revision
 from shutter_addon.core.frames import light
@@ -192,7 +192,8 @@ def test_the_command_goes_on_where_it_was_broken_off(bpy, film, tmp_path, kind):
     said = shutter("bake", tmp_path / "edit.blend", "--strip", "Shutter", "--format", kind)
     assert said.returncode == 0, said.stderr
     place = Path(said.stdout.splitlines()[-1])
-    assert f"1 of {COUNT}" in said.stdout.splitlines()
+    counts = [line for line in said.stdout.splitlines() if line.endswith(f" of {COUNT}")]
+    assert counts == [f"{done} of {COUNT}" for done in range(1, COUNT + 1)]
     assert place.parent == tmp_path / baked_film.FOLDER
     if kind == "movie":
         whole = place.read_bytes()
@@ -354,6 +355,18 @@ def test_keys_that_moved_along_are_no_change_and_others_are(bpy, film, change):
     assert states(scene, effect, strip) == [True]
 
 
+def test_check_tells_of_a_stale_film_that_is_shown(bpy, film):
+    scene, effect, strip = film()
+    baked = bake(bpy)
+    assert edit_check.stale_films(scene, range(1, COUNT + 1)) == []
+    effect.shutters[0].bars[0].weight = 0.25
+    assert edit_check.stale_films(scene, range(1, COUNT + 1)) == [
+        f'"{strip.name}": the effect has changed since it was baked, and its baked strip is shown'
+    ]
+    baked.mute = True
+    assert edit_check.stale_films(scene, range(1, COUNT + 1)) == []
+
+
 def test_names_are_no_change(bpy, film):
     scene, effect, strip = film()
     bake(bpy)
@@ -392,8 +405,9 @@ def test_any_retouched_frame_is_a_change(bpy, film, tmp_path):
     assert first not in (before, effect_version.key(scene, effect, strip, effect_version.frames_of(strip)))
 
 
-def test_what_lies_above_stays_above(bpy, film, tmp_path):
-    """A title above the effect, with room above it alone."""
+@pytest.mark.parametrize("is_deleted", [False, True])
+def test_what_lies_above_stays_above(bpy, film, tmp_path, is_deleted):
+    """A title above the effect, with room above it alone; by a second bake as well, and where its strip is deleted."""
     scene, _effect, strip = film()
     title = scene.sequence_editor.strips.new_effect("title", "COLOR", strip.channel + 1, 1, length=COUNT)
     title.color, title.blend_type, title.transform.scale_x = (0, 1, 0), "ALPHA_OVER", 0.5
@@ -402,6 +416,10 @@ def test_what_lies_above_stays_above(bpy, film, tmp_path):
     baked = bake(bpy)
     assert np.abs(rendered(bpy, scene, tmp_path / "baked", (4,)) - before).max() < 1e-4
     assert (baked.channel, title.channel, strip.channel) == (channel, channel + 1, channel + 3)
+    again = bake(bpy, "OPEN_EXR")
+    assert (again.channel, title.channel, strip.channel) == (channel, channel + 1, channel + 3)
+    if is_deleted:
+        scene.sequence_editor.strips.remove(again)
     bpy.ops.shutter.unbake()
     assert strip.channel == channel
     assert (rendered(bpy, scene, tmp_path / "again", (4,)) == before).all()
@@ -467,19 +485,21 @@ def test_a_transparent_source_stays_muted_below_what_was_baked_of_it(bpy, film, 
 
 def test_a_copy_of_a_killed_bake_goes(bpy, film, tmp_path):
     scene, effect, strip = film()
-    left = tmp_path / "edit.bake-00000000.blend"
-    left.write_bytes(b"")
-    os.utime(left, (0, 0))
+    left, own = tmp_path / "edit.bake-00000000.blend", tmp_path / "edit.bake-final.blend"
+    for path in (left, own):
+        path.write_bytes(b"")
+        os.utime(path, (0, 0))
     job = bake_job.start(scene, effect, strip, baked_film.film_of(scene, effect, strip, "OPEN_EXR"))
     try:
         assert not left.exists()
-        assert job.copy.exists()
+        assert own.exists()
         assert job.process.wait(60) == 0
+        assert not job.copy.exists(), "it has been read"
         assert job.failure() is None
         assert job.done() == COUNT
     finally:
         job.end()
-    assert not list(tmp_path.glob("*.bake-*"))
+    assert list(tmp_path.glob("*.bake-*")) == [own]
 
 
 def test_a_job_tells_why_it_failed(bpy, film, tmp_path):
@@ -493,3 +513,30 @@ def test_a_job_tells_why_it_failed(bpy, film, tmp_path):
         assert not job.failure().startswith("Virtual Shutter")
     finally:
         job.end()
+
+
+def test_a_bake_ends_with_the_blender_that_began_it(bpy, film):
+    scene, effect, strip = film()
+    strip.right_handle = 3000  # it takes long
+    job = bake_job.start(scene, effect, strip, baked_film.film_of(scene, effect, strip, "OPEN_EXR"))
+    try:
+        while not job.done():
+            assert not job.is_over(), job.failure()
+        job.process.stdin.close()  # as when that is killed
+        assert job.process.wait(30) == film_output.INTERRUPTED
+        assert 0 < job.done() < 2990
+    finally:
+        job.end()
+
+
+def test_a_transparent_source_beside_another_bake_is_shown(bpy, film, tmp_path):
+    scene, _effect, _strip = film(4)
+    bake(bpy)
+    first = str(tmp_path / "in" / "f0001.png")
+    source = scene.sequence_editor.strips.new_image("other", first, 1, 1)
+    source.channel, source.right_handle = 1, COUNT + 1
+    other, _effect = add_effect.add_effect(scene, source)
+    assert source.mute
+    scene.sequence_editor.strips.remove(other)
+    lifecycle.update()
+    assert not source.mute

@@ -396,5 +396,6 @@ def test_a_hard_cut_changes_no_picture(bpy, edit, render, tmp_path):
         of_parts = snapshots._taken[strip.scene.session_uid]  # what a job of the window reads, which is not to be seen
         assert [shown for shown, _ in of_parts] == [range(1, 5), range(5, 10)]
         assert of_parts[0][1].timing != of_parts[1][1].timing
+        assert max(of_parts[0][1].frames) < 7 < max(of_parts[1][1].frames)
     finally:
         snapshots.end()

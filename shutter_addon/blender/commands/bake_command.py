@@ -1,5 +1,11 @@
 """The command `bake`: the film of one effect of a saved edit, for an ordinary strip to show."""
 
+import argparse
+import os
+import signal
+import threading
+from contextlib import suppress
+
 from ...core.messages import sentence
 from ..data import strips
 from ..editing import saved_edit
@@ -8,9 +14,6 @@ from ..rendering import render_settings
 from . import command_line
 from .command_line import place
 
-FORMATS: dict[str, baked_film.Kind] = {"movie": "MOVIE", "exr": "OPEN_EXR"}
-PROGRESS = "{done} of {total}"  # what is printed after each frame, unless there is a terminal with a bar
-
 
 def add(commands) -> None:
     parser = commands.add_parser("bake", help="render one effect of a saved edit, for a strip to show")
@@ -18,29 +21,44 @@ def add(commands) -> None:
     option("source", type=place, help="a saved edit (.blend)")
     option("--strip", required=True, metavar="NAME", help="its effect strip")
     option("--scene", metavar="NAME", help="the scene that the strip is in (default: the active one)")
-    option("--format", choices=tuple(FORMATS), default="movie", help="H.264, or float EXR (default: movie)")
+    option("--format", choices=tuple(baked_film.KINDS), default="movie", help="H.264, or float EXR (default: movie)")
     option("--output", type=place, metavar="DIR", help="the folder it gets into (default: beside the edit)")
     command_line.add_device(parser)
+    option("--attached", action="store_true", help=argparse.SUPPRESS)  # to a Blender, whose copy of an edit it reads
     parser.set_defaults(run=run)
 
 
 def run(arguments) -> None:
     scene = saved_edit.open_edit(arguments.source, arguments.scene)
     scene.frame_set(scene.frame_current)  # what drivers and keys say, once
+    if arguments.attached:
+        arguments.source.unlink(missing_ok=True)
+        threading.Thread(target=_end_with_parent, daemon=True).start()
     effect, strip = _effect_strip(scene, arguments.strip)
-    film = baked_film.film_of(scene, effect, strip, FORMATS[arguments.format], arguments.output)
+    film = baked_film.film_of(scene, effect, strip, baked_film.KINDS[arguments.format], arguments.output)
     total = len(film.frames)
     with (
         render_settings.using(render_settings.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)),
         film_output.progress(total, "frame") as moved,
     ):
+        finished = 0
 
         def told(done: int) -> None:
-            moved()
-            command_line.tell(PROGRESS.format(done=done, total=total))
+            nonlocal finished
+            moved(done - finished)
+            finished = done
+            command_line.tell(f"{done} of {total}")
 
         baked_film.render(scene, effect, strip, film, told)
     command_line.tell(str(film.place))
+
+
+def _end_with_parent() -> None:
+    """Stops this process as Ctrl-C does, once nobody holds the other end of its input: touches no bpy."""
+    with suppress(OSError):
+        while os.read(0, 1):
+            pass
+    os.kill(os.getpid(), signal.SIGTERM)
 
 
 def _effect_strip(scene, name: str):

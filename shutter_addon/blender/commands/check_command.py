@@ -77,6 +77,7 @@ def _report(arguments, scene, frames: range, version: EditVersion) -> dict:
             words = f"in-between frames of source {frame_ranges.in_words(check.missing)} are missing"
             faults.append(f'"{check.name}": {words}; build them: {build}')
     faults += edit_check.left_out(scene, frames)
+    notes += edit_check.stale_films(scene, frames)
     faults += missing_media.faults(scene, frames, sources=False)  # of these the effects' own say more
     faults += missing_media.sound_faults(scene, frames)
     memory = _memory(checks, limit)

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, is_dataclass
+from functools import partial
 from numbers import Number
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,7 @@ from ...media import MediaError, inbetween_cache
 from ...media.sequence import ImageFiles
 from . import colour_configuration, fcurves, geometry, snapshot, strips, versions
 
+_READERS = 16  # threads
 _FEW, _BLOCKS = 256, 1 << 16  # of more files than these, blocks are read, where they have more bytes
 # Fields that hold timeline frames: they count from the effect strip's origin. In mappings the keys are frames, in
 # sequences of pairs the first of each.
@@ -55,13 +58,25 @@ def key(scene, effect, strip, frames: range) -> str:
     taken = snapshot.take(scene, effect, strip, [start + frame for frame in frames])
     digest = _Digest(start)
     size = None if taken.inbetween is None else (taken.inbetween.factor, taken.inbetween.method)
-    parts = taken.effect, taken.timing, taken.source, size, (frames.start, frames.stop)
+    rate = None if taken.timing else scene.render.fps / scene.render.fps_base  # a timing has it
+    parts = taken.effect, taken.timing, taken.source, size, rate, (frames.start, frames.stop)
     digest.add((versions.extension(), colour_configuration.name(), *parts))
     digest.add(_curves(scene, f"{effect.path_from_id()}.", start))
     if placed := _curves(scene, f"{strip.path_from_id()}.transform.", start):
         keyed = {path for path, *_ in placed}
         digest.add([placed, [getattr(strip.transform, name) for name in geometry.TRANSFORM if name not in keyed]])
     return digest.hexadecimal[:16]
+
+
+def is_changed(scene, effect, strip) -> bool:
+    """Whether an effect is another than when its strip was baked, or cannot be shown any more."""
+    bake, frames = strip.virtual_shutter_bake, frames_of(strip)
+    if frames.start < bake.first or frames.stop > bake.first + bake.count:
+        return True  # it has become longer
+    try:
+        return key(scene, effect, strip, range(bake.first, bake.first + bake.count)) != bake.version
+    except (UserError, MemoryError):
+        return True
 
 
 def _curves(scene: Any, path: str, start: int) -> list[tuple]:
@@ -84,8 +99,15 @@ def _curve(curve: Any, start: int) -> tuple:
 
 
 def _plain(modifier: Any) -> list:
-    simple = (prop for prop in modifier.bl_rna.properties if prop.type in ("INT", "FLOAT", "BOOLEAN", "ENUM"))
-    return [(prop.identifier, str(getattr(modifier, prop.identifier))) for prop in simple]
+    """All that it is, in plain data."""
+    plain: list = []
+    for prop in modifier.bl_rna.properties:
+        value = getattr(modifier, prop.identifier)
+        if prop.type == "COLLECTION":
+            plain += [_plain(item) for item in value]
+        elif prop.type in ("INT", "FLOAT", "BOOLEAN", "ENUM"):
+            plain.append((prop.identifier, tuple(value) if getattr(prop, "is_array", False) else value))
+    return plain
 
 
 class _Digest:
@@ -123,7 +145,9 @@ class _Digest:
         values = list(values)
         self._feed(len(values))
         if values and all(isinstance(value, Path) for value in values):
-            values = [_content(path, inbetween_cache.WHOLE if len(values) <= _FEW else _BLOCKS) for path in values]
+            whole = inbetween_cache.WHOLE if len(values) <= _FEW else _BLOCKS
+            with ThreadPoolExecutor(_READERS) as pool:
+                values = list(pool.map(partial(_content, whole=whole), values))
         for value in values:
             self.add(value)
 

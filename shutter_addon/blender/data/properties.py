@@ -298,12 +298,15 @@ class ShutterBake(PropertyGroup):
     """Of a strip that was baked from an effect strip, and of that strip: `identity` is the same.
 
     version: of the effect when it was baked (effect_version), over `count` frames from `first`, which count from the
-    effect strip's origin"""
+    effect strip's origin
+    source: identity of the effect's source; channel: that of the effect strip before it made room for the film"""
 
     identity: StringProperty()
     version: StringProperty()
     first: IntProperty()
     count: IntProperty()
+    source: StringProperty()
+    channel: IntProperty()
 
 
 classes = (ShutterBar, Shutter, TrackStop, ShutterRegion, ShutterCamera, ShutterEffect, ShutterScene, ShutterBake)

@@ -21,6 +21,7 @@ _PLAIN_RENDER |= {"frame_map_old": 100, "frame_map_new": 100}
 _STANDARD = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
 _STANDARD |= {"use_curve_mapping": False, "use_white_balance": False}
 _LEVELS = {"color_depth": "8", "color_management": "FOLLOW_SCENE"}
+_MODES = "RGB", "RGBA"  # grey is made of light
 _FORMATS = ("FFMPEG", "PNG", "JPEG")
 
 
@@ -65,7 +66,7 @@ def alone(scene: Any, frame: int, but: str | None = None) -> Alone | None:
         for strip in editor.strips
         if strip.type != "SOUND"
         and strip.name != but
-        and strip.left_handle <= frame < strip.right_handle
+        and strips.is_at(strip, frame)
         and not (strip.mute or editor.channels[strip.channel].mute)
     ]
     top = max(seen, key=lambda strip: strip.channel, default=None)
@@ -94,6 +95,7 @@ def makes_levels(scene: Any) -> bool:
         and has(scene.view_settings, _STANDARD)
         and has(scene.render.image_settings, _LEVELS)
         and scene.render.image_settings.file_format in _FORMATS
+        and scene.render.image_settings.color_mode in _MODES
         and has(scene.render, _PLAIN_RENDER)
         and scene.frame_subframe == 0
         and not any(_has_animation(scene, name) for name in ("view_settings", "render.", "display_settings"))

@@ -4,6 +4,7 @@ from typing import Any
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from . import strips
 from .strips import SOURCES, effect_of, effect_strips
 
 
@@ -66,7 +67,7 @@ def visible(scene) -> list:
     return [
         strip
         for strip in level.strips
-        if strip.left_handle <= frame < strip.right_handle
+        if strips.is_at(strip, frame)
         and strip.type != "SOUND"
         and not strip.mute
         and not level.channels[strip.channel].mute
@@ -75,7 +76,7 @@ def visible(scene) -> list:
 
 def why_unseen(scene, strip) -> str:
     """Why nothing of an effect strip is in the picture, and what to do, as a sentence."""
-    if not strip.left_handle <= scene.frame_current < strip.right_handle:
+    if not strips.is_at(strip, scene.frame_current):
         return rpt_("Move the playhead onto the Shutter strip")
     if strip.mute and strip.virtual_shutter_bake.identity:
         return rpt_("The effect is baked: unbake it to see changes")
@@ -94,10 +95,10 @@ def _effects_of(scene, strip) -> list:
 
 
 def _baked_part(scene, strip):
-    """Scene, effect and effect strip of a strip that belongs to a bake, or None. Of several the one with which it
-    shares frames: copies have the same identity."""
+    """Scene, effect and effect strip that a baked strip was made of; None: it is no baked strip. Copies have the same
+    identity: the one counts that shares frames with it."""
     parts = [part for part in of_bake(scene, strip) if part.type == "SCENE" and part.scene]
-    parts.sort(key=lambda part: (part != strip, not overlap(part, strip)))
+    parts.sort(key=lambda part: (part != strip, not strips.overlap(part, strip)))
     shown = ((effect_of(scene, part.scene), part) for part in parts)
     return next(((scene, effect, part) for effect, part in shown if effect), None)
 
@@ -105,13 +106,8 @@ def _baked_part(scene, strip):
 def of_bake(scene, strip) -> list:
     """All strips that belong to the same bake as a strip, and that itself; none, if it belongs to none."""
     identity = strip.virtual_shutter_bake.identity
-    strips = scene.sequence_editor.strips_all if identity else ()
-    return [other for other in strips if other.virtual_shutter_bake.identity == identity]
-
-
-def overlap(a, b) -> bool:
-    """Whether two strips share timeline frames."""
-    return a.left_handle < b.right_handle and b.left_handle < a.right_handle
+    found = scene.sequence_editor.strips_all if identity else ()
+    return [other for other in found if other.virtual_shutter_bake.identity == identity]
 
 
 def choose(scene, strip) -> None:

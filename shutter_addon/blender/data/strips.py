@@ -10,6 +10,7 @@ from ...core import revision
 from ...core.messages import EffectError
 
 ENGINE = "VIRTUAL_SHUTTER"
+CHANNELS = 128  # of Blender's sequencer
 SOURCES = ("MOVIE", "IMAGE", "MOVIECLIP")
 MATTES = ("MATTE", "RAMP")  # kinds of regions that have no strokes
 LAID = ("OUTLINE", *MATTES)  # kinds of mattes, which are laid over what scribbles give
@@ -82,6 +83,11 @@ def origin(strip) -> float:
 def skipped(strip) -> int:
     """How many frames of its content a strip leaves out before the first that it shows."""
     return math.floor(strip.left_handle - origin(strip))
+
+
+def overlap(a, b) -> bool:
+    """Whether two strips share timeline frames."""
+    return a.left_handle < b.right_handle and b.left_handle < a.right_handle
 
 
 def is_at(strip, frame: float) -> bool:

@@ -6,8 +6,8 @@ import bpy
 from bpy.app.translations import pgettext_data as data_
 
 from ...core.model.limits import MAX_FRAME
-from ..data import annotations, selection, source_media
-from ..data.strips import ENGINE, effect_of, origin
+from ..data import annotations, source_media
+from ..data.strips import ENGINE, effect_of, origin, overlap
 
 _COLOR = "COLOR_06"
 
@@ -26,7 +26,7 @@ def add_effect(scene, source):
     name = data_("Shutter {source}").format(source=source.name)
     effect_scene = new_effect_scene(scene, uuid.uuid4().hex, name, (medium.width, medium.height))
     level = (source.parent_meta() or scene.sequence_editor).strips
-    taken = {s.channel for s in level if selection.overlap(s, source)}
+    taken = {s.channel for s in level if overlap(s, source)}
     channel = next(c for c in range(source.channel + 1, source.channel + len(taken) + 2) if c not in taken)
     strip = level.new_scene(data_("Shutter"), effect_scene, channel, int(source.content_start))
     strip.left_handle, strip.right_handle = source.left_handle, source.right_handle

@@ -11,18 +11,17 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.messages import EffectError
 from ...core.revision import UntilChange
 from ..data import effect_version, fcurves, selection, strips
 from ..output.baked_film import Film
-from ..rendering.effect_source import FAULTS
 from . import add_effect, match_source
 
 _LOOK = ("blend_type", "blend_alpha")
 _CURVES = "transform.", "crop.", "blend_alpha", "color_multiply", "color_saturation"
-_CHANNELS = 128  # of Blender's sequencer
 _states = UntilChange()
 
 
@@ -36,23 +35,31 @@ def check(scene: Any, strip: Any) -> None:
 
 def lay(scene: Any, strip: Any, film: Film) -> Any:
     """Puts a finished film in the place of the effect strip that it was baked of, and mutes that; the new strip. That
-    of an older bake goes. EffectError: there is no room for it. RuntimeError: Blender cannot read the film."""
-    level = (strip.parent_meta() or scene.sequence_editor).strips
-    older = [baked for baked in baked_of(scene, strip) if selection.overlap(baked, strip)]
-    start, channel = round(strips.origin(strip)) + film.frames.start, _channel(scene, strip)
-    if any(strip.channel < each.channel < channel and selection.overlap(each, strip) for each in {*level} - {*older}):
-        strip.channel, channel = channel, strip.channel  # what lies above the effect has to lie above its film
-    baked = _new_strip(level, f"{strip.name} Baked", film, channel, start)
+    of an older bake goes. EffectError: there is no room for it."""
+    owner = strip.parent_meta() or scene.sequence_editor
+    older = [baked for baked in baked_of(scene, strip) if strips.overlap(baked, strip)]
+    home = strip.virtual_shutter_bake.channel if older else strip.channel
+    name, start = data_("{strip} Baked").format(strip=strip.name), round(strips.origin(strip)) + film.frames.start
+    baked = _new_strip(owner.strips, name, film, _channel(scene, strip), start)
     baked.left_handle, baked.right_handle = strip.left_handle, strip.right_handle
-    for other in older:
-        level.remove(other)
+    if older:
+        channel = older[0].channel
+        for other in older:
+            owner.strips.remove(other)
+        _move(owner, baked, channel)
+    elif any(home < each.channel < baked.channel and strips.overlap(each, strip) for each in owner.strips):
+        # What lies above the effect has to lie above its film.
+        spare = baked.channel
+        _move(owner, strip, _channel(scene, strip))
+        _move(owner, baked, home)
+        _move(owner, strip, spare)
     add_effect.copy_look(strip, baked)
-    for name in _LOOK:
-        setattr(baked, name, getattr(strip, name))
+    for look in _LOOK:
+        setattr(baked, look, getattr(strip, look))
     _copy_curves(scene, strip, baked)
     match_source.append_modifiers(scene, strip, baked)
     strip.mute = True
-    _note(strip, baked, film)
+    _note(strip, baked, film, home)
     baked.color_tag = strip.color_tag
     add_effect.connect(scene, [baked, strip, *strip.connections])
     return baked
@@ -61,13 +68,21 @@ def lay(scene: Any, strip: Any, film: Film) -> Any:
 def _channel(scene: Any, strip: Any) -> int:
     """The first channel above an effect strip that has room beside it, and is not muted. EffectError: there is none."""
     owner = strip.parent_meta() or scene.sequence_editor
-    taken = {other.channel for other in owner.strips if selection.overlap(other, strip)}
-    for channel in range(strip.channel + 1, _CHANNELS + 1):
-        if channel not in taken and not owner.channels[channel].mute:
+    for channel in range(strip.channel + 1, strips.CHANNELS + 1):
+        if _is_free(owner, strip, channel) and not owner.channels[channel].mute:
             return channel
-    raise EffectError(
-        rpt_('above "{strip}" there is no channel with room for the baked strip').format(strip=strip.name)
-    )
+    sentence = rpt_('above "{strip}" there is no channel with room for the baked strip')
+    raise EffectError(sentence.format(strip=strip.name))
+
+
+def _is_free(owner: Any, strip: Any, channel: int) -> bool:
+    return not any(other.channel == channel and strips.overlap(other, strip) for other in owner.strips)
+
+
+def _move(owner: Any, strip: Any, channel: int) -> None:
+    """Moves a strip to a channel, where there is room: Blender would shift it in time."""
+    if _is_free(owner, strip, channel):
+        strip.channel = channel
 
 
 def _new_strip(level: Any, name: str, film: Film, channel: int, start: int) -> Any:
@@ -93,13 +108,15 @@ def _copy_curves(scene: Any, strip: Any, baked: Any) -> None:
         fcurves.copy_curves(scene, f"{old}.{end}", scene, f"{new}.{end}")
 
 
-def _note(strip: Any, baked: Any, film: Film) -> None:
-    """Says of both strips that they belong together, and of which version the film is."""
-    identity = uuid.uuid4().hex
+def _note(strip: Any, baked: Any, film: Film, channel: int) -> None:
+    """Says of both strips that they belong together, and of which version the film is. channel: the effect strip's
+    own"""
+    identity, effect = uuid.uuid4().hex, strips.effect_of(strip.id_data, strip.scene)
     for each in (strip, baked):
         bake = each.virtual_shutter_bake
         bake.identity, bake.version = identity, film.version
         bake.first, bake.count = film.frames.start, len(film.frames)
+        bake.source, bake.channel = effect.source, channel
 
 
 def baked_of(scene: Any, strip: Any) -> list:
@@ -117,23 +134,22 @@ def effect_parts(scene: Any, strip: Any) -> list:
 
 def unbake(scene: Any, strip: Any) -> None:
     """Removes what is baked of an effect strip, and shows the effect again. Files stay."""
-    parts, channels = effect_parts(scene, strip), []
+    parts = effect_parts(scene, strip)
     for baked in baked_of(scene, strip):
-        channels.append(baked.channel)
         (baked.parent_meta() or scene.sequence_editor).strips.remove(baked)
     for part in parts:
-        if channels and part.channel > min(channels):  # they had changed places
-            part.channel = min(channels)
+        bake = part.virtual_shutter_bake
+        _move(part.parent_meta() or scene.sequence_editor, part, bake.channel)
         part.mute = False
-        for name in ("version", "first", "count", "identity"):
-            part.virtual_shutter_bake.property_unset(name)
+        for prop in bake.bl_rna.properties:
+            if not prop.is_readonly:
+                bake.property_unset(prop.identifier)
 
 
 def is_stale(scene: Any, effect: Any, strip: Any) -> bool:
     """Whether an effect has changed since its strip was baked: its pictures would be others. True as well where it has
     none any more."""
-    bake = strip.virtual_shutter_bake
-    return _states.get(_place(scene, effect, strip), lambda: _current(scene, effect, strip) != bake.version)
+    return _states.get(_place(scene, effect, strip), lambda: effect_version.is_changed(scene, effect, strip))
 
 
 def known_stale(scene: Any, effect: Any, strip: Any) -> bool | None:
@@ -143,13 +159,3 @@ def known_stale(scene: Any, effect: Any, strip: Any) -> bool | None:
 
 def _place(scene: Any, effect: Any, strip: Any) -> tuple:
     return scene.session_uid, effect.identity, strip.name
-
-
-def _current(scene: Any, effect: Any, strip: Any) -> str | None:
-    bake, frames = strip.virtual_shutter_bake, effect_version.frames_of(strip)
-    if frames.start < bake.first or frames.stop > bake.first + bake.count:
-        return None  # it has become longer
-    try:
-        return effect_version.key(scene, effect, strip, range(bake.first, bake.first + bake.count))
-    except FAULTS:
-        return None

@@ -4,7 +4,7 @@ import uuid
 
 import bpy
 
-from ..data import annotations, fcurves, requirements, selection, strips, undo
+from ..data import annotations, fcurves, requirements, strips, undo
 from ..rendering import invalidation, render_job, sessions
 from . import copies, match_source, renamed_drawings, shown_annotations, undelete
 from .add_effect import add_camera
@@ -157,9 +157,10 @@ def _unmute_sources(scene) -> None:
 
 
 def _is_baked_over(scene, source) -> bool:
-    """Whether what was baked of its effect lies above a source, which would show through it."""
-    above = (s for s in scene.sequence_editor.strips_all if s.type in strips.SOURCES and s.channel > source.channel)
-    return any(s.virtual_shutter_bake.identity and selection.overlap(s, source) for s in above)
+    """Whether a film that was baked of a source lies above it: the source would be seen through transparent parts."""
+    identity = source.virtual_shutter_source
+    baked = (s for s in scene.sequence_editor.strips_all if s.type in strips.SOURCES and s.channel > source.channel)
+    return any(s.virtual_shutter_bake.source == identity != "" and strips.overlap(s, source) for s in baked)
 
 
 def _remove_scenes(updated) -> None:

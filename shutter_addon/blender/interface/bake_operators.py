@@ -6,7 +6,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
 from bpy.types import Operator
 
-from ...core import messages
+from ...core import messages, revision
 from ...core.messages import EffectError
 from ..data import selection, strips
 from ..editing import baked_strips
@@ -15,12 +15,14 @@ from .operator_bases import UNDOABLE, OfEffect, redraw, refused
 from .panel_parts import WithEffect, sentence
 
 TICK = 0.5  # seconds from one look at the job to the next
+STILL = 1.0  # seconds without a change after which it is asked whether a film is stale
 FORMATS = (
     ("MOVIE", "Movie", "H.264, for playing: levels are off by little, and there is no transparency"),
     ("OPEN_EXR", "OpenEXR", "A folder of pictures in full precision, which play more slowly"),
 )
 _running: list[bake_job.BakeJob] = []  # one at most
 _stopped: list[bake_job.BakeJob] = []  # that finish the frame they are at
+_asked: list[int] = []  # revision.number() when that was wanted
 _failures: dict[str, str] = {}  # by the effect's identity: why its last bake failed
 
 
@@ -184,17 +186,23 @@ def _draw_state(layout, scene, effect, strip) -> None:
         sentence(layout, iface_("The baked strip was deleted"), "ERROR")
     elif (is_stale := baked_strips.known_stale(scene, effect, strip)) is None:
         if not bpy.app.timers.is_registered(_ask_whether_stale):  # beside drawing: it reads all of the effect
-            bpy.app.timers.register(_ask_whether_stale, first_interval=TICK)
+            _asked[:] = [revision.number()]
+            bpy.app.timers.register(_ask_whether_stale, first_interval=STILL)
     elif is_stale:
         sentence(layout, iface_("The effect has changed since it was baked"), "ERROR")
     else:
         sentence(layout, iface_("Baked, and up to date"), "CHECKMARK")
 
 
-def _ask_whether_stale() -> None:
+def _ask_whether_stale() -> float | None:
+    """Asks once the edit has been left alone for a moment."""
+    if _asked != [revision.number()]:
+        _asked[:] = [revision.number()]
+        return STILL
     if (active := selection.active(bpy.context)) is not None:
         baked_strips.is_stale(*active)
         redraw(bpy.context)
+    return None
 
 
 classes = SHUTTER_OT_bake, SHUTTER_OT_bake_stop, SHUTTER_OT_unbake

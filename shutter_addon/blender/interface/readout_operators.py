@@ -1,5 +1,7 @@
 """Operators that repair what a rolling shutter has skewed, and find how long its readout is."""
 
+from contextlib import contextmanager
+
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty, FloatProperty
@@ -10,6 +12,18 @@ from ..data import selection
 from ..data.choices import CONTEXT, READOUT_UNITS, READS, SIDES
 from ..editing import rolling_shutter
 from .operator_bases import OfEffect, has_room, refused
+
+
+@contextmanager
+def _waiting(window):
+    """Inside, the pointer shows that it takes some seconds."""
+    if window is not None:
+        window.cursor_modal_set("WAIT")
+    try:
+        yield
+    finally:
+        if window is not None:
+            window.cursor_modal_restore()
 
 
 class _OfReadout(OfEffect):
@@ -96,7 +110,8 @@ class SHUTTER_OT_find_readout(_OfReadout, Operator):
 
     def change(self, context, _effect):
         scene, effect, strip = selection.active(context)
-        found, side = rolling_shutter.find(scene, effect, strip, "TOP" if self.reads == "ROWS" else "LEFT")
+        with _waiting(context.window):
+            found, side = rolling_shutter.find(scene, effect, strip, "TOP" if self.reads == "ROWS" else "LEFT")
         rolling_shutter.repair(scene, effect, strip, min(abs(found.share), 1.0), side)
         name = next(name for word, name, _ in SIDES if word == side)
         percent = round(100 * abs(found.share))

@@ -4,6 +4,7 @@ then."""
 from __future__ import annotations
 
 import glob
+import re
 import secrets
 import subprocess
 import sys
@@ -18,12 +19,13 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.messages import EffectError, signed
-from .baked_film import Film
+from ..data import preferences
+from .baked_film import KINDS, Film
 
 _ZSTD = b"\x28\xb5\x2f\xfd"  # how a compressed file begins
 _READ = 600  # seconds after which a copy has been read
 _ROOT = Path(__file__).parents[3]  # of the extension, or of the checkout
-_FORMATS = {"MOVIE": "movie", "OPEN_EXR": "exr"}  # as the command calls them
+_COPY = re.compile(r"\.bake-[0-9a-f]{8}\.blend")
 
 
 @dataclass
@@ -52,7 +54,7 @@ class BakeJob:
 
     def failure(self) -> str | None:
         """Why it failed, as a sentence, once it is over; None: the film is there."""
-        if self.process.returncode == 0 and self.film.is_finished():
+        if self.film.is_finished():
             return None
         said = [line for line in self._said("err").splitlines() if line.startswith(signed(""))]
         return said[-1].removeprefix(signed("")).strip() if said else rpt_("the bake ended without a word")
@@ -76,21 +78,17 @@ class BakeJob:
 def start(scene: Any, effect: Any, strip: Any, film: Film) -> BakeJob:
     """Begins to bake a film. EffectError, OSError: it cannot be begun."""
     edit = Path(bpy.data.filepath)
-    for left in edit.parent.glob(f"{glob.escape(edit.stem)}.bake-*.blend"):  # by a Blender that was killed
-        with suppress(OSError):
-            if time.time() - left.stat().st_mtime > _READ:
-                left.unlink()
+    _clear_up(edit)
     copy = edit.with_name(f"{edit.stem}.bake-{secrets.token_hex(4)}.blend")  # where the paths in it lead to the same
     try:
         bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, compress=_is_compressed(edit), relative_remap=False)
         log = tempfile.TemporaryDirectory(prefix="virtual_shutter_bake_", ignore_cleanup_errors=True)
-        # Names may begin with a dash.
-        words = ["bake", str(copy), f"--scene={scene.name}", f"--strip={strip.name}", f"--format={_FORMATS[film.kind]}"]
+        words = _words(scene, strip, film)
         with open(Path(log.name, "out"), "wb") as out, open(Path(log.name, "err"), "wb") as err:
             process = subprocess.Popen(
-                [*_command(), *words, "--output", str(film.place.parent)],
+                [*_command(), "bake", str(copy), *words],
                 cwd=_ROOT,
-                stdin=subprocess.DEVNULL,
+                stdin=subprocess.PIPE,  # which ends with this process, and with that the other one
                 stdout=out,
                 stderr=err,
             )
@@ -106,6 +104,21 @@ def start(scene: Any, effect: Any, strip: Any, film: Film) -> BakeJob:
         log=log,
         process=process,
     )
+
+
+def _clear_up(edit: Path) -> None:
+    """Removes copies of an edit that were left behind, by a Blender that was killed before they were read."""
+    for left in edit.parent.glob(f"{glob.escape(edit.stem)}.bake-*.blend"):
+        with suppress(OSError):
+            if _COPY.fullmatch(left.name[len(edit.stem) :]) and time.time() - left.stat().st_mtime > _READ:
+                left.unlink()
+
+
+def _words(scene: Any, strip: Any, film: Film) -> list[str]:
+    """The command's options. Names may begin with a dash."""
+    kind = next(name for name, kind in KINDS.items() if kind == film.kind)
+    names = [f"--scene={scene.name}", f"--strip={strip.name}", f"--format={kind}", f"--output={film.place.parent}"]
+    return [*names, f"--device={preferences.device()}", f"--gpu-memory={preferences.gpu_memory()}", "--attached"]
 
 
 def _is_compressed(edit: Path) -> bool:

@@ -28,6 +28,7 @@ from . import film_output
 
 FOLDER = "virtual_shutter_baked"  # beside the .blend file
 Kind = Literal["MOVIE", "OPEN_EXR"]
+KINDS: dict[str, Kind] = {"movie": "MOVIE", "exr": "OPEN_EXR"}  # as the command calls them
 _CHANNELS = ["R", "G", "B", "A"]
 
 
@@ -112,6 +113,7 @@ def render(scene: Any, effect: Any, strip: Any, film: Film, told: Callable[[int]
     One of FAULTS, OutputError, OSError: it cannot be made. InterruptedRenderError: it was stopped. What is finished
     stays, and the next call goes on from there."""
     if film.kind == "MOVIE" and film.is_finished():
+        _remove_parts(film)
         told(len(film.frames))
         return
     start = round(strips.origin(strip))
@@ -159,16 +161,22 @@ def _make_pictures(film: Film, shown: Callable, size: tuple[int, int], _fps: Fra
 def _make_movie(film: Film, shown: Callable, _size: tuple[int, int], fps: Fraction, told: Callable) -> None:
     done = 0
     for path, frames in film.parts:
-        if not (path.is_file() and is_whole_movie(path, len(frames))):
+        if path.is_file() and is_whole_movie(path, len(frames)):
+            told(done + len(frames))
+        else:
             film_output.prepare(path.parent)
             film_parts.write_part(path, _counted(shown(frames), done, told), fps)
         done += len(frames)
-        told(done)
+    if not film.is_finished():  # by another process, say
+        film_parts.join([path for path, _frames in film.parts], film.place, fps)
+    _remove_parts(film)
+
+
+def _remove_parts(film: Film) -> None:
     parts = [path for path, _frames in film.parts]
-    film_parts.join(parts, film.place, fps)
     with suppress(OSError):
         for path in parts:
-            path.unlink()
+            path.unlink(missing_ok=True)
         parts[0].parent.rmdir()
 
 

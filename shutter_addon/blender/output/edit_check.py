@@ -21,7 +21,7 @@ from ...core.model.mattes import FileFrame
 from ...media import MediaError, cuts
 from ...media.carried_mattes import CarriedMattes
 from ...media.files import check_file
-from ..data import requirements, snapshot, source_media, strips
+from ..data import effect_version, requirements, selection, snapshot, source_media, strips
 from ..rendering import effect_source, job_snapshots
 from ..rendering.render_context import RenderContext
 from ..rendering.render_settings import RenderSettings
@@ -259,3 +259,16 @@ def left_out(scene, frames: range) -> list[str]:
     """Why the sequencer leaves effects out of some of these frames."""
     reasons = [why for shown, why in requirements.left_out(scene) if frame_ranges.common(shown, frames)]
     return list(dict.fromkeys(reasons))
+
+
+def stale_films(scene, frames: range) -> list[str]:
+    """Which baked strips that are shown at some of these frames are not of their effect as it is now."""
+    found = []
+    for shown, _at in requirements.scenes_at(scene, frames):
+        for strip in strips.effect_strips(shown):
+            films = [each for each in selection.of_bake(shown, strip) if each.type in strips.SOURCES]
+            effect = strips.effect_of(shown, strip.scene)
+            is_shown = any(requirements.is_shown(shown, film, frames) for film in films)
+            if effect and is_shown and effect_version.is_changed(shown, effect, strip):
+                found.append(f'"{strip.name}": the effect has changed since it was baked, and its baked strip is shown')
+    return found

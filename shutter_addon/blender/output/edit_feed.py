@@ -34,7 +34,8 @@ class _Film:
     scene: session_uid of the edit; changed: what puts it back
     strip: of the file, by name; None: there is none yet
     file: of levels; None: as above
-    makes_levels: as seen_alone.makes_levels; None: nobody has asked; has_failed: it was not possible"""
+    makes_levels: as seen_alone.makes_levels; None: nobody has asked; has_failed: it was not possible
+    has_begun: whether a frame is rendered"""
 
     scene: int
     changed: ExitStack = field(default_factory=ExitStack)
@@ -42,6 +43,7 @@ class _Film:
     file: LevelsFile | None = None
     makes_levels: bool | None = None
     has_failed: bool = False
+    has_begun: bool = False
 
 
 _films: list[_Film] = []  # one, while it renders
@@ -65,6 +67,9 @@ def before_frame(scene: Any) -> None:
     if not _films or _films[0].scene != scene.session_uid:
         return
     film = _films[0]
+    if not film.has_begun:  # a picture by itself may be saved as floats afterwards
+        film.has_begun = True
+        return
     if film.makes_levels is None or render_job.scripts_act():
         film.makes_levels = seen_alone.makes_levels(scene)
     can_feed = film.makes_levels and not film.has_failed

@@ -15,13 +15,12 @@ from ...core.frames import frame_ranges
 from ...core.messages import signed
 from ...media import image_writing, rendered_pictures
 from ...media.rendered_pictures import RenderedPicture
-from ..data import requirements
+from ..data import requirements, strips
 from ..rendering import render_job
 from . import film_output
 from .film_output import OutputError
 
 AT_ONCE = 1000  # pictures of a strip: Blender copies all that it has for each that is added
-_CHANNELS = 128  # of Blender's sequencer
 _CHANGES = {"look": "None", "exposure": 0.0, "gamma": 1.0, "use_curve_mapping": False, "use_white_balance": False}
 
 
@@ -214,7 +213,7 @@ def _lay_over(scene, paths: list[Path], first: RenderedPicture) -> None:
     editor = scene.sequence_editor
     editor.display_stack(None)  # out of meta strips: Blender renders what was open when the file was saved
     channel = max((strip.channel for strip in editor.strips), default=0) + 1
-    if channel > _CHANNELS:
+    if channel > strips.CHANNELS:
         raise OutputError("the edit has strips in the uppermost channel, where the frames are to lie; move them down")
     editor.channels[channel].mute = False
     space = _keep_colours(scene, paths[0].suffix, first)

@@ -7,17 +7,18 @@ from typing import Any, Self
 
 import numpy as np
 
+from ..data import strips
+
 # Rows of a tile of the file; its columns are a multiple of 16. A TIFF without tiles takes twice the time: Blender reads
 # rows upwards, for which OpenImageIO then allocates 64 MB for each picture.
 _ROWS, _COLUMNS = 64, 16
-_CHANNELS = 128  # of a sequencer
 
 
 def strip_above(editor: Any, path: Path, first: int, stop: int) -> Any:
     """A strip of that file which covers all others from one timeline frame to another. ValueError: there is no channel
     above them."""
     channel = max((strip.channel for strip in editor.strips), default=0) + 1
-    if channel > _CHANNELS:
+    if channel > strips.CHANNELS:
         raise ValueError
     strip = editor.strips.new_image(path.name, str(path), channel, first)
     strip.right_handle, strip.blend_type = stop, "REPLACE"

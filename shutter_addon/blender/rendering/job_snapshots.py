@@ -9,7 +9,6 @@ effect strip skips to) is read on the main thread when it is asked for.
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from typing import Any
 
 import bpy
@@ -20,7 +19,6 @@ from ...core.messages import EffectError
 from ...core.stopping import StoppedError
 from ..data import requirements, snapshot, strips
 from ..data.snapshot import Snapshot
-from ..data.strip_timing import timing_of
 from . import effect_source, invalidation, render_job, render_settings, sessions
 from .render_job import Where
 
@@ -40,24 +38,16 @@ def begin(film: int) -> None:
         if effect.scene.session_uid in _taken:  # of a copied scene: the first counts, as for strips.find_effect
             continue
         try:
-            frames = asked_frames(scene, parts, scene == film_scene)
-            _taken[effect.scene.session_uid] = _of_parts(scene, effect, parts, frames)
+            _taken[effect.scene.session_uid] = [
+                (
+                    range(part.left_handle, part.right_handle),
+                    snapshot.take(scene, effect, part, asked_frames(scene, [part], scene == film_scene)),
+                )
+                for part in parts
+            ]
         except effect_source.FAULTS as error:
             _taken[effect.scene.session_uid] = error
     look(film)
-
-
-def _of_parts(scene: Any, effect: Any, parts: list, frames: set[float]) -> list[tuple[range, Snapshot]]:
-    """The timeline frames and the snapshot of each part of an effect strip: those whose source is cut without its
-    content have one in common. One of effect_source.FAULTS: there is none."""
-    found: list[tuple[range, Snapshot]] = []
-    by_timing: dict[Any, Snapshot] = {}
-    for part in parts:
-        timing = replace(timing_of(strips.source_of(scene, effect, part)), name="", left_handle=0)
-        if timing not in by_timing:
-            by_timing[timing] = snapshot.take(scene, effect, part, frames)
-        found.append((range(part.left_handle, part.right_handle), by_timing[timing]))
-    return found
 
 
 def _part_at(parts: list[tuple[range, Snapshot]], scene_frame: float) -> Snapshot:

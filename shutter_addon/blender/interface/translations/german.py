@@ -1346,6 +1346,7 @@ MESSAGES = {
     ): "Keine Zwischenbilder: Das nächste Bild der Quelle wird gezeigt",
     # Bake
     ("*", "Bake"): "Backen",
+    ("*", "{strip} Baked"): "{strip} gebacken",
     ("Operator", "Bake to Strip"): "Zu Strip backen",
     ("Operator", "Bake Again"): "Neu backen",
     ("Operator", "Stop Baking"): "Backen anhalten",
