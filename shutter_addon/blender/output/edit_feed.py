@@ -3,8 +3,8 @@
 Where an effect is all that is seen of an edit, Blender makes levels of the engine's floats in several passes, and
 blends them over footage that nobody sees: several times the work that it has with a strip of footage. So a strip above
 shows a file of the very levels that Blender would make (core.pixels.shown_levels), from a film's second frame on: a
-picture by itself keeps its floats, as a script may save it as others than the edit's settings say. The edit is as it was once the
-render ends, or a file is saved or loaded meanwhile: from then on the engine renders.
+picture by itself keeps its floats, as a script may save it as others than the edit's settings say. The edit is as it
+was once the render ends, or a file is saved or loaded meanwhile: from then on the engine renders.
 """
 
 import tempfile
