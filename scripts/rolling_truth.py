@@ -16,8 +16,6 @@ when the other camera films all. Needs Blender as a library (bpy).
 
 from __future__ import annotations
 
-import argparse
-import json
 import subprocess
 import sys
 import tempfile
@@ -28,7 +26,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from truth import ROOT, codes, fail, place, read, stage
+from truth import ROOT, codes, fail, labelled, make_folders, parser_of, place, read, saved, stage
 
 from gallery import stills
 from shutter_addon import blender
@@ -146,7 +144,9 @@ def measure(args, folder: Path) -> tuple[list[dict], np.ndarray]:
             }
             rows.append(row)
             print(WORDS.format(**row), flush=True)
-        strips.append(_strip(share, before, own, truth))
+        strips.append(
+            labelled([codes(p) for p in (before, own, truth)], [f"Readout {share} %", "repaired", "all rows at once"])
+        )
     return rows, stills.sheet(*strips)
 
 
@@ -155,26 +155,18 @@ HEAD = """| readout | found | frame | unrepaired, dB | repaired, dB | pole, unre
 WORDS = "| {readout} % | {found} | {frame} | {unrepaired:.1f} | {psnr:.1f} | {skewed:.2f} | {bent:.2f} | {truth:.2f} |"
 
 
-def _strip(share: int, *pictures: np.ndarray) -> np.ndarray:
-    texts = (f"Readout {share} %", "repaired", "all rows at once")
-    shown = [stills.labelled(codes(p) / np.float32(255), text) for p, text in zip(pictures, texts, strict=True)]
-    return stills.beside(*shown)
-
-
 def parse(arguments=None):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__, "rolling_truth", (320, 180), 64)
     add = parser.add_argument
-    add("--output", type=Path, default=ROOT / "out" / "rolling_truth", metavar="DIR", help="for rolling_truth.png")
-    add("--json", type=Path, metavar="FILE", help="where the rows are written")
-    add("--size", type=lambda text: tuple(map(int, text.split("x"))), default=(320, 180), metavar="WIDTHxHEIGHT")
-    add("--samples", type=int, default=64, help="for each pixel of Cycles' pictures")
     add(
         "--readouts",
         type=lambda text: list(map(int, text.split(","))),
         default=[25, 50, 95],
         help="per cent of a frame",
     )
-    return parser.parse_args(arguments)
+    args = parser.parse_args(arguments)
+    make_folders(args, parser)
+    return args
 
 
 def main(arguments=None) -> None:
@@ -183,10 +175,7 @@ def main(arguments=None) -> None:
     print(HEAD)
     with tempfile.TemporaryDirectory() as folder:
         rows, sheet = measure(args, Path(folder))
-    args.output.mkdir(parents=True, exist_ok=True)
-    stills.save(sheet, args.output / "rolling_truth.png")
-    if args.json:
-        args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    saved(args, "rolling_truth", rows, sheet)
 
 
 if __name__ == "__main__":

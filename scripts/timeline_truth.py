@@ -18,7 +18,6 @@ which the length of an evenly lit one comes, once the still rod's is taken off. 
 
 from __future__ import annotations
 
-import argparse
 import json
 import subprocess
 import sys
@@ -30,7 +29,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from truth import ROOT, codes, compare, fail, place, read, stage
+from truth import ROOT, codes, compare, fail, labelled, make_folders, parser_of, place, read, saved, stage
 
 from gallery import stills
 
@@ -132,32 +131,28 @@ def measure(args, folder: Path) -> tuple[list[dict], np.ndarray]:
                 row = {"case": case, "frame": frame, "speed": speed, "picture": way, "length": own, "truth": pixels}
                 rows.append(row | compare(codes(truth), codes(pictures[at])))
                 print(WORDS.format(**rows[-1]), flush=True)
-            strips.append(_strip(f"{case}, frame {frame}", truth, made["timeline"][at], made["bars"][at]))
+            strips.append(
+                labelled(
+                    [codes(p) for p in (truth, made["timeline"][at], made["bars"][at])],
+                    [f"{case}, frame {frame}: Cycles", "Length: Timeline", "Length: Bars"],
+                )
+            )
     return rows, stills.sheet(*strips)
 
 
 WORDS = "| {case} | {frame} | {speed:.2f} | {picture} | {similarity:.4f} | {mean:.2f} | {length:.2f} | {truth:.2f} |"
 
 
-def _strip(text: str, *pictures: np.ndarray) -> np.ndarray:
-    texts = (f"{text}: Cycles", "Length: Timeline", "Length: Bars")
-    shown = [stills.labelled(codes(p) / np.float32(255), text) for p, text in zip(pictures, texts, strict=True)]
-    return stills.beside(*shown)
-
-
 def parse(arguments=None):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__, "timeline_truth", (320, 180), 256)
     add = parser.add_argument
-    add("--output", type=Path, default=ROOT / "out" / "timeline_truth", metavar="DIR", help="for timeline_truth.png")
-    add("--json", type=Path, metavar="FILE", help="where the rows are written")
-    add("--size", type=lambda text: tuple(map(int, text.split("x"))), default=(320, 180), metavar="WIDTHxHEIGHT")
-    add("--samples", type=int, default=256, help="for each pixel of Cycles' exposures")
     add(
         "--frames", type=lambda text: list(map(int, text.split(","))), default=[1, 3, 5], help="of the timeline, from 0"
     )
     args = parser.parse_args(arguments)
     if not all(0 <= frame < TIMELINE for frame in args.frames):
         parser.error(f"--frames: the timeline goes from 0 to {TIMELINE - 1}")
+    make_folders(args, parser)
     return args
 
 
@@ -166,10 +161,7 @@ def main(arguments=None) -> None:
     print("| case | frame | speed | picture | SSIM | mean | length | Cycles' |\n|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         rows, sheet = measure(args, Path(folder))
-    args.output.mkdir(parents=True, exist_ok=True)
-    stills.save(sheet, args.output / "timeline_truth.png")
-    if args.json:
-        args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    saved(args, "timeline_truth", rows, sheet)
 
 
 if __name__ == "__main__":

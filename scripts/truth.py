@@ -24,6 +24,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
@@ -223,7 +224,13 @@ def measure(args, folder: Path) -> tuple[list[dict], np.ndarray]:
 
 
 def side_by_side(case: str, *pictures: np.ndarray) -> np.ndarray:
-    texts = (f"{case}: Cycles", "virtual shutter", f"difference × {AMPLIFIED}", f"noise × {AMPLIFIED}")
+    return labelled(
+        pictures, [f"{case}: Cycles", "virtual shutter", f"difference × {AMPLIFIED}", f"noise × {AMPLIFIED}"]
+    )
+
+
+def labelled(pictures: Sequence[np.ndarray], texts: Sequence[str]) -> np.ndarray:
+    """Pictures of 8-bit sRGB side by side, each with a text."""
     return stills.beside(*(stills.labelled(p / np.float32(255), text) for p, text in zip(pictures, texts, strict=True)))
 
 
@@ -232,9 +239,14 @@ def amplified(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def write(args, rows: list[dict], sheet: np.ndarray) -> None:
-    stills.save(sheet, args.output / "truth.png")
     if args.docs:
         stills.save(stills.scaled(sheet, sheet.shape[1] // 2), ROOT / "docs" / "truth.jpg")
+    saved(args, "truth", rows, sheet)
+
+
+def saved(args, name: str, rows: list[dict], sheet: np.ndarray) -> None:
+    """Writes the sheet of pictures and the rows to where the options of `parser_of` say."""
+    stills.save(sheet, args.output / f"{name}.png")
     if args.json:
         part = args.json.with_name(f".part-{args.json.name}")
         part.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
@@ -246,28 +258,40 @@ def fail(sentence: str) -> None:
     sys.exit(2)
 
 
-def parse(arguments=None):
-    def size(text):
+def parser_of(about: str, name: str, size: tuple[int, int], samples: int) -> argparse.ArgumentParser:
+    """The options that scripts have which measure beside Cycles. name: of the sheet that they write"""
+
+    def size_in(text):
         match = re.fullmatch(r"(\d+)x(\d+)", text)
         if not match or min(map(int, match.groups())) < 16:
             raise argparse.ArgumentTypeError(f"{text!r} is not WIDTHxHEIGHT of 16 or more")
         return tuple(map(int, match.groups()))
 
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     add = parser.add_argument
-    add("--output", type=Path, default=ROOT / "out" / "truth", metavar="DIR", help="where truth.png is written")
+    add("--output", type=Path, default=ROOT / "out" / name, metavar="DIR", help=f"where {name}.png is written")
     add("--json", type=Path, metavar="FILE", help="where the rows are written")
-    add("--size", type=size, default=(640, 360), metavar="WIDTHxHEIGHT")
-    add("--samples", type=int, default=1024, help="for each pixel, of Cycles' picture and of all sub-frames together")
-    add("--docs", action="store_true", help="renew the picture of docs/developers.md, docs/truth.jpg")
-    args = parser.parse_args(arguments)
-    if args.samples < 1 or args.samples % SUBFRAMES:
-        parser.error(f"--samples: {args.samples} is not a multiple of {SUBFRAMES}: each sub-frame has as many")
+    add("--size", type=size_in, default=size, metavar="WIDTHxHEIGHT")
+    add("--samples", type=int, default=samples, help="for each pixel of Cycles' pictures")
+    return parser
+
+
+def make_folders(args, parser: argparse.ArgumentParser) -> None:
+    """Makes the folders that are written to, before anything is measured."""
     try:
         for folder in (args.output, *([args.json.parent] if args.json else [])):
             folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         parser.error(f"{error.filename}: {error.strerror}")
+
+
+def parse(arguments=None):
+    parser = parser_of(__doc__, "truth", (640, 360), 1024)
+    parser.add_argument("--docs", action="store_true", help="renew the picture of docs/developers.md, docs/truth.jpg")
+    args = parser.parse_args(arguments)
+    if args.samples < 1 or args.samples % SUBFRAMES:
+        parser.error(f"--samples: {args.samples} is not a multiple of {SUBFRAMES}: each sub-frame has as many")
+    make_folders(args, parser)
     return args
 
 
