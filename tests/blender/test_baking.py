@@ -213,6 +213,17 @@ def test_the_command_goes_on_where_it_was_broken_off(bpy, film, tmp_path, kind):
     assert pictures[0].stat().st_mtime_ns == kept
 
 
+def test_the_command_bakes_without_tqdm(film, tmp_path):
+    film()
+    script = (
+        "import sys; sys.modules['tqdm'] = None; sys.argv[1:] = "
+        f"['bake', {str(tmp_path / 'edit.blend')!r}, '--strip=Shutter']; import runpy;"
+        " runpy.run_module('shutter_addon', run_name='__main__')"
+    )
+    said = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
+    assert said.returncode == 0, said.stderr
+
+
 def test_parts_of_a_movie_are_kept(film, tmp_path, monkeypatch):
     monkeypatch.setattr(film_parts, "LENGTH", 4)
     scene, effect, strip = film(smooth=True)

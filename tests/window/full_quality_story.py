@@ -25,6 +25,12 @@ def button(operator="shutter.full_quality"):
     return found and ((found[0][0] + found[0][2]) / 2, (found[0][1] + found[0][3]) / 2)
 
 
+def label(operator):
+    """What a note's button says; None: there is none."""
+    found = interface("note_buttons").places.get((story.preview().as_pointer(), operator))
+    return found and found[1].label
+
+
 def clicked():
     yield from driver.until(button, "the button is there")
     region = story.preview()

@@ -42,18 +42,8 @@ def opened():
     yield from story.opened()
     yield from driver.edge_moved(driver.area_of("SEQUENCE_EDITOR", "SEQUENCER"), 0, -296)
     first = write_frames(FILM, [frame(number) for number in range(COUNT)])
-    edit = story.edit()
-    edit.render.resolution_y, edit.render.resolution_x = SIZE
-    source = edit.sequence_editor.strips.new_image("Film", str(first), 1, 1)
-    for path in sorted(first.parent.iterdir())[1:]:
-        source.elements.append(path.name)
-    edit.sequence_editor.active_strip = source
-    edit.frame_end = COUNT
-    bpy.ops.wm.save_as_mainfile(filepath=str(driver.OUT / "film.blend"))
-    with driver.override("SEQUENCER"):
-        bpy.ops.shutter.add_effect("INVOKE_DEFAULT", True)
-    yield 1.0
-    edit.frame_set(SHOWN)
+    yield from story.pictures_added(first, SIZE)
+    story.edit().frame_set(SHOWN)
     for bar in story.effect().shutters[0].bars[1:]:  # a still frame
         bar.weight = 0.0
     bpy.ops.ed.undo_push(message="Start")
@@ -63,8 +53,7 @@ def opened():
 
 
 def label():
-    found = look.interface("note_buttons").places.get((story.preview().as_pointer(), BUTTON))
-    return found and found[1].label
+    return look.label(BUTTON)
 
 
 def readout():

@@ -70,6 +70,21 @@ def seen(name):
     driver.saw(step=name, facts=facts(), crop=crop(), frame=edit().frame_current)
 
 
+def pictures_added(first, size):
+    """A strip of all pictures beside the first, height and width in pixels, under a new effect, in a saved edit."""
+    scene, paths = edit(), sorted(first.parent.iterdir())
+    scene.render.resolution_y, scene.render.resolution_x = size
+    source = scene.sequence_editor.strips.new_image("Film", str(first), 1, 1)
+    for path in paths[1:]:
+        source.elements.append(path.name)
+    scene.sequence_editor.active_strip = source
+    scene.frame_end = len(paths)
+    bpy.ops.wm.save_as_mainfile(filepath=str(driver.OUT / "film.blend"))
+    with driver.override("SEQUENCER"):
+        bpy.ops.shutter.add_effect("INVOKE_DEFAULT", True)
+    yield 1.0
+
+
 def opened():
     yield from driver.video_editing_opened()
     scene = bpy.data.scenes[0]

@@ -35,18 +35,8 @@ def frame(number):
 def opened():
     yield from story.opened()
     first = write_frames(FILM, [frame(number) for number in range(COUNT)])
-    edit = story.edit()
-    edit.render.resolution_y, edit.render.resolution_x = SIZE
-    source = edit.sequence_editor.strips.new_image("Film", str(first), 1, 1)
-    for path in sorted(first.parent.iterdir())[1:]:
-        source.elements.append(path.name)
-    edit.sequence_editor.active_strip = source
-    edit.frame_end = COUNT
-    bpy.ops.wm.save_as_mainfile(filepath=str(driver.OUT / "film.blend"))
-    with driver.override("SEQUENCER"):
-        bpy.ops.shutter.add_effect("INVOKE_DEFAULT", True)
-    yield 1.0
-    edit.frame_set(3)
+    yield from story.pictures_added(first, SIZE)
+    story.edit().frame_set(3)
     bpy.ops.ed.undo_push(message="Start")
     with driver.override("PREVIEW"):
         bpy.ops.sequencer.view_all_preview()
@@ -54,8 +44,7 @@ def opened():
 
 
 def label():
-    found = look.interface("note_buttons").places.get((story.preview().as_pointer(), BUTTON))
-    return found and found[1].label
+    return look.label(BUTTON)
 
 
 def note():

@@ -307,11 +307,11 @@ def in_words(error: Exception, place: Path | str) -> str:
 
 @contextmanager
 def progress(count: int, unit: str):
-    """A progress bar on a terminal; gives what moves it on by one."""
+    """A progress bar on a terminal; gives what moves it on by one, or by as many as it is told."""
     try:
         from tqdm import tqdm
     except ImportError:  # a Blender that the extension was copied into without its wheels
-        yield lambda: None
+        yield lambda _count=1: None
         return
     with tqdm(total=count, unit=unit, disable=None) as bar:
         yield bar.update
