@@ -6,12 +6,11 @@ these are too near to where a level ends; the few such pixels, one in some hundr
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ..core.pixels.shown_levels import Display
 from ..devices.device import Device, Texture
+from ..devices.named_textures import NamedTextures
 from ..devices.passes import read_pass
 
 _OCTAVES, _LOWEST = 10, -9  # from here on, to 2; below, the display is linear
@@ -33,14 +32,14 @@ class Displaying:
 
     def __init__(self, device: Device):
         self._device = device
-        self._textures: dict[str, Texture] = {}
-        self._written: dict[str, Any] = {}  # by texture: the display that it is of
+        self._textures = NamedTextures(device)
+        self._written: dict[str, tuple[Display, Texture]] = {}  # by name: what is of which display
         self._slope = 0.0
 
     def levels(self, picture: Texture, display: Display) -> np.ndarray:
         """The levels (H, W, 4) uint8 of an opaque picture of GPUCompositor.draw, top row first."""
         width, height, _ = picture.size
-        noise, levels = display.noise(width, height), self._texture("levels", width, height, "rgba8")
+        noise, levels = display.noise(width, height), self._textures.of("levels", (width, height, 1), "rgba8")
         images = {"picture": picture, "levels": levels}
         images["grain"] = self._sent("grain", display, noise[..., None], "r32f")
         images["curve"] = self._sent("curve", display, None, "rgba32f")
@@ -66,7 +65,8 @@ class Displaying:
             rows = -(-len(part) // columns)
             numbers = np.zeros((rows, columns, 1), np.uint32)
             numbers.ravel()[: len(part)] = part
-            sent, picked = self._texture("places", *_AT_ONCE, "r32ui"), self._texture("picked", *_AT_ONCE, "rgba32f")
+            sent = self._textures.of("places", (*_AT_ONCE, 1), "r32ui")
+            picked = self._textures.of("picked", (*_AT_ONCE, 1), "rgba32f")
             self._device.write(sent, numbers)
             images, size = {"picture": picture, "places": sent, "picked": picked}, (columns, rows)
             self._device.run(PICK, size, images=images, size=size, width=picture.size[0])
@@ -76,30 +76,19 @@ class Displaying:
     def _sent(self, name: str, display: Display, values: np.ndarray | None, kind: str) -> Texture:
         """The noise or the curve of a display, which is sent once."""
         width, height = (_PIECES, 1) if values is None else values.shape[1::-1]
-        texture, size = self._texture(name, width, height, kind), (width, height)
-        if self._written.get(name) != (display, size):
+        texture = self._textures.of(name, (width, height, 1), kind)
+        if self._written.get(name) != (display, texture):
             if values is None:
                 values = _curve(display)
                 # Below, OpenColorIO's slope, which is no 12.92.
                 self._slope = 255 * float(display.transfer(np.array([2.0**_LOWEST], np.float32))[0]) / 2.0**_LOWEST
             self._device.write(texture, np.ascontiguousarray(values))
-            self._written[name] = display, size
-        return texture
-
-    def _texture(self, name: str, width: int, height: int, kind: str) -> Texture:
-        texture = self._textures.get(name)
-        if texture is None or texture.size != (width, height, 1):
-            if texture is not None:
-                texture.release()
-            texture = self._textures[name] = self._device.texture(width, height, 1, kind)
-            self._written.pop(name, None)
+            self._written[name] = display, texture
         return texture
 
     def release(self) -> None:
         """Frees what it has on the device, inside Device.freeing."""
-        for texture in self._textures.values():
-            texture.release()
-        self._textures.clear()
+        self._textures.release()
         self._written.clear()
 
 

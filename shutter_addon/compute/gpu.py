@@ -15,6 +15,7 @@ from ..core.pixels import compositor
 from ..core.pixels.shown_levels import Display
 from ..devices.device import Device, NoDeviceError, Texture
 from ..devices.llvmpipe import MOST_ITERATIONS
+from ..devices.named_textures import NamedTextures
 from ..devices.passes import Pass
 from . import cpu
 from .composition_passes import (
@@ -192,7 +193,7 @@ class GPUCompositor:
     def __init__(self, device: Device):
         self.name = device.name
         self.device = device
-        self._textures: dict[str, Texture] = {}
+        self._textures = NamedTextures(device)
         self._displaying = Displaying(device)
 
     @property
@@ -257,7 +258,7 @@ class GPUCompositor:
     def over_black(self, drawn: Texture) -> np.ndarray:
         """A scene-linear picture of `draw` as Renderer.picture has it of levels."""
         size = drawn.size[:2]
-        texture = self._texture("levels", *size, 1, "rgba8")
+        texture = self._textures.of("levels", (*size, 1), "rgba8")
         self.device.run(LEVELS, size, images={"picture": drawn, "levels": texture}, size=size)
         return self.device.read(texture)[0]
 
@@ -337,8 +338,8 @@ class GPUCompositor:
         groups, (width, height, _) = -(-len(chosen) // 4), handle.size
         numbers = np.full((groups, 4), -1, np.float32)
         numbers.flat[: len(chosen)] = chosen
-        selected = self._texture("selected", width, height, groups, "rgba32f")
-        share = self._texture("share", width, height, 1, "r32f")
+        selected = self._textures.of("selected", (width, height, groups), "rgba32f")
+        share = self._textures.of("share", (width, height, 1), "r32f")
         images = {"coefficients": handle, "selected": selected, "share": share}
         given: dict[str, Any] = {"size": (width, height), "count": len(chosen), "blocks": {"chosen": numbers}}
         self.device.run(selection(groups, count), (width, height), images=images, **given)
@@ -396,7 +397,7 @@ class GPUCompositor:
             images["moves"] = self._filled("moves", moves[None], "rgba32f")
             images["summed"] = images.get("picture")
             sums = sums[::-1]
-            images["picture"] = self._texture(sums[0], width, height, 1, "rgba32f") if after else picture
+            images["picture"] = self._textures.of(sums[0], (width, height, 1), "rgba32f") if after else picture
             # What has more to do for a pixel takes long to compile for many.
             moved = Moved(
                 quads=1 if before or after else quads,
@@ -414,25 +415,15 @@ class GPUCompositor:
             self.device.run(program, extent, textures={**images, "frames": stack}, images=images, **given)
         return picture
 
-    def _texture(self, name: str, width: int, height: int, layers: int, kind: str) -> Texture:
-        texture = self._textures.get(name)
-        if texture is None or texture.size != (width, height, layers):
-            if texture is not None:
-                texture.release()
-            texture = self._textures[name] = self.device.texture(width, height, layers, kind)
-        return texture
-
     def _filled(self, name: str, values: np.ndarray, kind: str) -> Texture:
         layers, height, width, _ = values.shape
-        texture = self._texture(name, width, height, layers, kind)
+        texture = self._textures.of(name, (width, height, layers), kind)
         for layer in range(layers):
             self.device.write(texture, np.ascontiguousarray(values[layer]), layer)
         return texture
 
     def release(self) -> None:
         with self.device.freeing():
-            for texture in self._textures.values():
-                texture.release()
-            self._textures.clear()
+            self._textures.release()
             self._displaying.release()
         self.device.release()

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..devices.device import Device, Texture
+from ..devices.named_textures import NamedTextures
 from ..devices.passes import Pass, read_pass
 
 # Pixels along a side of the blocks whose least share is looked at.
@@ -53,12 +54,12 @@ class Laying:
 
     def __init__(self, device: Device):
         self._device = device
-        self._textures: dict[str, Texture] = {}
+        self._textures = NamedTextures(device)
 
     def least(self, exposed: Exposure) -> np.ndarray:
         """The least share (h, w) in blocks of BLOCK × BLOCK pixels, bottom row first."""
         width, height, _ = exposed.share.size
-        least = self._texture("least", -(-width // BLOCK), -(-height // BLOCK), "r32f")
+        least = self._textures.of("least", (-(-width // BLOCK), -(-height // BLOCK), 1), "r32f")
         images = {"clear": exposed.share, "least": least}
         self._device.run(LEAST, least.size[:2], images=images, size=(width, height))
         return self._device.read(least)[0, ..., 0]
@@ -75,7 +76,7 @@ class Laying:
     def plate(self, picture: np.ndarray) -> Texture:
         """A picture (H, W, 4) float32 for Behind.plate."""
         height, width, _ = picture.shape
-        plate = self._texture("plate", width, height, "rgba32f")
+        plate = self._textures.of("plate", (width, height, 1), "rgba32f")
         self._device.write(plate, np.ascontiguousarray(picture[::-1], np.float32))
         return plate
 
@@ -86,7 +87,7 @@ class Laying:
         for k, layer in enumerate(layers):
             ends = k == len(layers) - 1
             name = ("levels" if levels else "picture") if ends else f"part {k % 2}"
-            picture = self._texture(name, width, height, "rgba8" if levels and ends else "rgba32f")
+            picture = self._textures.of(name, (width, height, 1), "rgba8" if levels and ends else "rgba32f")
             program = laying_pass(
                 begins=not k,
                 ends=ends,
@@ -102,15 +103,5 @@ class Laying:
             under = picture
         return under
 
-    def _texture(self, name: str, width: int, height: int, kind: str) -> Texture:
-        texture = self._textures.get(name)
-        if texture is None or texture.size != (width, height, 1):
-            if texture is not None:
-                texture.release()
-            texture = self._textures[name] = self._device.texture(width, height, 1, kind)
-        return texture
-
     def release(self) -> None:
-        for texture in self._textures.values():
-            texture.release()
-        self._textures.clear()
+        self._textures.release()

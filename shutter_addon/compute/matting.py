@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core.model.mattes import Matte
 from ..devices.device import Device, Texture
+from ..devices.named_textures import NamedTextures
 from ..devices.passes import Pass, read_pass
 
 # Mattes that one pass lays, whose values are on the device at once.
@@ -24,8 +25,9 @@ class Matting:
 
     def __init__(self, device: Device):
         self._device = device
-        self._textures: dict[str, Texture] = {}
-        self._held: dict[int, Hashable] = {}  # by layer: the key of the values in it
+        self._textures = NamedTextures(device)
+        self._values: Texture | None = None
+        self._held: dict[int, Hashable] = {}  # by layer of that: the key of the values in it
 
     def lay(
         self, beneath: Texture, mattes: tuple[Matte, ...], layers: Sequence[tuple[Hashable, np.ndarray]]
@@ -35,7 +37,9 @@ class Matting:
         beneath: coefficients, a texture of a solver or of GPUCompositor.constant
         layers: of each matte a key, and its values (h, w) float32 (core.model.mattes.MatteReader.values)"""
         height, width = layers[0][1].shape
-        values = self._texture("values", (width, height, min(len(mattes), MOST)), "r32f")
+        values = self._textures.of("values", (width, height, min(len(mattes), MOST)), "r32f")
+        if values is not self._values:
+            self._values, self._held = values, {}
         ends = ["even", "odd"]
         laid = list(zip(mattes, layers, strict=True))
         for start in range(0, len(laid), MOST):
@@ -46,7 +50,7 @@ class Matting:
                 if self._held.get(layer) != key:
                     self._device.write(values, np.ascontiguousarray(array[..., None]), layer)
                     self._held[layer] = key
-            over = self._texture(ends[0], (width, height, beneath.size[2]), "rgba32f")
+            over = self._textures.of(ends[0], (width, height, beneath.size[2]), "rgba32f")
             self._device.run(
                 blend_pass(len(some), any(matte.blend == "add" for matte, _ in some)),
                 over.size,
@@ -58,18 +62,6 @@ class Matting:
             beneath, ends = over, ends[::-1]
         return beneath
 
-    def _texture(self, name: str, size: tuple[int, int, int], kind: str) -> Texture:
-        texture = self._textures.get(name)
-        if texture is None or texture.size != size:
-            if texture is not None:
-                texture.release()
-            self._textures[name] = texture = self._device.texture(*size, kind)
-            if name == "values":
-                self._held.clear()
-        return texture
-
     def release(self) -> None:
-        for texture in self._textures.values():
-            texture.release()
-        self._textures.clear()
-        self._held.clear()
+        self._textures.release()
+        self._values = None

@@ -1,0 +1,28 @@
+"""Textures that are kept from picture to picture, by name."""
+
+from __future__ import annotations
+
+from .device import Device, Texture
+
+
+class NamedTextures:
+    """Textures of a device, each made anew where another size is asked for."""
+
+    def __init__(self, device: Device):
+        self._device = device
+        self._kept: dict[str, Texture] = {}
+
+    def of(self, name: str, size: tuple[int, int, int], kind: str) -> Texture:
+        """The texture of a name, whose kind is always the same; size: width, height, layers."""
+        texture = self._kept.get(name)
+        if texture is None or texture.size != size:
+            if texture is not None:
+                texture.release()
+            texture = self._kept[name] = self._device.texture(*size, kind)
+        return texture
+
+    def release(self) -> None:
+        """Frees them, inside Device.freeing."""
+        for texture in self._kept.values():
+            texture.release()
+        self._kept.clear()
