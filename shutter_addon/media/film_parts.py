@@ -28,9 +28,9 @@ def missing_package() -> str | None:
     return None
 
 
-def write_part(path: Path, pictures: Iterable[np.ndarray], fps: Fraction) -> int:
-    """Writes pictures, levels (H, W, 3 or 4) uint8 without alpha, as H.264; how many there were. MediaError: they
-    cannot be written. What `pictures` raises goes through, and nothing is written."""
+def write_part(path: Path, pictures: Iterable[np.ndarray], fps: Fraction) -> None:
+    """Writes pictures, levels (H, W, 3 or 4) uint8 without alpha, as H.264. MediaError: they cannot be
+    written. What `pictures` raises goes through, and nothing is written."""
     import av
 
     count = 0
@@ -49,7 +49,6 @@ def write_part(path: Path, pictures: Iterable[np.ndarray], fps: Fraction) -> int
                 raise MediaError(f"{path}: could not be written whole")
     except (OSError, ValueError, av.error.FFmpegError) as error:
         raise _unwritten(path, error) from None
-    return count
 
 
 def _stream(container: Any, shape: Sequence[int], fps: Fraction) -> Any:

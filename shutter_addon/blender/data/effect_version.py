@@ -5,9 +5,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, is_dataclass
-from functools import partial
 from numbers import Number
 from pathlib import Path
 from typing import Any
@@ -15,12 +13,10 @@ from typing import Any
 import numpy as np
 
 from ...core.messages import UserError
-from ...media import MediaError, inbetween_cache
+from ...media import MediaError
 from ...media.sequence import ImageFiles
 from . import colour_configuration, fcurves, geometry, snapshot, strips, versions
 
-_READERS = 16  # threads
-_FEW, _BLOCKS = 256, 1 << 16  # of more files than these, blocks are read, where they have more bytes
 # Fields that hold timeline frames: they count from the effect strip's origin. In mappings the keys are frames, in
 # sequences of pairs the first of each.
 _FRAMES = {
@@ -129,7 +125,7 @@ class _Digest:
             self._feed(value.dtype.str, value.shape)
             self._hash.update(np.ascontiguousarray(value).tobytes())
         elif isinstance(value, Path):
-            self._feed(_content(value, inbetween_cache.WHOLE))
+            self._add_all([value])
         elif is_dataclass(value):
             self._add_fields(value)
         elif isinstance(value, Mapping):
@@ -145,9 +141,9 @@ class _Digest:
         values = list(values)
         self._feed(len(values))
         if values and all(isinstance(value, Path) for value in values):
-            whole = inbetween_cache.WHOLE if len(values) <= _FEW else _BLOCKS
-            with ThreadPoolExecutor(_READERS) as pool:
-                values = list(pool.map(partial(_content, whole=whole), values))
+            values = [
+                digest or f"missing: {path.name}" for path, digest in zip(values, versions.digests(values), strict=True)
+            ]
         for value in values:
             self.add(value)
 
@@ -197,10 +193,3 @@ def _files(path: Path, files: Sequence | None) -> list[Path]:
         return ImageFiles(path).files
     except MediaError:  # it is a movie, or whoever reads it is told
         return [path]
-
-
-def _content(path: Path, whole: int) -> str:
-    try:
-        return inbetween_cache.content_digest(path, whole).hex()
-    except MediaError as error:
-        return f"missing: {error}"

@@ -78,13 +78,18 @@ def _files_of(strip) -> list[Path]:
 def _footage(files: list[Path]) -> Footage:
     """The digest of files: of an image sequence's, in order."""
     files = [path for path, _ in groupby(files)]  # a still that is held is one file
-    whole = inbetween_cache.WHOLE if len(files) <= _FEW else _BLOCKS
     content, missing = hashlib.sha256(), ""
-    with ThreadPoolExecutor(_READERS) as pool:
-        for path, digest in zip(files, pool.map(partial(_digest, whole=whole), files), strict=True):
-            missing = missing or ("" if digest else path.name)
-            content.update(digest or b"missing: " + os.fsencode(path.name))
+    for path, digest in zip(files, digests(files), strict=True):
+        missing = missing or ("" if digest else path.name)
+        content.update(digest or b"missing: " + os.fsencode(path.name))
     return Footage(name=files[0].name, files=len(files), content=content.hexdigest(), missing=missing)
+
+
+def digests(files: list[Path]) -> list[bytes | None]:
+    """Digests of the contents of files that are read together; None for one that is missing, or cannot be read."""
+    whole = inbetween_cache.WHOLE if len(files) <= _FEW else _BLOCKS
+    with ThreadPoolExecutor(_READERS) as pool:
+        return list(pool.map(partial(_digest, whole=whole), files))
 
 
 def _digest(path: Path, whole: int) -> bytes | None:
