@@ -1,6 +1,6 @@
 """Random operators of an editor in a hurry: nothing of an effect that is gone stays, and pictures stay right. Run
 inside Blender, by test_random.py. SHUTTER_FOOTAGE has the source, SHUTTER_RECIPE the effect, SHUTTER_SEED and
-SHUTTER_STEPS say which operators and how many."""
+SHUTTER_STEPS say which operators and how many, SHUTTER_HIDDEN the Python packages that this Blender shall lack."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folders)
 import os
@@ -8,6 +8,7 @@ import random
 import sys
 from pathlib import Path
 
+sys.modules |= dict.fromkeys(os.environ.get("SHUTTER_HIDDEN", "").split())  # None: there is no such module
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
 
 import addon_utils

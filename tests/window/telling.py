@@ -18,6 +18,8 @@ WINDOW = os.environ.get("BLENDER_WINDOW", "")
 # Even numbers of pixels around the picture, so that its pixels fall on the screen's.
 SCREEN = "1600x1001x24"
 
+NO_NETWORK = ("unshare", "--net")  # not even this machine's own
+
 needs_window = pytest.mark.skipif(
     not WINDOW, reason="NO WINDOW: set BLENDER_WINDOW to the command that runs a script in a Blender with a window"
 )
@@ -31,9 +33,20 @@ def linked(folder):
     return folder
 
 
-def tell(story, backend, folder, **given):
+def installed(folder, zip_file, blender):
+    """The folder, whose Blender has the extension from a zip; blender: the command that runs it, as a list."""
+    user = folder / "user"
+    user.mkdir()
+    install = ("--command", "extension", "install-file", "-r", "user_default", "-e", zip_file)
+    environment = os.environ | {"BLENDER_USER_RESOURCES": str(user)}
+    subprocess.run([*NO_NETWORK, *blender, *install], env=environment, check=True, capture_output=True)
+    return folder
+
+
+def tell(story, backend, folder, *, before=(), **given):
     """Runs a story in Blender's window, with user folders of its own in `folder`; what it noted, and what Blender said
-    on the console. given: what the story finds in its environment as SHUTTER_NAME."""
+    on the console. before: what its command stands behind, as NO_NETWORK; given: what the story finds in its
+    environment as SHUTTER_NAME."""
     environment = {
         "BACKEND": backend,
         "SCREEN": SCREEN,
@@ -43,7 +56,7 @@ def tell(story, backend, folder, **given):
         "BLENDER_USER_RESOURCES": str(folder / "user"),
     } | {f"SHUTTER_{name.upper()}": str(value) for name, value in given.items()}
     done = subprocess.run(
-        [*shlex.split(WINDOW), str(Path(__file__).with_name(story))],
+        [*before, *shlex.split(WINDOW), str(Path(__file__).with_name(story))],
         env=os.environ | environment,
         capture_output=True,
         text=True,

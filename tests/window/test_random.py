@@ -8,13 +8,15 @@ import sys
 import numpy as np
 import OpenImageIO
 import pytest
-from telling import ROOT, linked, needs_window, tell
+from telling import NO_NETWORK, ROOT, installed, linked, needs_window, tell
 
 pytestmark = needs_window
 
 SEEDS = os.environ.get("SHUTTER_SEEDS", "1").split(",")
 STEPS = os.environ.get("SHUTTER_STEPS", "40")
 COUNT, TOLERANCE = 30, 1
+# What a distribution's Blender has for its own Python, and an official one has not.
+PACKAGES = "av cv2 glcontext moderngl scenedetect tqdm"
 
 
 def pixels(path):
@@ -53,5 +55,26 @@ def assert_right(seen, footage, folder):
 def test_random_operators(seed, backend, footage, tmp_path):
     given = {"footage": footage / "frames" / "0001.png", "recipe": footage / "recipe.json"}
     seen, console = tell("random_story.py", backend, linked(tmp_path), **given, seed=seed, steps=STEPS)
+    assert "Traceback" not in console
+    assert_right(seen, footage, tmp_path)
+
+
+@pytest.fixture(scope="module")
+def zips(tmp_path_factory, blenders_python):
+    """The zips for the Blender that is there: their folder."""
+    folder = tmp_path_factory.mktemp("zips")
+    build = [sys.executable, ROOT / "scripts" / "build.py", "--output", folder]
+    subprocess.run([*build, "--python", blenders_python, "--system", "linux-x64"], check=True, capture_output=True)
+    return folder
+
+
+@pytest.mark.parametrize(("kind", "hidden"), [("linux_x64", ""), ("no_wheels", PACKAGES)])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_random_operators_of_a_zip(seed, kind, hidden, zips, footage, real_blender, tmp_path):
+    """Installed in a Blender that has never seen the extension, without a network."""
+    (path,) = zips.glob(f"*{kind}.zip")
+    given = {"footage": footage / "frames" / "0001.png", "recipe": footage / "recipe.json", "hidden": hidden}
+    folder = installed(tmp_path, path, real_blender)
+    seen, console = tell("random_story.py", "opengl", folder, before=NO_NETWORK, **given, seed=seed, steps=STEPS)
     assert "Traceback" not in console
     assert_right(seen, footage, tmp_path)
