@@ -166,7 +166,7 @@ def _add_region(scene, effect, strip, source: recipe.Region, color: Sequence[flo
     region.name, region.shutter, region.width = source.name, source.shutter, source.width
     region.kind, region.is_layer = source.kind.upper(), source.layer
     region.layer = _draw(effect, strip, source, color, first)
-    path = region.path_from_id()
+    path = _last_path(effect)
     _set_number(scene, region, path, "opacity", source.opacity, first)
     _set_moves(scene, region, path, source.keys, first)
 
@@ -175,7 +175,7 @@ def _add_outline(scene, effect, strip, source: recipe.OutlineRegion, color: Sequ
     region = _new_matte(effect, source)
     region.between = source.between.upper()
     region.layer = _draw(effect, strip, source, color, first)
-    _set_numbers(scene, region, source, first)
+    _set_numbers(scene, effect, source, first)
 
 
 def _add_matte(scene, effect, strip, source: recipe.MatteRegion | recipe.RampRegion, images, first: float) -> None:
@@ -190,7 +190,7 @@ def _add_matte(scene, effect, strip, source: recipe.MatteRegion | recipe.RampReg
         is_named = source.channel not in recipe.CHANNELS
         region.channel = "NAMED" if is_named else source.channel.upper()
         region.channel_name = source.channel if is_named else ""
-    _set_numbers(scene, region, source, first)
+    _set_numbers(scene, effect, source, first)
 
 
 def _new_matte(effect, source: recipe.OutlineRegion | recipe.MatteRegion | recipe.RampRegion):
@@ -200,9 +200,14 @@ def _new_matte(effect, source: recipe.OutlineRegion | recipe.MatteRegion | recip
     return region
 
 
-def _set_numbers(scene, region, source, first: float) -> None:
-    """Numbers of a matte, and their keys."""
-    path = region.path_from_id()
+def _last_path(effect) -> str:
+    """The path of the region that was added last. Blender takes long to find an item's place among many."""
+    return f"{effect.path_from_id()}.regions[{len(effect.regions) - 1}]"
+
+
+def _set_numbers(scene, effect, source, first: float) -> None:
+    """Numbers of the matte that was added last, and their keys."""
+    region, path = effect.regions[-1], _last_path(effect)
     _set_number(scene, region, path, "opacity", source.opacity, first)
     _set_number(scene, region, path, "feather", source.width, first)
     _set_moves(scene, region, path, source.keys, first)
