@@ -8,7 +8,7 @@ from typing import get_args, get_type_hints
 import bpy
 
 from shutter_addon.blender.data import data_format, fcurves, properties
-from shutter_addon.core.recipes import recipe
+from shutter_addon.core.recipes import recipe, recipe_file
 
 PREFIX = "virtual_shutter"
 OWNERS = {"Strip": bpy.types.Strip, "Annotation": bpy.types.Annotation}  # beside scenes; IDs' own are in both
@@ -53,7 +53,7 @@ def names() -> dict:
     hints = {cls.__name__: get_type_hints(cls) for cls in parts}
     return {
         "format": data_format.FORMAT,
-        "recipe": max(get_args(hints["Recipe"]["version"])),
+        "recipe": recipe_file.VERSION,
         "properties": classes | owned,
         "fields": {
             name: {field: sorted(set(map(str, _words(kind)))) for field, kind in fields.items()}
